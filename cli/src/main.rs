@@ -1,0 +1,3 @@
+//! The program `taut`.
+
+fn main() {}

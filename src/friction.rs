@@ -1,0 +1,78 @@
+//! The friction laws: what resists a body that slides, and how much a body at rest can hold.
+
+/// Viscous and Coulomb friction with breakaway, each side of zero speed with its own values.
+///
+/// Sliding forward: F_f = b v + F_c, sliding backward: F_f = b v − F_c (eq. 15); at rest: whatever
+/// holds the body, up to the breakaway. Units: for a cart N s/m and N, for a pulley N m s and N m.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Friction {
+    /// While moving in the positive direction.
+    pub forward: Side,
+    /// While moving in the negative direction; its values are positive, too.
+    pub backward: Side,
+}
+
+/// Friction in one direction.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Side {
+    /// Viscous coefficient b (cart, N s/m) or B (pulley, N m s), eq. (1)-(3).
+    pub viscous: f64,
+    /// Coulomb force F_c (N) or torque τ_c (N m), eq. (15).
+    pub coulomb: f64,
+    /// What a body at rest holds before it starts to slide this way; at least `coulomb`.
+    pub breakaway: f64,
+}
+
+impl Friction {
+    /// The same in both directions, breakaway equal to Coulomb: the paper's law, eq. (15).
+    pub fn symmetric(viscous: f64, coulomb: f64) -> Self {
+        let side = Side { viscous, coulomb, breakaway: coulomb };
+        Self { forward: side, backward: side }
+    }
+
+    /// The same in both directions with a higher breakaway.
+    pub fn with_breakaway(viscous: f64, coulomb: f64, breakaway: f64) -> Self {
+        let side = Side { viscous, coulomb, breakaway };
+        Self { forward: side, backward: side }
+    }
+
+    /// Whether it is b v and no more, so that nothing ever sticks and the direction makes no difference.
+    pub fn is_linear(&self) -> bool {
+        self.forward == self.backward && self.forward.breakaway == 0.0 && self.forward.coulomb == 0.0
+    }
+}
+
+/// What a body is doing, as far as friction is concerned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Motion {
+    /// Sliding in the negative direction.
+    Backward,
+    /// At rest, held by friction.
+    Stuck,
+    /// Sliding in the positive direction.
+    Forward,
+    /// Without dry friction: nothing to distinguish.
+    Free,
+}
+
+impl Motion {
+    /// As in the result files: −1 backward, 0 stuck, 1 forward, 2 free.
+    pub fn code(self) -> i8 {
+        match self {
+            Motion::Backward => -1,
+            Motion::Stuck => 0,
+            Motion::Forward => 1,
+            Motion::Free => 2,
+        }
+    }
+
+    /// The word for it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Motion::Backward => "backward",
+            Motion::Stuck => "stuck",
+            Motion::Forward => "forward",
+            Motion::Free => "free",
+        }
+    }
+}

@@ -1,0 +1,11 @@
+//! Belt-driven axes: described in a file, simulated exactly.
+
+pub mod case;
+pub mod error;
+pub mod friction;
+pub mod signal;
+pub mod solve;
+pub mod stage;
+pub mod trajectory;
+
+pub use error::{Error, Result};
