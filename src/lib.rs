@@ -3,6 +3,7 @@
 pub mod case;
 pub mod error;
 pub mod friction;
+pub mod log;
 pub mod signal;
 pub mod solve;
 pub mod stage;
