@@ -283,21 +283,27 @@ impl Plant {
     }
 
     /// Friction force (N) or torque (N m) on a body: what its law gives while it slides, what holds it while it is stuck.
-    pub fn friction_value(&self, body: Body, motion: Motion, state: &State, input: f64) -> f64 {
+    ///
+    /// `load` is all else that acts on the body: the least and the most of it, which differ only where a gear with losses
+    /// holds a share of its own.
+    pub fn friction_value(&self, body: Body, motion: Motion, speed: f64, load: (f64, f64)) -> f64 {
         let law = self.friction(body);
-        let speed = state[body.speed_place()];
         match motion {
             // F_f = b v ± F_c                                                   (15)
             Motion::Free => law.forward.viscous * speed,
             Motion::Forward => law.forward.viscous * speed + law.forward.coulomb,
             Motion::Backward => law.backward.viscous * speed - law.backward.coulomb,
-            Motion::Stuck => {
-                // A gear with losses holds its share; what it cannot hold, friction does.
-                let pull = |forward, positive| self.load(body, forward, positive).value(self, state, input);
-                let positive = self.current.value(self, state, input) >= 0.0;
-                let (low, high) = (pull(true, positive), pull(false, positive));
-                0.0_f64.clamp(low.min(high), high.max(low)).clamp(-law.backward.breakaway, law.forward.breakaway)
-            }
+            // The gear holds what it can, friction the rest.
+            Motion::Stuck => 0.0_f64.clamp(load.0, load.1.max(load.0)),
         }
+    }
+
+    /// The least and the most torque that motor and gear put on a stuck drive pulley at this current, N m.
+    pub fn holding_torque(&self, current: f64) -> (f64, f64) {
+        let motor = &self.stage.motor;
+        let torque = motor.gear_ratio * motor.torque_constant * current;
+        // n η K_t i if it drives, n K_t i / η if it is driven back
+        let (passed, held) = (torque * motor.gear_efficiency, torque / motor.gear_efficiency);
+        (passed.min(held), passed.max(held))
     }
 }

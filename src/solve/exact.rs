@@ -197,6 +197,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     /// Advances to `offset` behind row `row`, event by event.
     fn reach(&mut self, row: u64, offset: f64) {
         while (self.row < row || (self.row == row && self.offset < offset)) && self.trouble.is_none() {
+            self.check();
             if self.offset == 0.0 {
                 self.put_out();
                 if self.row < row && self.hop(row - self.row) {
@@ -225,7 +226,12 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         }
         if self.recorder.flow == Flow::Stop {
             self.trouble = Some(Ending::Interrupted { time: self.time() });
-        } else if !self.z.iter().sum::<f64>().is_finite() {
+        }
+    }
+
+    /// Notices a state that is no number any more.
+    fn check(&mut self) {
+        if !self.z.iter().sum::<f64>().is_finite() {
             self.trouble = Some(Ending::Diverged { time: self.time() });
         }
     }

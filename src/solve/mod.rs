@@ -5,6 +5,7 @@ mod law;
 mod propagator;
 mod record;
 mod roots;
+mod table3;
 
 use crate::case::Experiment;
 use crate::error::Result;
@@ -19,6 +20,23 @@ pub enum Solver {
     /// Modes and matrix exponentials: exact to rounding.
     #[default]
     Exact,
+    /// The paper's Table 3 with a fixed step: a reproduction, not a recommendation.
+    Table3 {
+        /// Step, s; shortened so that steps fill the output interval.
+        step: f64,
+        /// Formula.
+        method: Method,
+    },
+}
+
+/// A fixed-step formula.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// The classical formula of order four (Simulink's ode4).
+    #[default]
+    RungeKutta4,
+    /// Order five (Simulink's ode5).
+    DormandPrince5,
 }
 
 /// A body that starts to slide, stops, or turns back.
@@ -153,8 +171,12 @@ impl Grid {
 
 /// Runs `experiment` on `stage` and keeps everything in memory.
 pub fn simulate(stage: &Stage, experiment: &Experiment, solver: Solver) -> Result<Solution> {
+    let rows = Grid::new(experiment.every, experiment.until).intervals() as usize + 1;
     let mut trajectory = Trajectory::default();
     let outcome = stream(stage, experiment, solver, &mut |block| {
+        if trajectory.is_empty() {
+            trajectory = Trajectory::with_capacity(&block.columns, rows);
+        }
         trajectory.append(block);
         Flow::Continue
     })?;
@@ -171,5 +193,6 @@ pub fn stream(
     let plant = Plant::new(stage);
     match solver {
         Solver::Exact => Ok(exact::run(&plant, experiment, sink)),
+        Solver::Table3 { step, method } => table3::run(&plant, experiment, step, method, sink),
     }
 }

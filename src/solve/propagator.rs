@@ -16,6 +16,19 @@ pub(crate) const SERIES_REACH: f64 = 0.25;
 /// Order of the Taylor series: 0.25¹³ / 13! is 2e-18 of the leading term.
 pub(crate) const SERIES_ORDER: usize = 12;
 
+/// 1/k!
+const RECIPROCAL_FACTORIAL: [f64; SERIES_ORDER + 1] = {
+    let mut table = [1.0; SERIES_ORDER + 1];
+    let mut factorial = 1.0;
+    let mut k = 1;
+    while k <= SERIES_ORDER {
+        factorial *= k as f64;
+        table[k] = 1.0 / factorial;
+        k += 1;
+    }
+    table
+};
+
 impl<const R: usize, const C: usize> Matrix<R, C> {
     pub(crate) fn zero() -> Self {
         Self { column: [[0.0; R]; C] }
@@ -23,10 +36,6 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
 
     pub(crate) fn set(&mut self, row: usize, column: usize, value: f64) {
         self.column[column][row] = value;
-    }
-
-    pub(crate) fn column(&self, column: usize) -> &[f64; R] {
-        &self.column[column]
     }
 
     /// The product with a vector.
@@ -77,23 +86,16 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         let x = self.scaled(h);
         let x2 = x.product(&x);
         let x3 = x.product(&x2);
-        let mut factorial = [1.0; SERIES_ORDER + 1];
-        for k in 1..=SERIES_ORDER {
-            factorial[k] = factorial[k - 1] * k as f64;
-        }
         let group = |k: usize, rest: Option<&Self>| {
-            let mut out = Self::zero();
-            for c in 0..C {
-                for r in 0..R {
-                    out.column[c][r] = x3.column[c][r] / factorial[k + 2]
-                        + x2.column[c][r] / factorial[k + 1]
-                        + x.column[c][r] / factorial[k];
-                }
-            }
-            if let Some(rest) = rest {
-                let higher = x3.product(rest);
-                for (o, h) in out.column.iter_mut().flatten().zip(higher.column.iter().flatten()) {
-                    *o += h;
+            let mut out = match rest {
+                Some(rest) => x3.product(rest),
+                None => Self::zero(),
+            };
+            let [a, b, c] = [RECIPROCAL_FACTORIAL[k], RECIPROCAL_FACTORIAL[k + 1], RECIPROCAL_FACTORIAL[k + 2]];
+            for column in 0..C {
+                for row in 0..R {
+                    let [x, x2, x3] = [&x, &x2, &x3].map(|power| power.column[column][row]);
+                    out.column[column][row] = out.column[column][row] + x3 * c + x2 * b + x * a;
                 }
             }
             out

@@ -2,13 +2,13 @@
 
 use super::{Flow, Grid};
 use crate::friction::Motion;
-use crate::plant::{Body, Plant, State, place};
+use crate::plant::{Body, Plant, place};
 use crate::stage::{AmplifierMode, EncoderPlace};
 use crate::trajectory::{Column, Trajectory};
 use std::f64::consts::PI;
 
 /// Rows handed on at a time; small enough to stay in the processor's cache.
-const BLOCK: usize = 1024;
+const BLOCK: usize = 256;
 
 /// Collects rows of states and hands them on as blocks of columns.
 pub(crate) struct Recorder<'a> {
@@ -106,14 +106,25 @@ impl<'a> Recorder<'a> {
         next().extend(raw.iter().map(current));
         let [k1, k2, k3] = stage.belt.stiffness;
         let [c1, c2, c3] = stage.belt.damping;
-        next().extend(raw.iter().map(|&[p1, w1, x, v, ..]| k1 * (r * p1 - x) + c1 * (r * w1 - v)));
-        next().extend(raw.iter().map(|&[_, _, x, v, p3, w3, ..]| k2 * (x - r * p3) + c2 * (v - r * w3)));
-        next().extend(raw.iter().map(|&[p1, w1, _, _, p3, w3, ..]| k3 * (r * p3 - r * p1) + c3 * (r * w3 - r * w1)));
-        for body in Body::ALL {
-            next().extend(raw.iter().zip(&self.motion).map(|(row, motion)| {
-                let state: &State = row[..place::COUNT].try_into().expect("the states come first");
-                self.plant.friction_value(body, motion[body.index()], state, row[INPUT])
-            }));
+        let spans = |&[p1, w1, x, v, p3, w3, ..]: &[f64; 8]| {
+            let (p1, w1, p3, w3) = (r * p1, r * w1, r * p3, r * w3);
+            // f₁, f₂, f₃ after (1)-(3)
+            [k1 * (p1 - x) + c1 * (w1 - v), k2 * (x - p3) + c2 * (v - w3), k3 * (p3 - p1) + c3 * (w3 - w1)]
+        };
+        let [force1, force2, force3] = std::array::from_fn(|_| next());
+        let [drive, cart, idler] = std::array::from_fn(|_| next());
+        for (row, &[m1, m2, m3]) in raw.iter().zip(&self.motion) {
+            let [f1, f2, f3] = spans(row);
+            force1.push(f1);
+            force2.push(f2);
+            force3.push(f3);
+            let [w1, v, w3] = [row[place::DRIVE_SPEED], row[place::CART_SPEED], row[place::IDLER_SPEED]];
+            let (least, most) = self.plant.holding_torque(current(row));
+            let pull = r * f3 - r * f1;
+            drive.push(self.plant.friction_value(Body::DrivePulley, m1, w1, (least + pull, most + pull)));
+            cart.push(self.plant.friction_value(Body::Cart, m2, v, (f1 - f2, f1 - f2)));
+            let pull = r * f2 - r * f3;
+            idler.push(self.plant.friction_value(Body::IdlerPulley, m3, w3, (pull, pull)));
         }
         for body in 0..3 {
             next().extend(self.motion.iter().map(|motion| f64::from(motion[body].code())));

@@ -21,6 +21,9 @@ pub(crate) fn first_fall(c: &[f64]) -> Option<f64> {
         steepest += k * c.abs();
         most_curved += k * (k - 1.0) * c.abs();
     }
+    if c.first().is_none_or(|&c0| c0 > steepest) {
+        return None;
+    }
     search(c, 0.0, 1.0, steepest, most_curved, 0)
 }
 
