@@ -38,11 +38,15 @@ impl Now {
     /// for spacings that the clock resolves.
     pub fn cell(self, guess: f64, seam: impl Fn(f64) -> f64) -> f64 {
         let mut k = guess.floor().max(0.0);
-        while k > 0.0 && !self.reached(seam(k)) {
-            k -= 1.0;
-        }
-        while self.reached(seam(k + 1.0)) {
-            k += 1.0;
+        // Rounding puts the guess off by one; the bound is there for lattices that overflow.
+        for _ in 0..4 {
+            if k > 0.0 && !self.reached(seam(k)) {
+                k -= 1.0;
+            } else if self.reached(seam(k + 1.0)) {
+                k += 1.0;
+            } else {
+                break;
+            }
         }
         k
     }

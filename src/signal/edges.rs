@@ -3,17 +3,16 @@
 use super::clock::Now;
 use super::smooth::product;
 use super::{Hold, Part};
-use std::f64::INFINITY;
 
 pub(super) fn step(now: Now, value: f64, at: f64) -> Part {
-    if now.reached(at) { Part::held(value, INFINITY) } else { Part::held(0.0, at) }
+    if now.reached(at) { Part::held(value, f64::INFINITY) } else { Part::held(0.0, at) }
 }
 
 /// Nothing at all if `duration` is not positive.
 pub(super) fn pulse(now: Now, value: f64, duration: f64, at: f64) -> Part {
     let end = at + duration;
     if now.reached(end) || duration.is_nan() || duration <= 0.0 {
-        Part::held(0.0, INFINITY)
+        Part::held(0.0, f64::INFINITY)
     } else if now.reached(at) {
         Part::held(value, end)
     } else {
@@ -28,7 +27,7 @@ pub(super) fn ramp(now: Now, value: f64, over: f64, at: f64) -> Part {
     if !now.reached(at) {
         Part::held(0.0, at)
     } else if now.reached(end) || !slope.is_finite() {
-        Part::held(value, INFINITY)
+        Part::held(value, f64::INFINITY)
     } else {
         Part::line(slope * (now.t - at), slope, end)
     }
@@ -48,7 +47,7 @@ pub(super) fn ramp_value(now: Now, value: f64, over: f64, at: f64) -> f64 {
 pub(super) fn triangle(now: Now, amplitude: f64, frequency: f64) -> Part {
     let (amplitude, f) = if frequency < 0.0 { (-amplitude, -frequency) } else { (amplitude, frequency) };
     if f.is_nan() || f == 0.0 || !now.resolves(0.5 / f) {
-        return Part::held(0.0, INFINITY);
+        return Part::held(0.0, f64::INFINITY);
     }
     let peak = |k: f64| if k > 0.0 { (2.0 * k - 1.0) / (4.0 * f) } else { 0.0 };
     let k = now.cell(2.0 * f * now.t + 0.5, peak);
@@ -79,13 +78,13 @@ pub(super) fn triangle_value(now: Now, amplitude: f64, frequency: f64) -> f64 {
 pub(super) fn square(now: Now, amplitude: f64, frequency: f64, duty: f64) -> Part {
     let f = frequency.abs();
     if duty.is_nan() || duty <= 0.0 {
-        return Part::held(-amplitude, INFINITY);
+        return Part::held(-amplitude, f64::INFINITY);
     }
     if duty >= 1.0 || f == 0.0 {
-        return Part::held(amplitude, INFINITY);
+        return Part::held(amplitude, f64::INFINITY);
     }
     if !now.resolves(1.0 / f) {
-        return Part::held(amplitude * (2.0 * duty - 1.0), INFINITY);
+        return Part::held(amplitude * (2.0 * duty - 1.0), f64::INFINITY);
     }
     let up = |k: f64| k / f;
     let k = now.cell(f * now.t, up);
@@ -134,9 +133,9 @@ impl<'a> Points<'a> {
 
     pub fn part(&self, now: Now) -> Part {
         match self.around(now) {
-            (None, None) => Part::held(0.0, INFINITY),
+            (None, None) => Part::held(0.0, f64::INFINITY),
             (None, Some([next, _])) => Part::held(0.0, next),
-            (Some([_, v]), None) => Part::held(v, INFINITY),
+            (Some([_, v]), None) => Part::held(v, f64::INFINITY),
             (Some([t0, v0]), Some([t1, v1])) => {
                 let slope = (v1 - v0) / (t1 - t0);
                 if self.hold == Hold::Zero || !slope.is_finite() {

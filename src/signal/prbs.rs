@@ -2,7 +2,6 @@
 
 use super::Part;
 use super::clock::Now;
-use std::f64::INFINITY;
 use std::sync::OnceLock;
 
 /// Stages of the register.
@@ -17,7 +16,7 @@ pub(super) const PERIOD: u64 = (1 << ORDER) - 1;
 /// places. A period has one high bit more than low ones, so its mean is `amplitude`/1048575.
 pub(super) fn part(now: Now, amplitude: f64, bit: f64, seed: u64) -> Part {
     if !now.resolves(bit) {
-        return Part::held(0.0, INFINITY);
+        return Part::held(0.0, f64::INFINITY);
     }
     let seam = |k: f64| k * bit;
     let k = now.cell(now.t / bit, seam);

@@ -5,7 +5,6 @@
 
 use super::clock::Now;
 use super::{DEGREE, Part, Tone};
-use std::f64::INFINITY;
 use std::f64::consts::{PI, TAU};
 use std::sync::OnceLock;
 
@@ -16,7 +15,7 @@ const N: usize = DEGREE + 1;
 
 /// Seams at k/(26 f), f the highest frequency of all tones.
 pub(super) fn multisine(now: Now, tones: &[Tone]) -> Part {
-    let Some(lattice) = lattice(now, tones) else { return Part::held(mean(tones), INFINITY) };
+    let Some(lattice) = lattice(now, tones) else { return Part::held(mean(tones), f64::INFINITY) };
     let seam = |k: f64| k / lattice;
     let k = now.cell(lattice * now.t, seam);
     let (start, end) = (seam(k), seam(k + 1.0));
@@ -90,9 +89,9 @@ impl Chirp {
         let &Self { amplitude: a, from, to, over } = self;
         let n = self.stretches(now);
         if n == 0.0 {
-            return Part::held(0.0, INFINITY);
+            return Part::held(0.0, f64::INFINITY);
         }
-        let seam = |k: f64| if k < n { k * over / n } else { over };
+        let seam = |k: f64| if k < n { over * (k / n) } else { over };
         let k = now.cell(now.t / over * n, seam).min(n - 1.0);
         let (start, end) = (seam(k), seam(k + 1.0));
         let (middle, half) = (0.5 * (start + end), 0.5 * (end - start));
