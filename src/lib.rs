@@ -4,6 +4,7 @@ pub mod case;
 pub mod error;
 pub mod friction;
 pub mod log;
+pub mod parameter;
 pub mod quantity;
 pub mod signal;
 pub mod solve;
