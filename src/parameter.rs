@@ -340,9 +340,9 @@ const INPUTS: &[Parameter] = &[
     row("input.prbs", "", INPUT, Required, ANY, "3 V", "Height of a pseudo-random binary sequence, which jumps between plus and minus this."),
     row("input.prbs.bit", "", "s", Required, DURATION, "20 ms", "Shortest time between jumps."),
     row("input.prbs.seed", "", "", Value(1.0), Range::whole(0.0, 9_007_199_254_740_991.0), "1", "Which sequence; the same seed gives the same one."),
-    row("input.table.time", "", "s", Required, TIME, "0.1 s", "First number of each point of a `table`, growing from point to point."),
-    row("input.table.value", "", INPUT, Required, ANY, "5 V", "Second number of each point; straight lines between points, the last one held."),
-    row("input.sequence.lasts", "", "s", Words("as long as a `pulse`, `ramp`, `chirp`, `table` or `file` takes"), DURATION, "1 s", "How long an element of a `sequence` has its turn."),
+    row("input.point.time", "", "s", Required, TIME, "0.1 s", "First number of each point of a `table`, growing from point to point."),
+    row("input.point.value", "", INPUT, Required, ANY, "5 V", "Second number of each point; straight lines between points, the last one held."),
+    row("input.element.lasts", "", "s", Words("as long as a `pulse`, `ramp`, `chirp`, `table` or `file` takes"), DURATION, "1 s", "How long an element of a `sequence` has its turn."),
 ];
 
 /// Titles of the sections, in the order of the case file, with the key prefix of their rows.
