@@ -103,7 +103,7 @@ fn nested(field: &Field, context: &Context, depth: usize, in_sequence: bool) -> 
         "table" => points(&main)?,
         "file" => sampled(&main, &table, context)?,
         "sum" => {
-            let parts = filled(&main)?;
+            let parts = main.filled_list()?;
             let parts = parts.iter().map(|part| nested(part, context, depth + 1, false));
             Signal::Sum(parts.collect::<Result<_>>()?)
         }
@@ -150,7 +150,7 @@ fn multisine(amplitude: f64, table: &Table, context: &Context) -> Result<Signal>
                     .fail("the frequencies are listed already")
                     .next("give either frequencies, or from, to and tones"));
             }
-            let list = filled(&field)?;
+            let list = field.filled_list()?;
             if list.len() > MOST_TONES {
                 return Err(field
                     .fail(format!("the list has {} values", list.len()))
@@ -186,18 +186,9 @@ fn multisine(amplitude: f64, table: &Table, context: &Context) -> Result<Signal>
     Ok(Signal::Multisine { tones: frequencies.into_iter().enumerate().map(tone).collect() })
 }
 
-/// A list with something in it.
-fn filled<'a>(field: &Field<'a>) -> Result<Vec<Field<'a>>> {
-    let list = field.list()?;
-    if list.is_empty() {
-        return Err(field.fail("the list is empty").allowed("at least one value"));
-    }
-    Ok(list)
-}
-
 fn points(field: &Field) -> Result<Signal> {
     let mut points: Vec<[f64; 2]> = Vec::new();
-    for point in filled(field)? {
+    for point in field.filled_list()? {
         let pair = point.list()?;
         let [time, value] = &pair[..] else {
             return Err(point
@@ -274,7 +265,7 @@ fn check_samples(times: &[f64], values: &[f64], time: &str, column: &str) -> Res
 
 /// One input after another.
 fn sequence(field: &Field, context: &Context, depth: usize) -> Result<Signal> {
-    let elements = filled(field)?;
+    let elements = field.filled_list()?;
     let last = elements.len() - 1;
     let mut slots = Vec::with_capacity(elements.len() + 1);
     for (i, element) in elements.iter().enumerate() {

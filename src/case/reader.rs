@@ -94,17 +94,44 @@ fn syntax(source: &Source, error: &toml_edit::TomlError) -> Error {
         let begin = source.text[..at].rfind('\n').map_or(0, |i| i + 1);
         source.text[begin..].lines().next().unwrap_or_default()
     };
-    let next = if message.contains("recursion limit") {
-        "nest less deeply"
-    } else if message.contains("duplicate key") {
-        "keep one of the two"
-    } else if line.trim_start().starts_with('[') {
-        "a table begins with its name in brackets, such as [cart] or [[experiment]]"
-    } else {
-        "a line is key = value; a number with a unit stands in quotes, such as mass = \"0.362 kg\""
-    };
-    Error::new(format!("this is not TOML: {message}")).at(source.place(span)).next(next)
+    let header = line.trim_start().starts_with('[');
+    let (what, next) = TOML_MISTAKES
+        .iter()
+        .find(|(theirs, ..)| message.contains(theirs))
+        .map_or((format!("this is not TOML: {message}"), None), |(_, what, next)| ((*what).to_string(), Some(*next)));
+    let next = next.unwrap_or(match header {
+        true => "a table begins with its name in brackets, such as [cart] or [[experiment]]",
+        false => A_LINE,
+    });
+    Error::new(what).at(source.place(span)).next(next)
 }
+
+const A_LINE: &str = "a line is key = value; a number with a unit stands in quotes, such as mass = \"0.362 kg\"";
+
+/// Mistakes of the notation: what the reader of TOML says, and what we say instead.
+const TOML_MISTAKES: &[(&str, &str, &str)] = &[
+    ("recursion", "this is nested too deeply", "nest lists and tables less deeply"),
+    ("duplicate key", "this stands here for the second time", "keep one of the two"),
+    ("values must be quoted", "this is neither a number nor a text in quotes", A_LINE),
+    ("number overflowed", "this number is too large for a computer's number", "check its digits and its power of ten"),
+    ("key with no value", "there is no `=` after this key", A_LINE),
+    (
+        "unclosed table",
+        "the `]` is missing",
+        "a table begins with its name in brackets, such as [cart] or [[experiment]]",
+    ),
+    ("invalid basic string", "the text is not closed: a `\"` is missing", A_LINE),
+    (
+        "comma between array elements",
+        "the list is not closed, or a comma is missing in it",
+        "a list is such as [1, 2, 3]",
+    ),
+    (
+        "comma between key-value pairs",
+        "a comma is missing",
+        "a table in one line is such as { viscous = 19, coulomb = 0.2 }",
+    ),
+];
 
 fn entries(table: &dyn toml_edit::TableLike, outer: Range<usize>) -> Vec<Entry> {
     table
@@ -222,7 +249,8 @@ impl<'a> Field<'a> {
                 let value = quantity::read(text, unit).map_err(|e| {
                     let mut error = self.fail(e.what);
                     error.allowed = e.allowed;
-                    error.next(e.next.unwrap_or(such_as.clone()))
+                    let useful = e.next.filter(|next| !unit.is_empty() && next != quantity::SUCH_AS);
+                    error.next(useful.unwrap_or(such_as.clone()))
                 })?;
                 (value, Some(text.trim()))
             }
@@ -232,7 +260,9 @@ impl<'a> Field<'a> {
             }
         };
         if !value.is_finite() {
-            return Err(self.fail(format!("{value} is not a finite number")).next(such_as));
+            return Err(self
+                .fail(format!("{} is not a finite number", value.to_string().to_lowercase()))
+                .next(such_as));
         }
         if !row.range.contains(value) {
             let shown = typed.map_or_else(
@@ -289,6 +319,15 @@ impl<'a> Field<'a> {
                 .fail(format!("{} stands where a list is wanted", other.word()))
                 .next("write the values in brackets, separated by commas: [1, 2, 3]")),
         }
+    }
+
+    /// A list with something in it.
+    pub fn filled_list(&self) -> Result<Vec<Field<'a>>> {
+        let list = self.list()?;
+        if list.is_empty() {
+            return Err(self.fail("the list is empty").allowed("at least one value"));
+        }
+        Ok(list)
     }
 
     /// Three numbers, one for each span.
@@ -406,12 +445,12 @@ impl<'a> Table<'a> {
 
     pub fn missing(&self, key: &str, example: &str) -> Error {
         let path = &self.field.path;
-        let whole = if path.is_empty() { key.to_string() } else { format!("{path}.{key}") };
+        let whole = if path.is_empty() { format!("[{key}]") } else { format!("`{path}.{key}`") };
         let place = match path.is_empty() {
             true => Place::file(&self.field.source.name),
             false => self.field.source.place(self.field.node.span.clone()),
         };
-        Error::new(format!("`{whole}` is missing")).at(place).next(format!("add {example}"))
+        Error::new(format!("{whole} is missing")).at(place).next(format!("add {example}"))
     }
 
     /// The number `key`, or its default.

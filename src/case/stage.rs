@@ -3,6 +3,7 @@
 use super::reader::{Field, Table};
 use crate::error::Result;
 use crate::friction::{Friction, Side};
+use crate::quantity::{rounded, show};
 use crate::stage::*;
 
 /// Keys that stand in the plan and not yet in the program.
@@ -105,18 +106,23 @@ fn friction(body: &Table) -> Result<Friction> {
     let breakaway_backward = table.number_if_given("static_backward")?.or(breakaway);
 
     // At rest a body holds at least what it resists with in motion.
-    let at_least = |key: &str, breakaway: Option<f64>, name: &str, coulomb: f64| match breakaway {
+    let unit = if body.field.section == "cart" { "N" } else { "N m" };
+    let at_least = |key: &str, breakaway: Option<f64>, allowed: &str, coulomb: f64| match breakaway {
         Some(value) if value < coulomb => {
             let field = table.optional(key).unwrap_or_else(|| table.field.clone());
+            let (value, coulomb) = (show(value, unit), show(coulomb, unit));
             Err(field
                 .fail(format!("a breakaway of {value} is less than the Coulomb friction of {coulomb}"))
-                .allowed(format!("at least {name}")))
+                .allowed(allowed))
         }
         _ => Ok(()),
     };
-    at_least("static", breakaway, "coulomb", coulomb)?;
-    let backward = if table.optional("static_backward").is_some() { "static_backward" } else { "static" };
-    at_least(backward, breakaway_backward, "coulomb_backward; static_backward can be given as well", coulomb_backward)?;
+    at_least("static", breakaway, "at least coulomb", coulomb)?;
+    let (backward, allowed) = match table.optional("static_backward") {
+        Some(_) => ("static_backward", "at least coulomb_backward, which is coulomb where it is not given"),
+        None => ("static", "at least coulomb_backward, unless static_backward is given"),
+    };
+    at_least(backward, breakaway_backward, allowed, coulomb_backward)?;
 
     let viscous_backward = table.number_if_given("viscous_backward")?.unwrap_or(viscous);
     Ok(Friction {
@@ -162,7 +168,7 @@ fn modulus(field: &Field) -> Result<f64> {
         return field.number();
     }
     let parts = field
-        .list()?
+        .filled_list()?
         .iter()
         .map(|part| {
             let part = part.table()?;
@@ -172,7 +178,7 @@ fn modulus(field: &Field) -> Result<f64> {
         .collect::<Result<Vec<_>>>()?;
     let whole: f64 = parts.iter().map(|(share, _)| share).sum();
     if (whole - 1.0).abs() > ROUNDING {
-        return Err(field.fail(format!("the shares add up to {whole}")).allowed("shares that add up to 1"));
+        return Err(field.fail(format!("the shares add up to {}", rounded(whole))).allowed("shares that add up to 1"));
     }
     Ok(composite_modulus(&parts))
 }

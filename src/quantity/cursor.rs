@@ -142,9 +142,7 @@ impl<'a> Cursor<'a> {
 
     pub fn number(&mut self) -> Result<Number> {
         if self.chars.is_empty() {
-            return Err(
-                Error::new("an empty text is no number").next("write a number with its unit, such as \"19.4 mm\"")
-            );
+            return Err(Error::new("an empty text is no number").next(super::SUCH_AS));
         }
         let negative = match self.peek() {
             Some('-' | '−') => true,
@@ -165,9 +163,7 @@ impl<'a> Cursor<'a> {
             let word: String = self.from(self.at).chars().take_while(|c| c.is_alphabetic()).collect();
             return Err(match word.to_lowercase().as_str() {
                 "nan" | "inf" | "infinity" => self.error("is not a finite number"),
-                _ => {
-                    self.error("does not begin with a number").next("write a number with its unit, such as \"19.4 mm\"")
-                }
+                _ => self.error("does not begin with a number").next(super::SUCH_AS),
             });
         };
         let mut number = Number { negative, digits, exponent: 0, divisor: 1 };

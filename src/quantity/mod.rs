@@ -20,6 +20,9 @@ use crate::error::{Error, Result};
 use cursor::{Cursor, Number, Product};
 use std::f64::consts::PI;
 
+/// The advice for a text that is no quantity at all.
+pub(crate) const SUCH_AS: &str = "write a number with its unit, such as \"19.4 mm\"";
+
 /// A number with its unit, in SI.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantity {
