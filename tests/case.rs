@@ -143,6 +143,28 @@ fn mistakes_in_a_set_value_say_so() {
     assert!(shown("title=2").contains("a number stands where a text is wanted"));
 }
 
+/// Lists of any length that fits the file are read in reasonable time; longer files are refused.
+#[test]
+fn large_files() {
+    let points: Vec<String> = (0..200_000).map(|i| format!("[{i}, 1]")).collect();
+    let long = TEMPLATE.replace(
+        "{ pulse = \"5 V\", for = \"0.25 s\" }\nuntil",
+        &format!("{{ table = [{}] }}\nuntil", points.join(",")),
+    );
+    let case = Case::from_text("axis.toml", &long).unwrap();
+    assert!(matches!(&case.experiments[0].input, Signal::Table { points } if points.len() == 200_000));
+
+    let one = TEMPLATE.split("[[experiment]]").nth(1).unwrap();
+    let many: String =
+        (0..20_000).map(|i| format!("[[experiment]]{}", one.replace("5 V pulse", &format!("run {i}")))).collect();
+    let case = Case::from_text("axis.toml", &format!("{TEMPLATE}\n{many}")).unwrap();
+    assert_eq!(case.experiments.len(), 20_002);
+
+    let padded = format!("{TEMPLATE}#{}", " ".repeat(17 << 20));
+    let error = Case::from_text("axis.toml", &padded).unwrap_err();
+    assert_eq!(error.what, "this case file is too large");
+}
+
 /// The template's first input replaced by `input`.
 fn input(input: &str) -> Signal {
     with(&[&format!("experiment.0.input={input}")]).experiments[0].input.clone()

@@ -5,6 +5,7 @@ mod reader;
 mod set;
 mod stage;
 mod template;
+mod tree;
 
 pub use template::TEMPLATE;
 
@@ -12,6 +13,8 @@ use crate::error::{Error, Result};
 use crate::signal::Signal;
 use crate::stage::{AmplifierMode, Stage};
 use reader::{Field, Table};
+use std::collections::HashMap;
+use std::io::Read;
 use std::path::Path;
 
 /// Most rows of a result.
@@ -81,13 +84,7 @@ impl Case {
     pub fn read_with(path: impl AsRef<Path>, changes: &[&str]) -> Result<Self> {
         let path = path.as_ref();
         let fail = |what: String| Error::new(what).in_file(path);
-        let size = std::fs::metadata(path).map(|m| m.len()).unwrap_or(0);
-        if size > reader::LARGEST_FILE as u64 {
-            return Err(fail(format!("a case file of {size} bytes is too large"))
-                .allowed(format!("up to {} bytes", reader::LARGEST_FILE))
-                .next("put long tables into a CSV file, and read it with input = { file = ... }"));
-        }
-        let bytes = std::fs::read(path).map_err(|e| {
+        let bytes = read_bytes(path).map_err(|e| {
             let error = fail(format!("this case file cannot be read: {}", told(&e)));
             match e.kind() {
                 std::io::ErrorKind::NotFound => error.next("check the path, or write a new case with `taut init`"),
@@ -140,6 +137,13 @@ impl Case {
     }
 }
 
+/// The content of a file, up to a little more than a case may have: what is too long is told with the rest.
+fn read_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)?.take(tree::LARGEST_FILE as u64 + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
 /// What the system says about a file, in our words.
 fn told(error: &std::io::Error) -> String {
     use std::io::ErrorKind as Kind;
@@ -181,20 +185,18 @@ fn experiments(root: &Table, stage: &Stage, folder: &Path) -> Result<Vec<Experim
         return Err(field.fail("the list is empty").next(format!("add {such_as}")));
     }
     let mut experiments: Vec<Experiment> = Vec::new();
+    let mut files: HashMap<String, usize> = HashMap::new();
     for field in list {
         let experiment = experiment(&field.clone().named("experiment"), stage, folder)?;
-        let table = || field.table()?.required("name", "a name");
-        if let Some(other) = experiments.iter().find(|e| e.file_name() == experiment.file_name()) {
-            return Err(match other.name == experiment.name {
-                true => table()?.fail(format!("\"{}\" is the name of two experiments", experiment.name)),
-                false => table()?.fail(format!(
-                    "\"{}\" and \"{}\" would both be written to {}.csv",
-                    other.name,
-                    experiment.name,
-                    experiment.file_name()
-                )),
-            }
-            .next("give each experiment a name of its own"));
+        let file = experiment.file_name();
+        if let Some(other) = files.insert(file.clone(), experiments.len()).and_then(|i| experiments.get(i)) {
+            let (name, other) = (&experiment.name, &other.name);
+            let what = match name == other {
+                true => format!("\"{name}\" is the name of two experiments"),
+                false => format!("\"{other}\" and \"{name}\" would both be written to {file}.csv"),
+            };
+            let field = field.table()?.required("name", "a name")?;
+            return Err(field.fail(what).next("give each experiment a name of its own"));
         }
         experiments.push(experiment);
     }

@@ -1,6 +1,6 @@
 //! `--set KEY=VALUE`: changes the text of a case and leaves its comments alone.
 
-use super::reader::{Kind, Node, Override, Source};
+use super::tree::{Kind, Node, Override, Source};
 use crate::error::{Error, Place, Result};
 use std::path::Path;
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Key, Table, Value};

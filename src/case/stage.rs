@@ -67,7 +67,9 @@ fn radius(table: &Table) -> Result<f64> {
         (Some(_), Some(other), _) | (Some(_), None, Some(other)) => {
             Err(other.fail("the radius is given already").next("give either radius, or teeth and pitch"))
         }
-        (None, Some(teeth), Some(pitch)) => Ok(pitch_radius(teeth.number()?, pitch.number()?)),
+        (None, Some(teeth), Some(pitch)) => {
+            table.computed("radius", &pitch, pitch_radius(teeth.number()?, pitch.number()?))
+        }
         (None, Some(_), None) => Err(table.missing("pitch", "for example pitch = \"2.03 mm\"")),
         (None, None, Some(_)) => Err(table.missing("teeth", "for example teeth = 60")),
         (None, None, None) => Err(table.missing("radius", "for example radius = \"19.4 mm\", or teeth and pitch")),
@@ -87,7 +89,7 @@ fn pulley(table: &Table) -> Result<Pulley> {
             {
                 return Err(field.fail("the bore is not smaller than the outside").allowed("below outer_diameter"));
             }
-            cylinder_inertia(outer, bore, width?, density?)
+            table.computed("inertia", &field, cylinder_inertia(outer, bore, width?, density?))?
         }
         _ => table.number("inertia")?,
     };
@@ -158,7 +160,11 @@ fn belt(table: &Table) -> Result<Belt> {
         section: section(&table.required("section", "for example section = \"5.5626 mm^2\"")?)?,
         spans: table.required("spans", "for example spans = [\"0.34925 m\", \"0.34925 m\", \"0.7874 m\"]")?.three()?,
     };
-    Ok(Belt { stiffness: make.stiffness(), damping, make: Some(make) })
+    let stiffness = make.stiffness();
+    for k in stiffness {
+        table.computed("stiffness", &table.field, k)?;
+    }
+    Ok(Belt { stiffness, damping, make: Some(make) })
 }
 
 /// One modulus, or the parts of a composite.
