@@ -1,6 +1,8 @@
 //! What several tests share: the paper's machine, and where the reference data lie.
 #![allow(dead_code)]
 
+pub mod random;
+
 use std::path::PathBuf;
 use taut::case::{Experiment, Initial};
 use taut::friction::Friction;
