@@ -2,8 +2,12 @@
 
 pub mod case;
 pub mod error;
+pub mod files;
 pub mod friction;
 pub mod log;
+pub mod number;
+#[cfg(feature = "report")]
+pub mod report;
 pub mod signal;
 pub mod solve;
 pub mod stage;
