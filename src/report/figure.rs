@@ -38,7 +38,7 @@ pub struct Axis {
 pub struct Panel {
     /// The y axis.
     pub y: Axis,
-    /// The curves, the first drawn last, on top.
+    /// The curves; the last is drawn on top.
     pub series: Vec<Series>,
     /// Horizontal lines: "breakaway".
     pub horizontals: Vec<Marker>,

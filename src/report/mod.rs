@@ -25,6 +25,7 @@ pub mod decimate;
 pub mod diagram;
 pub mod drawing;
 pub mod equations;
+mod embed;
 pub mod figure;
 pub mod page;
 mod plot;
@@ -33,5 +34,6 @@ mod svg;
 
 pub use decimate::{Decimator, decimate};
 pub use figure::{Axis, Figure, Marker, Panel, Series, Style};
+pub use page::{Callout, Cell, Page, Table};
 pub use raster::png;
 pub use svg::Colour;

@@ -38,7 +38,7 @@ pub(crate) fn svg(figure: &Figure, with_title: bool) -> String {
         .panels
         .iter()
         .zip(&ys)
-        .map(|(p, y)| y.ticks((panel_height(figure, p) / 46.0).round() as usize))
+        .map(|(p, y)| y.ticks((panel_height(figure, p) / 40.0).round() as usize))
         .collect();
     let widest = ticks.iter().flatten().map(|(_, t)| text_width(t, 12.0, false)).fold(0.0, f64::max);
     let left = (widest + 16.0).max(44.0);
@@ -59,9 +59,10 @@ pub(crate) fn svg(figure: &Figure, with_title: bool) -> String {
     let total = top + 48.0;
 
     let mut out = Svg::new(WIDTH, total);
+    out.margin = if with_title { 12.0 } else { 0.0 };
     if with_title && !figure.title.is_empty() {
-        let title = svg::fit(&figure.title, 15.5, WIDTH - 8.0);
-        out.text((0.0, 20.0), 15.0, Anchor::Start, svg::INK, " font-weight=\"600\"", &title);
+        let title = svg::fit(&figure.title, 15.5, width);
+        out.text((left, 20.0), 15.0, Anchor::Start, svg::INK, " font-weight=\"600\"", &title);
     }
     let x_ticks = x.ticks((width / 90.0).round() as usize);
     let across = |v: f64| left + width * x.place(v);
@@ -81,11 +82,11 @@ pub(crate) fn svg(figure: &Figure, with_title: bool) -> String {
             out.line((across(*v), top), (across(*v), top + height), svg::GRID, 1.0);
         }
         markers(&mut out, figure, i == 0, &across, (left, left + width), (top, height));
-        clip(&mut out, i, (left, top), (width, height));
-        for series in panel.series.iter().rev() {
+        clip(&mut out, (left, top), (width, height));
+        for series in &panel.series {
             curve(&mut out, series, (figure.x.factor, panel.y.factor), (&x, y), &across, &up, width);
         }
-        out.raw("</g>");
+        out.raw("</svg>");
         for Marker { at, label } in &panel.horizontals {
             let at = up(at * panel.y.factor);
             dashed(&mut out, (left, at), (left + width, at));
@@ -181,11 +182,10 @@ fn dashed(out: &mut Svg, from: (f64, f64), to: (f64, f64)) {
     out.path(&d, svg::MARK, 1.1, " stroke-dasharray=\"1.5 3\"");
 }
 
-fn clip(out: &mut Svg, i: usize, at: (f64, f64), size: (f64, f64)) {
-    // A nested viewport clips without an id, so that many figures fit on one page.
-    let _ = i;
+/// Opens a nested viewport: it clips without an id, so that many figures fit on one page.
+fn clip(out: &mut Svg, at: (f64, f64), size: (f64, f64)) {
     let (x, y, w, h) = (n(at.0), n(at.1 - 2.0), n(size.0), n(size.1 + 4.0));
-    out.raw(&format!("<g><svg x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" viewBox=\"{x} {y} {w} {h}\">"));
+    out.raw(&format!("<svg x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" viewBox=\"{x} {y} {w} {h}\">"));
 }
 
 fn dash(style: Style) -> &'static str {
@@ -234,7 +234,7 @@ fn curve(
     out.path(&d, paint, 1.8, &format!("{}{ends}", dash(series.style)));
 }
 
-/// A coordinate to a tenth of a pixel... of which a hundredth matters to no eye.
+/// A coordinate of a curve, to a tenth of a pixel.
 fn n1(value: f64) -> String {
     n((value.clamp(-1e6, 1e6) * 10.0).round() / 10.0)
 }

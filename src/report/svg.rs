@@ -86,17 +86,19 @@ pub(crate) enum Anchor {
 pub(crate) struct Svg {
     width: f64,
     height: f64,
+    /// Space around the picture.
+    pub margin: f64,
     body: String,
 }
 
 impl Svg {
     pub fn new(width: f64, height: f64) -> Self {
-        Self { width, height, body: String::new() }
+        Self { width, height, margin: 0.0, body: String::new() }
     }
 
     /// The whole file; `label` is read out to those who cannot see it.
     pub fn finish(self, label: &str) -> String {
-        let (w, h) = (n(self.width), n(self.height));
+        let (m, w, h) = (n(-self.margin), n(self.width + 2.0 * self.margin), n(self.height + 2.0 * self.margin));
         let label = escape(label);
         let mut style = String::from("@media (prefers-color-scheme:dark){");
         for Paint { class, dark, .. } in &PALETTE {
@@ -104,7 +106,7 @@ impl Svg {
         }
         style.push('}');
         format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {w} {h}\" width=\"{w}\" height=\"{h}\" role=\"img\" \
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"{m} {m} {w} {h}\" width=\"{w}\" height=\"{h}\" role=\"img\" \
              aria-label=\"{label}\" font-family=\"{FONT}\" font-size=\"13\" fill=\"none\" stroke-linejoin=\"round\">\
              <style>{style}</style>{}</svg>\n",
             self.body
