@@ -7,8 +7,7 @@ const MINUS: char = '−';
 const NO_BREAK: char = '\u{a0}';
 
 /// Prefixes from pico to giga with their powers of ten.
-const PREFIXES: [(i32, &str); 8] =
-    [(-12, "p"), (-9, "n"), (-6, "µ"), (-3, "m"), (0, ""), (3, "k"), (6, "M"), (9, "G")];
+const PREFIXES: [(i32, &str); 8] = [(-12, "p"), (-9, "n"), (-6, "µ"), (-3, "m"), (0, ""), (3, "k"), (6, "M"), (9, "G")];
 
 /// `value` in `unit` with at most `digits` significant digits and the prefix that suits: `132.8 kN/m`.
 ///

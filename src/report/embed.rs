@@ -84,7 +84,8 @@ struct Arrays {
 impl Arrays {
     fn index(&mut self, values: Vec<f64>, factor: f64) -> usize {
         let values: Vec<f64> = values.into_iter().map(|v| v * factor).collect();
-        let same = |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
+        let same =
+            |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
         if let Some(i) = self.done.iter().position(|(known, _)| same(known, &values)) {
             return i;
         }
@@ -157,7 +158,8 @@ mod tests {
 
     #[test]
     fn base64_is_as_the_standard_says() {
-        let cases = [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foob", "Zm9vYg=="), ("fooba", "Zm9vYmE=")];
+        let cases =
+            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foob", "Zm9vYg=="), ("fooba", "Zm9vYmE=")];
         for (plain, coded) in cases {
             assert_eq!(base64(plain.as_bytes()), coded);
         }

@@ -24,8 +24,8 @@ mod axis;
 pub mod decimate;
 pub mod diagram;
 pub mod drawing;
-pub mod equations;
 mod embed;
+pub mod equations;
 pub mod figure;
 pub mod page;
 mod plot;
@@ -33,6 +33,8 @@ mod raster;
 mod svg;
 
 pub use decimate::{Decimator, decimate};
+pub use drawing::stage_drawing;
+pub use equations::{BodyEquation, FrictionTerm, Inertia, MotorEquation, Term, axis_diagram, body_diagram};
 pub use figure::{Axis, Figure, Marker, Panel, Series, Style};
 pub use page::{Callout, Cell, Page, Table};
 pub use raster::png;

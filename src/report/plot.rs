@@ -254,11 +254,8 @@ fn thin(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
         let length = dx.hypot(dy);
         let mut far = (0.06, None);
         for (i, (x, y)) in points.iter().enumerate().take(b).skip(a + 1) {
-            let distance = if length > 0.0 {
-                ((x - ax) * dy - (y - ay) * dx).abs() / length
-            } else {
-                (x - ax).hypot(y - ay)
-            };
+            let distance =
+                if length > 0.0 { ((x - ax) * dy - (y - ay) * dx).abs() / length } else { (x - ax).hypot(y - ay) };
             if distance > far.0 {
                 far = (distance, Some(i));
             }

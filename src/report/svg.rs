@@ -300,8 +300,14 @@ fn rich(text: &str, size: f64, markup: bool) -> String {
     let mut i = 0;
     while i < levels.len() {
         let level = levels[i].0;
-        let run: String = levels[i..].iter().take_while(|(l, _)| *l == level).map(|(_, c)| *c).collect();
+        let run = levels[i..].iter().take_while(|(l, c)| *l == level && !is_dots(*c)).count().max(1);
+        let run: String = levels[i..i + run].iter().map(|(_, c)| *c).collect();
         i += run.chars().count();
+        if let Some(&(_, dots)) = levels.get(i).filter(|(_, c)| is_dots(*c) && offset == 0.0) {
+            i += 1;
+            out.push_str(&dotted(&escape(&run), dots, size));
+            continue;
+        }
         let target = match level {
             Level::Base => 0.0,
             Level::Below => 0.22 * size,
@@ -314,17 +320,45 @@ fn rich(text: &str, size: f64, markup: bool) -> String {
                 let _ = write!(out, "<tspan dy=\"{}\">{run}</tspan>", n(target - offset));
             }
             _ => {
-                let _ = write!(
-                    out,
-                    "<tspan dy=\"{}\" font-size=\"{}\">{run}</tspan>",
-                    n(target - offset),
-                    n(0.7 * size)
-                );
+                let _ =
+                    write!(out, "<tspan dy=\"{}\" font-size=\"{}\">{run}</tspan>", n(target - offset), n(0.7 * size));
             }
         }
         offset = target;
     }
     out
+}
+
+fn is_dots(c: char) -> bool {
+    matches!(c, '\u{307}' | '\u{308}')
+}
+
+/// Text whose last letter carries one dot or two, as derivatives do. Where there is no such letter as a whole,
+/// full stops are raised above it: the mark that combines is misplaced by many fonts.
+fn dotted(text: &str, dots: char, size: f64) -> String {
+    let whole = match (text.chars().last(), dots) {
+        (Some('x'), '\u{307}') => Some('ẋ'),
+        (Some('x'), _) => Some('ẍ'),
+        _ => None,
+    };
+    if let Some(whole) = whole {
+        return format!("{}{whole}", &text[..text.len() - 1]);
+    }
+    // A Greek letter is about 0.66 em wide, a full stop 0.27.
+    let (letter, stop) = (0.66 * size, 0.27 * size);
+    let (rise, close) = (0.6 * size, 0.05 * size);
+    let (marks, wide) = if dots == '\u{307}' { (".", stop) } else { ("..", 2.0 * stop - close) };
+    let spacing = if marks.len() > 1 {
+        format!("{} {}", n(-(letter + wide) / 2.0), n(-close))
+    } else {
+        n(-(letter + wide) / 2.0)
+    };
+    format!(
+        "{text}<tspan dx=\"{spacing}\" dy=\"{}\">{marks}</tspan><tspan dx=\"{}\" dy=\"{}\">\u{200b}</tspan>",
+        n(-rise),
+        n((letter - wide) / 2.0),
+        n(rise)
+    )
 }
 
 /// Advance widths of the printable ASCII characters in hundredths of the font size (Noto Sans; most system fonts are narrower).
