@@ -90,7 +90,7 @@ fn round_step(rough: f64) -> f64 {
 /// A tick's text: as many decimals as the step needs, powers of ten beyond comfortable lengths.
 fn label(value: f64, step: f64, largest: f64) -> String {
     let value = if value.abs() < 1e-9 * step { 0.0 } else { value };
-    if value != 0.0 && (largest >= 1e6 || largest < 1e-4) {
+    if largest >= 1e6 || largest < 1e-4 {
         let digits = (largest / step).log10().ceil().clamp(0.0, 15.0) as usize + 1;
         return crate::number::engineering(value, "", digits);
     }

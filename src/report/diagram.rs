@@ -248,7 +248,7 @@ impl Block {
             Kind::Function => (text.max(note).max(70.0) + 20.0, 50.0),
             Kind::System(lines) => {
                 let widest = lines.iter().map(|l| text_width(l, 12.0, true)).fold(text * 1.08, f64::max);
-                (widest + 28.0, 40.0 + 18.0 * lines.len() as f64)
+                (widest + 38.0, 40.0 + 18.0 * lines.len() as f64)
             }
         }
     }

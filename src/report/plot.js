@@ -28,7 +28,8 @@ const raised = e => [...String(e)].map(c => c === "-" ? "\u207b" : "\u2070\u00b9
 const minus = s => s.replace("-", MINUS);
 function label(v, step, largest) {
   if (Math.abs(v) < 1e-9 * step) v = 0;
-  if (v !== 0 && (largest >= 1e6 || largest < 1e-4)) {
+  if (largest >= 1e6 || largest < 1e-4) {
+    if (v === 0) return "0";
     const digits = Math.max(0, Math.min(15, Math.ceil(Math.log10(largest / step))));
     const [m, e] = v.toExponential(digits).split("e");
     return minus(m.includes(".") ? m.replace(/\.?0+$/, "") : m) + "\u00d710" + raised(+e);
@@ -318,7 +319,8 @@ function plot(figure) {
     if (act && !e.ctrlKey && !e.metaKey && !e.altKey) { act(); e.preventDefault(); }
   });
   figure.querySelector(".figtitle button").addEventListener("click", reset);
-  let seen = 0;
+  let seen = stage.clientWidth;
+  if (seen) draw();
   new ResizeObserver(() => { if (stage.clientWidth && stage.clientWidth !== seen) { seen = stage.clientWidth; later(); } }).observe(stage);
 }
 for (const figure of document.querySelectorAll("figure.plot")) {

@@ -301,12 +301,14 @@ fn rich(text: &str, size: f64, markup: bool) -> String {
     while i < levels.len() {
         let level = levels[i].0;
         let run = levels[i..].iter().take_while(|(l, c)| *l == level && !is_dots(*c)).count().max(1);
-        let run: String = levels[i..i + run].iter().map(|(_, c)| *c).collect();
+        let mut run: String = levels[i..i + run].iter().map(|(_, c)| *c).collect();
         i += run.chars().count();
-        if let Some(&(_, dots)) = levels.get(i).filter(|(_, c)| is_dots(*c) && offset == 0.0) {
-            i += 1;
-            out.push_str(&dotted(&escape(&run), dots, size));
-            continue;
+        let mut dots = levels.get(i).map(|(_, c)| *c).filter(|c| is_dots(*c) && level == Level::Base);
+        i += usize::from(dots.is_some());
+        if let (Some(mark), true) = (dots, run.ends_with('x')) {
+            run.pop();
+            run.push(if mark == '\u{307}' { 'ẋ' } else { 'ẍ' });
+            dots = None;
         }
         let target = match level {
             Level::Base => 0.0,
@@ -325,6 +327,9 @@ fn rich(text: &str, size: f64, markup: bool) -> String {
             }
         }
         offset = target;
+        if let Some(dots) = dots {
+            out.push_str(&raised_dots(dots, size));
+        }
     }
     out
 }
@@ -333,28 +338,17 @@ fn is_dots(c: char) -> bool {
     matches!(c, '\u{307}' | '\u{308}')
 }
 
-/// Text whose last letter carries one dot or two, as derivatives do. Where there is no such letter as a whole,
-/// full stops are raised above it: the mark that combines is misplaced by many fonts.
-fn dotted(text: &str, dots: char, size: f64) -> String {
-    let whole = match (text.chars().last(), dots) {
-        (Some('x'), '\u{307}') => Some('ẋ'),
-        (Some('x'), _) => Some('ẍ'),
-        _ => None,
-    };
-    if let Some(whole) = whole {
-        return format!("{}{whole}", &text[..text.len() - 1]);
-    }
+/// One dot or two above the letter before, as derivatives have: full stops, raised, since the marks that
+/// combine are misplaced by many fonts.
+fn raised_dots(dots: char, size: f64) -> String {
     // A Greek letter is about 0.66 em wide, a full stop 0.27.
     let (letter, stop) = (0.66 * size, 0.27 * size);
     let (rise, close) = (0.6 * size, 0.05 * size);
     let (marks, wide) = if dots == '\u{307}' { (".", stop) } else { ("..", 2.0 * stop - close) };
-    let spacing = if marks.len() > 1 {
-        format!("{} {}", n(-(letter + wide) / 2.0), n(-close))
-    } else {
-        n(-(letter + wide) / 2.0)
-    };
+    let back = n(-(letter + wide) / 2.0);
+    let spacing = if marks.len() > 1 { format!("{back} {}", n(-close)) } else { back };
     format!(
-        "{text}<tspan dx=\"{spacing}\" dy=\"{}\">{marks}</tspan><tspan dx=\"{}\" dy=\"{}\">\u{200b}</tspan>",
+        "<tspan dx=\"{spacing}\" dy=\"{}\">{marks}</tspan><tspan dx=\"{}\" dy=\"{}\">\u{200b}</tspan>",
         n(-rise),
         n((letter - wide) / 2.0),
         n(rise)
