@@ -1,5 +1,10 @@
 //! Scales: the range that is shown, the ticks on it, and what is written at them.
 
+/// Whether a value can be shown at all.
+pub(crate) fn in_range(value: f64) -> bool {
+    value.abs() < 1e300
+}
+
 /// Values to coordinates.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Scale {
@@ -12,7 +17,7 @@ impl Scale {
     /// A scale that shows all `values`; `tight` ends at the outermost ones, otherwise there is some air.
     pub fn covering(values: impl Iterator<Item = f64>, log: bool, tight: bool) -> Self {
         let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
-        for v in values.filter(|v| v.is_finite() && v.abs() < 1e300 && (!log || *v > 0.0)) {
+        for v in values.filter(|v| in_range(*v) && (!log || *v > 0.0)) {
             lo = lo.min(v);
             hi = hi.max(v);
         }
@@ -90,7 +95,7 @@ fn round_step(rough: f64) -> f64 {
 /// A tick's text: as many decimals as the step needs, powers of ten beyond comfortable lengths.
 fn label(value: f64, step: f64, largest: f64) -> String {
     let value = if value.abs() < 1e-9 * step { 0.0 } else { value };
-    if largest >= 1e6 || largest < 1e-4 {
+    if !(1e-4..1e6).contains(&largest) {
         let digits = (largest / step).log10().ceil().clamp(0.0, 15.0) as usize + 1;
         return crate::number::engineering(value, "", digits);
     }

@@ -1,6 +1,6 @@
 //! A figure as SVG. `plot.js` draws the same on a page after a zoom; keep the two alike.
 
-use super::axis::Scale;
+use super::axis::{Scale, in_range};
 use super::decimate::decimate;
 use super::figure::{Figure, Marker, Panel, Series, Style};
 use super::svg::{self, Anchor, Svg, n, text_width};
@@ -82,11 +82,9 @@ pub(crate) fn svg(figure: &Figure, with_title: bool) -> String {
             out.line((across(*v), top), (across(*v), top + height), svg::GRID, 1.0);
         }
         markers(&mut out, figure, i == 0, &across, (left, left + width), (top, height));
-        clip(&mut out, (left, top), (width, height));
         for series in &panel.series {
             curve(&mut out, series, (figure.x.factor, panel.y.factor), (&x, y), &across, &up, width);
         }
-        out.raw("</svg>");
         for Marker { at, label } in &panel.horizontals {
             let at = up(at * panel.y.factor);
             dashed(&mut out, (left, at), (left + width, at));
@@ -182,12 +180,6 @@ fn dashed(out: &mut Svg, from: (f64, f64), to: (f64, f64)) {
     out.path(&d, svg::MARK, 1.1, " stroke-dasharray=\"1.5 3\"");
 }
 
-/// Opens a nested viewport: it clips without an id, so that many figures fit on one page.
-fn clip(out: &mut Svg, at: (f64, f64), size: (f64, f64)) {
-    let (x, y, w, h) = (n(at.0), n(at.1 - 2.0), n(size.0), n(size.1 + 4.0));
-    out.raw(&format!("<svg x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" viewBox=\"{x} {y} {w} {h}\">"));
-}
-
 fn dash(style: Style) -> &'static str {
     match style {
         Style::Solid | Style::Points => "",
@@ -209,7 +201,8 @@ fn curve(
     let paint = series.colour.paint();
     let points = x.iter().zip(&y).map(|(&x, &y)| {
         let (x, y) = (x * fx, y * fy);
-        let shown = x.is_finite() && y.is_finite() && (!sx.log || x > 0.0) && (!sy.log || y > 0.0);
+        // The scales cover all that is shown, so nothing needs to be clipped.
+        let shown = in_range(x) && in_range(y) && (!sx.log || x > 0.0) && (!sy.log || y > 0.0);
         shown.then(|| (across(x), up(y)))
     });
     let points: Vec<Option<(f64, f64)>> = points.collect();

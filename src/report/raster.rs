@@ -35,5 +35,19 @@ pub fn png(svg: &str, scale: f32) -> Result<Vec<u8>> {
     let mut pixels = Pixmap::new(width as u32, height as u32).expect("the size was checked");
     pixels.fill(Color::WHITE);
     resvg::render(&tree, Transform::from_scale(scale, scale), &mut pixels.as_mut());
-    pixels.encode_png().map_err(|e| Error::new(format!("this picture cannot be encoded: {e}")))
+    encode(&pixels).map_err(|e| Error::new(format!("this picture cannot be encoded: {e}")))
+}
+
+/// Nothing is transparent after the white, so three channels do; and plots compress well with little effort.
+fn encode(pixels: &Pixmap) -> std::result::Result<Vec<u8>, png::EncodingError> {
+    let rgb: Vec<u8> = pixels.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+    let mut out = Vec::new();
+    let mut encoder = png::Encoder::new(&mut out, pixels.width(), pixels.height());
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Fast);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&rgb)?;
+    writer.finish()?;
+    Ok(out)
 }

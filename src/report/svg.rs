@@ -113,10 +113,6 @@ impl Svg {
         )
     }
 
-    pub fn raw(&mut self, text: &str) {
-        self.body.push_str(text);
-    }
-
     /// A stroked path.
     pub fn path(&mut self, d: &str, paint: &Paint, width: f64, extra: &str) {
         let Paint { class, light, .. } = paint;
