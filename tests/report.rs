@@ -38,7 +38,7 @@ fn body(name: &str, terms: usize) -> BodyEquation {
         gain: "r² k₁".into(),
         value: i as f64,
         unit: "N m/rad".into(),
-        sign: if i % 2 == 0 { Sign::Plus } else { Sign::Minus },
+        sign: if i.is_multiple_of(2) { Sign::Plus } else { Sign::Minus },
     };
     BodyEquation {
         name: name.into(),
