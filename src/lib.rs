@@ -6,6 +6,9 @@ pub mod files;
 pub mod friction;
 pub mod log;
 pub mod number;
+pub mod parameter;
+pub mod plant;
+pub mod quantity;
 #[cfg(feature = "report")]
 pub mod report;
 pub mod signal;

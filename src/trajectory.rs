@@ -38,6 +38,16 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
+    /// No rows yet, the headings of `columns`, and room for so many rows.
+    pub fn with_capacity(columns: &[Column], rows: usize) -> Self {
+        let room = |column: &Column| Column {
+            name: column.name.clone(),
+            unit: column.unit.clone(),
+            values: Vec::with_capacity(rows.min(1 << 20)),
+        };
+        Self { columns: columns.iter().map(room).collect() }
+    }
+
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.columns.first().map_or(0, |c| c.values.len())

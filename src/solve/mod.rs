@@ -1,17 +1,42 @@
 //! Runs an experiment on a stage: the choice of solver, the events, how it ended and what it cost.
 
+mod exact;
+mod law;
+mod propagator;
+mod record;
+mod roots;
+mod table3;
+
+use crate::case::Experiment;
+use crate::error::Result;
 use crate::friction::Motion;
+use crate::plant::{Body, Plant};
+use crate::stage::Stage;
 use crate::trajectory::Trajectory;
 
-/// One of the three inertias.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Body {
-    /// Drive pulley, φ₁.
-    DrivePulley,
-    /// Cart, x.
-    Cart,
-    /// Idler pulley, φ₃.
-    IdlerPulley,
+/// How the equations are solved.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Solver {
+    /// Modes and matrix exponentials: exact to rounding.
+    #[default]
+    Exact,
+    /// The paper's Table 3 with a fixed step: a reproduction, not a recommendation.
+    Table3 {
+        /// Step, s; shortened so that steps fill the output interval.
+        step: f64,
+        /// Formula.
+        method: Method,
+    },
+}
+
+/// A fixed-step formula.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// The classical formula of order four (Simulink's ode4).
+    #[default]
+    RungeKutta4,
+    /// Order five (Simulink's ode5).
+    DormandPrince5,
 }
 
 /// A body that starts to slide, stops, or turns back.
@@ -30,18 +55,16 @@ pub struct Event {
 }
 
 /// How a run ended.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Ending {
     /// At the end of the experiment.
     Complete,
-    /// More events than the bound allows; the time reached, s, is given.
+    /// More events than the bound allows.
     TooManyEvents {
         /// Time reached, s.
         time: f64,
-        /// Events so far.
-        events: usize,
     },
-    /// A state became infinite or not a number; the time reached, s, is given.
+    /// A state became infinite or not a number.
     Diverged {
         /// Time reached, s.
         time: f64,
@@ -58,16 +81,31 @@ pub enum Ending {
 pub struct Cost {
     /// Rows put out.
     pub samples: u64,
-    /// Events handled.
-    pub events: u64,
     /// Pieces of the input.
     pub pieces: u64,
-    /// Propagator matrices computed (exact solver).
+    /// Modes for which equations were set up.
+    pub modes: u64,
+    /// Propagator matrices computed.
     pub propagators: u64,
     /// Steps taken: products of a propagator and a state, or steps of a fixed-step method.
     pub steps: u64,
+    /// Intervals looked at for an event.
+    pub looks: u64,
+    /// Taylor series of the state expanded.
+    pub series: u64,
     /// Evaluations of the equations of motion (fixed-step methods).
     pub evaluations: u64,
+}
+
+/// Everything about a run but its rows.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// Every stick, slip and reversal, in order.
+    pub events: Vec<Event>,
+    /// How it ended.
+    pub ending: Ending,
+    /// What it cost.
+    pub cost: Cost,
 }
 
 /// A whole run in memory.
@@ -75,10 +113,86 @@ pub struct Cost {
 pub struct Solution {
     /// What every quantity did.
     pub trajectory: Trajectory,
-    /// Every stick, slip and reversal, in order.
-    pub events: Vec<Event>,
-    /// How it ended.
-    pub ending: Ending,
-    /// What it cost.
-    pub cost: Cost,
+    /// Events, ending and cost.
+    pub outcome: Outcome,
+}
+
+/// What the receiver of a block of rows wants next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Flow {
+    /// More.
+    Continue,
+    /// No more.
+    Stop,
+}
+
+/// The times at which rows are put out: 0, `every`, 2 `every`, … up to `until`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grid {
+    every: f64,
+    until: f64,
+    /// Number of intervals.
+    intervals: u64,
+    /// Whether the intervals fill the run, so that row k is at k·until/intervals, rounded once.
+    whole: bool,
+}
+
+impl Grid {
+    /// The rows of an experiment.
+    pub fn new(every: f64, until: f64) -> Self {
+        let ratio = until / every;
+        let nearest = ratio.round();
+        let whole = (ratio - nearest).abs() <= 1e-9 * nearest.max(1.0) && nearest >= 1.0;
+        let intervals = if whole { nearest } else { ratio.floor() };
+        Self { every, until, intervals: intervals as u64, whole }
+    }
+
+    /// Time of row `k`, s.
+    #[inline]
+    pub fn time(&self, k: u64) -> f64 {
+        if self.whole { k as f64 * self.until / self.intervals as f64 } else { k as f64 * self.every }
+    }
+
+    /// Number of intervals; there is one row more.
+    pub fn intervals(&self) -> u64 {
+        self.intervals
+    }
+
+    /// Length of an interval, s.
+    pub fn interval(&self) -> f64 {
+        if self.whole { self.until / self.intervals as f64 } else { self.every }
+    }
+
+    /// Time of the last row, s: where the run ends.
+    pub fn end(&self) -> f64 {
+        self.time(self.intervals)
+    }
+}
+
+/// Runs `experiment` on `stage` and keeps everything in memory.
+pub fn simulate(stage: &Stage, experiment: &Experiment, solver: Solver) -> Result<Solution> {
+    let rows = Grid::new(experiment.every, experiment.until).intervals() as usize + 1;
+    let mut trajectory = Trajectory::default();
+    let outcome = stream(stage, experiment, solver, &mut |block| {
+        if trajectory.is_empty() {
+            trajectory = Trajectory::with_capacity(&block.columns, rows);
+        }
+        trajectory.append(block);
+        Flow::Continue
+    })?;
+    Ok(Solution { trajectory, outcome })
+}
+
+/// Runs `experiment` on `stage` and hands its rows to `sink` in blocks, so that memory stays bounded however long it is.
+pub fn stream(
+    stage: &Stage,
+    experiment: &Experiment,
+    solver: Solver,
+    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+) -> Result<Outcome> {
+    let plant = Plant::new(stage);
+    match solver {
+        Solver::Exact => Ok(exact::run(&plant, experiment, sink)),
+        Solver::Table3 { step, method } => table3::run(&plant, experiment, step, method, sink),
+    }
 }

@@ -1,0 +1,281 @@
+//! The case file: TOML in, a [`Case`] out, and every mistake told with its line.
+
+mod input;
+mod reader;
+mod set;
+mod stage;
+mod template;
+mod tree;
+
+pub use template::TEMPLATE;
+
+use crate::error::{Error, Result};
+use crate::signal::Signal;
+use crate::stage::{AmplifierMode, Stage};
+use reader::{Field, Table};
+use std::collections::HashMap;
+use std::io::Read;
+use std::path::Path;
+
+/// Most rows of a result.
+const MOST_SAMPLES: f64 = 1e9;
+
+/// Longest name of an experiment, in characters.
+const LONGEST_NAME: usize = 100;
+
+/// Keys that stand in the plan and not yet in the program.
+const PLANNED: &[&str] = &["controller", "fit", "sweep"];
+const PLANNED_EXPERIMENT: &[&str] = &["log"];
+
+/// Everything needed to repeat a run.
+#[derive(Debug, Clone)]
+pub struct Case {
+    /// What the file says it is; its name where it does not say.
+    pub title: String,
+    /// The machine.
+    pub stage: Stage,
+    /// What is done with it, in the file's order.
+    pub experiments: Vec<Experiment>,
+    /// The text it was read from, with `--set` applied: read again, it gives the same case.
+    pub text: String,
+}
+
+/// One run of the stage.
+#[derive(Debug, Clone)]
+pub struct Experiment {
+    /// Its name, unique within the case.
+    pub name: String,
+    /// What is fed into the amplifier.
+    pub input: Signal,
+    /// End of the run, s.
+    pub until: f64,
+    /// Output interval, s.
+    pub every: f64,
+    /// Where it starts from.
+    pub initial: Initial,
+}
+
+/// The state at time zero; at rest at the origin unless said otherwise.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Initial {
+    /// φ₁, rad.
+    pub drive_angle: f64,
+    /// φ₁′, rad/s.
+    pub drive_speed: f64,
+    /// x, m.
+    pub cart_position: f64,
+    /// x′, m/s.
+    pub cart_speed: f64,
+    /// φ₃, rad.
+    pub idler_angle: f64,
+    /// φ₃′, rad/s.
+    pub idler_speed: f64,
+    /// Armature current, A; matters only with an inductance.
+    pub motor_current: f64,
+}
+
+impl Case {
+    /// Reads a case file.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        Self::read_with(path, &[])
+    }
+
+    /// Reads a case file with changes, each as `KEY=VALUE`.
+    pub fn read_with(path: impl AsRef<Path>, changes: &[&str]) -> Result<Self> {
+        let path = path.as_ref();
+        let fail = |what: String| Error::new(what).in_file(path);
+        let bytes = read_bytes(path).map_err(|e| {
+            let error = fail(format!("this case file cannot be read: {}", told(&e)));
+            match e.kind() {
+                std::io::ErrorKind::NotFound => error.next("check the path, or write a new case with `taut init`"),
+                _ => error,
+            }
+        })?;
+        let text = String::from_utf8(bytes).map_err(|e| {
+            fail(format!("this is not a text file: byte {} is not UTF-8", e.utf8_error().valid_up_to() + 1))
+                .next("give the path of a case file in TOML, saved as UTF-8")
+        })?;
+        Self::from_text_with(path, &text, changes)
+    }
+
+    /// Reads a case from text; `name` stands in messages, and paths in the text are relative to its folder.
+    pub fn from_text(name: impl AsRef<Path>, text: &str) -> Result<Self> {
+        Self::from_text_with(name, text, &[])
+    }
+
+    /// Reads a case from text with changes, each as `KEY=VALUE`.
+    ///
+    /// ```
+    /// use taut::case::{Case, TEMPLATE};
+    /// let case = Case::from_text_with("axis.toml", TEMPLATE, &["cart.mass=0.5 kg", "experiment.0.until=2s"])?;
+    /// assert_eq!(case.stage.cart.mass, 0.5);
+    /// assert_eq!(case.experiments[0].until, 2.0);
+    /// # Ok::<(), taut::Error>(())
+    /// ```
+    pub fn from_text_with(name: impl AsRef<Path>, text: &str, changes: &[&str]) -> Result<Self> {
+        let name = name.as_ref();
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let source = set::apply(name, text, changes)?;
+        let tree = source.tree()?;
+        let root = Field::root(&source, &tree).table()?;
+        if root.keys().next().is_none() {
+            return Err(Error::new("this case file is empty")
+                .in_file(name)
+                .next("write a commented one to start from with `taut init`"));
+        }
+        let tables =
+            ["title", "motor", "amplifier", "drive_pulley", "idler_pulley", "cart", "belt", "encoder", "experiment"];
+        root.check_keys(&tables, PLANNED)?;
+
+        let title = match root.optional("title") {
+            Some(field) => field.text()?.to_string(),
+            None => name.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
+        };
+        let stage = stage::stage(&root)?;
+        let experiments = experiments(&root, &stage, name.parent().unwrap_or(Path::new("")))?;
+        Ok(Self { title, stage, experiments, text: source.text.clone() })
+    }
+}
+
+/// The content of a file, up to a little more than a case may have: what is too long is told with the rest.
+fn read_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)?.take(tree::LARGEST_FILE as u64 + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// What the system says about a file, in our words.
+fn told(error: &std::io::Error) -> String {
+    use std::io::ErrorKind as Kind;
+    match error.kind() {
+        Kind::NotFound => "there is no such file".to_string(),
+        Kind::PermissionDenied => "permission is denied".to_string(),
+        Kind::IsADirectory => "it is a folder".to_string(),
+        _ => error.to_string(),
+    }
+}
+
+impl Experiment {
+    /// Its name as that of a file, without ending: in lower case, what is neither letter nor digit as `-`.
+    pub fn file_name(&self) -> String {
+        file_name(&self.name)
+    }
+
+    /// Number of rows of its result, the first at time zero.
+    pub fn samples(&self) -> u64 {
+        (self.until / self.every * (1.0 + 1e-12)).floor() as u64 + 1
+    }
+}
+
+/// A name as that of a file: `5 V pulse` becomes `5-v-pulse`.
+pub fn file_name(name: &str) -> String {
+    name.to_lowercase().chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect()
+}
+
+fn experiments(root: &Table, stage: &Stage, folder: &Path) -> Result<Vec<Experiment>> {
+    let such_as = "[[experiment]] with name, input, until and every";
+    let field = root.required("experiment", such_as)?;
+    if field.is_table() {
+        return Err(field
+            .fail("a list of tables is wanted")
+            .next("write [[experiment]] with double brackets: there can be several"));
+    }
+    let list = field.list()?;
+    if list.is_empty() {
+        return Err(field.fail("the list is empty").next(format!("add {such_as}")));
+    }
+    let mut experiments: Vec<Experiment> = Vec::new();
+    let mut files: HashMap<String, usize> = HashMap::new();
+    for field in list {
+        let experiment = experiment(&field.clone().named("experiment"), stage, folder)?;
+        let file = experiment.file_name();
+        if let Some(other) = files.insert(file.clone(), experiments.len()).and_then(|i| experiments.get(i)) {
+            let (name, other) = (&experiment.name, &other.name);
+            let what = match name == other {
+                true => format!("\"{name}\" is the name of two experiments"),
+                false => format!("\"{other}\" and \"{name}\" would both be written to {file}.csv"),
+            };
+            let field = field.table()?.required("name", "a name")?;
+            return Err(field.fail(what).next("give each experiment a name of its own"));
+        }
+        experiments.push(experiment);
+    }
+    Ok(experiments)
+}
+
+fn experiment(field: &Field, stage: &Stage, folder: &Path) -> Result<Experiment> {
+    let field = Field {
+        input_unit: match stage.amplifier.mode {
+            AmplifierMode::Voltage => "V",
+            AmplifierMode::Current => "A",
+        },
+        ..field.clone()
+    };
+    let table = field.table()?;
+    table.check_keys(&["name", "input"], PLANNED_EXPERIMENT)?;
+    let name = table.required("name", "for example name = \"5 V pulse\"")?;
+    check_name(&name)?;
+    let until = table.number("until")?;
+    let every = table.number("every")?;
+    if every > until {
+        let field = table.optional("every").unwrap_or(field);
+        return Err(field
+            .fail(format!("an interval of {every} s is longer than the run of {until} s"))
+            .allowed(format!("up to {until} s")));
+    }
+    if until / every > MOST_SAMPLES {
+        let field = table.optional("every").unwrap_or(field);
+        return Err(field
+            .fail(format!("this makes {} rows", crate::quantity::rounded(until / every)))
+            .allowed(format!("up to {} rows", crate::quantity::rounded(MOST_SAMPLES)))
+            .next("take a longer interval: it does not affect the accuracy"));
+    }
+    let unit = field.input_unit;
+    let input =
+        table.required("input", &format!("for example input = {{ pulse = \"5 {unit}\", for = \"0.25 s\" }}"))?;
+    let input = input::signal(&input, &input::Context { folder, until })?;
+    let initial = match table.optional("initial") {
+        Some(field) => initial(&field.table()?, stage)?,
+        None => Initial::default(),
+    };
+    Ok(Experiment { name: name.text()?.to_string(), input, until, every, initial })
+}
+
+fn check_name(field: &Field) -> Result<()> {
+    let name = field.text()?;
+    let usable = "letters, digits, spaces and signs other than / and \\";
+    if !name.chars().any(char::is_alphanumeric) {
+        return Err(field.fail(format!("\"{}\" holds no letter and no digit", name.escape_debug())).allowed(usable));
+    }
+    if let Some(c) = name.chars().find(|c| matches!(c, '/' | '\\') || c.is_control()) {
+        return Err(field
+            .fail(format!("a name with `{}` would lead out of the output folder", c.escape_debug()))
+            .allowed(usable));
+    }
+    match name.chars().count() {
+        n if n > LONGEST_NAME => {
+            Err(field.fail(format!("the name has {n} characters")).allowed(format!("up to {LONGEST_NAME}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn initial(table: &Table, stage: &Stage) -> Result<Initial> {
+    table.check_keys(&[], &[])?;
+    if let Some(current) = table.optional("motor_current")
+        && (stage.motor.inductance == 0.0 || stage.amplifier.mode == AmplifierMode::Current)
+    {
+        return Err(current
+            .fail("this current would have no effect")
+            .next("it needs motor.inductance above zero and amplifier.mode = \"voltage\"; or leave it out"));
+    }
+    Ok(Initial {
+        drive_angle: table.number("drive_angle")?,
+        drive_speed: table.number("drive_speed")?,
+        cart_position: table.number("cart_position")?,
+        cart_speed: table.number("cart_speed")?,
+        idler_angle: table.number("idler_angle")?,
+        idler_speed: table.number("idler_speed")?,
+        motor_current: table.number("motor_current")?,
+    })
+}

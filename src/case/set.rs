@@ -1,0 +1,174 @@
+//! `--set KEY=VALUE`: changes the text of a case and leaves its comments alone.
+
+use super::tree::{Kind, Node, Override, Source};
+use crate::error::{Error, Place, Result};
+use std::path::Path;
+use toml_edit::{ArrayOfTables, DocumentMut, Item, Key, Table, Value};
+
+/// A change, as given on the command line.
+struct Change<'a> {
+    argument: &'a str,
+    key: Vec<String>,
+    value: Value,
+}
+
+/// The text with all changes applied, and where they ended up in it.
+pub(super) fn apply(name: &Path, text: &str, changes: &[&str]) -> Result<Source> {
+    let source = Source::new(name, text.to_string());
+    if changes.is_empty() {
+        return Ok(source);
+    }
+    source.tree()?; // tells mistakes of the file as such
+    let mut document: DocumentMut = text.parse().map_err(|_| Error::new("this is not TOML").in_file(name))?;
+    let changes = changes.iter().map(|argument| Change::new(argument)).collect::<Result<Vec<_>>>()?;
+    for change in &changes {
+        change.apply(document.as_item_mut())?;
+    }
+    let mut changed = Source::new(name, document.to_string());
+    let tree = changed.tree()?;
+    for change in &changes {
+        if let Some(range) = find(&tree, &change.key) {
+            changed.overrides.push(Override { argument: change.argument.to_string(), range });
+        }
+    }
+    Ok(changed)
+}
+
+impl<'a> Change<'a> {
+    fn new(argument: &'a str) -> Result<Self> {
+        let usage = "write KEY=VALUE, such as --set cart.mass=\"0.5 kg\" or --set experiment.0.until=2s";
+        let whole = || Place::in_text("--set", argument, 0..argument.len());
+        let Some((key, value)) = argument.split_once('=') else {
+            return Err(Error::new("there is no `=`").at(whole()).next(usage));
+        };
+        let keys = Key::parse(key).ok().filter(|keys| !keys.is_empty());
+        let Some(keys) = keys else {
+            return Err(Error::new(format!("\"{key}\" is no key")).at(whole()).next(usage));
+        };
+        let value = value.trim();
+        // What TOML understands is TOML; the rest is a text: 0.5 kg needs no second pair of quotes.
+        let value = match value.parse::<Value>() {
+            Ok(parsed) => parsed,
+            Err(_) if value.starts_with(['[', '{', '"', '\'']) => {
+                let at = Place::in_text("--set", argument, key.len() + 1..argument.len());
+                return Err(Error::new("this list, table or text is not complete")
+                    .at(at)
+                    .next("inside it, texts stand in quotes: [\"1 kN/m\", \"2 kN/m\"]"));
+            }
+            Err(_) => Value::from(value),
+        };
+        Ok(Self { argument, key: keys.iter().map(|k| k.get().to_string()).collect(), value })
+    }
+
+    fn fail(&self, what: impl Into<String>) -> Error {
+        let key = self.argument.find('=').unwrap_or(self.argument.len());
+        Error::new(what).at(Place::in_text("--set", self.argument, 0..key))
+    }
+
+    fn apply(&self, root: &mut Item) -> Result<()> {
+        let mut item = root;
+        let Some((last, path)) = self.key.split_last() else { return Ok(()) };
+        for (depth, step) in path.iter().enumerate() {
+            item = self.step(item, step, depth)?;
+        }
+        let fresh = matches!(item, Item::Table(_));
+        match item {
+            Item::Value(Value::Array(list)) => {
+                let length = list.len();
+                let slot = last.parse::<usize>().ok().and_then(|i| list.get_mut(i));
+                let Some(slot) = slot else { return Err(self.no_element(last, length)) };
+                replace(slot, self.value.clone());
+            }
+            other => {
+                let Some(table) = other.as_table_like_mut() else {
+                    return Err(self.fail(format!("`{last}` cannot be set: what stands before it is no table")));
+                };
+                match table.get_mut(last) {
+                    Some(Item::Value(old)) => replace(old, self.value.clone()),
+                    _ => {
+                        let mut value = self.value.clone();
+                        if fresh {
+                            value.decor_mut().clear();
+                        }
+                        table.insert(last, Item::Value(value));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The table or list element called `step`; a table that is not there yet is made.
+    fn step<'i>(&self, item: &'i mut Item, step: &str, depth: usize) -> Result<&'i mut Item> {
+        if let Item::ArrayOfTables(tables) = item {
+            let length = tables.len();
+            let Some(index) = index_of(tables, step) else { return Err(self.no_element(step, length)) };
+            return item.get_mut(index).ok_or_else(|| self.no_element(step, length));
+        }
+        if item.is_array() {
+            return Err(self.fail(format!("`{step}` lies inside a list; set the whole list instead")));
+        }
+        let Some(table) = item.as_table_like_mut() else {
+            return Err(self.fail(format!("`{step}` cannot be reached: what stands before it is no table")));
+        };
+        if !table.contains_key(step) {
+            let new = match depth {
+                0 => Item::Table(Table::new()),
+                _ => Item::Value(Value::InlineTable(toml_edit::InlineTable::new())),
+            };
+            table.insert(step, new);
+        }
+        table.get_mut(step).ok_or_else(|| self.fail(format!("`{step}` cannot be made")))
+    }
+
+    fn no_element(&self, step: &str, length: usize) -> Error {
+        let allowed = match length {
+            0 => "the list is empty".to_string(),
+            n => format!("0 to {}, or the name of an experiment in quotes", n - 1),
+        };
+        self.fail(format!("there is no element `{step}`")).allowed(allowed)
+    }
+}
+
+/// Puts `new` where `old` was, with the old one's spaces and comments.
+fn replace(old: &mut Value, mut new: Value) {
+    *new.decor_mut() = old.decor().clone();
+    *old = new;
+}
+
+fn index_of(tables: &ArrayOfTables, step: &str) -> Option<usize> {
+    match step.parse::<usize>() {
+        Ok(index) => Some(index).filter(|&i| i < tables.len()),
+        Err(_) => tables.iter().position(|t| t.get("name").and_then(Item::as_str) == Some(step)),
+    }
+}
+
+/// Where the value of `key` stands in the changed text, its key included.
+fn find(tree: &Node, key: &[String]) -> Option<std::ops::Range<usize>> {
+    let mut node = tree;
+    let mut range = node.span.clone();
+    for step in key {
+        match &node.kind {
+            Kind::Table(entries) => {
+                let entry = entries.iter().find(|e| e.key == *step)?;
+                node = &entry.node;
+                range = entry.key_span.start..node.span.end.max(entry.key_span.end);
+            }
+            Kind::List(nodes) | Kind::Tables(nodes) => {
+                let by_name = |n: &&Node| match &n.kind {
+                    Kind::Table(entries) => entries
+                        .iter()
+                        .any(|e| e.key == "name" && matches!(&e.node.kind, Kind::Text(text) if text == step)),
+                    _ => false,
+                };
+                node = match step.parse::<usize>() {
+                    Ok(index) => nodes.get(index)?,
+                    Err(_) => nodes.iter().find(by_name)?,
+                };
+                range = node.span.clone();
+            }
+            _ => return None,
+        }
+    }
+    Some(range)
+}

@@ -1,0 +1,188 @@
+//! TOML with places: every value knows where it stands, so that every mistake can be told with its line.
+
+use crate::error::{Error, Place, Result};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use toml_edit::{Document, Item, Value};
+
+/// Largest case file, in bytes; what is longer than that belongs into a CSV file.
+pub(super) const LARGEST_FILE: usize = 16 << 20;
+
+/// The text of a case and where it came from.
+pub(super) struct Source {
+    pub name: PathBuf,
+    pub text: String,
+    /// What `--set` put into the text.
+    pub overrides: Vec<Override>,
+}
+
+/// One `--set`, and the stretch of the text that it made.
+pub(super) struct Override {
+    pub argument: String,
+    pub range: Range<usize>,
+}
+
+/// A value with its place.
+#[derive(Debug, Clone)]
+pub(super) struct Node {
+    pub span: Range<usize>,
+    pub kind: Kind,
+}
+
+#[derive(Debug, Clone)]
+pub(super) enum Kind {
+    Text(String),
+    Integer(i64),
+    Float(f64),
+    Bool(bool),
+    Date,
+    List(Vec<Node>),
+    /// From `[[header]]`s.
+    Tables(Vec<Node>),
+    Table(Vec<Entry>),
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Entry {
+    pub key: String,
+    pub key_span: Range<usize>,
+    pub node: Node,
+}
+
+impl Source {
+    pub fn new(name: &Path, text: String) -> Self {
+        Self { name: name.to_path_buf(), text, overrides: Vec::new() }
+    }
+
+    pub fn place(&self, range: Range<usize>) -> Place {
+        let set = self.overrides.iter().find(|o| o.range.start <= range.start && range.end <= o.range.end);
+        if let Some(set) = set {
+            let value = set.argument.find('=').map_or(0, |i| i + 1);
+            return Place::in_text("--set", &set.argument, value..set.argument.len());
+        }
+        Place::in_text(&self.name, &self.text, range)
+    }
+
+    /// The root table, or where the text is no TOML.
+    pub fn tree(&self) -> Result<Node> {
+        let text = self.text.as_str();
+        if text.len() > LARGEST_FILE {
+            return Err(Error::new("this case file is too large")
+                .in_file(&self.name)
+                .allowed(format!("up to {LARGEST_FILE} bytes"))
+                .next("put long tables into a CSV file, and read it with input = { file = ... }"));
+        }
+        if let Some(at) = text.find('\0') {
+            return Err(Error::new("this is not a text file: it holds a zero byte")
+                .at(self.place(at..at))
+                .next("give the path of a case file in TOML"));
+        }
+        let document = Document::parse(text).map_err(|e| syntax(self, &e))?;
+        Ok(Node { span: 0..0, kind: Kind::Table(entries(document.as_table(), 0..0)) })
+    }
+}
+
+/// A TOML mistake in our words where we have better ones.
+fn syntax(source: &Source, error: &toml_edit::TomlError) -> Error {
+    let end = source.text.len();
+    let span = error.span().unwrap_or(end..end);
+    let message = error.message().lines().collect::<Vec<_>>().join("; ");
+    let line = {
+        let at = source.text.floor_char_boundary(span.start);
+        let begin = source.text[..at].rfind('\n').map_or(0, |i| i + 1);
+        source.text[begin..].lines().next().unwrap_or_default()
+    };
+    let header = line.trim_start().starts_with('[');
+    let (what, next) = TOML_MISTAKES
+        .iter()
+        .find(|(theirs, ..)| message.contains(theirs))
+        .map_or((format!("this is not TOML: {message}"), None), |(_, what, next)| ((*what).to_string(), Some(*next)));
+    let next = next.unwrap_or(match header {
+        true => "a table begins with its name in brackets, such as [cart] or [[experiment]]",
+        false => A_LINE,
+    });
+    Error::new(what).at(source.place(span)).next(next)
+}
+
+const A_LINE: &str = "a line is key = value; a number with a unit stands in quotes, such as mass = \"0.362 kg\"";
+
+/// Mistakes of the notation: what the reader of TOML says, and what we say instead.
+const TOML_MISTAKES: &[(&str, &str, &str)] = &[
+    ("recursion", "this is nested too deeply", "nest lists and tables less deeply"),
+    ("duplicate key", "this stands here for the second time", "keep one of the two"),
+    ("values must be quoted", "this is neither a number nor a text in quotes", A_LINE),
+    ("number overflowed", "this number is too large for a computer's number", "check its digits and its power of ten"),
+    ("key with no value", "there is no `=` after this key", A_LINE),
+    (
+        "unclosed table",
+        "the `]` is missing",
+        "a table begins with its name in brackets, such as [cart] or [[experiment]]",
+    ),
+    ("invalid basic string", "the text is not closed: a `\"` is missing", A_LINE),
+    (
+        "comma between array elements",
+        "the list is not closed, or a comma is missing in it",
+        "a list is such as [1, 2, 3]",
+    ),
+    (
+        "comma between key-value pairs",
+        "a comma is missing",
+        "a table in one line is such as { viscous = 19, coulomb = 0.2 }",
+    ),
+];
+
+fn entries(table: &dyn toml_edit::TableLike, outer: Range<usize>) -> Vec<Entry> {
+    table
+        .iter()
+        .filter(|(_, item)| !item.is_none())
+        .map(|(key, item)| {
+            let key_span = table.key(key).and_then(toml_edit::Key::span).unwrap_or(outer.clone());
+            Entry { key: key.to_string(), node: node(item, &key_span), key_span }
+        })
+        .collect()
+}
+
+fn node(item: &Item, key_span: &Range<usize>) -> Node {
+    match item {
+        Item::None => Node { span: key_span.clone(), kind: Kind::Table(Vec::new()) },
+        Item::Value(value) => value_node(value, key_span),
+        Item::Table(table) => Node { span: key_span.clone(), kind: Kind::Table(entries(table, key_span.clone())) },
+        Item::ArrayOfTables(tables) => {
+            let one = |table: &toml_edit::Table| {
+                let span = table.span().unwrap_or(key_span.clone());
+                Node { kind: Kind::Table(entries(table, span.clone())), span }
+            };
+            Node { span: key_span.clone(), kind: Kind::Tables(tables.iter().map(one).collect()) }
+        }
+    }
+}
+
+fn value_node(value: &Value, outer: &Range<usize>) -> Node {
+    let span = value.span().unwrap_or(outer.clone());
+    let kind = match value {
+        Value::String(text) => Kind::Text(text.value().clone()),
+        Value::Integer(number) => Kind::Integer(*number.value()),
+        Value::Float(number) => Kind::Float(*number.value()),
+        Value::Boolean(flag) => Kind::Bool(*flag.value()),
+        Value::Datetime(_) => Kind::Date,
+        Value::Array(list) => Kind::List(list.iter().map(|v| value_node(v, &span)).collect()),
+        Value::InlineTable(table) => Kind::Table(entries(table, span.clone())),
+    };
+    Node { span, kind }
+}
+
+impl Kind {
+    /// What it is, for messages.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Kind::Text(_) => "a text",
+            Kind::Integer(_) | Kind::Float(_) => "a number",
+            Kind::Bool(true) => "true",
+            Kind::Bool(false) => "false",
+            Kind::Date => "a date or a time of day",
+            Kind::List(_) => "a list",
+            Kind::Tables(_) => "a list of tables",
+            Kind::Table(_) => "a table",
+        }
+    }
+}

@@ -1,0 +1,474 @@
+//! The one table of parameters: every number a case file can hold, with its symbol, unit, default, range and meaning.
+//!
+//! Reading, documentation and everything else that has to know a parameter derive from it.
+
+use crate::quantity::{rounded, shortest};
+use std::fmt::Write;
+
+/// One number of the case file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameter {
+    /// Where it stands: `cart.mass`. An experiment's own number is left out: `experiment.until`.
+    pub key: &'static str,
+    /// Its symbol in the equations; empty where it has none.
+    pub symbol: &'static str,
+    /// Its SI unit; empty for a pure number, [`INPUT`] for what the amplifier takes.
+    pub unit: &'static str,
+    /// What holds when it is not given.
+    pub default: Fallback,
+    /// The values it may take, in SI.
+    pub range: Range,
+    /// What it is.
+    pub sentence: &'static str,
+    /// How it is typically written.
+    pub example: &'static str,
+}
+
+/// The unit of what is fed into the amplifier: V in voltage mode, A in current mode.
+pub const INPUT: &str = "V or A";
+
+/// What holds for a parameter that is not given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Fallback {
+    /// It has to be given, at least where its table is.
+    Required,
+    /// This value, in SI.
+    Value(f64),
+    /// What the words say, mostly the value of another parameter.
+    Words(&'static str),
+}
+
+/// The values that make sense.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    /// The least value.
+    pub low: f64,
+    /// The greatest value.
+    pub high: f64,
+    /// Whether `low` itself is excluded.
+    pub above: bool,
+    /// Whether `high` itself is excluded.
+    pub below: bool,
+    /// Whether only whole numbers will do.
+    pub whole: bool,
+}
+
+impl Range {
+    const fn new(low: f64, high: f64) -> Self {
+        Self { low, high, above: false, below: false, whole: false }
+    }
+
+    /// Above zero, and within what a computer can tell apart.
+    const POSITIVE: Self = Self::new(1e-15, 1e15);
+    /// Zero or above.
+    const NOT_NEGATIVE: Self = Self::new(0.0, 1e15);
+    /// Of either sign.
+    const ANY: Self = Self::new(-1e15, 1e15);
+
+    const fn whole(low: f64, high: f64) -> Self {
+        Self { whole: true, ..Self::new(low, high) }
+    }
+
+    /// Whether `value` lies in it.
+    pub fn contains(&self, value: f64) -> bool {
+        let low = if self.above { value > self.low } else { value >= self.low };
+        let high = if self.below { value < self.high } else { value <= self.high };
+        low && high && (!self.whole || value.fract() == 0.0)
+    }
+
+    /// In words, with the unit: `from 0 to 1`, `above zero: from 1e-15 kg to 1e15 kg`.
+    pub fn describe(&self, unit: &str) -> String {
+        let with_unit = |v: f64| match unit {
+            "" => rounded(v),
+            _ => format!("{} {unit}", rounded(v)),
+        };
+        let (low, high) = (with_unit(self.low), with_unit(self.high));
+        let whole = if self.whole { "a whole number " } else { "" };
+        match (self.above, self.below) {
+            (false, false) => format!("{whole}from {low} to {high}"),
+            (true, false) => format!("{whole}above {low}, up to {high}"),
+            (false, true) => format!("{whole}from {low}, below {high}"),
+            (true, true) => format!("{whole}above {low} and below {high}"),
+        }
+    }
+
+    /// As short as a table wants it: `> 0`, `≥ 0`, `0 … 1`.
+    fn short(&self) -> String {
+        const FAR: f64 = 1e8;
+        let text = match (self.low, self.high) {
+            (low, high) if low <= -FAR && high >= FAR => "any".to_string(),
+            (low, high) if high >= FAR && low > 0.0 && low < 1e-9 => "> 0".to_string(),
+            (low, high) if high >= FAR => format!("≥ {}", shortest(low)),
+            (low, high) => format!(
+                "{}{} … {}{}",
+                if self.above { "> " } else { "" },
+                shortest(low),
+                if self.below { "< " } else { "" },
+                shortest(high)
+            ),
+        };
+        if self.whole { format!("whole, {text}") } else { text }
+    }
+}
+
+const fn row(
+    key: &'static str,
+    symbol: &'static str,
+    unit: &'static str,
+    default: Fallback,
+    range: Range,
+    example: &'static str,
+    sentence: &'static str,
+) -> Parameter {
+    Parameter { key, symbol, unit, default, range, sentence, example }
+}
+
+use Fallback::{Required, Value, Words};
+
+const ANY: Range = Range::ANY;
+const POSITIVE: Range = Range::POSITIVE;
+const NOT_NEGATIVE: Range = Range::NOT_NEGATIVE;
+/// Times in a run.
+const TIME: Range = Range::new(0.0, 1e9);
+const DURATION: Range = Range::new(1e-12, 1e9);
+const FREQUENCY: Range = Range::new(1e-9, 1e9);
+const UP_TO_ONE: Range = Range { above: true, ..Range::new(0.0, 1.0) };
+
+/// Friction of one body: the six rows with that body's key, symbols and units.
+macro_rules! friction {
+    ($body:literal, $viscous:literal, $coulomb:literal, $static:literal, $slope:literal, $load:literal,
+     $slope_example:literal, $load_example:literal, $static_example:literal) => {
+        [
+            row(
+                concat!($body, ".friction.viscous"),
+                $viscous,
+                $slope,
+                Value(0.0),
+                NOT_NEGATIVE,
+                $slope_example,
+                "Viscous friction: resistance per speed.",
+            ),
+            row(
+                concat!($body, ".friction.coulomb"),
+                $coulomb,
+                $load,
+                Value(0.0),
+                NOT_NEGATIVE,
+                $load_example,
+                "Coulomb friction: what resists at any speed.",
+            ),
+            row(
+                concat!($body, ".friction.static"),
+                $static,
+                $load,
+                Words("as `coulomb`, on each side"),
+                NOT_NEGATIVE,
+                $static_example,
+                "Breakaway: what it holds at rest before it slides; at least `coulomb`.",
+            ),
+            row(
+                concat!($body, ".friction.viscous_backward"),
+                $viscous,
+                $slope,
+                Words("as `viscous`"),
+                NOT_NEGATIVE,
+                $slope_example,
+                "Viscous friction in the negative direction.",
+            ),
+            row(
+                concat!($body, ".friction.coulomb_backward"),
+                $coulomb,
+                $load,
+                Words("as `coulomb`"),
+                NOT_NEGATIVE,
+                $load_example,
+                "Coulomb friction in the negative direction.",
+            ),
+            row(
+                concat!($body, ".friction.static_backward"),
+                $static,
+                $load,
+                Words("as `static`; without it as `coulomb_backward`"),
+                NOT_NEGATIVE,
+                $static_example,
+                "Breakaway in the negative direction; at least `coulomb_backward`.",
+            ),
+        ]
+    };
+}
+
+/// Inertia of one pulley: given, or from its geometry.
+macro_rules! pulley {
+    ($body:literal, $inertia:literal) => {
+        [
+            row(
+                concat!($body, ".inertia"),
+                $inertia,
+                "kg m^2",
+                Required,
+                POSITIVE,
+                "6.3e-5 kg m^2",
+                "Moment of inertia about its axis; or a table with the four rows below.",
+            ),
+            row(
+                concat!($body, ".inertia.outer_diameter"),
+                "d_o",
+                "m",
+                Required,
+                POSITIVE,
+                "38.3 mm",
+                "Outer diameter of the hollow cylinder that stands for the pulley.",
+            ),
+            row(
+                concat!($body, ".inertia.bore_diameter"),
+                "d_i",
+                "m",
+                Value(0.0),
+                NOT_NEGATIVE,
+                "6.35 mm",
+                "Diameter of its bore; smaller than the outer one.",
+            ),
+            row(concat!($body, ".inertia.width"), "w", "m", Required, POSITIVE, "12.7 mm", "Its width."),
+            row(
+                concat!($body, ".inertia.density"),
+                "ρ",
+                "kg/m^3",
+                Required,
+                POSITIVE,
+                "2.7 g/cm^3",
+                "Density of its material.",
+            ),
+        ]
+    };
+}
+
+#[rustfmt::skip]
+const MOTOR: &[Parameter] = &[
+    row("motor.torque_constant", "K_t", "N m/A", Required, NOT_NEGATIVE, "23 mN m/A", "Torque per ampere, at the motor's own shaft."),
+    row("motor.back_emf_constant", "K_e", "V s/rad", Required, NOT_NEGATIVE, "23 mV s/rad", "Voltage per speed, at the motor's own shaft."),
+    row("motor.resistance", "R", "ohm", Required, POSITIVE, "0.71 ohm", "Resistance of the armature."),
+    row("motor.inductance", "L", "H", Value(0.0), NOT_NEGATIVE, "0.66 mH", "Inductance of the armature; with 0 the current follows the voltage at once."),
+    row("motor.rotor_inertia", "J_r", "kg m^2", Value(0.0), NOT_NEGATIVE, "4.2e-6 kg m^2", "Inertia of the rotor, at the motor's own shaft."),
+    row("motor.gear_ratio", "n", "", Value(1.0), Range::new(1e-6, 1e6), "5.9", "Motor turns per turn of the drive pulley."),
+    row("motor.gear_efficiency", "η", "", Value(1.0), UP_TO_ONE, "0.73", "The part of the power that passes the gear, whichever side drives."),
+];
+
+#[rustfmt::skip]
+const AMPLIFIER: &[Parameter] = &[
+    row("amplifier.gain", "", "", Value(1.0), ANY, "1", "Output, V or A, per unit of input; negative where the wires are swapped."),
+];
+
+#[rustfmt::skip]
+const RADIUS: &[Parameter] = &[
+    row("drive_pulley.radius", "r", "m", Words("from `teeth` and `pitch`"), POSITIVE, "19.4 mm", "Pitch radius, the same for both pulleys."),
+    row("drive_pulley.teeth", "z", "", Words("not used with `radius`"), Range::whole(1.0, 1e6), "60", "Number of teeth or grooves; instead of `radius`, with `pitch`."),
+    row("drive_pulley.pitch", "p", "m", Words("not used with `radius`"), POSITIVE, "2.03 mm", "Distance from tooth to tooth along the belt."),
+];
+
+#[rustfmt::skip]
+const CART: &[Parameter] = &[
+    row("cart.mass", "M", "kg", Required, POSITIVE, "0.362 kg", "Mass of the cart with its load."),
+];
+
+#[rustfmt::skip]
+const BELT: &[Parameter] = &[
+    row("belt.stiffness", "k₁ k₂ k₃", "N/m", Words("from `modulus`, `section` and `spans`"), POSITIVE, "132.76 kN/m",
+        "Stiffness of each span: drive pulley to cart, cart to idler pulley, and the way back. Three values in a list."),
+    row("belt.modulus", "E", "Pa", Words("not used with `stiffness`"), POSITIVE, "8.335 GPa",
+        "Modulus of elasticity, eq. (11); or a list of parts, each `{ share, modulus }`, for a composite."),
+    row("belt.modulus.share", "", "", Required, UP_TO_ONE, "1/3", "Share of the section that is of this material; all shares add up to 1."),
+    row("belt.modulus.modulus", "E", "Pa", Required, POSITIVE, "50 GPa", "Modulus of this material."),
+    row("belt.section", "A", "m^2", Words("not used with `stiffness`"), POSITIVE, "5.5626 mm^2",
+        "Cross-section that carries the load; or `{ plain, toothed, toothed_share }` for a toothed belt, eq. (12)."),
+    row("belt.section.plain", "A_nt", "m^2", Required, POSITIVE, "5.5626 mm^2", "Cross-section between the teeth."),
+    row("belt.section.toothed", "A_t", "m^2", Required, POSITIVE, "10.4 mm^2", "Cross-section at a tooth."),
+    row("belt.section.toothed_share", "", "", Required, Range::new(0.0, 1.0), "0.5", "Share of the belt's length that has the cross-section `toothed`."),
+    row("belt.spans", "l₁ l₂ l₃", "m", Words("not used with `stiffness`"), POSITIVE, "0.34925 m", "Length of each span. Three values in a list."),
+    row("belt.damping", "c₁ c₂ c₃", "N s/m", Value(0.0), NOT_NEGATIVE, "0 N s/m", "Damping of each span, parallel to its stiffness. Three values in a list."),
+];
+
+#[rustfmt::skip]
+const ENCODER: &[Parameter] = &[
+    row("encoder.lines", "", "", Required, POSITIVE, "512", "Lines per turn, or at the cart per metre; in quadrature each gives four counts."),
+];
+
+#[rustfmt::skip]
+const EXPERIMENT: &[Parameter] = &[
+    row("experiment.until", "", "s", Required, DURATION, "1 s", "End of the run."),
+    row("experiment.every", "", "s", Required, DURATION, "1 ms", "Interval between the rows of the result; it does not affect the accuracy."),
+];
+
+#[rustfmt::skip]
+const INITIAL: &[Parameter] = &[
+    row("experiment.initial.drive_angle", "φ₁", "rad", Value(0.0), ANY, "0 rad", "Angle of the drive pulley at time zero."),
+    row("experiment.initial.drive_speed", "φ₁′", "rad/s", Value(0.0), ANY, "0 rad/s", "Its speed."),
+    row("experiment.initial.cart_position", "x", "m", Value(0.0), ANY, "0 mm", "Position of the cart at time zero."),
+    row("experiment.initial.cart_speed", "x′", "m/s", Value(0.0), ANY, "0 m/s", "Its speed."),
+    row("experiment.initial.idler_angle", "φ₃", "rad", Value(0.0), ANY, "0 rad", "Angle of the idler pulley at time zero."),
+    row("experiment.initial.idler_speed", "φ₃′", "rad/s", Value(0.0), ANY, "0 rad/s", "Its speed."),
+    row("experiment.initial.motor_current", "i", "A", Value(0.0), ANY, "0 A", "Armature current at time zero; only with an inductance and in voltage mode."),
+];
+
+#[rustfmt::skip]
+const INPUTS: &[Parameter] = &[
+    row("input.step", "", INPUT, Required, ANY, "5 V", "Height of the step."),
+    row("input.step.at", "", "s", Value(0.0), TIME, "0 s", "When it comes."),
+    row("input.pulse", "", INPUT, Required, ANY, "5 V", "Height of the pulse."),
+    row("input.pulse.for", "", "s", Required, DURATION, "0.25 s", "How long it lasts."),
+    row("input.pulse.at", "", "s", Value(0.0), TIME, "0 s", "When it begins."),
+    row("input.ramp", "", INPUT, Required, ANY, "1.2 V", "Value that the ramp reaches from zero, and then holds."),
+    row("input.ramp.over", "", "s", Required, DURATION, "1 s", "How long it takes."),
+    row("input.ramp.at", "", "s", Value(0.0), TIME, "0 s", "When it begins."),
+    row("input.triangle", "", INPUT, Required, ANY, "3 V", "Peak of the triangle wave, which begins at zero and rises first."),
+    row("input.triangle.frequency", "", "Hz", Required, FREQUENCY, "2 Hz", "Periods per second."),
+    row("input.square", "", INPUT, Required, ANY, "3 V", "Height of the square wave, which begins high and goes to the negative of it."),
+    row("input.square.frequency", "", "Hz", Required, FREQUENCY, "2 Hz", "Periods per second."),
+    row("input.square.duty", "", "", Value(0.5), Range { above: true, below: true, ..Range::new(0.0, 1.0) }, "0.5", "Share of the period that is high."),
+    row("input.sine", "", INPUT, Required, ANY, "3 V", "Peak of the sine, without its offset."),
+    row("input.sine.frequency", "", "Hz", Required, FREQUENCY, "2 Hz", "Periods per second."),
+    row("input.sine.phase", "", "rad", Value(0.0), Range::new(-1e6, 1e6), "90 deg", "Phase at time zero."),
+    row("input.sine.offset", "", INPUT, Value(0.0), ANY, "0 V", "Added to the sine."),
+    row("input.chirp", "", INPUT, Required, ANY, "2 V", "Peak of a sine whose frequency moves evenly; zero when it is over."),
+    row("input.chirp.from", "", "Hz", Required, Range::new(0.0, 1e9), "1 Hz", "Frequency at the beginning."),
+    row("input.chirp.to", "", "Hz", Required, Range::new(0.0, 1e9), "300 Hz", "Frequency at the end."),
+    row("input.chirp.over", "", "s", Required, DURATION, "10 s", "How long it takes."),
+    row("input.multisine", "", INPUT, Required, ANY, "0.2 V", "Peak of each sine of the sum."),
+    row("input.multisine.frequencies", "", "Hz", Words("from `from`, `to` and `tones`"), FREQUENCY, "1 Hz", "Frequencies in a list, at most 1000."),
+    row("input.multisine.from", "", "Hz", Words("not used with `frequencies`"), FREQUENCY, "1 Hz", "Lowest frequency."),
+    row("input.multisine.to", "", "Hz", Words("not used with `frequencies`"), FREQUENCY, "50 Hz", "Highest frequency."),
+    row("input.multisine.tones", "", "", Words("not used with `frequencies`"), Range::whole(2.0, 1000.0), "50", "How many sines, equally spaced in frequency."),
+    row("input.prbs", "", INPUT, Required, ANY, "3 V", "Height of a pseudo-random binary sequence, which jumps between plus and minus this."),
+    row("input.prbs.bit", "", "s", Required, DURATION, "20 ms", "Shortest time between jumps."),
+    row("input.prbs.seed", "", "", Value(1.0), Range::whole(0.0, 9_007_199_254_740_991.0), "1", "Which sequence; the same seed gives the same one."),
+    row("input.point.time", "", "s", Required, TIME, "0.1 s", "First number of each point of a `table`, growing from point to point."),
+    row("input.point.value", "", INPUT, Required, ANY, "5 V", "Second number of each point; straight lines between points, the last one held."),
+    row("input.element.lasts", "", "s", Words("as long as a `pulse`, `ramp`, `chirp`, `table` or `file` takes"), DURATION, "1 s", "How long an element of a `sequence` has its turn."),
+];
+
+/// Titles of the sections, in the order of the case file, with the key prefix of their rows.
+const SECTIONS: &[(&str, &[&[Parameter]])] = &[
+    ("motor", &[MOTOR]),
+    ("amplifier", &[AMPLIFIER]),
+    (
+        "drive_pulley",
+        &[
+            RADIUS,
+            &pulley!("drive_pulley", "J₁"),
+            &friction!(
+                "drive_pulley",
+                "B₁",
+                "τ_c1",
+                "τ_b1",
+                "N m s/rad",
+                "N m",
+                "0.0016 N m s",
+                "0.0150 N m",
+                "0.02 N m"
+            ),
+        ],
+    ),
+    (
+        "idler_pulley",
+        &[
+            &pulley!("idler_pulley", "J₂"),
+            &friction!(
+                "idler_pulley",
+                "B₂",
+                "τ_c2",
+                "τ_b2",
+                "N m s/rad",
+                "N m",
+                "0.0016 N m s",
+                "0.0150 N m",
+                "0.02 N m"
+            ),
+        ],
+    ),
+    ("cart", &[CART, &friction!("cart", "b", "F_c", "F_b", "N s/m", "N", "19.0424 N s/m", "0.2 N", "0.3 N")]),
+    ("belt", &[BELT]),
+    ("encoder", &[ENCODER]),
+    ("experiment", &[EXPERIMENT]),
+    ("experiment.initial", &[INITIAL]),
+    ("input", &[INPUTS]),
+];
+
+/// All parameters, in the order of the case file.
+pub fn all() -> impl Iterator<Item = &'static Parameter> {
+    SECTIONS.iter().flat_map(|(_, groups)| groups.iter().flat_map(|rows| rows.iter()))
+}
+
+/// The parameter with this key.
+pub fn find(key: &str) -> Option<&'static Parameter> {
+    all().find(|p| p.key == key)
+}
+
+/// The names that follow directly after `section` in the keys: for `cart` these are `mass` and `friction`.
+pub fn names_in(section: &str) -> Vec<&'static str> {
+    let mut names = Vec::new();
+    for parameter in all() {
+        let rest = parameter.key.strip_prefix(section).and_then(|rest| rest.strip_prefix('.'));
+        if let Some(name) = rest.and_then(|rest| rest.split('.').next())
+            && !names.contains(&name)
+        {
+            names.push(name);
+        }
+    }
+    names
+}
+
+/// The sections of the table, each of which [`markdown`] renders.
+pub fn sections() -> impl Iterator<Item = &'static str> {
+    SECTIONS.iter().map(|(name, _)| *name)
+}
+
+/// The parameters of a section as a Markdown table.
+pub fn markdown(section: &str) -> String {
+    let mut text = String::from(
+        "| key | symbol | SI unit | default | range | example | meaning |\n|---|---|---|---|---|---|---|\n",
+    );
+    let rows = SECTIONS.iter().filter(|(name, _)| *name == section).flat_map(|(_, groups)| groups.iter());
+    for p in rows.flat_map(|rows| rows.iter()) {
+        let key =
+            p.key.strip_prefix("input.").or_else(|| p.key.strip_prefix(section).map(|k| &k[1..])).unwrap_or(p.key);
+        let default = match p.default {
+            Fallback::Required => "required".to_string(),
+            Fallback::Value(value) => shortest(value),
+            Fallback::Words(words) => words.to_string(),
+        };
+        let unit = if p.unit.is_empty() { "–" } else { p.unit };
+        let symbol = if p.symbol.is_empty() { "–" } else { p.symbol };
+        let _ = writeln!(
+            text,
+            "| `{key}` | {symbol} | {unit} | {default} | {} | {} | {} |",
+            p.range.short(),
+            p.example,
+            p.sentence
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::quantity;
+
+    #[test]
+    fn examples_and_defaults_lie_in_their_ranges() {
+        for p in all() {
+            let unit = if p.unit == INPUT { "V" } else { p.unit };
+            let example = quantity::read(p.example, unit).unwrap_or_else(|e| panic!("{}: {e}", p.key));
+            assert!(p.range.contains(example), "{}", p.key);
+            if let Fallback::Value(value) = p.default {
+                assert!(p.range.contains(value), "{}", p.key);
+            }
+        }
+    }
+
+    #[test]
+    fn no_key_stands_twice() {
+        for p in all() {
+            assert_eq!(all().filter(|q| q.key == p.key).count(), 1, "{}", p.key);
+        }
+    }
+}

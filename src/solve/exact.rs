@@ -1,0 +1,499 @@
+//! The exact solver: modes and matrix exponentials.
+//!
+//! Within a mode the stage is linear and a step is a product with e^{A h}. A mode may be left only when one of its guards
+//! becomes negative, so the solver moves in the largest steps on which no guard can, by a bound that holds for
+//! certain, and looks closer (halves the step, and at last expands the state into a Taylor series) only where the bound does not decide.
+//!
+//! The bound. y = ż obeys ẏ = A y + b u̇, and friction, resistance and damping only take energy away, so its energy
+//! V(y) = ½ Σ m a² + ½ Σ k (Δv)² + ½ w L (di/dt)² can only grow by the input's rate: √V(τ) ≤ √V(0) + |b|·|u̇|·τ. A guard
+//! g = w·z therefore changes no faster than |w|·√(2V), |w| being the norm dual to V; and likewise its slope, with ẏ.
+
+use super::law::{Law, chain};
+use super::record::Recorder;
+use super::propagator::SERIES_ORDER;
+use super::roots;
+use super::{Cost, Ending, Event, Flow, Grid, Outcome};
+use crate::case::Experiment;
+use crate::friction::Motion;
+use crate::plant::{Body, Cause, Mode, Plant, State, place};
+use crate::signal::{DEGREE, Piece};
+use crate::trajectory::Trajectory;
+use std::rc::Rc;
+
+/// Events allowed at once, and per simulated second: more is an accumulation, not a machine.
+const EVENTS_AT_LEAST: f64 = 1e5;
+const EVENTS_PER_SECOND: f64 = 1e7;
+
+/// Mode changes allowed at one instant.
+const CHANGES_AT_ONCE: usize = 100;
+
+/// Runs the experiment.
+pub(crate) fn run(plant: &Plant, experiment: &Experiment, sink: &mut dyn FnMut(&Trajectory) -> Flow) -> Outcome {
+    // Eight moving quantities (three positions, three speeds, current, input) serve straight inputs; smooth ones carry
+    // their derivatives along.
+    if experiment.input.degree() <= 1 {
+        Run::<8, 10>::new(plant, experiment, sink).finish(experiment)
+    } else {
+        Run::<16, 18>::new(plant, experiment, sink).finish(experiment)
+    }
+}
+
+/// A run under way.
+struct Run<'a, const R: usize, const C: usize> {
+    plant: &'a Plant,
+    grid: Grid,
+    /// Output interval.
+    h: f64,
+    /// State, input and its derivatives, and a one.
+    z: [f64; C],
+    mode: Mode,
+    law: Rc<Law<R, C>>,
+    laws: Vec<Rc<Law<R, C>>>,
+    /// How many leading Taylor coefficients of a sliding body's speed are zero by definition, because it starts from rest:
+    /// 1 where it is accelerated, 2 where the load has only just reached its friction. Last, the same for the gear's torque.
+    fresh: [usize; 4],
+    /// Bounds of |u̇| and |ü| on the present piece.
+    input_rate: f64,
+    input_curvature: f64,
+    /// Where the run stands: so far behind row `row`.
+    row: u64,
+    offset: f64,
+    recorder: Recorder<'a>,
+    events: Vec<Event>,
+    cost: Cost,
+    trouble: Option<Ending>,
+}
+
+/// What a look at an interval tells.
+enum Look<const C: usize> {
+    /// No guard falls; here is the end, if it was computed.
+    Safe(Option<[f64; C]>),
+    /// Look closer.
+    Unsure,
+}
+
+impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
+    fn new(plant: &'a Plant, experiment: &Experiment, sink: &'a mut dyn FnMut(&Trajectory) -> Flow) -> Self {
+        let grid = Grid::new(experiment.every, experiment.until);
+        let h = grid.interval();
+        let start = &experiment.initial;
+        let mut z = [0.0; C];
+        z[..place::COUNT].copy_from_slice(&[
+            start.drive_angle,
+            start.drive_speed,
+            start.cart_position,
+            start.cart_speed,
+            start.idler_angle,
+            start.idler_speed,
+            if plant.has_current_state() { start.motor_current } else { 0.0 },
+        ]);
+        z[C - 1] = 1.0;
+        let motion = Body::ALL.map(|body| match z[body.speed_place()] {
+            _ if !plant.has_modes(body) => Motion::Free,
+            v if v > 0.0 => Motion::Forward,
+            v if v < 0.0 => Motion::Backward,
+            _ => Motion::Stuck,
+        });
+        let mode = Mode { motion, gear_torque_positive: true };
+        let law = Rc::new(Law::new(plant, mode, h));
+        Self {
+            plant,
+            grid,
+            h,
+            z,
+            mode,
+            laws: vec![Rc::clone(&law)],
+            law,
+            fresh: [0; 4],
+            input_rate: 0.0,
+            input_curvature: 0.0,
+            row: 0,
+            offset: 0.0,
+            recorder: Recorder::new(plant, grid, sink),
+            events: Vec::new(),
+            cost: Cost { modes: 1, ..Cost::default() },
+            trouble: None,
+        }
+    }
+
+    /// The recipe: piece by piece of the input, to the end.
+    fn finish(mut self, experiment: &Experiment) -> Outcome {
+        let end = self.grid.end();
+        let mut time = 0.0;
+        while self.trouble.is_none() {
+            let piece = experiment.input.piece(time);
+            self.set_input(&piece);
+            self.resolve();
+            if time >= end {
+                self.put_out();
+                break;
+            }
+            let (row, offset) = self.locate(piece.end.min(end));
+            self.reach(row, offset);
+            time = piece.end.min(end);
+        }
+        self.recorder.finish();
+        self.cost.samples = self.recorder.rows;
+        let ending = match (self.trouble, self.recorder.flow) {
+            (Some(trouble), _) => trouble,
+            (None, Flow::Stop) => Ending::Interrupted { time: self.time() },
+            (None, Flow::Continue) => Ending::Complete,
+        };
+        self.cost.propagators = self.laws.iter().map(|law| law.propagators()).sum();
+        Outcome { events: self.events, ending, cost: self.cost }
+    }
+
+    fn time(&self) -> f64 {
+        self.grid.time(self.row) + self.offset
+    }
+
+    /// The row at or before `time` and how far behind it; next to a row means on it.
+    fn locate(&self, time: f64) -> (u64, f64) {
+        let last = self.grid.intervals();
+        let mut row = ((time / self.h) as u64).min(last);
+        while row > 0 && self.grid.time(row) > time {
+            row -= 1;
+        }
+        while row < last && self.grid.time(row + 1) <= time {
+            row += 1;
+        }
+        let offset = time - self.grid.time(row);
+        let near = 1e-9 * self.h;
+        if offset < near || row == last {
+            (row, 0.0)
+        } else if self.h - offset < near {
+            (row + 1, 0.0)
+        } else {
+            (row, offset)
+        }
+    }
+
+    fn set_input(&mut self, piece: &Piece) {
+        self.cost.pieces += 1;
+        let length = if piece.end.is_finite() { piece.end - piece.start } else { 0.0 };
+        let (mut factorial, mut rate, mut curvature) = (1.0, 0.0, 0.0);
+        let (mut power1, mut power2) = (1.0, 1.0);
+        for (k, &c) in piece.coefficients.iter().enumerate() {
+            let order = k as f64;
+            if k >= 1 {
+                factorial *= order;
+                rate += order * c.abs() * power1;
+                power1 *= length;
+            }
+            if k >= 2 {
+                curvature += order * (order - 1.0) * c.abs() * power2;
+                power2 *= length;
+            }
+            if k <= if R == 8 { 1 } else { DEGREE } {
+                // u⁽ᵏ⁾ = k! c_k
+                self.z[chain::<R>(k)] = c * factorial;
+            }
+        }
+        self.input_rate = rate;
+        self.input_curvature = curvature;
+        self.fresh = [0; 4];
+    }
+
+    /// Advances to `offset` behind row `row`, event by event.
+    fn reach(&mut self, row: u64, offset: f64) {
+        while (self.row < row || (self.row == row && self.offset < offset)) && self.trouble.is_none() {
+            self.check();
+            if self.offset == 0.0 {
+                self.put_out();
+                if self.row < row && self.hop(row - self.row) {
+                    continue;
+                }
+            }
+            let ahead = if self.row < row { self.h } else { offset };
+            match self.advance(ahead - self.offset) {
+                Some(cause) => {
+                    self.change(cause);
+                    self.resolve();
+                }
+                None if self.row < row => {
+                    self.row += 1;
+                    self.offset = 0.0;
+                }
+                None => self.offset = offset,
+            }
+        }
+    }
+
+    /// Puts out the present row, once, and looks whether all is well.
+    fn put_out(&mut self) {
+        if self.recorder.next_row() == self.row {
+            self.recorder.push(std::array::from_fn(|j| self.z[j]), self.mode.motion);
+        }
+        if self.recorder.flow == Flow::Stop {
+            self.trouble = Some(Ending::Interrupted { time: self.time() });
+        }
+    }
+
+    /// Notices a state that is no number any more.
+    fn check(&mut self) {
+        if !self.z.iter().sum::<f64>().is_finite() {
+            self.trouble = Some(Ending::Diverged { time: self.time() });
+        }
+    }
+
+    /// Moves as many whole intervals, up to `most`, as no guard can fall on; false if not even one.
+    fn hop(&mut self, most: u64) -> bool {
+        let law = Rc::clone(&self.law);
+        let y = law.rate(&self.z);
+        let mut safe = most;
+        if !law.guards.is_empty() {
+            self.cost.looks += 1;
+            let norm = law.norm(&y);
+            let mut time = f64::INFINITY;
+            for guard in &law.guards {
+                // g(τ) ≥ g − (|w| √2V + |w_u| |u̇|) τ − |w| |b| |u̇| τ²/2
+                let g = guard.value(&self.z);
+                let slope = law.growth_factor() * guard.dual * norm + guard.input.abs() * self.input_rate;
+                let bend = law.growth_factor() * guard.dual * law.forcing * self.input_rate * 0.5;
+                if g < 0.0 || self.fresh_order(guard.cause) > 0 {
+                    time = 0.0;
+                } else if slope > 0.0 || bend > 0.0 {
+                    time = f64::min(time, 2.0 * g / (slope + (slope * slope + 4.0 * bend * g).sqrt()));
+                }
+            }
+            time = time.min(law.growth_time());
+            // A float that is too large becomes the largest integer.
+            safe = safe.min((time / self.h * 0.999) as u64);
+        }
+        if safe == 0 {
+            return false;
+        }
+        let resting = y.iter().all(|&rate| rate == 0.0);
+        let step = law.step(0);
+        for j in 0..safe {
+            if j > 0 {
+                self.put_out();
+                if self.trouble.is_some() {
+                    return true;
+                }
+            }
+            if !resting {
+                step.advance(&mut self.z);
+            }
+            self.row += 1;
+        }
+        self.cost.steps += if resting { 0 } else { safe };
+        true
+    }
+
+    fn fresh_order(&self, cause: Cause) -> usize {
+        match cause {
+            Cause::Stop(body) => self.fresh[body.index()],
+            Cause::GearTorque => self.fresh[3],
+            _ => 0,
+        }
+    }
+
+    /// Advances by `distance`, at most an interval; stops at the first guard that falls and says why.
+    fn advance(&mut self, mut distance: f64) -> Option<Cause> {
+        let law = Rc::clone(&self.law);
+        if self.fresh != [0; 4] && distance > 0.0 {
+            // A speed that starts from zero is told apart from one that falls to zero by its series.
+            let first = distance.min(law.reach());
+            if let Some(cause) = self.creep(&law, first) {
+                return Some(cause);
+            }
+            distance -= first;
+            if first > 1e-3 * law.reach() {
+                self.fresh = [0; 4];
+            }
+        }
+        for level in 0..=law.finest {
+            while distance >= law.length(level) {
+                if let Some(cause) = self.cross(&law, level) {
+                    return Some(cause);
+                }
+                distance -= law.length(level);
+            }
+        }
+        if distance > 0.0 { self.creep(&law, distance) } else { None }
+    }
+
+    /// Crosses an interval of h/2^level.
+    fn cross(&mut self, law: &Law<R, C>, level: usize) -> Option<Cause> {
+        let length = law.length(level);
+        match self.look(law, length, Some(level)) {
+            Look::Safe(end) => {
+                match end {
+                    Some(end) => self.z = end,
+                    None => law.step(level).advance(&mut self.z),
+                }
+                self.cost.steps += 1;
+                self.offset += length;
+                None
+            }
+            Look::Unsure if level < law.finest => self.cross(law, level + 1).or_else(|| self.cross(law, level + 1)),
+            Look::Unsure => self.creep(law, length),
+        }
+    }
+
+    /// Decides, if it can, that no guard falls within `length`.
+    fn look(&mut self, law: &Law<R, C>, length: f64, level: Option<usize>) -> Look<C> {
+        if law.guards.is_empty() {
+            return Look::Safe(None);
+        }
+        self.cost.looks += 1;
+        let y = law.rate(&self.z);
+        let grow = law.growth_over(length);
+        let norm = grow * (law.norm(&y) + law.forcing * self.input_rate * length);
+        let steepness = |dual: f64, input: f64| dual * norm + input.abs() * self.input_rate;
+        let undecided = |g: f64, steepness: f64| !(g > steepness * length || (g >= 0.0 && steepness == 0.0));
+        if !law.guards.iter().any(|guard| undecided(guard.value(&self.z), steepness(guard.dual, guard.input))) {
+            return Look::Safe(None);
+        }
+
+        let second = law.rate_of_rate(&y);
+        let norm2 = grow * (law.norm(&second) + law.forcing * self.input_curvature * length);
+        let mut falling = false;
+        for guard in &law.guards {
+            let g = guard.value(&self.z);
+            if !undecided(g, steepness(guard.dual, guard.input)) {
+                continue;
+            }
+            let slope = guard.slope(&y);
+            let bend = guard.dual * norm2 + guard.input.abs() * self.input_curvature;
+            // g(τ) ≥ g + ġ τ − |g̈| τ²/2
+            let stays = g >= 0.0 && g + slope.min(0.0) * length - 0.5 * bend * length * length > 0.0;
+            let rises = g >= 0.0 && slope > bend * length;
+            let falls = g > 0.0 && slope < -bend * length;
+            match (stays || rises, falls) {
+                (true, _) => {}
+                (false, true) => falling = true,
+                (false, false) => return Look::Unsure,
+            }
+        }
+        let Some(level) = level.filter(|_| falling) else { return Look::Safe(None) };
+        // What falls all the way has not fallen through if it is still positive at the end.
+        let mut end = self.z;
+        law.step(level).advance(&mut end);
+        if law.guards.iter().all(|guard| guard.value(&end) > 0.0) { Look::Safe(Some(end)) } else { Look::Unsure }
+    }
+
+    /// Advances by a `distance` within the reach of the Taylor series, to the first guard that falls.
+    fn creep(&mut self, law: &Law<R, C>, distance: f64) -> Option<Cause> {
+        self.cost.series += 1;
+        let series = law.series(&self.z, distance);
+        let mut first: Option<(f64, Cause)> = None;
+        for guard in &law.guards {
+            let mut coefficients: [f64; SERIES_ORDER + 1] = std::array::from_fn(|k| guard.value(&series[k]));
+            let order = self.fresh_order(guard.cause);
+            coefficients[..order].fill(0.0);
+            if let Some(s) = roots::first_fall(&coefficients[order..])
+                && first.is_none_or(|(earliest, _)| s < earliest)
+            {
+                first = Some((s, guard.cause));
+            }
+        }
+        let s = first.map_or(1.0, |(s, _)| s);
+        for j in 0..R {
+            let change = series[1..].iter().rev().fold(0.0, |sum, term| (sum + term[j]) * s);
+            self.z[j] += change;
+        }
+        self.offset += s * distance;
+        first.map(|(_, cause)| cause)
+    }
+
+    fn state(&self) -> State {
+        std::array::from_fn(|j| self.z[j])
+    }
+
+    fn value(&self, form: &crate::plant::Form) -> f64 {
+        form.value(self.plant, &self.state(), self.z[place::COUNT])
+    }
+
+    /// Loads on a body that would go forward, and backward; the same unless the gear loses power.
+    fn loads(&self, body: Body) -> (f64, f64) {
+        let positive = self.value(self.plant.current()) >= 0.0;
+        (self.value(&self.plant.load(body, true, positive)), self.value(&self.plant.load(body, false, positive)))
+    }
+
+    /// What a body at zero speed does under its present load.
+    fn decide(&self, body: Body) -> Motion {
+        let law = self.plant.friction(body);
+        let (forward, backward) = self.loads(body);
+        if forward > law.forward.breakaway {
+            Motion::Forward
+        } else if backward < -law.backward.breakaway {
+            Motion::Backward
+        } else {
+            Motion::Stuck
+        }
+    }
+
+    /// Goes into the mode that follows when `cause` ends the present one.
+    fn change(&mut self, cause: Cause) {
+        let (body, to) = match cause {
+            Cause::GearTorque => {
+                self.mode.gear_torque_positive = !self.mode.gear_torque_positive;
+                self.fresh[3] = 1;
+                self.enter();
+                return;
+            }
+            Cause::Stop(body) => {
+                self.z[body.speed_place()] = 0.0;
+                (body, self.decide(body))
+            }
+            Cause::BreakForward(body) => (body, Motion::Forward),
+            Cause::BreakBackward(body) => (body, Motion::Backward),
+        };
+        let (forward, backward) = self.loads(body);
+        let law = self.plant.friction(body);
+        let (load, resistance) = match to {
+            Motion::Backward => (backward, -law.backward.coulomb),
+            _ => (forward, law.forward.coulomb),
+        };
+        self.fresh[body.index()] = match to {
+            Motion::Stuck | Motion::Free => 0,
+            // Where breakaway equals Coulomb friction the acceleration starts from zero, but for rounding.
+            _ if (load - resistance).abs() <= 1e-9 * resistance.abs() => 2,
+            _ => 1,
+        };
+        let from = std::mem::replace(&mut self.mode.motion[body.index()], to);
+        if from != to {
+            self.events.push(Event { time: self.time(), body, from, to, load });
+        }
+        self.enter();
+    }
+
+    /// Takes up the equations of the present mode.
+    fn enter(&mut self) {
+        let known = self.laws.iter().find(|law| law.mode == self.mode);
+        self.law = match known {
+            Some(law) => Rc::clone(law),
+            None => {
+                let law = Rc::new(Law::new(self.plant, self.mode, self.h));
+                self.cost.modes += 1;
+                self.laws.push(Rc::clone(&law));
+                law
+            }
+        };
+    }
+
+    /// Changes modes, without time passing, until every guard holds.
+    fn resolve(&mut self) {
+        for _ in 0..CHANGES_AT_ONCE {
+            let law = Rc::clone(&self.law);
+            let y = law.rate(&self.z);
+            let fallen = law.guards.iter().find(|guard| {
+                let g = guard.value(&self.z);
+                let fresh = self.fresh_order(guard.cause) > 0;
+                !fresh && (g < 0.0 || (g == 0.0 && guard.slope(&y) < 0.0))
+            });
+            match fallen {
+                Some(guard) => self.change(guard.cause),
+                None => {
+                    if self.events.len() as f64 > EVENTS_AT_LEAST + EVENTS_PER_SECOND * self.time() {
+                        self.trouble = Some(Ending::TooManyEvents { time: self.time() });
+                    }
+                    return;
+                }
+            }
+        }
+        self.trouble = Some(Ending::TooManyEvents { time: self.time() });
+    }
+}

@@ -1,0 +1,229 @@
+//! The paper's own solver: the friction function of its Table 3 with a fixed step.
+//!
+//! Kept to reproduce the paper and to show what it does: any speed inside a band of ±0.01 is frozen rather than brought
+//! to rest, so the stage creeps after it has stopped, by an amount that depends on the step.
+
+use super::record::Recorder;
+use super::{Cost, Ending, Flow, Grid, Method, Outcome};
+use crate::case::Experiment;
+use crate::error::{Error, Result};
+use crate::friction::Motion;
+use crate::plant::{Body, Form, Plant, State, place};
+use crate::signal::Signal;
+use crate::trajectory::Trajectory;
+
+/// Half-width of Table 3's band of "zero" speed, rad/s for the pulleys and m/s for the cart.
+const BAND: f64 = 0.01;
+
+/// Runs the experiment with steps of `step` or a little less, so that they fill the output interval.
+pub(crate) fn run(
+    plant: &Plant,
+    experiment: &Experiment,
+    step: f64,
+    method: Method,
+    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+) -> Result<Outcome> {
+    let model = Model::new(plant, &experiment.input)?;
+    let grid = Grid::new(experiment.every, experiment.until);
+    let substeps = (grid.interval() / step - 1e-9).ceil().max(1.0);
+    if !substeps.is_finite() || substeps * grid.intervals() as f64 > 1e12 {
+        return Err(Error::new(format!("a step of {step} s would take more than 1e12 steps"))
+            .allowed("a step above zero, such as 1e-4 s")
+            .next("choose a larger step"));
+    }
+    let h = grid.interval() / substeps;
+    let start = &experiment.initial;
+    let mut state = [
+        start.drive_angle,
+        start.drive_speed,
+        start.cart_position,
+        start.cart_speed,
+        start.idler_angle,
+        start.idler_speed,
+        if plant.has_current_state() { start.motor_current } else { 0.0 },
+    ];
+    let mut recorder = Recorder::new(plant, grid, sink);
+    let mut cost = Cost { modes: 1, ..Cost::default() };
+    let mut ending = Ending::Complete;
+    for row in 0..=grid.intervals() {
+        let time = grid.time(row);
+        let input = experiment.input.value(time);
+        let motion = model.motion(&state, input);
+        recorder.push(std::array::from_fn(|j| if j < place::COUNT { state[j] } else { input }), motion);
+        if recorder.flow == Flow::Stop {
+            ending = Ending::Interrupted { time };
+            break;
+        }
+        if !state.iter().sum::<f64>().is_finite() {
+            ending = Ending::Diverged { time };
+            break;
+        }
+        if row == grid.intervals() {
+            break;
+        }
+        for k in 0..substeps as u64 {
+            let t = time + k as f64 * h;
+            state = match method {
+                Method::RungeKutta4 => runge_kutta_4(&model, t, &state, h),
+                Method::DormandPrince5 => dormand_prince_5(&model, t, &state, h),
+            };
+        }
+        cost.steps += substeps as u64;
+        cost.evaluations += substeps as u64 * if method == Method::RungeKutta4 { 4 } else { 6 };
+    }
+    recorder.finish();
+    cost.samples = recorder.rows;
+    Ok(Outcome { events: Vec::new(), ending, cost })
+}
+
+/// The equations (16)-(18) with Table 3 for the friction.
+struct Model<'a> {
+    plant: &'a Plant,
+    input: &'a Signal,
+    load: [Form; 3],
+    current_rate: Form,
+    inertia: [f64; 3],
+    viscous: [f64; 3],
+    coulomb: [f64; 3],
+}
+
+impl<'a> Model<'a> {
+    fn new(plant: &'a Plant, input: &'a Signal) -> Result<Self> {
+        let unfit = |what: String| {
+            Error::new(what)
+                .allowed("one viscous and one Coulomb value for each body, and a gear without losses")
+                .next("leave --solver out: the exact solver takes all of these")
+        };
+        let mut viscous = [0.0; 3];
+        let mut coulomb = [0.0; 3];
+        for body in Body::ALL {
+            let law = plant.friction(body);
+            if law.forward != law.backward || law.forward.breakaway != law.forward.coulomb {
+                return Err(unfit(format!(
+                    "the paper's Table 3 does not know the friction of the {}: it has directions or a breakaway of its own",
+                    body.name()
+                )));
+            }
+            viscous[body.index()] = law.forward.viscous;
+            coulomb[body.index()] = law.forward.coulomb;
+        }
+        if plant.gear_loses() {
+            return Err(unfit("the paper's Table 3 does not know a gear efficiency below 1".into()));
+        }
+        let free = crate::plant::Mode { motion: [Motion::Free; 3], gear_torque_positive: true };
+        let equations = plant.equations(free);
+        Ok(Self {
+            plant,
+            input,
+            load: Body::ALL.map(|body| plant.load(body, true, true)),
+            current_rate: equations.current_rate,
+            inertia: equations.inertia,
+            viscous,
+            coulomb,
+        })
+    }
+
+    /// Table 3 as printed: `phidot` and `TauComputed` in, `Tauf` out.
+    fn friction(&self, body: usize, speed: f64, computed: f64) -> f64 {
+        if (-BAND..=BAND).contains(&speed) && computed.abs() <= self.coulomb[body] {
+            computed
+        } else {
+            // sign(0) = 0, as in MATLAB
+            let sign = if speed == 0.0 { 0.0 } else { speed.signum() };
+            self.viscous[body] * speed + sign * self.coulomb[body]
+        }
+    }
+
+    fn rate(&self, t: f64, state: &State) -> State {
+        let input = self.input.value(t);
+        let mut rate = [0.0; place::COUNT];
+        for body in 0..3 {
+            let speed = state[2 * body + 1];
+            let computed = self.load[body].value(self.plant, state, input);
+            rate[2 * body] = speed;
+            // J φ̈ = TauComputed − Tauf                                          (16)-(18)
+            rate[2 * body + 1] = (computed - self.friction(body, speed, computed)) / self.inertia[body];
+        }
+        rate[place::CURRENT] = self.current_rate.value(self.plant, state, input);
+        rate
+    }
+
+    /// What the function makes of each body: frozen, or sliding with the sign of its speed.
+    fn motion(&self, state: &State, input: f64) -> [Motion; 3] {
+        std::array::from_fn(|body| {
+            let speed = state[2 * body + 1];
+            let computed = self.load[body].value(self.plant, state, input);
+            if self.coulomb[body] == 0.0 {
+                Motion::Free
+            } else if (-BAND..=BAND).contains(&speed) && computed.abs() <= self.coulomb[body] || speed == 0.0 {
+                Motion::Stuck
+            } else if speed > 0.0 {
+                Motion::Forward
+            } else {
+                Motion::Backward
+            }
+        })
+    }
+}
+
+/// `state` + `h` Σ weight · rate.
+fn moved(state: &State, h: f64, rates: &[(f64, &State)]) -> State {
+    std::array::from_fn(|j| state[j] + h * rates.iter().map(|(weight, rate)| weight * rate[j]).sum::<f64>())
+}
+
+fn runge_kutta_4(model: &Model, t: f64, x: &State, h: f64) -> State {
+    let k1 = model.rate(t, x);
+    let k2 = model.rate(t + h / 2.0, &moved(x, h, &[(0.5, &k1)]));
+    let k3 = model.rate(t + h / 2.0, &moved(x, h, &[(0.5, &k2)]));
+    let k4 = model.rate(t + h, &moved(x, h, &[(1.0, &k3)]));
+    moved(x, h / 6.0, &[(1.0, &k1), (2.0, &k2), (2.0, &k3), (1.0, &k4)])
+}
+
+/// The fifth-order formula of Dormand & Prince (1980), without its step control: Simulink's ode5.
+fn dormand_prince_5(model: &Model, t: f64, x: &State, h: f64) -> State {
+    let k1 = model.rate(t, x);
+    let k2 = model.rate(t + h / 5.0, &moved(x, h, &[(1.0 / 5.0, &k1)]));
+    let k3 = model.rate(t + h * 3.0 / 10.0, &moved(x, h, &[(3.0 / 40.0, &k1), (9.0 / 40.0, &k2)]));
+    let k4 = model.rate(
+        t + h * 4.0 / 5.0,
+        &moved(x, h, &[(44.0 / 45.0, &k1), (-56.0 / 15.0, &k2), (32.0 / 9.0, &k3)]),
+    );
+    let k5 = model.rate(
+        t + h * 8.0 / 9.0,
+        &moved(
+            x,
+            h,
+            &[
+                (19372.0 / 6561.0, &k1),
+                (-25360.0 / 2187.0, &k2),
+                (64448.0 / 6561.0, &k3),
+                (-212.0 / 729.0, &k4),
+            ],
+        ),
+    );
+    let k6 = model.rate(
+        t + h,
+        &moved(
+            x,
+            h,
+            &[
+                (9017.0 / 3168.0, &k1),
+                (-355.0 / 33.0, &k2),
+                (46732.0 / 5247.0, &k3),
+                (49.0 / 176.0, &k4),
+                (-5103.0 / 18656.0, &k5),
+            ],
+        ),
+    );
+    moved(
+        x,
+        h,
+        &[
+            (35.0 / 384.0, &k1),
+            (500.0 / 1113.0, &k3),
+            (125.0 / 192.0, &k4),
+            (-2187.0 / 6784.0, &k5),
+            (11.0 / 84.0, &k6),
+        ],
+    )
+}

@@ -1,0 +1,55 @@
+//! Every wrong case file we could think of, with the exact message it must give.
+//!
+//! `UPDATE_EXPECT=1 cargo test --test bad_cases` writes the messages anew; read each of them aloud before keeping it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use taut::case::Case;
+
+#[test]
+fn every_wrong_case_gives_its_message() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bad/case");
+    let mut files: Vec<PathBuf> = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.retain(|path| path.extension().is_some_and(|e| e == "toml"));
+    files.sort();
+    assert!(files.len() >= 60, "only {} wrong files", files.len());
+
+    let update = std::env::var_os("UPDATE_EXPECT").is_some();
+    let mut wrong = Vec::new();
+    for path in files {
+        // Messages name the file as the user does; here that is its bare name.
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        let message = match Case::read(&path) {
+            Ok(_) => "no error".to_string(),
+            Err(error) => error.to_string().replace(&path.display().to_string(), &name),
+        };
+        let message = format!("{message}\n");
+        let expected = path.with_extension("txt");
+        if update && message != "no error\n" {
+            fs::write(&expected, &message).unwrap();
+        } else if fs::read_to_string(&expected).unwrap_or_default() != message {
+            wrong.push(format!("── {name}\n{message}"));
+        }
+    }
+    assert!(wrong.is_empty(), "these messages are not the expected ones:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn no_message_is_left_without_its_file() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bad/case");
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        assert!(path.with_extension("toml").exists(), "{}", path.display());
+    }
+}
+
+#[test]
+fn a_file_that_is_not_there_and_a_folder() {
+    let error = Case::read("no/such/axis.toml").unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "no/such/axis.toml: this case file cannot be read: there is no such file\n  next: check the path, or write a new case with `taut init`"
+    );
+    let error = Case::read("tests").unwrap_err().to_string();
+    assert_eq!(error, "tests: this case file cannot be read: it is a folder");
+}

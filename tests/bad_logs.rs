@@ -1,0 +1,64 @@
+//! Every wrong log in `tests/bad/log` gives exactly the message beside it; `UPDATE_EXPECT=1` writes the messages again.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use taut::log::{read_columns, read_samples};
+
+fn message(file: &Path) -> String {
+    match read_samples(file, "time_s", "voltage_V") {
+        Ok(_) => format!("{} was read without a complaint", file.display()),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[test]
+fn wrong_logs_are_told_what_is_wrong_with_them() {
+    let update = std::env::var_os("UPDATE_EXPECT").is_some();
+    let mut files: Vec<PathBuf> = fs::read_dir("tests/bad/log").unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.retain(|file| file.extension().is_some_and(|e| e == "csv"));
+    files.sort();
+    assert!(files.len() >= 30);
+    let mut wrong = Vec::new();
+    for file in files {
+        let message = message(&file) + "\n";
+        assert!(!message.contains("without a complaint"), "{message}");
+        let expected = file.with_extension("txt");
+        if update {
+            fs::write(&expected, &message).unwrap();
+        }
+        if fs::read_to_string(&expected).unwrap_or_default() != message {
+            wrong.push(message);
+        }
+    }
+    assert!(wrong.is_empty(), "{} messages differ from what is expected:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+#[test]
+fn a_missing_file_and_a_folder() {
+    assert_eq!(
+        message(Path::new("tests/bad/log/nowhere.csv")),
+        "tests/bad/log/nowhere.csv: there is no such file\n  next: check the name and the folder it is in"
+    );
+    let folder = message(Path::new("tests/bad/log"));
+    assert!(folder.starts_with("tests/bad/log: "), "{folder}");
+}
+
+/// A log with its rows and columns swapped has a column for each sample; the answer must not take the memory of all.
+#[test]
+fn a_million_columns_are_refused_at_once() {
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("million-columns.csv");
+    let row: String = (0..1_000_000).map(|k| format!("c{k},")).collect();
+    fs::write(&file, format!("{row}\n{row}\n")).unwrap();
+    let begin = std::time::Instant::now();
+    let error = read_columns(&file, &["c5"]).unwrap_err();
+    assert!(begin.elapsed().as_secs_f64() < 1.0);
+    assert_eq!(error.what, "line 1 has more than 10,000 columns");
+    // Names so short that the line is within its limit.
+    fs::write(&file, "a,".repeat(10_001) + "b\n").unwrap();
+    assert_eq!(read_columns(&file, &["b"]).unwrap_err().what, "line 1 has more than 10,000 columns");
+    fs::write(&file, "a,".repeat(9_999) + "b\n" + &"1,".repeat(9_999) + "2\n").unwrap();
+    assert_eq!(read_columns(&file, &["b"]), Ok(vec![vec![2.0]]));
+    fs::write(&file, "a".repeat(3 << 20)).unwrap();
+    assert_eq!(read_columns(&file, &["b"]).unwrap_err().what, "line 1 is longer than 1 MiB");
+    fs::remove_file(&file).unwrap();
+}

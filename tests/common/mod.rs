@@ -1,0 +1,62 @@
+//! What several tests share: the paper's machine, and where the reference data lie.
+#![allow(dead_code)]
+
+pub mod random;
+
+use std::path::PathBuf;
+use taut::case::{Experiment, Initial};
+use taut::friction::Friction;
+use taut::signal::Signal;
+use taut::stage::{Amplifier, AmplifierMode, Belt, Cart, Motor, Pulley, Stage};
+
+/// The folder of data that are read in place, beside the repository; `None` where it is absent.
+pub fn shared(folder: &str) -> Option<PathBuf> {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared").join(folder);
+    path.is_dir().then_some(path)
+}
+
+/// A stage with the paper's motor and radius.
+pub fn paper_stage(stiffness: [f64; 3], inertia: f64, pulley: Friction, cart: Friction) -> Stage {
+    let pulley = Pulley { inertia, friction: pulley };
+    Stage {
+        motor: Motor {
+            torque_constant: 0.023,
+            back_emf_constant: 0.023,
+            resistance: 0.71,
+            inductance: 0.0,
+            rotor_inertia: 0.0,
+            gear_ratio: 1.0,
+            gear_efficiency: 1.0,
+        },
+        amplifier: Amplifier { mode: AmplifierMode::Voltage, gain: 1.0 },
+        pulley_radius: 0.0194,
+        drive_pulley: pulley,
+        idler_pulley: pulley,
+        cart: Cart { mass: 0.362, friction: cart },
+        belt: Belt { stiffness, damping: [0.0; 3], make: None },
+        encoder: None,
+    }
+}
+
+/// Table 1.
+pub fn table1() -> Stage {
+    let viscous = (Friction::symmetric(0.0042, 0.0), Friction::symmetric(40.6518, 0.0));
+    paper_stage([2.6552e5, 2.6552e5, 11.777e4], 7e-5, viscous.0, viscous.1)
+}
+
+/// Table 2.
+pub fn table2() -> Stage {
+    let viscous = (Friction::symmetric(0.0021, 0.0), Friction::symmetric(20.3259, 0.0));
+    paper_stage([1.3276e5, 1.3276e5, 5.8885e4], 6.3e-5, viscous.0, viscous.1)
+}
+
+/// Friction of Table 4, the rest of Table 2.
+pub fn table4() -> Stage {
+    let dry = (Friction::symmetric(0.0016, 0.015), Friction::symmetric(19.0424, 0.2));
+    paper_stage([1.3276e5, 1.3276e5, 5.8885e4], 6.3e-5, dry.0, dry.1)
+}
+
+/// An experiment from rest with an output every millisecond.
+pub fn experiment(input: Signal, until: f64) -> Experiment {
+    Experiment { name: "test".into(), input, until, every: 1e-3, initial: Initial::default() }
+}

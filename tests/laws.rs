@@ -1,0 +1,235 @@
+//! Laws that hold for any stage and any input, tried on random ones.
+
+mod common;
+
+use common::random::{self, Dry};
+use proptest::prelude::*;
+use taut::case::{Experiment, Initial};
+use taut::friction::Motion;
+use taut::plant::{Body, Mode, Plant, State};
+use taut::signal::Signal;
+use taut::solve::{Ending, Solution, Solver, simulate};
+use taut::stage::{AmplifierMode, Stage};
+use taut::trajectory::Trajectory;
+
+const STATES: [&str; 6] =
+    ["drive_angle", "drive_speed", "cart_position", "cart_speed", "idler_angle", "idler_speed"];
+
+fn run(stage: &Stage, input: &Signal, until: f64, every: f64) -> Solution {
+    let experiment =
+        Experiment { name: "law".into(), input: input.clone(), until, every, initial: Initial::default() };
+    let solution = simulate(stage, &experiment, Solver::Exact).unwrap();
+    assert_eq!(solution.outcome.ending, Ending::Complete);
+    solution
+}
+
+fn state(trajectory: &Trajectory, row: usize) -> State {
+    let get = |name: &str| trajectory.get(name).unwrap()[row];
+    [
+        get("drive_angle"),
+        get("drive_speed"),
+        get("cart_position"),
+        get("cart_speed"),
+        get("idler_angle"),
+        get("idler_speed"),
+        get("motor_current"),
+    ]
+}
+
+fn motion(code: f64) -> Motion {
+    match code as i8 {
+        -1 => Motion::Backward,
+        0 => Motion::Stuck,
+        1 => Motion::Forward,
+        _ => Motion::Free,
+    }
+}
+
+/// The largest excursion of any of the states, to measure differences against: m or rad, and per second.
+fn extents(trajectory: &Trajectory) -> [f64; 2] {
+    let largest = |names: [&str; 3]| {
+        names
+            .iter()
+            .flat_map(|name| trajectory.get(name).unwrap())
+            .fold(1e-12, |largest: f64, value| largest.max(value.abs()))
+    };
+    [largest([STATES[0], STATES[2], STATES[4]]), largest([STATES[1], STATES[3], STATES[5]])]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 1000, ..ProptestConfig::default() })]
+
+    /// The energy that comes in goes into heat or is stored, over every interval without an event: by quadrature of
+    /// the powers along the computed motion, so that it is the motion that is tested.
+    #[test]
+    fn power_is_balanced(stage in random::stage(Dry::Any), input in random::input()) {
+        let plant = Plant::new(&stage);
+        // Boole's rule over eight samples; the fastest swing of these stages is resolved many times over.
+        let every = 2e-6;
+        let solution = run(&stage, &input, 0.02, every);
+        let trajectory = &solution.trajectory;
+        let (time, gain) = (trajectory.get("time").unwrap(), stage.amplifier.gain);
+        let input_at = |row: usize| match stage.amplifier.mode {
+            AmplifierMode::Voltage => trajectory.get("voltage").unwrap()[row] / gain,
+            AmplifierMode::Current => trajectory.get("motor_current").unwrap()[row] / gain,
+        };
+        let power = |row: usize| {
+            let codes = Body::ALL.map(|b| trajectory.get(&format!("{}_state", b.key())).unwrap()[row]);
+            let mode = |positive| Mode { motion: codes.map(motion), gear_torque_positive: positive };
+            let state = state(trajectory, row);
+            // The sign of the gear's torque is the one that is consistent with itself.
+            let both = [true, false].map(|positive| plant.power(mode(positive), &state, input_at(row)));
+            let loss = |p: &taut::plant::Power| p.gear;
+            let power = if loss(&both[0]) >= 0.0 { both[0] } else { both[1] };
+            prop_assert!(power.imbalance().abs() <= 1e-9 * power.scale().max(1e-12), "{power:?}");
+            prop_assert!(power.gear >= -1e-12 * power.scale(), "the gear adds power: {power:?}");
+            prop_assert!(power.friction.iter().all(|&f| f >= 0.0), "friction adds power: {power:?}");
+            prop_assert!(power.belt >= 0.0 && power.copper >= 0.0);
+            Ok((power.stored, power.scale()))
+        };
+        let disturbed = |from: f64, to: f64| {
+            solution.outcome.events.iter().any(|e| e.time >= from - every && e.time <= to + every)
+        };
+        for first in (0..trajectory.len() - 9).step_by(800) {
+            let last = first + 8;
+            if disturbed(time[first], time[last]) || plant.gear_loses() || (first..last).any(|r| {
+                (input_at(r + 1) - input_at(r)).abs() > 0.01 * (1.0 + input_at(r).abs())
+            }) {
+                continue;
+            }
+            let mut integral = 0.0;
+            let mut scale: f64 = 0.0;
+            // Boole's rule on two groups of four intervals
+            for (k, weight) in [7.0, 32.0, 12.0, 32.0, 14.0, 32.0, 12.0, 32.0, 7.0].iter().enumerate() {
+                let (stored, size) = power(first + k)?;
+                integral += weight * stored * every * 2.0 / 45.0;
+                scale = scale.max(size);
+            }
+            let change = plant.energy(&state(trajectory, last)) - plant.energy(&state(trajectory, first));
+            let energy = plant.energy(&state(trajectory, last));
+            prop_assert!(
+                (change - integral).abs() <= 1e-9 * (scale * 8.0 * every) + 1e-13 * energy,
+                "energy changed by {change:e}, the powers say {integral:e}, of {energy:e} (scale {:e})", scale * 8.0 * every
+            );
+        }
+    }
+
+    /// u → −u turns the motion around, bit for bit.
+    #[test]
+    fn the_mirror_image_moves_as_the_image(stage in random::stage(Dry::Symmetric), input in random::input()) {
+        let there = run(&stage, &input, 0.3, 1e-3);
+        let back = run(&stage, &random::mirrored(&input), 0.3, 1e-3);
+        for name in STATES {
+            let (a, b) = (there.trajectory.get(name).unwrap(), back.trajectory.get(name).unwrap());
+            for (a, b) in a.iter().zip(b) {
+                prop_assert!(*a == -b, "{name}: {a:e} and {b:e}");
+            }
+        }
+        prop_assert_eq!(there.outcome.events.len(), back.outcome.events.len());
+        for (a, b) in there.outcome.events.iter().zip(&back.outcome.events) {
+            prop_assert!(a.time == b.time && a.load == -b.load && a.body == b.body);
+        }
+    }
+
+    /// Rows more or less often, and on other times: the same motion and the same events.
+    #[test]
+    fn the_output_interval_changes_nothing(stage in random::stage(Dry::Any), input in random::input(), odd in 0.2..0.9_f64) {
+        let coarse = run(&stage, &input, 0.3, 0.01);
+        let fine = run(&stage, &input, 0.3, 0.01 / 16.0);
+        let other = run(&stage, &input, 0.3, 0.01 * odd);
+        let [length, speed] = extents(&fine.trajectory);
+        for name in STATES {
+            let tolerance = 1e-9 * if name.ends_with("speed") { speed } else { length };
+            for (row, a) in coarse.trajectory.get(name).unwrap().iter().enumerate() {
+                let b = fine.trajectory.get(name).unwrap()[row * 16];
+                prop_assert!((a - b).abs() <= tolerance, "{name} at row {row}: {a:e} and {b:e}");
+            }
+        }
+        let same = |other: &Solution| {
+            let until = coarse.trajectory.get("time").unwrap().last().unwrap().min(*other.trajectory.get("time").unwrap().last().unwrap());
+            let within = |s: &Solution| s.outcome.events.iter().filter(|e| e.time < until - 1e-6).copied().collect::<Vec<_>>();
+            let (a, b) = (within(&coarse), within(other));
+            prop_assert_eq!(a.len(), b.len());
+            for (a, b) in a.iter().zip(&b) {
+                prop_assert!(a.body == b.body && a.to == b.to && (a.time - b.time).abs() < 1e-9, "{a:?} and {b:?}");
+            }
+            Ok(())
+        };
+        same(&fine)?;
+        same(&other)?;
+    }
+
+    /// Stiffness, inertia, mass, friction and torque constant by one factor: the same motion.
+    #[test]
+    fn scaling_all_forces_changes_nothing(stage in random::stage(Dry::Any), input in random::input(), factor in 0.1..10.0_f64) {
+        let mut scaled = stage.clone();
+        let side = |s: &mut taut::friction::Side| {
+            s.viscous *= factor;
+            s.coulomb *= factor;
+            s.breakaway *= factor;
+        };
+        for friction in [&mut scaled.drive_pulley.friction, &mut scaled.cart.friction, &mut scaled.idler_pulley.friction] {
+            side(&mut friction.forward);
+            side(&mut friction.backward);
+        }
+        scaled.belt.stiffness.iter_mut().chain(&mut scaled.belt.damping).for_each(|k| *k *= factor);
+        scaled.drive_pulley.inertia *= factor;
+        scaled.idler_pulley.inertia *= factor;
+        scaled.motor.rotor_inertia *= factor;
+        scaled.cart.mass *= factor;
+        scaled.motor.torque_constant *= factor;
+        let (a, b) = (run(&stage, &input, 0.3, 1e-3), run(&scaled, &input, 0.3, 1e-3));
+        let [length, speed] = extents(&a.trajectory);
+        for name in STATES {
+            let tolerance = 1e-8 * if name.ends_with("speed") { speed } else { length };
+            for (a, b) in a.trajectory.get(name).unwrap().iter().zip(b.trajectory.get(name).unwrap()) {
+                prop_assert!((a - b).abs() <= tolerance, "{name}: {a:e} and {b:e}");
+            }
+        }
+    }
+
+    /// A load inside breakaway moves nothing by one bit, for ever.
+    #[test]
+    fn at_rest_nothing_moves(stage in random::stage(Dry::Any), share in -0.999..0.999_f64, until in random::decades(1e-3, 1e6)) {
+        let mut stage = stage;
+        let law = &mut stage.drive_pulley.friction;
+        law.forward.coulomb = law.forward.coulomb.max(1e-3);
+        law.backward.coulomb = law.backward.coulomb.max(1e-3);
+        law.forward.breakaway = law.forward.breakaway.max(law.forward.coulomb);
+        law.backward.breakaway = law.backward.breakaway.max(law.backward.coulomb);
+        // The input that a forward (or backward) load just inside breakaway needs; a lossy gear only holds more.
+        let breakaway = if share > 0.0 { law.forward.breakaway } else { law.backward.breakaway };
+        let per_ampere = stage.motor.torque_constant * stage.motor.gear_ratio / stage.amplifier.gain;
+        let value = share * breakaway / per_ampere
+            * if stage.amplifier.mode == AmplifierMode::Voltage { stage.motor.resistance } else { 1.0 };
+        let solution = run(&stage, &Signal::Step { value, at: 0.0 }, until, until / 50.0);
+        prop_assert!(solution.outcome.events.is_empty(), "{:?}", solution.outcome.events);
+        for name in STATES {
+            prop_assert!(solution.trajectory.get(name).unwrap().iter().all(|&v| v == 0.0), "{name}");
+        }
+    }
+
+    /// Nothing coming in, the energy never grows.
+    #[test]
+    fn energy_decays_by_itself(stage in random::stage(Dry::Any), speeds in [-20.0..20.0_f64, -0.4..0.4, -20.0..20.0], offset in -1e-4..1e-4_f64) {
+        let plant = Plant::new(&stage);
+        let initial = Initial {
+            drive_speed: speeds[0],
+            cart_speed: speeds[1],
+            idler_speed: speeds[2],
+            cart_position: offset,
+            ..Initial::default()
+        };
+        let experiment =
+            Experiment { name: "law".into(), input: Signal::Step { value: 0.0, at: 0.0 }, until: 0.3, every: 1e-3, initial };
+        let solution = simulate(&stage, &experiment, Solver::Exact).unwrap();
+        // A motor whose two constants differ is no passive machine.
+        prop_assume!(stage.motor.torque_constant == stage.motor.back_emf_constant);
+        let mut before = f64::INFINITY;
+        for row in 0..solution.trajectory.len() {
+            let energy = plant.energy(&state(&solution.trajectory, row));
+            prop_assert!(energy <= before * (1.0 + 1e-12), "row {row}: {before:e} J, then {energy:e} J");
+            before = energy;
+        }
+    }
+}
