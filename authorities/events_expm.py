@@ -4,10 +4,11 @@ Within a mode, on one piece of the input, everything is linear in the augmented 
 
     z = (φ₁, w₁, x, v, φ₃, w₃, i, 1, p₀ … p_d)        p_k = u⁽ᵏ⁾ ηᵏ / k!   the input's Taylor terms
 
-so ż = A z and z(t) = exp(A t) z(0), exact to rounding. Every function that can end the mode is a row g z. All rows are looked at
-50 times per period of the fastest motion, together with their slopes g A z, so that a double crossing between two looks is seen
-as well; a root is then bisected on the row's own Taylor polynomial. Numbers are 80-bit (`numpy.longdouble` on x86-64: 64-bit
-mantissa) unless told otherwise: the same run in 64-bit numbers shows how sensitive a case is to rounding.
+so ż = A z and z(t) = exp(A t) z(0), exact to rounding. Every function that can end the mode is a row g z. All rows are
+looked at 50 times per period of the fastest motion, together with their slopes g A z, so that a double crossing between
+two looks is seen as well; a root is then bisected on the row's own Taylor polynomial. Numbers are 80-bit
+(`numpy.longdouble` on x86-64: 64-bit mantissa) unless told otherwise: the same run in 64-bit numbers shows how sensitive
+a case is to rounding.
 """
 
 from __future__ import annotations
@@ -92,9 +93,14 @@ class Mode:
                 load = {1: belt, 2: cart_load, 3: idler_load}[body]
                 forward, backward = number(friction.breakaway_forward) * one, number(friction.breakaway_backward) * one
                 scale = max(friction.breakaway_forward, friction.breakaway_backward, 1e-30)
-                # A lossy gear makes two half-planes of each side: K_t i η and K_t i / η, whichever is less (forward) or more.
-                motors = [(0 * one, None)] if body != 1 else [(n * motor * eta, -1)] if eta == 1 else \
-                    [(n * motor * eta, 1), (n * motor / eta, -1)]
+                # A lossy gear makes two half-planes of each side: K_t i η and K_t i / η, the lesser (forward) or greater.
+                motors = (
+                    [(0 * one, None)]
+                    if body != 1
+                    else [(n * motor * eta, -1)]
+                    if eta == 1
+                    else [(n * motor * eta, 1), (n * motor / eta, -1)]
+                )
                 if len(motors) == 1:
                     self.names += [("forward", body), ("backward", body)]
                     rows += [forward - load - motors[0][0], load + motors[0][0] + backward]
@@ -258,8 +264,12 @@ class Solver:
         for j, (what, body) in enumerate(mode.names):
             if what.endswith(" by η"):  # a pair: both have to be past breakaway
                 falls[:, j] = falls[:, j + 1] = falls[:, j] & falls[:, j + 1]
-        # Between two looks a row lies above its tangents where it is convex: only a low tangent hides a double crossing.
-        dips = (slope[:-1] < 0) & (slope[1:] > 0) & (np.maximum(g[:-1] + slope[:-1] * h, g[1:] - slope[1:] * h) <= 0.01 * g[:-1])
+        # Between two looks a convex row lies above its tangents: only a low tangent hides a double crossing.
+        dips = (
+            (slope[:-1] < 0)
+            & (slope[1:] > 0)
+            & (np.maximum(g[:-1] + slope[:-1] * h, g[1:] - slope[1:] * h) <= 0.01 * g[:-1])
+        )
         for k in np.flatnonzero((falls | dips).any(axis=1)):
             found = []
             state = z.copy()
@@ -339,7 +349,6 @@ class Solver:
 
     def run(self):
         number = self.number
-        until = self.times[-1]
         starts = {piece.start: piece for piece in self.chain}
         stops = sorted(set(starts) | set(map(float, self.times)))
         y, t = np.zeros(8, dtype=number), number(0)
@@ -360,7 +369,13 @@ class Solver:
                     self.handle(name, z, t)
                 y = z
         wanted = [kept[float(t)] for t in self.times]
-        return Run(np.array(self.times), np.array([w[0] for w in wanted]), np.array([w[1] for w in wanted]), self.events, self.doubts)
+        return Run(
+            np.array(self.times),
+            np.array([w[0] for w in wanted]),
+            np.array([w[1] for w in wanted]),
+            self.events,
+            self.doubts,
+        )
 
     def handle(self, name, z, t):
         what, body = name

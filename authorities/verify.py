@@ -20,8 +20,17 @@ PAPER = dict(torque_constant=23e-3, back_emf_constant=23e-3, resistance=0.71, pu
 
 
 def paper_stage(drive_friction, cart_friction, inertia, k, k3):
-    return Stage(**PAPER, drive_inertia=inertia, idler_inertia=inertia, k1=k, k2=k, k3=k3,
-                 drive_friction=drive_friction, cart_friction=cart_friction, idler_friction=drive_friction)
+    return Stage(
+        **PAPER,
+        drive_inertia=inertia,
+        idler_inertia=inertia,
+        k1=k,
+        k2=k,
+        k3=k3,
+        drive_friction=drive_friction,
+        cart_friction=cart_friction,
+        idler_friction=drive_friction,
+    )
 
 
 TABLE1 = paper_stage(Friction.symmetric(0.0042), Friction.symmetric(40.6518), 7e-5, 2.6552e5, 11.777e4)
@@ -50,15 +59,19 @@ def reference(case):
     states = np.column_stack([table[name] for name in ("phi1", "w1", "x", "v", "phi3", "w3")])
     modes = np.column_stack([table[f"mode{k}"] for k in (1, 2, 3)]).astype(int)
     with open(REFERENCE / f"{case}.events.csv") as file:
-        events = [(float(row["t"]), int(row["inertia"]), int(row["from"]), int(row["to"]), float(row["applied"]))
-                  for row in csv.DictReader(file)]
+        events = [
+            (float(row["t"]), int(row["inertia"]), int(row["from"]), int(row["to"]), float(row["applied"]))
+            for row in csv.DictReader(file)
+        ]
     return table["t"], states, modes, events
 
 
 def main():
     print("Largest difference from the references, over every sample and event.")
-    print(f"{'case':<20}{'authority':<9}{'events':>7}{'same modes':>11}{'angle/rad':>11}{'x/m':>10}"
-          f"{'w/(rad/s)':>11}{'v/(m/s)':>10}{'event/s':>10}{'load':>10}{'seconds':>9}")
+    print(
+        f"{'case':<20}{'authority':<9}{'events':>7}{'same modes':>11}{'angle/rad':>11}{'x/m':>10}"
+        f"{'w/(rad/s)':>11}{'v/(m/s)':>10}{'event/s':>10}{'load':>10}{'seconds':>9}"
+    )
     for case, (stage, signal) in CASES.items():
         times, states, modes, events = reference(case)
         grid = [k / 1000 for k in range(len(times))]
@@ -71,8 +84,11 @@ def main():
             same = sequence and (run.modes == modes).all()
             event = max((abs(e.time - ref[0]) for e, ref in zip(run.events, events)), default=0.0)
             load = max((abs(e.load - ref[4]) for e, ref in zip(run.events, events)), default=0.0)
-            print(f"{case:<20}{name:<9}{len(run.events):>7}{'yes' if same else 'NO':>11}{max(off[0], off[4]):>11.1e}{off[2]:>10.1e}"
-                  f"{max(off[1], off[5]):>11.1e}{off[3]:>10.1e}{event:>10.1e}{load:>10.1e}{clock:>9.2f}", flush=True)
+            print(
+                f"{case:<20}{name:<9}{len(run.events):>7}{'yes' if same else 'NO':>11}{max(off[0], off[4]):>11.1e}{off[2]:>10.1e}"
+                f"{max(off[1], off[5]):>11.1e}{off[3]:>10.1e}{event:>10.1e}{load:>10.1e}{clock:>9.2f}",
+                flush=True,
+            )
             for doubt in run.doubts:
                 print(f"    doubt: {doubt}")
 
