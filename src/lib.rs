@@ -2,8 +2,11 @@
 
 pub mod case;
 pub mod error;
+pub mod files;
 pub mod friction;
 pub mod log;
+pub mod metrics;
+pub mod number;
 pub mod parameter;
 pub mod plant;
 pub mod quantity;
