@@ -10,6 +10,8 @@ pub mod number;
 pub mod parameter;
 pub mod plant;
 pub mod quantity;
+#[cfg(feature = "report")]
+pub mod report;
 pub mod signal;
 pub mod solve;
 pub mod stage;
