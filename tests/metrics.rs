@@ -198,7 +198,8 @@ fn the_last_stretch_counts_and_its_sign() {
 
 #[test]
 fn what_never_moves_has_stopped_at_once_and_what_has_no_dry_friction_never_stops() {
-    let (_, held) = run(&table4(), Signal::Step { value: 1.0, at: 0.0 }, 0.5);
+    // 0.4 V is 13 mN m, below the 15 mN m of the drive pulley.
+    let (_, held) = run(&table4(), Signal::Step { value: 0.4, at: 0.0 }, 0.5);
     assert_eq!((held.stop_time, held.settled), (Some(0.0), true));
     let steady = held.steady_speed.unwrap();
     assert_eq!((steady.value, steady.reached, steady.analytic), (0.0, true, Some(0.0)));
