@@ -127,7 +127,7 @@ proptest! {
     /// Under a constant input every machine without a breakaway to hold it ends at the speed of the balance.
     #[test]
     fn a_long_step_ends_at_the_balance_of_forces(stage in random::stage(Dry::Any), input in prop_oneof![3.0..12.0f64, -12.0..-3.0f64]) {
-        let long = simulate(&stage, &experiment(Signal::Step { value: input, at: 0.0 }, 20.0), Solver::Exact).unwrap();
+        let long = simulate(&stage, &experiment(Signal::Step { value: input, at: 0.0 }, 5.0), Solver::Exact).unwrap();
         let metrics = measure(&stage, &long, 256);
         let steady = metrics.steady_speed.unwrap();
         if let Some(analytic) = steady.analytic
