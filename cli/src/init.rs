@@ -12,7 +12,10 @@ pub fn run(args: &Init) -> Outcome {
     let file = &args.file;
     if file.is_dir() {
         let inside = file.join("axis.toml");
-        return Err(Error::new("this is a folder").in_file(file).next(format!("name a file: {}", inside.display())).into());
+        return Err(Error::new("this is a folder")
+            .in_file(file)
+            .next(format!("name a file: {}", inside.display()))
+            .into());
     }
     if file.exists() && !args.force {
         let error = Error::new("this file exists already, and nothing was written").in_file(file);

@@ -1,11 +1,11 @@
 //! The inputs: `{ pulse = "5 V", for = "0.25 s" }` and its kind.
 
 use super::reader::{Field, Table, nearest};
+use super::{Folder, InputFile};
 use crate::error::{Error, Result};
 use crate::quantity;
 use crate::signal::{Hold, Signal, Slot, Tone};
 use std::f64::consts::PI;
-use std::path::Path;
 
 /// Every kind of input; the key of that name holds its main value.
 pub(super) const KINDS: &[&str] = &[
@@ -36,7 +36,7 @@ const MOST_TONES: usize = 1000;
 /// What an input has to know about the experiment it belongs to.
 pub(super) struct Context<'a> {
     /// Where relative paths begin.
-    pub folder: &'a Path,
+    pub folder: &'a Folder<'a>,
     /// End of the run, s.
     pub until: f64,
 }
@@ -227,7 +227,7 @@ fn sampled(main: &Field, table: &Table, context: &Context) -> Result<Signal> {
         }
         None => 1.0,
     };
-    let path = context.folder.join(file);
+    let path = context.folder.path.join(file);
     let (times, values) = crate::log::read_samples(&path, time, column)?;
     if let Some(first) = times.first().filter(|&&t| t < 0.0) {
         return Err(Error::new(format!("column `{time}` begins at {first} s"))
@@ -235,6 +235,7 @@ fn sampled(main: &Field, table: &Table, context: &Context) -> Result<Signal> {
             .allowed("times from 0 s on")
             .next("subtract the first time from all of them"));
     }
+    context.folder.read.borrow_mut().push(InputFile { path, place: main.node.span.clone() });
     Ok(Signal::Sampled { times, values: values.into_iter().map(|v| v * unit).collect(), hold })
 }
 

@@ -3,9 +3,10 @@
 use super::run::{Run, Setting};
 use super::summary::Summary;
 use super::{page, plots};
+use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use taut::case::Experiment;
+use taut::case::{Case, Experiment};
 use taut::files::write_atomically;
 use taut::solve::Event;
 use taut::{Error, Result};
@@ -47,18 +48,42 @@ impl Folder {
         Ok(name)
     }
 
+    /// Copies the files that the case's inputs are read from into `inputs/`; returns the text that names them there.
+    fn bring_inputs(&self, case: &Case) -> Result<String> {
+        let mut names: HashMap<PathBuf, String> = HashMap::new();
+        for file in &case.files {
+            if names.contains_key(&file.path) {
+                continue;
+            }
+            let bytes = std::fs::read(&file.path).map_err(|e| Error::new(e.to_string()).in_file(&file.path))?;
+            let own = file.path.file_name().unwrap_or_default().to_string_lossy();
+            let free = |name: &String| names.values().all(|other| !other.eq_ignore_ascii_case(name));
+            let name =
+                std::iter::once(format!("inputs/{own}")).chain((2..).map(|k| format!("inputs/{k}-{own}"))).find(free);
+            let name = name.unwrap_or_default();
+            self.make("inputs")?;
+            write_atomically(self.path(&name), bytes)?;
+            names.insert(file.path.clone(), name);
+        }
+        Ok(case.text_with(|file| names.get(&file.path).cloned().unwrap_or_default()))
+    }
+
+    fn make(&self, name: &str) -> Result<()> {
+        let path = self.path(name);
+        std::fs::create_dir_all(&path).map_err(|e| Error::new(told(&e)).in_file(&path).next("remove what has its name"))
+    }
+
     /// What belongs to all experiments: summary, case, report and plots.
     pub fn write_common(&self, setting: &Setting, summary: &Summary, runs: &[Run]) -> Result<()> {
         let case = setting.case;
         write_atomically(self.path("summary.json"), summary.json())?;
-        write_atomically(self.path("case.toml"), &case.text)?;
+        write_atomically(self.path("case.toml"), self.bring_inputs(case)?)?;
         if setting.args.no_report {
             return Ok(());
         }
         let figures: Vec<_> = runs.iter().map(|run| plots::figures(case, run)).collect();
         page::page(case, setting.solver, runs, &figures).write(self.path("report.html"))?;
-        std::fs::create_dir_all(self.path("plots"))
-            .map_err(|e| Error::new(told(&e)).in_file(self.path("plots")).next("remove what has its name"))?;
+        self.make("plots")?;
         plots::write(&self.path("plots"), runs, &figures)
     }
 }

@@ -16,7 +16,9 @@ const MOST_EVENTS: usize = 200;
 pub fn page(case: &Case, solver: Solver, runs: &[Run], figures: &[Vec<Named>]) -> Page {
     let how = match solver {
         Solver::Exact => "Solved exactly: modes and matrix exponentials, events located to rounding.",
-        Solver::Table3 { .. } => "Solved with the friction function of the paper's Table 3 and a fixed step: a reproduction, not exact.",
+        Solver::Table3 { .. } => {
+            "Solved with the friction function of the paper's Table 3 and a fixed step: a reproduction, not exact."
+        }
     };
     let mut page = Page::new(case.title.clone()).subtitle(how);
     page.section("The stage");

@@ -43,12 +43,10 @@ pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
         .panel(plot.panel(Axis::new("Speed", "m/s").shown_as("mm/s", 1e3), &speeds))
         .caption("Speeds along the belt.");
     let spans = [("stretch 1", "span 1"), ("stretch 2", "span 2"), ("stretch 3", "span 3")];
-    let stretch = figure("stretch")
-        .panel(plot.panel(Axis::new("Stretch", "m").shown_as("µm", 1e6), &spans))
-        .caption(
-            "Stretch of the spans: 1 from drive pulley to cart, 2 from cart to idler pulley, 3 from idler to drive pulley. \
+    let stretch = figure("stretch").panel(plot.panel(Axis::new("Stretch", "m").shown_as("µm", 1e6), &spans)).caption(
+        "Stretch of the spans: 1 from drive pulley to cart, 2 from cart to idler pulley, 3 from idler to drive pulley. \
              Negative means shorter than at rest.",
-        );
+    );
     let spans = [("force 1", "span 1"), ("force 2", "span 2"), ("force 3", "span 3")];
     let forces = figure("forces")
         .panel(plot.panel(Axis::new("Force", "N"), &spans))
@@ -59,7 +57,9 @@ pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
         .panel(plot.panel(Axis::new("Torque", "N m").shown_as("mN m", 1e3), &pulleys))
         .panel(plot.panel(Axis::new("Force", "N"), &[("cart friction", "cart")]))
         .panel(plot.panel(Axis::new("State", ""), &states))
-        .caption("What friction takes or holds, and the states: 1 forward, 0 stuck, −1 backward, 2 without dry friction.");
+        .caption(
+            "What friction takes or holds, and the states: 1 forward, 0 stuck, −1 backward, 2 without dry friction.",
+        );
     vec![
         ("input", input),
         ("positions", positions),

@@ -36,18 +36,45 @@ pub fn value(value: f64, unit: &str) -> String {
     number::engineering(value, unit, 5).replace(['\u{a0}', '\u{202f}'], " ").replace('−', "-")
 }
 
+/// A length of travel in mm, far ones in m.
+fn travel(metres: f64) -> String {
+    match metres.abs() {
+        m if m < 1e-4 && m > 0.0 => value(metres, "m"),
+        m if m < 10.0 => format!("{:.4} mm", metres * 1e3),
+        _ => value(metres, "m"),
+    }
+}
+
+/// A speed in mm/s, fast ones in m/s.
+fn speed(metres_per_second: f64) -> String {
+    match metres_per_second.abs() {
+        v if v < 1e-3 && v > 0.0 => value(metres_per_second, "m/s"),
+        v if v < 10.0 => format!("{:.2} mm/s", metres_per_second * 1e3),
+        _ => value(metres_per_second, "m/s"),
+    }
+}
+
+/// A time in ms, long ones in s.
+fn time(seconds: f64) -> String {
+    match seconds.abs() {
+        s if s < 1e-3 && s > 0.0 => value(seconds, "s"),
+        s if s < 1.0 => format!("{} ms", number::fixed(seconds * 1e3, 3).trim_end_matches('0').trim_end_matches('.')),
+        _ => value(seconds, "s"),
+    }
+}
+
 /// How a run ended that did not reach its end.
 pub fn early_end(ending: &Ending) -> Option<String> {
     match *ending {
         Ending::Complete => None,
-        Ending::TooManyEvents { time } => Some(format!(
+        Ending::TooManyEvents { time: at } => Some(format!(
             "ended at {}: bodies stick and slip without end there, more often than a machine does",
-            value(time, "s")
+            time(at)
         )),
-        Ending::Diverged { time } => {
-            Some(format!("ended at {}: its state is no number any more; a smaller --step may help", value(time, "s")))
+        Ending::Diverged { time: at } => {
+            Some(format!("ended at {}: its state is no number any more; a smaller --step may help", time(at)))
         }
-        Ending::Interrupted { time } => Some(format!("was interrupted at {}", value(time, "s"))),
+        Ending::Interrupted { time: at } => Some(format!("was interrupted at {}", time(at))),
     }
 }
 
@@ -61,28 +88,21 @@ pub fn lines(run: &Run, solver: Solver) -> Vec<(&'static str, String)> {
     vec![
         (
             "final position",
-            format!("cart {}, r φ₁ {}", value(metrics.final_cart_position, "m"), value(metrics.final_drive_travel, "m")),
+            format!("cart {}, r φ₁ {}", travel(metrics.final_cart_position), travel(metrics.final_drive_travel)),
         ),
         ("steady speed", steady(metrics)),
         (
             "peak speed",
-            format!(
-                "cart {} at {}",
-                value(metrics.peak_cart_speed.value, "m/s"),
-                value(metrics.peak_cart_speed.time, "s")
-            ),
+            format!("cart {} at {}", speed(metrics.peak_cart_speed.value), time(metrics.peak_cart_speed.time)),
         ),
-        ("peak stretch", format!("{} in span {span} at {}", value(stretch.value, "m"), value(stretch.time, "s"))),
-        ("peak force", format!("{} in span {force_span} at {}", value(force.value, "N"), value(force.time, "s"))),
-        (
-            "peak current",
-            format!("{} at {}", value(metrics.peak_current.value, "A"), value(metrics.peak_current.time, "s")),
-        ),
+        ("peak stretch", format!("{} in span {span} at {}", value(stretch.value, "m"), time(stretch.time))),
+        ("peak force", format!("{} in span {force_span} at {}", value(force.value, "N"), time(force.time))),
+        ("peak current", format!("{} at {}", value(metrics.peak_current.value, "A"), time(metrics.peak_current.time))),
         ("stop time", stop(metrics, solver)),
         ("events", events(metrics, solver)),
         (
             "r φ₁ - cart",
-            format!("at most {} at {}, {} at the end", value(error.value, "m"), value(error.time, "s"), value(left, "m")),
+            format!("at most {} at {}, {} at the end", value(error.value, "m"), time(error.time), value(left, "m")),
         ),
         ("cost", cost(run)),
     ]
@@ -93,25 +113,25 @@ fn steady(metrics: &Metrics) -> String {
         return "none: no constant input lasts 20 samples".into();
     };
     let balance = match steady.analytic {
-        Some(speed) => format!("forces balance at {}", value(speed, "m/s")),
+        Some(balance) => format!("forces balance at {}", speed(balance)),
         None => "nothing limits the speed".into(),
     };
     if steady.reached {
-        format!("{}; {balance}", value(steady.value, "m/s"))
+        format!("{}; {balance}", speed(steady.value))
     } else {
-        let (speed, change) = (value(steady.value, "m/s"), value(steady.change, "m/s"));
-        format!("not reached: {speed}, and {change} of it in the last tenth; {balance}")
+        let (reached, change) = (speed(steady.value), speed(steady.change));
+        format!("not reached: {reached} at the end, {change} of it in the last tenth; {balance}")
     }
 }
 
 fn stop(metrics: &Metrics, solver: Solver) -> String {
     match metrics.stop_time {
         Some(0.0) if metrics.events.iter().all(|count| count.total() == 0) => "nothing moved".into(),
-        Some(time) => value(time, "s"),
+        Some(at) => time(at),
         None if matches!(solver, Solver::Table3 { .. }) => {
-            format!("none: Table 3 freezes speeds and creeps on, cart at {}", value(metrics.final_cart_speed, "m/s"))
+            format!("none: Table 3 freezes speeds and creeps on, cart at {}", speed(metrics.final_cart_speed))
         }
-        None => format!("still moving at the end, cart at {}", value(metrics.final_cart_speed, "m/s")),
+        None => format!("still moving at the end, cart at {}", speed(metrics.final_cart_speed)),
     }
 }
 
@@ -135,6 +155,7 @@ fn events(metrics: &Metrics, solver: Solver) -> String {
 fn cost(run: &Run) -> String {
     let cost = run.outcome.cost;
     let work = match cost.evaluations {
+        0 if cost.modes == 1 => format!("{} steps, 1 mode", cost.steps),
         0 => format!("{} steps, {} modes", cost.steps, cost.modes),
         n => format!("{} steps, {n} evaluations", cost.steps),
     };
