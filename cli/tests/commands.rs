@@ -193,13 +193,14 @@ fn json_on_the_terminal_is_the_summary_in_the_folder() {
 #[test]
 fn wrong_input_is_told_on_stderr_with_status_2() {
     let folder = TempDir::new().unwrap();
-    fs::write(folder.path().join("axis.toml"), "[motor]\ntorque_konstant = 1\n").unwrap();
+    let misspelt = taut::case::TEMPLATE.replace("torque_constant", "torque_konstant");
+    fs::write(folder.path().join("axis.toml"), misspelt).unwrap();
     fs::write(folder.path().join("file"), "").unwrap();
     let table4 = table4();
     let table4 = table4.to_str().unwrap();
     let wrong: [(&[&str], &str); 9] = [
         (&["simulate", "nowhere.toml"], "error: nowhere.toml: this case file cannot be read: there is no such file"),
-        (&["simulate", "axis.toml"], "torque_konstant"),
+        (&["simulate", "axis.toml"], "did you mean `torque_constant`?"),
         (&["simulate", table4, "--set", "cart.mass=0.5 m"], "a length"),
         (&["simulate", table4, "--experiment", "6 V pulse"], "allowed: \"5 V pulse\", \"10 V pulse\""),
         (&["simulate", table4, "--step", "1ms"], "add --solver table3"),

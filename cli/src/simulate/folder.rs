@@ -77,12 +77,13 @@ impl Folder {
     pub fn write_common(&self, setting: &Setting, summary: &Summary, runs: &[Run]) -> Result<()> {
         let case = setting.case;
         write_atomically(self.path("summary.json"), summary.json())?;
-        write_atomically(self.path("case.toml"), self.bring_inputs(case)?)?;
+        let text = self.bring_inputs(case)?;
+        write_atomically(self.path("case.toml"), &text)?;
         if setting.args.no_report {
             return Ok(());
         }
         let figures: Vec<_> = runs.iter().map(|run| plots::figures(case, run)).collect();
-        page::page(case, setting.solver, runs, &figures).write(self.path("report.html"))?;
+        page::page(case, &text, setting.solver, runs, &figures).write(self.path("report.html"))?;
         self.make("plots")?;
         plots::write(&self.path("plots"), runs, &figures)
     }

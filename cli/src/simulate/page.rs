@@ -12,8 +12,8 @@ use taut::solve::Solver;
 /// Events shown; the rest is in the events' own file.
 const MOST_EVENTS: usize = 200;
 
-/// The page for these runs.
-pub fn page(case: &Case, solver: Solver, runs: &[Run], figures: &[Vec<Named>]) -> Page {
+/// The page for these runs; `text` is the case that repeats them.
+pub fn page(case: &Case, text: &str, solver: Solver, runs: &[Run], figures: &[Vec<Named>]) -> Page {
     let how = match solver {
         Solver::Exact => "Solved exactly: modes and matrix exponentials, events located to rounding.",
         Solver::Table3 { .. } => {
@@ -28,7 +28,7 @@ pub fn page(case: &Case, solver: Solver, runs: &[Run], figures: &[Vec<Named>]) -
     }
     page.section("The case");
     page.prose("This text repeats the run.");
-    page.embed("case.toml", &case.text);
+    page.embed("case.toml", text);
     page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
     page
 }

@@ -19,9 +19,10 @@ pub fn text(case: &Case, solver: Solver, runs: &[Run], folder: Option<&Folder>) 
         if let Some(told) = early_end(&run.outcome.ending) {
             let _ = writeln!(text, "  {:<16}{told}", "ended early");
         }
-        for (name, value) in lines(run, solver) {
-            let _ = writeln!(text, "  {name:<16}{value}");
+        for (name, words) in lines(run, solver) {
+            let _ = writeln!(text, "  {name:<16}{words}");
         }
+        let _ = writeln!(text, "  {:<16}{}", "took", took(run.took));
     }
     text.push('\n');
     match folder {
@@ -29,6 +30,10 @@ pub fn text(case: &Case, solver: Solver, runs: &[Run], folder: Option<&Folder>) 
         None => text.push_str("nothing was written: add --out DIR for files and a report\n"),
     }
     text
+}
+
+fn took(duration: Duration) -> String {
+    number::engineering(duration.as_secs_f64(), "s", 3).replace('\u{a0}', " ")
 }
 
 /// A value with its unit for people, spaces and signs as a terminal and `grep` like them.
@@ -101,7 +106,7 @@ pub fn lines(run: &Run, solver: Solver) -> Vec<(&'static str, String)> {
         ("stop time", stop(metrics, solver)),
         ("events", events(metrics, solver)),
         (
-            "r φ₁ - cart",
+            "r φ₁ - x",
             format!("at most {} at {}, {} at the end", value(error.value, "m"), time(error.time), value(left, "m")),
         ),
         ("cost", cost(run)),
@@ -159,12 +164,7 @@ fn cost(run: &Run) -> String {
         0 => format!("{} steps, {} modes", cost.steps, cost.modes),
         n => format!("{} steps, {n} evaluations", cost.steps),
     };
-    format!("{} rows, {work}, {}", cost.samples, duration(run.took))
-}
-
-fn duration(took: Duration) -> String {
-    let digits = number::engineering(took.as_secs_f64(), "s", 3);
-    digits.replace('\u{a0}', " ")
+    format!("{} rows, {work}", cost.samples)
 }
 
 fn solver_words(solver: Solver) -> String {
