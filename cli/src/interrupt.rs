@@ -1,4 +1,5 @@
-//! Ctrl-C and a request to terminate: the first ends the run in order, the second at once.
+//! Ctrl-C and a request to terminate: the first ends the run in order, the second at once (and may then leave a hidden
+//! file whose name ends in `.tmp`, never half a result under its own name).
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use std::sync::Arc;

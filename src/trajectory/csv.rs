@@ -102,8 +102,8 @@ mod tests {
     #[test]
     fn numbers_are_short() {
         let texts = [0.0, -0.0, 5.0, 0.001, 0.1 + 0.2, -1.5e-7, 1e300, f64::NAN, f64::NEG_INFINITY].map(shown);
-        assert_eq!(texts, ["0", "-0", "5", "0.001", "0.30000000000000004", "-1.5e-7", "1e300", "NaN", "-inf"]);
-        assert_eq!(shown(-f64::MIN_POSITIVE).len(), 24);
+        assert_eq!(texts, ["0", "-0", "5", "0.001", "0.30000000000000004", "-1.5e-7", "1e+300", "NaN", "-inf"]);
+        assert_eq!(shown(-f64::MIN_POSITIVE), "-2.2250738585072014e-308");
     }
 
     proptest! {

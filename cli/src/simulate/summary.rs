@@ -6,7 +6,7 @@ use taut::case::Case;
 use taut::metrics::{Metrics, Peak, SteadySpeed};
 use taut::plant::Body;
 use taut::solve::{Ending, Event, Method, Solver};
-use taut::stage::Stage;
+use taut::stage::{AmplifierMode, Stage};
 
 /// Events listed; the rest is in the events' own file.
 const MOST_EVENTS: usize = 10_000;
@@ -99,6 +99,7 @@ struct SteadyTold {
     reached: bool,
     analytic_m_s: Option<f64>,
     input: f64,
+    input_unit: &'static str,
     from_s: f64,
     to_s: f64,
 }
@@ -141,7 +142,7 @@ impl Summary {
             version: env!("CARGO_PKG_VERSION"),
             solver: SolverUsed::of(solver),
             stage: StageFigures::of(&case.stage),
-            experiments: runs.iter().map(ExperimentFigures::of).collect(),
+            experiments: runs.iter().map(|run| ExperimentFigures::of(run, case.stage.amplifier.mode)).collect(),
         }
     }
 
@@ -187,7 +188,7 @@ impl StageFigures {
 }
 
 impl ExperimentFigures {
-    fn of(run: &Run) -> Self {
+    fn of(run: &Run, mode: AmplifierMode) -> Self {
         let (metrics, outcome) = (&run.metrics, &run.outcome);
         let (word, time_s) = match outcome.ending {
             Ending::Complete => ("complete", metrics.end),
@@ -200,7 +201,7 @@ impl ExperimentFigures {
             name: run.experiment.name.clone(),
             files: run.files.clone(),
             ending: EndingTold { word, time_s },
-            metrics: MetricsTold::of(metrics),
+            metrics: MetricsTold::of(metrics, mode),
             events: outcome.events.iter().take(MOST_EVENTS).map(EventTold::of).collect(),
             events_not_listed: outcome.events.len().saturating_sub(MOST_EVENTS),
             cost: CostTold {
@@ -218,7 +219,7 @@ impl ExperimentFigures {
 }
 
 impl MetricsTold {
-    fn of(metrics: &Metrics) -> Self {
+    fn of(metrics: &Metrics, mode: AmplifierMode) -> Self {
         let count = |body: Body| {
             let count = metrics.events[body.index()];
             CountTold { body: body.key(), stops: count.stops, starts: count.starts, reversals: count.reversals }
@@ -231,7 +232,7 @@ impl MetricsTold {
             final_cart_speed_m_s: metrics.final_cart_speed,
             cart_speed: metrics.peak_cart_speed.into(),
             drive_speed: metrics.peak_drive_speed.into(),
-            steady_speed: metrics.steady_speed.map(SteadyTold::from),
+            steady_speed: metrics.steady_speed.map(|steady| SteadyTold::of(steady, mode)),
             stretch: metrics.peak_stretch.map(PeakTold::from),
             force: metrics.peak_force.map(PeakTold::from),
             current: metrics.peak_current.into(),
@@ -250,14 +251,15 @@ impl From<Peak> for PeakTold {
     }
 }
 
-impl From<SteadySpeed> for SteadyTold {
-    fn from(steady: SteadySpeed) -> Self {
+impl SteadyTold {
+    fn of(steady: SteadySpeed, mode: AmplifierMode) -> Self {
         Self {
             cart_speed_m_s: steady.value,
             change_m_s: steady.change,
             reached: steady.reached,
             analytic_m_s: steady.analytic,
             input: steady.input,
+            input_unit: if mode == AmplifierMode::Current { "A" } else { "V" },
             from_s: steady.stretch.0,
             to_s: steady.stretch.1,
         }
