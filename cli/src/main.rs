@@ -1,3 +1,33 @@
-//! The program `taut`.
+//! The program `taut`: reads the command line, does what it says, and tells how it ended.
 
-fn main() {}
+mod args;
+mod failure;
+mod init;
+mod interrupt;
+mod simulate;
+mod terminal;
+
+use args::{Args, Command};
+use clap::Parser;
+use failure::Status;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let args = match Args::try_parse() {
+        Ok(args) => args,
+        Err(told) => return terminal::show_help_or_mistake(&told),
+    };
+    let done = match args.command {
+        Command::Init(args) => init::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
+    };
+    match done {
+        Ok(Status::Done) => ExitCode::SUCCESS,
+        Ok(Status::Incomplete) => ExitCode::from(1),
+        Ok(Status::Interrupted(signal)) => ExitCode::from(128 + signal),
+        Err(failure) => {
+            terminal::show_error(&failure.error);
+            ExitCode::from(failure.status)
+        }
+    }
+}
