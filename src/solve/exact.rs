@@ -55,6 +55,9 @@ struct Run<'a, const R: usize, const C: usize> {
     /// How many leading Taylor coefficients of a sliding body's speed are zero by definition, because it starts from rest:
     /// 1 where it is accelerated, 2 where the load has only just reached its friction. Last, the same for the gear's torque.
     fresh: [usize; 4],
+    /// By how much the load on a stuck body may pass its breakaway before it counts: what rounding can do to the load.
+    /// Without it a body that comes to rest just at its limit would chatter on the last bit.
+    slack: [f64; 3],
     /// Bounds of |u̇| and |ü| on the present piece.
     input_rate: f64,
     input_curvature: f64,
@@ -108,6 +111,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             laws: vec![Rc::clone(&law)],
             law,
             fresh: [0; 4],
+            slack: [0.0; 3],
             input_rate: 0.0,
             input_curvature: 0.0,
             row: 0,
@@ -250,7 +254,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             let mut time = f64::INFINITY;
             for guard in &law.guards {
                 // g(τ) ≥ g − (|w| √2V + |w_u| |u̇|) τ − |w| |b| |u̇| τ²/2
-                let g = guard.standing(&self.z);
+                let g = self.standing(guard);
                 let slope = law.growth_factor() * guard.dual * norm + guard.input.abs() * self.input_rate;
                 let bend = law.growth_factor() * guard.dual * law.forcing * self.input_rate * 0.5;
                 let moves = slope > 0.0 || bend > 0.0;
@@ -283,6 +287,15 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         }
         self.cost.steps += if resting { 0 } else { safe };
         true
+    }
+
+    /// Value of a guard, with what rounding alone may have made negative forgiven.
+    fn standing(&self, guard: &Watch<C>) -> f64 {
+        guard.standing(&self.z)
+            + match guard.cause {
+                Cause::BreakForward(body) | Cause::BreakBackward(body) => self.slack[body.index()],
+                Cause::Stop(_) | Cause::GearTorque => 0.0,
+            }
     }
 
     fn fresh_order(&self, cause: Cause) -> usize {
@@ -344,7 +357,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         let norm = grow * (law.norm(&y) + law.forcing * self.input_rate * length);
         let steepness = |dual: f64, input: f64| dual * norm + input.abs() * self.input_rate;
         let undecided = |g: f64, steepness: f64| !(g > steepness * length || (g >= 0.0 && steepness == 0.0));
-        if !law.guards.iter().any(|guard| undecided(guard.standing(&self.z), steepness(guard.dual, guard.input))) {
+        if !law.guards.iter().any(|guard| undecided(self.standing(guard), steepness(guard.dual, guard.input))) {
             return Look::Safe(None);
         }
 
@@ -352,7 +365,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         let norm2 = grow * (law.norm(&second) + law.forcing * self.input_curvature * length);
         let mut falling = false;
         for guard in &law.guards {
-            let g = guard.standing(&self.z);
+            let g = self.standing(guard);
             if !undecided(g, steepness(guard.dual, guard.input)) {
                 continue;
             }
@@ -382,7 +395,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         let mut first: Option<(f64, Cause)> = None;
         for guard in &law.guards {
             let mut coefficients: [f64; SERIES_ORDER + 1] = std::array::from_fn(|k| guard.value(&series[k]));
-            coefficients[0] = guard.standing(&self.z);
+            coefficients[0] = self.standing(guard);
             let order = self.fresh_order(guard.cause);
             coefficients[..order].fill(0.0);
             if let Some(s) = roots::first_fall(&coefficients[order..])
@@ -459,6 +472,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             _ => 1,
         };
         self.mode.motion[body.index()] = to;
+        self.slack[body.index()] = 2.0 * noise;
         if from != to {
             self.events.push(Event { time: self.time(), body, from, to, load });
         }
@@ -485,7 +499,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             let law = Rc::clone(&self.law);
             let y = law.rate(&self.z);
             let falls = |guard: &&Watch<C>| {
-                let g = guard.standing(&self.z);
+                let g = self.standing(guard);
                 let slope = guard.slope(&y);
                 if g != 0.0 || self.fresh_order(guard.cause) > 0 {
                     return g < 0.0;
