@@ -1,3 +1,5 @@
 //! The program `taut`.
 
+mod paper;
+
 fn main() {}
