@@ -2,4 +2,6 @@
 
 mod paper;
 
-fn main() {}
+fn main() {
+    paper::scratch().unwrap();
+}

@@ -111,3 +111,94 @@ pub fn after_pulse(a: &Matrix, b: &SVector<f64, 6>, volts: f64) -> SVector<f64, 
     }
     state.fixed_rows::<6>(0).into_owned()
 }
+
+/// What the linear model says about the printed matrix, its poles and its modes.
+pub struct Linear {
+    /// Modes of Table 1, of Table 2, and of Table 2 with the viscous friction of Table 4.
+    pub modes: [Vec<Oscillation>; 3],
+    /// The slow pole of the same three, 1/s, and what a rigid belt gives: −B_tot/J_tot.
+    pub slow: [(f64, f64); 3],
+    /// Largest real part among the poles of (7) as printed: Table 1 and Table 2, 1/s.
+    pub printed_pole: [f64; 2],
+    /// The same with −b/M.
+    pub corrected_pole: [f64; 2],
+    /// r φ₁ at the end of the 5 V run with (7) as printed, Table 1, m.
+    pub printed_end: f64,
+    /// x₃ at the end of the 5 V run with (7) but −b/M, Table 1: what eq. (6) calls the cart's position, m.
+    pub corrected_x3: f64,
+    /// Its x₁ there times r, m.
+    pub corrected_end: f64,
+    /// Final position by the matrices of eq. (1)-(4) and the matrix exponential, m: an independent path to the same number.
+    pub by_exponential: f64,
+    /// r K_t/R · V · T/(B₁ + B₂ + b r² + K_t K_e/R) for 5 V and Table 1, m: where every linear set must end.
+    pub closed_form: f64,
+    /// Cart at a distance l₁ from the drive pulley, m; frequencies of the two modes of Table 2 there, Hz.
+    pub travel: Vec<(f64, [f64; 2])>,
+}
+
+/// Nearest that the cart comes to a pulley in the sweep along the travel, m.
+pub const NEAREST: f64 = 0.05;
+
+impl Linear {
+    /// Computes it.
+    pub fn new(sets: &super::model::Sets) -> Self {
+        let stages = [&sets.table1.stage, &sets.table2.stage, &sets.table4.stage];
+        let all = stages.map(|stage| poles(&matrices(stage).0));
+        let slowest = |poles: &[Complex<f64>]| {
+            poles.iter().filter(|p| p.im == 0.0 && p.re < -1e-3).map(|p| p.re).fold(f64::NEG_INFINITY, f64::max)
+        };
+        let rigid = |stage: &Stage| {
+            let r2 = stage.pulley_radius.powi(2);
+            let inertia = stage.drive_pulley.inertia + stage.idler_pulley.inertia + stage.cart.mass * r2;
+            -total_viscous(stage) / inertia
+        };
+        let rightmost = |a: &Matrix| poles(a).first().map_or(f64::NAN, |p| p.re);
+        let both = |signed: bool| [stages[0], stages[1]].map(|stage| rightmost(&printed(stage, signed)));
+        let first = stages[0];
+        let r = first.pulley_radius;
+        let (a, b) = matrices(first);
+        let corrected = after_pulse(&printed(first, true), &b, 5.0);
+        let motor = &first.motor;
+        let impulse = motor.torque_constant / motor.resistance * 5.0 * PULSE;
+        Self {
+            modes: [0, 1, 2].map(|i| oscillations(&all[i])),
+            slow: [0, 1, 2].map(|i| (slowest(&all[i]), rigid(stages[i]))),
+            printed_pole: both(false),
+            corrected_pole: both(true),
+            printed_end: r * after_pulse(&printed(first, false), &b, 5.0)[0],
+            corrected_x3: corrected[2],
+            corrected_end: r * corrected[0],
+            by_exponential: r * after_pulse(&a, &b, 5.0)[0],
+            closed_form: r * impulse / total_viscous(first),
+            travel: travel(stages[1]),
+        }
+    }
+}
+
+/// B₁ + B₂ + b r² + K_t K_e/R, N m s: all that resists in proportion to speed.
+fn total_viscous(stage: &Stage) -> f64 {
+    let b = |law: &taut::friction::Friction| law.forward.viscous;
+    let motor = &stage.motor;
+    b(&stage.drive_pulley.friction)
+        + b(&stage.idler_pulley.friction)
+        + b(&stage.cart.friction) * stage.pulley_radius.powi(2)
+        + motor.torque_constant * motor.back_emf_constant / motor.resistance
+}
+
+/// The modes with spans 1 and 2 as long as the cart's place makes them; their stiffness times length stays.
+fn travel(stage: &Stage) -> Vec<(f64, [f64; 2])> {
+    let middle = super::belt::INCHES.0;
+    let product = stage.belt.stiffness[0] * middle;
+    let count = 120;
+    (0..=count)
+        .map(|i| {
+            let l1 = NEAREST + (middle - NEAREST) * 2.0 * f64::from(i) / f64::from(count);
+            let mut moved = stage.clone();
+            moved.belt.stiffness[0] = product / l1;
+            moved.belt.stiffness[1] = product / (2.0 * middle - l1);
+            let modes = oscillations(&poles(&matrices(&moved).0));
+            let frequency = |i: usize| modes.get(i).map_or(f64::NAN, |m| m.frequency);
+            (l1, [frequency(0), frequency(1)])
+        })
+        .collect()
+}

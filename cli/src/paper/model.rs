@@ -54,6 +54,8 @@ pub struct Response {
     pub cart_position: Vec<f64>,
     /// Cart velocity x′, m/s.
     pub cart_speed: Vec<f64>,
+    /// Mean velocity of the three inertias, each weighted by its inertia, m/s: the belt's oscillation is not in it.
+    pub mean_speed: Vec<f64>,
     /// Every body that stopped or started.
     pub events: Vec<Event>,
 }
@@ -87,11 +89,14 @@ impl Response {
         (self.position[to] - self.position[from]) / (self.time[to] - self.time[from])
     }
 
-    /// When the cart, which the belt's oscillation hardly touches, has first reached 1 − 1/e of the plateau, s.
+    /// When the mean velocity has first reached 1 − 1/e of the plateau, s.
     pub fn time_constant(&self) -> f64 {
         let goal = (1.0 - (-1.0_f64).exp()) * self.plateau();
-        let Some(row) = self.cart_speed.iter().position(|v| *v >= goal) else { return f64::NAN };
-        let (before, after) = (self.cart_speed[row - 1], self.cart_speed[row]);
+        let Some(row) = self.mean_speed.iter().position(|v| *v >= goal) else { return f64::NAN };
+        if row == 0 {
+            return f64::NAN;
+        }
+        let (before, after) = (self.mean_speed[row - 1], self.mean_speed[row]);
         let share = (goal - before) / (after - before);
         self.time[row - 1] + share * (self.time[row] - self.time[row - 1])
     }
@@ -154,12 +159,18 @@ pub fn run(stage: &Stage, experiment: &Experiment, solver: Solver) -> Result<Res
     let r = stage.pulley_radius;
     let column = |name: &str| solution.trajectory.get(name).unwrap_or_default().to_vec();
     let metres = |name: &str| column(name).into_iter().map(|angle| r * angle).collect();
+    let (speed, cart_speed): (Vec<f64>, Vec<f64>) = (metres("drive_speed"), column("cart_speed"));
+    let idler_speed: Vec<f64> = metres("idler_speed");
+    // Inertias as masses on the belt: J₁/r², M, J₂/r².
+    let [m1, m2, m3] = [stage.drive_pulley.inertia / (r * r), stage.cart.mass, stage.idler_pulley.inertia / (r * r)];
+    let mean = |((a, b), c): ((&f64, &f64), &f64)| (m1 * a + m2 * b + m3 * c) / (m1 + m2 + m3);
     Ok(Response {
         time: column("time"),
         position: metres("drive_angle"),
-        speed: metres("drive_speed"),
+        mean_speed: speed.iter().zip(&cart_speed).zip(&idler_speed).map(mean).collect(),
+        speed,
         cart_position: column("cart_position"),
-        cart_speed: column("cart_speed"),
+        cart_speed,
         events: solution.outcome.events,
     })
 }
