@@ -3,7 +3,7 @@
 mod common;
 use std::time::Instant;
 use taut::signal::Signal;
-use taut::solve::{Solver, simulate, stream, Flow};
+use taut::solve::{Flow, Solver, simulate, stream};
 
 fn main() {
     let stage = common::table4();

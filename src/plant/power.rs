@@ -91,8 +91,9 @@ impl Plant {
             copper: motor.resistance * i * i,
             gear: (1.0 - e) * n * torque * speed[0],
             conversion: (motor.back_emf_constant - motor.torque_constant) * n * i * speed[0],
-            friction: Body::ALL
-                .map(|b| speed[b.index()] * self.friction_value(b, mode.motion[b.index()], speed[b.index()], (0.0, 0.0))),
+            friction: Body::ALL.map(|b| {
+                speed[b.index()] * self.friction_value(b, mode.motion[b.index()], speed[b.index()], (0.0, 0.0))
+            }),
             belt: (0..3).map(|j| stage.belt.damping[j] * rate[j] * rate[j]).sum(),
             stored: kinetic + elastic + motor.inductance * i * di,
         }

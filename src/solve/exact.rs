@@ -9,8 +9,8 @@
 //! g = w·z therefore changes no faster than |w|·√(2V), |w| being the norm dual to V; and likewise its slope, with ẏ.
 
 use super::law::{Law, chain};
-use super::record::Recorder;
 use super::propagator::SERIES_ORDER;
+use super::record::Recorder;
 use super::roots;
 use super::{Cost, Ending, Event, Flow, Grid, Outcome};
 use crate::case::Experiment;

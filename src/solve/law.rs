@@ -65,7 +65,18 @@ impl<const R: usize, const C: usize> Law<R, C> {
         let stage = plant.stage();
         let motor = &stage.motor;
         let r = stage.pulley_radius;
-        let equations = plant.equations(mode);
+        let mut equations = plant.equations(mode);
+        // What is stuck has no speed, and a span between two stuck bodies does not change: leaving both out of the
+        // conditions lets the bounds know it.
+        let stuck = mode.motion.map(|motion| motion == Motion::Stuck);
+        let at_rest = [stuck[0] && stuck[1], stuck[1] && stuck[2], stuck[2] && stuck[0]];
+        for form in equations.guards.iter_mut().map(|guard| &mut guard.form).chain(&mut equations.acceleration) {
+            for body in 0..3 {
+                if stuck[body] {
+                    form.speed[body] = 0.0;
+                }
+            }
+        }
 
         let row_of = |form: &Form| {
             let mut row = [0.0; C];
@@ -110,7 +121,9 @@ impl<const R: usize, const C: usize> Law<R, C> {
         let dual = |form: &Form| {
             let mut sum = 0.0;
             for j in 0..3 {
-                sum += form.stretch[j] * form.stretch[j] / stiffness[j];
+                if !at_rest[j] {
+                    sum += form.stretch[j] * form.stretch[j] / stiffness[j];
+                }
                 sum += form.speed[j] * form.speed[j] / inertia[j];
             }
             if form.current != 0.0 {

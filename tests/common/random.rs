@@ -32,7 +32,9 @@ fn friction(viscous: f64, coulomb: f64, dry: Dry) -> BoxedStrategy<Friction> {
     let one = side(viscous, coulomb);
     match dry {
         Dry::Symmetric => one.prop_map(|side| Friction { forward: side, backward: side }).boxed(),
-        Dry::Any => (one, side(viscous, coulomb)).prop_map(|(forward, backward)| Friction { forward, backward }).boxed(),
+        Dry::Any => {
+            (one, side(viscous, coulomb)).prop_map(|(forward, backward)| Friction { forward, backward }).boxed()
+        }
     }
 }
 

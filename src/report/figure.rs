@@ -1,0 +1,205 @@
+//! What a figure shows, said once for SVG, PNG and the page.
+
+use super::svg::Colour;
+use crate::error::Result;
+use crate::files::write_atomically;
+use std::path::Path;
+
+/// One or more panels above a common x axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figure {
+    /// Stands above the figure.
+    pub title: String,
+    /// What there is to see; stands below the figure on a page.
+    pub caption: String,
+    /// The x axis, usually time.
+    pub x: Axis,
+    /// From top to bottom.
+    pub panels: Vec<Panel>,
+    /// Vertical lines through all panels: "voltage off".
+    pub verticals: Vec<Marker>,
+}
+
+/// What an axis measures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// The quantity: `Position`.
+    pub label: String,
+    /// The unit that is shown: `mm`; empty for a pure number.
+    pub unit: String,
+    /// Shown units per unit of the data.
+    pub factor: f64,
+    /// Logarithmic; values that are not positive are left out.
+    pub log: bool,
+}
+
+/// A plot area with its own y axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Panel {
+    /// The y axis.
+    pub y: Axis,
+    /// The curves; the last is drawn on top.
+    pub series: Vec<Series>,
+    /// Horizontal lines: "breakaway".
+    pub horizontals: Vec<Marker>,
+    /// Height of the plot area relative to the other panels; 1 unless set.
+    pub weight: f64,
+}
+
+/// One curve; in the units of the data, before the axis' factor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Its name in the legend; empty for none.
+    pub name: String,
+    /// Where.
+    pub x: Vec<f64>,
+    /// How much; a value that is not finite makes a gap.
+    pub y: Vec<f64>,
+    /// How it is drawn.
+    pub style: Style,
+    /// In which colour.
+    pub colour: Colour,
+}
+
+/// How a curve is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Style {
+    /// A continuous line.
+    #[default]
+    Solid,
+    /// Dashes, for the second of a pair.
+    Dashed,
+    /// Dots, for references and inputs.
+    Dotted,
+    /// Points alone, for measurements.
+    Points,
+}
+
+/// A line across the plot with a word to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Marker {
+    /// Where, in the units of the data.
+    pub at: f64,
+    /// What it marks; may be empty.
+    pub label: String,
+}
+
+impl Axis {
+    /// A linear axis; `unit` may be written `m/s^2`.
+    pub fn new(label: impl Into<String>, unit: &str) -> Self {
+        Self { label: label.into(), unit: crate::number::pretty_unit(unit), factor: 1.0, log: false }
+    }
+
+    /// Shows the data in another unit, of which `factor` make one of the data's: `("mm", 1e3)` for metres.
+    pub fn shown_as(mut self, unit: &str, factor: f64) -> Self {
+        self.unit = crate::number::pretty_unit(unit);
+        self.factor = factor;
+        self
+    }
+
+    /// Makes it logarithmic.
+    pub fn logarithmic(mut self) -> Self {
+        self.log = true;
+        self
+    }
+
+    /// Label and unit as they stand at the axis: `Position, mm`.
+    pub fn heading(&self) -> String {
+        if self.unit.is_empty() { self.label.clone() } else { format!("{}, {}", self.label, self.unit) }
+    }
+}
+
+impl Series {
+    /// A solid blue line.
+    pub fn new(name: impl Into<String>, x: impl Into<Vec<f64>>, y: impl Into<Vec<f64>>) -> Self {
+        Self { name: name.into(), x: x.into(), y: y.into(), style: Style::Solid, colour: Colour::Blue }
+    }
+
+    /// Draws it that way.
+    pub fn style(mut self, style: Style) -> Self {
+        self.style = style;
+        self
+    }
+
+    /// Gives it that colour.
+    pub fn colour(mut self, colour: Colour) -> Self {
+        self.colour = colour;
+        self
+    }
+}
+
+impl Panel {
+    /// An empty panel.
+    pub fn new(y: Axis) -> Self {
+        Self { y, series: Vec::new(), horizontals: Vec::new(), weight: 1.0 }
+    }
+
+    /// Adds a solid line in the next colour.
+    pub fn line(self, name: impl Into<String>, x: &[f64], y: &[f64]) -> Self {
+        let colour = Colour::CYCLE[self.series.len() % Colour::CYCLE.len()];
+        self.series(Series::new(name, x, y).colour(colour))
+    }
+
+    /// Adds a curve as it is.
+    pub fn series(mut self, series: Series) -> Self {
+        self.series.push(series);
+        self
+    }
+
+    /// Adds a horizontal line.
+    pub fn horizontal(mut self, at: f64, label: impl Into<String>) -> Self {
+        self.horizontals.push(Marker { at, label: label.into() });
+        self
+    }
+
+    /// Makes it higher or lower than the others.
+    pub fn weight(mut self, weight: f64) -> Self {
+        self.weight = weight;
+        self
+    }
+}
+
+impl Figure {
+    /// A figure without panels.
+    pub fn new(title: impl Into<String>, x: Axis) -> Self {
+        Self { title: title.into(), caption: String::new(), x, panels: Vec::new(), verticals: Vec::new() }
+    }
+
+    /// Sets the caption.
+    pub fn caption(mut self, caption: impl Into<String>) -> Self {
+        self.caption = caption.into();
+        self
+    }
+
+    /// Adds a panel below those there are.
+    pub fn panel(mut self, panel: Panel) -> Self {
+        self.panels.push(panel);
+        self
+    }
+
+    /// Adds a vertical line through all panels.
+    pub fn vertical(mut self, at: f64, label: impl Into<String>) -> Self {
+        self.verticals.push(Marker { at, label: label.into() });
+        self
+    }
+
+    /// The figure as an SVG file with its title, light and dark.
+    pub fn svg(&self) -> String {
+        super::plot::svg(self, true)
+    }
+
+    /// The figure as a PNG, `scale` pixels (1 to 4 are sensible) per SVG pixel, on white.
+    pub fn png(&self, scale: f32) -> Result<Vec<u8>> {
+        super::png(&self.svg(), scale)
+    }
+
+    /// Writes [`Figure::svg`] to `path`.
+    pub fn write_svg(&self, path: impl AsRef<Path>) -> Result<()> {
+        write_atomically(path, self.svg())
+    }
+
+    /// Writes [`Figure::png`] at twice the size to `path`.
+    pub fn write_png(&self, path: impl AsRef<Path>) -> Result<()> {
+        write_atomically(path, self.png(2.0)?)
+    }
+}

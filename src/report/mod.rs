@@ -1,0 +1,41 @@
+//! Figures, drawings, diagrams and the report page that holds them.
+//!
+//! A [`Figure`] is described once and shown three ways: as SVG, as PNG (that very SVG, rasterised
+//! with a font that is part of the program), and on a [`Page`], where a small script redraws it as the
+//! reader zooms. Everything is a pure function of its input until a `write` is called.
+//!
+//! ```
+//! use taut::report::{Axis, Callout, Figure, Page, Panel};
+//!
+//! let time: Vec<f64> = (0..=100).map(|i| 0.01 * i as f64).collect();
+//! let position: Vec<f64> = time.iter().map(|t| 0.05 * (1.0 - (-5.0 * t).exp())).collect();
+//! let figure = Figure::new("Cart position", Axis::new("Time", "s"))
+//!     .caption("A first-order approach.")
+//!     .panel(Panel::new(Axis::new("Position", "m").shown_as("mm", 1e3)).line("x", &time, &position));
+//! let mut page = Page::new("A stage");
+//! page.section("Motion");
+//! page.prose("The cart settles after a second.");
+//! page.figure(&figure);
+//! page.callout(Callout::Holds, "It settles", "within 0.1 mm");
+//! assert!(page.html().starts_with("<!DOCTYPE html>"));
+//! ```
+
+mod axis;
+pub mod decimate;
+pub mod diagram;
+pub mod drawing;
+mod embed;
+pub mod equations;
+pub mod figure;
+pub mod page;
+mod plot;
+mod raster;
+mod svg;
+
+pub use decimate::{Decimator, decimate};
+pub use drawing::stage_drawing;
+pub use equations::{BodyEquation, FrictionTerm, Inertia, MotorEquation, Term, axis_diagram, body_diagram};
+pub use figure::{Axis, Figure, Marker, Panel, Series, Style};
+pub use page::{Callout, Cell, Page, Table};
+pub use raster::png;
+pub use svg::Colour;

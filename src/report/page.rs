@@ -1,0 +1,330 @@
+//! A report: one HTML file that opens without a network, on a phone, in the dark and on paper.
+
+use super::figure::Figure;
+use super::svg::PALETTE;
+use super::{embed, plot};
+use crate::error::Result;
+use crate::files::write_atomically;
+use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
+use std::fmt::Write;
+use std::path::Path;
+
+/// A report under construction: call what comes next, then [`Page::html`] or [`Page::write`].
+///
+/// Wherever it takes `impl Render`, a string is escaped and `maud::html!` markup is taken as it is.
+#[derive(Debug, Clone, Default)]
+pub struct Page {
+    title: String,
+    subtitle: Option<Markup>,
+    footer: Option<Markup>,
+    body: String,
+    contents: Vec<(String, String)>,
+    figures: usize,
+}
+
+/// What a callout or a badge says about a statement.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Callout {
+    /// It holds.
+    Holds,
+    /// It holds with a reservation.
+    Partly,
+    /// It does not hold.
+    Fails,
+    /// Something to know.
+    Note,
+}
+
+impl Callout {
+    /// The word in its badge.
+    pub fn word(self) -> &'static str {
+        match self {
+            Callout::Holds => "holds",
+            Callout::Partly => "in part",
+            Callout::Fails => "does not hold",
+            Callout::Note => "note",
+        }
+    }
+
+    fn class(self) -> &'static str {
+        match self {
+            Callout::Holds => "holds",
+            Callout::Partly => "partly",
+            Callout::Fails => "fails",
+            Callout::Note => "note-kind",
+        }
+    }
+
+    /// A badge with another word, for a table cell or for prose.
+    pub fn badge(self, word: &str) -> Markup {
+        html! { span class={ "badge " (self.class()) } { (word) } }
+    }
+}
+
+/// One cell of a table.
+#[derive(Debug, Clone)]
+pub enum Cell {
+    /// Left-aligned text.
+    Text(String),
+    /// A number, already formatted; right-aligned.
+    Number(String),
+    /// A verdict with its word.
+    Badge(Callout, String),
+    /// Markup as it is.
+    Markup(Markup),
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        Cell::Text(text.into())
+    }
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Cell::Text(text)
+    }
+}
+
+impl From<Markup> for Cell {
+    fn from(markup: Markup) -> Self {
+        Cell::Markup(markup)
+    }
+}
+
+impl From<Callout> for Cell {
+    fn from(kind: Callout) -> Self {
+        Cell::Badge(kind, kind.word().into())
+    }
+}
+
+impl Cell {
+    /// A number with so many significant digits.
+    pub fn number(value: f64, digits: usize) -> Self {
+        Cell::Number(crate::number::significant(value, digits))
+    }
+
+    /// A number with so many decimals.
+    pub fn fixed(value: f64, decimals: usize) -> Self {
+        Cell::Number(crate::number::fixed(value, decimals))
+    }
+}
+
+/// A table: headings with units, then rows.
+#[derive(Debug, Clone, Default)]
+pub struct Table {
+    caption: String,
+    headings: Vec<(String, String)>,
+    rows: Vec<Vec<Cell>>,
+}
+
+impl Table {
+    /// A table without columns; the caption may be empty.
+    pub fn new(caption: impl Into<String>) -> Self {
+        Self { caption: caption.into(), ..Self::default() }
+    }
+
+    /// Adds a column; its unit stands in the heading and may be empty.
+    pub fn column(mut self, heading: impl Into<String>, unit: &str) -> Self {
+        self.headings.push((heading.into(), crate::number::pretty_unit(unit)));
+        self
+    }
+
+    /// Adds a row, one cell per column.
+    pub fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
+        self.rows.push(cells.into_iter().collect());
+    }
+
+    /// A column whose cells are mostly numbers has its heading on the right, too.
+    fn numeric(&self, column: usize) -> bool {
+        let cells = || self.rows.iter().filter_map(|row| row.get(column));
+        2 * cells().filter(|c| matches!(c, Cell::Number(_))).count() > cells().count()
+    }
+}
+
+impl Render for Table {
+    fn render(&self) -> Markup {
+        html! {
+            div.scroll { table {
+                @if !self.caption.is_empty() { caption { (self.caption) } }
+                thead { tr {
+                    @for (i, (heading, unit)) in self.headings.iter().enumerate() {
+                        th scope="col" class=[self.numeric(i).then_some("num")] {
+                            (heading)
+                            @if !unit.is_empty() { span.unit { (unit) } }
+                        }
+                    }
+                } }
+                tbody { @for row in &self.rows { tr { @for cell in row { @match cell {
+                    Cell::Text(text) => td { (text) },
+                    Cell::Number(text) => td.num { (text) },
+                    Cell::Badge(kind, word) => td { (kind.badge(word)) },
+                    Cell::Markup(markup) => td { (markup) },
+                } } } } }
+            } }
+        }
+    }
+}
+
+impl Page {
+    /// An empty page with its title.
+    pub fn new(title: impl Into<String>) -> Self {
+        Self { title: title.into(), ..Self::default() }
+    }
+
+    /// The sentence under the title.
+    pub fn subtitle(mut self, text: impl Render) -> Self {
+        self.subtitle = Some(text.render());
+        self
+    }
+
+    /// What stands at the very end.
+    pub fn footer(&mut self, text: impl Render) {
+        self.footer = Some(text.render());
+    }
+
+    /// Begins a section; it gets an entry in the table of contents.
+    pub fn section(&mut self, heading: &str) {
+        let id = format!("s{}", self.contents.len() + 1);
+        self.push(html! { h2 id=(id) { (heading) } });
+        self.contents.push((id, heading.to_string()));
+    }
+
+    /// Begins a part of a section.
+    pub fn subsection(&mut self, heading: &str) {
+        self.push(html! { h3 { (heading) } });
+    }
+
+    /// A paragraph.
+    pub fn prose(&mut self, text: impl Render) {
+        self.push(html! { p { (text) } });
+    }
+
+    /// Anything else, as it is.
+    pub fn markup(&mut self, markup: Markup) {
+        self.push(markup);
+    }
+
+    /// A table.
+    pub fn table(&mut self, table: &Table) {
+        self.push(table.render());
+    }
+
+    /// Terms and what they mean or amount to.
+    pub fn definitions<T: Render, D: Render>(&mut self, pairs: impl IntoIterator<Item = (T, D)>) {
+        self.push(html! { dl { @for (term, text) in pairs { dt { (term) } dd { (text) } } } });
+    }
+
+    /// A statement with its verdict: the badge, what was stated, and what was found.
+    pub fn callout(&mut self, kind: Callout, head: impl Render, text: impl Render) {
+        self.push(html! {
+            div class={ "callout " (kind.class()) } {
+                p.head { (kind.badge(kind.word())) (head) }
+                p { (text) }
+            }
+        });
+    }
+
+    /// A figure that can be zoomed, with its title and caption.
+    pub fn figure(&mut self, figure: &Figure) {
+        self.figures += 1;
+        let svg = strip_style(&plot::svg(figure, false));
+        self.push(html! {
+            figure.plot {
+                div.figtitle { span { (figure.title) } button type="button" { "Reset zoom" } }
+                div.stage tabindex="0" { (PreEscaped(svg)) }
+                script type="application/json" { (PreEscaped(embed::json(figure))) }
+                @if !figure.caption.is_empty() { figcaption { (figure.caption) } }
+            }
+        });
+    }
+
+    /// A drawing: an SVG as it is, so it must come from this library. The caption may be empty.
+    pub fn drawing(&mut self, svg: &str, caption: impl Render) {
+        let caption = caption.render();
+        self.push(html! {
+            figure.drawing {
+                div.scroll { (PreEscaped(strip_style(svg))) }
+                @if !caption.0.is_empty() { figcaption { (caption) } }
+            }
+        });
+    }
+
+    /// An equation as MathML (`html! { math { mi { "x" } } }`) with its number, if it has one.
+    pub fn equation(&mut self, math: impl Render, number: Option<&str>) {
+        self.push(html! { div.equation { (math) @if let Some(number) = number { span.number { (number) } } } });
+    }
+
+    /// A text that can be unfolded: the case file, a log.
+    pub fn embed(&mut self, title: &str, text: &str) {
+        let lines = text.lines().count();
+        self.push(html! {
+            details.embed { summary { b { (title) } (lines) " lines" } pre { (text) } }
+        });
+    }
+
+    fn push(&mut self, markup: Markup) {
+        self.body.push_str(&markup.into_string());
+        self.body.push('\n');
+    }
+
+    /// The whole file. Nothing in it asks for another.
+    pub fn html(&self) -> String {
+        let nav = self.contents.len() >= 4;
+        let page = html! {
+            (DOCTYPE)
+            html lang="en" {
+                head {
+                    meta charset="utf-8";
+                    meta name="viewport" content="width=device-width, initial-scale=1";
+                    meta name="color-scheme" content="light dark";
+                    title { (self.title) }
+                    style { (PreEscaped(colours())) (PreEscaped(include_str!("page.css"))) }
+                }
+                body {
+                    main.page.with-nav[nav] {
+                        header {
+                            h1 { (self.title) }
+                            @if let Some(subtitle) = &self.subtitle { p.subtitle { (subtitle) } }
+                        }
+                        @if nav {
+                            nav aria-label="Contents" { details open { summary { "Contents" } ol {
+                                @for (id, heading) in &self.contents { li { a href={ "#" (id) } { (heading) } } }
+                            } } }
+                        }
+                        (PreEscaped(&self.body))
+                        @if let Some(footer) = &self.footer { footer { (footer) } }
+                    }
+                    @if self.figures > 0 { script { (PreEscaped(include_str!("plot.js"))) } }
+                }
+            }
+        };
+        page.into_string()
+    }
+
+    /// Writes the file.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
+        write_atomically(path, self.html())
+    }
+}
+
+/// The palette as variables for both themes, paper always light, and the classes that pictures use.
+fn colours() -> String {
+    let list = |pick: fn(&super::svg::Paint) -> &'static str| -> String {
+        PALETTE.iter().map(|p| format!("--{}:{};", p.class, pick(p))).collect()
+    };
+    let (light, dark) = (list(|p| p.light), list(|p| p.dark));
+    let mut css = format!(":root{{{light}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}");
+    for p in &PALETTE {
+        let _ = write!(css, ".s-{0}{{stroke:var(--{0})}}.f-{0}{{fill:var(--{0})}}", p.class);
+    }
+    css
+}
+
+/// A picture without its own style sheet: on a page, the page's applies.
+fn strip_style(svg: &str) -> String {
+    match (svg.find("<style>"), svg.find("</style>")) {
+        (Some(a), Some(b)) if a < b => format!("{}{}", &svg[..a], &svg[b + "</style>".len()..]),
+        _ => svg.to_string(),
+    }
+}
