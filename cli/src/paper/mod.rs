@@ -1,30 +1,114 @@
-//! `taut paper`: recomputes Sollmann & Jouaneh (2011).
-#![allow(dead_code)]
+//! `taut paper`: every table, figure and claim of Sollmann & Jouaneh (2011), computed again.
 
 mod belt;
 mod claims;
+mod diagrams;
+mod figures;
 mod findings;
+mod laws;
 mod linear;
+mod misprints;
 mod model;
+mod plots;
+mod readings;
+mod report;
+mod statements;
 mod studies;
+mod tables;
+mod words;
 
-pub fn scratch() -> taut::Result<()> {
-    let t = std::time::Instant::now();
-    let f = findings::Findings::new()?;
-    println!("{:?}", t.elapsed());
-    for s in &f.belt.stiffness { println!("{} {} {} {:.2} {:.2} {:.2}", s.table, s.symbol, s.printed, s.lengths, s.inches, s.unrounded); }
-    let b = &f.belt;
-    println!("{} {} {} {} {} {} {} {}", b.composite, b.radius, b.thickness, b.cylinder_length, b.belt_wide_inertia, b.mass, b.mass_share, b.neoprene_teeth);
-    for s in &f.identifiability.sharing { println!("{} {:?} {:?} {:?}", s.name, s.difference, s.adjusted, s.adjustment); }
-    let i = &f.identifiability;
-    println!("{} {} {:?} {:?} {} {} {}", i.scaled, i.count, i.geared, i.breakaway, i.below_breakaway, i.total_viscous, i.total_coulomb);
-    let l = &f.linear;
-    println!("{:?} {:?} {:?} {:?} {} {} {} {} {}", l.modes, l.slow, l.printed_pole, l.corrected_pole, l.printed_end, l.corrected_x3, l.corrected_end, l.by_exponential, l.closed_form);
-    println!("{:?}", l.travel.first());
-    let m = &f.matched;
-    println!("{:?} {:?} {:?} {} {} {:?}", m.final_position, m.speed, m.ratio, m.scaled_to_5, m.scaled_to_10, m.table1);
-    println!("creep {} {:?}", f.table3.exact_creep, f.table3.start);
-    for (n, r) in [("t1", &f.runs.table1), ("t2", &f.runs.table2), ("t4", &f.runs.table4)] { println!("{n} tau {} cartv.24 {:.11}", r[0].time_constant(), r[0].cart_speed[r[0].row(0.24)]); }
-    for e in &f.runs.effects { println!("{:?} {} x{} {}V tau {:+.4}% {:.6} osc {:+.3}", e.from, e.change.name(), e.factor, e.volts, 100.0*e.time_constant_change, e.time_constant, 100.0*e.oscillation); }
-    Ok(())
+use claims::{Claim, Kind, Verdict};
+use findings::Findings;
+use plots::Plot;
+use rayon::prelude::*;
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+use taut::error::{Error, Result};
+use taut::files::write_atomically;
+
+/// Where the results go unless told otherwise.
+pub const FOLDER: &str = "out/paper";
+
+/// Recomputes the paper, writes report, claims, figures and data into `out`, and tells the verdicts on `terminal`.
+pub fn run(out: Option<&Path>, json: bool, terminal: &mut dyn Write) -> Result<()> {
+    let out = out.unwrap_or(Path::new(FOLDER));
+    let findings = Findings::new()?;
+    let claims = claims(&findings);
+    let plots = plots(&findings);
+    write(out, &findings, &claims, &plots)?;
+    let text = if json { claims::json(&claims) } else { table(&claims, out) };
+    terminal.write_all(text.as_bytes()).map_err(|e| Error::new(format!("the terminal does not take the result: {e}")))
+}
+
+/// Every claim: the paper's sentences in its order, then P1 to P10, then independent numbers.
+fn claims(findings: &Findings) -> Vec<Claim> {
+    let mut all = statements::statements(findings);
+    all.extend(readings::readings(findings));
+    all.extend(readings::references(findings));
+    all
+}
+
+fn plots(findings: &Findings) -> Vec<Plot> {
+    let mut all = vec![laws::toothed(findings), figures::travel(findings)];
+    all.extend(figures::figures(findings));
+    all.push(figures::table3(findings));
+    all
+}
+
+/// report.html, claims.json, figures/*.svg, figures/*.png, data/*.csv.
+fn write(out: &Path, findings: &Findings, claims: &[Claim], plots: &[Plot]) -> Result<()> {
+    let (figures, data) = (out.join("figures"), out.join("data"));
+    for folder in [&figures, &data] {
+        fs::create_dir_all(folder).map_err(|e| {
+            Error::new(format!("this folder cannot be made: {e}")).in_file(folder).next("choose another with --out")
+        })?;
+    }
+    let stage = &findings.sets.table4.stage;
+    let drawings = [
+        ("figure-01-02", taut::report::stage_drawing(&findings.sets.table1.stage)),
+        ("figure-18", diagrams::drive_pulley(stage)),
+        ("figure-19", diagrams::whole(stage)),
+    ];
+    let drawn = || {
+        drawings.par_iter().try_for_each(|(name, svg)| picture(&figures, name, svg))?;
+        plots.par_iter().try_for_each(|plot| {
+            write_atomically(data.join(format!("{}.csv", plot.file)), plot.csv())?;
+            picture(&figures, &plot.file, &plot.figure.svg())
+        })
+    };
+    let page = || report::page(findings, claims, plots).write(out.join("report.html"));
+    let (drawn, page) = rayon::join(drawn, page);
+    drawn?;
+    page?;
+    write_atomically(out.join("claims.json"), claims::json(claims))
+}
+
+/// An SVG and the PNG of it.
+fn picture(folder: &Path, name: &str, svg: &str) -> Result<()> {
+    write_atomically(folder.join(format!("{name}.svg")), svg)?;
+    write_atomically(folder.join(format!("{name}.png")), taut::report::png(svg, 2.0)?)
+}
+
+/// What the terminal shows.
+fn table(claims: &[Claim], out: &Path) -> String {
+    let mut text = String::from("Sollmann & Jouaneh, Dynamic modelling of a single-axis belt-drive system (2011), recomputed\n\n");
+    let width = claims.iter().map(|c| c.id.len()).max().unwrap_or(0);
+    let groups = [
+        (Kind::Statement, "What the paper says"),
+        (Kind::Print, "What it prints"),
+        (Kind::Reading, "What a close reading adds"),
+        (Kind::Reference, "Independent solutions"),
+    ];
+    for (kind, heading) in groups {
+        text += &format!("{heading}\n");
+        for claim in claims.iter().filter(|c| c.kind == kind) {
+            let value = claim.checks.first().map_or("-".into(), |c| taut::number::ascii(&report::value(c)));
+            text += &format!("  {:width$}  {value:>22}  {}\n", claim.id, claim.verdict().word());
+        }
+        text += "\n";
+    }
+    let count = |v: Verdict| claims.iter().filter(|c| c.verdict() == v).count();
+    let counts: Vec<String> = Verdict::ALL.iter().map(|v| format!("{} {}", count(*v), v.word())).collect();
+    text + &format!("{} claims: {}\nreport: {}\n", claims.len(), counts.join(", "), out.join("report.html").display())
 }
