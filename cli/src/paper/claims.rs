@@ -15,6 +15,8 @@ pub struct Claim {
     pub statement: &'static str,
     /// The numbers; the first is the one that is shown.
     pub checks: Vec<Check>,
+    /// What was found, in a few words with a number; empty where the first number says it.
+    pub found: String,
     /// What else there is to say; where there are no checks, why not.
     pub remark: String,
 }
@@ -40,7 +42,7 @@ pub struct Check {
     pub what: String,
     /// The number, SI.
     pub value: f64,
-    /// Its unit; empty for a ratio.
+    /// Its unit; `1` for a relative change, empty for ratios and counts.
     pub unit: &'static str,
     /// When it holds.
     pub rule: Rule,
@@ -116,7 +118,7 @@ impl Verdict {
 impl Claim {
     /// A claim without numbers yet.
     pub fn new(id: &'static str, kind: Kind, source: &'static str, statement: &'static str) -> Self {
-        Self { id, kind, source, statement, checks: Vec::new(), remark: String::new() }
+        Self { id, kind, source, statement, checks: Vec::new(), found: String::new(), remark: String::new() }
     }
 
     /// Adds a number with which the claim stands or falls.
@@ -128,6 +130,12 @@ impl Claim {
     /// Adds a number that earns a remark where it does not hold.
     pub fn further(mut self, what: impl Into<String>, value: f64, unit: &'static str, rule: Rule) -> Self {
         self.checks.push(Check { what: what.into(), value, unit, rule, decides: false });
+        self
+    }
+
+    /// Sets what was found.
+    pub fn found(mut self, found: impl Into<String>) -> Self {
+        self.found = found.into();
         self
     }
 
@@ -165,6 +173,7 @@ struct Entry<'a> {
     tolerance: Option<f64>,
     rule: Option<String>,
     verdict: &'static str,
+    found: &'a str,
     remark: &'a str,
     checks: Vec<EntryCheck<'a>>,
 }
@@ -203,6 +212,7 @@ fn entry(claim: &Claim) -> Entry<'_> {
         tolerance,
         rule: first.map(|c| c.rule.words()),
         verdict: claim.verdict().word(),
+        found: &claim.found,
         remark: &claim.remark,
         checks: claim
             .checks

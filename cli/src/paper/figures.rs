@@ -12,6 +12,9 @@ use taut::report::{Axis, Colour, Style};
 const NO_MEASUREMENT: &str =
     "The paper shows a measured curve beside each: it is not available as data and nothing is drawn in its place.";
 
+/// How much of a run is drawn, s. Its data go on to the end, and nothing happens there any more.
+const SHOWN: f64 = 0.5;
+
 /// What is plotted over time.
 #[derive(Clone, Copy, PartialEq)]
 enum What {
@@ -72,17 +75,22 @@ pub fn figures(f: &Findings) -> Vec<Plot> {
 
 fn over_time(number: u8, title: String, time: &[f64]) -> Plot {
     let title = format!("Figure {number}. {title}");
-    Plot::new(format!("figure-{number:02}"), title, Axis::new("Time", "s"), "time_s", time).vertical(PULSE, "voltage off")
+    Plot::new(format!("figure-{number:02}"), title, Axis::new("Time", "s"), "time_s", time).up_to(SHOWN).vertical(PULSE, "voltage off")
 }
 
-/// Colours: 10 V strong, 5 V light of the same family.
+/// 10 V solid and 5 V dashed, in one colour.
 fn base<'a>(responses: &'a [Response; 2], what: What, name: &str) -> Vec<Curve<'a>> {
-    [(1, Colour::Blue), (0, Colour::Sky)]
-        .map(|(i, colour)| {
-            let volts = VOLTS[i];
-            Curve::new(format!("{name}, {volts}\u{a0}V"), what.heading("nominal", volts), what.of(&responses[i]), colour)
-        })
-        .into()
+    [(1, Style::Solid), (0, Style::Dashed)].map(|(i, style)| one_curve(responses, i, what, name, Colour::Blue).style(style)).into()
+}
+
+/// Both solid, in two colours: for figures that show nothing else.
+fn alone<'a>(responses: &'a [Response; 2], what: What, name: &str) -> Vec<Curve<'a>> {
+    [(1, Colour::Blue), (0, Colour::Vermillion)].map(|(i, colour)| one_curve(responses, i, what, name, colour)).into()
+}
+
+fn one_curve<'a>(responses: &'a [Response; 2], i: usize, what: What, name: &str, colour: Colour) -> Curve<'a> {
+    let volts = VOLTS[i];
+    Curve::new(format!("{name}, {volts}\u{a0}V"), what.heading("nominal", volts), what.of(&responses[i]), colour)
 }
 
 fn open_loop(f: &Findings, number: u8, what: What) -> Plot {
@@ -103,7 +111,7 @@ fn open_loop(f: &Findings, number: u8, what: What) -> Plot {
         ),
     };
     over_time(number, format!("{}, parameters of Table 1", what.word()), &runs[0].time)
-        .panel(what.axis(), 1.0, base(runs, what, "Table 1"))
+        .panel(what.axis(), 1.0, alone(runs, what, "Table 1"))
         .caption(format!("{text} {NO_MEASUREMENT}"))
 }
 
@@ -162,7 +170,7 @@ fn stiffness(f: &Findings, number: u8, what: What, factor: f64) -> Plot {
             .iter()
             .zip(&differences)
             .map(|(e, d)| {
-                let colour = if e.volts > 7.0 { Colour::Blue } else { Colour::Sky };
+                let colour = if e.volts > 7.0 { Colour::Blue } else { Colour::Vermillion };
                 let heading = what.heading("change", e.volts);
                 Curve::new(format!("change, {}\u{a0}V", e.volts), heading, d, colour)
             })
@@ -244,7 +252,8 @@ fn matched(f: &Findings, number: u8, what: What) -> Plot {
     for (i, volts) in [(1, 10.0), (0, 5.0)] {
         let name = format!("Table 4, simulated, {volts}\u{a0}V");
         let heading = what.heading("table4", volts);
-        curves.push(Curve::new(name, heading, what.of(&f.runs.table4[i]), Colour::Grey).style(Style::Dashed));
+        let style = if i == 1 { Style::Solid } else { Style::Dashed };
+        curves.push(Curve::new(name, heading, what.of(&f.runs.table4[i]), Colour::Grey).style(style));
     }
     let m = &f.matched;
     let (at_5, at_10, of) = match what {
@@ -254,7 +263,7 @@ fn matched(f: &Findings, number: u8, what: What) -> Plot {
     over_time(number, format!("{}, parameters of Table 2", what.word()), &f.runs.table2[0].time)
         .panel(what.axis(), 1.3, curves)
         .caption(format!(
-            "Dashed, for comparison, the non-linear model of Table 4, simulated. The linear set differs from it in {of} by {} at 5 V and {} at 10 V. {NO_MEASUREMENT}",
+            "In grey, for comparison, the non-linear model of Table 4, simulated. The linear set differs from it in {of} by {} at 5 V and {} at 10 V. {NO_MEASUREMENT}",
             percent(at_5),
             percent(at_10)
         ))
@@ -279,7 +288,7 @@ fn dry(f: &Findings, number: u8, what: What) -> Plot {
         ),
     };
     over_time(number, format!("{}, non-linear model of Table 4", what.word()), &runs[0].time)
-        .panel(what.axis(), 1.0, base(runs, what, "Table 4"))
+        .panel(what.axis(), 1.0, alone(runs, what, "Table 4"))
         .caption(format!("{text} {NO_MEASUREMENT}"))
 }
 

@@ -18,7 +18,7 @@ pub fn toothed(f: &Findings) -> Plot {
     let ratio: Vec<f64> = (0..=180).map(|i| 1.0 + 0.05 * f64::from(i)).collect();
     let whole: Vec<f64> = ratio.iter().map(|a| series_over_plain(*a, 0.5)).collect();
     let stretches: Vec<f64> = ratio.iter().map(|a| series_over_plain_stretches(*a, 0.5)).collect();
-    Plot::new("figure-03", "Figure 3. Toothed and plain stretches in series", Axis::new("A_t / A_nt", ""), "area_ratio", &ratio)
+    Plot::new("figure-03", "Figure 3. Toothed and plain stretches in series", Axis::new("Toothed section / plain section", ""), "area_ratio", &ratio)
         .panel(
             Axis::new("Eq. (12) / eq. (13)", ""),
             1.0,
@@ -76,7 +76,7 @@ pub fn laws(f: &Findings) -> [Plot; 2] {
                 ],
             )
             .caption(format!(
-                "The cart's b = {} and F_c = {} of Table 4. The paper gives no F_s and no F_τ: {} and {} s²/m² are chosen to show the shape.",
+                "The cart's viscous coefficient {} and Coulomb force {} are those of Table 4. The paper gives neither the static force nor the Stribeck parameter: {} and {} s²/m² are chosen to show the shape.",
                 si(b, "N s/m", 6),
                 si(fc, "N", 4),
                 si(STATIC, "N", 2),

@@ -103,8 +103,8 @@ fn table(claims: &[Claim], out: &Path) -> String {
     for (kind, heading) in groups {
         text += &format!("{heading}\n");
         for claim in claims.iter().filter(|c| c.kind == kind) {
-            let value = claim.checks.first().map_or("-".into(), |c| taut::number::ascii(&report::value(c)));
-            text += &format!("  {:width$}  {value:>22}  {}\n", claim.id, claim.verdict().word());
+            let found = taut::number::ascii(&words::found(claim)).replace('×', "x");
+            text += &format!("  {:width$}  {:<23}  {found}\n", claim.id, claim.verdict().word());
         }
         text += "\n";
     }

@@ -126,11 +126,6 @@ impl Response {
     pub fn position_distance(&self, other: &Response) -> f64 {
         distance(&self.position, &other.position)
     }
-
-    /// Largest distance to another run in speed, m/s.
-    pub fn speed_distance(&self, other: &Response) -> f64 {
-        distance(&self.speed, &other.speed)
-    }
 }
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {
@@ -196,8 +191,8 @@ impl Change {
     pub fn name(self) -> &'static str {
         match self {
             Change::Stiffness => "stiffness",
-            Change::PulleyInertia => "inertia, J alone",
-            Change::AllInertia => "inertia, J and M",
+            Change::PulleyInertia => "inertia\u{a0}J",
+            Change::AllInertia => "inertia\u{a0}J,\u{a0}M",
             Change::Friction => "friction",
         }
     }

@@ -10,6 +10,8 @@ pub struct Plot {
     pub figure: Figure,
     /// Headings and values, the common x first.
     pub columns: Vec<(String, Vec<f64>)>,
+    /// How many rows are drawn; the file of data has all.
+    pub shown: usize,
 }
 
 /// One curve of a plot.
@@ -42,15 +44,21 @@ impl<'a> Curve<'a> {
 impl Plot {
     /// A plot without panels.
     pub fn new(file: impl Into<String>, title: impl Into<String>, x: Axis, heading: &str, values: &[f64]) -> Self {
-        Self { file: file.into(), figure: Figure::new(title, x), columns: vec![(heading.into(), values.to_vec())] }
+        Self { file: file.into(), figure: Figure::new(title, x), columns: vec![(heading.into(), values.to_vec())], shown: values.len() }
+    }
+
+    /// Draws only up to this x.
+    pub fn up_to(mut self, x: f64) -> Self {
+        self.shown = self.columns[0].1.iter().take_while(|v| **v <= x).count();
+        self
     }
 
     /// Adds a panel with its curves.
     pub fn panel(mut self, y: Axis, weight: f64, curves: Vec<Curve<'_>>) -> Self {
         let mut panel = Panel::new(y).weight(weight);
         for curve in curves {
-            let x = self.columns[0].1.clone();
-            let series = Series::new(curve.name, x, curve.values).style(curve.style).colour(curve.colour);
+            let x = &self.columns[0].1[..self.shown];
+            let series = Series::new(curve.name, x, &curve.values[..self.shown]).style(curve.style).colour(curve.colour);
             panel = panel.series(series);
             self.columns.push((curve.heading, curve.values.to_vec()));
         }

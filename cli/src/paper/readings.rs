@@ -34,43 +34,50 @@ pub fn readings(f: &Findings) -> Vec<Claim> {
     vec![
         print("p1-sign-of-b", "eq. (7)", "A(4,4) = +b/M")
             .decide("largest real part among the poles of (7) as printed, Table 1", l.printed_pole[0], "1/s", Rule::AtMost(1e-6))
+            .found(format!("a pole at {} 1/s", super::words::signed(l.printed_pole[0], 3)))
             .remark(format!(
-                "Equations (2) and (17) need −b/M; with it the largest real part is {} 1/s, the free translation. As printed, a 5 V pulse has driven the motor {} after 1 s.",
+                "Equations (2) and (17) need −b/M; with it the largest real part is {} 1/s, which is the free translation's zero but for rounding. As printed, a 5 V pulse drives the motor to {} m within 1 s.",
                 significant(l.corrected_pole[0], 1),
-                si(l.printed_end, "m", 3)
+                significant(l.printed_end, 3)
             )),
-        print("p2-r-and-r-squared", "eq. (6)-(7)", "x_3 = x_2'")
+        print("p2-r-and-r-squared", "eq. (6)–(7)", "x_3 = x_2'")
             .decide("x₃ at the end of the 5 V run with (7), its sign corrected", l.corrected_x3, "m", near(cart, 1e-3 * cart))
+            .found(format!("x_3 ends at {}, the cart at {}", si(l.corrected_x3, "m", 4), si(cart, "m", 4)))
             .remark(format!(
-                "Row 2 of (7) has k_1 r²/J_1 where k_1 r/J_1 is needed, row 4 has k_1/M where k_1 r/M is needed. The matrix is right for x_3 = x_2'/r: its x_1 ends within {} of the equations (1)-(4), its x_3 is {} times the cart's position and would lie beyond the stage of 863 mm.",
+                "Row 2 of (7) has k_1 r²/J_1 where k_1 r/J_1 is needed, row 4 has k_1/M where k_1 r/M is needed. The matrix is right for x_3 = x_2'/r: its x_1 ends within {} of the equations (1)–(4), its x_3 is {} times the cart's position: {} lengths of the stage (863 mm).",
                 si((l.corrected_end - l.by_exponential).abs(), "m", 1),
-                significant(l.corrected_x3 / cart, 4)
+                significant(l.corrected_x3 / cart, 4),
+                significant(l.corrected_x3 / super::belt::RAIL, 3)
             )),
         print("p3-back-emf", "section 2.2, Table 1", "30.3 V, 800 rpm, 5.9:1; K_e = 0.023 V s/rad")
             .decide("back-EMF constant at the motor's shaft from the rating", back_emf, "V s/rad", near(printed, 0.5e-3))
+            .found(format!("the rating implies {}", si(back_emf, "V s/rad", 3)))
             .remark(format!(
                 "With 0.023 V s/rad, 800 rpm behind the gear need {}, not 30.3 V. Equation (4) has no gear; with 5.9 : 1 in it, Table 4 would end {} (5 V) and {} (10 V) further.",
                 si(printed * motor_speed, "V", 3),
                 percent(i.geared[0] / f.runs.table4[0].final_position() - 1.0),
                 percent(i.geared[1] / f.runs.table4[1].final_position() - 1.0)
             )),
-        print("p4-lengths", "section 2.3.1, Tables 1-2", "l_1 = l_2 = 0.349 m, l_3 = 0.787 m")
+        print("p4-lengths", "section 2.3.1, Tables 1–2", "l_1 = l_2 = 0.349 m, l_3 = 0.787 m")
             .decide("largest distance of the computed from the printed stiffness, in half units of its last digit", worst(|s| s.lengths), "", Rule::AtMost(1.0))
+            .found(format!("off by up to {} half units of the last digit", significant(worst(|s| s.lengths), 3)))
             .remark(format!(
                 "With 0.34925 m and 0.7874 m the largest distance is {}; with these and the modulus before rounding it is {}.",
                 significant(worst(|s| s.inches), 3),
                 significant(worst(|s| s.unrounded), 2)
             )),
-        print("p5-notation", "Tables 1, 2, 4, figures 18-19", "R, B, F_r and the references to equations")
+        print("p5-notation", "Tables 1, 2, 4, figures 18–19", "R, B, F_r and the references to equations")
+            .found("notation only")
             .remark("A matter of notation only: no number depends on it. R is a radius and a resistance, B a pulley's coefficient and the cart's, F_r and F_τ are one, figure 18 is described as (16) and captioned (17), and (2) is cited where (4) is meant."),
         reading("p6-table3-creeps", "Table 3", "Table 3 freezes a speed inside its band instead of ending it: the axis creeps after its stop")
             .decide("largest creep between 0.5 s and 1 s", low.abs().max(high.abs()), "m", Rule::AtLeast(i.count))
             .decide("motion of the exact solution after its last stop", t.exact_creep, "m", Rule::AtMost(0.0))
             .remark(format!("Over all formulas, steps and both voltages the creep lies between {} and {}.", um(low, 3), um(high, 3))),
         reading("p6-table3-limit", "Table 3", "with ever smaller steps the creep tends to that of the band's edge, 0.01 rad/s")
-            .decide("distance of the creep at a step of 1e-6 s from 0.01 rad/s · r · 0.5 s, relative", finest, "", Rule::AtMost(0.01))
+            .decide("distance of the creep at a step of 1e-6 s from 0.01 rad/s · r · 0.5 s, relative", finest, "1", Rule::AtMost(0.01))
+            .found(format!("{} from it at a step of 1 µs", share(finest)))
             .remark(format!(
-                "That is {} in half a second: a limit, and the wrong one. Steps of 1e-3 s to 1e-5 s show no order.",
+                "That is {} in half a second: a limit, and the wrong one. Runs with larger steps show no order.",
                 um(t.band_edge, 3)
             )),
         reading("p6-sign-of-zero", "Table 3", "sign(0) = 0 drops Coulomb friction at the start")
@@ -79,8 +86,9 @@ pub fn readings(f: &Findings) -> Vec<Claim> {
         reading("p7-scaling", "Tables 1, 2, 4", "E, J, M, B, b, τ_c, F_c and K_t/R times one factor leave every response unchanged")
             .decide(format!("largest difference in r φ₁ with everything times {}", i.factor), i.scaled, "m", Rule::AtMost(1e-12)),
         reading("p7-sharing", "Table 4", "friction shared otherwise among pulleys and cart, with the same totals, looks the same to the encoder")
-            .decide("largest difference in r φ₁, over the final position", shared_share, "", Rule::AtMost(1e-3))
+            .decide("largest difference in r φ₁, over the final position", shared_share, "1", Rule::AtMost(1e-3))
             .further("largest difference in r φ₁", shared, "m", Rule::AtMost(i.count))
+            .found(format!("up to {} or {}", um(shared, 3), share(shared_share)))
             .remark(format!(
                 "The largest difference is {}, {} counts of an encoder before the gear: the belt's stretch betrays a little of where friction acts. Totals: {} and {}.",
                 um(shared, 3),
@@ -95,6 +103,7 @@ pub fn readings(f: &Findings) -> Vec<Claim> {
         reading("p8-damping", "Tables 2 and 4", "damping ratios of 0.013 to 0.019")
             .decide("least damping ratio, viscous friction of Table 4", f.linear.modes[2].first().map_or(f64::NAN, |m| m.damping), "", near(0.013, 0.5e-3))
             .decide("greatest damping ratio, Table 2", f.linear.modes[1].get(1).map_or(f64::NAN, |m| m.damping), "", near(0.019, 0.5e-3))
+            .found(format!("{} to {}", significant(f.linear.modes[2].first().map_or(f64::NAN, |m| m.damping), 3), significant(f.linear.modes[1].get(1).map_or(f64::NAN, |m| m.damping), 3)))
             .remark(format!(
                 "Table 2 itself has {} and {}; the lower end belongs to the viscous friction of Table 4.",
                 significant(f.linear.modes[1].first().map_or(f64::NAN, |m| m.damping), 3),
@@ -103,32 +112,37 @@ pub fn readings(f: &Findings) -> Vec<Claim> {
         reading("p8-travel", "Table 2", "over the travel the first mode moves between 161 and 195 Hz")
             .decide("lowest frequency, cart 50 mm from a pulley", lowest, "Hz", near(161.0, 0.5))
             .decide("highest frequency, cart in the middle", highest, "Hz", near(195.0, 0.5))
+            .found(format!("{} to {} Hz", significant(lowest, 4), significant(highest, 4)))
             .remark("The paper keeps k_1 = k_2; how near the cart comes to the pulleys is our choice."),
         reading("p9-superposition", "figures 14, 15, 20, 21", "10 V moves a linear stage 2 times as far as 5 V, Table 4 2.298 times")
             .decide("Table 2", m.ratio.0, "", near(2.0, 1e-9))
-            .decide("Table 4", m.ratio.1, "", near(2.298, 0.5e-3)),
+            .decide("Table 4", m.ratio.1, "", near(2.298, 0.5e-3))
+            .found(format!("{} and {}", significant(m.ratio.0, 4), significant(m.ratio.1, 4))),
         reading("p9-table2-at-5-V", "Table 2", "Table 2 ends 16 % beyond Table 4 at 5 V")
-            .decide("final position, relative", m.final_position[0], "", near(0.16, 0.005)),
+            .decide("final position, relative", m.final_position[0], "1", near(0.16, 0.005)),
         reading("p9-table2-at-10-V", "Table 2", "Table 2 ends 1.0 % beyond Table 4 at 10 V")
-            .decide("final position, relative", m.final_position[1], "", near(0.010, 0.0005)),
+            .decide("final position, relative", m.final_position[1], "1", near(0.010, 0.0005)),
         reading("p9-scaled", "figures 14, 15", "a linear set that meets Table 4 at 5 V misses it by -13 % at 10 V")
-            .decide("final position, relative", m.scaled_to_5, "", near(-0.13, 0.005))
+            .decide("final position, relative", m.scaled_to_5, "1", near(-0.13, 0.005))
             .remark(format!("The other way round, a set that meets 10 V is {} off at 5 V.", percent(m.scaled_to_10))),
         reading("p10-inertia", "figure 10", "the final position is independent of inertia for viscous friction only")
-            .decide("largest change, Table 1", final_position(From::Table1), "", Rule::AtMost(1e-5))
-            .decide("J x2, Table 4 at 5 V", f.runs.one(From::Table4, Change::PulleyInertia, 2.0, 5.0).final_position, "", near(-0.019, 0.0005))
-            .decide("J and M x2, Table 4 at 5 V", f.runs.one(From::Table4, Change::AllInertia, 2.0, 5.0).final_position, "", near(-0.040, 0.0005)),
-        reading("p10-friction", "figure 12", "friction x2 and x0.5 changes the final position by -49 % and +94 %")
-            .decide("x2, Table 1", f.runs.one(From::Table1, Change::Friction, 2.0, 5.0).final_position, "", near(-0.49, 0.005))
-            .decide("x0.5, Table 1", f.runs.one(From::Table1, Change::Friction, 0.5, 5.0).final_position, "", near(0.94, 0.005))
+            .decide("largest change, Table 1", final_position(From::Table1), "1", Rule::AtMost(1e-5))
+            .decide("J ×2, Table 4 at 5 V", f.runs.one(From::Table4, Change::PulleyInertia, 2.0, 5.0).final_position, "1", near(-0.019, 0.0005))
+            .decide("J and M ×2, Table 4 at 5 V", f.runs.one(From::Table4, Change::AllInertia, 2.0, 5.0).final_position, "1", near(-0.040, 0.0005))
+            .found(format!("Table 1: {}; Table 4: up to {}", share(final_position(From::Table1)), share(final_position(From::Table4)))),
+        reading("p10-friction", "figure 12", "friction ×2 and ×0.5 changes the final position by -49 % and +94 %")
+            .decide("×2, Table 1", f.runs.one(From::Table1, Change::Friction, 2.0, 5.0).final_position, "1", near(-0.49, 0.005))
+            .decide("×0.5, Table 1", f.runs.one(From::Table1, Change::Friction, 0.5, 5.0).final_position, "1", near(0.94, 0.005))
+            .found(format!("{} and {}", percent(f.runs.one(From::Table1, Change::Friction, 2.0, 5.0).final_position), percent(f.runs.one(From::Table1, Change::Friction, 0.5, 5.0).final_position)))
             .remark(format!(
                 "Both belong to Table 1. From Table 4 it is {} and {} at 5 V.",
                 percent(f.runs.one(From::Table4, Change::Friction, 2.0, 5.0).final_position),
                 percent(f.runs.one(From::Table4, Change::Friction, 0.5, 5.0).final_position)
             )),
-        reading("p10-stiffness", "figures 6-7", "stiffness changes the final position by less than 0.001 % (linear), by 0.03 % (Coulomb)")
-            .decide("largest change, Table 1", largest(f.runs.of(From::Table1, &[Change::Stiffness]), |e| e.final_position), "", Rule::AtMost(1e-5))
-            .decide("largest change, Table 4", largest(f.runs.of(From::Table4, &[Change::Stiffness]), |e| e.final_position), "", near(3e-4, 0.5e-4))
+        reading("p10-stiffness", "figures 6–7", "stiffness changes the final position by less than 0.001 % (linear), by 0.03 % (Coulomb)")
+            .decide("largest change, Table 1", largest(f.runs.of(From::Table1, &[Change::Stiffness]), |e| e.final_position), "1", Rule::AtMost(1e-5))
+            .decide("largest change, Table 4", largest(f.runs.of(From::Table4, &[Change::Stiffness]), |e| e.final_position), "1", near(3e-4, 0.5e-4))
+            .found(format!("Table 1: {}; Table 4: up to {}", share(largest(f.runs.of(From::Table1, &[Change::Stiffness]), |e| e.final_position)), share(largest(f.runs.of(From::Table4, &[Change::Stiffness]), |e| e.final_position))))
             .remark(format!("Table 1: {}.", share(largest(f.runs.of(From::Table1, &[Change::Stiffness]), |e| e.final_position)))),
     ]
 }
@@ -161,7 +175,7 @@ pub fn references(f: &Findings) -> Vec<Claim> {
         number("golden-table2-5V", "Table 2, 5 V: r φ₁ at 1 s", runs.table2[0].final_position(), "m", 0.062371416174, 1e-12),
         number("golden-table2-10V", "Table 2, 10 V: r φ₁ at 1 s", runs.table2[1].final_position(), "m", 0.124742832348, 1e-12),
         number("golden-closed-form", "Table 1, 5 V: r K_t/R · V T/B_tot", runs.table1[0].final_position(), "m", l.closed_form, 1e-12),
-        number("golden-matrix-exponential", "Table 1, 5 V: eq. (1)-(4) as a matrix, by its exponential", runs.table1[0].final_position(), "m", l.by_exponential, 1e-12),
+        number("golden-matrix-exponential", "Table 1, 5 V: eq. (1)–(4) as a matrix, by its exponential", runs.table1[0].final_position(), "m", l.by_exponential, 1e-12),
     ]
 }
 

@@ -1,11 +1,11 @@
 //! The report: what holds and what does not, then the paper from its first figure to its last.
 
-use super::claims::{Check, Claim, Kind, Rule, Verdict};
+use super::claims::{Claim, Kind, Verdict};
 use super::findings::Findings;
 use super::misprints::MISPRINTS;
 use super::plots::Plot;
 use super::studies::From;
-use super::words::{mm, percent, share, si, um};
+use super::words::{found, mm, percent, rule, share, si, symbols, um, value};
 use super::{diagrams, tables};
 use maud::{Markup, html};
 use taut::number::significant;
@@ -82,33 +82,32 @@ impl Report<'_> {
             " not, and " (open) " cannot be checked: mostly those that rest on the measured curves, which are not available as data."
         });
         page.markup(html! { dl {
-            dt { "The physics holds" }
-            dd { "Friction decides how far and how fast the axis goes: doubled, it takes " (percent(linear(Friction, 2.0).final_position))
-                 " of the final position; halved, it adds " (percent(linear(Friction, 0.5).final_position)) ". Twice the stiffness \
-                 changes the position by at most " (share(linear(Stiffness, 2.0).path)) ". Twice the inertia changes the time constant by "
+            dt { "Friction first" }
+            dd { "Twice the friction changes the final position by " (percent(linear(Friction, 2.0).final_position)) ", half of it by "
+                 (percent(linear(Friction, 0.5).final_position)) ". Twice the stiffness changes the position by at most "
+                 (share(linear(Stiffness, 2.0).path)) ". Twice the inertia changes the time constant by "
                  (percent(linear(PulleyInertia, 2.0).time_constant_change)) " (J) or " (percent(linear(AllInertia, 2.0).time_constant_change))
-                 " (J and M), and not where the axis ends." }
-            dt { "One linear set for two voltages" }
-            dd { "does not exist, as the paper says: met at 5 V, it is " (percent(misses.1)) " off at 10 V. But Table 2, called matched for 5 V, lies "
-                 (percent(misses.0[0])) " from Table 4 there, and only " (percent(misses.0[1])) " at 10 V." }
-            dt { "With Coulomb friction" }
-            dd { "inertia does move the final position: " (percent(inertia)) " for twice J at 5 V." }
-            dt { "Equation (7) as printed" }
-            dd { "is unstable: a pole at " (super::words::signed(pole, 3)) " 1/s. The sign of b is a misprint." }
-            dt { "Table 3 as printed" }
-            dd { "lets the axis creep by up to " (um(creep, 3)) " in half a second after it should have stopped. The exact solution then moves by "
+                 " (J and M), and the final position by " (share(linear(AllInertia, 2.0).final_position)) "." }
+            dt { "Two voltages" }
+            dd { "As the paper says, no linear set serves both: one that meets Table 4 at 5 V is " (percent(misses.1)) " off at 10 V. But Table 2, \
+                 called matched for 5 V, lies " (percent(misses.0[0])) " from Table 4 at 5 V and " (percent(misses.0[1])) " at 10 V." }
+            dt { "Coulomb friction" }
+            dd { "With it, inertia does move the final position: by " (percent(inertia)) " for twice J at 5 V." }
+            dt { "Equation (7)" }
+            dd { "As printed it is unstable, with a pole at " (super::words::signed(pole, 3)) " 1/s: the sign of b is a misprint." }
+            dt { "Table 3" }
+            dd { "As printed it lets the axis creep by up to " (um(creep, 3)) " in half a second after it should have stopped. The exact solution then moves by "
                  @if f.table3.exact_creep == 0.0 { "not one bit." } @else { (um(f.table3.exact_creep, 2)) "." } }
             dt { "Position data" }
-            dd { "determine friction only by its totals, " (si(f.identifiability.total_viscous, "N m s", 4)) " and "
-                 (si(f.identifiability.total_coulomb, "N m", 4)) ". Shared otherwise, the motor's position differs by at most "
+            dd { "They determine friction by its totals, " (si(f.identifiability.total_viscous, "N m s", 4)) " and "
+                 (si(f.identifiability.total_coulomb, "N m", 4)) ". Sharing them otherwise among pulleys and cart moves the motor by at most "
                  (um(f.identifiability.sharing.iter().flat_map(|s| s.difference).fold(0.0, f64::max), 2)) "." }
         } });
-        let mut table = Table::new("").column("The paper", "").column("Where", "").column("Here", "").column("Verdict", "");
+        let mut table = Table::new("").column("The paper", "").column("Here", "").column("", "");
         for claim in self.claims.iter().filter(|c| own.contains(&c.kind)) {
             table.row([
-                Cell::Markup(symbols(claim.statement)),
-                claim.source.into(),
-                Cell::Number(claim.checks.first().map_or("–".into(), value)),
+                Cell::Markup(html! { (symbols(claim.statement)) br; small { (claim.source) } }),
+                Cell::Markup(symbols(&found(claim))),
                 badge(claim.verdict()).into(),
             ]);
         }
@@ -134,17 +133,17 @@ impl Report<'_> {
             ("Inertia J", format!("{} times", ratio(|s| s.drive_pulley.inertia))),
         ]);
         page.table(&tables::parameters(f));
-        page.markup(html! { p.note { "“R” is printed for the radius and for the resistance; “B” for the pulleys in Tables 1 and 2 and for the cart in Table 4; K_e is printed in V/(rad s)." } });
+        page.markup(html! { p.note { (symbols("Grey: taken over from Table 2. \"R\" is printed for the radius and for the resistance; \"B\" for the pulleys in Tables 1 and 2 and for the cart in Table 4; K_e is printed in V/(rad s).")) } });
     }
 
     fn belt(&mut self) {
         let f = self.f;
         self.page.section("Belt, pulleys and modes");
         self.page.prose(format!(
-            "Two thirds of neoprene and one third of fibreglass in parallel give a modulus of {}; the paper prints 16.67e9 N/m². \
+            "Two thirds of neoprene and one third of fibreglass in parallel give a modulus of {}; the paper prints 16.67 GPa. \
              Equation (11) then gives the stiffness. The printed lengths are rounded: with the same lengths in inches, and the \
              modulus before rounding, all printed digits come out.",
-            si(f.belt.composite, "N/m^2", 6)
+            si(f.belt.composite, "Pa", 6)
         ));
         self.page.table(&tables::stiffness(f));
         for id in ["composite-modulus", "stiffness-table1-k1", "pitch-diameter"] {
@@ -177,7 +176,7 @@ impl Report<'_> {
         self.page.section("First response: Table 1");
         self.page.prose(
             "The input is a pulse of 0.25 s, of 5 V or 10 V. Position and velocity are the motor's, expressed in metres by the \
-             pulley's radius.",
+             pulley's radius. The figures show the first half second, the files of data the whole.",
         );
         self.figures(4..=5);
         self.claim("figure-4-falls-short");
@@ -187,9 +186,10 @@ impl Report<'_> {
         self.page.section("One parameter at a time");
         self.page.prose(
             "Stiffness, inertia and friction are doubled and halved, one after the other. The paper does it from Table 1; the second \
-             table does the same from Table 4. “Inertia” may mean J alone or J and M: both are given. The time constant is when \
-             the mean velocity of the three inertias reaches 1 − 1/e of what it settles at; the oscillation is the largest difference \
-             between motor and cart velocity.",
+             table does the same from Table 4. “Inertia” may mean J alone or J and M: both are given. All columns are changes against the \
+             unchanged set: of the final position; of the position at any time, in per cent of the final one; of the mean speed \
+             in the last 50 ms of the pulse; of the highest speed; of the time until the mean velocity of the three inertias has \
+             reached 1 − 1/e of that speed; of the largest difference between motor and cart velocity.",
         );
         self.page.table(&tables::study(self.f, From::Table1));
         self.page.table(&tables::study(self.f, From::Table4));
@@ -256,7 +256,8 @@ impl Report<'_> {
         self.page.section("Table 3 against the exact solution");
         self.page.prose(format!(
             "Table 3 sets friction equal to the computed torque while the speed is within ±0.01 and the torque within the Coulomb value. \
-             The acceleration is then zero and the speed stays what it is. The exact solution comes to rest at {} and {}.",
+             The acceleration is then zero and the speed stays what it is. The exact solution comes to rest at {} and {}. Creep is the \
+             motion of r φ₁ between 0.5 s and 1 s; turns are the changes of its direction after 0.35 s.",
             mm(f.runs.table4[0].final_position()),
             mm(f.runs.table4[1].final_position())
         ));
@@ -275,6 +276,10 @@ impl Report<'_> {
             ids.into_iter().for_each(|id| self.claim(id));
             if m.number == "P7" {
                 self.page.table(&tables::sharing(self.f));
+                self.page.prose(format!(
+                    "The last two columns are what remains when the totals are adjusted, by at most {}, so that both final positions agree.",
+                    share(self.f.identifiability.sharing.iter().flat_map(|s| s.adjustment).fold(0.0, |a: f64, b| a.max(b.abs())))
+                ));
             }
         }
     }
@@ -298,7 +303,7 @@ impl Report<'_> {
                 let what = if check.decides { check.what.clone() } else { format!("further: {}", check.what) };
                 table.row([
                     name.into(),
-                    what.into(),
+                    Cell::Markup(symbols(&what)),
                     Cell::Number(value(check)),
                     rule(check).into(),
                     kind.badge(if holds { "holds" } else { "fails" }).into(),
@@ -360,55 +365,5 @@ fn callout(claim: &Claim) -> Markup {
             }
             @if !claim.remark.is_empty() { p { (symbols(&claim.remark)) } }
         }
-    }
-}
-
-/// `K_t` with its subscript set as such, and straight quotation marks as round ones.
-fn symbols(text: &str) -> Markup {
-    let mut open = false;
-    let words = text.split_inclusive([' ', '/', '(', ')', ',', ';', '=']);
-    html! {
-        @for word in words {
-            @let (head, tail) = subscript(word);
-            @let head: String = head.chars().map(|c| if c == '"' { open = !open; if open { '“' } else { '”' } } else { c }).collect();
-            (head)
-            @if let Some((below, rest)) = tail {
-                sub { (below) }
-                @let rest: String = rest.chars().map(|c| if c == '"' { open = !open; if open { '“' } else { '”' } } else { c }).collect();
-                (rest)
-            }
-        }
-    }
-}
-
-/// Splits `k_nt,` into `k`, and `nt` and `,`.
-fn subscript(word: &str) -> (&str, Option<(&str, &str)>) {
-    let Some((head, tail)) = word.split_once('_') else { return (word, None) };
-    let end = tail.find(|c: char| !c.is_alphanumeric()).unwrap_or(tail.len());
-    (head, Some((&tail[..end], &tail[end..])))
-}
-
-/// The number with its unit, with as many digits as its rule needs.
-pub fn value(check: &Check) -> String {
-    let digits = match check.rule {
-        Rule::Near { expected, tolerance } if tolerance > 0.0 && expected != 0.0 => {
-            ((expected / tolerance).abs().log10().ceil() as usize + 1).clamp(3, 13)
-        }
-        _ => 3,
-    };
-    if check.value == 0.0 {
-        return if check.unit.is_empty() { "0".into() } else { format!("0\u{a0}{}", taut::number::pretty_unit(check.unit)) };
-    }
-    si(check.value, check.unit, digits)
-}
-
-fn rule(check: &Check) -> String {
-    match check.rule {
-        Rule::Near { expected, tolerance } if tolerance == 0.0 => format!("equal to {}", si(expected, check.unit, 13)),
-        Rule::Near { expected, tolerance } => {
-            format!("within {} of {}", si(tolerance, check.unit, 2), si(expected, check.unit, 13))
-        }
-        Rule::AtMost(limit) => format!("at most {}", si(limit, check.unit, 3)),
-        Rule::AtLeast(limit) => format!("at least {}", si(limit, check.unit, 4)),
     }
 }

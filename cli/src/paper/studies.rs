@@ -141,9 +141,9 @@ pub struct Frozen {
     pub final_position: f64,
     /// How far r φ₁ moves between 0.5 s and 1 s, m.
     pub creep: f64,
-    /// r φ₁′ at the end, m/s.
-    pub final_speed: f64,
-    /// φ₁′ after the first step, over its time: the acceleration with which the pulley starts, rad/s².
+    /// How often the motor turns back after 0.35 s.
+    pub turns: usize,
+    /// r φ₁ at the output times, m.
     pub position: Vec<f64>,
 }
 
@@ -184,13 +184,14 @@ impl Table3 {
             .map(|(method, step, volts)| {
                 let response = run(stage, &pulse(volts, 1e-3), Solver::Table3 { step, method })?;
                 let half = response.position[response.row(0.5)];
+                let late = &response.speed[response.row(0.35)..];
                 Ok(Frozen {
                     method,
                     step,
                     volts,
                     final_position: response.final_position(),
                     creep: response.final_position() - half,
-                    final_speed: response.speed[response.speed.len() - 1],
+                    turns: late.windows(2).filter(|v| v[0] * v[1] < 0.0).count(),
                     position: response.position,
                 })
             })

@@ -4,7 +4,7 @@ use super::belt::{MODULUS_1, MODULUS_2, SECTION};
 use super::findings::Findings;
 use super::model::VOLTS;
 use super::studies::{Effect, From};
-use super::words::{percent, signed};
+use super::words::{percent, signed, symbols};
 use taut::number::{engineering, significant};
 use taut::report::{Cell, Table};
 use taut::solve::Method;
@@ -13,18 +13,19 @@ use taut::stage::Stage;
 /// Tables 1, 2 and 4: the printed symbol, ours, and what runs.
 pub fn parameters(f: &Findings) -> Table {
     type Pick = fn(&Stage) -> f64;
-    let rows: [(&str, &str, &str, &str, Pick); 15] = [
+    let rows: [(&str, &str, &str, &str, Pick); 16] = [
         ("R", "r", "drive_pulley.radius", "m", |s| s.pulley_radius),
-        ("k₁", "k₁", "belt.stiffness", "N/m", |s| s.belt.stiffness[0]),
-        ("k₂", "k₂", "belt.stiffness", "N/m", |s| s.belt.stiffness[1]),
-        ("k₃", "k₃", "belt.stiffness", "N/m", |s| s.belt.stiffness[2]),
-        ("B; B1", "B₁", "drive_pulley.friction.viscous", "N m s", |s| s.drive_pulley.friction.forward.viscous),
-        ("B; B2", "B₂", "idler_pulley.friction.viscous", "N m s", |s| s.idler_pulley.friction.forward.viscous),
-        ("b; B", "b", "cart.friction.viscous", "N s/m", |s| s.cart.friction.forward.viscous),
+        ("k_1", "k_1", "belt.stiffness", "N/m", |s| s.belt.stiffness[0]),
+        ("k_2", "k_2", "belt.stiffness", "N/m", |s| s.belt.stiffness[1]),
+        ("k_3", "k_3", "belt.stiffness", "N/m", |s| s.belt.stiffness[2]),
+        ("B, B1", "B_1", "drive_pulley.friction.viscous", "N m s", |s| s.drive_pulley.friction.forward.viscous),
+        ("B, B2", "B_2", "idler_pulley.friction.viscous", "N m s", |s| s.idler_pulley.friction.forward.viscous),
+        ("b, B", "b", "cart.friction.viscous", "N s/m", |s| s.cart.friction.forward.viscous),
         ("τ_c1", "τ_c1", "drive_pulley.friction.coulomb", "N m", |s| s.drive_pulley.friction.forward.coulomb),
         ("τ_c2", "τ_c2", "idler_pulley.friction.coulomb", "N m", |s| s.idler_pulley.friction.forward.coulomb),
         ("F_c", "F_c", "cart.friction.coulomb", "N", |s| s.cart.friction.forward.coulomb),
-        ("J", "J₁, J₂", "drive_pulley.inertia, idler_pulley.inertia", "kg m^2", |s| s.drive_pulley.inertia),
+        ("J", "J_1", "drive_pulley.inertia", "kg m^2", |s| s.drive_pulley.inertia),
+        ("J", "J_2", "idler_pulley.inertia", "kg m^2", |s| s.idler_pulley.inertia),
         ("M", "M", "cart.mass", "kg", |s| s.cart.mass),
         ("K_t", "K_t", "motor.torque_constant", "N m/A", |s| s.motor.torque_constant),
         ("K_e", "K_e", "motor.back_emf_constant", "V s/rad", |s| s.motor.back_emf_constant),
@@ -38,30 +39,20 @@ pub fn parameters(f: &Findings) -> Table {
         .column("Table 1", "")
         .column("Table 2", "")
         .column("Table 4", "");
-    let make = |printed: &str, what: &str, unit: &str, values: [f64; 2]| {
-        [
-            printed.into(),
-            printed.into(),
-            what.into(),
-            taut::number::pretty_unit(unit).into(),
-            number(values[0]),
-            number(values[1]),
-            Cell::Number("as Table 2".into()),
-        ]
-    };
-    table.row(make("A", "shown beside the stiffness", "m^2", [SECTION; 2]));
-    table.row(make("E", "shown beside the stiffness", "N/m^2", [MODULUS_1, MODULUS_2]));
-    for (printed, ours, key, unit, pick) in rows {
+    let unit = |unit: &str| Cell::Text(taut::number::pretty_unit(unit).replace(' ', "\u{a0}"));
+    for (symbol, si, values) in [("A", "m^2", [SECTION; 2]), ("E", "N/m^2", [MODULUS_1, MODULUS_2])] {
+        table.row([symbol.into(), symbol.into(), "beside the stiffness".into(), unit(si), number(values[0]), number(values[1]), taken_over(values[1])]);
+    }
+    for (printed, ours, key, si, pick) in rows {
         let [t1, t2, t4] = [&f.sets.table1, &f.sets.table2, &f.sets.table4].map(|case| pick(&case.stage));
-        let own = key.contains("friction");
         table.row([
-            printed.into(),
-            ours.into(),
+            symbols(printed).into(),
+            symbols(ours).into(),
             maud::html! { code { (key) } }.into(),
-            taut::number::pretty_unit(unit).into(),
+            unit(si),
             number(t1),
             number(t2),
-            if own { number(t4) } else { Cell::Number("as Table 2".into()) },
+            if key.contains("friction") { number(t4) } else { taken_over(t4) },
         ]);
     }
     table
@@ -69,46 +60,43 @@ pub fn parameters(f: &Findings) -> Table {
 
 /// As many digits as the number has, up to six.
 fn number(value: f64) -> Cell {
-    Cell::Number(if value == 0.0 { "–".into() } else { engineering(value, "", 6) })
+    Cell::Number(digits(value))
+}
+
+/// The same in grey, on the right.
+fn taken_over(value: f64) -> Cell {
+    Cell::Markup(maud::html! { div.num { small { (digits(value)) } } })
+}
+
+fn digits(value: f64) -> String {
+    if value == 0.0 { "–".into() } else { engineering(value, "", 6) }
 }
 
 /// Eq. (11)-(13) beside the printed stiffness.
 pub fn stiffness(f: &Findings) -> Table {
-    let mut table = Table::new("Stiffness by eq. (11), and the difference from the printed one")
-        .column("", "")
-        .column("", "")
-        .column("Printed", "N/m")
-        .column("l = 0.349, 0.787 m", "N/m")
-        .column("", "%")
-        .column("l = 0.34925, 0.7874 m", "N/m")
-        .column("", "%")
-        .column("and E not rounded", "N/m")
-        .column("", "%");
+    let mut table = Table::new("Stiffness by eq. (11), N/m, and its difference from the printed one").column("Lengths", "");
     for s in &f.belt.stiffness {
-        let difference = |k: f64| Cell::Number(signed(100.0 * (k / s.printed - 1.0), 2));
-        table.row([
-            s.table.into(),
-            s.symbol.into(),
-            Cell::fixed(s.printed, 0),
-            Cell::fixed(s.lengths, 0),
-            difference(s.lengths),
-            Cell::fixed(s.inches, 0),
-            difference(s.inches),
-            Cell::fixed(s.unrounded, 0),
-            difference(s.unrounded),
-        ]);
+        table = table.column(format!("{}, {}", s.table, s.symbol), "");
     }
+    let row = |name: &str, pick: &dyn Fn(&super::belt::Stiffness) -> String| {
+        let mut row = vec![Cell::from(name)];
+        row.extend(f.belt.stiffness.iter().map(|s| Cell::Number(pick(s))));
+        row
+    };
+    let beside = |k: f64, printed: f64| format!("{k:.0} ({})", percent(k / printed - 1.0));
+    table.row(row("printed stiffness", &|s| format!("{:.0}", s.printed)));
+    table.row(row("0.349 m and 0.787 m, as printed", &|s| beside(s.lengths, s.printed)));
+    table.row(row("0.34925 m and 0.7874 m", &|s| beside(s.inches, s.printed)));
+    table.row(row("the same, and the modulus before rounding", &|s| beside(s.unrounded, s.printed)));
     table
 }
 
 /// Eq. (12) over (13) for some shapes of tooth.
 pub fn toothed() -> Table {
-    let mut table = Table::new("Eq. (12) over eq. (13) with l the whole span")
-        .column("Toothed part of the length", "")
-        .column("A_t = 1.5 A_nt", "")
-        .column("2 A_nt", "")
-        .column("5 A_nt", "")
-        .column("10 A_nt", "");
+    let mut table = Table::new("Eq. (12) over eq. (13) with l the whole span").column("Toothed part of the length", "");
+    for ratio in [1.5, 2.0, 5.0, 10.0] {
+        table = table.column(format!("toothed section = {ratio} plain ones"), "");
+    }
     for share in [0.3, 0.4, 0.5, 0.6] {
         let mut row = vec![Cell::fixed(share, 1)];
         row.extend([1.5, 2.0, 5.0, 10.0].map(|ratio| Cell::fixed(super::belt::series_over_plain(ratio, share), 3)));
@@ -148,21 +136,22 @@ pub fn study(f: &Findings, from: From) -> Table {
     let mut table = Table::new(name)
         .column("Changed", "")
         .column("by", "")
-        .column("Final position", "%")
-        .column("Position at any time, up to", "% of final")
-        .column("Speed reached", "%")
+        .column("Final", "%")
+        .column("Path, up to", "%")
+        .column("Speed", "%")
         .column("Peak speed", "%")
-        .column("Time constant", "ms")
-        .column("", "%")
+        .column("Time constant", "%")
         .column("Oscillation", "%");
-    if from == From::Table4 {
-        table = table.column("Final position at 10 V", "%");
-    }
+    table = match from {
+        From::Table1 => table.column("Time constant", "ms"),
+        From::Table4 => table.column("Final, 10\u{a0}V", "%"),
+    };
     for e in f.runs.effects.iter().filter(|e| e.from == from && e.volts == VOLTS[0]) {
         let mut row = effect_row(e);
-        if from == From::Table4 {
-            row.push(change(f.runs.one(from, e.change, e.factor, VOLTS[1]).final_position));
-        }
+        row.push(match from {
+            From::Table1 => Cell::fixed(1e3 * e.time_constant, 2),
+            From::Table4 => change(f.runs.one(from, e.change, e.factor, VOLTS[1]).final_position),
+        });
         table.row(row);
     }
     table
@@ -172,8 +161,8 @@ pub fn study(f: &Findings, from: From) -> Table {
 fn change(value: f64) -> Cell {
     let p = 100.0 * value;
     Cell::Number(match p.abs() {
-        small if small < 5e-6 => "0".into(),
-        small if small < 0.1 => format!("{}{}", if p > 0.0 { "+" } else { "" }, taut::number::fixed(p, 5)),
+        small if small < 5e-5 => "0.0000".into(),
+        small if small < 0.1 => format!("{}{}", if p > 0.0 { "+" } else { "" }, taut::number::fixed(p, 4)),
         large if large < 10.0 => format!("{}{}", if p > 0.0 { "+" } else { "" }, taut::number::fixed(p, 2)),
         _ => format!("{}{}", if p > 0.0 { "+" } else { "" }, taut::number::fixed(p, 1)),
     })
@@ -187,7 +176,6 @@ fn effect_row(e: &Effect) -> Vec<Cell> {
         Cell::Number(significant(100.0 * e.path, 3)),
         change(e.plateau),
         change(e.peak),
-        Cell::fixed(1e3 * e.time_constant, 2),
         change(e.time_constant_change),
         change(e.oscillation),
     ]
@@ -238,24 +226,28 @@ pub fn table3(f: &Findings) -> Table {
     let mut table = Table::new("Table 3 with a fixed step, against the exact solution")
         .column("Formula", "")
         .column("Step", "s")
-        .column("Final position, 5 V", "mm")
-        .column("Creep from 0.5 s to 1 s", "µm")
-        .column("Final position, 10 V", "mm")
-        .column("Creep from 0.5 s to 1 s", "µm");
+        .column("Final, 5 V", "mm")
+        .column("Creep", "µm")
+        .column("Turns", "")
+        .column("Final, 10 V", "mm")
+        .column("Creep", "µm")
+        .column("Turns", "");
     for run in f.table3.runs.iter().filter(|r| r.volts == VOLTS[0]) {
         let other = f.table3.runs.iter().find(|o| o.volts == VOLTS[1] && o.step == run.step && o.method == run.method);
         let Some(other) = other else { continue };
         table.row([
             match run.method {
-                Method::RungeKutta4 => "Runge–Kutta 4",
-                Method::DormandPrince5 => "Dormand–Prince 5",
+                Method::RungeKutta4 => "Runge–Kutta\u{a0}4",
+                Method::DormandPrince5 => "Dormand–Prince\u{a0}5",
             }
             .into(),
             Cell::Number(engineering(run.step, "", 1)),
             Cell::fixed(1e3 * run.final_position, 4),
             Cell::Number(signed(1e6 * run.creep, 3)),
+            Cell::Number(run.turns.to_string()),
             Cell::fixed(1e3 * other.final_position, 4),
             Cell::Number(signed(1e6 * other.creep, 3)),
+            Cell::Number(other.turns.to_string()),
         ]);
     }
     let last = |values: &[f64]| values[values.len() - 1];
@@ -267,8 +259,10 @@ pub fn table3(f: &Findings) -> Table {
         Cell::Number("none".into()),
         Cell::fixed(1e3 * last(five), 4),
         cell(five),
+        Cell::Number("0".into()),
         Cell::fixed(1e3 * last(ten), 4),
         cell(ten),
+        Cell::Number("0".into()),
     ]);
     table
 }
@@ -280,10 +274,8 @@ pub fn sharing(f: &Findings) -> Table {
         .column("Instead of Table 4", "")
         .column("5 V", "µm")
         .column("10 V", "µm")
-        .column("in encoder counts", "")
-        .column("Totals adjusted to meet both final positions: viscous", "")
-        .column("Coulomb", "")
-        .column("5 V", "µm")
+        .column("Encoder counts", "")
+        .column("Adjusted: 5 V", "µm")
         .column("10 V", "µm");
     for s in &i.sharing {
         let counts = s.difference.map(|d| significant(d / i.count, 2));
@@ -291,9 +283,7 @@ pub fn sharing(f: &Findings) -> Table {
             s.name.into(),
             Cell::fixed(1e6 * s.difference[0], 1),
             Cell::fixed(1e6 * s.difference[1], 1),
-            Cell::Number(format!("{} and {}", counts[0], counts[1])),
-            Cell::Number(percent(s.adjustment[0])),
-            Cell::Number(percent(s.adjustment[1])),
+            Cell::Number(format!("{}, {}", counts[0], counts[1])),
             Cell::fixed(1e6 * s.adjusted[0], 1),
             Cell::fixed(1e6 * s.adjusted[1], 1),
         ]);
