@@ -126,11 +126,13 @@ impl Report<'_> {
             "The three sets run as printed. Table 4 gives friction alone; everything else is Table 2's. Table 2 is Table 1 with \
              other stiffness, friction and inertia:",
         );
-        let ratio = |pick: fn(&taut::stage::Stage) -> f64| significant(pick(&f.sets.table2.stage) / pick(&f.sets.table1.stage), 4);
+        let ratio = |pick: fn(&taut::stage::Stage) -> f64| {
+            taut::number::engineering(pick(&f.sets.table2.stage) / pick(&f.sets.table1.stage), "", 4)
+        };
         page.definitions([
-            ("Stiffness k₁, k₃", format!("{} and {} times Table 1", ratio(|s| s.belt.stiffness[0]), ratio(|s| s.belt.stiffness[2]))),
-            ("Viscous friction B, b", format!("{} and {} times", ratio(|s| s.drive_pulley.friction.forward.viscous), ratio(|s| s.cart.friction.forward.viscous))),
-            ("Inertia J", format!("{} times", ratio(|s| s.drive_pulley.inertia))),
+            ("Stiffness k₁, k₃", format!("{} and {} of Table 1", ratio(|s| s.belt.stiffness[0]), ratio(|s| s.belt.stiffness[2]))),
+            ("Viscous friction B, b", format!("{} and {} of it", ratio(|s| s.drive_pulley.friction.forward.viscous), ratio(|s| s.cart.friction.forward.viscous))),
+            ("Inertia J, mass M", format!("{} and {} of it", ratio(|s| s.drive_pulley.inertia), ratio(|s| s.cart.mass))),
         ]);
         page.table(&tables::parameters(f));
         page.markup(html! { p.note { (symbols("Grey: taken over from Table 2. \"R\" is printed for the radius and for the resistance; \"B\" for the pulleys in Tables 1 and 2 and for the cart in Table 4; K_e is printed in V/(rad s).")) } });

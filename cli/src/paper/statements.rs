@@ -134,8 +134,7 @@ fn figures_4_to_13(f: &Findings) -> Vec<Claim> {
         Claim::new("figure-4-falls-short", Statement, "section 3, figure 4", "\"the final steady state value of the simulated system is less than what was observed in the real system\"")
             .found("no measured data")
             .remark(format!(
-                "The measured curves are not available as data. Table 4, which the paper says matches them, ends {} (5 V) and \
-                 {} (10 V) away from Table 1.",
+                "The measured curves are not available as data. Table 4, which the paper says matches them, ends {} (5 V) and {} (10 V) further than Table 1.",
                 percent(1.0 / (1.0 + f.matched.table1[0]) - 1.0),
                 percent(1.0 / (1.0 + f.matched.table1[1]) - 1.0)
             )),
@@ -166,7 +165,7 @@ fn figures_4_to_13(f: &Findings) -> Vec<Claim> {
             .further("the same for Table 4", largest(dry(stiffness), path), "1", Rule::AtMost(NOT_APPRECIABLE))
             .found(format!("position changes by up to {}", share(largest(linear(stiffness), path))))
             .remark(format!(
-                "The final position moves by at most {} (Table 1) and {} (Table 4).",
+                "The final position moves by {} (Table 1) and by up to {} (Table 4).",
                 share(largest(linear(stiffness), final_position)),
                 share(largest(dry(stiffness), final_position))
             )),
@@ -176,7 +175,7 @@ fn figures_4_to_13(f: &Findings) -> Vec<Claim> {
             .further("largest change of the oscillation between motor and cart (Table 1)", largest(linear(stiffness), oscillation), "1", Rule::AtMost(MINOR))
             .found(format!("oscillation {} (k ×2), {} (×0.5)", percent(one(From::Table1, Change::Stiffness, double).oscillation), percent(one(From::Table1, Change::Stiffness, half).oscillation)))
             .remark(format!(
-                "Nothing else changes; the oscillation itself by {} (×2) and {} (×0.5).",
+                "The speed that is reached and the time constant stay; the oscillation changes by {} (×2) and {} (×0.5).",
                 percent(one(From::Table1, Change::Stiffness, double).oscillation),
                 percent(one(From::Table1, Change::Stiffness, half).oscillation)
             )),

@@ -4,7 +4,7 @@ use super::belt::{MODULUS_1, MODULUS_2, SECTION};
 use super::findings::Findings;
 use super::model::VOLTS;
 use super::studies::{Effect, From};
-use super::words::{percent, signed, symbols};
+use super::words::{signed, symbols};
 use taut::number::{engineering, significant};
 use taut::report::{Cell, Table};
 use taut::solve::Method;
@@ -32,8 +32,7 @@ pub fn parameters(f: &Findings) -> Table {
         ("R", "R", "motor.resistance", "ohm", |s| s.motor.resistance),
     ];
     let mut table = Table::new("Tables 1, 2 and 4 as they run")
-        .column("Printed", "")
-        .column("Here", "")
+        .column("Printed, here", "")
         .column("In the case file", "")
         .column("Unit", "")
         .column("Table 1", "")
@@ -41,14 +40,13 @@ pub fn parameters(f: &Findings) -> Table {
         .column("Table 4", "");
     let unit = |unit: &str| Cell::Text(taut::number::pretty_unit(unit).replace(' ', "\u{a0}"));
     for (symbol, si, values) in [("A", "m^2", [SECTION; 2]), ("E", "N/m^2", [MODULUS_1, MODULUS_2])] {
-        table.row([symbol.into(), symbol.into(), "beside the stiffness".into(), unit(si), number(values[0]), number(values[1]), taken_over(values[1])]);
+        table.row([symbol.into(), maud::html! { small { "with the stiffness, below" } }.into(), unit(si), number(values[0]), number(values[1]), taken_over(values[1])]);
     }
     for (printed, ours, key, si, pick) in rows {
         let [t1, t2, t4] = [&f.sets.table1, &f.sets.table2, &f.sets.table4].map(|case| pick(&case.stage));
         table.row([
-            symbols(printed).into(),
-            symbols(ours).into(),
-            maud::html! { code { (key) } }.into(),
+            symbols(&if printed == ours { printed.to_string() } else { format!("{printed} → {ours}") }).into(),
+            maud::html! { small { code { (key) } } }.into(),
             unit(si),
             number(t1),
             number(t2),
@@ -74,7 +72,7 @@ fn digits(value: f64) -> String {
 
 /// Eq. (11)-(13) beside the printed stiffness.
 pub fn stiffness(f: &Findings) -> Table {
-    let mut table = Table::new("Stiffness by eq. (11), N/m, and its difference from the printed one").column("Lengths", "");
+    let mut table = Table::new("Stiffness by eq. (11), N/m, and in brackets its difference from the printed one, %").column("Lengths", "");
     for s in &f.belt.stiffness {
         table = table.column(format!("{}, {}", s.table, s.symbol), "");
     }
@@ -83,7 +81,7 @@ pub fn stiffness(f: &Findings) -> Table {
         row.extend(f.belt.stiffness.iter().map(|s| Cell::Number(pick(s))));
         row
     };
-    let beside = |k: f64, printed: f64| format!("{k:.0} ({})", percent(k / printed - 1.0));
+    let beside = |k: f64, printed: f64| format!("{k:.0} ({})", signed(100.0 * (k / printed - 1.0), 2));
     table.row(row("printed stiffness", &|s| format!("{:.0}", s.printed)));
     table.row(row("0.349 m and 0.787 m, as printed", &|s| beside(s.lengths, s.printed)));
     table.row(row("0.34925 m and 0.7874 m", &|s| beside(s.inches, s.printed)));
