@@ -7,6 +7,7 @@ mod form;
 mod power;
 
 pub use form::Form;
+pub(crate) use form::ROUNDING;
 pub use power::Power;
 
 use crate::friction::{Friction, Motion, Side};

@@ -197,8 +197,8 @@ proptest! {
         law.backward.breakaway = law.backward.breakaway.max(law.backward.coulomb);
         // The input that a forward (or backward) load just inside breakaway needs; a lossy gear only holds more.
         let breakaway = if share > 0.0 { law.forward.breakaway } else { law.backward.breakaway };
-        let per_ampere = stage.motor.torque_constant * stage.motor.gear_ratio / stage.amplifier.gain;
-        let value = share * breakaway / per_ampere
+        let torque_per_unit = stage.motor.torque_constant * stage.motor.gear_ratio * stage.amplifier.gain;
+        let value = share * breakaway / torque_per_unit
             * if stage.amplifier.mode == AmplifierMode::Voltage { stage.motor.resistance } else { 1.0 };
         let solution = run(&stage, &Signal::Step { value, at: 0.0 }, until, until / 50.0);
         prop_assert!(solution.outcome.events.is_empty(), "{:?}", solution.outcome.events);

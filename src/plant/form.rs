@@ -79,6 +79,22 @@ impl Form {
     }
 }
 
+/// What rounding may do to the value of a form, as a share of its largest parts.
+pub(crate) const ROUNDING: f64 = 1e-14;
+
+impl Form {
+    /// An estimate of the rounding error of its value at this state.
+    pub fn noise(&self, plant: &Plant, state: &State, input: f64) -> f64 {
+        let r = plant.stage().pulley_radius;
+        let row = self.on_state(r);
+        let mut size = (self.input * input).abs() + self.constant.abs();
+        for (coefficient, value) in row.iter().zip(state) {
+            size += (coefficient * value).abs();
+        }
+        ROUNDING * size
+    }
+}
+
 /// The stretches of the three spans, m.
 pub fn stretches(r: f64, state: &State) -> [f64; 3] {
     let (p1, x, p3) = (r * state[place::DRIVE_ANGLE], state[place::CART_POSITION], r * state[place::IDLER_ANGLE]);

@@ -15,7 +15,7 @@ use super::roots;
 use super::{Cost, Ending, Event, Flow, Grid, Outcome};
 use crate::case::Experiment;
 use crate::friction::Motion;
-use crate::plant::{Body, Cause, Mode, Plant, State, place};
+use crate::plant::{Body, Cause, Form, Mode, Plant, State, place};
 use crate::signal::{DEGREE, Piece};
 use crate::trajectory::Trajectory;
 use std::rc::Rc;
@@ -247,7 +247,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             let mut time = f64::INFINITY;
             for guard in &law.guards {
                 // g(τ) ≥ g − (|w| √2V + |w_u| |u̇|) τ − |w| |b| |u̇| τ²/2
-                let g = guard.value(&self.z);
+                let g = guard.standing(&self.z);
                 let slope = law.growth_factor() * guard.dual * norm + guard.input.abs() * self.input_rate;
                 let bend = law.growth_factor() * guard.dual * law.forcing * self.input_rate * 0.5;
                 if g < 0.0 || self.fresh_order(guard.cause) > 0 {
@@ -343,7 +343,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         let norm = grow * (law.norm(&y) + law.forcing * self.input_rate * length);
         let steepness = |dual: f64, input: f64| dual * norm + input.abs() * self.input_rate;
         let undecided = |g: f64, steepness: f64| !(g > steepness * length || (g >= 0.0 && steepness == 0.0));
-        if !law.guards.iter().any(|guard| undecided(guard.value(&self.z), steepness(guard.dual, guard.input))) {
+        if !law.guards.iter().any(|guard| undecided(guard.standing(&self.z), steepness(guard.dual, guard.input))) {
             return Look::Safe(None);
         }
 
@@ -351,7 +351,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         let norm2 = grow * (law.norm(&second) + law.forcing * self.input_curvature * length);
         let mut falling = false;
         for guard in &law.guards {
-            let g = guard.value(&self.z);
+            let g = guard.standing(&self.z);
             if !undecided(g, steepness(guard.dual, guard.input)) {
                 continue;
             }
@@ -381,6 +381,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         let mut first: Option<(f64, Cause)> = None;
         for guard in &law.guards {
             let mut coefficients: [f64; SERIES_ORDER + 1] = std::array::from_fn(|k| guard.value(&series[k]));
+            coefficients[0] = guard.standing(&self.z);
             let order = self.fresh_order(guard.cause);
             coefficients[..order].fill(0.0);
             if let Some(s) = roots::first_fall(&coefficients[order..])
@@ -402,27 +403,29 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         std::array::from_fn(|j| self.z[j])
     }
 
-    fn value(&self, form: &crate::plant::Form) -> f64 {
+    fn value(&self, form: &Form) -> f64 {
         form.value(self.plant, &self.state(), self.z[place::COUNT])
     }
 
-    /// Loads on a body that would go forward, and backward; the same unless the gear loses power.
-    fn loads(&self, body: Body) -> (f64, f64) {
+    /// Load on a body at rest that would go forward, or backward (the same unless the gear loses power); what friction
+    /// would then take of it; and what rounding may have done to it.
+    fn load(&self, body: Body, forward: bool) -> (f64, f64, f64) {
         let positive = self.value(self.plant.current()) >= 0.0;
-        (self.value(&self.plant.load(body, true, positive)), self.value(&self.plant.load(body, false, positive)))
+        let form = self.plant.load(body, forward, positive);
+        let law = self.plant.friction(body);
+        let resistance = if forward { law.forward.coulomb } else { -law.backward.coulomb };
+        (self.value(&form), resistance, form.noise(self.plant, &self.state(), self.z[place::COUNT]))
     }
 
     /// What a body at zero speed does under its present load.
     fn decide(&self, body: Body) -> Motion {
         let law = self.plant.friction(body);
-        let (forward, backward) = self.loads(body);
-        if forward > law.forward.breakaway {
-            Motion::Forward
-        } else if backward < -law.backward.breakaway {
-            Motion::Backward
-        } else {
-            Motion::Stuck
+        let (forward, _, noise) = self.load(body, true);
+        if forward > law.forward.breakaway + noise {
+            return Motion::Forward;
         }
+        let (backward, _, noise) = self.load(body, false);
+        if backward < -law.backward.breakaway - noise { Motion::Backward } else { Motion::Stuck }
     }
 
     /// Goes into the mode that follows when `cause` ends the present one.
@@ -430,8 +433,12 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         let (body, to) = match cause {
             Cause::GearTorque => {
                 self.mode.gear_torque_positive = !self.mode.gear_torque_positive;
-                self.fresh[3] = 1;
                 self.enter();
+                let equations = self.plant.equations(self.mode);
+                let torque = equations.guards.iter().find(|guard| guard.cause == cause).map(|guard| guard.form);
+                let torque = torque.unwrap_or(Form::ZERO);
+                let noise = torque.noise(self.plant, &self.state(), self.z[place::COUNT]);
+                self.fresh[3] = usize::from(self.value(&torque).abs() <= noise);
                 return;
             }
             Cause::Stop(body) => {
@@ -441,16 +448,12 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             Cause::BreakForward(body) => (body, Motion::Forward),
             Cause::BreakBackward(body) => (body, Motion::Backward),
         };
-        let (forward, backward) = self.loads(body);
-        let law = self.plant.friction(body);
-        let (load, resistance) = match to {
-            Motion::Backward => (backward, -law.backward.coulomb),
-            _ => (forward, law.forward.coulomb),
-        };
-        self.fresh[body.index()] = match to {
-            Motion::Stuck | Motion::Free => 0,
+        let (load, resistance, noise) = self.load(body, to != Motion::Backward);
+        self.fresh[body.index()] = match (to, cause) {
+            (Motion::Stuck | Motion::Free, _) => 0,
+            (_, Cause::Stop(_)) => 1,
             // Where breakaway equals Coulomb friction the acceleration starts from zero, but for rounding.
-            _ if (load - resistance).abs() <= 1e-9 * resistance.abs() => 2,
+            _ if (load - resistance).abs() <= 2.0 * noise => 2,
             _ => 1,
         };
         let from = std::mem::replace(&mut self.mode.motion[body.index()], to);
@@ -480,7 +483,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             let law = Rc::clone(&self.law);
             let y = law.rate(&self.z);
             let fallen = law.guards.iter().find(|guard| {
-                let g = guard.value(&self.z);
+                let g = guard.standing(&self.z);
                 let fresh = self.fresh_order(guard.cause) > 0;
                 !fresh && (g < 0.0 || (g == 0.0 && guard.slope(&y) < 0.0))
             });

@@ -2,7 +2,7 @@
 
 use super::propagator::{Matrix, SERIES_ORDER, SERIES_REACH};
 use crate::friction::Motion;
-use crate::plant::{Body, Cause, Form, Mode, Plant, place};
+use crate::plant::{Body, Cause, Form, Mode, Plant, ROUNDING, place};
 use crate::signal::DEGREE;
 use std::cell::OnceCell;
 
@@ -32,6 +32,16 @@ pub(super) struct Watch<const C: usize> {
 impl<const C: usize> Watch<C> {
     pub(super) fn value(&self, z: &[f64; C]) -> f64 {
         self.row.iter().zip(z).fold(0.0, |sum, (w, z)| sum + w * z)
+    }
+
+    /// Its value, with what rounding alone may have made negative taken for zero.
+    pub(super) fn standing(&self, z: &[f64; C]) -> f64 {
+        let value = self.value(z);
+        if value >= 0.0 {
+            return value;
+        }
+        let noise = ROUNDING * self.row.iter().zip(z).fold(0.0, |sum, (w, z)| sum + (w * z).abs());
+        if value >= -2.0 * noise { 0.0 } else { value }
     }
 
     /// Its rate of change, `y` being ż.

@@ -1,48 +1,75 @@
 //! The first place in (0, 1] where a polynomial becomes negative.
 
+use super::propagator::SERIES_ORDER;
+
 /// Value of Σ c_k sᵏ.
 pub(crate) fn value(c: &[f64], s: f64) -> f64 {
     c.iter().rev().fold(0.0, |sum, c| sum * s + c)
 }
 
+/// Its derivative.
 fn slope(c: &[f64], s: f64) -> f64 {
     c.iter().enumerate().skip(1).rev().fold(0.0, |sum, (k, c)| sum * s + k as f64 * c)
 }
 
 /// The first s in (0, 1] at which Σ c_k sᵏ, not negative at 0, turns negative; `None` if it stays.
 pub(crate) fn first_fall(c: &[f64]) -> Option<f64> {
-    if c.first().is_some_and(|&c0| c0 < 0.0) {
+    let (&c0, rest) = c.split_first()?;
+    if c0 < 0.0 {
         return Some(0.0);
     }
-    // |p′| ≤ Σ k |c_k| and |p″| ≤ Σ k (k−1) |c_k| on [0, 1]
-    let (mut steepest, mut most_curved) = (0.0, 0.0);
-    for (k, c) in c.iter().enumerate().skip(1) {
-        let k = k as f64;
-        steepest += k * c.abs();
-        most_curved += k * (k - 1.0) * c.abs();
-    }
-    if c.first().is_none_or(|&c0| c0 > steepest) {
+    if c0 >= rest.iter().map(|c| c.abs()).sum() {
         return None;
     }
-    search(c, 0.0, 1.0, steepest, most_curved, 0)
+    // Bernstein coefficients, b_i = Σ_{k ≤ i} C(i,k)/C(n,k) c_k: the polynomial lies within their hull.
+    let mut b = [0.0; MOST];
+    let n = c.len() - 1;
+    for (i, b) in b.iter_mut().enumerate().take(n + 1) {
+        let mut ratio = 1.0;
+        for (k, c) in c.iter().enumerate().take(i + 1) {
+            *b += ratio * c;
+            ratio *= (i - k) as f64 / (n - k).max(1) as f64;
+        }
+    }
+    search(c, &b[..=n], 0.0, 1.0)
 }
 
-fn search(c: &[f64], low: f64, high: f64, steepest: f64, most_curved: f64, depth: u32) -> Option<f64> {
-    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-    if value(c, middle) > steepest * half {
+/// Room for the coefficients of a Taylor series.
+const MOST: usize = SERIES_ORDER + 1;
+
+/// Halvings after which a touch is as good as a point: 2⁻⁴⁰ of an interval that is itself a fraction of a swing.
+const NARROWEST: f64 = 1e-12;
+
+/// The first fall within [low, high], on which the Bernstein coefficients are `b`.
+fn search(c: &[f64], b: &[f64], low: f64, high: f64) -> Option<f64> {
+    // Descartes: no more zeros than changes of sign, and one if there is one change.
+    let mut changes = 0;
+    let mut before = 0.0;
+    for &b in b.iter().filter(|b| **b != 0.0) {
+        changes += u32::from(before * b < 0.0);
+        before = b.signum();
+    }
+    let ends_below = b.last().is_some_and(|&b| b < 0.0);
+    if changes == 0 && !ends_below {
         return None;
     }
-    let tilt = slope(c, middle);
-    let monotone = tilt.abs() > most_curved * half;
-    if monotone || depth == 40 {
-        // One crossing at most; where it is too flat to tell (a touch), the sign at the end decides.
-        if value(c, high) >= 0.0 {
-            return None;
-        }
-        return Some(polish(c, low, high));
+    if changes <= 1 || high - low < NARROWEST {
+        // What only touches within a point is told by the sign at the end.
+        return ends_below.then(|| polish(c, low, high));
     }
-    search(c, low, middle, steepest, most_curved, depth + 1)
-        .or_else(|| search(c, middle, high, steepest, most_curved, depth + 1))
+    // de Casteljau: the coefficients of both halves
+    let n = b.len();
+    let (mut left, mut right) = ([0.0; MOST], [0.0; MOST]);
+    right[..n].copy_from_slice(b);
+    for i in 0..n {
+        left[i] = right[0];
+        for j in 0..n - 1 - i {
+            right[j] = 0.5 * (right[j] + right[j + 1]);
+        }
+    }
+    let middle = 0.5 * (low + high);
+    // What is left in `right` runs from the middle outwards, the other way round.
+    search(c, &left[..n], low, middle).or_else(|| search(c, &right[..n], middle, high))
 }
 
 /// Newton's method kept within a bracket whose upper end is negative.
@@ -82,5 +109,15 @@ mod tests {
         assert_eq!(first_fall(&[0.25 + 1e-12, -1.0, 1.0]), None);
         assert_eq!(first_fall(&[1.0, 0.0, 0.0]), None);
         assert_eq!(first_fall(&[0.0, 0.0, 1.0]), None);
+        assert_eq!(first_fall(&[0.0; 13]), None);
+    }
+
+    #[test]
+    fn flat_crossings_are_found_quickly() {
+        // −(s − 0.3)³ and −(s − 0.3)⁵, whose roots are as flat as rounding
+        let root = first_fall(&[0.027, -0.27, 0.9, -1.0]).unwrap();
+        assert!((root - 0.3).abs() < 1e-5, "{root}");
+        let root = first_fall(&[0.00243, -0.0405, 0.27, -0.9, 1.5, -1.0]).unwrap();
+        assert!((root - 0.3).abs() < 1e-3, "{root}");
     }
 }
