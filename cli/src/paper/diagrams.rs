@@ -46,7 +46,9 @@ fn body(plant: &Plant, body: Body) -> BodyEquation {
     let row = form.on_state(stage.pulley_radius);
     // What the coefficients of φ₁, x, φ₃ and φ̇₁ are called.
     let (gains, unit, torque) = match body {
-        Body::DrivePulley => (["r² (k₁ + k₃)", "r k₁", "r² k₃", "K_t K_e/R"], ["N m/rad", "N", "N m/rad", "N m s"], true),
+        Body::DrivePulley => {
+            (["r² (k₁ + k₃)", "r k₁", "r² k₃", "K_t K_e/R"], ["N m/rad", "N", "N m/rad", "N m s"], true)
+        }
         Body::Cart => (["r k₁", "k₁ + k₂", "r k₂", ""], ["N/rad", "N/m", "N/rad", ""], false),
         Body::IdlerPulley => (["r² k₃", "r k₂", "r² (k₂ + k₃)", ""], ["N m/rad", "N", "N m/rad", ""], true),
     };

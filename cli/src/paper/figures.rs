@@ -75,12 +75,16 @@ pub fn figures(f: &Findings) -> Vec<Plot> {
 
 fn over_time(number: u8, title: String, time: &[f64]) -> Plot {
     let title = format!("Figure {number}. {title}");
-    Plot::new(format!("figure-{number:02}"), title, Axis::new("Time", "s"), "time_s", time).up_to(SHOWN).vertical(PULSE, "voltage off")
+    Plot::new(format!("figure-{number:02}"), title, Axis::new("Time", "s"), "time_s", time)
+        .up_to(SHOWN)
+        .vertical(PULSE, "voltage off")
 }
 
 /// 10 V solid and 5 V dashed, in one colour.
 fn base<'a>(responses: &'a [Response; 2], what: What, name: &str) -> Vec<Curve<'a>> {
-    [(1, Style::Solid), (0, Style::Dashed)].map(|(i, style)| one_curve(responses, i, what, name, Colour::Blue).style(style)).into()
+    [(1, Style::Solid), (0, Style::Dashed)]
+        .map(|(i, style)| one_curve(responses, i, what, name, Colour::Blue).style(style))
+        .into()
 }
 
 /// Both solid, in two colours: for figures that show nothing else.
@@ -195,7 +199,8 @@ fn stiffness(f: &Findings, number: u8, what: What, factor: f64) -> Plot {
 fn inertia(f: &Findings, number: u8, what: What) -> Plot {
     let runs = &f.runs.table1;
     let panel = |change: Change, name: &str| {
-        let effects: Vec<&Effect> = f.runs.effects.iter().filter(|e| e.from == From::Table1 && e.change == change).collect();
+        let effects: Vec<&Effect> =
+            f.runs.effects.iter().filter(|e| e.from == From::Table1 && e.change == change).collect();
         let mut curves = base(runs, what, "Table 1");
         curves.extend(varied(&effects, what, name));
         curves
@@ -204,7 +209,10 @@ fn inertia(f: &Findings, number: u8, what: What) -> Plot {
     let text = match what {
         What::Position => format!(
             "Above the pulleys' inertia J alone, below J and the cart's mass M. All end at the same place: the largest change is {}.",
-            percent(super::studies::largest(f.runs.of(From::Table1, &[Change::PulleyInertia, Change::AllInertia]), |e| e.final_position))
+            percent(super::studies::largest(
+                f.runs.of(From::Table1, &[Change::PulleyInertia, Change::AllInertia]),
+                |e| e.final_position
+            ))
         ),
         What::Speed => format!(
             "Above J alone, below J and M. Time constants at 5 V: {} as in Table 1; {} and {} for J × 2 and × 0.5; {} and {} for J and M.",
@@ -300,7 +308,8 @@ pub fn table3(f: &Findings) -> Plot {
     let time = &t.time[from..];
     let relative = |values: &[f64]| values[from..].iter().map(|v| v - rest).collect::<Vec<_>>();
     let exact = relative(&t.exact[0]);
-    let runs: Vec<_> = t.runs.iter().filter(|r| r.volts == VOLTS[0] && r.method == taut::solve::Method::RungeKutta4).collect();
+    let runs: Vec<_> =
+        t.runs.iter().filter(|r| r.volts == VOLTS[0] && r.method == taut::solve::Method::RungeKutta4).collect();
     let values: Vec<_> = runs.iter().map(|r| relative(&r.position)).collect();
     let mut curves: Vec<Curve> = runs
         .iter()

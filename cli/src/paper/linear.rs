@@ -88,10 +88,7 @@ pub fn oscillations(poles: &[Complex<f64>]) -> Vec<Oscillation> {
     let mut all: Vec<_> = poles
         .iter()
         .filter(|p| p.im > 1e-6 * p.norm())
-        .map(|p| Oscillation {
-            frequency: p.norm() / (2.0 * std::f64::consts::PI),
-            damping: -p.re / p.norm(),
-        })
+        .map(|p| Oscillation { frequency: p.norm() / (2.0 * std::f64::consts::PI), damping: -p.re / p.norm() })
         .collect();
     all.sort_by(|p, q| p.frequency.total_cmp(&q.frequency));
     all

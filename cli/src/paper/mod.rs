@@ -92,7 +92,8 @@ fn picture(folder: &Path, name: &str, svg: &str) -> Result<()> {
 
 /// What the terminal shows.
 fn table(claims: &[Claim], out: &Path) -> String {
-    let mut text = String::from("Sollmann & Jouaneh, Dynamic modelling of a single-axis belt-drive system (2011), recomputed\n\n");
+    let mut text =
+        String::from("Sollmann & Jouaneh, Dynamic modelling of a single-axis belt-drive system (2011), recomputed\n\n");
     let width = claims.iter().map(|c| c.id.len()).max().unwrap_or(0);
     let groups = [
         (Kind::Statement, "What the paper says"),

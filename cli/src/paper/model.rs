@@ -221,7 +221,8 @@ impl Change {
 
 /// Everything that resists or drives times `factor`: no voltage-to-position response can tell (P7).
 pub fn scale_everything(stage: &Stage, factor: f64) -> Stage {
-    let mut stage = Change::Friction.apply(&Change::AllInertia.apply(&Change::Stiffness.apply(stage, factor), factor), factor);
+    let mut stage =
+        Change::Friction.apply(&Change::AllInertia.apply(&Change::Stiffness.apply(stage, factor), factor), factor);
     stage.motor.torque_constant *= factor;
     stage
 }
@@ -232,10 +233,7 @@ pub fn frictions(stage: &mut Stage) -> [&mut Friction; 3] {
 }
 
 fn scaled(law: &Friction, factor: f64) -> Friction {
-    let side = |s: Side| Side {
-        viscous: s.viscous * factor,
-        coulomb: s.coulomb * factor,
-        breakaway: s.breakaway * factor,
-    };
+    let side =
+        |s: Side| Side { viscous: s.viscous * factor, coulomb: s.coulomb * factor, breakaway: s.breakaway * factor };
     Friction { forward: side(law.forward), backward: side(law.backward) }
 }

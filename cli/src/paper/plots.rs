@@ -44,7 +44,12 @@ impl<'a> Curve<'a> {
 impl Plot {
     /// A plot without panels.
     pub fn new(file: impl Into<String>, title: impl Into<String>, x: Axis, heading: &str, values: &[f64]) -> Self {
-        Self { file: file.into(), figure: Figure::new(title, x), columns: vec![(heading.into(), values.to_vec())], shown: values.len() }
+        Self {
+            file: file.into(),
+            figure: Figure::new(title, x),
+            columns: vec![(heading.into(), values.to_vec())],
+            shown: values.len(),
+        }
     }
 
     /// Draws only up to this x.
@@ -58,7 +63,8 @@ impl Plot {
         let mut panel = Panel::new(y).weight(weight);
         for curve in curves {
             let x = &self.columns[0].1[..self.shown];
-            let series = Series::new(curve.name, x, &curve.values[..self.shown]).style(curve.style).colour(curve.colour);
+            let series =
+                Series::new(curve.name, x, &curve.values[..self.shown]).style(curve.style).colour(curve.colour);
             panel = panel.series(series);
             self.columns.push((curve.heading, curve.values.to_vec()));
         }

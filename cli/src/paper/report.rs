@@ -130,9 +130,22 @@ impl Report<'_> {
             taut::number::engineering(pick(&f.sets.table2.stage) / pick(&f.sets.table1.stage), "", 4)
         };
         page.definitions([
-            ("Stiffness k₁, k₃", format!("{} and {} of Table 1", ratio(|s| s.belt.stiffness[0]), ratio(|s| s.belt.stiffness[2]))),
-            ("Viscous friction B, b", format!("{} and {} of it", ratio(|s| s.drive_pulley.friction.forward.viscous), ratio(|s| s.cart.friction.forward.viscous))),
-            ("Inertia J, mass M", format!("{} and {} of it", ratio(|s| s.drive_pulley.inertia), ratio(|s| s.cart.mass))),
+            (
+                "Stiffness k₁, k₃",
+                format!("{} and {} of Table 1", ratio(|s| s.belt.stiffness[0]), ratio(|s| s.belt.stiffness[2])),
+            ),
+            (
+                "Viscous friction B, b",
+                format!(
+                    "{} and {} of it",
+                    ratio(|s| s.drive_pulley.friction.forward.viscous),
+                    ratio(|s| s.cart.friction.forward.viscous)
+                ),
+            ),
+            (
+                "Inertia J, mass M",
+                format!("{} and {} of it", ratio(|s| s.drive_pulley.inertia), ratio(|s| s.cart.mass)),
+            ),
         ]);
         page.table(&tables::parameters(f));
         page.markup(html! { p.note { (symbols("Grey: taken over from Table 2. \"R\" is printed for the radius and for the resistance; \"B\" for the pulleys in Tables 1 and 2 and for the cart in Table 4; K_e is printed in V/(rad s).")) } });
@@ -292,10 +305,19 @@ impl Report<'_> {
             "The verdict follows from the numbers by the rules beside them: a claim is confirmed if all hold, confirmed with a remark if only \
              those marked “further” fail, and not confirmed otherwise. The same is in " code { "claims.json" } "."
         });
-        let mut table = Table::new("").column("Claim", "").column("Number", "").column("Value", "").column("Rule", "").column("", "");
+        let mut table = Table::new("")
+            .column("Claim", "")
+            .column("Number", "")
+            .column("Value", "")
+            .column("Rule", "")
+            .column("", "");
         for claim in self.claims {
             for (i, check) in claim.checks.iter().enumerate() {
-                let name = if i == 0 { html! { code { (claim.id) } } } else { html! {} };
+                let name = if i == 0 {
+                    html! { code { (claim.id) } }
+                } else {
+                    html! {}
+                };
                 let holds = check.rule.holds(check.value);
                 let kind = match (holds, check.decides) {
                     (true, _) => Callout::Holds,
@@ -318,7 +340,8 @@ impl Report<'_> {
     fn method(&mut self) {
         let f = self.f;
         let golden = self.claims.iter().filter(|c| c.kind == Kind::Reference);
-        let (right, all) = golden.fold((0, 0), |(right, all), c| (right + usize::from(c.verdict() == Verdict::Confirmed), all + 1));
+        let (right, all) =
+            golden.fold((0, 0), |(right, all), c| (right + usize::from(c.verdict() == Verdict::Confirmed), all + 1));
         self.page.section("How it was computed");
         self.page.prose(format!(
             "Friction makes the equations linear piece by piece: each body slides forward, slides backward or is stuck. Within a piece the motion is \
@@ -336,7 +359,9 @@ impl Report<'_> {
             "Beside this file: each figure as SVG and PNG in " code { "figures" } ", its curves as CSV in " code { "data" } ", and the claims in "
             code { "claims.json" } "."
         });
-        for (title, case) in [("table1.toml", &f.sets.table1), ("table2.toml", &f.sets.table2), ("table4.toml", &f.sets.table4)] {
+        for (title, case) in
+            [("table1.toml", &f.sets.table1), ("table2.toml", &f.sets.table2), ("table4.toml", &f.sets.table4)]
+        {
             self.page.embed(title, &case.text);
         }
     }

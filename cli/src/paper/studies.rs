@@ -1,6 +1,8 @@
 //! One parameter at a time, doubled and halved (section 3), and everything else that compares runs with each other.
 
-use super::model::{Change, EVERY, PULSE, Response, Sets, UNTIL, VOLTS, frictions, pulse, respond, run, scale_everything};
+use super::model::{
+    Change, EVERY, PULSE, Response, Sets, UNTIL, VOLTS, frictions, pulse, respond, run, scale_everything,
+};
 use rayon::prelude::*;
 use taut::error::Result;
 use taut::friction::Friction;
@@ -64,7 +66,8 @@ pub struct Runs {
 impl Runs {
     /// Runs them all.
     pub fn new(sets: &Sets) -> Result<Self> {
-        let both = |stage: &Stage| -> Result<[Response; 2]> { Ok([respond(stage, VOLTS[0])?, respond(stage, VOLTS[1])?]) };
+        let both =
+            |stage: &Stage| -> Result<[Response; 2]> { Ok([respond(stage, VOLTS[0])?, respond(stage, VOLTS[1])?]) };
         let (table1, table2, table4) =
             (both(&sets.table1.stage)?, both(&sets.table2.stage)?, both(&sets.table4.stage)?);
         let mut jobs = Vec::new();
@@ -93,9 +96,7 @@ impl Runs {
 
     /// One effect.
     pub fn one(&self, from: From, change: Change, factor: f64, volts: f64) -> &Effect {
-        self.of(from, &[change])
-            .find(|e| e.factor == factor && e.volts == volts)
-            .expect("every combination is run")
+        self.of(from, &[change]).find(|e| e.factor == factor && e.volts == volts).expect("every combination is run")
     }
 }
 
@@ -220,7 +221,9 @@ fn rest_motion(stage: &Stage, volts: f64) -> Result<f64> {
     let time = solution.trajectory.get("time").unwrap_or_default();
     let Some(first) = time.iter().position(|t| *t > stop) else { return Ok(f64::NAN) };
     let mut most: f64 = 0.0;
-    for (name, factor) in [("drive_angle", stage.pulley_radius), ("cart_position", 1.0), ("idler_angle", stage.pulley_radius)] {
+    for (name, factor) in
+        [("drive_angle", stage.pulley_radius), ("cart_position", 1.0), ("idler_angle", stage.pulley_radius)]
+    {
         let values = &solution.trajectory.get(name).unwrap_or_default()[first..];
         most = values.iter().map(|v| factor * (v - values[0]).abs()).fold(most, f64::max);
     }
@@ -373,7 +376,8 @@ impl Matched {
         let ratio = |a: &[Response; 2]| a[1].final_position() / a[0].final_position();
         let at = |r: &Response| r.speed[r.row(PULSE - 0.01)];
         let (linear, dry) = (ratio(&runs.table2), ratio(&runs.table4));
-        let over = |a: &[Response; 2], f: &dyn Fn(&Response) -> f64| [0, 1].map(|i| f(&a[i]) / f(&runs.table4[i]) - 1.0);
+        let over =
+            |a: &[Response; 2], f: &dyn Fn(&Response) -> f64| [0, 1].map(|i| f(&a[i]) / f(&runs.table4[i]) - 1.0);
         Self {
             final_position: over(&runs.table2, &Response::final_position),
             speed: over(&runs.table2, &at),

@@ -40,7 +40,14 @@ pub fn parameters(f: &Findings) -> Table {
         .column("Table 4", "");
     let unit = |unit: &str| Cell::Text(taut::number::pretty_unit(unit).replace(' ', "\u{a0}"));
     for (symbol, si, values) in [("A", "m^2", [SECTION; 2]), ("E", "N/m^2", [MODULUS_1, MODULUS_2])] {
-        table.row([symbol.into(), maud::html! { small { "with the stiffness, below" } }.into(), unit(si), number(values[0]), number(values[1]), taken_over(values[1])]);
+        table.row([
+            symbol.into(),
+            maud::html! { small { "with the stiffness, below" } }.into(),
+            unit(si),
+            number(values[0]),
+            number(values[1]),
+            taken_over(values[1]),
+        ]);
     }
     for (printed, ours, key, si, pick) in rows {
         let [t1, t2, t4] = [&f.sets.table1, &f.sets.table2, &f.sets.table4].map(|case| pick(&case.stage));
@@ -72,7 +79,8 @@ fn digits(value: f64) -> String {
 
 /// Eq. (11)-(13) beside the printed stiffness.
 pub fn stiffness(f: &Findings) -> Table {
-    let mut table = Table::new("Stiffness by eq. (11), N/m, and in brackets its difference from the printed one, %").column("Lengths", "");
+    let mut table = Table::new("Stiffness by eq. (11), N/m, and in brackets its difference from the printed one, %")
+        .column("Lengths", "");
     for s in &f.belt.stiffness {
         table = table.column(format!("{}, {}", s.table, s.symbol), "");
     }
@@ -250,7 +258,8 @@ pub fn table3(f: &Findings) -> Table {
     }
     let last = |values: &[f64]| values[values.len() - 1];
     let creep = |values: &[f64]| last(values) - values[values.len() / 2];
-    let cell = |values: &[f64]| Cell::Number(if creep(values) == 0.0 { "0".into() } else { signed(1e6 * creep(values), 3) });
+    let cell =
+        |values: &[f64]| Cell::Number(if creep(values) == 0.0 { "0".into() } else { signed(1e6 * creep(values), 3) });
     let [five, ten] = &f.table3.exact;
     table.row([
         "exact".into(),

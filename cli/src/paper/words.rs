@@ -14,7 +14,8 @@ pub fn share(part: f64) -> String {
     let p = 100.0 * part.abs();
     if tiny(part) {
         let power = (p.log10().ceil() as i32).unsigned_abs();
-        let raised: String = power.to_string().chars().map(|c| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(c as usize - 48).unwrap_or(c)).collect();
+        let raised: String =
+            power.to_string().chars().map(|c| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(c as usize - 48).unwrap_or(c)).collect();
         return format!("less than 10⁻{raised}\u{a0}%");
     }
     significant(p, 2) + "\u{a0}%"
