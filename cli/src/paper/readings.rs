@@ -77,16 +77,16 @@ pub fn readings(f: &Findings) -> Vec<Claim> {
             .decide("largest creep between 0.5 s and 1 s", low.abs().max(high.abs()), "m", Rule::AtLeast(i.count))
             .decide("motion of the exact solution after its last stop", t.exact_creep, "m", Rule::AtMost(0.0))
             .remark(format!("Over all formulas, steps and both voltages the creep lies between {} and {}.", um(low, 3), um(high, 3))),
-        reading("p6-table3-limit", "Table 3", "with ever smaller steps the creep tends to that of the band's edge, 0.01 rad/s")
+        reading("p6-table3-limit", "Table 3", "with a step of 1 µs the creep is that of the band's edge, 0.01 rad/s")
             .decide("distance of the creep at a step of 1e-6 s from 0.01 rad/s · r · 0.5 s, relative", finest, "1", Rule::AtMost(0.01))
             .found(format!("{} from it at a step of 1 µs", share(finest)))
             .remark(format!(
-                "That is {} in half a second: a limit, and the wrong one. Runs with larger steps show no order.",
+                "That is {} in half a second: smaller steps lead to a limit, but not to rest. Larger steps show no order.",
                 um(t.band_edge, 3)
             )),
         reading("p6-sign-of-zero", "Table 3", "sign(0) = 0 drops Coulomb friction at the start")
             .decide("first acceleration of the drive pulley at 5 V with Table 3, over that with friction", t.start.0 / t.start.1, "", Rule::AtLeast(1.001))
-            .remark(format!("{} against {} rad/s².", significant(t.start.0, 4), significant(t.start.1, 4))),
+            .remark(format!("{} against {} rad/s². It acts only while the speed is exactly zero: in the first evaluation of the first step.", significant(t.start.0, 4), significant(t.start.1, 4))),
         reading("p7-scaling", "Tables 1, 2, 4", "E, J, M, B, b, τ_c, F_c and K_t/R times one factor leave every response unchanged")
             .decide(format!("largest difference in r φ₁ with everything times {}", i.factor), i.scaled, "m", Rule::AtMost(1e-12)),
         reading("p7-sharing", "Table 4", "friction shared otherwise among pulleys and cart, with the same totals, looks the same to the encoder")

@@ -202,9 +202,9 @@ impl Report<'_> {
         self.page.prose(
             "Stiffness, inertia and friction are doubled and halved, one after the other. The paper does it from Table 1; the second \
              table does the same from Table 4. “Inertia” may mean J alone or J and M: both are given. All columns are changes against the \
-             unchanged set: of the final position; of the position at any time, in per cent of the final one; of the mean speed \
-             in the last 50 ms of the pulse; of the highest speed; of the time until the mean velocity of the three inertias has \
-             reached 1 − 1/e of that speed; of the largest difference between motor and cart velocity.",
+             unchanged set: of the final position; of the position at any time, in per cent of the final one; of the highest speed; \
+             of the time until the mean velocity of the three inertias has reached 1 − 1/e of that in the last 50 ms of the pulse; \
+             of the largest difference between motor and cart velocity.",
         );
         self.page.table(&tables::study(self.f, From::Table1));
         self.page.table(&tables::study(self.f, From::Table4));

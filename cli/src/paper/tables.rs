@@ -144,7 +144,6 @@ pub fn study(f: &Findings, from: From) -> Table {
         .column("by", "")
         .column("Final", "%")
         .column("Path, up to", "%")
-        .column("Speed", "%")
         .column("Peak speed", "%")
         .column("Time constant", "%")
         .column("Oscillation", "%");
@@ -180,7 +179,6 @@ fn effect_row(e: &Effect) -> Vec<Cell> {
         Cell::Number(format!("× {}", e.factor)),
         change(e.final_position),
         Cell::Number(significant(100.0 * e.path, 3)),
-        change(e.plateau),
         change(e.peak),
         change(e.time_constant_change),
         change(e.oscillation),
