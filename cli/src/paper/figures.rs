@@ -9,8 +9,8 @@ use taut::number::significant;
 use taut::report::{Axis, Colour, Style};
 
 /// What every caption says where the paper shows a measurement.
-const NO_MEASUREMENT: &str =
-    "The paper shows a measured curve beside each: it is not available as data and nothing is drawn in its place.";
+const NO_MEASUREMENT: &str = "The paper shows a measured curve beside each: it is not available as data and nothing is drawn in its \
+     place.";
 
 /// How much of a run is drawn, s. Its data go on to the end, and nothing happens there any more.
 const SHOWN: f64 = 0.5;
@@ -106,7 +106,8 @@ fn open_loop(f: &Findings, number: u8, what: What) -> Plot {
             mm(runs[1].final_position())
         ),
         What::Speed => format!(
-            "The velocity settles at {} and {}, with a time constant of {}. The ripple is the belt's, at {} and {}.",
+            "The velocity settles at {} and {}, with a time constant of {}. The ripple is the belt's, at {} \
+             and {}.",
             si(runs[0].plateau(), "m/s", 4),
             si(runs[1].plateau(), "m/s", 4),
             si(runs[0].time_constant(), "s", 3),
@@ -183,7 +184,8 @@ fn stiffness(f: &Findings, number: u8, what: What, factor: f64) -> Plot {
     let e = effects[1];
     let text = match what {
         What::Position => format!(
-            "The curves lie on each other; below, their difference. At 5 V it is at most {}, {} of the final position.",
+            "The curves lie on each other; below, their difference. At 5 V it is at most {}, {} of the \
+             final position.",
             um(e.path * runs[0].final_position(), 3),
             super::words::share(e.path)
         ),
@@ -208,14 +210,16 @@ fn inertia(f: &Findings, number: u8, what: What) -> Plot {
     let one = |change, factor| f.runs.one(From::Table1, change, factor, VOLTS[0]);
     let text = match what {
         What::Position => format!(
-            "Above the pulleys' inertia J alone, below J and the cart's mass M. All end at the same place: the largest change is {}.",
+            "Above the pulleys' inertia J alone, below J and the cart's mass M. All end at the same place: \
+             the largest change is {}.",
             percent(super::studies::largest(
                 f.runs.of(From::Table1, &[Change::PulleyInertia, Change::AllInertia]),
                 |e| e.final_position
             ))
         ),
         What::Speed => format!(
-            "Above J alone, below J and M. Time constants at 5 V: {} as in Table 1; {} and {} for J × 2 and × 0.5; {} and {} for J and M.",
+            "Above J alone, below J and M. Time constants at 5 V: {} as in Table 1; {} and {} for J × 2 and \
+             × 0.5; {} and {} for J and M.",
             si(runs[0].time_constant(), "s", 3),
             si(one(Change::PulleyInertia, 2.0).time_constant, "s", 3),
             si(one(Change::PulleyInertia, 0.5).time_constant, "s", 3),
@@ -242,7 +246,8 @@ fn friction(f: &Findings, number: u8, what: What) -> Plot {
             percent(one(0.5).final_position)
         ),
         What::Speed => format!(
-            "Friction moves the speed that is reached by {} (× 2) and {} (× 0.5), and the time constant from {} to {} and {}.",
+            "Friction moves the speed that is reached by {} (× 2) and {} (× 0.5), and the time constant \
+             from {} to {} and {}.",
             percent(one(2.0).plateau),
             percent(one(0.5).plateau),
             si(runs[0].time_constant(), "s", 3),
@@ -271,7 +276,8 @@ fn matched(f: &Findings, number: u8, what: What) -> Plot {
     over_time(number, format!("{}, parameters of Table 2", what.word()), &f.runs.table2[0].time)
         .panel(what.axis(), 1.3, curves)
         .caption(format!(
-            "In grey, for comparison, the non-linear model of Table 4, simulated. The linear set differs from it in {of} by {} at 5 V and {} at 10 V. {NO_MEASUREMENT}",
+            "In grey, for comparison, the non-linear model of Table 4, simulated. The linear set differs \
+             from it in {of} by {} at 5 V and {} at 10 V. {NO_MEASUREMENT}",
             percent(at_5),
             percent(at_10)
         ))
@@ -281,7 +287,8 @@ fn dry(f: &Findings, number: u8, what: What) -> Plot {
     let runs = &f.runs.table4;
     let text = match what {
         What::Position => format!(
-            "The motor comes to rest at {} and {}, the cart {} and {} beside it: friction holds the belt strained.",
+            "The motor comes to rest at {} and {}, the cart {} and {} beside it: friction holds the belt \
+             strained.",
             mm(runs[0].final_position()),
             mm(runs[1].final_position()),
             um((runs[0].final_cart_position() - runs[0].final_position()).abs(), 2),
@@ -325,7 +332,8 @@ pub fn table3(f: &Findings) -> Plot {
     Plot::new("table-3", "Table 3 after the 5 V pulse, classical Runge–Kutta", Axis::new("Time", "s"), "time_s", time)
         .panel(axis, 1.0, curves)
         .caption(format!(
-            "The exact solution is at rest from {} on. With Table 3 the axis creeps, by an amount and in a direction that depend on the step: {} in half a second.",
+            "The exact solution is at rest from {} on. With Table 3 the axis creeps, by an amount and in a \
+             direction that depend on the step: {} in half a second.",
             si(f.runs.table4[0].stop_time().unwrap_or(f64::NAN), "s", 4),
             runs.iter().map(|r| format!("{} at {}", um(r.creep, 3), si(r.step, "s", 1))).collect::<Vec<_>>().join(", ")
         ))
@@ -337,20 +345,27 @@ pub fn travel(f: &Findings) -> Plot {
     let [first, second] = [0, 1].map(|i| f.linear.travel.iter().map(|(_, modes)| modes[i]).collect::<Vec<_>>());
     let low = first.iter().copied().fold(f64::INFINITY, f64::min);
     let high = first.iter().copied().fold(0.0, f64::max);
-    Plot::new("modes-along-the-travel", "Elastic modes of Table 2 along the travel", Axis::new("Length of span 1", "m"), "span1_m", &l1)
-        .panel(
-            Axis::new("Frequency", "Hz"),
-            1.0,
-            vec![
-                Curve::new("first", "first_mode_Hz", &first, Colour::Blue),
-                Curve::new("second", "second_mode_Hz", &second, Colour::Vermillion),
-            ],
-        )
-        .vertical(super::belt::INCHES.0, "l₁ = l₂")
-        .caption(format!(
-            "Spans 1 and 2 as long as the cart's place makes them, at least {}. The first mode moves between {} and {} Hz. The paper's model keeps the cart's middle place.",
-            si(super::linear::NEAREST, "m", 2),
-            significant(low, 4),
-            significant(high, 4)
-        ))
+    Plot::new(
+        "modes-along-the-travel",
+        "Elastic modes of Table 2 along the travel",
+        Axis::new("Length of span 1", "m"),
+        "span1_m",
+        &l1,
+    )
+    .panel(
+        Axis::new("Frequency", "Hz"),
+        1.0,
+        vec![
+            Curve::new("first", "first_mode_Hz", &first, Colour::Blue),
+            Curve::new("second", "second_mode_Hz", &second, Colour::Vermillion),
+        ],
+    )
+    .vertical(super::belt::INCHES.0, "l₁ = l₂")
+    .caption(format!(
+        "Spans 1 and 2 as long as the cart's place makes them, at least {}. The first mode moves \
+             between {} and {} Hz. The paper's model keeps the cart's middle place.",
+        si(super::linear::NEAREST, "m", 2),
+        significant(low, 4),
+        significant(high, 4)
+    ))
 }

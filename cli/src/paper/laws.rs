@@ -18,21 +18,28 @@ pub fn toothed(f: &Findings) -> Plot {
     let ratio: Vec<f64> = (0..=180).map(|i| 1.0 + 0.05 * f64::from(i)).collect();
     let whole: Vec<f64> = ratio.iter().map(|a| series_over_plain(*a, 0.5)).collect();
     let stretches: Vec<f64> = ratio.iter().map(|a| series_over_plain_stretches(*a, 0.5)).collect();
-    Plot::new("figure-03", "Figure 3. Toothed and plain stretches in series", Axis::new("Toothed section / plain section", ""), "area_ratio", &ratio)
-        .panel(
-            Axis::new("Eq. (12) / eq. (13)", ""),
-            1.0,
-            vec![
-                Curve::new("l in (13): the whole span", "whole_span", &whole, Colour::Blue),
-                Curve::new("l in (13): the plain stretches", "plain_stretches", &stretches, Colour::Vermillion),
-            ],
-        )
-        .caption(format!(
-            "Teeth on half the length, of the same composite as the belt. The larger their section, the better (13) holds with l the \
+    Plot::new(
+        "figure-03",
+        "Figure 3. Toothed and plain stretches in series",
+        Axis::new("Toothed section / plain section", ""),
+        "area_ratio",
+        &ratio,
+    )
+    .panel(
+        Axis::new("Eq. (12) / eq. (13)", ""),
+        1.0,
+        vec![
+            Curve::new("l in (13): the whole span", "whole_span", &whole, Colour::Blue),
+            Curve::new("l in (13): the plain stretches", "plain_stretches", &stretches, Colour::Vermillion),
+        ],
+    )
+    .caption(format!(
+        "Teeth on half the length, of the same composite as the belt. The larger their section, the \
+             better (13) holds with l the \
              plain stretches, and the worse with l the whole span, which is what the tables use. Teeth of neoprene, \
              which the cords do not enter, add only {} to the stiffness: then the whole span is right.",
-            share(f.belt.neoprene_teeth)
-        ))
+        share(f.belt.neoprene_teeth)
+    ))
 }
 
 /// Eq. (14) and (15).
@@ -76,7 +83,9 @@ pub fn laws(f: &Findings) -> [Plot; 2] {
                 ],
             )
             .caption(format!(
-                "The cart's viscous coefficient {} and Coulomb force {} are those of Table 4. The paper gives neither the static force nor the Stribeck parameter: {} and {} s²/m² are chosen to show the shape.",
+                "The cart's viscous coefficient {} and Coulomb force {} are those of Table 4. The paper \
+                 gives neither the static force nor the Stribeck parameter: {} and {} s²/m² are chosen to \
+                 show the shape.",
                 si(b, "N s/m", 6),
                 si(fc, "N", 4),
                 si(STATIC, "N", 2),
@@ -85,7 +94,8 @@ pub fn laws(f: &Findings) -> [Plot; 2] {
         Plot::new("figure-17", "Figure 17. Friction law of eq. (15), viscous and Coulomb", x(), "velocity_m_s", &v)
             .panel(y(), 1.0, vec![Curve::new("cart, Table 4", "friction_N", &reduced, Colour::Blue)])
             .caption(format!(
-                "The cart's law as it runs: at rest friction takes whatever value between −{0} and {0} holds the cart.",
+                "The cart's law as it runs: at rest friction takes whatever value between −{0} and {0} \
+                 holds the cart.",
                 si(fc, "N", 4)
             )),
     ]

@@ -24,13 +24,16 @@ pub const MISPRINTS: [Misprint; 10] = [
         number: "P2",
         prefix: "p2-",
         title: "r and r² in eq. (7)",
-        text: "The matrix is consistent only for x₃ = x₂′/r, while eq. (6) says x₃ = x₂′. Equations (1)–(3) and (16)–(18) run, in metres.",
+        text: "The matrix is consistent only for x₃ = x₂′/r, while eq. (6) says x₃ = x₂′. Equations (1)–(3) \
+         and (16)–(18) run, in metres.",
     },
     Misprint {
         number: "P3",
         prefix: "p3-",
         title: "The motor's rating and its constants",
-        text: "Rating and tables disagree about the back-EMF constant, and eq. (4) knows no gear, no rotor and no amplifier. These are parameters here; for the paper's sets they stay at ratio 1, inertia 0 and gain 1.",
+        text: "Rating and tables disagree about the back-EMF constant, and eq. (4) knows no gear, no rotor \
+         and no amplifier. These are parameters here; for the paper's sets they stay at ratio 1, inertia 0 \
+         and gain 1.",
     },
     Misprint {
         number: "P4",
@@ -48,13 +51,16 @@ pub const MISPRINTS: [Misprint; 10] = [
         number: "P6",
         prefix: "p6-",
         title: "Table 3 at rest",
-        text: "Inside its band the function cancels the torque, and so keeps whatever speed there is. It is available here as a labelled reproduction; what runs otherwise brings a body to rest and holds it there.",
+        text: "Inside its band the function cancels the torque, and so keeps whatever speed there is. It is \
+         available here as a labelled reproduction; what runs otherwise brings a body to rest and holds it \
+         there.",
     },
     Misprint {
         number: "P7",
         prefix: "p7-",
         title: "What position data determine",
-        text: "Voltage and motor position determine the parameters only up to a common factor, and friction by its totals. Table 4 is one choice among many.",
+        text: "Voltage and motor position determine the parameters only up to a common factor, and friction \
+         by its totals. Table 4 is one choice among many.",
     },
     Misprint {
         number: "P8",
@@ -66,7 +72,8 @@ pub const MISPRINTS: [Misprint; 10] = [
         number: "P9",
         prefix: "p9-",
         title: "Which voltage Table 2 was matched at",
-        text: "Table 2 is called matched for 5 V. Beside Table 4 it fits 10 V. Measured curves could decide; they are not available.",
+        text: "Table 2 is called matched for 5 V. Beside Table 4 it fits 10 V. Measured curves could \
+         decide; they are not available.",
     },
     Misprint {
         number: "P10",

@@ -7,10 +7,12 @@ mod figures;
 mod findings;
 mod laws;
 mod linear;
+mod make;
 mod misprints;
 mod model;
 mod plots;
 mod readings;
+mod references;
 mod report;
 mod statements;
 mod studies;
@@ -45,7 +47,7 @@ pub fn run(out: Option<&Path>, json: bool, terminal: &mut dyn Write) -> Result<(
 fn claims(findings: &Findings) -> Vec<Claim> {
     let mut all = statements::statements(findings);
     all.extend(readings::readings(findings));
-    all.extend(readings::references(findings));
+    all.extend(references::references(findings));
     all
 }
 

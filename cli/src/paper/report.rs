@@ -14,7 +14,8 @@ use taut::report::{Callout, Cell, Page, Table, stage_drawing};
 /// Puts it together. `plots` are looked up by their files' names.
 pub fn page(f: &Findings, claims: &[Claim], plots: &[Plot]) -> Page {
     let mut page = Page::new("A belt-driven stage, recomputed").subtitle(html! {
-        "Every table, figure and claim of K. Sollmann and M. Jouaneh, “Dynamic modelling of a single-axis belt-drive \
+        "Every table, figure and claim of K. Sollmann and M. Jouaneh, “Dynamic modelling of a single-axis \
+         belt-drive \
          system”, " i { "International Journal of Modelling, Identification and Control" } ", 2011."
     });
     let report = &mut Report { page: &mut page, f, claims, plots };
@@ -76,10 +77,12 @@ impl Report<'_> {
         let page = &mut *self.page;
         page.section("Summary");
         page.prose(html! {
-            "The paper models a cart on a timing belt as three inertias and three springs, first with viscous friction, then with \
+            "The paper models a cart on a timing belt as three inertias and three springs, first with \
+             viscous friction, then with \
              Coulomb friction. Its equations are solved here exactly, and its statements are held against the result. Of "
             (all) " statements and printed items, " b { (confirmed) " are confirmed" } ", " (remark) " with a remark, " (not)
-            " not, and " (open) " cannot be checked: mostly those that rest on the measured curves, which are not available as data."
+            " not, and " (open) " cannot be checked: mostly those that rest on the measured curves, which \
+             are not available as data."
         });
         page.markup(html! { dl {
             dt { "Friction first" }
@@ -89,18 +92,21 @@ impl Report<'_> {
                  (percent(linear(PulleyInertia, 2.0).time_constant_change)) " (J) or " (percent(linear(AllInertia, 2.0).time_constant_change))
                  " (J and M), and the final position by " (share(linear(AllInertia, 2.0).final_position)) "." }
             dt { "Two voltages" }
-            dd { "As the paper says, no linear set serves both: one that meets Table 4 at 5 V is " (percent(misses.1)) " off at 10 V. But Table 2, \
+            dd { "As the paper says, no linear set serves both: one that meets Table 4 at 5 V is \
+             " (percent(misses.1)) " off at 10 V. But Table 2, \
                  called matched for 5 V, lies " (percent(misses.0[0])) " from Table 4 at 5 V and " (percent(misses.0[1])) " at 10 V." }
             dt { "Coulomb friction" }
             dd { "With it, inertia does move the final position: by " (percent(inertia)) " for twice J at 5 V." }
             dt { "Equation (7)" }
             dd { "As printed it is unstable, with a pole at " (super::words::signed(pole, 3)) " 1/s: the sign of b is a misprint." }
             dt { "Table 3" }
-            dd { "As printed it lets the axis creep by up to " (um(creep, 3)) " in half a second after it should have stopped. The exact solution then moves by "
+            dd { "As printed it lets the axis creep by up to " (um(creep, 3)) " in half a second after it \
+             should have stopped. The exact solution then moves by "
                  @if f.table3.exact_creep == 0.0 { "not one bit." } @else { (um(f.table3.exact_creep, 2)) "." } }
             dt { "Position data" }
             dd { "They determine friction by its totals, " (si(f.identifiability.total_viscous, "N m s", 4)) " and "
-                 (si(f.identifiability.total_coulomb, "N m", 4)) ". Sharing them otherwise among pulleys and cart moves the motor by at most "
+                 (si(f.identifiability.total_coulomb, "N m", 4)) ". Sharing them otherwise among pulleys \
+                  and cart moves the motor by at most "
                  (um(f.identifiability.sharing.iter().flat_map(|s| s.difference).fold(0.0, f64::max), 2)) "." }
         } });
         let mut table = Table::new("").column("The paper", "").column("Here", "").column("", "");
@@ -120,10 +126,12 @@ impl Report<'_> {
         page.section("The stage and its parameters");
         page.drawing(
             &stage_drawing(&f.sets.table1.stage),
-            html! { b { "Figures 1 and 2. " } "The stage as it is modelled, with the values of Table 1. Rotation and position count positive in the sense of the arrows." },
+            html! { b { "Figures 1 and 2. " } "The stage as it is modelled, with the values of Table 1. \
+            Rotation and position count positive in the sense of the arrows." },
         );
         page.prose(
-            "The three sets run as printed. Table 4 gives friction alone; everything else is Table 2's. Table 2 is Table 1 with \
+            "The three sets run as printed. Table 4 gives friction alone; everything else is Table 2's. \
+             Table 2 is Table 1 with \
              other stiffness, friction and inertia:",
         );
         let ratio = |pick: fn(&taut::stage::Stage) -> f64| {
@@ -148,14 +156,17 @@ impl Report<'_> {
             ),
         ]);
         page.table(&tables::parameters(f));
-        page.markup(html! { p.note { (symbols("Grey: taken over from Table 2. \"R\" is printed for the radius and for the resistance; \"B\" for the pulleys in Tables 1 and 2 and for the cart in Table 4; K_e is printed in V/(rad s).")) } });
+        page.markup(html! { p.note { (symbols(
+        "Grey: taken over from Table 2. \"R\" is printed for the radius and for the resistance; \"B\" \
+         for the pulleys in Tables 1 and 2 and for the cart in Table 4; K_e is printed in V/(rad s).")) } });
     }
 
     fn belt(&mut self) {
         let f = self.f;
         self.page.section("Belt, pulleys and modes");
         self.page.prose(format!(
-            "Two thirds of neoprene and one third of fibreglass in parallel give a modulus of {}; the paper prints 16.67 GPa. \
+            "Two thirds of neoprene and one third of fibreglass in parallel give a modulus of {}; the paper \
+             prints 16.67 GPa. \
              Equation (11) then gives the stiffness. The printed lengths are rounded: with the same lengths in inches, and the \
              modulus before rounding, all printed digits come out.",
             si(f.belt.composite, "Pa", 6)
@@ -166,7 +177,8 @@ impl Report<'_> {
         }
         self.page.subsection("Teeth");
         self.page.prose(
-            "Equation (12) puts toothed and plain stretches in series; eq. (13) keeps the plain section. How far they differ depends on \
+            "Equation (12) puts toothed and plain stretches in series; eq. (13) keeps the plain section. \
+             How far they differ depends on \
              the length that is meant.",
         );
         self.figure("figure-03");
@@ -178,7 +190,8 @@ impl Report<'_> {
         self.claim("pulley-inertia");
         self.page.subsection("Modes");
         self.page.prose(format!(
-            "Three inertias and three springs move as one with a slow decay, and oscillate in two ways that lie close together: {} and {} Hz \
+            "Three inertias and three springs move as one with a slow decay, and oscillate in two ways that \
+             lie close together: {} and {} Hz \
              for Table 2. With l₁ = l₂ the modes are nearly equal; away from the middle they part.",
             significant(f.linear.modes[1].first().map_or(f64::NAN, |m| m.frequency), 4),
             significant(f.linear.modes[1].get(1).map_or(f64::NAN, |m| m.frequency), 4)
@@ -190,7 +203,8 @@ impl Report<'_> {
     fn first_response(&mut self) {
         self.page.section("First response: Table 1");
         self.page.prose(
-            "The input is a pulse of 0.25 s, of 5 V or 10 V. Position and velocity are the motor's, expressed in metres by the \
+            "The input is a pulse of 0.25 s, of 5 V or 10 V. Position and velocity are the motor's, \
+             expressed in metres by the \
              pulley's radius. The figures show the first half second, the files of data the whole.",
         );
         self.figures(4..=5);
@@ -200,7 +214,8 @@ impl Report<'_> {
     fn one_at_a_time(&mut self) {
         self.page.section("One parameter at a time");
         self.page.prose(
-            "Stiffness, inertia and friction are doubled and halved, one after the other. The paper does it from Table 1; the second \
+            "Stiffness, inertia and friction are doubled and halved, one after the other. The paper does it \
+             from Table 1; the second \
              table does the same from Table 4. “Inertia” may mean J alone or J and M: both are given. All columns are changes against the \
              unchanged set: of the final position; of the position at any time, in per cent of the final one; of the highest speed; \
              of the time until the mean velocity of the three inertias has reached 1 − 1/e of that in the last 50 ms of the pulse; \
@@ -227,7 +242,8 @@ impl Report<'_> {
         let m = &self.f.matched;
         self.page.section("A linear set against two voltages");
         self.page.prose(format!(
-            "A linear stage goes exactly twice as far for twice the voltage; here {} times. With the friction of Table 4 it goes {} times as far. \
+            "A linear stage goes exactly twice as far for twice the voltage; here {} times. With the \
+             friction of Table 4 it goes {} times as far. \
              No linear set can therefore agree with Table 4 at both voltages.",
             significant(m.ratio.0, 5),
             significant(m.ratio.1, 4)
@@ -238,7 +254,8 @@ impl Report<'_> {
         self.claim("linear-misses-10-V");
         self.claim("table2-fits-5-V");
         self.page.prose(format!(
-            "There are two readings. Either the measured 5 V response was that of Table 2: then Table 4 misses it by {}. Or it was that of \
+            "There are two readings. Either the measured 5 V response was that of Table 2: then Table 4 \
+             misses it by {}. Or it was that of \
              Table 4: then Table 2 was matched at 10 V, where the two differ by {}. The measured curves would decide.",
             percent(1.0 / (1.0 + m.final_position[0]) - 1.0),
             percent(m.final_position[1])
@@ -259,7 +276,8 @@ impl Report<'_> {
         );
         self.page.drawing(
             &diagrams::whole(&f.sets.table4.stage),
-            html! { b { "Figure 19. " } "The whole: motor, drive pulley, cart and idler pulley, equations (4) and (16)–(18)." },
+            html! { b { "Figure 19. " } "The whole: motor, drive pulley, cart and idler pulley, equations \
+            (4) and (16)–(18)." },
         );
         self.page.subsection("Both voltages with Table 4");
         self.figures(20..=21);
@@ -270,7 +288,8 @@ impl Report<'_> {
         let f = self.f;
         self.page.section("Table 3 against the exact solution");
         self.page.prose(format!(
-            "Table 3 sets friction equal to the computed torque while the speed is within ±0.01 and the torque within the Coulomb value. \
+            "Table 3 sets friction equal to the computed torque while the speed is within ±0.01 and the \
+             torque within the Coulomb value. \
              The acceleration is then zero and the speed stays what it is. The exact solution comes to rest at {} and {}. Creep is the \
              motion of r φ₁ between 0.5 s and 1 s; turns are the changes of its direction after 0.35 s.",
             mm(f.runs.table4[0].final_position()),
@@ -292,8 +311,16 @@ impl Report<'_> {
             if m.number == "P7" {
                 self.page.table(&tables::sharing(self.f));
                 self.page.prose(format!(
-                    "The last two columns are what remains when the totals are adjusted, by at most {}, so that both final positions agree.",
-                    share(self.f.identifiability.sharing.iter().flat_map(|s| s.adjustment).fold(0.0, |a: f64, b| a.max(b.abs())))
+                    "The last two columns are what remains when the totals are adjusted, by at most {}, so \
+                     that both final positions agree.",
+                    share(
+                        self.f
+                            .identifiability
+                            .sharing
+                            .iter()
+                            .flat_map(|s| s.adjustment)
+                            .fold(0.0, |a: f64, b| a.max(b.abs()))
+                    )
                 ));
             }
         }
@@ -302,7 +329,8 @@ impl Report<'_> {
     fn all_claims(&mut self) {
         self.page.section("Every number and its rule");
         self.page.prose(html! {
-            "The verdict follows from the numbers by the rules beside them: a claim is confirmed if all hold, confirmed with a remark if only \
+            "The verdict follows from the numbers by the rules beside them: a claim is confirmed if all \
+             hold, confirmed with a remark if only \
              those marked “further” fail, and not confirmed otherwise. The same is in " code { "claims.json" } "."
         });
         let mut table = Table::new("")
@@ -344,7 +372,8 @@ impl Report<'_> {
             golden.fold((0, 0), |(right, all), c| (right + usize::from(c.verdict() == Verdict::Confirmed), all + 1));
         self.page.section("How it was computed");
         self.page.prose(format!(
-            "Friction makes the equations linear piece by piece: each body slides forward, slides backward or is stuck. Within a piece the motion is \
+            "Friction makes the equations linear piece by piece: each body slides forward, slides backward \
+             or is stuck. Within a piece the motion is \
              a matrix exponential, and the pieces end where a speed reaches zero or a load reaches breakaway. There is no step size. {right} of {all} numbers \
              of independent solutions are met to their printed digits, among them the final position of Table 1 by the matrix exponential of \
              equations (1)–(4), {}, and by the closed form r K_t/R · V T/B_tot, {}.",
@@ -352,7 +381,8 @@ impl Report<'_> {
             mm(f.linear.closed_form)
         ));
         self.page.prose(
-            "Words were given numbers before the runs: “by far” is five times, “minor” and “marginal” less than a tenth, “not appreciable” \
+            "Words were given numbers before the runs: “by far” is five times, “minor” and “marginal” less \
+             than a tenth, “not appreciable” \
              less than a hundredth, “the same” less than a thousandth.",
         );
         self.page.prose(html! {
