@@ -119,7 +119,7 @@ pub fn readings(f: &Findings) -> Vec<Claim> {
         )),
         reading("p6-table3-limit", "Table 3", "with a step of 1 µs the creep is that of the band's edge, 0.01 rad/s")
             .decide(
-                "distance of the creep at a step of 1e-6 s from 0.01 rad/s · r · 0.5 s, \
+                "distance of the creep at a step of 1 µs from 0.01 rad/s · r · 0.5 s, \
                  relative",
                 finest,
                 "1",

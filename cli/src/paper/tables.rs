@@ -80,28 +80,30 @@ fn digits(value: f64) -> String {
 /// Eq. (11)-(13) beside the printed stiffness.
 pub fn stiffness(f: &Findings) -> Table {
     let mut table = Table::new("Stiffness by eq. (11), N/m, and in brackets its difference from the printed one, %")
-        .column("Lengths", "");
+        .column("", "")
+        .column("printed", "")
+        .column("0.349, 0.787 m", "")
+        .column("0.34925, 0.7874 m", "")
+        .column("and E unrounded", "");
     for s in &f.belt.stiffness {
-        table = table.column(format!("{}, {}", s.table, s.symbol), "");
+        let beside = |k: f64| Cell::Number(format!("{k:.0} ({})", signed(100.0 * (k / s.printed - 1.0), 2)));
+        table.row([
+            format!("{}, {}", s.table, s.symbol).replace(' ', "\u{a0}").into(),
+            Cell::fixed(s.printed, 0),
+            beside(s.lengths),
+            beside(s.inches),
+            beside(s.unrounded),
+        ]);
     }
-    let row = |name: &str, pick: &dyn Fn(&super::belt::Stiffness) -> String| {
-        let mut row = vec![Cell::from(name)];
-        row.extend(f.belt.stiffness.iter().map(|s| Cell::Number(pick(s))));
-        row
-    };
-    let beside = |k: f64, printed: f64| format!("{k:.0} ({})", signed(100.0 * (k / printed - 1.0), 2));
-    table.row(row("printed stiffness", &|s| format!("{:.0}", s.printed)));
-    table.row(row("0.349 m and 0.787 m, as printed", &|s| beside(s.lengths, s.printed)));
-    table.row(row("0.34925 m and 0.7874 m", &|s| beside(s.inches, s.printed)));
-    table.row(row("the same, and the modulus before rounding", &|s| beside(s.unrounded, s.printed)));
     table
 }
 
 /// Eq. (12) over (13) for some shapes of tooth.
 pub fn toothed() -> Table {
-    let mut table = Table::new("Eq. (12) over eq. (13) with l the whole span").column("Toothed part of the length", "");
+    let mut table = Table::new("Eq. (12) over eq. (13), l the whole span, for toothed sections of so many plain ones")
+        .column("Toothed part of the length", "");
     for ratio in [1.5, 2.0, 5.0, 10.0] {
-        table = table.column(format!("toothed section = {ratio} plain ones"), "");
+        table = table.column(ratio.to_string(), "");
     }
     for share in [0.3, 0.4, 0.5, 0.6] {
         let mut row = vec![Cell::fixed(share, 1)];
@@ -254,6 +256,11 @@ pub fn table3(f: &Findings) -> Table {
             Cell::Number(other.turns.to_string()),
         ]);
     }
+    let late = f.table3.time.iter().position(|t| *t >= 0.35).unwrap_or(0);
+    let turns = |values: &[f64]| {
+        let steps: Vec<f64> = values[late..].windows(2).map(|x| x[1] - x[0]).collect();
+        Cell::Number(steps.windows(2).filter(|v| v[0] * v[1] < 0.0).count().to_string())
+    };
     let last = |values: &[f64]| values[values.len() - 1];
     let creep = |values: &[f64]| last(values) - values[values.len() / 2];
     let cell =
@@ -264,10 +271,10 @@ pub fn table3(f: &Findings) -> Table {
         Cell::Number("none".into()),
         Cell::fixed(1e3 * last(five), 4),
         cell(five),
-        Cell::Number("0".into()),
+        turns(five),
         Cell::fixed(1e3 * last(ten), 4),
         cell(ten),
-        Cell::Number("0".into()),
+        turns(ten),
     ]);
     table
 }
