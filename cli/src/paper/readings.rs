@@ -127,7 +127,7 @@ pub fn readings(f: &Findings) -> Vec<Claim> {
             )
             .found(format!("{} from it at a step of 1 µs", share(finest)))
             .remark(format!(
-                "That is {} in half a second: smaller steps lead to a limit, but not to rest. Larger steps \
+                "That is {} in half a second: a finer step does not bring the axis to rest. Larger steps \
                  show no order.",
                 um(t.band_edge, 3)
             )),
