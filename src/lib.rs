@@ -5,6 +5,7 @@ pub mod error;
 pub mod files;
 pub mod friction;
 pub mod log;
+pub mod metrics;
 pub mod number;
 pub mod parameter;
 pub mod plant;

@@ -271,7 +271,8 @@ impl Plant {
             // T = K_t i − J_r n φ̈₁, the torque that the motor hands to the gear
             let torque = self.current * motor.torque_constant - acceleration[0] * (motor.rotor_inertia * n);
             let sign = if mode.gear_torque_positive { 1.0 } else { -1.0 };
-            guards.push(Guard { form: torque * sign, cause: Cause::GearTorque });
+            // First, because the loads that the others watch depend on it.
+            guards.insert(0, Guard { form: torque * sign, cause: Cause::GearTorque });
         }
         let current_rate = if self.has_current_state() {
             // L di/dt = V_in − R i − K_e n φ̇₁

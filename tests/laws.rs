@@ -55,7 +55,7 @@ fn extents(trajectory: &Trajectory) -> [f64; 2] {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 1000, max_global_rejects: 100_000, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// The energy that comes in goes into heat or is stored, over every interval without an event: by quadrature of
     /// the powers along the computed motion, so that it is the motion that is tested.
@@ -63,8 +63,11 @@ proptest! {
     fn power_is_balanced(stage in random::stage(Dry::Any), input in random::input()) {
         let plant = Plant::new(&stage);
         // Boole's rule over eight samples; the fastest swing of these stages is resolved many times over.
-        let every = 2e-6;
-        let solution = run(&stage, &input, 0.004, every);
+        let every = match stage.motor.inductance {
+            0.0 => 2e-6,
+            inductance => f64::min(2e-6, 0.01 * inductance / stage.motor.resistance),
+        };
+        let solution = run(&stage, &input, 2000.0 * every, every);
         let trajectory = &solution.trajectory;
         let (time, gain) = (trajectory.get("time").unwrap(), stage.amplifier.gain);
         let input_at = |row: usize| match stage.amplifier.mode {
@@ -90,9 +93,8 @@ proptest! {
         };
         for first in (0..trajectory.len() - 9).step_by(160) {
             let last = first + 8;
-            if disturbed(time[first], time[last]) || plant.gear_loses() || (first..last).any(|r| {
-                (input_at(r + 1) - input_at(r)).abs() > 0.01 * (1.0 + input_at(r).abs())
-            }) {
+            let seam = input.piece(time[first]).end;
+            if disturbed(time[first], time[last]) || plant.gear_loses() || seam < time[last] + every {
                 continue;
             }
             let mut integral = 0.0;
@@ -125,7 +127,7 @@ proptest! {
         }
         prop_assert_eq!(there.outcome.events.len(), back.outcome.events.len());
         for (a, b) in there.outcome.events.iter().zip(&back.outcome.events) {
-            prop_assert!(a.time == b.time && a.load == -b.load && a.body == b.body);
+            prop_assert!(a.time == b.time && a.load == -b.load && a.body == b.body, "{a:?} and {b:?}");
         }
     }
 
@@ -143,11 +145,21 @@ proptest! {
                 prop_assert!((a - b).abs() <= tolerance, "{name} at row {row}: {a:e} and {b:e}");
             }
         }
+        // Without losses a speed may touch zero and go on, and rounding decides whether it rests there for an instant.
+        let bodies = [&stage.drive_pulley.friction, &stage.cart.friction, &stage.idler_pulley.friction];
+        let mut sides = bodies.iter().flat_map(|law| [law.forward, law.backward]);
+        prop_assume!(sides.all(|side| side.viscous > 0.0 && side.coulomb > 0.0));
+        let end = |s: &Solution| *s.trajectory.get("time").unwrap().last().unwrap();
         let same = |other: &Solution| {
-            let until = coarse.trajectory.get("time").unwrap().last().unwrap().min(*other.trajectory.get("time").unwrap().last().unwrap());
-            let within = |s: &Solution| s.outcome.events.iter().filter(|e| e.time < until - 1e-6).copied().collect::<Vec<_>>();
+            let until = end(&coarse).min(end(other)) - 1e-6;
+            // Of several bodies that change at one instant, rounding decides which comes first.
+            let within = |s: &Solution| {
+                let mut events: Vec<_> = s.outcome.events.iter().filter(|e| e.time < until).copied().collect();
+                events.sort_by_key(|e| e.body.index());
+                events
+            };
             let (a, b) = (within(&coarse), within(other));
-            prop_assert_eq!(a.len(), b.len());
+            prop_assert_eq!(a.len(), b.len(), "{:#?}\n{:#?}", a, b);
             for (a, b) in a.iter().zip(&b) {
                 prop_assert!(a.body == b.body && a.to == b.to && (a.time - b.time).abs() < 1e-9, "{a:?} and {b:?}");
             }
@@ -210,6 +222,9 @@ proptest! {
     /// Nothing coming in, the energy never grows.
     #[test]
     fn energy_decays_by_itself(stage in random::stage(Dry::Any), speeds in [-20.0..20.0_f64, -0.4..0.4, -20.0..20.0], offset in -1e-4..1e-4_f64) {
+        // A motor whose two constants differ is no passive machine.
+        let mut stage = stage;
+        stage.motor.back_emf_constant = stage.motor.torque_constant;
         let plant = Plant::new(&stage);
         let initial = Initial {
             drive_speed: speeds[0],
@@ -221,12 +236,11 @@ proptest! {
         let experiment =
             Experiment { name: "law".into(), input: Signal::Step { value: 0.0, at: 0.0 }, until: 0.3, every: 1e-3, initial };
         let solution = simulate(&stage, &experiment, Solver::Exact).unwrap();
-        // A motor whose two constants differ is no passive machine.
-        prop_assume!(stage.motor.torque_constant == stage.motor.back_emf_constant);
+        let first = plant.energy(&state(&solution.trajectory, 0));
         let mut before = f64::INFINITY;
         for row in 0..solution.trajectory.len() {
             let energy = plant.energy(&state(&solution.trajectory, row));
-            prop_assert!(energy <= before * (1.0 + 1e-12), "row {row}: {before:e} J, then {energy:e} J");
+            prop_assert!(energy <= before + 1e-12 * first, "row {row}: {before:e} J, then {energy:e} J");
             before = energy;
         }
     }

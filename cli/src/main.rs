@@ -1,23 +1,35 @@
-//! The program `taut`.
+//! The program `taut`: reads the command line, does what it says, and tells how it ended.
 
+mod args;
+mod failure;
+mod init;
+mod interrupt;
 mod paper;
+mod simulate;
+mod terminal;
 
-use std::path::PathBuf;
+use args::{Args, Command};
+use clap::Parser;
+use failure::Status;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let out = arguments.iter().position(|a| a == "--out").and_then(|i| arguments.get(i + 1)).map(PathBuf::from);
-    let json = arguments.iter().any(|a| a == "--json");
-    if arguments.first().map(String::as_str) != Some("paper") {
-        eprintln!("usage: taut paper [--out DIR] [--json]");
-        return ExitCode::from(2);
-    }
-    match paper::run(out.as_deref(), json, &mut std::io::stdout()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("{error}");
-            ExitCode::FAILURE
+    let args = match Args::try_parse() {
+        Ok(args) => args,
+        Err(told) => return terminal::show_help_or_mistake(&told),
+    };
+    let done = match args.command {
+        Command::Paper(args) => paper::run(&args),
+        Command::Init(args) => init::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
+    };
+    match done {
+        Ok(Status::Done) => ExitCode::SUCCESS,
+        Ok(Status::Incomplete) => ExitCode::from(1),
+        Ok(Status::Interrupted(signal)) => ExitCode::from(128 + signal),
+        Err(failure) => {
+            terminal::show_error(&failure.error);
+            ExitCode::from(failure.status)
         }
     }
 }

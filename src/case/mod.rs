@@ -13,9 +13,11 @@ use crate::error::{Error, Result};
 use crate::signal::Signal;
 use crate::stage::{AmplifierMode, Stage};
 use reader::{Field, Table};
+use std::cell::RefCell;
 use std::collections::HashMap;
 use std::io::Read;
-use std::path::Path;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 
 /// Most rows of a result.
 const MOST_SAMPLES: f64 = 1e9;
@@ -38,6 +40,17 @@ pub struct Case {
     pub experiments: Vec<Experiment>,
     /// The text it was read from, with `--set` applied: read again, it gives the same case.
     pub text: String,
+    /// The files that its inputs name, in the text's order.
+    pub files: Vec<InputFile>,
+}
+
+/// A file that an input is read from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InputFile {
+    /// Where it is: the path in the text, from the case's folder on.
+    pub path: PathBuf,
+    /// Where the text names it, quotes included.
+    pub place: Range<usize>,
 }
 
 /// One run of the stage.
@@ -132,8 +145,23 @@ impl Case {
             None => name.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
         };
         let stage = stage::stage(&root)?;
-        let experiments = experiments(&root, &stage, name.parent().unwrap_or(Path::new("")))?;
-        Ok(Self { title, stage, experiments, text: source.text.clone() })
+        let folder = Folder { path: name.parent().unwrap_or(Path::new("")), read: RefCell::default() };
+        let experiments = experiments(&root, &stage, &folder)?;
+        let mut files = folder.read.into_inner();
+        files.sort_by_key(|file| file.place.start);
+        Ok(Self { title, stage, experiments, text: source.text.clone(), files })
+    }
+
+    /// The text with other names for the files of its inputs; it is to lie where these names lead to them.
+    pub fn text_with(&self, name: impl Fn(&InputFile) -> String) -> String {
+        let mut text = String::with_capacity(self.text.len());
+        let mut end = 0;
+        for file in &self.files {
+            text.push_str(&self.text[end..file.place.start]);
+            text.push_str(&toml_edit::Value::from(name(file)).to_string());
+            end = file.place.end;
+        }
+        text + &self.text[end..]
     }
 }
 
@@ -172,7 +200,13 @@ pub fn file_name(name: &str) -> String {
     name.to_lowercase().chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect()
 }
 
-fn experiments(root: &Table, stage: &Stage, folder: &Path) -> Result<Vec<Experiment>> {
+/// Where the paths of a case begin, and what was read from there.
+struct Folder<'a> {
+    path: &'a Path,
+    read: RefCell<Vec<InputFile>>,
+}
+
+fn experiments(root: &Table, stage: &Stage, folder: &Folder) -> Result<Vec<Experiment>> {
     let such_as = "[[experiment]] with name, input, until and every";
     let field = root.required("experiment", such_as)?;
     if field.is_table() {
@@ -203,7 +237,7 @@ fn experiments(root: &Table, stage: &Stage, folder: &Path) -> Result<Vec<Experim
     Ok(experiments)
 }
 
-fn experiment(field: &Field, stage: &Stage, folder: &Path) -> Result<Experiment> {
+fn experiment(field: &Field, stage: &Stage, folder: &Folder) -> Result<Experiment> {
     let field = Field {
         input_unit: match stage.amplifier.mode {
             AmplifierMode::Voltage => "V",

@@ -8,7 +8,7 @@
 //! V(y) = ½ Σ m a² + ½ Σ k (Δv)² + ½ w L (di/dt)² can only grow by the input's rate: √V(τ) ≤ √V(0) + |b|·|u̇|·τ. A guard
 //! g = w·z therefore changes no faster than |w|·√(2V), |w| being the norm dual to V; and likewise its slope, with ẏ.
 
-use super::law::{Law, chain};
+use super::law::{Law, Watch, chain};
 use super::propagator::SERIES_ORDER;
 use super::record::Recorder;
 use super::roots;
@@ -26,6 +26,9 @@ const EVENTS_PER_SECOND: f64 = 1e7;
 
 /// Mode changes allowed at one instant.
 const CHANGES_AT_ONCE: usize = 100;
+
+/// For so small a part of the series' reach a speed that has left zero is still told by its series alone.
+const SOON: f64 = 1e-6;
 
 /// Runs the experiment.
 pub(crate) fn run(plant: &Plant, experiment: &Experiment, sink: &mut dyn FnMut(&Trajectory) -> Flow) -> Outcome {
@@ -250,9 +253,10 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
                 let g = guard.standing(&self.z);
                 let slope = law.growth_factor() * guard.dual * norm + guard.input.abs() * self.input_rate;
                 let bend = law.growth_factor() * guard.dual * law.forcing * self.input_rate * 0.5;
-                if g < 0.0 || self.fresh_order(guard.cause) > 0 {
+                let moves = slope > 0.0 || bend > 0.0;
+                if g < 0.0 || (g == 0.0 && moves) || self.fresh_order(guard.cause) > 0 {
                     time = 0.0;
-                } else if slope > 0.0 || bend > 0.0 {
+                } else if moves {
                     time = f64::min(time, 2.0 * g / (slope + (slope * slope + 4.0 * bend * g).sqrt()));
                 }
             }
@@ -299,9 +303,6 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
                 return Some(cause);
             }
             distance -= first;
-            if first > 1e-3 * law.reach() {
-                self.fresh = [0; 4];
-            }
         }
         for level in 0..=law.finest {
             while distance >= law.length(level) {
@@ -396,6 +397,9 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             self.z[j] += change;
         }
         self.offset += s * distance;
+        if s * distance > SOON * law.reach() {
+            self.fresh = [0; 4];
+        }
         first.map(|(_, cause)| cause)
     }
 
@@ -434,11 +438,6 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             Cause::GearTorque => {
                 self.mode.gear_torque_positive = !self.mode.gear_torque_positive;
                 self.enter();
-                let equations = self.plant.equations(self.mode);
-                let torque = equations.guards.iter().find(|guard| guard.cause == cause).map(|guard| guard.form);
-                let torque = torque.unwrap_or(Form::ZERO);
-                let noise = torque.noise(self.plant, &self.state(), self.z[place::COUNT]);
-                self.fresh[3] = usize::from(self.value(&torque).abs() <= noise);
                 return;
             }
             Cause::Stop(body) => {
@@ -448,7 +447,10 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             Cause::BreakForward(body) => (body, Motion::Forward),
             Cause::BreakBackward(body) => (body, Motion::Backward),
         };
-        let (load, resistance, noise) = self.load(body, to != Motion::Backward);
+        // Where it stops, the load is the one on the side it came from.
+        let from = self.mode.motion[body.index()];
+        let side = if to == Motion::Stuck { from } else { to };
+        let (load, resistance, noise) = self.load(body, side != Motion::Backward);
         self.fresh[body.index()] = match (to, cause) {
             (Motion::Stuck | Motion::Free, _) => 0,
             (_, Cause::Stop(_)) => 1,
@@ -456,7 +458,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             _ if (load - resistance).abs() <= 2.0 * noise => 2,
             _ => 1,
         };
-        let from = std::mem::replace(&mut self.mode.motion[body.index()], to);
+        self.mode.motion[body.index()] = to;
         if from != to {
             self.events.push(Event { time: self.time(), body, from, to, load });
         }
@@ -482,14 +484,27 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         for _ in 0..CHANGES_AT_ONCE {
             let law = Rc::clone(&self.law);
             let y = law.rate(&self.z);
-            let fallen = law.guards.iter().find(|guard| {
+            let falls = |guard: &&Watch<C>| {
                 let g = guard.standing(&self.z);
-                let fresh = self.fresh_order(guard.cause) > 0;
-                !fresh && (g < 0.0 || (g == 0.0 && guard.slope(&y) < 0.0))
-            });
+                let slope = guard.slope(&y);
+                if g != 0.0 || self.fresh_order(guard.cause) > 0 {
+                    return g < 0.0;
+                }
+                if slope != 0.0 {
+                    return slope < 0.0;
+                }
+                // On the edge and not moving off it at once: the first term of its series that is not zero decides.
+                let series = law.series(&self.z, law.reach());
+                let terms = series[2..].iter().map(|term| guard.value(term));
+                terms.into_iter().find(|&term| term != 0.0).is_some_and(|term| term < 0.0)
+            };
+            let fallen = law.guards.iter().find(falls);
             match fallen {
                 Some(guard) => self.change(guard.cause),
                 None => {
+                    if let Some(torque) = law.guards.iter().find(|guard| guard.cause == Cause::GearTorque) {
+                        self.fresh[3] = usize::from(torque.is_zero(&self.z));
+                    }
                     if self.events.len() as f64 > EVENTS_AT_LEAST + EVENTS_PER_SECOND * self.time() {
                         self.trouble = Some(Ending::TooManyEvents { time: self.time() });
                     }

@@ -37,11 +37,13 @@ impl<const C: usize> Watch<C> {
     /// Its value, with what rounding alone may have made negative taken for zero.
     pub(super) fn standing(&self, z: &[f64; C]) -> f64 {
         let value = self.value(z);
-        if value >= 0.0 {
-            return value;
-        }
-        let noise = ROUNDING * self.row.iter().zip(z).fold(0.0, |sum, (w, z)| sum + (w * z).abs());
-        if value >= -2.0 * noise { 0.0 } else { value }
+        if value < 0.0 && self.is_zero(z) { 0.0 } else { value }
+    }
+
+    /// Whether its value is zero but for rounding.
+    pub(super) fn is_zero(&self, z: &[f64; C]) -> bool {
+        let size = self.row.iter().zip(z).fold(0.0, |sum, (w, z)| sum + (w * z).abs());
+        self.value(z).abs() <= 2.0 * ROUNDING * size
     }
 
     /// Its rate of change, `y` being ż.

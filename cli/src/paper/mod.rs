@@ -19,28 +19,36 @@ mod studies;
 mod tables;
 mod words;
 
+use crate::args::Paper;
+use crate::failure::{Failure, Outcome, Status};
+use crate::terminal;
 use claims::{Claim, Kind, Verdict};
 use findings::Findings;
 use plots::Plot;
 use rayon::prelude::*;
 use std::fs;
-use std::io::Write;
 use std::path::Path;
 use taut::error::{Error, Result};
 use taut::files::write_atomically;
 
 /// Where the results go unless told otherwise.
-pub const FOLDER: &str = "out/paper";
+const FOLDER: &str = "out/paper";
 
-/// Recomputes the paper, writes report, claims, figures and data into `out`, and tells the verdicts on `terminal`.
-pub fn run(out: Option<&Path>, json: bool, terminal: &mut dyn Write) -> Result<()> {
-    let out = out.unwrap_or(Path::new(FOLDER));
+/// Recomputes the paper, writes report, claims, figures and data, and tells the verdicts on the terminal.
+pub fn run(args: &Paper) -> Outcome {
+    let out = args.out.as_deref().unwrap_or(Path::new(FOLDER));
+    let text = recompute(out, args.json).map_err(Failure::work)?;
+    terminal::show(&text);
+    Ok(Status::Done)
+}
+
+/// The whole, and what the terminal shows of it.
+fn recompute(out: &Path, json: bool) -> Result<String> {
     let findings = Findings::new()?;
     let claims = claims(&findings);
     let plots = plots(&findings);
     write(out, &findings, &claims, &plots)?;
-    let text = if json { claims::json(&claims) } else { table(&claims, out) };
-    terminal.write_all(text.as_bytes()).map_err(|e| Error::new(format!("the terminal does not take the result: {e}")))
+    Ok(if json { claims::json(&claims) } else { table(&claims, out) })
 }
 
 /// Every claim: the paper's sentences in its order, then P1 to P10, then independent numbers.

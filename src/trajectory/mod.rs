@@ -1,5 +1,13 @@
 //! Named, unit-bearing columns over time: what a simulation computes and what a log records.
 
+mod csv;
+#[cfg(feature = "parquet")]
+mod parquet;
+
+pub use csv::CsvWriter;
+#[cfg(feature = "parquet")]
+pub use parquet::ParquetWriter;
+
 /// One quantity over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {

@@ -1,0 +1,172 @@
+//! The command line, and its help.
+
+use clap::{Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+use taut::quantity;
+use taut::solve::{Method, Solver};
+
+/// Belt-driven axes: described in a file, simulated exactly.
+#[derive(Debug, Parser)]
+#[command(name = "taut", version, max_term_width = 100, after_help = STATUS)]
+pub struct Args {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+const STATUS: &str = "\
+Start with:
+  taut init axis.toml
+  taut simulate axis.toml --out results
+
+Exit status: 0 done, 1 the work could not be done or ended early, 2 the input was wrong, 130 ended by Ctrl-C.";
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    Paper(Paper),
+    Init(Init),
+    Simulate(Simulate),
+}
+
+/// Recompute the paper of Sollmann and Jouaneh (2011): every table, figure and claim.
+///
+/// Writes report.html, claims.json, each figure as SVG and PNG and its curves as CSV, and prints each claim with its verdict.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  taut paper --out out/paper")]
+pub struct Paper {
+    /// The folder to write results into; it is made if it is not there [default: out/paper]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print the claims as JSON, the same as in claims.json
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Write a commented case file to start from.
+///
+/// The file describes a complete axis and two experiments, and simulates as it stands; its remarks name every key that can
+/// be added.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  taut init axis.toml")]
+pub struct Init {
+    /// The file to write, such as axis.toml
+    pub file: PathBuf,
+    /// Replace the file if it exists
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Run the experiments of a case file.
+///
+/// Prints the key figures of each experiment. With --out it also writes, for each experiment, every quantity over time
+/// (CSV, Parquet), its stick and slip events and its plots, and for all of them a report, a summary as JSON, and the case
+/// file that repeats the run.
+///
+/// A length, a force or a time on the command line is written as in the case file: "0.5 kg", 0.1ms, "24 V".
+#[derive(Debug, clap::Args)]
+#[command(after_help = SIMULATE)]
+pub struct Simulate {
+    /// The case file
+    pub case: PathBuf,
+    /// The folder to write results into; it is made if it is not there
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Change one value of the case for this run, as often as needed
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub changes: Vec<String>,
+    /// Run only the experiment of this name, as often as needed
+    #[arg(long = "experiment", value_name = "NAME")]
+    pub experiments: Vec<String>,
+    /// How the equations are solved
+    #[arg(long, value_enum, default_value_t)]
+    pub solver: SolverName,
+    /// Step of --solver table3 [default: 0.1 ms]
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
+    pub step: Option<f64>,
+    /// Formula of --solver table3 [default: rk4]
+    #[arg(long, value_enum)]
+    pub method: Option<MethodName>,
+    /// Formats of the quantities over time, separated by commas
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "FORMAT", default_value = "csv")]
+    pub format: Vec<Format>,
+    /// Leave out the report and the plots
+    #[arg(long)]
+    pub no_report: bool,
+    /// Print the summary as JSON, the same as in summary.json
+    #[arg(long)]
+    pub json: bool,
+    /// Print nothing but errors
+    #[arg(long, short, conflicts_with = "json")]
+    pub quiet: bool,
+}
+
+const SIMULATE: &str = "\
+Examples:
+  taut simulate axis.toml
+  taut simulate axis.toml --out results
+  taut simulate axis.toml --set cart.mass=\"0.5 kg\" --set experiment.0.until=2s
+  taut simulate axis.toml --experiment \"5 V pulse\" --json | jq .experiments[0].metrics
+  taut simulate axis.toml --solver table3 --step 1ms --out as-printed
+
+Ctrl-C ends a run early: what was computed until then is written and reported, with exit status 130.";
+
+/// How the equations are solved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum SolverName {
+    /// Exact to rounding: stick, slip and matrix exponentials
+    #[default]
+    Exact,
+    /// The friction function of the paper's Table 3 with a fixed step, to reproduce the paper
+    Table3,
+}
+
+/// A fixed-step formula.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum MethodName {
+    /// The classical Runge-Kutta formula of order 4
+    #[default]
+    Rk4,
+    /// The Dormand-Prince formula of order 5
+    Dp5,
+}
+
+/// A format of the quantities over time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// Text, with every digit that matters
+    Csv,
+    /// Columns of doubles with their units
+    #[cfg(feature = "parquet")]
+    Parquet,
+}
+
+impl Simulate {
+    /// The solver that is asked for.
+    pub fn solver(&self) -> taut::Result<Solver> {
+        match self.solver {
+            SolverName::Exact => match (self.step, self.method) {
+                (None, None) => Ok(Solver::Exact),
+                (step, _) => {
+                    let option = if step.is_some() { "--step" } else { "--method" };
+                    Err(taut::Error::new("the exact solver has no step and no formula to choose")
+                        .in_file(option)
+                        .next(format!("leave {option} out, or add --solver table3")))
+                }
+            },
+            SolverName::Table3 => Ok(Solver::Table3 {
+                step: self.step.unwrap_or(1e-4),
+                method: match self.method.unwrap_or_default() {
+                    MethodName::Rk4 => Method::RungeKutta4,
+                    MethodName::Dp5 => Method::DormandPrince5,
+                },
+            }),
+        }
+    }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let step = match text.parse() {
+        Ok(number) => number,
+        Err(_) => quantity::read(text, "s").map_err(|e| e.to_string())?,
+    };
+    if step > 0.0 && f64::is_finite(step) { Ok(step) } else { Err("a step above zero is needed, such as 0.1ms".into()) }
+}

@@ -1,0 +1,39 @@
+//! How a command ends.
+
+use taut::Error;
+
+/// The end of a command that has a result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// All was done: exit status 0.
+    Done,
+    /// The result says how far it came: exit status 1.
+    Incomplete,
+    /// A signal ended it early, what there was is written: exit status 128 and the signal's number.
+    Interrupted(u8),
+}
+
+/// The end of a command that has none.
+#[derive(Debug)]
+pub struct Failure {
+    /// What to tell.
+    pub error: Error,
+    /// 1 if the work could not be done, 2 if the input was wrong.
+    pub status: u8,
+}
+
+/// What a command returns.
+pub type Outcome = Result<Status, Failure>;
+
+impl Failure {
+    /// The input was right, and still the work could not be done: a full disk, say.
+    pub fn work(error: Error) -> Self {
+        Self { error, status: 1 }
+    }
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        Self { error, status: 2 }
+    }
+}

@@ -1,0 +1,75 @@
+//! `taut simulate`: runs the experiments of a case, and says what they show.
+
+mod curves;
+mod folder;
+mod page;
+mod plots;
+mod run;
+mod summary;
+mod table;
+
+use crate::args::Simulate;
+use crate::failure::{Failure, Outcome, Status};
+use crate::interrupt::Interrupt;
+use crate::terminal;
+use folder::Folder;
+use run::{Run, Setting};
+use summary::Summary;
+use taut::case::{Case, Experiment};
+use taut::solve::Ending;
+use taut::{Error, Result};
+
+/// Reads the case, simulates, measures, reports.
+pub fn run(args: &Simulate) -> Outcome {
+    let solver = args.solver()?;
+    let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
+    let case = Case::read_with(&args.case, &changes)?;
+    let experiments = chosen(&case, &args.experiments)?;
+    let folder = args.out.as_deref().map(Folder::create).transpose()?;
+    let interrupt = Interrupt::listen();
+    let setting = Setting { args, case: &case, solver, folder: folder.as_ref(), interrupt: &interrupt };
+
+    let mut runs = Vec::new();
+    for experiment in experiments {
+        runs.push(setting.run(experiment)?);
+        if interrupt.signal().is_some() {
+            break;
+        }
+    }
+    let summary = Summary::new(&case, solver, &runs);
+    if let Some(folder) = &folder {
+        folder.write_common(&setting, &summary, &runs).map_err(Failure::work)?;
+    }
+    if args.json {
+        terminal::show(&summary.json());
+    } else if !args.quiet {
+        terminal::show(&table::text(&case, solver, &runs, folder.as_ref()));
+    }
+    Ok(status(&runs, &interrupt))
+}
+
+/// The experiments named on the command line, in the file's order; all if none is named.
+fn chosen<'a>(case: &'a Case, names: &[String]) -> Result<Vec<&'a Experiment>> {
+    if let Some(name) = names.iter().find(|name| case.experiments.iter().all(|e| e.name != **name)) {
+        let known: Vec<String> = case.experiments.iter().map(|e| format!("\"{}\"", e.name)).collect();
+        return Err(Error::new(format!("there is no experiment \"{name}\""))
+            .in_file("--experiment")
+            .allowed(known.join(", "))
+            .next("name one of these, or leave --experiment out to run them all"));
+    }
+    Ok(case.experiments.iter().filter(|e| names.is_empty() || names.contains(&e.name)).collect())
+}
+
+/// How it ended, and a word about every run that did not reach its end.
+fn status(runs: &[Run], interrupt: &Interrupt) -> Status {
+    for run in runs {
+        if let Some(told) = table::early_end(&run.outcome.ending) {
+            terminal::show_error(&format!("the run \"{}\" {told}", run.experiment.name));
+        }
+    }
+    match interrupt.signal() {
+        Some(signal) => Status::Interrupted(signal),
+        None if runs.iter().all(|run| run.outcome.ending == Ending::Complete) => Status::Done,
+        None => Status::Incomplete,
+    }
+}

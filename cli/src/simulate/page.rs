@@ -1,0 +1,74 @@
+//! The report: one HTML file.
+
+use super::plots::Named;
+use super::run::Run;
+use super::summary::load_unit;
+use super::table::{early_end, lines};
+use taut::case::Case;
+use taut::number;
+use taut::report::{Callout, Cell, Page, Table, stage_drawing};
+use taut::solve::Solver;
+
+/// Events shown; the rest is in the events' own file.
+const MOST_EVENTS: usize = 200;
+
+/// The page for these runs; `text` is the case that repeats them.
+pub fn page(case: &Case, text: &str, solver: Solver, runs: &[Run], figures: &[Vec<Named>]) -> Page {
+    let how = match solver {
+        Solver::Exact => "Solved exactly: modes and matrix exponentials, events located to rounding.",
+        Solver::Table3 { .. } => {
+            "Solved with the friction function of the paper's Table 3 and a fixed step: a reproduction, not exact."
+        }
+    };
+    let mut page = Page::new(case.title.clone()).subtitle(how);
+    page.section("The stage");
+    page.drawing(&stage_drawing(&case.stage), "Symbols, values and positive directions.");
+    for (run, figures) in runs.iter().zip(figures) {
+        experiment(&mut page, run, figures, solver);
+    }
+    page.section("The case");
+    page.prose("This text repeats the run.");
+    page.embed("case.toml", text);
+    page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
+    page
+}
+
+fn experiment(page: &mut Page, run: &Run, figures: &[Named], solver: Solver) {
+    page.section(&run.experiment.name);
+    if let Some(told) = early_end(&run.outcome.ending) {
+        page.callout(Callout::Fails, "The whole run", format!("This run {told}."));
+    }
+    let mut table = Table::new("").column("Quantity", "").column("Value", "");
+    for (name, value) in lines(run, solver) {
+        table.row([Cell::from(name), Cell::from(value.replace('-', "−"))]);
+    }
+    page.table(&table);
+    for (_, figure) in figures {
+        page.figure(figure);
+    }
+    events(page, run);
+}
+
+fn events(page: &mut Page, run: &Run) {
+    let events = &run.outcome.events;
+    if events.is_empty() {
+        return;
+    }
+    page.subsection("Events");
+    let mut table = Table::new("").column("Time", "s").column("Body", "").column("From", "").column("To", "");
+    table = table.column("Load", "");
+    for event in events.iter().take(MOST_EVENTS) {
+        table.row([
+            Cell::fixed(event.time, 9),
+            Cell::from(event.body.name()),
+            Cell::from(event.from.word()),
+            Cell::from(event.to.word()),
+            Cell::Number(number::engineering(event.load, load_unit(event.body), 4)),
+        ]);
+    }
+    page.table(&table);
+    if events.len() > MOST_EVENTS {
+        let file = format!("{}.events.csv", run.experiment.file_name());
+        page.prose(format!("{} more are in {file}.", events.len() - MOST_EVENTS));
+    }
+}

@@ -1,0 +1,119 @@
+//! The plots of a run.
+
+use super::curves::Curves;
+use super::run::Run;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use taut::Result;
+use taut::case::Case;
+use taut::report::{Axis, Colour, Figure, Panel, Series, Style};
+use taut::stage::AmplifierMode;
+
+/// A figure and its name in file names.
+pub type Named = (&'static str, Figure);
+
+/// Every plot of a run, in the order of a report; none if its curves were not kept.
+pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
+    let Some(curves) = &run.curves else { return Vec::new() };
+    let figure = |name: &str| Figure::new(format!("{}: {name}", run.experiment.name), Axis::new("Time", "s"));
+    let millimetres = || Axis::new("Position", "m").shown_as("mm", 1e3);
+    let plot = Plot { curves };
+
+    let mut input = figure("input");
+    let commanded = case.stage.amplifier.mode == AmplifierMode::Current;
+    if curves.get("input").is_some() {
+        let axis = Axis::new("Input", if commanded { "A" } else { "V" });
+        input = input.panel(plot.panel(axis, &[("input", "u")]));
+    }
+    input = input
+        .panel(plot.panel(Axis::new("Voltage", "V"), &[("voltage", "motor voltage")]))
+        .panel(plot.panel(Axis::new("Current", "A"), &[("current", "motor current")]))
+        .caption("What the motor gets, and the current it draws.");
+
+    let bodies = [("drive", "drive pulley r φ₁"), ("cart", "cart x"), ("idler", "idler pulley r φ₃")];
+    let positions = figure("positions")
+        .panel(plot.panel(millimetres(), &bodies).weight(2.0))
+        .panel(plot.panel(Axis::new("r φ₁ − x", "m").shown_as("µm", 1e6), &[("stretch 1", "r φ₁ − x")]))
+        .caption(
+            "Positions along the belt, and by how much an encoder at the drive pulley misses the cart. \
+             The three positions nearly coincide: zoom in to see them part.",
+        );
+    let speeds = [("drive speed", "drive pulley r φ̇₁"), ("cart speed", "cart ẋ"), ("idler speed", "idler pulley r φ̇₃")];
+    let speeds = figure("speeds")
+        .panel(plot.panel(Axis::new("Speed", "m/s").shown_as("mm/s", 1e3), &speeds))
+        .caption("Speeds along the belt.");
+    let spans = [("stretch 1", "span 1"), ("stretch 2", "span 2"), ("stretch 3", "span 3")];
+    let stretch = figure("stretch").panel(plot.panel(Axis::new("Stretch", "m").shown_as("µm", 1e6), &spans)).caption(
+        "Stretch of the spans: 1 from drive pulley to cart, 2 from cart to idler pulley, 3 from idler to drive pulley. \
+             Negative means shorter than at rest.",
+    );
+    let spans = [("force 1", "span 1"), ("force 2", "span 2"), ("force 3", "span 3")];
+    let forces = figure("forces")
+        .panel(plot.panel(Axis::new("Force", "N"), &spans))
+        .caption("Forces in the spans, without the belt's pretension.");
+    let pulleys = [("drive friction", "drive pulley"), ("idler friction", "idler pulley")];
+    let states = [("drive state", "drive pulley"), ("cart state", "cart"), ("idler state", "idler pulley")];
+    let friction = figure("friction")
+        .panel(plot.panel(Axis::new("Torque", "N m").shown_as("mN m", 1e3), &pulleys))
+        .panel(plot.panel(Axis::new("Force", "N"), &[("cart friction", "cart")]))
+        .panel(plot.panel(Axis::new("State", ""), &states))
+        .caption(
+            "What friction takes or holds, and the states: 1 forward, 0 stuck, −1 backward, 2 without dry friction.",
+        );
+    vec![
+        ("input", input),
+        ("positions", positions),
+        ("speeds", speeds),
+        ("stretch", stretch),
+        ("forces", forces),
+        ("friction", friction),
+    ]
+}
+
+struct Plot<'a> {
+    curves: &'a Curves,
+}
+
+impl Plot<'_> {
+    /// A panel with these curves and their names in the legend.
+    fn panel(&self, axis: Axis, curves: &[(&str, &str)]) -> Panel {
+        let colours = [Colour::Blue, Colour::Vermillion, Colour::Green];
+        let styles = [Style::Solid, Style::Solid, Style::Dashed];
+        let mut panel = Panel::new(axis);
+        for (i, (curve, name)) in curves.iter().enumerate() {
+            if let Some((x, y)) = self.curves.get(curve) {
+                let name = if curves.len() > 1 { *name } else { "" };
+                panel = panel.series(Series::new(name, x, y).colour(colours[i % 3]).style(styles[i % 3]));
+            }
+        }
+        panel
+    }
+}
+
+/// Writes every figure as SVG and PNG, on all processors.
+pub fn write(folder: &Path, runs: &[Run], figures: &[Vec<Named>]) -> Result<()> {
+    let mut jobs = Vec::new();
+    for (run, figures) in runs.iter().zip(figures) {
+        for (name, figure) in figures {
+            jobs.push((folder.join(format!("{}-{name}", run.experiment.file_name())), figure));
+        }
+    }
+    let next = AtomicUsize::new(0);
+    let work = || -> Result<()> {
+        while let Some((path, figure)) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
+            // Names may hold points: endings are added, not replaced.
+            figure.write_svg(format!("{}.svg", path.display()))?;
+            figure.write_png(format!("{}.png", path.display()))?;
+        }
+        Ok(())
+    };
+    let workers = std::thread::available_parallelism().map_or(1, usize::from).min(jobs.len().max(1));
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = (1..workers).map(|_| scope.spawn(work)).collect();
+        let mine = work();
+        threads.into_iter().fold(mine, |done, thread| match thread.join() {
+            Ok(theirs) => done.and(theirs),
+            Err(panic) => std::panic::resume_unwind(panic),
+        })
+    })
+}

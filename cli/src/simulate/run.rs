@@ -1,0 +1,166 @@
+//! One experiment: its rows go to files, meter and plots as they come, and none is kept.
+
+use super::curves::Curves;
+use super::folder::Folder;
+use crate::args::{Format, Simulate};
+use crate::failure::Failure;
+use crate::interrupt::Interrupt;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+use taut::case::{Case, Experiment};
+use taut::metrics::{Meter, Metrics};
+use taut::solve::{self, Flow, Solver};
+#[cfg(feature = "parquet")]
+use taut::trajectory::ParquetWriter;
+use taut::trajectory::{CsvWriter, Trajectory};
+use taut::{Error, Result};
+
+/// How long a run may take before its progress is shown.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// What all runs of a command share.
+pub struct Setting<'a> {
+    pub args: &'a Simulate,
+    pub case: &'a Case,
+    pub solver: Solver,
+    pub folder: Option<&'a Folder>,
+    pub interrupt: &'a Interrupt,
+}
+
+/// What is known of an experiment after it ran.
+pub struct Run<'a> {
+    pub experiment: &'a Experiment,
+    pub outcome: solve::Outcome,
+    pub metrics: Metrics,
+    /// Its curves, where plots are wanted.
+    pub curves: Option<Curves>,
+    /// Its files, as paths within the folder.
+    pub files: Vec<String>,
+    /// How long solving and writing took.
+    pub took: Duration,
+}
+
+impl<'a> Setting<'a> {
+    /// Runs `experiment`.
+    pub fn run(&self, experiment: &'a Experiment) -> std::result::Result<Run<'a>, Failure> {
+        let begin = Instant::now();
+        let stage = &self.case.stage;
+        let mut writers = self.writers(experiment).map_err(Failure::work)?;
+        let mut meter = Meter::new(stage);
+        let mut curves = (self.folder.is_some() && !self.args.no_report).then(|| Curves::new(stage));
+        let mut progress = Progress::new(experiment, self.args.quiet);
+        let mut trouble: Option<Error> = None;
+
+        let mut take = |block: &Trajectory| {
+            meter.take(block);
+            if let Some(curves) = &mut curves {
+                curves.take(block);
+            }
+            trouble = writers.iter_mut().find_map(|writer| writer.write(block).err());
+            progress.advance(block.len() as u64, begin);
+            if trouble.is_some() || self.interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue }
+        };
+        let outcome = solve::stream(stage, experiment, self.solver, &mut take)?;
+        progress.clear();
+        if let Some(trouble) = trouble {
+            return Err(Failure::work(trouble));
+        }
+
+        let mut files = Vec::new();
+        for writer in writers {
+            files.push(format!("{}.{}", experiment.file_name(), writer.ending()));
+            writer.finish().map_err(Failure::work)?;
+        }
+        if let Some(folder) = self.folder {
+            files.push(folder.write_events(experiment, &outcome.events).map_err(Failure::work)?);
+        }
+        let metrics = meter.finish(&outcome.events);
+        Ok(Run { experiment, outcome, metrics, curves, files, took: begin.elapsed() })
+    }
+
+    fn writers(&self, experiment: &Experiment) -> Result<Vec<Writer>> {
+        let Some(folder) = self.folder else { return Ok(Vec::new()) };
+        let mut formats = self.args.format.clone();
+        formats.dedup();
+        let create = |format: &Format| match format {
+            Format::Csv => CsvWriter::create(folder.path(&format!("{}.csv", experiment.file_name()))).map(Writer::Csv),
+            #[cfg(feature = "parquet")]
+            Format::Parquet => {
+                let path = folder.path(&format!("{}.parquet", experiment.file_name()));
+                ParquetWriter::create(path).map(|writer| Writer::Parquet(Box::new(writer)))
+            }
+        };
+        formats.iter().map(create).collect()
+    }
+}
+
+/// A file that rows go to.
+enum Writer {
+    Csv(CsvWriter),
+    #[cfg(feature = "parquet")]
+    Parquet(Box<ParquetWriter>),
+}
+
+impl Writer {
+    fn write(&mut self, block: &Trajectory) -> Result<()> {
+        match self {
+            Writer::Csv(writer) => writer.write(block),
+            #[cfg(feature = "parquet")]
+            Writer::Parquet(writer) => writer.write(block),
+        }
+    }
+
+    fn finish(self) -> Result<()> {
+        match self {
+            Writer::Csv(writer) => writer.finish(),
+            #[cfg(feature = "parquet")]
+            Writer::Parquet(writer) => writer.finish(),
+        }
+    }
+
+    fn ending(&self) -> &'static str {
+        match self {
+            Writer::Csv(_) => "csv",
+            #[cfg(feature = "parquet")]
+            Writer::Parquet(_) => "parquet",
+        }
+    }
+}
+
+/// A bar on standard error, for runs that take longer than one likes to wait.
+struct Progress {
+    bar: Option<ProgressBar>,
+    name: String,
+    rows: u64,
+    all: u64,
+    wanted: bool,
+}
+
+impl Progress {
+    fn new(experiment: &Experiment, quiet: bool) -> Self {
+        let wanted = !quiet && std::io::stderr().is_terminal();
+        Self { bar: None, name: experiment.name.clone(), rows: 0, all: experiment.samples(), wanted }
+    }
+
+    fn advance(&mut self, rows: u64, begin: Instant) {
+        self.rows += rows;
+        if self.bar.is_none() && self.wanted && begin.elapsed() > PATIENCE {
+            let bar = ProgressBar::new(self.all);
+            if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {percent} %, {eta} left") {
+                bar.set_style(style);
+            }
+            bar.set_message(self.name.clone());
+            self.bar = Some(bar);
+        }
+        if let Some(bar) = &self.bar {
+            bar.set_position(self.rows);
+        }
+    }
+
+    fn clear(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

@@ -1,0 +1,285 @@
+//! The summary as data: what `--json` prints and `summary.json` holds. Units are in the keys.
+
+use super::run::Run;
+use serde::Serialize;
+use taut::case::Case;
+use taut::metrics::{Metrics, Peak, SteadySpeed};
+use taut::plant::Body;
+use taut::solve::{Ending, Event, Method, Solver};
+use taut::stage::{AmplifierMode, Stage};
+
+/// Events listed; the rest is in the events' own file.
+const MOST_EVENTS: usize = 10_000;
+
+/// The whole summary.
+#[derive(Serialize)]
+pub struct Summary {
+    title: String,
+    version: &'static str,
+    solver: SolverUsed,
+    stage: StageFigures,
+    experiments: Vec<ExperimentFigures>,
+}
+
+#[derive(Serialize)]
+struct SolverUsed {
+    name: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    step_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    method: Option<&'static str>,
+}
+
+#[derive(Serialize)]
+struct StageFigures {
+    pulley_radius_m: f64,
+    cart_mass_kg: f64,
+    drive_pulley_inertia_kg_m2: f64,
+    idler_pulley_inertia_kg_m2: f64,
+    rotor_inertia_at_pulley_kg_m2: f64,
+    /// Everything that moves, as if it were at the drive pulley.
+    total_inertia_kg_m2: f64,
+    gear_ratio: f64,
+    belt_stiffness_newton_per_m: [f64; 3],
+}
+
+#[derive(Serialize)]
+struct ExperimentFigures {
+    name: String,
+    files: Vec<String>,
+    ending: EndingTold,
+    metrics: MetricsTold,
+    events: Vec<EventTold>,
+    events_not_listed: usize,
+    cost: CostTold,
+}
+
+#[derive(Serialize)]
+struct EndingTold {
+    word: &'static str,
+    time_s: f64,
+}
+
+#[derive(Serialize)]
+struct MetricsTold {
+    end_time_s: f64,
+    final_drive_angle_rad: f64,
+    final_drive_travel_m: f64,
+    final_cart_position_m: f64,
+    final_cart_speed_m_s: f64,
+    #[serde(rename = "peak_cart_speed_m_s")]
+    cart_speed: PeakTold,
+    #[serde(rename = "peak_drive_speed_m_s")]
+    drive_speed: PeakTold,
+    steady_speed: Option<SteadyTold>,
+    #[serde(rename = "peak_span_stretch_m")]
+    stretch: [PeakTold; 3],
+    #[serde(rename = "peak_span_force_N")]
+    force: [PeakTold; 3],
+    #[serde(rename = "peak_motor_current_A")]
+    current: PeakTold,
+    #[serde(rename = "peak_drive_travel_minus_cart_m")]
+    encoder_error: PeakTold,
+    final_drive_travel_minus_cart_m: f64,
+    stop_time_s: Option<f64>,
+    settled: bool,
+    event_counts: [CountTold; 3],
+}
+
+#[derive(Serialize)]
+struct PeakTold {
+    value: f64,
+    time_s: f64,
+}
+
+#[derive(Serialize)]
+struct SteadyTold {
+    cart_speed_m_s: f64,
+    change_m_s: f64,
+    reached: bool,
+    analytic_m_s: Option<f64>,
+    input: f64,
+    input_unit: &'static str,
+    from_s: f64,
+    to_s: f64,
+}
+
+#[derive(Serialize)]
+struct CountTold {
+    body: &'static str,
+    stops: u64,
+    starts: u64,
+    reversals: u64,
+}
+
+#[derive(Serialize)]
+struct EventTold {
+    time_s: f64,
+    body: &'static str,
+    from: &'static str,
+    to: &'static str,
+    load: f64,
+    load_unit: &'static str,
+}
+
+#[derive(Serialize)]
+struct CostTold {
+    samples: u64,
+    input_pieces: u64,
+    modes: u64,
+    propagators: u64,
+    steps: u64,
+    looks: u64,
+    series: u64,
+    evaluations: u64,
+}
+
+impl Summary {
+    /// The summary of these runs.
+    pub fn new(case: &Case, solver: Solver, runs: &[Run]) -> Self {
+        Self {
+            title: case.title.clone(),
+            version: env!("CARGO_PKG_VERSION"),
+            solver: SolverUsed::of(solver),
+            stage: StageFigures::of(&case.stage),
+            experiments: runs.iter().map(|run| ExperimentFigures::of(run, case.stage.amplifier.mode)).collect(),
+        }
+    }
+
+    /// As JSON, numbers to the last bit; what is no number is `null`.
+    pub fn json(&self) -> String {
+        let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
+        text.push('\n');
+        text
+    }
+}
+
+impl SolverUsed {
+    fn of(solver: Solver) -> Self {
+        match solver {
+            Solver::Exact => Self { name: "exact", step_s: None, method: None },
+            Solver::Table3 { step, method } => {
+                let method = match method {
+                    Method::RungeKutta4 => "rk4",
+                    Method::DormandPrince5 => "dp5",
+                };
+                Self { name: "table3", step_s: Some(step), method: Some(method) }
+            }
+        }
+    }
+}
+
+impl StageFigures {
+    fn of(stage: &Stage) -> Self {
+        let (n, r) = (stage.motor.gear_ratio, stage.pulley_radius);
+        let rotor = n * n * stage.motor.rotor_inertia;
+        let (j1, j2, m) = (stage.drive_pulley.inertia, stage.idler_pulley.inertia, stage.cart.mass);
+        Self {
+            pulley_radius_m: r,
+            cart_mass_kg: m,
+            drive_pulley_inertia_kg_m2: j1,
+            idler_pulley_inertia_kg_m2: j2,
+            rotor_inertia_at_pulley_kg_m2: rotor,
+            total_inertia_kg_m2: j1 + j2 + rotor + m * r * r,
+            gear_ratio: n,
+            belt_stiffness_newton_per_m: stage.belt.stiffness,
+        }
+    }
+}
+
+impl ExperimentFigures {
+    fn of(run: &Run, mode: AmplifierMode) -> Self {
+        let (metrics, outcome) = (&run.metrics, &run.outcome);
+        let (word, time_s) = match outcome.ending {
+            Ending::Complete => ("complete", metrics.end),
+            Ending::TooManyEvents { time } => ("too_many_events", time),
+            Ending::Diverged { time } => ("diverged", time),
+            Ending::Interrupted { time } => ("interrupted", time),
+        };
+        let cost = outcome.cost;
+        Self {
+            name: run.experiment.name.clone(),
+            files: run.files.clone(),
+            ending: EndingTold { word, time_s },
+            metrics: MetricsTold::of(metrics, mode),
+            events: outcome.events.iter().take(MOST_EVENTS).map(EventTold::of).collect(),
+            events_not_listed: outcome.events.len().saturating_sub(MOST_EVENTS),
+            cost: CostTold {
+                samples: cost.samples,
+                input_pieces: cost.pieces,
+                modes: cost.modes,
+                propagators: cost.propagators,
+                steps: cost.steps,
+                looks: cost.looks,
+                series: cost.series,
+                evaluations: cost.evaluations,
+            },
+        }
+    }
+}
+
+impl MetricsTold {
+    fn of(metrics: &Metrics, mode: AmplifierMode) -> Self {
+        let count = |body: Body| {
+            let count = metrics.events[body.index()];
+            CountTold { body: body.key(), stops: count.stops, starts: count.starts, reversals: count.reversals }
+        };
+        Self {
+            end_time_s: metrics.end,
+            final_drive_angle_rad: metrics.final_drive_angle,
+            final_drive_travel_m: metrics.final_drive_travel,
+            final_cart_position_m: metrics.final_cart_position,
+            final_cart_speed_m_s: metrics.final_cart_speed,
+            cart_speed: metrics.peak_cart_speed.into(),
+            drive_speed: metrics.peak_drive_speed.into(),
+            steady_speed: metrics.steady_speed.map(|steady| SteadyTold::of(steady, mode)),
+            stretch: metrics.peak_stretch.map(PeakTold::from),
+            force: metrics.peak_force.map(PeakTold::from),
+            current: metrics.peak_current.into(),
+            encoder_error: metrics.peak_encoder_error.into(),
+            final_drive_travel_minus_cart_m: metrics.final_drive_travel - metrics.final_cart_position,
+            stop_time_s: metrics.stop_time,
+            settled: metrics.settled,
+            event_counts: Body::ALL.map(count),
+        }
+    }
+}
+
+impl From<Peak> for PeakTold {
+    fn from(peak: Peak) -> Self {
+        Self { value: peak.value, time_s: peak.time }
+    }
+}
+
+impl SteadyTold {
+    fn of(steady: SteadySpeed, mode: AmplifierMode) -> Self {
+        Self {
+            cart_speed_m_s: steady.value,
+            change_m_s: steady.change,
+            reached: steady.reached,
+            analytic_m_s: steady.analytic,
+            input: steady.input,
+            input_unit: if mode == AmplifierMode::Current { "A" } else { "V" },
+            from_s: steady.stretch.0,
+            to_s: steady.stretch.1,
+        }
+    }
+}
+
+impl EventTold {
+    fn of(event: &Event) -> Self {
+        Self {
+            time_s: event.time,
+            body: event.body.key(),
+            from: event.from.word(),
+            to: event.to.word(),
+            load: event.load,
+            load_unit: load_unit(event.body),
+        }
+    }
+}
+
+/// The unit of an event's load: a force at the cart, a torque at a pulley.
+pub fn load_unit(body: Body) -> &'static str {
+    if body == Body::Cart { "N" } else { "N m" }
+}

@@ -1,0 +1,194 @@
+//! The summary for people: a small table for each experiment.
+
+use super::folder::Folder;
+use super::run::Run;
+use crate::terminal::bold;
+use std::fmt::Write;
+use std::time::Duration;
+use taut::case::Case;
+use taut::metrics::{Metrics, largest};
+use taut::number;
+use taut::plant::Body;
+use taut::solve::{Ending, Method, Solver};
+
+/// The text on the terminal.
+pub fn text(case: &Case, solver: Solver, runs: &[Run], folder: Option<&Folder>) -> String {
+    let mut text = format!("{}\n{}\n", bold(&case.title), solver_words(solver));
+    for run in runs {
+        let _ = write!(text, "\n{}\n", bold(&run.experiment.name));
+        if let Some(told) = early_end(&run.outcome.ending) {
+            let _ = writeln!(text, "  {:<16}{told}", "ended early");
+        }
+        for (name, words) in lines(run, solver) {
+            let _ = writeln!(text, "  {name:<16}{words}");
+        }
+        let _ = writeln!(text, "  {:<16}{}", "took", took(run.took));
+    }
+    text.push('\n');
+    match folder {
+        Some(folder) => text.push_str(&written(folder, runs)),
+        None => text.push_str("nothing was written: add --out DIR for files and a report\n"),
+    }
+    text
+}
+
+fn took(duration: Duration) -> String {
+    number::engineering(duration.as_secs_f64(), "s", 3).replace('\u{a0}', " ")
+}
+
+/// A value with its unit for people, spaces and signs as a terminal and `grep` like them.
+pub fn value(value: f64, unit: &str) -> String {
+    number::engineering(value, unit, 5).replace(['\u{a0}', '\u{202f}'], " ").replace('−', "-")
+}
+
+/// A length of travel in mm, far ones in m.
+fn travel(metres: f64) -> String {
+    match metres.abs() {
+        m if m < 1e-4 && m > 0.0 => value(metres, "m"),
+        m if m < 10.0 => format!("{:.4} mm", metres * 1e3),
+        _ => value(metres, "m"),
+    }
+}
+
+/// A speed in mm/s, fast ones in m/s.
+fn speed(metres_per_second: f64) -> String {
+    match metres_per_second.abs() {
+        v if v < 1e-3 && v > 0.0 => value(metres_per_second, "m/s"),
+        v if v < 10.0 => format!("{:.2} mm/s", metres_per_second * 1e3),
+        _ => value(metres_per_second, "m/s"),
+    }
+}
+
+/// A time in ms, long ones in s.
+fn time(seconds: f64) -> String {
+    match seconds.abs() {
+        s if s < 1e-3 && s > 0.0 => value(seconds, "s"),
+        s if s < 1.0 => format!("{} ms", number::fixed(seconds * 1e3, 3).trim_end_matches('0').trim_end_matches('.')),
+        _ => value(seconds, "s"),
+    }
+}
+
+/// How a run ended that did not reach its end.
+pub fn early_end(ending: &Ending) -> Option<String> {
+    match *ending {
+        Ending::Complete => None,
+        Ending::TooManyEvents { time: at } => Some(format!(
+            "ended at {}: bodies stick and slip without end there, more often than a machine does",
+            time(at)
+        )),
+        Ending::Diverged { time: at } => {
+            Some(format!("ended at {}: its state is no number any more; a smaller --step may help", time(at)))
+        }
+        Ending::Interrupted { time: at } => Some(format!("was interrupted at {}", time(at))),
+    }
+}
+
+/// The key figures of a run with their names.
+pub fn lines(run: &Run, solver: Solver) -> Vec<(&'static str, String)> {
+    let metrics = &run.metrics;
+    let (span, stretch) = largest(&metrics.peak_stretch);
+    let (force_span, force) = largest(&metrics.peak_force);
+    let error = metrics.peak_encoder_error;
+    let left = metrics.final_drive_travel - metrics.final_cart_position;
+    vec![
+        (
+            "final position",
+            format!("cart {}, r φ₁ {}", travel(metrics.final_cart_position), travel(metrics.final_drive_travel)),
+        ),
+        ("steady speed", steady(metrics)),
+        (
+            "peak speed",
+            format!("cart {} at {}", speed(metrics.peak_cart_speed.value), time(metrics.peak_cart_speed.time)),
+        ),
+        ("peak stretch", format!("{} in span {span} at {}", value(stretch.value, "m"), time(stretch.time))),
+        ("peak force", format!("{} in span {force_span} at {}", value(force.value, "N"), time(force.time))),
+        ("peak current", format!("{} at {}", value(metrics.peak_current.value, "A"), time(metrics.peak_current.time))),
+        ("stop time", stop(metrics, solver)),
+        ("events", events(metrics, solver)),
+        (
+            "r φ₁ - x",
+            format!("at most {} at {}, {} at the end", value(error.value, "m"), time(error.time), value(left, "m")),
+        ),
+        ("cost", cost(run)),
+    ]
+}
+
+fn steady(metrics: &Metrics) -> String {
+    let Some(steady) = metrics.steady_speed else {
+        return "none: no constant input lasts 20 samples".into();
+    };
+    let balance = match steady.analytic {
+        Some(balance) => format!("forces balance at {}", speed(balance)),
+        None => "nothing limits the speed".into(),
+    };
+    if steady.reached {
+        format!("{}; {balance}", speed(steady.value))
+    } else {
+        let (reached, change) = (speed(steady.value), speed(steady.change));
+        format!("not reached: {reached} at the end, {change} of it in the last tenth; {balance}")
+    }
+}
+
+fn stop(metrics: &Metrics, solver: Solver) -> String {
+    match metrics.stop_time {
+        Some(0.0) if metrics.events.iter().all(|count| count.total() == 0) => "nothing moved".into(),
+        Some(at) => time(at),
+        None if matches!(solver, Solver::Table3 { .. }) => {
+            format!("none: Table 3 freezes speeds and creeps on, cart at {}", speed(metrics.final_cart_speed))
+        }
+        None => format!("still moving at the end, cart at {}", speed(metrics.final_cart_speed)),
+    }
+}
+
+fn events(metrics: &Metrics, solver: Solver) -> String {
+    if matches!(solver, Solver::Table3 { .. }) {
+        return "none: a fixed step locates none".into();
+    }
+    let total: u64 = metrics.events.iter().map(|count| count.total()).sum();
+    if total == 0 {
+        return "none".into();
+    }
+    let each: Vec<String> = Body::ALL
+        .iter()
+        .map(|body| (body, metrics.events[body.index()].total()))
+        .filter(|(_, count)| *count > 0)
+        .map(|(body, count)| format!("{} {count}", body.name()))
+        .collect();
+    format!("{total}: {}", each.join(", "))
+}
+
+fn cost(run: &Run) -> String {
+    let cost = run.outcome.cost;
+    let work = match cost.evaluations {
+        0 if cost.modes == 1 => format!("{} steps, 1 mode", cost.steps),
+        0 => format!("{} steps, {} modes", cost.steps, cost.modes),
+        n => format!("{} steps, {n} evaluations", cost.steps),
+    };
+    format!("{} rows, {work}", cost.samples)
+}
+
+fn solver_words(solver: Solver) -> String {
+    match solver {
+        Solver::Exact => "solved exactly".into(),
+        Solver::Table3 { step, method } => {
+            let method = match method {
+                Method::RungeKutta4 => "Runge-Kutta 4",
+                Method::DormandPrince5 => "Dormand-Prince 5",
+            };
+            format!("the paper's Table 3, {method}, step {}: a reproduction, not exact", value(step, "s"))
+        }
+    }
+}
+
+fn written(folder: &Folder, runs: &[Run]) -> String {
+    let mut text = format!("wrote in {}:\n", folder.shown());
+    for run in runs {
+        let _ = writeln!(text, "  {}", run.files.join("  "));
+    }
+    text.push_str("  summary.json  case.toml");
+    if runs.iter().any(|run| run.curves.is_some()) {
+        text.push_str("  report.html  plots/");
+    }
+    text.push('\n');
+    text
+}

@@ -1,0 +1,37 @@
+//! What reaches the terminal: errors in one form, colour only where it is seen, and no complaint about a closed pipe.
+
+use clap::error::ErrorKind;
+use std::fmt::Display;
+use std::io::{self, IsTerminal, Write};
+use std::process::ExitCode;
+
+/// Writes `error: …` to standard error.
+pub fn show_error(error: &impl Display) {
+    let word = paint(io::stderr().is_terminal(), "\u{1b}[1;31m", "error");
+    let _ = writeln!(io::stderr(), "{word}: {error}");
+}
+
+/// Writes `text` to standard output. Whoever closed the pipe has read enough: that is no error.
+pub fn show(text: &str) {
+    let mut out = io::stdout().lock();
+    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+}
+
+/// `text` in bold, if standard output is a terminal.
+pub fn bold(text: &str) -> String {
+    paint(io::stdout().is_terminal(), "\u{1b}[1m", text)
+}
+
+/// What clap has to say: help and version are answers, all else is a mistake in the input.
+pub fn show_help_or_mistake(told: &clap::Error) -> ExitCode {
+    let _ = told.print();
+    match told.kind() {
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => ExitCode::SUCCESS,
+        _ => ExitCode::from(2),
+    }
+}
+
+fn paint(terminal: bool, colour: &str, text: &str) -> String {
+    let wanted = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+    if terminal && wanted { format!("{colour}{text}\u{1b}[0m") } else { text.to_string() }
+}

@@ -1,0 +1,247 @@
+//! The commands as a user types them.
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+fn taut(folder: &Path) -> Command {
+    let mut command = Command::cargo_bin("taut").unwrap();
+    command.current_dir(folder);
+    command
+}
+
+fn table4() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/sollmann-jouaneh/table4.toml")
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).unwrap()
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// Names of everything in a folder, sorted.
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+/// The two pulses of Table 4, simulated into a fresh folder.
+fn simulated(more: &[&str]) -> TempDir {
+    let folder = TempDir::new().unwrap();
+    taut(folder.path()).arg("simulate").arg(table4()).args(["--out", "out"]).args(more).assert().success();
+    folder
+}
+
+#[test]
+fn init_then_simulate() {
+    let folder = TempDir::new().unwrap();
+    let first = taut(folder.path()).args(["init", "axis.toml"]).assert().success();
+    assert_eq!(text(&first.get_output().stdout), "wrote axis.toml\nnext: taut simulate axis.toml --out results\n");
+    let again = taut(folder.path()).args(["init", "axis.toml"]).assert().code(2);
+    assert_eq!(
+        text(&again.get_output().stderr),
+        "error: axis.toml: this file exists already, and nothing was written\n  next: choose another name, or replace it with --force\n"
+    );
+    taut(folder.path()).args(["init", "axis.toml", "--force"]).assert().success();
+    let run = taut(folder.path()).args(["simulate", "axis.toml", "--out", "results"]).assert().success();
+    let out = text(&run.get_output().stdout);
+    for word in
+        ["My axis", "final position", "steady speed", "peak stretch", "stop time", "events", "cost", "report.html"]
+    {
+        assert!(out.contains(word), "{word} is not in\n{out}");
+    }
+    assert!(run.get_output().stderr.is_empty());
+}
+
+#[test]
+fn the_numbers_of_the_paper() {
+    let folder = simulated(&["--no-report"]);
+    let summary = json(&folder.path().join("out/summary.json"));
+    let golden =
+        [("5 V pulse", 0.053744890394, 0.053746653033, [6, 6]), ("10 V pulse", 0.123487374321, 0.123487225459, [4, 4])];
+    for (experiment, (name, drive, cart, _)) in summary["experiments"].as_array().unwrap().iter().zip(golden) {
+        let metrics = &experiment["metrics"];
+        assert_eq!(experiment["name"], name);
+        assert!((metrics["final_drive_travel_m"].as_f64().unwrap() - drive).abs() < 1e-9);
+        assert!((metrics["final_cart_position_m"].as_f64().unwrap() - cart).abs() < 1e-9);
+        assert_eq!(metrics["settled"], true);
+        assert_eq!(experiment["ending"]["word"], "complete");
+    }
+    for (experiment, (.., counts)) in summary["experiments"].as_array().unwrap().iter().zip(golden) {
+        let count = |key: &str| -> u64 {
+            let bodies = experiment["metrics"]["event_counts"].as_array().unwrap();
+            bodies.iter().map(|body| body[key].as_u64().unwrap()).sum()
+        };
+        assert_eq!([count("stops"), count("starts")], counts);
+    }
+}
+
+#[test]
+fn the_folder_holds_what_it_should_and_nothing_else() {
+    let folder = simulated(&["--format", "csv"]);
+    let out = folder.path().join("out");
+    assert_eq!(names(folder.path()), ["out"]);
+    let top = [
+        "10-v-pulse.csv",
+        "10-v-pulse.events.csv",
+        "5-v-pulse.csv",
+        "5-v-pulse.events.csv",
+        "case.toml",
+        "plots",
+        "report.html",
+        "summary.json",
+    ];
+    assert_eq!(names(&out), top);
+    let plots = ["forces", "friction", "input", "positions", "speeds", "stretch"];
+    let mut expected = Vec::new();
+    for run in ["10-v-pulse", "5-v-pulse"] {
+        for plot in plots {
+            expected.extend([format!("{run}-{plot}.png"), format!("{run}-{plot}.svg")]);
+        }
+    }
+    assert_eq!(names(&out.join("plots")), expected);
+    let report = fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(report.starts_with("<!DOCTYPE html>") && report.contains("torque_constant"));
+    for outside in ["src=\"http", "href=\"http", "url(http"] {
+        assert!(!report.contains(outside), "the report asks for another file: {outside}");
+    }
+    let events = fs::read_to_string(out.join("5-v-pulse.events.csv")).unwrap();
+    assert!(events.starts_with("time_s,body,from,to,load\n0,drive,stuck,forward,"), "{events}");
+    assert_eq!(events.lines().count(), 16);
+}
+
+#[test]
+fn the_table_reads_back_to_the_bits_that_were_computed() {
+    use taut::solve::{Solver, simulate};
+    let folder = simulated(&["--no-report"]);
+    let csv = fs::read_to_string(folder.path().join("out/5-v-pulse.csv")).unwrap();
+    let mut lines = csv.lines();
+    assert_eq!(
+        lines.next().unwrap(),
+        "time_s,voltage_V,drive_angle_rad,drive_speed_rad_s,cart_position_m,cart_speed_m_s,idler_angle_rad,\
+         idler_speed_rad_s,motor_current_A,span1_force_N,span2_force_N,span3_force_N,drive_friction_N_m,\
+         cart_friction_N,idler_friction_N_m,drive_state,cart_state,idler_state"
+    );
+    let case = taut::case::Case::read(table4()).unwrap();
+    let solution = simulate(&case.stage, &case.experiments[0], Solver::Exact).unwrap();
+    for (row, line) in lines.enumerate() {
+        for (column, number) in solution.trajectory.columns.iter().zip(line.split(',')) {
+            assert_eq!(number.parse::<f64>().unwrap().to_bits(), column.values[row].to_bits(), "{} {row}", column.name);
+        }
+    }
+}
+
+#[test]
+fn the_written_case_repeats_the_run() {
+    let folder = TempDir::new().unwrap();
+    let first = ["--set", "cart.mass=0.5 kg", "--set", "experiment.0.until=0.3 s", "--no-report", "--out", "one"];
+    taut(folder.path()).arg("simulate").arg(table4()).args(first).assert().success();
+    taut(folder.path()).args(["simulate", "one/case.toml", "--no-report", "--out", "two"]).assert().success();
+    for name in names(&folder.path().join("one")) {
+        let read = |run: &str| fs::read(folder.path().join(run).join(&name)).unwrap();
+        assert!(read("one") == read("two"), "{name} differs");
+    }
+    let summary = json(&folder.path().join("two/summary.json"));
+    assert_eq!(summary["stage"]["cart_mass_kg"], 0.5);
+    assert_eq!(summary["experiments"][0]["metrics"]["end_time_s"], 0.3);
+}
+
+/// A recorded input is copied into the folder, so that the case there does not depend on where it came from.
+#[test]
+fn the_written_case_brings_its_input_files_along() {
+    let folder = TempDir::new().unwrap();
+    let here = folder.path();
+    fs::create_dir_all(here.join("machine")).unwrap();
+    fs::write(here.join("u.csv"), "t,u\n0,5\n0.2,0\n").unwrap();
+    let case = fs::read_to_string(table4()).unwrap();
+    let case =
+        case.replace("{ pulse = \"5 V\", for = \"0.25 s\" }", "{ file = \"../u.csv\", time = \"t\", column = \"u\" }");
+    fs::write(here.join("machine/axis.toml"), case).unwrap();
+    taut(here).args(["simulate", "machine/axis.toml", "--no-report", "--out", "results/one"]).assert().success();
+    fs::remove_file(here.join("u.csv")).unwrap();
+    taut(here).args(["simulate", "results/one/case.toml", "--no-report", "--out", "two"]).assert().success();
+    let read = |run: &str| fs::read(here.join(run).join("5-v-pulse.csv")).unwrap();
+    assert!(read("results/one") == read("two"));
+}
+
+#[test]
+fn json_on_the_terminal_is_the_summary_in_the_folder() {
+    let folder = TempDir::new().unwrap();
+    let run = taut(folder.path())
+        .arg("simulate")
+        .arg(table4())
+        .args(["--json", "--no-report", "--out", "out", "--experiment", "10 V pulse"])
+        .assert()
+        .success();
+    let printed = text(&run.get_output().stdout);
+    assert_eq!(printed, fs::read_to_string(folder.path().join("out/summary.json")).unwrap());
+    let summary: Value = serde_json::from_str(printed).unwrap();
+    assert_eq!(summary["experiments"].as_array().unwrap().len(), 1);
+    assert_eq!(summary["solver"]["name"], "exact");
+    assert_eq!(summary["experiments"][0]["files"][0], "10-v-pulse.csv");
+    let quiet = taut(folder.path()).arg("simulate").arg(table4()).arg("--quiet").assert().success();
+    assert!(quiet.get_output().stdout.is_empty() && quiet.get_output().stderr.is_empty());
+}
+
+#[test]
+fn wrong_input_is_told_on_stderr_with_status_2() {
+    let folder = TempDir::new().unwrap();
+    let misspelt = taut::case::TEMPLATE.replace("torque_constant", "torque_konstant");
+    fs::write(folder.path().join("axis.toml"), misspelt).unwrap();
+    fs::write(folder.path().join("file"), "").unwrap();
+    let table4 = table4();
+    let table4 = table4.to_str().unwrap();
+    let wrong: [(&[&str], &str); 9] = [
+        (&["simulate", "nowhere.toml"], "error: nowhere.toml: this case file cannot be read: there is no such file"),
+        (&["simulate", "axis.toml"], "did you mean `torque_constant`?"),
+        (&["simulate", table4, "--set", "cart.mass=0.5 m"], "a length"),
+        (&["simulate", table4, "--experiment", "6 V pulse"], "allowed: \"5 V pulse\", \"10 V pulse\""),
+        (&["simulate", table4, "--step", "1ms"], "add --solver table3"),
+        (&["simulate", table4, "--solver", "table3", "--step", "0"], "a step above zero"),
+        (&["simulate", table4, "--out", "file"], "error: file: this is a file, not a folder"),
+        (&["simulate", table4, "--frobnicate"], "unexpected argument '--frobnicate'"),
+        (&["init", "."], "this is a folder"),
+    ];
+    for (args, message) in wrong {
+        let run = taut(folder.path()).args(args).assert().code(2);
+        let (out, err) = (text(&run.get_output().stdout), text(&run.get_output().stderr));
+        assert!(err.starts_with("error: ") && err.contains(message), "{args:?} says\n{err}");
+        assert!(out.is_empty() && !err.contains('\u{1b}'), "{args:?}");
+    }
+    assert_eq!(names(folder.path()), ["axis.toml", "file"]);
+}
+
+#[test]
+fn help_and_version_are_answers() {
+    let folder = TempDir::new().unwrap();
+    let help = taut(folder.path()).args(["simulate", "--help"]).assert().success();
+    let help = text(&help.get_output().stdout);
+    assert!(help.contains("Examples:") && help.contains("--set") && !help.contains('\u{1b}'));
+    taut(folder.path()).arg("--version").assert().success();
+    taut(folder.path()).assert().code(2);
+}
+
+#[test]
+fn a_run_that_diverges_says_how_far_it_came() {
+    let folder = TempDir::new().unwrap();
+    let far = ["--set", "experiment.0.until=9s", "--set", "experiment.0.every=10ms", "--experiment", "5 V pulse"];
+    let run = taut(folder.path())
+        .arg("simulate")
+        .arg(table4())
+        .args(["--solver", "table3", "--step", "10ms", "--out", "out", "--no-report"])
+        .args(far)
+        .assert()
+        .code(1);
+    let err = text(&run.get_output().stderr);
+    assert!(err.starts_with("error: the run \"5 V pulse\" ended at "), "{err}");
+    let summary = json(&folder.path().join("out/summary.json"));
+    assert_eq!(summary["experiments"][0]["ending"]["word"], "diverged");
+    assert!(names(&folder.path().join("out")).contains(&"5-v-pulse.csv".to_string()));
+}
