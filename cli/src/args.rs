@@ -22,8 +22,23 @@ Exit status: 0 done, 1 the work could not be done or ended early, 2 the input wa
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    Paper(Paper),
     Init(Init),
     Simulate(Simulate),
+}
+
+/// Recompute the paper of Sollmann and Jouaneh (2011): every table, figure and claim.
+///
+/// Writes report.html, claims.json, each figure as SVG and PNG and its curves as CSV, and prints each claim with its verdict.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  taut paper --out out/paper")]
+pub struct Paper {
+    /// The folder to write results into; it is made if it is not there [default: out/paper]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print the claims as JSON, the same as in claims.json
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Write a commented case file to start from.

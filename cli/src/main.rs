@@ -4,6 +4,7 @@ mod args;
 mod failure;
 mod init;
 mod interrupt;
+mod paper;
 mod simulate;
 mod terminal;
 
@@ -18,6 +19,7 @@ fn main() -> ExitCode {
         Err(told) => return terminal::show_help_or_mistake(&told),
     };
     let done = match args.command {
+        Command::Paper(args) => paper::run(&args),
         Command::Init(args) => init::run(&args),
         Command::Simulate(args) => simulate::run(&args),
     };
