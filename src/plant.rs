@@ -296,7 +296,7 @@ impl Plant {
             Motion::Forward => law.forward.viscous * speed + law.forward.coulomb,
             Motion::Backward => law.backward.viscous * speed - law.backward.coulomb,
             // The gear holds what it can, friction the rest.
-            Motion::Stuck => 0.0_f64.clamp(load.0, load.1.max(load.0)),
+            Motion::Stuck => load.0.max(0.0) + load.1.min(0.0),
         }
     }
 

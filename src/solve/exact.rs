@@ -393,7 +393,14 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         self.cost.series += 1;
         let series = law.series(&self.z, distance);
         let mut first: Option<(f64, Cause)> = None;
+        // Term 1 of the series is ż · distance: most guards are too far away to fall, as in `look`.
+        let change = std::array::from_fn(|j| series[1][j]);
+        let push = law.forcing * self.input_rate * distance;
+        let norm = law.growth_over(distance) * (law.norm(&change) + push * distance);
         for guard in &law.guards {
+            if self.standing(guard) > guard.dual * norm + guard.input.abs() * self.input_rate * distance {
+                continue;
+            }
             let mut coefficients: [f64; SERIES_ORDER + 1] = std::array::from_fn(|k| guard.value(&series[k]));
             coefficients[0] = self.standing(guard);
             let order = self.fresh_order(guard.cause);

@@ -71,9 +71,10 @@ impl<'a> Recorder<'a> {
         self.motion.clear();
     }
 
-    /// Computes every column of the block from the states.
+    /// Computes every column of the block from the states, column by column so that the loops become vector instructions.
     fn fill(&mut self) {
         let raw = &self.raw;
+        let rows = raw.len();
         let stage = self.plant.stage();
         let motor = &stage.motor;
         let r = stage.pulley_radius;
@@ -81,67 +82,93 @@ impl<'a> Recorder<'a> {
         let mut columns = self.block.columns.iter_mut().map(|column| &mut column.values);
         let mut next = || {
             let values = columns.next().expect("one column for each heading");
-            values.clear();
-            values
+            values.resize(rows, 0.0);
+            &mut values[..rows]
         };
-
-        next().extend((0..raw.len() as u64).map(|j| self.grid.time(self.rows + j)));
+        let first = self.rows;
+        put(next(), |j| self.grid.time(first + j as u64));
+        let voltage = next();
+        let [p1, w1, x, v, p3, w3] = std::array::from_fn(|state| {
+            let column = next();
+            put(column, |j| raw[j][state]);
+            &*column
+        });
         let kn = motor.back_emf_constant * motor.gear_ratio;
-        let current = |&[_, w1, _, _, _, _, i, u]: &[f64; 8]| match stage.amplifier.mode {
-            AmplifierMode::Current => gain * u,
-            AmplifierMode::Voltage if motor.inductance > 0.0 => i,
-            // i = (V_in − K_e n φ̇₁) / R                                          in (4)
-            AmplifierMode::Voltage => (gain * u - kn * w1) / motor.resistance,
-        };
+        let current = next();
         match stage.amplifier.mode {
-            AmplifierMode::Voltage => next().extend(raw.iter().map(|row| gain * row[INPUT])),
-            // What the terminals show at this current, the inductance apart: R i + K_e n φ̇₁
+            AmplifierMode::Voltage => {
+                put(voltage, |j| gain * raw[j][INPUT]);
+                if self.plant.has_current_state() {
+                    put(current, |j| raw[j][place::CURRENT]);
+                } else {
+                    // i = (V_in − K_e n φ̇₁) / R                                  in (4)
+                    put(current, |j| (gain * raw[j][INPUT] - kn * w1[j]) / motor.resistance);
+                }
+            }
             AmplifierMode::Current => {
-                next().extend(raw.iter().map(|row| motor.resistance * current(row) + kn * row[place::DRIVE_SPEED]))
+                put(current, |j| gain * raw[j][INPUT]);
+                // What the terminals show at this current, the inductance apart: R i + K_e n φ̇₁
+                put(voltage, |j| motor.resistance * current[j] + kn * w1[j]);
             }
         }
-        for state in 0..place::CURRENT {
-            next().extend(raw.iter().map(|row| row[state]));
-        }
-        next().extend(raw.iter().map(current));
+        let current = &*current;
         let [k1, k2, k3] = stage.belt.stiffness;
         let [c1, c2, c3] = stage.belt.damping;
-        let spans = |&[p1, w1, x, v, p3, w3, ..]: &[f64; 8]| {
-            let (p1, w1, p3, w3) = (r * p1, r * w1, r * p3, r * w3);
-            // f₁, f₂, f₃ after (1)-(3)
-            [k1 * (p1 - x) + c1 * (w1 - v), k2 * (x - p3) + c2 * (v - w3), k3 * (p3 - p1) + c3 * (w3 - w1)]
-        };
-        let [force1, force2, force3] = std::array::from_fn(|_| next());
-        let [drive, cart, idler] = std::array::from_fn(|_| next());
-        for (row, &[m1, m2, m3]) in raw.iter().zip(&self.motion) {
-            let [f1, f2, f3] = spans(row);
-            force1.push(f1);
-            force2.push(f2);
-            force3.push(f3);
-            let [w1, v, w3] = [row[place::DRIVE_SPEED], row[place::CART_SPEED], row[place::IDLER_SPEED]];
-            let (least, most) = self.plant.holding_torque(current(row));
-            let pull = r * f3 - r * f1;
-            drive.push(self.plant.friction_value(Body::DrivePulley, m1, w1, (least + pull, most + pull)));
-            cart.push(self.plant.friction_value(Body::Cart, m2, v, (f1 - f2, f1 - f2)));
-            let pull = r * f2 - r * f3;
-            idler.push(self.plant.friction_value(Body::IdlerPulley, m3, w3, (pull, pull)));
+        // f₁, f₂, f₃ after (1)-(3)
+        let (f1, f2, f3) = (next(), next(), next());
+        put(f1, |j| k1 * (r * p1[j] - x[j]) + c1 * (r * w1[j] - v[j]));
+        put(f2, |j| k2 * (x[j] - r * p3[j]) + c2 * (v[j] - r * w3[j]));
+        put(f3, |j| k3 * (r * p3[j] - r * p1[j]) + c3 * (r * w3[j] - r * w1[j]));
+        let (f1, f2, f3) = (&*f1, &*f2, &*f3);
+
+        let one = |load: f64| (load, load);
+        for (body, speed) in Body::ALL.into_iter().zip([w1, v, w3]) {
+            let friction = next();
+            // Stretches of rows in the same motion follow one formula.
+            let mut start = 0;
+            for same in self.motion.chunk_by(|a, b| a[body.index()] == b[body.index()]) {
+                let stretch = start..start + same.len();
+                let motion = same[0][body.index()];
+                let law = |j: usize, load| self.plant.friction_value(body, motion, speed[j], load);
+                let out = &mut friction[stretch];
+                match (motion, body) {
+                    (Motion::Stuck, Body::DrivePulley) => put(out, |j| {
+                        let j = start + j;
+                        let (least, most) = self.plant.holding_torque(current[j]);
+                        let pull = r * f3[j] - r * f1[j];
+                        law(j, (least + pull, most + pull))
+                    }),
+                    (Motion::Stuck, Body::Cart) => put(out, |j| law(start + j, one(f1[start + j] - f2[start + j]))),
+                    (Motion::Stuck, Body::IdlerPulley) => {
+                        put(out, |j| law(start + j, one(r * f2[start + j] - r * f3[start + j])))
+                    }
+                    _ => put(out, |j| law(start + j, (0.0, 0.0))),
+                }
+                start += same.len();
+            }
         }
         for body in 0..3 {
-            next().extend(self.motion.iter().map(|motion| f64::from(motion[body].code())));
+            put(next(), |j| f64::from(self.motion[j][body].code()));
         }
         if shows_input(self.plant) {
-            next().extend(raw.iter().map(|row| row[INPUT]));
+            put(next(), |j| raw[j][INPUT]);
         }
         if let Some(encoder) = stage.encoder {
             // In quadrature every line gives four counts; the nearest count is shown.
             let (position, counts) = match encoder.at {
-                EncoderPlace::Motor => (place::DRIVE_ANGLE, 4.0 * encoder.lines * motor.gear_ratio / (2.0 * PI)),
-                EncoderPlace::DrivePulley => (place::DRIVE_ANGLE, 4.0 * encoder.lines / (2.0 * PI)),
-                EncoderPlace::Cart => (place::CART_POSITION, 4.0 * encoder.lines),
+                EncoderPlace::Motor => (p1, 4.0 * encoder.lines * motor.gear_ratio / (2.0 * PI)),
+                EncoderPlace::DrivePulley => (p1, 4.0 * encoder.lines / (2.0 * PI)),
+                EncoderPlace::Cart => (x, 4.0 * encoder.lines),
             };
-            next().extend(raw.iter().map(|row| (row[position] * counts).round()));
+            put(next(), |j| (position[j] * counts).round());
         }
     }
+}
+
+/// column[j] = value(j).
+#[inline(always)]
+fn put(column: &mut [f64], value: impl Fn(usize) -> f64) {
+    column.iter_mut().enumerate().for_each(|(j, entry)| *entry = value(j));
 }
 
 /// Where the input stands in a row, behind the states.

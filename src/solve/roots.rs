@@ -2,14 +2,9 @@
 
 use super::propagator::SERIES_ORDER;
 
-/// Value of Σ c_k sᵏ.
-pub(crate) fn value(c: &[f64], s: f64) -> f64 {
-    c.iter().rev().fold(0.0, |sum, c| sum * s + c)
-}
-
-/// Its derivative.
-fn slope(c: &[f64], s: f64) -> f64 {
-    c.iter().enumerate().skip(1).rev().fold(0.0, |sum, (k, c)| sum * s + k as f64 * c)
+/// Value and derivative of Σ c_k sᵏ.
+fn value_and_slope(c: &[f64], s: f64) -> (f64, f64) {
+    c.iter().rev().fold((0.0, 0.0), |(p, slope), c| (p * s + c, slope * s + p))
 }
 
 /// The first s in (0, 1] at which Σ c_k sᵏ, not negative at 0, turns negative; `None` if it stays.
@@ -72,24 +67,23 @@ fn search(c: &[f64], b: &[f64], low: f64, high: f64) -> Option<f64> {
     search(c, &left[..n], low, middle).or_else(|| search(c, &right[..n], middle, high))
 }
 
-/// Newton's method kept within a bracket whose upper end is negative.
+/// Newton's method kept within a bracket whose upper end is negative; halving where it would leave it.
 fn polish(c: &[f64], mut low: f64, mut high: f64) -> f64 {
     let mut s = 0.5 * (low + high);
     for _ in 0..100 {
-        let p = value(c, s);
+        let (p, slope) = value_and_slope(c, s);
         if p < 0.0 {
             high = s;
         } else {
             low = s;
         }
-        let newton = s - p / slope(c, s);
-        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        if next == s || next <= low || next >= high {
-            return high;
+        let newton = s - p / slope;
+        if (newton - s).abs() <= f64::EPSILON * s {
+            return newton.clamp(0.0, 1.0);
         }
-        s = next;
+        s = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
     }
-    high
+    s
 }
 
 #[cfg(test)]
