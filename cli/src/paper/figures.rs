@@ -266,7 +266,7 @@ fn matched(f: &Findings, number: u8, what: What) -> Plot {
         let name = format!("Table 4, simulated, {volts}\u{a0}V");
         let heading = what.heading("table4", volts);
         let style = if i == 1 { Style::Solid } else { Style::Dashed };
-        curves.push(Curve::new(name, heading, what.of(&f.runs.table4[i]), Colour::Grey).style(style));
+        curves.push(Curve::new(name, heading, what.of(&f.runs.table4[i]), Colour::Vermillion).style(style));
     }
     let m = &f.matched;
     let (at_5, at_10, of) = match what {
@@ -276,7 +276,7 @@ fn matched(f: &Findings, number: u8, what: What) -> Plot {
     over_time(number, format!("{}, parameters of Table 2", what.word()), &f.runs.table2[0].time)
         .panel(what.axis(), 1.3, curves)
         .caption(format!(
-            "In grey, for comparison, the non-linear model of Table 4, simulated. The linear set differs \
+            "In the second colour, for comparison, the non-linear model of Table 4, simulated. The linear set differs \
              from it in {of} by {} at 5 V and {} at 10 V. {NO_MEASUREMENT}",
             percent(at_5),
             percent(at_10)

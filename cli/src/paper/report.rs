@@ -333,19 +333,10 @@ impl Report<'_> {
              hold, confirmed with a remark if only \
              those marked “further” fail, and not confirmed otherwise. The same is in " code { "claims.json" } "."
         });
-        let mut table = Table::new("")
-            .column("Claim", "")
-            .column("Number", "")
-            .column("Value", "")
-            .column("Rule", "")
-            .column("", "");
+        let mut table =
+            Table::new("").column("Claim and number", "").column("Value", "").column("Rule", "").column("", "");
         for claim in self.claims {
             for (i, check) in claim.checks.iter().enumerate() {
-                let name = if i == 0 {
-                    html! { code { (claim.id) } }
-                } else {
-                    html! {}
-                };
                 let holds = check.rule.holds(check.value);
                 let kind = match (holds, check.decides) {
                     (true, _) => Callout::Holds,
@@ -354,8 +345,7 @@ impl Report<'_> {
                 };
                 let what = if check.decides { check.what.clone() } else { format!("further: {}", check.what) };
                 table.row([
-                    name.into(),
-                    Cell::Markup(symbols(&what)),
+                    Cell::Markup(html! { @if i == 0 { b { code { (claim.id) } } br; } (symbols(&what)) }),
                     Cell::Number(value(check)),
                     rule(check).into(),
                     kind.badge(if holds { "holds" } else { "fails" }).into(),
