@@ -9,7 +9,7 @@ use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::Motion;
 use crate::plant::{Body, Form, Plant, State, place};
-use crate::signal::Signal;
+use crate::signal::Piece;
 use crate::trajectory::Trajectory;
 
 /// Half-width of Table 3's band of "zero" speed, rad/s for the pulleys and m/s for the cart.
@@ -23,7 +23,7 @@ pub(crate) fn run(
     method: Method,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<Outcome> {
-    let model = Model::new(plant, &experiment.input)?;
+    let model = Model::new(plant)?;
     let grid = Grid::new(experiment.every, experiment.until);
     let substeps = (grid.interval() / step - 1e-9).ceil().max(1.0);
     if !substeps.is_finite() || substeps * grid.intervals() as f64 > 1e12 {
@@ -62,10 +62,12 @@ pub(crate) fn run(
             break;
         }
         for k in 0..substeps as u64 {
+            // A step sees the input as it is at its beginning: an edge at its end belongs to the next one.
             let t = time + k as f64 * h;
+            let step = Step { model: &model, input: experiment.input.piece(t), h };
             state = match method {
-                Method::RungeKutta4 => runge_kutta_4(&model, t, &state, h),
-                Method::DormandPrince5 => dormand_prince_5(&model, t, &state, h),
+                Method::RungeKutta4 => step.runge_kutta_4(&state),
+                Method::DormandPrince5 => step.dormand_prince_5(&state),
             };
         }
         cost.steps += substeps as u64;
@@ -79,7 +81,6 @@ pub(crate) fn run(
 /// The equations (16)-(18) with Table 3 for the friction.
 struct Model<'a> {
     plant: &'a Plant,
-    input: &'a Signal,
     load: [Form; 3],
     current_rate: Form,
     inertia: [f64; 3],
@@ -88,7 +89,7 @@ struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    fn new(plant: &'a Plant, input: &'a Signal) -> Result<Self> {
+    fn new(plant: &'a Plant) -> Result<Self> {
         let unfit = |what: String| {
             Error::new(what)
                 .allowed("one viscous and one Coulomb value for each body, and a gear without losses")
@@ -114,7 +115,6 @@ impl<'a> Model<'a> {
         let equations = plant.equations(free);
         Ok(Self {
             plant,
-            input,
             load: Body::ALL.map(|body| plant.load(body, true, true)),
             current_rate: equations.current_rate,
             inertia: equations.inertia,
@@ -134,8 +134,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    fn rate(&self, t: f64, state: &State) -> State {
-        let input = self.input.value(t);
+    fn rate(&self, input: f64, state: &State) -> State {
         let mut rate = [0.0; place::COUNT];
         for body in 0..3 {
             let speed = state[2 * body + 1];
@@ -171,51 +170,67 @@ fn moved(state: &State, h: f64, rates: &[(f64, &State)]) -> State {
     std::array::from_fn(|j| state[j] + h * rates.iter().map(|(weight, rate)| weight * rate[j]).sum::<f64>())
 }
 
-fn runge_kutta_4(model: &Model, t: f64, x: &State, h: f64) -> State {
-    let k1 = model.rate(t, x);
-    let k2 = model.rate(t + h / 2.0, &moved(x, h, &[(0.5, &k1)]));
-    let k3 = model.rate(t + h / 2.0, &moved(x, h, &[(0.5, &k2)]));
-    let k4 = model.rate(t + h, &moved(x, h, &[(1.0, &k3)]));
-    moved(x, h / 6.0, &[(1.0, &k1), (2.0, &k2), (2.0, &k3), (1.0, &k4)])
+/// One step.
+struct Step<'a> {
+    model: &'a Model<'a>,
+    input: Piece,
+    h: f64,
 }
 
-/// The fifth-order formula of Dormand & Prince (1980), without its step control: Simulink's ode5.
-fn dormand_prince_5(model: &Model, t: f64, x: &State, h: f64) -> State {
-    let k1 = model.rate(t, x);
-    let k2 = model.rate(t + h / 5.0, &moved(x, h, &[(1.0 / 5.0, &k1)]));
-    let k3 = model.rate(t + h * 3.0 / 10.0, &moved(x, h, &[(3.0 / 40.0, &k1), (9.0 / 40.0, &k2)]));
-    let k4 = model.rate(t + h * 4.0 / 5.0, &moved(x, h, &[(44.0 / 45.0, &k1), (-56.0 / 15.0, &k2), (32.0 / 9.0, &k3)]));
-    let k5 = model.rate(
-        t + h * 8.0 / 9.0,
-        &moved(
-            x,
-            h,
-            &[(19372.0 / 6561.0, &k1), (-25360.0 / 2187.0, &k2), (64448.0 / 6561.0, &k3), (-212.0 / 729.0, &k4)],
-        ),
-    );
-    let k6 = model.rate(
-        t + h,
-        &moved(
+impl Step<'_> {
+    /// Rates at the share `c` of the step.
+    fn rate(&self, c: f64, state: &State) -> State {
+        self.model.rate(self.input.value(self.input.start + c * self.h), state)
+    }
+
+    fn runge_kutta_4(&self, x: &State) -> State {
+        let h = self.h;
+        let k1 = self.rate(0.0, x);
+        let k2 = self.rate(0.5, &moved(x, h, &[(0.5, &k1)]));
+        let k3 = self.rate(0.5, &moved(x, h, &[(0.5, &k2)]));
+        let k4 = self.rate(1.0, &moved(x, h, &[(1.0, &k3)]));
+        moved(x, h / 6.0, &[(1.0, &k1), (2.0, &k2), (2.0, &k3), (1.0, &k4)])
+    }
+
+    /// The fifth-order formula of Dormand & Prince (1980), without its step control: Simulink's ode5.
+    fn dormand_prince_5(&self, x: &State) -> State {
+        let h = self.h;
+        let k1 = self.rate(0.0, x);
+        let k2 = self.rate(1.0 / 5.0, &moved(x, h, &[(1.0 / 5.0, &k1)]));
+        let k3 = self.rate(3.0 / 10.0, &moved(x, h, &[(3.0 / 40.0, &k1), (9.0 / 40.0, &k2)]));
+        let k4 = self.rate(4.0 / 5.0, &moved(x, h, &[(44.0 / 45.0, &k1), (-56.0 / 15.0, &k2), (32.0 / 9.0, &k3)]));
+        let k5 = self.rate(
+            8.0 / 9.0,
+            &moved(
+                x,
+                h,
+                &[(19372.0 / 6561.0, &k1), (-25360.0 / 2187.0, &k2), (64448.0 / 6561.0, &k3), (-212.0 / 729.0, &k4)],
+            ),
+        );
+        let k6 = self.rate(
+            1.0,
+            &moved(
+                x,
+                h,
+                &[
+                    (9017.0 / 3168.0, &k1),
+                    (-355.0 / 33.0, &k2),
+                    (46732.0 / 5247.0, &k3),
+                    (49.0 / 176.0, &k4),
+                    (-5103.0 / 18656.0, &k5),
+                ],
+            ),
+        );
+        moved(
             x,
             h,
             &[
-                (9017.0 / 3168.0, &k1),
-                (-355.0 / 33.0, &k2),
-                (46732.0 / 5247.0, &k3),
-                (49.0 / 176.0, &k4),
-                (-5103.0 / 18656.0, &k5),
+                (35.0 / 384.0, &k1),
+                (500.0 / 1113.0, &k3),
+                (125.0 / 192.0, &k4),
+                (-2187.0 / 6784.0, &k5),
+                (11.0 / 84.0, &k6),
             ],
-        ),
-    );
-    moved(
-        x,
-        h,
-        &[
-            (35.0 / 384.0, &k1),
-            (500.0 / 1113.0, &k3),
-            (125.0 / 192.0, &k4),
-            (-2187.0 / 6784.0, &k5),
-            (11.0 / 84.0, &k6),
-        ],
-    )
+        )
+    }
 }
