@@ -65,8 +65,11 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         for (to, from) in out.column.iter_mut().zip(&other.column) {
             let mut sum = [0.0; R];
             for (column, &factor) in self.column.iter().zip(from) {
-                for (s, c) in sum.iter_mut().zip(column) {
-                    *s += c * factor;
+                // What is stuck, and much of A itself, is zero.
+                if factor != 0.0 {
+                    for (s, c) in sum.iter_mut().zip(column) {
+                        *s += c * factor;
+                    }
                 }
             }
             *to = sum;

@@ -88,11 +88,16 @@ impl<'a> Recorder<'a> {
         let first = self.rows;
         put(next(), |j| self.grid.time(first + j as u64));
         let voltage = next();
-        let [p1, w1, x, v, p3, w3] = std::array::from_fn(|state| {
-            let column = next();
-            put(column, |j| raw[j][state]);
-            &*column
-        });
+        let (p1, w1, x, v, p3, w3) = (next(), next(), next(), next(), next(), next());
+        for (j, &[phi1, omega1, position, speed, phi3, omega3, ..]) in raw.iter().enumerate() {
+            p1[j] = phi1;
+            w1[j] = omega1;
+            x[j] = position;
+            v[j] = speed;
+            p3[j] = phi3;
+            w3[j] = omega3;
+        }
+        let (p1, w1, x, v, p3, w3) = (&*p1, &*w1, &*x, &*v, &*p3, &*w3);
         let kn = motor.back_emf_constant * motor.gear_ratio;
         let current = next();
         match stage.amplifier.mode {
@@ -202,7 +207,7 @@ pub(crate) fn headings(plant: &Plant) -> Vec<Column> {
         ("cart_state", ""),
         ("idler_state", ""),
     ]
-    .map(|(name, unit)| Column::new(name, unit))
+    .map(|(name, unit)| Column { values: Vec::with_capacity(BLOCK), ..Column::new(name, unit) })
     .into();
     if shows_input(plant) {
         let unit = if plant.stage().amplifier.mode == AmplifierMode::Current { "A" } else { "V" };
