@@ -55,7 +55,7 @@ fn extents(trajectory: &Trajectory) -> [f64; 2] {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 1000, max_global_rejects: 100_000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 1000, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// The energy that comes in goes into heat or is stored, over every interval without an event: by quadrature of
     /// the powers along the computed motion, so that it is the motion that is tested.
@@ -131,9 +131,10 @@ proptest! {
         }
     }
 
-    /// Rows more or less often, and on other times: the same motion and the same events.
+    /// Rows more or less often, and on other times: the same motion and the same events. (Without losses a speed may
+    /// touch zero and go on, and rounding decides whether it rests there for an instant.)
     #[test]
-    fn the_output_interval_changes_nothing(stage in random::stage(Dry::Any), input in random::input(), odd in 0.2..0.9_f64) {
+    fn the_output_interval_changes_nothing(stage in random::stage(Dry::Lossy), input in random::input(), odd in 0.2..0.9_f64) {
         let coarse = run(&stage, &input, 0.3, 0.01);
         let fine = run(&stage, &input, 0.3, 0.01 / 16.0);
         let other = run(&stage, &input, 0.3, 0.01 * odd);
@@ -145,10 +146,7 @@ proptest! {
                 prop_assert!((a - b).abs() <= tolerance, "{name} at row {row}: {a:e} and {b:e}");
             }
         }
-        // Without losses a speed may touch zero and go on, and rounding decides whether it rests there for an instant.
         let bodies = [&stage.drive_pulley.friction, &stage.cart.friction, &stage.idler_pulley.friction];
-        let mut sides = bodies.iter().flat_map(|law| [law.forward, law.backward]);
-        prop_assume!(sides.all(|side| side.viscous > 0.0 && side.coulomb > 0.0));
         let end = |s: &Solution| *s.trajectory.get("time").unwrap().last().unwrap();
         let same = |other: &Solution| {
             let until = end(&coarse).min(end(other)) - 1e-6;
@@ -161,7 +159,13 @@ proptest! {
             let (a, b) = (within(&coarse), within(other));
             prop_assert_eq!(a.len(), b.len(), "{:#?}\n{:#?}", a, b);
             for (a, b) in a.iter().zip(&b) {
-                prop_assert!(a.body == b.body && a.to == b.to && (a.time - b.time).abs() < 1e-9, "{a:?} and {b:?}");
+                prop_assert!(a.body == b.body && a.to == b.to, "{a:?} and {b:?}");
+                // The less the load is off the friction, the less the moment is determined.
+                let law = bodies[a.body.index()];
+                let side = if a.load < 0.0 { law.backward } else { law.forward };
+                let faint = (a.load.abs() - side.coulomb).abs() < 1e-4 * side.coulomb;
+                let tolerance = if faint { 1e-5 } else { 1e-9 };
+                prop_assert!((a.time - b.time).abs() < tolerance, "{a:?} and {b:?}");
             }
             Ok(())
         };
