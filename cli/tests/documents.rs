@@ -28,13 +28,14 @@ fn printed(folder: &Path, line: &str) -> String {
     let mut command = Command::new("sh");
     command.arg("-c").arg(format!("{{ {line}\n}} 2>&1")).current_dir(folder);
     let output = command.env("PATH", path).env("COLUMNS", "100").output().unwrap();
-    String::from_utf8(output.stdout).unwrap()
+    let text = String::from_utf8(output.stdout).unwrap();
+    text.lines().flat_map(|line| [line.trim_end(), "\n"]).collect()
 }
 
 /// The lines of an output with its clock times taken away.
 fn timeless(text: &str) -> Vec<String> {
     let took = |line: &str| line.trim_start().starts_with("took ");
-    text.lines().map(|line| if took(line) { "  took".to_string() } else { line.trim_end().to_string() }).collect()
+    text.lines().map(|line| if took(line) { "  took" } else { line }.to_string()).collect()
 }
 
 /// Runs the commands of a document's `console` blocks, one after another in one folder, and compares what they print.
