@@ -167,3 +167,23 @@ fn modules_use_those_above_them() {
         }
     }
 }
+
+/// The first column of NOTATION.md's tables holds names that the code has.
+#[test]
+fn the_names_of_the_notation_are_those_of_the_code() {
+    fn sources(folder: &Path) -> String {
+        let mut text = String::new();
+        for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+            text += &if path.is_dir() { sources(&path) } else { fs::read_to_string(&path).unwrap_or_default() };
+        }
+        text
+    }
+    let code = sources(&root().join("src"));
+    let mut unknown = Vec::new();
+    for row in read("NOTATION.md").lines().filter(|line| line.starts_with("| `")) {
+        let first = row.split('|').nth(1).unwrap_or_default();
+        let names = first.split('`').skip(1).step_by(2).flat_map(|name| name.split(['.', ':']));
+        unknown.extend(names.filter(|name| !code.contains(name)).map(str::to_string));
+    }
+    assert!(unknown.is_empty(), "{unknown:?}");
+}
