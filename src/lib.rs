@@ -1,4 +1,57 @@
 //! Belt-driven axes: described in a file, simulated exactly.
+//!
+//! An axis is a motor, two pulleys, a toothed belt and a cart. [`case`] reads what it is and what is done with it,
+//! [`solve`] computes the motion, and the result is a [`trajectory`]: named columns over time.
+//!
+//! ```
+//! use taut::case::{Case, TEMPLATE};
+//! use taut::metrics::Meter;
+//! use taut::solve::{Ending, Solver, simulate};
+//!
+//! // A case file, here the one that `taut init` writes, with another mass.
+//! let case = Case::from_text_with("axis.toml", TEMPLATE, &["cart.mass=0.5 kg"])?;
+//! let experiment = &case.experiments[0];
+//!
+//! // The motion, exact to rounding.
+//! let solution = simulate(&case.stage, experiment, Solver::Exact)?;
+//! assert_eq!(solution.outcome.ending, Ending::Complete);
+//!
+//! // Where the cart is, and where an encoder at the drive pulley says it is.
+//! let last = |column: &str| *solution.trajectory.get(column).unwrap().last().unwrap();
+//! let (cart, encoder) = (last("cart_position"), case.stage.pulley_radius * last("drive_angle"));
+//! assert!(cart > 0.04 && (cart - encoder).abs() < 5e-6);
+//!
+//! // Who stuck and slipped, and when.
+//! let first = solution.outcome.events[0];
+//! assert_eq!((first.time, first.body.name(), first.to.word()), (0.0, "drive pulley", "forward"));
+//!
+//! // The key figures.
+//! let mut meter = Meter::new(&case.stage);
+//! meter.take(&solution.trajectory);
+//! let metrics = meter.finish(&solution.outcome.events);
+//! assert!(metrics.settled && metrics.stop_time < Some(0.5));
+//! # Ok::<(), taut::Error>(())
+//! ```
+//!
+//! # Modules
+//!
+//! In the order of dependence; each uses only those above it.
+//!
+//! - [`error`]: what is wrong, where, what is allowed, what to do next.
+//! - [`files`]: files that appear whole or not at all. [`number`]: numbers written for people.
+//! - [`quantity`]: `"19.4 mm"` becomes 0.0194, with the dimension checked. Everywhere else numbers are in SI units.
+//! - [`parameter`]: the one table of everything a case file can say.
+//! - [`trajectory`]: columns with units, and their files.
+//! - [`friction`], [`stage`]: what the machine is.
+//! - [`signal`]: what is fed into it.
+//! - [`plant`]: its equations of motion, mode by mode.
+//! - [`log`]: measured columns in. [`case`]: the case file in.
+//! - [`solve`]: the motion. [`metrics`]: what it shows.
+//! - `report`: figures, drawings and an HTML page of them (feature `report`, on by default).
+//!
+//! # Features
+//!
+//! `report` (default) adds figures and reports; `parquet` adds Parquet files. Without both the library is the physics alone.
 
 pub mod case;
 pub mod error;
@@ -18,3 +71,8 @@ pub mod stage;
 pub mod trajectory;
 
 pub use error::{Error, Result};
+
+/// The examples of the README are tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -112,6 +112,17 @@ impl Case {
     }
 
     /// Reads a case from text; `name` stands in messages, and paths in the text are relative to its folder.
+    ///
+    /// ```
+    /// use taut::case::{Case, TEMPLATE};
+    /// let case = Case::from_text("axis.toml", TEMPLATE)?;
+    /// assert_eq!(case.stage.pulley_radius, 0.0194);
+    ///
+    /// let misspelt = TEMPLATE.replace("torque_constant", "torque_konstant");
+    /// let error = Case::from_text("axis.toml", &misspelt).unwrap_err();
+    /// assert!(error.to_string().contains("did you mean `torque_constant`?"));
+    /// # Ok::<(), taut::Error>(())
+    /// ```
     pub fn from_text(name: impl AsRef<Path>, text: &str) -> Result<Self> {
         Self::from_text_with(name, text, &[])
     }

@@ -6,6 +6,15 @@ use crate::files::write_atomically;
 use std::path::Path;
 
 /// One or more panels above a common x axis.
+///
+/// ```
+/// use taut::report::{Axis, Figure, Panel};
+/// let (time, position) = ([0.0, 0.1, 0.2], [0.0, 0.01, 0.03]);
+/// let figure = Figure::new("Cart", Axis::new("Time", "s"))
+///     .panel(Panel::new(Axis::new("Position", "m").shown_as("mm", 1e3)).line("x", &time, &position))
+///     .vertical(0.15, "voltage off");
+/// assert!(figure.svg().starts_with("<svg"));
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
     /// Stands above the figure.

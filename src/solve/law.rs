@@ -83,9 +83,9 @@ impl<const R: usize, const C: usize> Law<R, C> {
         let stuck = mode.motion.map(|motion| motion == Motion::Stuck);
         let at_rest = [stuck[0] && stuck[1], stuck[1] && stuck[2], stuck[2] && stuck[0]];
         for form in equations.guards.iter_mut().map(|guard| &mut guard.form).chain(&mut equations.acceleration) {
-            for body in 0..3 {
-                if stuck[body] {
-                    form.speed[body] = 0.0;
+            for (speed, stuck) in form.speed.iter_mut().zip(stuck) {
+                if stuck {
+                    *speed = 0.0;
                 }
             }
         }

@@ -170,6 +170,17 @@ impl Grid {
 }
 
 /// Runs `experiment` on `stage` and keeps everything in memory.
+///
+/// ```
+/// use taut::case::{Case, TEMPLATE};
+/// use taut::solve::{Ending, Solver, simulate};
+/// let case = Case::from_text("axis.toml", TEMPLATE)?;
+/// let solution = simulate(&case.stage, &case.experiments[0], Solver::Exact)?;
+/// assert_eq!(solution.outcome.ending, Ending::Complete);
+/// let positions = solution.trajectory.get("cart_position").unwrap();
+/// assert_eq!(positions.len() as u64, case.experiments[0].samples());
+/// # Ok::<(), taut::Error>(())
+/// ```
 pub fn simulate(stage: &Stage, experiment: &Experiment, solver: Solver) -> Result<Solution> {
     let rows = Grid::new(experiment.every, experiment.until).intervals() as usize + 1;
     let mut trajectory = Trajectory::default();
@@ -184,6 +195,22 @@ pub fn simulate(stage: &Stage, experiment: &Experiment, solver: Solver) -> Resul
 }
 
 /// Runs `experiment` on `stage` and hands its rows to `sink` in blocks, so that memory stays bounded however long it is.
+///
+/// ```
+/// use taut::case::{Case, TEMPLATE};
+/// use taut::solve::{Ending, Flow, Solver, stream};
+/// let case = Case::from_text("axis.toml", TEMPLATE)?;
+/// // How far does the cart get?
+/// let mut farthest: f64 = 0.0;
+/// let outcome = stream(&case.stage, &case.experiments[0], Solver::Exact, &mut |rows| {
+///     for &x in rows.get("cart_position").unwrap() {
+///         farthest = farthest.max(x);
+///     }
+///     Flow::Continue
+/// })?;
+/// assert!(farthest > 0.05 && outcome.ending == Ending::Complete);
+/// # Ok::<(), taut::Error>(())
+/// ```
 pub fn stream(
     stage: &Stage,
     experiment: &Experiment,

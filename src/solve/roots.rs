@@ -56,8 +56,8 @@ fn search(c: &[f64], b: &[f64], low: f64, high: f64) -> Option<f64> {
     let n = b.len();
     let (mut left, mut right) = ([0.0; MOST], [0.0; MOST]);
     right[..n].copy_from_slice(b);
-    for i in 0..n {
-        left[i] = right[0];
+    for (i, left) in left.iter_mut().enumerate().take(n) {
+        *left = right[0];
         for j in 0..n - 1 - i {
             right[j] = 0.5 * (right[j] + right[j + 1]);
         }

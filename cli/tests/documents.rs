@@ -1,0 +1,189 @@
+//! The documents tell the truth: what they show of the program is what it prints, and what they name is there.
+#![cfg(unix)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use tempfile::TempDir;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap()
+}
+
+fn read(name: &str) -> String {
+    fs::read_to_string(root().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+}
+
+/// A folder in which the repository's machines can be named as from its root.
+fn workplace() -> TempDir {
+    let folder = TempDir::new().unwrap();
+    std::os::unix::fs::symlink(root().join("stages"), folder.path().join("stages")).unwrap();
+    folder
+}
+
+/// What a command line prints on both streams, as in a terminal 100 characters wide.
+fn printed(folder: &Path, line: &str) -> String {
+    let programs = assert_cmd::cargo::cargo_bin("taut").parent().unwrap().to_path_buf();
+    let path = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap_or_default());
+    let mut command = Command::new("sh");
+    command.arg("-c").arg(format!("{{ {line}\n}} 2>&1")).current_dir(folder);
+    let output = command.env("PATH", path).env("COLUMNS", "100").output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    text.lines().flat_map(|line| [line.trim_end(), "\n"]).collect()
+}
+
+/// The lines of an output with its clock times taken away.
+fn timeless(text: &str) -> Vec<String> {
+    let took = |line: &str| line.trim_start().starts_with("took ");
+    text.lines().map(|line| if took(line) { "  took" } else { line }.to_string()).collect()
+}
+
+/// Runs the commands of a document's `console` blocks, one after another in one folder, and compares what they print.
+fn check(document: &str) {
+    let text = read(document);
+    let folder = workplace();
+    let mut updated = String::new();
+    let mut wrong = Vec::new();
+    let mut rest = text.as_str();
+    let mut commands = 0;
+    while let Some((before, behind)) = rest.split_once("```console\n") {
+        let (block, after) = behind.split_once("\n```").expect("an end of the block");
+        updated += before;
+        updated += "```console";
+        for entry in block.strip_prefix("$ ").expect("a command first").split("\n$ ") {
+            let (line, want) = entry.split_once('\n').unwrap_or((entry, ""));
+            let got = printed(folder.path(), line);
+            commands += 1;
+            if timeless(&got) == timeless(want) {
+                updated += &format!("\n$ {entry}");
+            } else {
+                wrong.push(format!("$ {line}\n--- the document\n{want}\n--- the program\n{got}"));
+                updated += format!("\n$ {line}\n{got}").trim_end_matches('\n');
+            }
+        }
+        updated += "\n```";
+        rest = after;
+    }
+    updated += rest;
+    assert!(commands > 0, "{document} shows no command");
+    if std::env::var_os("UPDATE_EXPECT").is_some() {
+        fs::write(root().join(document), updated).unwrap();
+    } else {
+        assert!(wrong.is_empty(), "{document}: UPDATE_EXPECT=1 writes it anew\n{}", wrong.join("\n"));
+    }
+}
+
+#[test]
+fn the_readme_shows_what_the_program_prints() {
+    check("README.md");
+}
+
+#[test]
+fn the_reference_of_the_commands_shows_their_help() {
+    check("docs/commands.md");
+}
+
+#[test]
+fn the_pictures_are_those_that_the_commands_draw() {
+    let folder = workplace();
+    for line in [
+        "taut simulate stages/sollmann-jouaneh/table4.toml --out out/table4 --quiet",
+        "taut paper --out out/paper --json > claims.json",
+    ] {
+        assert_eq!(printed(folder.path(), line), "", "{line}");
+    }
+    for (picture, made) in [
+        ("encoder-and-cart.svg", "out/table4/plots/5-v-pulse-positions.svg"),
+        ("stage.svg", "out/paper/figures/figure-01-02.svg"),
+    ] {
+        let made = fs::read_to_string(folder.path().join(made)).unwrap();
+        let committed = root().join("docs/pictures").join(picture);
+        if std::env::var_os("UPDATE_EXPECT").is_some() {
+            fs::create_dir_all(committed.parent().unwrap()).unwrap();
+            fs::write(&committed, &made).unwrap();
+        }
+        assert!(fs::read_to_string(&committed).unwrap() == made, "docs/pictures/{picture} is out of date");
+    }
+}
+
+/// Every path between backquotes, and every link within the repository, leads somewhere.
+#[test]
+fn what_the_documents_name_is_there() {
+    let documents = [
+        "README.md",
+        "ARCHITECTURE.md",
+        "NOTATION.md",
+        "CONTRIBUTING.md",
+        "CHANGELOG.md",
+        "docs/case-file.md",
+        "docs/commands.md",
+        "docs/paper.md",
+        "docs/solver.md",
+        "stages/sollmann-jouaneh/README.md",
+    ];
+    let folders = ["src", "cli", "stages", "tests", "examples", "docs", "authorities", "xtask", ".ci"];
+    let mut missing = Vec::new();
+    for document in documents {
+        let text = read(document);
+        let quoted = text.split('`').skip(1).step_by(2);
+        let paths = quoted.filter(|word| {
+            let first = word.split('/').next().unwrap_or_default();
+            folders.contains(&first) && !word.contains([' ', '\n', '*'])
+        });
+        missing.extend(paths.filter(|path| !root().join(path).exists()).map(|path| format!("{document}: {path}")));
+        let links = text.split("](").skip(1).filter_map(|rest| rest.split([')', '#']).next());
+        let inside = links.filter(|link| !link.is_empty() && !link.contains("://"));
+        let here = root().join(document).parent().unwrap().to_path_buf();
+        missing.extend(inside.filter(|link| !here.join(link).exists()).map(|link| format!("{document}: {link}")));
+    }
+    assert!(missing.is_empty(), "{missing:#?}");
+}
+
+/// The order of ARCHITECTURE.md's code map is the order of dependence.
+#[test]
+fn modules_use_those_above_them() {
+    let map = read("ARCHITECTURE.md");
+    let mut modules: Vec<String> = Vec::new();
+    for row in map.lines().filter(|line| line.starts_with("| `src/")) {
+        let name = row.trim_start_matches("| `src/").split(['`', '.']).next().unwrap_or_default();
+        modules.push(name.to_string());
+    }
+    let sources = |module: &str| -> String {
+        let folder = fs::read_dir(root().join("src").join(module)).into_iter().flatten().flatten();
+        let files = folder.map(|entry| entry.path()).chain([root().join(format!("src/{module}.rs"))]);
+        files.filter_map(|file| fs::read_to_string(file).ok()).collect()
+    };
+    for entry in fs::read_dir(root().join("src")).unwrap().flatten() {
+        let name = entry.path().file_stem().unwrap().to_string_lossy().into_owned();
+        assert!(modules.contains(&name), "ARCHITECTURE.md does not name {name}");
+    }
+    for (place, module) in modules.iter().enumerate().filter(|(_, module)| *module != "lib") {
+        let text = sources(module);
+        let code = text.lines().filter(|line| !line.trim_start().starts_with("//"));
+        let lines: Vec<&str> = code.collect();
+        for below in &modules[place + 1..] {
+            let used = lines.iter().find(|line| line.contains(&format!("crate::{below}")));
+            assert!(used.is_none(), "{module} uses {below}, which stands below it: {used:?}");
+        }
+    }
+}
+
+/// The first column of NOTATION.md's tables holds names that the code has.
+#[test]
+fn the_names_of_the_notation_are_those_of_the_code() {
+    fn sources(folder: &Path) -> String {
+        let mut text = String::new();
+        for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+            text += &if path.is_dir() { sources(&path) } else { fs::read_to_string(&path).unwrap_or_default() };
+        }
+        text
+    }
+    let code = sources(&root().join("src"));
+    let mut unknown = Vec::new();
+    for row in read("NOTATION.md").lines().filter(|line| line.starts_with("| `")) {
+        let first = row.split('|').nth(1).unwrap_or_default();
+        let names = first.split('`').skip(1).step_by(2).flat_map(|name| name.split(['.', ':']));
+        unknown.extend(names.filter(|name| !code.contains(name)).map(str::to_string));
+    }
+    assert!(unknown.is_empty(), "{unknown:?}");
+}
