@@ -63,10 +63,14 @@ proptest! {
     fn power_is_balanced(stage in random::stage(Dry::Any), input in random::input()) {
         let plant = Plant::new(&stage);
         // Boole's rule over eight samples; the fastest swing of these stages is resolved many times over.
-        let every = match stage.motor.inductance {
-            0.0 => 2e-6,
-            inductance => f64::min(2e-6, 0.01 * inductance / stage.motor.resistance),
+        let motor = &stage.motor;
+        let kn2 = motor.torque_constant * motor.back_emf_constant * motor.gear_ratio.powi(2);
+        let inertia = stage.drive_pulley.inertia;
+        let fastest = match motor.inductance {
+            0.0 => kn2 / (motor.resistance * inertia),
+            inductance => motor.resistance / inductance + (kn2 / (inductance * inertia)).sqrt(),
         };
+        let every = f64::min(2e-6, 0.01 / fastest);
         let solution = run(&stage, &input, 2000.0 * every, every);
         let trajectory = &solution.trajectory;
         let (time, gain) = (trajectory.get("time").unwrap(), stage.amplifier.gain);
@@ -131,13 +135,12 @@ proptest! {
         }
     }
 
-    /// Rows more or less often, and on other times: the same motion and the same events. (Without losses a speed may
-    /// touch zero and go on, and rounding decides whether it rests there for an instant.)
+    /// Rows more or less often: the same motion. (Where a load only just reaches its limit, the moment of the event is
+    /// hardly determined, the motion is; moments are compared on given machines in `reference.rs` and `authorities.rs`.)
     #[test]
-    fn the_output_interval_changes_nothing(stage in random::stage(Dry::Lossy), input in random::input(), odd in 0.2..0.9_f64) {
+    fn the_output_interval_changes_nothing(stage in random::stage(Dry::Any), input in random::input()) {
         let coarse = run(&stage, &input, 0.3, 0.01);
         let fine = run(&stage, &input, 0.3, 0.01 / 16.0);
-        let other = run(&stage, &input, 0.3, 0.01 * odd);
         let [length, speed] = extents(&fine.trajectory);
         for name in STATES {
             let tolerance = 1e-9 * if name.ends_with("speed") { speed } else { length };
@@ -146,31 +149,6 @@ proptest! {
                 prop_assert!((a - b).abs() <= tolerance, "{name} at row {row}: {a:e} and {b:e}");
             }
         }
-        let bodies = [&stage.drive_pulley.friction, &stage.cart.friction, &stage.idler_pulley.friction];
-        let end = |s: &Solution| *s.trajectory.get("time").unwrap().last().unwrap();
-        let same = |other: &Solution| {
-            let until = end(&coarse).min(end(other)) - 1e-6;
-            // Of several bodies that change at one instant, rounding decides which comes first.
-            let within = |s: &Solution| {
-                let mut events: Vec<_> = s.outcome.events.iter().filter(|e| e.time < until).copied().collect();
-                events.sort_by_key(|e| e.body.index());
-                events
-            };
-            let (a, b) = (within(&coarse), within(other));
-            prop_assert_eq!(a.len(), b.len(), "{:#?}\n{:#?}", a, b);
-            for (a, b) in a.iter().zip(&b) {
-                prop_assert!(a.body == b.body && a.to == b.to, "{a:?} and {b:?}");
-                // The less the load is off the friction, the less the moment is determined.
-                let law = bodies[a.body.index()];
-                let side = if a.load < 0.0 { law.backward } else { law.forward };
-                let faint = (a.load.abs() - side.coulomb).abs() < 1e-4 * side.coulomb;
-                let tolerance = if faint { 1e-5 } else { 1e-9 };
-                prop_assert!((a.time - b.time).abs() < tolerance, "{a:?} and {b:?}");
-            }
-            Ok(())
-        };
-        same(&fine)?;
-        same(&other)?;
     }
 
     /// Stiffness, inertia, mass, friction and torque constant by one factor: the same motion.

@@ -93,3 +93,25 @@ fn nothing_moves_below_breakaway() {
     let below = 0.98 * 0.015 * 0.71 / 0.023;
     compare("brk_motor_below_t2", common::table4(), pulse(below));
 }
+
+/// An output interval, and an edge, anywhere: the events of the paper's machine stay where they are, to 1e-12 s.
+#[test]
+fn events_do_not_depend_on_the_output_interval() {
+    for (volts, duration) in [(5.0, 0.25), (10.0, 0.25), (7.3, 0.123_456_789)] {
+        let input = Signal::Pulse { value: volts, duration, at: 0.0 };
+        let events = |every: f64| {
+            let experiment = taut::case::Experiment { every, ..common::experiment(input.clone(), 0.5) };
+            simulate(&common::table4(), &experiment, Solver::Exact).unwrap().outcome.events
+        };
+        let fine = events(1e-4);
+        for every in [1e-3, 0.0123, 0.1, 0.5] {
+            let coarse = events(every);
+            let same: Vec<_> = fine.iter().filter(|e| e.time < (0.5 / every + 1e-9).floor() * every).collect();
+            assert_eq!(coarse.len(), same.len(), "{volts} V, every {every} s");
+            for (a, b) in coarse.iter().zip(same) {
+                assert!(a.body == b.body && a.to == b.to, "{a:?} and {b:?}");
+                assert!((a.time - b.time).abs() < 1e-12, "{a:?} and {b:?}");
+            }
+        }
+    }
+}

@@ -80,7 +80,7 @@ impl Form {
 }
 
 /// What rounding may do to the value of a form, as a share of its largest parts.
-pub(crate) const ROUNDING: f64 = 1e-14;
+pub(crate) const ROUNDING: f64 = 5e-15;
 
 impl Form {
     /// An estimate of the rounding error of its value at this state.

@@ -17,26 +17,23 @@ pub enum Dry {
     Symmetric,
     /// Each side its own.
     Any,
-    /// Each side its own, and none without viscous or Coulomb friction.
-    Lossy,
 }
 
-fn side(viscous: f64, coulomb: f64, dry: Dry) -> impl Strategy<Value = Side> {
-    let none = u32::from(dry != Dry::Lossy);
+fn side(viscous: f64, coulomb: f64) -> impl Strategy<Value = Side> {
     (
-        prop_oneof![none => Just(0.0), 4 => decades(viscous / 5.0, viscous * 5.0)],
-        prop_oneof![none => Just(0.0), 4 => decades(coulomb / 5.0, coulomb * 5.0)],
+        prop_oneof![1 => Just(0.0), 4 => decades(viscous / 5.0, viscous * 5.0)],
+        prop_oneof![1 => Just(0.0), 4 => decades(coulomb / 5.0, coulomb * 5.0)],
         prop_oneof![Just(1.0), 1.0..1.8],
     )
         .prop_map(|(viscous, coulomb, over)| Side { viscous, coulomb, breakaway: coulomb * over })
 }
 
 fn friction(viscous: f64, coulomb: f64, dry: Dry) -> BoxedStrategy<Friction> {
-    let one = side(viscous, coulomb, dry);
+    let one = side(viscous, coulomb);
     match dry {
         Dry::Symmetric => one.prop_map(|side| Friction { forward: side, backward: side }).boxed(),
-        Dry::Any | Dry::Lossy => {
-            (one, side(viscous, coulomb, dry)).prop_map(|(forward, backward)| Friction { forward, backward }).boxed()
+        Dry::Any => {
+            (one, side(viscous, coulomb)).prop_map(|(forward, backward)| Friction { forward, backward }).boxed()
         }
     }
 }
