@@ -1,0 +1,80 @@
+//! What the exact solver costs: the paper's machine, per sample, per event, per edge, and beside a plain sketch of the same method.
+//!
+//! `cargo bench --package taut`; rivals (SciPy, CVODE) are timed beside it by `authorities/speed.py`.
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+mod sketch;
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use std::hint::black_box;
+use taut::case::Experiment;
+use taut::signal::{Hold, Signal};
+use taut::solve::{Flow, Solver, simulate, stream};
+use taut::stage::Stage;
+
+fn pulse() -> Signal {
+    Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 }
+}
+
+fn streamed(stage: &Stage, experiment: &Experiment) -> usize {
+    let outcome = stream(stage, experiment, Solver::Exact, &mut |block| {
+        black_box(block);
+        Flow::Continue
+    });
+    outcome.expect("the machine is sound").events.len()
+}
+
+/// Table 4, 5 V for 0.25 s, one second, 1000 intervals, every column.
+fn table4(c: &mut Criterion) {
+    let (stage, experiment) = (common::table4(), common::experiment(pulse(), 1.0));
+    let mut group = c.benchmark_group("table 4, 5 V pulse, 1 s, 1001 rows, 15 events");
+    group.bench_function("taut, handed on in blocks", |b| b.iter(|| streamed(&stage, &experiment)));
+    group.bench_function("taut, kept in memory", |b| {
+        b.iter(|| simulate(&stage, &experiment, Solver::Exact).expect("the machine is sound"));
+    });
+    // Only positions and speeds, one exponential and forty doublings a mode, bisection to the last bit.
+    assert_eq!(sketch::run(&stage, 5.0, 0.25, 1000).events, 15);
+    group.bench_function("plain sketch", |b| b.iter(|| sketch::run(&stage, 5.0, 0.25, 1000)));
+    group.finish();
+}
+
+fn rows(c: &mut Criterion) {
+    let stage = common::table4();
+    let mut group = c.benchmark_group("against the number of rows");
+    for rows in [100_i32, 1_000, 10_000, 100_000] {
+        let experiment = Experiment { every: 1.0 / f64::from(rows), ..common::experiment(pulse(), 1.0) };
+        group.throughput(Throughput::Elements(rows as u64));
+        group.bench_with_input(BenchmarkId::from_parameter(rows), &experiment, |b, e| b.iter(|| streamed(&stage, e)));
+    }
+    group.finish();
+}
+
+/// A triangle wave that sticks and slips all the time, with hardly any rows: the throughput is events.
+fn events(c: &mut Criterion) {
+    let stage = common::table4();
+    let input = Signal::Triangle { amplitude: 3.0, frequency: 10.0 };
+    let experiment = Experiment { every: 0.1, ..common::experiment(input, 1.0) };
+    let mut group = c.benchmark_group("events of a triangle wave, 11 rows");
+    group.throughput(Throughput::Elements(streamed(&stage, &experiment) as u64));
+    group.bench_function("3 V, 10 Hz", |b| b.iter(|| streamed(&stage, &experiment)));
+    group.finish();
+}
+
+/// A recorded input of 10 kHz, held and joined, on rows of 1 kHz.
+fn edges(c: &mut Criterion) {
+    let stage = common::table4();
+    let times: Vec<f64> = (0..10_000).map(|k| f64::from(k) * 1e-4 + 3e-5).collect();
+    let values: Vec<f64> = times.iter().map(|t| 4.0 * (20.0 * t).sin() + 2.0 * (313.0 * t).sin()).collect();
+    let mut group = c.benchmark_group("edges of a sampled input");
+    group.throughput(Throughput::Elements(10_000));
+    for (name, hold) in [("held", Hold::Zero), ("joined", Hold::Linear)] {
+        let input = Signal::Sampled { times: times.clone(), values: values.clone(), hold };
+        let experiment = common::experiment(input, 1.0);
+        group.bench_function(name, |b| b.iter(|| streamed(&stage, &experiment)));
+    }
+    group.finish();
+}
+
+criterion_group!(benches, table4, rows, events, edges);
+criterion_main!(benches);
