@@ -296,7 +296,9 @@ impl Plant {
             Motion::Forward => law.forward.viscous * speed + law.forward.coulomb,
             Motion::Backward => law.backward.viscous * speed - law.backward.coulomb,
             // The gear holds what it can, friction the rest.
-            Motion::Stuck => 0.0_f64.clamp(load.0, load.1.max(load.0)),
+            Motion::Stuck if load.0 > 0.0 => load.0,
+            Motion::Stuck if load.1 < 0.0 => load.1,
+            Motion::Stuck => 0.0,
         }
     }
 
