@@ -255,7 +255,7 @@ fn no_friction_at_all() {
 fn small_inductance_is_nearly_none() {
     let without = complete(&table4(), &experiment(pulse(5.0), 0.5));
     let mut before = None;
-    for inductance in [1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-12, 1e-15] {
+    for inductance in [1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-12, 1e-13] {
         let mut stage = table4();
         stage.motor.inductance = inductance;
         let with = complete(&stage, &experiment(pulse(5.0), 0.5));
