@@ -72,11 +72,7 @@ fn input(value: &Value) -> Signal {
             offset: get("offset"),
         },
         "chirp" => Signal::Chirp { amplitude: get("amplitude"), from: get("from"), to: get("to"), over: get("over") },
-        "prbs" => Signal::Prbs {
-            amplitude: get("amplitude"),
-            bit: get("bit"),
-            seed: value["seed"].as_u64().unwrap(),
-        },
+        "prbs" => Signal::Prbs { amplitude: get("amplitude"), bit: get("bit"), seed: value["seed"].as_u64().unwrap() },
         "table" => Signal::Table {
             points: value["points"]
                 .as_array()

@@ -189,12 +189,8 @@ fn all_three_stop_at_once() {
                 set_friction(&mut stage, [pulley, Friction::symmetric(viscous * m, deceleration * m), pulley]);
                 let speed = 0.1 * direction;
                 let mut experiment = experiment(Signal::Step { value: 0.0, at: 0.0 }, 1.0);
-                experiment.initial = Initial {
-                    drive_speed: speed / r,
-                    cart_speed: speed,
-                    idler_speed: speed / r,
-                    ..Initial::default()
-                };
+                experiment.initial =
+                    Initial { drive_speed: speed / r, cart_speed: speed, idler_speed: speed / r, ..Initial::default() };
                 let solution = complete(&stage, &experiment);
                 // v̇ = −a − b v / m
                 let stop = if viscous == 0.0 {
@@ -210,11 +206,7 @@ fn all_three_stop_at_once() {
                 for column in ["drive_state", "cart_state", "idler_state"] {
                     assert_eq!(last(&solution, column), 0.0);
                 }
-                let way = if viscous == 0.0 {
-                    0.005 / deceleration
-                } else {
-                    (0.1 - deceleration * stop) / viscous
-                };
+                let way = if viscous == 0.0 { 0.005 / deceleration } else { (0.1 - deceleration * stop) / viscous };
                 let got = last(&solution, "cart_position") * direction;
                 assert!((got - way).abs() < 1e-12, "{got} {way}");
                 assert!((last(&solution, "drive_angle") * r - got * direction).abs() < 1e-12);
@@ -327,7 +319,11 @@ fn a_stiff_belt_is_rigid() {
         let force = load_at(&stage, 5.0) / stage.pulley_radius;
         let want = rigid.pulse(force, 0.25);
         let got = last(&solution, "cart_position");
-        println!("k {decade:e}: {got:.12} m, rigid {want:.12} m, difference {:e}; {:?}", got - want, solution.outcome.cost);
+        println!(
+            "k {decade:e}: {got:.12} m, rigid {want:.12} m, difference {:e}; {:?}",
+            got - want,
+            solution.outcome.cost
+        );
         assert!((got - want).abs() < 2e-3 / decade.sqrt(), "{decade:e}: {got} {want}");
     }
 }
@@ -347,8 +343,18 @@ fn edges_anywhere() {
         ("just after", at(0.25 + 1e-15)),
         ("just before", at(0.25 - 1e-15)),
         ("near", at(0.25 + 1e-13)),
-        ("two edges", Signal::Sum(vec![five(), Signal::Step { value: -2.0, at: 0.25 }, Signal::Step { value: -3.0, at: 0.25 }])),
-        ("close edges", Signal::Sum(vec![five(), Signal::Step { value: -9.0, at: 0.25 }, Signal::Step { value: 4.0, at: 0.25 + 5e-13 }])),
+        (
+            "two edges",
+            Signal::Sum(vec![five(), Signal::Step { value: -2.0, at: 0.25 }, Signal::Step { value: -3.0, at: 0.25 }]),
+        ),
+        (
+            "close edges",
+            Signal::Sum(vec![
+                five(),
+                Signal::Step { value: -9.0, at: 0.25 },
+                Signal::Step { value: 4.0, at: 0.25 + 5e-13 },
+            ]),
+        ),
         ("sequence", Signal::Sequence(vec![slot(five(), 0.25), slot(Signal::Step { value: 0.0, at: 0.0 }, 1.0)])),
         ("sampled", Signal::Sampled { times: vec![0.0, 0.25], values: vec![5.0, 0.0], hold: Hold::Zero }),
     ] {
@@ -359,9 +365,7 @@ fn edges_anywhere() {
 
 #[test]
 fn intervals_of_any_length() {
-    let run = |until: f64, every: f64| {
-        complete(&table4(), &Experiment { until, every, ..experiment(pulse(5.0), 1.0) })
-    };
+    let run = |until: f64, every: f64| complete(&table4(), &Experiment { until, every, ..experiment(pulse(5.0), 1.0) });
     let want = last(&run(0.6, 1e-3), "cart_position");
     for (until, every, rows) in [(0.6, 0.6, 2), (1e6, 1e6, 2), (2e6, 1e6, 3), (1e4, 10.0, 1001)] {
         let solution = run(until, every);
@@ -448,7 +452,9 @@ fn no_machine_is_refused() {
     refused(|s| s.motor.resistance = 1e-300);
     refused(|s| s.motor.gear_efficiency = 2.0);
     refused(|s| s.cart.friction.forward.breakaway = 0.1);
-    for (until, every) in [(f64::NAN, 1e-3), (1.0, f64::NAN), (f64::INFINITY, 1.0), (1.0, 0.0), (1.0, -1.0), (1.0, 1e-300)] {
+    for (until, every) in
+        [(f64::NAN, 1e-3), (1.0, f64::NAN), (f64::INFINITY, 1.0), (1.0, 0.0), (1.0, -1.0), (1.0, 1e-300)]
+    {
         let experiment = Experiment { until, every, ..experiment(pulse(5.0), 1.0) };
         simulate(&table4(), &experiment, Solver::Exact).unwrap_err();
     }

@@ -24,14 +24,16 @@ pub(super) fn stage(stage: &Stage) -> Result<()> {
     let laws = [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction];
 
     // `Err` for whatever `good` does not hold of; a value that is no number is never good.
-    let all = |what: &str, values: &[f64], good: fn(f64) -> bool, allowed: &str| match values.iter().find(|v| !good(**v)) {
-        Some(value) => Err(Error::new(format!("{what} cannot be {value:e}")).allowed(allowed)),
-        None => Ok(()),
-    };
+    let all =
+        |what: &str, values: &[f64], good: fn(f64) -> bool, allowed: &str| match values.iter().find(|v| !good(**v)) {
+            Some(value) => Err(Error::new(format!("{what} cannot be {value:e}")).allowed(allowed)),
+            None => Ok(()),
+        };
     let positive = |what, values: &[f64]| {
         all(what, values, |v| (LEAST..=MOST).contains(&v), "above zero: from 1e-15 to 1e15, in SI units")
     };
-    let not_negative = |what, values: &[f64]| all(what, values, |v| (0.0..=MOST).contains(&v), "from 0 to 1e15, in SI units");
+    let not_negative =
+        |what, values: &[f64]| all(what, values, |v| (0.0..=MOST).contains(&v), "from 0 to 1e15, in SI units");
     let finite = |what, values: &[f64]| all(what, values, |v| v.abs() <= MOST, "from -1e15 to 1e15, in SI units");
 
     positive("a mass or inertia", &bodies)?;
@@ -63,7 +65,8 @@ pub(super) fn stage(stage: &Stage) -> Result<()> {
     let [c1, c2, c3] = stage.belt.damping;
     let n = motor.gear_ratio;
     let brake = motor.torque_constant * motor.back_emf_constant * n * n / motor.resistance / motor.gear_efficiency;
-    let brake = if motor.inductance > 0.0 || stage.amplifier.mode == AmplifierMode::Current { 0.0 } else { brake.abs() };
+    let brake =
+        if motor.inductance > 0.0 || stage.amplifier.mode == AmplifierMode::Current { 0.0 } else { brake.abs() };
     let around = [(k1 + k3, c1 + c3, r * r, brake), (k1 + k2, c1 + c2, 1.0, 0.0), (k2 + k3, c2 + c3, r * r, 0.0)];
     for (((k, c, arm, brake), inertia), law) in around.into_iter().zip(bodies).zip(laws) {
         let drag = c * arm + brake + law.forward.viscous.max(law.backward.viscous);
@@ -101,7 +104,9 @@ pub(super) fn experiment(experiment: &Experiment) -> Result<()> {
         initial.motor_current,
     ];
     match state.iter().find(|v| !v.is_finite()) {
-        Some(value) => Err(Error::new(format!("the state at the start cannot be {value}")).allowed("any finite number")),
+        Some(value) => {
+            Err(Error::new(format!("the state at the start cannot be {value}")).allowed("any finite number"))
+        }
         None => Ok(()),
     }
 }
