@@ -172,6 +172,22 @@ class Wave:
         return coefficients
 
 
+PERIOD = 2**20 - 1
+
+
+def prbs_bits(seed, count):
+    """The bits of b_k = b_{k-3} xor b_{k-20}, entered where the seed says (SplitMix64's finaliser, modulo the period)."""
+    mask = 2**64 - 1
+    z = (seed + 0x9E3779B97F4A7C15) & mask
+    z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & mask
+    z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & mask
+    skip = (z ^ (z >> 31)) % PERIOD
+    bits = [0] * 19 + [1]  # what came before the first bit, the latest last
+    for _ in range(skip + count):
+        bits.append(bits[-3] ^ bits[-20])
+    return bits[20 + skip :]
+
+
 def pieces(signal, until):
     """The input as a chain of pieces, each holding until the next begins; the first begins at time zero."""
     kind = signal["kind"]
@@ -210,6 +226,12 @@ def pieces(signal, until):
         points = signal["points"]
         chain = [Line(t0, u0, (u1 - u0) / (t1 - t0)) for (t0, u0), (t1, u1) in zip(points, points[1:])]
         chain.append(Line(*points[-1]))
+    elif kind == "prbs":
+        bit = signal["bit"]
+        high = prbs_bits(signal["seed"], math.ceil(until / bit))
+        a = signal["amplitude"]
+        chain = [Line(k * bit, a if up else -a) for k, up in enumerate(high)]
+        chain = [piece for k, piece in enumerate(chain) if k == 0 or piece.value != chain[k - 1].value]
     else:
         raise ValueError(f"unknown input {kind!r}")
     if chain[0].start > 0.0:

@@ -231,8 +231,13 @@ def solve_case(number, seed, kind):
     stage = random_stage(rng)
     until = round(float(rng.uniform(0.3, 1.0)), 2)
     signal = random_input(rng, stage, kind, until)
+    times = sample_times(rng, pieces(signal, until), until)
+    return judged(f"{number:03d} {kind}", seed, stage, signal, until, times)
+
+
+def judged(name, seed, stage, signal, until, times):
+    """The same for a case that is already drawn."""
     chain = pieces(signal, until)
-    times = sample_times(rng, chain, until)
     try:
         run = events_expm.solve(stage, signal, times)
         if run.doubts:
@@ -246,20 +251,20 @@ def solve_case(number, seed, kind):
     near = min((abs(event.time - t) for event in run.events for t in times), default=1.0)
     if near < 1e-8:
         return None, "an event falls on a sample"
-    for name, other in (("64-bit exponentials", coarse), ("DOP853", rival)):
+    for other_name, other in (("64-bit exponentials", coarse), ("DOP853", rival)):
         if sequence(other) != sequence(run):
-            return None, f"{name} see other mode changes ({len(other.events)} instead of {len(run.events)})"
+            return None, f"{other_name} see other mode changes ({len(other.events)} instead of {len(run.events)})"
         if (other.modes != run.modes).any():
-            return None, f"{name} see other modes"
+            return None, f"{other_name} see other modes"
     states = with_current(stage, chain, run)
     off_rival = difference(run, rival, states, with_current(stage, chain, rival))
     off_coarse = difference(run, coarse, states, with_current(stage, chain, coarse))
-    for name, off in (("64-bit exponentials", off_coarse), ("DOP853", off_rival)):
+    for other_name, off in (("64-bit exponentials", off_coarse), ("DOP853", off_rival)):
         if too_far := beyond(off, states):
-            return None, f"{name} differ by " + ", ".join(too_far)
-    digits = lambda off: {name: float(f"{value:.1e}") for name, value in off.items()}
+            return None, f"{other_name} differ by " + ", ".join(too_far)
+    digits = lambda off: {key: float(f"{value:.1e}") for key, value in off.items()}
     return {
-        "name": f"{number:03d} {kind}",
+        "name": name,
         "seed": seed,
         "until": until,
         "every": EVERY,
@@ -272,6 +277,20 @@ def solve_case(number, seed, kind):
         "scipy_differs_by": digits(off_rival),
         "rounding_differs_by": digits(off_coarse),
     }, None
+
+
+def write(path, authority, replaced, cases):
+    """Cases, each on a line of its own."""
+    head = {
+        "format": 1,
+        "authority": authority,
+        "state": ["phi1", "w1", "x", "v", "phi3", "w3", "i"],
+        "event": ["time", "body", "from", "to", "load"],
+        "replaced": replaced,
+    }
+    body = ",\n".join(json.dumps(case, ensure_ascii=False) for case in cases)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(head, ensure_ascii=False)[:-1] + ',\n"cases": [\n' + body + "\n]}\n")
 
 
 def main():
@@ -303,17 +322,7 @@ def main():
     print(f"{len(cases)} cases with {events} events, {len(replaced)} replaced; {time.perf_counter() - began:.0f} s")
     for field in ("scipy_differs_by", "rounding_differs_by"):
         print(field, {name: max(case[field][name] for case in cases) for name in cases[0][field]})
-
-    head = {
-        "format": 1,
-        "authority": "authorities/random_stages.py",
-        "state": ["phi1", "w1", "x", "v", "phi3", "w3", "i"],
-        "event": ["time", "body", "from", "to", "load"],
-        "replaced": replaced,
-    }
-    body = ",\n".join(json.dumps(case, ensure_ascii=False) for case in cases)
-    options.output.parent.mkdir(parents=True, exist_ok=True)
-    options.output.write_text(json.dumps(head, ensure_ascii=False)[:-1] + ',\n"cases": [\n' + body + "\n]}\n")
+    write(options.output, "authorities/random_stages.py", replaced, cases)
 
 
 if __name__ == "__main__":

@@ -11,10 +11,17 @@ pub fn show_error(error: &impl Display) {
     let _ = writeln!(io::stderr(), "{word}: {error}");
 }
 
-/// Writes `text` to standard output. Whoever closed the pipe has read enough: that is no error.
+/// Writes `text` to standard output. Whoever closed the pipe has read enough: that is no error. Anything else, a full disk
+/// say, ends the program with status 1.
 pub fn show(text: &str) {
     let mut out = io::stdout().lock();
-    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
+            show_error(&format!("the results cannot be written to standard output: {e}"));
+            std::process::exit(1);
+        }
+        _ => {}
+    }
 }
 
 /// `text` in bold, if standard output is a terminal.

@@ -1,5 +1,6 @@
 //! Runs an experiment on a stage: the choice of solver, the events, how it ended and what it cost.
 
+mod check;
 mod exact;
 mod law;
 mod propagator;
@@ -64,7 +65,7 @@ pub enum Ending {
         /// Time reached, s.
         time: f64,
     },
-    /// A state became infinite or not a number.
+    /// A state became infinite or not a number; with a fixed step, already one beyond 1e9 m, rad, m/s, rad/s or A.
     Diverged {
         /// Time reached, s.
         time: f64,
@@ -182,7 +183,8 @@ impl Grid {
 /// # Ok::<(), taut::Error>(())
 /// ```
 pub fn simulate(stage: &Stage, experiment: &Experiment, solver: Solver) -> Result<Solution> {
-    let rows = Grid::new(experiment.every, experiment.until).intervals() as usize + 1;
+    // What does not fit at once is asked for as it comes.
+    let rows = Grid::new(experiment.every, experiment.until).intervals().min(1 << 20) as usize + 1;
     let mut trajectory = Trajectory::default();
     let outcome = stream(stage, experiment, solver, &mut |block| {
         if trajectory.is_empty() {
@@ -217,6 +219,8 @@ pub fn stream(
     solver: Solver,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<Outcome> {
+    check::stage(stage)?;
+    check::experiment(experiment)?;
     let plant = Plant::new(stage);
     match solver {
         Solver::Exact => Ok(exact::run(&plant, experiment, sink)),

@@ -15,6 +15,9 @@ use crate::trajectory::Trajectory;
 /// Half-width of Table 3's band of "zero" speed, rad/s for the pulleys and m/s for the cart.
 const BAND: f64 = 0.01;
 
+/// A state beyond it, in SI units, is none of a machine: the step was too long for the belt's swing.
+const BOUND: f64 = 1e9;
+
 /// Runs the experiment with steps of `step` or a little less, so that they fill the output interval.
 pub(crate) fn run(
     plant: &Plant,
@@ -26,8 +29,8 @@ pub(crate) fn run(
     let model = Model::new(plant)?;
     let grid = Grid::new(experiment.every, experiment.until);
     let substeps = (grid.interval() / step - 1e-9).ceil().max(1.0);
-    if !substeps.is_finite() || substeps * grid.intervals() as f64 > 1e12 {
-        return Err(Error::new(format!("a step of {step} s would take more than 1e12 steps"))
+    if !substeps.is_finite() || step.is_nan() || step <= 0.0 || substeps * grid.intervals() as f64 > 1e12 {
+        return Err(Error::new(format!("a step of {step:e} s would take more than 1e12 steps"))
             .allowed("a step above zero, such as 1e-4 s")
             .next("choose a larger step"));
     }
@@ -47,15 +50,16 @@ pub(crate) fn run(
     let mut ending = Ending::Complete;
     for row in 0..=grid.intervals() {
         let time = grid.time(row);
+        // What is no number fails the comparison too.
+        if row > 0 && !state.iter().all(|value| value.abs() <= BOUND) {
+            ending = Ending::Diverged { time };
+            break;
+        }
         let input = experiment.input.value(time);
         let motion = model.motion(&state, input);
         recorder.push(std::array::from_fn(|j| if j < place::COUNT { state[j] } else { input }), motion);
         if recorder.flow == Flow::Stop {
             ending = Ending::Interrupted { time };
-            break;
-        }
-        if !state.iter().sum::<f64>().is_finite() {
-            ending = Ending::Diverged { time };
             break;
         }
         if row == grid.intervals() {

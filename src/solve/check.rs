@@ -1,0 +1,112 @@
+//! What a stage and an experiment have to be before anything is computed.
+//!
+//! The case reader checks what is in a file, and says on which line; here it is what a program built by itself.
+
+use crate::case::Experiment;
+use crate::error::{Error, Result};
+use crate::stage::{AmplifierMode, Stage};
+
+/// The range of anything that has to be above zero, as in a case file.
+const LEAST: f64 = 1e-15;
+const MOST: f64 = 1e15;
+
+/// Fastest rate, 1/s, that a stage may have: beyond it, what rounding does to the rates of change hides the motion.
+const FASTEST: f64 = 1e13;
+
+/// Most rows.
+const MOST_ROWS: f64 = 1e12;
+
+/// Refuses what is no machine.
+pub(super) fn stage(stage: &Stage) -> Result<()> {
+    let motor = &stage.motor;
+    let r = stage.pulley_radius;
+    let bodies = [stage.drive_pulley.inertia, stage.cart.mass, stage.idler_pulley.inertia];
+    let laws = [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction];
+
+    // `Err` for whatever `good` does not hold of; a value that is no number is never good.
+    let all =
+        |what: &str, values: &[f64], good: fn(f64) -> bool, allowed: &str| match values.iter().find(|v| !good(**v)) {
+            Some(value) => Err(Error::new(format!("{what} cannot be {value:e}")).allowed(allowed)),
+            None => Ok(()),
+        };
+    let positive = |what, values: &[f64]| {
+        all(what, values, |v| (LEAST..=MOST).contains(&v), "above zero: from 1e-15 to 1e15, in SI units")
+    };
+    let not_negative =
+        |what, values: &[f64]| all(what, values, |v| (0.0..=MOST).contains(&v), "from 0 to 1e15, in SI units");
+    let finite = |what, values: &[f64]| all(what, values, |v| v.abs() <= MOST, "from -1e15 to 1e15, in SI units");
+
+    positive("a mass or inertia", &bodies)?;
+    positive("the stiffness of a span", &stage.belt.stiffness)?;
+    positive("the pulleys' radius", &[r])?;
+    positive("the armature's resistance", &[motor.resistance])?;
+    positive("the gear ratio", &[motor.gear_ratio])?;
+    all("the gear's efficiency", &[motor.gear_efficiency], |v| (LEAST..=1.0).contains(&v), "above 0, up to 1")?;
+    not_negative("the damping of a span", &stage.belt.damping)?;
+    not_negative("an inductance or the rotor's inertia", &[motor.inductance, motor.rotor_inertia])?;
+    finite("a motor constant", &[motor.torque_constant, motor.back_emf_constant])?;
+    finite("the amplifier's gain", &[stage.amplifier.gain])?;
+    for side in laws.iter().flat_map(|law| [law.forward, law.backward]) {
+        not_negative("friction", &[side.viscous, side.coulomb, side.breakaway])?;
+        if side.breakaway < side.coulomb {
+            let what = format!("the breakaway cannot be {}, below Coulomb friction", side.breakaway);
+            return Err(Error::new(what).allowed(format!("at least {}", side.coulomb)));
+        }
+    }
+
+    // Whatever is by itself this fast: the current, and each body against its springs, dampers, friction and the motor.
+    if motor.inductance > 0.0 && stage.amplifier.mode == AmplifierMode::Voltage {
+        let rate = motor.resistance / motor.inductance;
+        if rate > FASTEST {
+            return Err(too_fast("the current", rate).next("leave the inductance out: it does not show at this size"));
+        }
+    }
+    let [k1, k2, k3] = stage.belt.stiffness;
+    let [c1, c2, c3] = stage.belt.damping;
+    let n = motor.gear_ratio;
+    let brake = motor.torque_constant * motor.back_emf_constant * n * n / motor.resistance / motor.gear_efficiency;
+    let brake =
+        if motor.inductance > 0.0 || stage.amplifier.mode == AmplifierMode::Current { 0.0 } else { brake.abs() };
+    let around = [(k1 + k3, c1 + c3, r * r, brake), (k1 + k2, c1 + c2, 1.0, 0.0), (k2 + k3, c2 + c3, r * r, 0.0)];
+    for (((k, c, arm, brake), inertia), law) in around.into_iter().zip(bodies).zip(laws) {
+        let drag = c * arm + brake + law.forward.viscous.max(law.backward.viscous);
+        let rate = f64::max((k * arm / inertia).sqrt(), drag / inertia);
+        if rate > FASTEST {
+            return Err(too_fast("a body", rate).next("give it more inertia, or less stiffness, damping and friction"));
+        }
+    }
+    Ok(())
+}
+
+fn too_fast(what: &str, rate: f64) -> Error {
+    Error::new(format!("{what} would change within {:.0e} s, too fast to be told from rounding", 1.0 / rate))
+        .allowed(format!("{:e} s and longer", 1.0 / FASTEST))
+}
+
+/// Refuses a run that has no rows, or no state to begin with.
+pub(super) fn experiment(experiment: &Experiment) -> Result<()> {
+    let &Experiment { until, every, ref initial, .. } = experiment;
+    if !(until.is_finite() && every.is_finite() && until > 0.0 && every > 0.0) {
+        return Err(Error::new(format!("a run of {until:e} s with a row every {every:e} s cannot be"))
+            .allowed("a length and an interval above zero"));
+    }
+    if until / every > MOST_ROWS {
+        return Err(Error::new(format!("a row every {every:e} s makes more than {MOST_ROWS:e} rows"))
+            .next("choose a longer interval"));
+    }
+    let state = [
+        initial.drive_angle,
+        initial.drive_speed,
+        initial.cart_position,
+        initial.cart_speed,
+        initial.idler_angle,
+        initial.idler_speed,
+        initial.motor_current,
+    ];
+    match state.iter().find(|v| !v.is_finite()) {
+        Some(value) => {
+            Err(Error::new(format!("the state at the start cannot be {value}")).allowed("any finite number"))
+        }
+        None => Ok(()),
+    }
+}
