@@ -8,7 +8,7 @@
 //! V(y) = ½ Σ m a² + ½ Σ k (Δv)² + ½ w L (di/dt)² can only grow by the input's rate: √V(τ) ≤ √V(0) + |b|·|u̇|·τ. A guard
 //! g = w·z therefore changes no faster than |w|·√(2V), |w| being the norm dual to V; and likewise its slope, with ẏ.
 
-use super::law::{Law, Watch, chain};
+use super::law::{Law, Size, Watch, chain};
 use super::propagator::SERIES_ORDER;
 use super::record::Recorder;
 use super::roots;
@@ -165,10 +165,11 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             row += 1;
         }
         let offset = time - self.grid.time(row);
-        let near = 1e-9 * self.h;
-        if offset < near || row == last {
+        // What a sum of decimal times may be off by; no part of the interval, which may be long.
+        let near = (8.0 * f64::EPSILON * time).min(1e-9 * self.h);
+        if offset <= near || row == last {
             (row, 0.0)
-        } else if self.h - offset < near {
+        } else if self.h - offset <= near {
             (row + 1, 0.0)
         } else {
             (row, offset)
@@ -250,13 +251,15 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         let mut safe = most;
         if !law.guards.is_empty() {
             self.cost.looks += 1;
-            let norm = law.norm(&y);
+            let size = law.size(&y);
+            let push = law.forcing * self.input_rate * 0.5;
             let mut time = f64::INFINITY;
             for guard in &law.guards {
                 // g(τ) ≥ g − (|w| √2V + |w_u| |u̇|) τ − |w| |b| |u̇| τ²/2
                 let g = self.standing(guard);
-                let slope = law.growth_factor() * guard.dual * norm + guard.input.abs() * self.input_rate;
-                let bend = law.growth_factor() * guard.dual * law.forcing * self.input_rate * 0.5;
+                let grow = law.growth_factor();
+                let slope = grow * law.steepness(guard, size, 0.0) + guard.input.abs() * self.input_rate;
+                let bend = grow * law.steepness(guard, Size::ZERO, push);
                 let moves = slope > 0.0 || bend > 0.0;
                 if g < 0.0 || (g == 0.0 && moves) || self.fresh_order(guard.cause) > 0 {
                     time = 0.0;
@@ -354,23 +357,24 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         self.cost.looks += 1;
         let y = law.rate(&self.z);
         let grow = law.growth_over(length);
-        let norm = grow * (law.norm(&y) + law.forcing * self.input_rate * length);
-        let steepness = |dual: f64, input: f64| dual * norm + input.abs() * self.input_rate;
+        let (size, push) = (law.size(&y), law.forcing * self.input_rate * length);
+        let steepness =
+            |guard: &Watch<C>| grow * law.steepness(guard, size, push) + guard.input.abs() * self.input_rate;
         let undecided = |g: f64, steepness: f64| !(g > steepness * length || (g >= 0.0 && steepness == 0.0));
-        if !law.guards.iter().any(|guard| undecided(self.standing(guard), steepness(guard.dual, guard.input))) {
+        if !law.guards.iter().any(|guard| undecided(self.standing(guard), steepness(guard))) {
             return Look::Safe(None);
         }
 
         let second = law.rate_of_rate(&y);
-        let norm2 = grow * (law.norm(&second) + law.forcing * self.input_curvature * length);
+        let (size, push) = (law.size(&second), law.forcing * self.input_curvature * length);
         let mut falling = false;
         for guard in &law.guards {
             let g = self.standing(guard);
-            if !undecided(g, steepness(guard.dual, guard.input)) {
+            if !undecided(g, steepness(guard)) {
                 continue;
             }
             let slope = guard.slope(&y);
-            let bend = guard.dual * norm2 + guard.input.abs() * self.input_curvature;
+            let bend = grow * law.steepness(guard, size, push) + guard.input.abs() * self.input_curvature;
             // g(τ) ≥ g + ġ τ − |g̈| τ²/2
             let stays = g >= 0.0 && g + slope.min(0.0) * length - 0.5 * bend * length * length > 0.0;
             let rises = g >= 0.0 && slope > bend * length;
@@ -395,10 +399,11 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         let mut first: Option<(f64, Cause)> = None;
         // Term 1 of the series is ż · distance: most guards are too far away to fall, as in `look`.
         let change = std::array::from_fn(|j| series[1][j]);
-        let push = law.forcing * self.input_rate * distance;
-        let norm = law.growth_over(distance) * (law.norm(&change) + push * distance);
+        let (size, push) = (law.size(&change), law.forcing * self.input_rate * distance * distance);
+        let grow = law.growth_over(distance);
         for guard in &law.guards {
-            if self.standing(guard) > guard.dual * norm + guard.input.abs() * self.input_rate * distance {
+            let fall = grow * law.steepness(guard, size, push) + guard.input.abs() * self.input_rate * distance;
+            if self.standing(guard) > fall {
                 continue;
             }
             let mut coefficients: [f64; SERIES_ORDER + 1] = std::array::from_fn(|k| guard.value(&series[k]));

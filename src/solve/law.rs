@@ -19,11 +19,22 @@ const fn highest<const R: usize>() -> usize {
     if R == 8 { 1 } else { DEGREE }
 }
 
+/// The size of a rate of change: √(2V), or per unit of it, of the mechanical and of the magnetic energy.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Size {
+    mechanical: f64,
+    magnetic: f64,
+}
+
+impl Size {
+    pub(super) const ZERO: Size = Size { mechanical: 0.0, magnetic: 0.0 };
+}
+
 /// A condition of the mode on the vector z.
 pub(super) struct Watch<const C: usize> {
     row: [f64; C],
-    /// The norm dual to the energy: how much its value can change per unit of √(2V).
-    pub(super) dual: f64,
+    /// The norm dual to the energy: how much its value can change per unit of √(2V), mechanical and magnetic.
+    dual: Size,
     /// Its coefficient of the input.
     pub(super) input: f64,
     pub(super) cause: Cause,
@@ -70,6 +81,8 @@ pub(super) struct Law<const R: usize, const C: usize> {
     stiffness: [f64; 3],
     /// w L of the current's share in V.
     magnetic: f64,
+    /// Whether the current moves the drive pulley, and the drive pulley the current.
+    coupled: bool,
 }
 
 impl<const R: usize, const C: usize> Law<R, C> {
@@ -130,6 +143,7 @@ impl<const R: usize, const C: usize> Law<R, C> {
 
         let inertia = equations.inertia;
         let stiffness = stage.belt.stiffness;
+        // A little more, for the rounding of all that is compared with it.
         let dual = |form: &Form| {
             let mut sum = 0.0;
             for j in 0..3 {
@@ -138,11 +152,8 @@ impl<const R: usize, const C: usize> Law<R, C> {
                 }
                 sum += form.speed[j] * form.speed[j] / inertia[j];
             }
-            if form.current != 0.0 {
-                sum += form.current * form.current / magnetic;
-            }
-            // A little more, for the rounding of all that is compared with it.
-            sum.sqrt() * (1.0 + 1e-9)
+            let magnetic = if form.current == 0.0 { 0.0 } else { form.current.abs() / magnetic.sqrt() };
+            Size { mechanical: sum.sqrt() * (1.0 + 1e-9), magnetic: magnetic * (1.0 + 1e-9) }
         };
         let guards = equations
             .guards
@@ -192,6 +203,7 @@ impl<const R: usize, const C: usize> Law<R, C> {
             inertia,
             stiffness,
             magnetic,
+            coupled: has_current && !stuck[0],
         }
     }
 
@@ -206,7 +218,7 @@ impl<const R: usize, const C: usize> Law<R, C> {
     }
 
     /// √(2V) of ż.
-    pub(super) fn norm(&self, y: &[f64; R]) -> f64 {
+    pub(super) fn size(&self, y: &[f64; R]) -> Size {
         let r = self.radius;
         let [v1, a1, v2, a2, v3, a3, di] = std::array::from_fn::<f64, { place::COUNT }, _>(|j| y[j]);
         let [m1, m2, m3] = self.inertia;
@@ -215,7 +227,19 @@ impl<const R: usize, const C: usize> Law<R, C> {
         // 2V = Σ m a² + Σ k (Δv)² + w L (di/dt)²
         let kinetic = m1 * a1 * a1 + m2 * a2 * a2 + m3 * a3 * a3;
         let elastic = k1 * d1 * d1 + k2 * d2 * d2 + k3 * d3 * d3;
-        (kinetic + elastic + self.magnetic * di * di).sqrt()
+        Size { mechanical: (kinetic + elastic).sqrt(), magnetic: (self.magnetic * di * di).sqrt() }
+    }
+
+    /// How fast a guard can change while ż has at most this size, and the input adds at most `push` to it.
+    pub(super) fn steepness(&self, guard: &Watch<C>, size: Size, push: f64) -> f64 {
+        let dual = guard.dual;
+        if self.coupled {
+            // Motion and current pass energy to each other: only their sum is bounded.
+            return (dual.mechanical * dual.mechanical + dual.magnetic * dual.magnetic).sqrt()
+                * ((size.mechanical * size.mechanical + size.magnetic * size.magnetic).sqrt() + push);
+        }
+        let (moving, magnetic) = if self.magnetic > 0.0 { (0.0, push) } else { (push, 0.0) };
+        dual.mechanical * (size.mechanical + moving) + dual.magnetic * (size.magnetic + magnetic)
     }
 
     /// Length of the intervals of a level: h/2^level.
