@@ -1,10 +1,9 @@
-//! What the exact solver costs: the paper's machine, per sample, per event, per edge, and beside a plain sketch of the same method.
+//! What the exact solver costs: the paper's machine, per sample, per event, per edge.
 //!
 //! `cargo bench --package taut`; rivals (SciPy, CVODE) are timed beside it by `authorities/speed.py`.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
-mod sketch;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -33,9 +32,6 @@ fn table4(c: &mut Criterion) {
     group.bench_function("taut, kept in memory", |b| {
         b.iter(|| simulate(&stage, &experiment, Solver::Exact).expect("the machine is sound"));
     });
-    // Only positions and speeds, one exponential and forty doublings a mode, bisection to the last bit.
-    assert_eq!(sketch::run(&stage, 5.0, 0.25, 1000).events, 15);
-    group.bench_function("plain sketch", |b| b.iter(|| sketch::run(&stage, 5.0, 0.25, 1000)));
     group.finish();
 }
 
