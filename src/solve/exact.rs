@@ -27,6 +27,9 @@ const EVENTS_PER_SECOND: f64 = 1e7;
 /// Mode changes allowed at one instant.
 const CHANGES_AT_ONCE: usize = 100;
 
+/// Turns of a body at one instant after which it is taken to rest.
+const TURNS_AT_ONCE: usize = 20;
+
 /// For so small a part of the series' reach a speed that has left zero is still told by its series alone.
 const SOON: f64 = 1e-6;
 
@@ -66,6 +69,9 @@ struct Run<'a, const R: usize, const C: usize> {
     offset: f64,
     recorder: Recorder<'a>,
     events: Vec<Event>,
+    /// Where the last mode change was, and how many there have been there.
+    changed_at: (u64, f64),
+    changes: usize,
     cost: Cost,
     trouble: Option<Ending>,
 }
@@ -118,6 +124,8 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             offset: 0.0,
             recorder: Recorder::new(plant, grid, sink),
             events: Vec::new(),
+            changed_at: (0, 0.0),
+            changes: 0,
             cost: Cost { modes: 1, ..Cost::default() },
             trouble: None,
         }
@@ -459,6 +467,12 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
 
     /// Goes into the mode that follows when `cause` ends the present one.
     fn change(&mut self, cause: Cause) {
+        let here = (self.row, self.offset);
+        self.changes = if here == self.changed_at { self.changes + 1 } else { 0 };
+        self.changed_at = here;
+        if self.changes > CHANGES_AT_ONCE {
+            self.trouble = Some(Ending::TooManyEvents { time: self.time() });
+        }
         let (body, to) = match cause {
             Cause::GearTorque => {
                 self.mode.gear_torque_positive = !self.mode.gear_torque_positive;
@@ -467,7 +481,8 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             }
             Cause::Stop(body) => {
                 self.z[body.speed_place()] = 0.0;
-                (body, self.decide(body))
+                // Where rounding turns a body back again and again without a moment passing, it rests.
+                (body, if self.changes > TURNS_AT_ONCE { Motion::Stuck } else { self.decide(body) })
             }
             Cause::BreakForward(body) => (body, Motion::Forward),
             Cause::BreakBackward(body) => (body, Motion::Backward),
@@ -484,7 +499,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             _ => 1,
         };
         self.mode.motion[body.index()] = to;
-        self.slack[body.index()] = 2.0 * noise;
+        self.slack[body.index()] = if self.changes > TURNS_AT_ONCE { 20.0 } else { 2.0 } * noise;
         if from != to {
             self.events.push(Event { time: self.time(), body, from, to, load });
         }
