@@ -36,6 +36,16 @@ impl Friction {
         Self { forward: side, backward: side }
     }
 
+    /// Adds the friction of another body that goes `ratio` times as far.
+    pub fn add(&mut self, other: &Friction, ratio: f64) {
+        for (side, other) in [(&mut self.forward, other.forward), (&mut self.backward, other.backward)] {
+            // Power is conserved: F = ρ τ, and τ = B ρ v
+            side.viscous += ratio * ratio * other.viscous;
+            side.coulomb += ratio * other.coulomb;
+            side.breakaway += ratio * other.breakaway;
+        }
+    }
+
     /// Whether it is b v and no more, so that nothing ever sticks and the direction makes no difference.
     pub fn is_linear(&self) -> bool {
         self.forward == self.backward && self.forward.breakaway == 0.0 && self.forward.coulomb == 0.0

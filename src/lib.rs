@@ -23,7 +23,7 @@
 //!
 //! // Who stuck and slipped, and when.
 //! let first = solution.outcome.events[0];
-//! assert_eq!((first.time, first.body.name(), first.to.word()), (0.0, "drive pulley", "forward"));
+//! assert_eq!((first.time, first.part.name(), first.to.word()), (0.0, "drive pulley", "forward"));
 //!
 //! // The key figures.
 //! let mut meter = Meter::new(&case.stage);

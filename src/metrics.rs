@@ -192,14 +192,17 @@ impl Meter {
         let mut metrics = self.seen;
         metrics.steady_speed = self.steady.map(|plateau| plateau.steady_speed(&self.stage));
         for event in events {
-            let count = &mut metrics.events[event.body.index()];
-            match (event.from, event.to) {
-                (_, Motion::Stuck) => count.stops += 1,
-                (Motion::Stuck, _) => count.starts += 1,
-                _ => count.reversals += 1,
+            let Some(body) = event.body() else { continue };
+            let count = &mut metrics.events[body.index()];
+            if event.to == Motion::Stuck {
+                count.stops += 1;
+            } else if event.from == Motion::Stuck {
+                count.starts += 1;
+            } else {
+                count.reversals += 1;
             }
         }
-        metrics.stop_time = match events.last() {
+        metrics.stop_time = match events.iter().rfind(|event| event.body().is_some()) {
             Some(last) => Some(last.time).filter(|_| metrics.settled),
             None => Some(0.0).filter(|_| metrics.settled && self.never_moved),
         };

@@ -251,11 +251,17 @@ const MOTOR: &[Parameter] = &[
     row("motor.rotor_inertia", "J_r", "kg m^2", Value(0.0), NOT_NEGATIVE, "4.2e-6 kg m^2", "Inertia of the rotor, at the motor's own shaft."),
     row("motor.gear_ratio", "n", "", Value(1.0), Range::new(1e-6, 1e6), "5.9", "Motor turns per turn of the drive pulley."),
     row("motor.gear_efficiency", "η", "", Value(1.0), UP_TO_ONE, "0.73", "The part of the power that passes the gear, whichever side drives."),
+    row("motor.backlash", "2α", "rad", Value(0.0), Range { below: true, ..Range::new(0.0, 6.3) }, "0.5 deg", "Play of the gear: by how much the drive pulley can turn while the rotor stands. Needs `gear_stiffness`."),
+    row("motor.gear_stiffness", "k_g", "N m/rad", Words("stiff"), POSITIVE, "300 N m/rad", "Stiffness of the gear between rotor and drive pulley, at the pulley; makes the rotor an inertia of its own."),
+    row("motor.gear_damping", "c_g", "N m s/rad", Value(0.0), NOT_NEGATIVE, "0.01 N m s", "Damping of the gear where its flanks touch, at the pulley."),
 ];
 
 #[rustfmt::skip]
 const AMPLIFIER: &[Parameter] = &[
     row("amplifier.gain", "", "", Value(1.0), ANY, "1", "Output, V or A, per unit of input; negative where the wires are swapped."),
+    row("amplifier.voltage_limit", "V_max", "V", Words("none"), POSITIVE, "24 V", "Largest voltage at the motor's terminals, either way."),
+    row("amplifier.current_limit", "I_max", "A", Words("none"), POSITIVE, "12 A", "Largest current, either way."),
+    row("amplifier.bandwidth", "f_b", "Hz", Words("none: the current follows at once"), FREQUENCY, "1 kHz", "Bandwidth of the current loop, first order; only in current mode."),
 ];
 
 #[rustfmt::skip]
@@ -268,6 +274,8 @@ const RADIUS: &[Parameter] = &[
 #[rustfmt::skip]
 const CART: &[Parameter] = &[
     row("cart.mass", "M", "kg", Required, POSITIVE, "0.362 kg", "Mass of the cart with its load."),
+    row("cart.load", "F_L", "N", Value(0.0), ANY, "-3 N", "Constant force on the cart, positive towards larger x."),
+    row("cart.inclination", "θ", "rad", Value(0.0), Range::new(-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2), "10 deg", "Inclination of the axis, positive if the cart climbs towards larger x; adds −M g sin θ to the load."),
 ];
 
 #[rustfmt::skip]
@@ -285,6 +293,15 @@ const BELT: &[Parameter] = &[
     row("belt.section.toothed_share", "", "", Required, Range::new(0.0, 1.0), "0.5", "Share of the belt's length that has the cross-section `toothed`."),
     row("belt.spans", "l₁ l₂ l₃", "m", Words("not used with `stiffness`"), POSITIVE, "0.34925 m", "Length of each span. Three values in a list."),
     row("belt.damping", "c₁ c₂ c₃", "N s/m", Value(0.0), NOT_NEGATIVE, "0 N s/m", "Damping of each span, parallel to its stiffness. Three values in a list."),
+    row("belt.pretension", "T₀", "N", Words("none: spans can push"), POSITIVE, "50 N", "Tension of every span at rest; a span whose tension is used up goes slack and carries nothing."),
+];
+
+#[rustfmt::skip]
+const TRAVEL: &[Parameter] = &[
+    row("travel.min", "x_min", "m", Required, ANY, "-0.2 m", "Least position of the cart."),
+    row("travel.max", "x_max", "m", Required, ANY, "0.3 m", "Greatest position of the cart; above `min`."),
+    row("travel.stop_stiffness", "k_s", "N/m", Words("no stops: a run ends there"), POSITIVE, "20 kN/m", "Stiffness of the end stops."),
+    row("travel.stop_damping", "c_s", "N s/m", Value(0.0), NOT_NEGATIVE, "50 N s/m", "Their damping."),
 ];
 
 #[rustfmt::skip]
@@ -306,7 +323,7 @@ const INITIAL: &[Parameter] = &[
     row("experiment.initial.cart_speed", "x′", "m/s", Value(0.0), ANY, "0 m/s", "Its speed."),
     row("experiment.initial.idler_angle", "φ₃", "rad", Value(0.0), ANY, "0 rad", "Angle of the idler pulley at time zero."),
     row("experiment.initial.idler_speed", "φ₃′", "rad/s", Value(0.0), ANY, "0 rad/s", "Its speed."),
-    row("experiment.initial.motor_current", "i", "A", Value(0.0), ANY, "0 A", "Armature current at time zero; only with an inductance and in voltage mode."),
+    row("experiment.initial.motor_current", "i", "A", Value(0.0), ANY, "0 A", "Armature current at time zero; only where it does not follow at once: with an inductance, or in current mode with a bandwidth."),
 ];
 
 #[rustfmt::skip]
@@ -386,6 +403,7 @@ const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     ),
     ("cart", &[CART, &friction!("cart", "b", "F_c", "F_b", "N s/m", "N", "19.0424 N s/m", "0.2 N", "0.3 N")]),
     ("belt", &[BELT]),
+    ("travel", &[TRAVEL]),
     ("encoder", &[ENCODER]),
     ("experiment", &[EXPERIMENT]),
     ("experiment.initial", &[INITIAL]),

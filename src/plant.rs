@@ -3,15 +3,18 @@
 //! Every force is a [`Form`]: a linear form of stretches, speeds, current and input. Friction makes the equations
 //! piecewise linear; within one [`Mode`] they are linear, and [`Plant::equations`] gives them.
 
+mod elements;
 mod form;
+mod mode;
 mod power;
 
 pub use form::Form;
-pub(crate) use form::ROUNDING;
+pub(crate) use form::{POSITION, ROTOR, ROUNDING, SPEEDS, STRETCHES, arms};
+pub use mode::{Cause, Contact, Guard, Limit, Mode, Part, Status, Switch};
 pub use power::Power;
 
 use crate::friction::{Friction, Motion, Side};
-use crate::stage::{AmplifierMode, Stage};
+use crate::stage::{AmplifierMode, BeltModel, Stage};
 
 /// Places in the state vector: φ₁, φ₁′, x, x′, φ₃, φ₃′ (eq. 6, in the paper's order), then the armature current.
 pub mod place {
@@ -27,10 +30,14 @@ pub mod place {
     pub const IDLER_ANGLE: usize = 4;
     /// φ₃′, rad/s.
     pub const IDLER_SPEED: usize = 5;
-    /// i, A; a state only where the armature has an inductance.
+    /// i, A; a state only where the armature has an inductance, or the current loop a bandwidth.
     pub const CURRENT: usize = 6;
+    /// φ_r, rad: the rotor's angle seen from behind the gear; a state only where the gear gives way, else φ₁.
+    pub const ROTOR_ANGLE: usize = 7;
+    /// φ_r′, rad/s.
+    pub const ROTOR_SPEED: usize = 8;
     /// Number of states.
-    pub const COUNT: usize = 7;
+    pub const COUNT: usize = 9;
 }
 
 /// The state of a stage, in the order of [`place`].
@@ -72,58 +79,31 @@ impl Body {
     }
 }
 
-/// Which linear equations hold: what each body does, and which way the gear carries torque.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Mode {
-    /// Motion of drive pulley, cart, idler pulley.
-    pub motion: [Motion; 3],
-    /// Whether the torque through the gear is positive; matters only where the gear loses power.
-    pub gear_torque_positive: bool,
-}
-
 /// The equations in one mode: accelerations, rate of current, and what must stay true.
 #[derive(Debug, Clone)]
 pub struct Equations {
-    /// φ̈₁, ẍ, φ̈₃.
-    pub acceleration: [Form; 3],
+    /// φ̈₁, ẍ, φ̈₃ and φ̈_r; the last is zero where the rotor is no inertia of its own.
+    pub acceleration: [Form; SPEEDS],
     /// di/dt; zero where the current is no state.
     pub current_rate: Form,
-    /// Inertia that each acceleration was divided by: J₁ (+ rotor through the gear), M, J₂.
-    pub inertia: [f64; 3],
+    /// Inertia of each: J₁ (+ rotor through the gear), M, J₂, and that of the rotor seen from behind the gear.
+    pub inertia: [f64; SPEEDS],
+    /// Stiffness that stores energy in this mode: of the spans, the gear, and the end stop.
+    pub stiffness: [f64; STRETCHES],
     /// Conditions under which these equations hold.
     pub guards: Vec<Guard>,
-}
-
-/// A condition of a mode: the mode holds while `form` ≥ 0.
-#[derive(Debug, Clone, Copy)]
-pub struct Guard {
-    /// What must not become negative.
-    pub form: Form,
-    /// What it means when it does.
-    pub cause: Cause,
-}
-
-/// Why a mode ends.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cause {
-    /// A sliding body comes to zero speed.
-    Stop(Body),
-    /// The load on a stuck body passes its breakaway forward.
-    BreakForward(Body),
-    /// The load on a stuck body passes its breakaway backward.
-    BreakBackward(Body),
-    /// The torque through the gear changes sign.
-    GearTorque,
 }
 
 /// The equations of a stage in all its modes.
 #[derive(Debug, Clone)]
 pub struct Plant {
     stage: Stage,
-    /// Forces of the spans: f₁ pulls the cart forward, f₂ backward, f₃ pulls drive and idler pulley together.
+    /// Stiffness and damping of the spans as the model has them.
+    belt: [[f64; 3]; 2],
+    /// Forces of the spans as long as they are taut: f₁ pulls the cart forward, f₂ backward, f₃ pulls drive and idler
+    /// pulley together.
     span: [Form; 3],
-    /// Armature current.
-    current: Form,
+    /// Friction laws; that of bodies that move as one stands with the one that leads.
     friction: [Friction; 3],
 }
 
@@ -131,8 +111,15 @@ impl Plant {
     /// The equations of `stage`.
     pub fn new(stage: &Stage) -> Self {
         let r = stage.pulley_radius;
-        let [k1, k2, k3] = stage.belt.stiffness;
-        let [c1, c2, c3] = stage.belt.damping;
+        let [mut k, mut c] = [stage.belt.stiffness, stage.belt.damping];
+        if stage.belt.model == BeltModel::TwoMass {
+            // Spans 2 and 3 in series, the idler pulley between them without inertia or friction of its own:
+            // 1/k₂₃ = 1/k₂ + 1/k₃ and, for slow motion, c₂₃ = (c₂ k₃² + c₃ k₂²)/(k₂ + k₃)²
+            let sum = k[1] + k[2];
+            c[1] = (c[1] * k[2] * k[2] + c[2] * k[1] * k[1]) / (sum * sum);
+            k[1] = k[1] * k[2] / sum;
+        }
+        let ([k1, k2, k3], [c1, c2, c3]) = (k, c);
         let (w1, v, w3) = (Form::speed(0), Form::speed(1), Form::speed(2));
         // f₁ = k₁ (r φ₁ − x) + c₁ (r φ̇₁ − ẋ)                                  after (1), (2)
         let f1 = Form::stretch(0) * k1 + (w1 * r - v) * c1;
@@ -140,19 +127,18 @@ impl Plant {
         let f2 = Form::stretch(1) * k2 + (v - w3 * r) * c2;
         // f₃ = k₃ (r φ₃ − r φ₁) + c₃ (r φ̇₃ − r φ̇₁)                            after (1), (3)
         let f3 = Form::stretch(2) * k3 + (w3 * r - w1 * r) * c3;
-
-        let motor = &stage.motor;
-        let u = Form::input() * stage.amplifier.gain;
-        let current = match stage.amplifier.mode {
-            AmplifierMode::Current => u,
-            AmplifierMode::Voltage if motor.inductance > 0.0 => Form::current(),
-            // i = (V_in − K_e n φ̇₁) / R                                        in (4)
-            AmplifierMode::Voltage => {
-                (u - w1 * (motor.back_emf_constant * motor.gear_ratio)) * (1.0 / motor.resistance)
-            }
+        let span = match stage.belt.model {
+            BeltModel::Elastic => [f1, f2, f3],
+            BeltModel::TwoMass => [f1, f2, f2],
+            BeltModel::Rigid => [Form::ZERO; 3],
         };
-        let friction = [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction];
-        Self { stage: stage.clone(), span: [f1, f2, f3], current, friction }
+        let mut plant = Self { stage: stage.clone(), belt: [k, c], span, friction: [Friction::default(); 3] };
+        let laws = [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction];
+        for (body, law) in Body::ALL.into_iter().zip(laws) {
+            let ratio = plant.ratio(body);
+            plant.friction[plant.leader(body).index()].add(&law, ratio);
+        }
+        plant
     }
 
     /// The stage.
@@ -160,34 +146,70 @@ impl Plant {
         &self.stage
     }
 
-    /// Force of each span, N.
-    pub fn span_forces(&self) -> &[Form; 3] {
-        &self.span
+    /// The body that this one moves with: itself, unless the belt's model makes several bodies one.
+    pub fn leader(&self, body: Body) -> Body {
+        match (self.stage.belt.model, body) {
+            (BeltModel::Elastic, _) => body,
+            (BeltModel::TwoMass, Body::Cart) | (BeltModel::Rigid, _) => Body::Cart,
+            (BeltModel::TwoMass, _) => Body::DrivePulley,
+        }
     }
 
-    /// Armature current, A.
-    pub fn current(&self) -> &Form {
-        &self.current
+    /// The way of this body per way of its leader: 1, or 1/r for a pulley that goes with the cart.
+    pub fn ratio(&self, body: Body) -> f64 {
+        match self.stage.belt.model {
+            BeltModel::Rigid if body != Body::Cart => 1.0 / self.stage.pulley_radius,
+            _ => 1.0,
+        }
+    }
+
+    /// Bodies that move by themselves.
+    pub fn leaders(&self) -> impl Iterator<Item = Body> {
+        Body::ALL.into_iter().filter(|&body| self.leader(body) == body)
+    }
+
+    /// Bodies that move with `leader`, itself included.
+    pub fn followers(&self, leader: Body) -> impl Iterator<Item = Body> {
+        Body::ALL.into_iter().filter(move |&body| self.leader(body) == leader)
+    }
+
+    /// Whether the rotor is an inertia of its own.
+    pub fn has_rotor(&self) -> bool {
+        self.stage.motor.gear_play.is_some()
     }
 
     /// Whether the armature current is a state of its own.
     pub fn has_current_state(&self) -> bool {
-        self.stage.motor.inductance > 0.0 && self.stage.amplifier.mode == AmplifierMode::Voltage
+        match self.stage.amplifier.mode {
+            AmplifierMode::Voltage => self.stage.motor.inductance > 0.0,
+            AmplifierMode::Current => self.stage.amplifier.bandwidth.is_some(),
+        }
     }
 
-    /// Friction law of a body.
+    /// Friction law of a body; nothing for one that another leads.
     pub fn friction(&self, body: Body) -> &Friction {
         &self.friction[body.index()]
     }
 
     /// Whether a body can stick or has a direction-dependent law, so that its motion has modes at all.
     pub fn has_modes(&self, body: Body) -> bool {
-        !self.friction(body).is_linear() || (body == Body::DrivePulley && self.gear_loses())
+        let leader = self.leader(body);
+        !self.friction(leader).is_linear() || (self.gear_loses() && leader == self.leader(Body::DrivePulley))
     }
 
     /// Whether the gear's efficiency is below one.
     pub fn gear_loses(&self) -> bool {
         self.stage.motor.gear_efficiency < 1.0
+    }
+
+    /// The mode in which `state` is looked at first: each body moves as its speed says, all else is in order.
+    pub fn first_mode(&self, state: &State) -> Mode {
+        Mode::of(Body::ALL.map(|body| match state[self.leader(body).speed_place()] {
+            _ if !self.has_modes(body) => Motion::Free,
+            v if v > 0.0 => Motion::Forward,
+            v if v < 0.0 => Motion::Backward,
+            _ => Motion::Stuck,
+        }))
     }
 
     /// The part of the torque that the gear passes on: η if the motor drives, 1/η if it is driven.
@@ -198,64 +220,81 @@ impl Plant {
         if forward == torque_positive { eta } else { 1.0 / eta }
     }
 
-    /// All forces (N) or torques (N m) on a body except its friction, for a body that moves, or is about to move,
-    /// forward or backward: the inner brackets of eq. (16)-(18).
-    pub fn load(&self, body: Body, forward: bool, gear_torque_positive: bool) -> Form {
+    /// All forces (N) or torques (N m) on a body, and on those that move with it, except friction, for a body that moves, or
+    /// is about to move, forward or backward: the inner brackets of eq. (16)-(18).
+    pub fn load(&self, body: Body, forward: bool, mode: &Mode) -> Form {
+        let own = |body| self.own_load(body, forward, mode) * self.ratio(body);
+        self.followers(body).map(own).fold(Form::ZERO, |sum, form| sum + form)
+    }
+
+    fn own_load(&self, body: Body, forward: bool, mode: &Mode) -> Form {
         let r = self.stage.pulley_radius;
-        let [f1, f2, f3] = self.span;
+        let [f1, f2, f3] = self.span_forces(mode);
         match body {
             // −r f₁ + r f₃ + τ_M                                                (16)
-            Body::DrivePulley => self.motor_torque(self.gear_factor(forward, gear_torque_positive)) + f3 * r - f1 * r,
-            // f₁ − f₂                                                           (17)
-            Body::Cart => f1 - f2,
+            Body::DrivePulley => self.torque_on_pulley(forward, mode) + f3 * r - f1 * r,
+            // f₁ − f₂, a constant force, and that of an end stop                (17)
+            Body::Cart => f1 - f2 + Form::constant(self.stage.cart.constant_force()) + self.stop_force(mode),
             // r f₂ − r f₃                                                       (18)
             Body::IdlerPulley => f2 * r - f3 * r,
         }
     }
 
-    /// Motor torque at the drive pulley at constant speed, for a gear that passes on the part `e`.
-    fn motor_torque(&self, e: f64) -> Form {
+    /// Torque of motor and gear on the drive pulley, rotor inertia apart where the gear is stiff.
+    fn torque_on_pulley(&self, forward: bool, mode: &Mode) -> Form {
+        if self.has_rotor() {
+            return self.gear_torque(mode);
+        }
         let motor = &self.stage.motor;
+        let e = self.gear_factor(forward, mode.gear_torque_positive);
         // τ_M = e n K_t i                                                       (4) with a gear
-        self.current * (motor.torque_constant * motor.gear_ratio * e)
+        self.current(mode) * (motor.torque_constant * motor.gear_ratio * e)
     }
 
     /// The equations that hold in `mode`, and the conditions under which they do.
     pub fn equations(&self, mode: Mode) -> Equations {
-        let motor = &self.stage.motor;
+        let stage = &self.stage;
+        let motor = &stage.motor;
         let n = motor.gear_ratio;
-        let mut acceleration = [Form::ZERO; 3];
-        let mut inertia = [self.stage.drive_pulley.inertia, self.stage.cart.mass, self.stage.idler_pulley.inertia];
+        let mut acceleration = [Form::ZERO; SPEEDS];
+        let mut inertia = [stage.drive_pulley.inertia, stage.cart.mass, stage.idler_pulley.inertia, 0.0];
         let mut guards = Vec::with_capacity(7);
 
-        for body in Body::ALL {
+        let rotor = n * n * motor.rotor_inertia;
+        if self.has_rotor() {
+            // n² J_r φ̈_r = n K_t i − T
+            inertia[ROTOR] = rotor;
+            let torque = self.current(&mode) * (n * motor.torque_constant) - self.gear_torque(&mode);
+            acceleration[ROTOR] = torque * (1.0 / rotor);
+        } else {
+            // J₁ + e n² J_r: the rotor turns n times as fast, behind the gear.
+            let forward = mode.motion[0] != Motion::Backward;
+            inertia[0] += self.gear_factor(forward, mode.gear_torque_positive) * rotor;
+        }
+
+        for body in self.leaders() {
             let index = body.index();
             let speed = Form::speed(index);
             let motion = mode.motion[index];
-            let forward = motion != Motion::Backward;
-            if body == Body::DrivePulley {
-                // J₁ + e n² J_r: the rotor turns n times as fast, behind the gear.
-                let e = self.gear_factor(forward, mode.gear_torque_positive);
-                inertia[0] += e * n * n * motor.rotor_inertia;
-            }
             let law = self.friction(body);
-            let load = self.load(body, forward, mode.gear_torque_positive);
+            let load = self.load(body, motion != Motion::Backward, &mode);
+            let mass: f64 = self.followers(body).map(|b| self.ratio(b).powi(2) * inertia[b.index()]).sum();
             // J φ̈ = load − F_f, with F_f = b v ± F_c                             (15)-(18)
             let sliding = |side: Side, sign: f64| {
-                (load - speed * side.viscous - Form::constant(sign * side.coulomb)) * (1.0 / inertia[index])
+                (load - speed * side.viscous - Form::constant(sign * side.coulomb)) * (1.0 / mass)
             };
-            match motion {
-                Motion::Free => acceleration[index] = sliding(law.forward, 0.0),
+            let own = match motion {
+                Motion::Free => sliding(law.forward, 0.0),
                 Motion::Forward => {
-                    acceleration[index] = sliding(law.forward, 1.0);
                     guards.push(Guard { form: speed, cause: Cause::Stop(body) });
+                    sliding(law.forward, 1.0)
                 }
                 Motion::Backward => {
-                    acceleration[index] = sliding(law.backward, -1.0);
                     guards.push(Guard { form: -speed, cause: Cause::Stop(body) });
+                    sliding(law.backward, -1.0)
                 }
                 Motion::Stuck => {
-                    let back = self.load(body, false, mode.gear_torque_positive);
+                    let back = self.load(body, false, &mode);
                     guards.push(Guard {
                         form: Form::constant(law.forward.breakaway) - load,
                         cause: Cause::BreakForward(body),
@@ -264,24 +303,23 @@ impl Plant {
                         form: Form::constant(law.backward.breakaway) + back,
                         cause: Cause::BreakBackward(body),
                     });
+                    Form::ZERO
                 }
+            };
+            for follower in self.followers(body) {
+                acceleration[follower.index()] = own * self.ratio(follower);
             }
         }
-        if self.gear_loses() {
+        if self.gear_loses() && !self.has_rotor() {
             // T = K_t i − J_r n φ̈₁, the torque that the motor hands to the gear
-            let torque = self.current * motor.torque_constant - acceleration[0] * (motor.rotor_inertia * n);
+            let torque = self.current(&mode) * motor.torque_constant - acceleration[0] * (motor.rotor_inertia * n);
             let sign = if mode.gear_torque_positive { 1.0 } else { -1.0 };
             // First, because the loads that the others watch depend on it.
             guards.insert(0, Guard { form: torque * sign, cause: Cause::GearTorque });
         }
-        let current_rate = if self.has_current_state() {
-            // L di/dt = V_in − R i − K_e n φ̇₁
-            let drop = Form::current() * motor.resistance + Form::speed(0) * (motor.back_emf_constant * n);
-            (Form::input() * self.stage.amplifier.gain - drop) * (1.0 / motor.inductance)
-        } else {
-            Form::ZERO
-        };
-        Equations { acceleration, current_rate, inertia, guards }
+        self.watch_elements(&mode, &mut guards);
+        let stiffness = self.stiffness_in(&mode);
+        Equations { acceleration, current_rate: self.current_rate(&mode), inertia, stiffness, guards }
     }
 
     /// Friction force (N) or torque (N m) on a body: what its law gives while it slides, what holds it while it is stuck.
@@ -295,7 +333,8 @@ impl Plant {
             Motion::Free => law.forward.viscous * speed,
             Motion::Forward => law.forward.viscous * speed + law.forward.coulomb,
             Motion::Backward => law.backward.viscous * speed - law.backward.coulomb,
-            // The gear holds what it can, friction the rest.
+            // The gear holds what it can, friction the rest; what moves with another body leaves it to that one.
+            Motion::Stuck if self.leader(body) != body => 0.0,
             Motion::Stuck => load.0.max(0.0) + load.1.min(0.0),
         }
     }

@@ -20,8 +20,28 @@ pub struct Stage {
     pub idler_pulley: Pulley,
     /// The belt's three spans.
     pub belt: Belt,
+    /// How far the cart may go, if that is bounded.
+    pub travel: Option<Travel>,
     /// How the motion is measured, if it is.
     pub encoder: Option<Encoder>,
+}
+
+impl Stage {
+    /// The first part of it that the paper's equations do not have, in words.
+    pub fn beyond_the_paper(&self) -> Option<&'static str> {
+        let amplifier = &self.amplifier;
+        let parts = [
+            (amplifier.voltage_limit.is_some(), "a voltage limit"),
+            (amplifier.current_limit.is_some(), "a current limit"),
+            (amplifier.bandwidth.is_some(), "a current loop of finite bandwidth"),
+            (self.motor.gear_play.is_some(), "a gear that gives way"),
+            (self.belt.pretension.is_some(), "spans that go slack"),
+            (self.belt.model != BeltModel::Elastic, "a reduced model of the belt"),
+            (self.cart.constant_force() != 0.0, "a constant force on the cart"),
+            (self.travel.is_some(), "the ends of the travel"),
+        ];
+        parts.into_iter().find(|(there, _)| *there).map(|(_, words)| words)
+    }
 }
 
 /// A brushed DC motor with a gear, eq. (4) and beyond.
@@ -41,6 +61,19 @@ pub struct Motor {
     pub gear_ratio: f64,
     /// Gear efficiency η: the part of the power that passes, whichever side drives.
     pub gear_efficiency: f64,
+    /// A gear that gives way, so that the rotor is an inertia of its own; none for one that is stiff and without play.
+    pub gear_play: Option<GearPlay>,
+}
+
+/// A gear with play and stiffness, seen from the drive pulley.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GearPlay {
+    /// Backlash 2α, rad: by how much the drive pulley can turn while the rotor stands.
+    pub backlash: f64,
+    /// Stiffness of a flank in contact k_g, N m/rad.
+    pub stiffness: f64,
+    /// Damping of a flank in contact c_g, N m s/rad.
+    pub damping: f64,
 }
 
 /// What the input commands.
@@ -50,6 +83,19 @@ pub struct Amplifier {
     pub mode: AmplifierMode,
     /// Output (V or A) per unit of input.
     pub gain: f64,
+    /// Largest voltage V_max at the motor's terminals, V, either way.
+    pub voltage_limit: Option<f64>,
+    /// Largest current I_max, A, either way.
+    pub current_limit: Option<f64>,
+    /// Bandwidth f_b of the current loop, Hz; none for one that is faster than anything else.
+    pub bandwidth: Option<f64>,
+}
+
+impl Amplifier {
+    /// An amplifier without limits.
+    pub fn ideal(mode: AmplifierMode, gain: f64) -> Self {
+        Self { mode, gain, voltage_limit: None, current_limit: None, bandwidth: None }
+    }
 }
 
 /// Whether the amplifier imposes a voltage or a current.
@@ -77,6 +123,20 @@ pub struct Cart {
     pub mass: f64,
     /// Friction force, N over m/s.
     pub friction: Friction,
+    /// A constant force on the cart F_L, N, positive towards larger x: what a hanging mass or a spring of constant force pulls.
+    pub load: f64,
+    /// Inclination of the axis, rad: positive if the cart climbs towards larger x.
+    pub inclination: f64,
+}
+
+/// Standard acceleration of gravity, m/s² (CGPM 1901).
+pub const GRAVITY: f64 = 9.80665;
+
+impl Cart {
+    /// The constant force on the cart, N: F_L − M g sin θ.
+    pub fn constant_force(&self) -> f64 {
+        self.load - self.mass * GRAVITY * self.inclination.sin()
+    }
 }
 
 /// Three spans: 1 drive pulley to cart, 2 cart to idler pulley, 3 idler pulley back to drive pulley.
@@ -88,6 +148,60 @@ pub struct Belt {
     pub damping: [f64; 3],
     /// What the stiffness was computed from, where it was not given as such.
     pub make: Option<BeltMake>,
+    /// Tension T₀ of every span at rest, N. A span whose tension is used up goes slack; none for spans that can push.
+    pub pretension: Option<f64>,
+    /// How many of the three inertias move by themselves.
+    pub model: BeltModel,
+}
+
+impl Belt {
+    /// Spans of given stiffness (N/m) and damping (N s/m) and no more.
+    pub fn given(stiffness: [f64; 3], damping: [f64; 3]) -> Self {
+        Self { stiffness, damping, make: None, pretension: None, model: BeltModel::Elastic }
+    }
+}
+
+/// What the belt lets move by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum BeltModel {
+    /// All three inertias: the paper's model.
+    #[default]
+    Elastic,
+    /// Both pulleys as one inertia, and the cart on spans 1 and, in series, 2 and 3 (as Hace et al. 2005).
+    TwoMass,
+    /// Everything as one inertia: a belt that does not stretch (as Li & Rehani 1996).
+    Rigid,
+}
+
+impl BeltModel {
+    /// As in the case file.
+    pub fn word(self) -> &'static str {
+        match self {
+            BeltModel::Elastic => "elastic",
+            BeltModel::TwoMass => "two-mass",
+            BeltModel::Rigid => "rigid",
+        }
+    }
+}
+
+/// How far the cart may go.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Travel {
+    /// Least position x, m.
+    pub min: f64,
+    /// Greatest position x, m.
+    pub max: f64,
+    /// What stands there; without, a run ends when the cart leaves its travel.
+    pub stop: Option<EndStop>,
+}
+
+/// An elastic end stop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EndStop {
+    /// Stiffness k_s, N/m.
+    pub stiffness: f64,
+    /// Damping c_s, N s/m.
+    pub damping: f64,
 }
 
 /// What a belt is made of; gives its stiffness by eq. (11).

@@ -39,20 +39,22 @@ fn stage(value: &Value) -> Stage {
             rotor_inertia: get("rotor_inertia"),
             gear_ratio: get("gear_ratio"),
             gear_efficiency: get("gear_efficiency"),
+            gear_play: None,
         },
-        amplifier: Amplifier {
-            mode: match value["amplifier_mode"].as_str() {
+        amplifier: Amplifier::ideal(
+            match value["amplifier_mode"].as_str() {
                 Some("voltage") => AmplifierMode::Voltage,
                 Some("current") => AmplifierMode::Current,
                 other => panic!("amplifier mode {other:?}"),
             },
-            gain: get("amplifier_gain"),
-        },
+            get("amplifier_gain"),
+        ),
         pulley_radius: get("pulley_radius"),
         drive_pulley: pulley("drive_inertia", "drive_friction"),
-        cart: Cart { mass: get("cart_mass"), friction: friction(&value["cart_friction"]) },
+        cart: Cart { mass: get("cart_mass"), friction: friction(&value["cart_friction"]), load: 0.0, inclination: 0.0 },
         idler_pulley: pulley("idler_inertia", "idler_friction"),
-        belt: Belt { stiffness: ["k1", "k2", "k3"].map(get), damping: ["c1", "c2", "c3"].map(get), make: None },
+        belt: Belt::given(["k1", "k2", "k3"].map(get), ["c1", "c2", "c3"].map(get)),
+        travel: None,
         encoder: None,
     }
 }
@@ -153,7 +155,7 @@ fn compare(text: &str) -> usize {
             .outcome
             .events
             .iter()
-            .map(|e| (e.body.index() as i64 + 1, i64::from(e.from.code()), i64::from(e.to.code())))
+            .map(|e| (e.body().unwrap().index() as i64 + 1, i64::from(e.from.code()), i64::from(e.to.code())))
             .collect();
         let theirs = case["events"].as_array().unwrap();
         let want: Vec<_> =

@@ -31,6 +31,8 @@ fn state(trajectory: &Trajectory, row: usize) -> State {
         get("idler_angle"),
         get("idler_speed"),
         get("motor_current"),
+        get("drive_angle"),
+        get("drive_speed"),
     ]
 }
 
@@ -80,7 +82,7 @@ proptest! {
         };
         let power = |row: usize| {
             let codes = Body::ALL.map(|b| trajectory.get(&format!("{}_state", b.key())).unwrap()[row]);
-            let mode = |positive| Mode { motion: codes.map(motion), gear_torque_positive: positive };
+            let mode = |positive| Mode { gear_torque_positive: positive, ..Mode::of(codes.map(motion)) };
             let state = state(trajectory, row);
             // The sign of the gear's torque is the one that is consistent with itself.
             let both = [true, false].map(|positive| plant.power(mode(positive), &state, input_at(row)));
@@ -131,7 +133,7 @@ proptest! {
         }
         prop_assert_eq!(there.outcome.events.len(), back.outcome.events.len());
         for (a, b) in there.outcome.events.iter().zip(&back.outcome.events) {
-            prop_assert!(a.time == b.time && a.load == -b.load && a.body == b.body, "{a:?} and {b:?}");
+            prop_assert!(a.time == b.time && a.load == -b.load && a.part == b.part, "{a:?} and {b:?}");
         }
     }
 

@@ -43,7 +43,7 @@ fn compare(case: &str, stage: Stage, input: Signal) {
         println!("{case}: {name} differs by at most {worst:.2e}");
         assert!(worst <= tolerance, "{case}: {name} differs by {worst:e}");
     }
-    let modes = |e: &taut::solve::Event| (e.body.index() + 1, e.from.code(), e.to.code());
+    let modes = |e: &taut::solve::Event| (e.body().unwrap().index() + 1, e.from.code(), e.to.code());
     let got_modes: Vec<_> = got.outcome.events.iter().map(modes).collect();
     let want_modes: Vec<_> = events.iter().map(|e| (e[1] as usize, e[2] as i8, e[3] as i8)).collect();
     assert_eq!(got_modes, want_modes, "{case}");
@@ -109,7 +109,7 @@ fn events_do_not_depend_on_the_output_interval() {
             let same: Vec<_> = fine.iter().filter(|e| e.time < (0.5 / every + 1e-9).floor() * every).collect();
             assert_eq!(coarse.len(), same.len(), "{volts} V, every {every} s");
             for (a, b) in coarse.iter().zip(same) {
-                assert!(a.body == b.body && a.to == b.to, "{a:?} and {b:?}");
+                assert!(a.part == b.part && a.to == b.to, "{a:?} and {b:?}");
                 assert!((a.time - b.time).abs() < 1e-12, "{a:?} and {b:?}");
             }
         }

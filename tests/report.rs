@@ -21,13 +21,15 @@ fn stage(encoder: Option<Encoder>) -> Stage {
             rotor_inertia: 1e-6,
             gear_ratio: 5.9,
             gear_efficiency: 0.8,
+            gear_play: None,
         },
-        amplifier: Amplifier { mode: AmplifierMode::Voltage, gain: 2.0 },
+        amplifier: Amplifier::ideal(AmplifierMode::Voltage, 2.0),
         pulley_radius: 0.0194,
         drive_pulley: pulley,
-        cart: Cart { mass: 0.362, friction: Friction::symmetric(19.0424, 0.2) },
+        cart: Cart { mass: 0.362, friction: Friction::symmetric(19.0424, 0.2), load: 0.0, inclination: 0.0 },
         idler_pulley: pulley,
-        belt: Belt { stiffness: [132.76e3, 132.76e3, f64::NAN], damping: [0.0, 3.0, 0.0], make: None },
+        belt: Belt::given([132.76e3, 132.76e3, f64::NAN], [0.0, 3.0, 0.0]),
+        travel: None,
         encoder,
     }
 }

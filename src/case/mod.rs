@@ -99,6 +99,9 @@ impl Initial {
             self.idler_angle,
             self.idler_speed,
             if plant.has_current_state() { self.motor_current } else { 0.0 },
+            // The rotor in the middle of its play.
+            self.drive_angle,
+            self.drive_speed,
         ]
     }
 }
@@ -163,8 +166,18 @@ impl Case {
                 .in_file(name)
                 .next("write a commented one to start from with `taut init`"));
         }
-        let tables =
-            ["title", "motor", "amplifier", "drive_pulley", "idler_pulley", "cart", "belt", "encoder", "experiment"];
+        let tables = [
+            "title",
+            "motor",
+            "amplifier",
+            "drive_pulley",
+            "idler_pulley",
+            "cart",
+            "belt",
+            "travel",
+            "encoder",
+            "experiment",
+        ];
         root.check_keys(&tables, PLANNED)?;
 
         let title = match root.optional("title") {
@@ -324,11 +337,11 @@ fn check_name(field: &Field) -> Result<()> {
 fn initial(table: &Table, stage: &Stage) -> Result<Initial> {
     table.check_keys(&[], &[])?;
     if let Some(current) = table.optional("motor_current")
-        && (stage.motor.inductance == 0.0 || stage.amplifier.mode == AmplifierMode::Current)
+        && !Plant::new(stage).has_current_state()
     {
-        return Err(current
-            .fail("this current would have no effect")
-            .next("it needs motor.inductance above zero and amplifier.mode = \"voltage\"; or leave it out"));
+        return Err(current.fail("this current would have no effect").next(
+            "it needs motor.inductance above zero in voltage mode, or amplifier.bandwidth in current mode; or leave it out",
+        ));
     }
     Ok(Initial {
         drive_angle: table.number("drive_angle")?,

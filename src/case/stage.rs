@@ -7,8 +7,7 @@ use crate::quantity::{rounded, show};
 use crate::stage::*;
 
 /// Keys that stand in the plan and not yet in the program.
-const PLANNED_AMPLIFIER: &[&str] = &["voltage_limit", "current_limit"];
-const PLANNED_BELT: &[&str] = &["follows_cart", "model"];
+const PLANNED_BELT: &[&str] = &["follows_cart"];
 const PLANNED_FRICTION: &[&str] = &["stribeck", "lugre"];
 
 pub(super) fn stage(root: &Table) -> Result<Stage> {
@@ -19,6 +18,7 @@ pub(super) fn stage(root: &Table) -> Result<Stage> {
     let idler = table("idler_pulley", "inertia")?;
     let cart = table("cart", "mass")?;
     let belt = table("belt", "stiffness")?;
+    let travel = root.optional("travel").map(|field| field.table()).transpose()?;
     let encoder = root.optional("encoder").map(|field| field.table()).transpose()?;
 
     drive.check_keys(&[], &[])?;
@@ -26,12 +26,18 @@ pub(super) fn stage(root: &Table) -> Result<Stage> {
     cart.check_keys(&[], &[])?;
     Ok(Stage {
         motor: self::motor(&motor)?,
-        amplifier: self::amplifier(amplifier.as_ref())?,
+        amplifier: self::amplifier(amplifier.as_ref(), &motor)?,
         pulley_radius: radius(&drive)?,
         drive_pulley: pulley(&drive)?,
-        cart: Cart { mass: cart.number("mass")?, friction: friction(&cart)? },
+        cart: Cart {
+            mass: cart.number("mass")?,
+            friction: friction(&cart)?,
+            load: cart.number("load")?,
+            inclination: cart.number("inclination")?,
+        },
         idler_pulley: pulley(&idler)?,
         belt: self::belt(&belt)?,
+        travel: travel.map(|table| self::travel(&table)).transpose()?,
         encoder: encoder.map(|table| self::encoder(&table)).transpose()?,
     })
 }
@@ -46,17 +52,90 @@ fn motor(table: &Table) -> Result<Motor> {
         rotor_inertia: table.number("rotor_inertia")?,
         gear_ratio: table.number("gear_ratio")?,
         gear_efficiency: table.number("gear_efficiency")?,
+        gear_play: gear_play(table)?,
     })
 }
 
-fn amplifier(table: Option<&Table>) -> Result<Amplifier> {
-    let Some(table) = table else {
-        return Ok(Amplifier { mode: AmplifierMode::Voltage, gain: 1.0 });
+/// A gear that gives way: `gear_stiffness`, and `backlash` and `gear_damping` with it.
+fn gear_play(table: &Table) -> Result<Option<GearPlay>> {
+    let Some(stiffness) = table.optional("gear_stiffness") else {
+        return match ["backlash", "gear_damping"].into_iter().find_map(|key| table.optional(key)) {
+            None => Ok(None),
+            Some(field) => Err(field
+                .fail("this needs a gear that gives way, so that rotor and drive pulley can turn against each other")
+                .next("add for example gear_stiffness = \"300 N m/rad\"")),
+        };
     };
-    table.check_keys(&["mode"], PLANNED_AMPLIFIER)?;
+    if table.number("rotor_inertia")? == 0.0 {
+        return Err(stiffness
+            .fail("a rotor that turns by itself needs an inertia")
+            .next("add for example rotor_inertia = \"4.2e-6 kg m^2\""));
+    }
+    if let Some(efficiency) = table.optional("gear_efficiency")
+        && efficiency.number()? != 1.0
+    {
+        return Err(efficiency
+            .fail("a gear that gives way has no efficiency of its own")
+            .next("leave gear_efficiency out, and give the loss as gear_damping or as friction of the drive pulley"));
+    }
+    Ok(Some(GearPlay {
+        backlash: table.number("backlash")?,
+        stiffness: stiffness.number()?,
+        damping: table.number("gear_damping")?,
+    }))
+}
+
+fn travel(table: &Table) -> Result<Travel> {
+    table.check_keys(&[], &[])?;
+    let (min, max) = (table.number("min")?, table.number("max")?);
+    if min >= max
+        && let Some(field) = table.optional("max")
+    {
+        return Err(field.fail("the travel ends before it begins").allowed("above min"));
+    }
+    let damping = table.number("stop_damping")?;
+    let stop = table.number_if_given("stop_stiffness")?.map(|stiffness| EndStop { stiffness, damping });
+    match table.optional("stop_damping") {
+        Some(field) if stop.is_none() => Err(field
+            .fail("there are no stops that this could be the damping of")
+            .next("add for example stop_stiffness = \"20 kN/m\"")),
+        _ => Ok(Travel { min, max, stop }),
+    }
+}
+
+fn amplifier(table: Option<&Table>, motor: &Table) -> Result<Amplifier> {
+    let Some(table) = table else {
+        return Ok(Amplifier::ideal(AmplifierMode::Voltage, 1.0));
+    };
+    table.check_keys(&["mode"], &[])?;
     let modes = [("voltage", AmplifierMode::Voltage), ("current", AmplifierMode::Current)];
     let mode = table.optional("mode").map_or(Ok(AmplifierMode::Voltage), |field| field.choice(&modes))?;
-    Ok(Amplifier { mode, gain: table.number("gain")? })
+    let inductance = motor.number("inductance")?;
+    match (mode, table.optional("bandwidth"), table.optional("voltage_limit")) {
+        (AmplifierMode::Voltage, Some(bandwidth), _) => {
+            return Err(bandwidth
+                .fail("an amplifier that commands the voltage has no current loop")
+                .next("leave it out, or set mode = \"current\""));
+        }
+        (AmplifierMode::Current, None, Some(limit)) if inductance > 0.0 => {
+            return Err(limit.fail("a current that jumps would need any voltage at an inductance").next(
+                "add the current loop's bandwidth, for example bandwidth = \"1 kHz\", or leave motor.inductance out",
+            ));
+        }
+        (AmplifierMode::Current, Some(_), Some(limit)) if inductance == 0.0 => {
+            return Err(limit
+                .fail("without inductance the voltage does not limit how fast the current changes")
+                .next("add motor.inductance, or leave amplifier.bandwidth out"));
+        }
+        _ => {}
+    }
+    Ok(Amplifier {
+        mode,
+        gain: table.number("gain")?,
+        voltage_limit: table.number_if_given("voltage_limit")?,
+        current_limit: table.number_if_given("current_limit")?,
+        bandwidth: table.number_if_given("bandwidth")?,
+    })
 }
 
 /// `radius`, or `teeth` and `pitch`.
@@ -138,7 +217,17 @@ fn friction(body: &Table) -> Result<Friction> {
 }
 
 fn belt(table: &Table) -> Result<Belt> {
-    table.check_keys(&[], PLANNED_BELT)?;
+    table.check_keys(&["model"], PLANNED_BELT)?;
+    let models = [BeltModel::Elastic, BeltModel::TwoMass, BeltModel::Rigid].map(|model| (model.word(), model));
+    let model = table.optional("model").map_or(Ok(BeltModel::Elastic), |field| field.choice(&models))?;
+    let pretension = table.number_if_given("pretension")?;
+    if let Some(field) = table.optional("pretension")
+        && model == BeltModel::Rigid
+    {
+        return Err(field
+            .fail("a rigid belt has no tension that could be used up")
+            .next("leave it out, or set model = \"two-mass\" or \"elastic\""));
+    }
     let make = ["modulus", "section", "spans"];
     let damping = table.optional("damping").map_or(Ok([0.0; 3]), |field| field.three())?;
     if let Some(stiffness) = table.optional("stiffness") {
@@ -147,7 +236,7 @@ fn belt(table: &Table) -> Result<Belt> {
                 .fail("the stiffness is given already")
                 .next("give either stiffness, or modulus, section and spans"));
         }
-        return Ok(Belt { stiffness: stiffness.three()?, damping, make: None });
+        return Ok(Belt { stiffness: stiffness.three()?, damping, make: None, pretension, model });
     }
     if make.iter().all(|key| table.optional(key).is_none()) {
         return Err(table.missing(
@@ -164,7 +253,7 @@ fn belt(table: &Table) -> Result<Belt> {
     for k in stiffness {
         table.computed("stiffness", &table.field, k)?;
     }
-    Ok(Belt { stiffness, damping, make: Some(make) })
+    Ok(Belt { stiffness, damping, make: Some(make), pretension, model })
 }
 
 /// One modulus, or the parts of a composite.

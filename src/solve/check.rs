@@ -4,7 +4,9 @@
 
 use crate::case::Experiment;
 use crate::error::{Error, Result};
+use crate::plant::{Body, Plant};
 use crate::stage::{AmplifierMode, Stage};
+use std::f64::consts::PI;
 
 /// The range of anything that has to be above zero, as in a case file.
 const LEAST: f64 = 1e-15;
@@ -46,6 +48,28 @@ pub(super) fn stage(stage: &Stage) -> Result<()> {
     not_negative("an inductance or the rotor's inertia", &[motor.inductance, motor.rotor_inertia])?;
     finite("a motor constant", &[motor.torque_constant, motor.back_emf_constant])?;
     finite("the amplifier's gain", &[stage.amplifier.gain])?;
+    finite("a load or an inclination", &[stage.cart.load, stage.cart.inclination])?;
+    let amplifier = &stage.amplifier;
+    for limit in [amplifier.voltage_limit, amplifier.current_limit, amplifier.bandwidth, stage.belt.pretension] {
+        positive("a limit, a bandwidth or a pretension", &limit.map_or([1.0], |limit| [limit]))?;
+    }
+    if let Some(play) = motor.gear_play {
+        positive("the gear's stiffness or the rotor's inertia", &[play.stiffness, motor.rotor_inertia])?;
+        not_negative("the gear's backlash or damping", &[play.backlash, play.damping])?;
+        if motor.gear_efficiency != 1.0 {
+            return Err(Error::new("a gear that gives way has no efficiency of its own").allowed("an efficiency of 1"));
+        }
+    }
+    if let Some(travel) = stage.travel {
+        finite("an end of the travel", &[travel.min, travel.max])?;
+        if travel.min >= travel.max {
+            return Err(Error::new("the travel ends before it begins").allowed("max above min"));
+        }
+        if let Some(stop) = travel.stop {
+            positive("the stiffness of an end stop", &[stop.stiffness])?;
+            not_negative("the damping of an end stop", &[stop.damping])?;
+        }
+    }
     for side in laws.iter().flat_map(|law| [law.forward, law.backward]) {
         not_negative("friction", &[side.viscous, side.coulomb, side.breakaway])?;
         if side.breakaway < side.coulomb {
@@ -55,7 +79,10 @@ pub(super) fn stage(stage: &Stage) -> Result<()> {
     }
 
     // Whatever is by itself this fast: the current, and each body against its springs, dampers, friction and the motor.
-    if motor.inductance > 0.0 && stage.amplifier.mode == AmplifierMode::Voltage {
+    if let Some(bandwidth) = amplifier.bandwidth.filter(|bandwidth| 2.0 * PI * bandwidth > FASTEST) {
+        return Err(too_fast("the current", 2.0 * PI * bandwidth).next("leave the bandwidth out: it does not show"));
+    }
+    if motor.inductance > 0.0 && (amplifier.mode == AmplifierMode::Voltage || amplifier.voltage_limit.is_some()) {
         let rate = motor.resistance / motor.inductance;
         if rate > FASTEST {
             return Err(too_fast("the current", rate).next("leave the inductance out: it does not show at this size"));
@@ -84,7 +111,7 @@ fn too_fast(what: &str, rate: f64) -> Error {
 }
 
 /// Refuses a run that has no rows, or no state to begin with.
-pub(super) fn experiment(experiment: &Experiment) -> Result<()> {
+pub(super) fn experiment(plant: &Plant, experiment: &Experiment) -> Result<()> {
     let &Experiment { until, every, ref initial, .. } = experiment;
     if !(until.is_finite() && every.is_finite() && until > 0.0 && every > 0.0) {
         return Err(Error::new(format!("a run of {until:e} s with a row every {every:e} s cannot be"))
@@ -105,8 +132,25 @@ pub(super) fn experiment(experiment: &Experiment) -> Result<()> {
     ];
     match state.iter().find(|v| !v.is_finite()) {
         Some(value) => {
-            Err(Error::new(format!("the state at the start cannot be {value}")).allowed("any finite number"))
+            return Err(Error::new(format!("the state at the start cannot be {value}")).allowed("any finite number"));
         }
-        None => Ok(()),
+        None => {}
     }
+    // What moves as one begins as one.
+    let state = initial.state(plant);
+    for body in Body::ALL {
+        let (own, leader) = (body.speed_place(), plant.leader(body).speed_place());
+        for (own, leader) in [(state[own - 1], state[leader - 1]), (state[own], state[leader])] {
+            let wanted = plant.ratio(body) * leader;
+            if (own - wanted).abs() > 1e-9 * wanted.abs() {
+                return Err(Error::new(format!(
+                    "in this model of the belt {} and {} move as one, and do not begin so: {own} instead of {wanted}",
+                    body.name(),
+                    plant.leader(body).name()
+                ))
+                .allowed("positions and speeds at the start that fit: x = r φ₁ = r φ₃"));
+            }
+        }
+    }
+    Ok(())
 }

@@ -8,15 +8,16 @@
 //! V(y) = ½ Σ m a² + ½ Σ k (Δv)² + ½ w L (di/dt)² can only grow by the input's rate: √(2V)(τ) ≤ √(2V)(0) + |b|·|u̇|·τ. A guard
 //! g = w·z therefore changes no faster than |w|·√(2V), |w| being the norm dual to V; and likewise its slope, with ẏ.
 
-use super::law::{Law, Size, Watch, chain};
+use super::law::{Law, Size, Watch, chain, highest, states};
 use super::propagator::SERIES_ORDER;
 use super::record::Recorder;
 use super::roots;
 use super::{Cost, Ending, Event, Flow, Grid, Outcome};
 use crate::case::Experiment;
 use crate::friction::Motion;
-use crate::plant::{Body, Cause, Form, Mode, Plant, State, place};
-use crate::signal::{DEGREE, Piece};
+use crate::plant::{Body, Cause, Form, Limit, Mode, Part, Plant, State, Status, Switch, place};
+use crate::signal::Piece;
+use crate::stage::AmplifierMode;
 use crate::trajectory::Trajectory;
 use std::rc::Rc;
 
@@ -38,11 +39,36 @@ const SOON: f64 = 1e-6;
 pub(crate) fn run(plant: &Plant, experiment: &Experiment, sink: &mut dyn FnMut(&Trajectory) -> Flow) -> Outcome {
     // Eight moving quantities (three positions, three speeds, current, input) serve straight inputs; smooth ones carry
     // their derivatives along.
-    if experiment.input.degree() <= 1 {
-        Run::<8, 10>::new(plant, experiment, sink).finish(experiment)
-    } else {
-        Run::<16, 18>::new(plant, experiment, sink).finish(experiment)
+    // A rotor that turns by itself adds two.
+    match (experiment.input.degree() <= 1, plant.has_rotor()) {
+        (true, false) => Run::<8, 10>::new(plant, experiment, sink).finish(experiment),
+        (true, true) => Run::<12, 14>::new(plant, experiment, sink).finish(experiment),
+        (false, _) => Run::<16, 18>::new(plant, experiment, sink).finish(experiment),
     }
+}
+
+/// Conditions that are told apart: on the three bodies, the gear's torque, three spans, gear, voltage, current, end stop.
+const WATCHED: usize = 11;
+
+/// Which of them a cause belongs to; breakaway stands with the body.
+fn watched(cause: Cause) -> usize {
+    match cause {
+        Cause::Stop(body) | Cause::BreakForward(body) | Cause::BreakBackward(body) => body.index(),
+        Cause::GearTorque => 3,
+        Cause::Switch(switch) => match switch {
+            Switch::Span(span, _) => 4 + span,
+            Switch::Gear(_) => 7,
+            Switch::Voltage(_) => 8,
+            Switch::Current(_) => 9,
+            Switch::Stop(_) => 10,
+        },
+        Cause::LeaveTravel => 10,
+    }
+}
+
+/// Whether a cause is on a part other than a body, or on the torque through the gear.
+fn is_element(cause: Cause) -> bool {
+    matches!(cause, Cause::GearTorque | Cause::Switch(_))
 }
 
 /// A run under way.
@@ -57,12 +83,12 @@ struct Run<'a, const R: usize, const C: usize> {
     law: Rc<Law<R, C>>,
     laws: Vec<Rc<Law<R, C>>>,
     /// How many leading Taylor coefficients of a sliding body's speed are zero by definition, because it starts from rest:
-    /// 1 where it is accelerated, 2 where the load has only just reached its friction. Last, the same for the gear's torque.
-    fresh: [usize; 4],
+    /// 1 where it is accelerated, 2 where the load has only just reached its friction. The same for all else that is watched.
+    fresh: [usize; WATCHED],
     /// By how much the load on a stuck body may pass its breakaway before it counts: what rounding can do to the load.
-    /// Without it a body that comes to rest just at its limit would chatter on the last bit. Last, the same for the gear's
-    /// torque, which is zero but for rounding where it counts as wrong whichever way the gear carries.
-    slack: [f64; 4],
+    /// Without it a body that comes to rest just at its limit would chatter on the last bit. The same for all else that is
+    /// watched where it is zero but for rounding, and would count as wrong in either state.
+    slack: [f64; WATCHED],
     /// Bounds of |u̇| and |ü| on the present piece.
     input_rate: f64,
     input_curvature: f64,
@@ -90,16 +116,11 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     fn new(plant: &'a Plant, experiment: &Experiment, sink: &'a mut dyn FnMut(&Trajectory) -> Flow) -> Self {
         let grid = Grid::new(experiment.every, experiment.until);
         let h = grid.interval();
+        let start = experiment.initial.state(plant);
         let mut z = [0.0; C];
-        z[..place::COUNT].copy_from_slice(&experiment.initial.state(plant));
+        z[..states::<R>()].copy_from_slice(&start[..states::<R>()]);
         z[C - 1] = 1.0;
-        let motion = Body::ALL.map(|body| match z[body.speed_place()] {
-            _ if !plant.has_modes(body) => Motion::Free,
-            v if v > 0.0 => Motion::Forward,
-            v if v < 0.0 => Motion::Backward,
-            _ => Motion::Stuck,
-        });
-        let mode = Mode { motion, gear_torque_positive: true };
+        let mode = plant.first_mode(&start);
         let law = Rc::new(Law::new(plant, mode, h));
         Self {
             plant,
@@ -109,8 +130,8 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             mode,
             laws: vec![Rc::clone(&law)],
             law,
-            fresh: [0; 4],
-            slack: [0.0; 4],
+            fresh: [0; WATCHED],
+            slack: [0.0; WATCHED],
             input_rate: 0.0,
             input_curvature: 0.0,
             row: 0,
@@ -193,14 +214,14 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
                 curvature += order * (order - 1.0) * c.abs() * power2;
                 power2 *= length;
             }
-            if k <= if R == 8 { 1 } else { DEGREE } {
+            if k <= highest::<R>() {
                 // u⁽ᵏ⁾ = k! c_k
                 self.z[chain::<R>(k)] = c * factorial;
             }
         }
         self.input_rate = rate;
         self.input_curvature = curvature;
-        self.fresh = [0; 4];
+        self.fresh = [0; WATCHED];
     }
 
     /// Advances to `offset` behind row `row`, event by event.
@@ -232,7 +253,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     fn put_out(&mut self) {
         self.check();
         if self.recorder.next_row() == self.row && self.trouble.is_none() {
-            self.recorder.push(std::array::from_fn(|j| self.z[j]), self.mode.motion);
+            self.recorder.push(self.state(), self.z[chain::<R>(0)], self.mode);
         }
         if self.recorder.flow == Flow::Stop {
             self.trouble = Some(Ending::Interrupted { time: self.time() });
@@ -298,24 +319,22 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     fn standing(&self, guard: &Watch<C>) -> f64 {
         guard.standing(&self.z)
             + match guard.cause {
-                Cause::BreakForward(body) | Cause::BreakBackward(body) => self.slack[body.index()],
-                Cause::GearTorque => self.slack[3],
                 Cause::Stop(_) => 0.0,
+                cause => self.slack[watched(cause)],
             }
     }
 
     fn fresh_order(&self, cause: Cause) -> usize {
         match cause {
-            Cause::Stop(body) => self.fresh[body.index()],
-            Cause::GearTorque => self.fresh[3],
-            _ => 0,
+            Cause::BreakForward(_) | Cause::BreakBackward(_) => 0,
+            cause => self.fresh[watched(cause)],
         }
     }
 
     /// Advances by `distance`, at most an interval; stops at the first guard that falls and says why.
     fn advance(&mut self, mut distance: f64) -> Option<Cause> {
         let law = Rc::clone(&self.law);
-        if self.fresh != [0; 4] && distance > 0.0 {
+        if self.fresh != [0; WATCHED] && distance > 0.0 {
             // A speed that starts from zero is told apart from one that falls to zero by its series.
             let first = distance.min(law.reach());
             if let Some(cause) = self.creep(&law, first) {
@@ -426,27 +445,38 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         }
         self.offset += s * distance;
         if s * distance > SOON * law.reach() {
-            self.fresh = [0; 4];
+            self.fresh = [0; WATCHED];
         }
         first.map(|(_, cause)| cause)
     }
 
     fn state(&self) -> State {
-        std::array::from_fn(|j| self.z[j])
+        let z = &self.z;
+        let mut state: State = std::array::from_fn(|j| if j < states::<R>() { z[j] } else { 0.0 });
+        if states::<R>() < place::COUNT || !self.plant.has_rotor() {
+            // The rotor turns with the drive pulley.
+            (state[place::ROTOR_ANGLE], state[place::ROTOR_SPEED]) = (z[place::DRIVE_ANGLE], z[place::DRIVE_SPEED]);
+        }
+        state
+    }
+
+    fn input(&self) -> f64 {
+        self.z[chain::<R>(0)]
     }
 
     fn value(&self, form: &Form) -> f64 {
-        form.value(self.plant, &self.state(), self.z[place::COUNT])
+        form.value(self.plant, &self.state(), self.input())
     }
 
     /// Load on a body at rest that would go forward, or backward (the same unless the gear loses power); what friction
     /// would then take of it; and what rounding may have done to it.
     fn load(&self, body: Body, forward: bool) -> (f64, f64, f64) {
-        let positive = self.value(self.plant.current()) >= 0.0;
-        let form = self.plant.load(body, forward, positive);
+        let positive = self.value(&self.plant.current(&self.mode)) >= 0.0;
+        let mode = Mode { gear_torque_positive: positive, ..self.mode };
+        let form = self.plant.load(body, forward, &mode);
         let law = self.plant.friction(body);
         let resistance = if forward { law.forward.coulomb } else { -law.backward.coulomb };
-        (self.value(&form), resistance, form.noise(self.plant, &self.state(), self.z[place::COUNT]))
+        (self.value(&form), resistance, form.noise(self.plant, &self.state(), self.input()))
     }
 
     /// What a body at zero speed does under its present load.
@@ -472,13 +502,21 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             Cause::GearTorque => {
                 self.mode.gear_torque_positive = !self.mode.gear_torque_positive;
                 self.enter();
-                let (now, noise) =
-                    self.gear_torque().map_or((0.0, 0.0), |torque| (torque.value(&self.z), torque.noise(&self.z)));
-                self.slack[3] = if (-20.0 * noise..0.0).contains(&now) { -now } else { 0.0 };
+                self.forgive(cause);
+                return;
+            }
+            Cause::Switch(switch) => {
+                self.switch(switch);
+                return;
+            }
+            Cause::LeaveTravel => {
+                self.trouble = Some(Ending::LeftTravel { time: self.time() });
                 return;
             }
             Cause::Stop(body) => {
-                self.z[body.speed_place()] = 0.0;
+                for follower in self.plant.followers(body) {
+                    self.z[follower.speed_place()] = 0.0;
+                }
                 // Where rounding turns a body back again and again without a moment passing, it rests.
                 (body, if self.changes > TURNS_AT_ONCE { Motion::Stuck } else { self.decide(body) })
             }
@@ -496,17 +534,67 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             _ if (load - resistance).abs() <= 2.0 * noise => 2,
             _ => 1,
         };
-        self.mode.motion[body.index()] = to;
-        self.slack[body.index()] = if self.changes > TURNS_AT_ONCE { 20.0 } else { 2.0 } * noise;
-        if from != to {
-            self.events.push(Event { time: self.time(), body, from, to, load });
+        for follower in self.plant.followers(body) {
+            self.mode.motion[follower.index()] = to;
         }
+        self.slack[body.index()] = if self.changes > TURNS_AT_ONCE { 20.0 } else { 2.0 } * noise;
+        self.note(Part::Body(body), Status::Motion(from), load);
         self.enter();
     }
 
-    /// The condition on the gear's torque in the present mode.
-    fn gear_torque(&self) -> Option<&Watch<C>> {
-        self.law.guards.iter().find(|guard| guard.cause == Cause::GearTorque)
+    /// Lets a part other than a body do something else.
+    fn switch(&mut self, switch: Switch) {
+        let before = self.mode.status(switch.part());
+        // Let go by the motion and not by an edge of the input, a current leaves its limit with no rate of its own.
+        let at_edge = |guard: &Watch<C>| guard.value(&self.z).abs() <= 20.0 * guard.noise(&self.z);
+        let gently = self.law.guards.iter().any(|guard| guard.cause == Cause::Switch(switch) && at_edge(guard));
+        self.mode.switch(switch);
+        self.note(switch.part(), before, 0.0);
+        self.enter();
+        if let (Switch::Current(side), true) = (switch, self.current_stands()) {
+            if side != Limit::Inside {
+                // It stands at its limit, to the last bit.
+                self.z[place::CURRENT] = side.sign() * self.plant.stage().amplifier.current_limit.unwrap_or(0.0);
+            }
+            self.forgive(Cause::Switch(switch));
+            if side == Limit::Inside && gently {
+                self.fresh[watched(Cause::Switch(switch))] = 2;
+            }
+        } else {
+            self.forgive(Cause::Switch(switch));
+        }
+    }
+
+    /// Whether the current is a state that its limit holds.
+    fn current_stands(&self) -> bool {
+        self.plant.has_current_state() && self.plant.stage().amplifier.mode == AmplifierMode::Voltage
+    }
+
+    /// Notes an event, unless nothing that shows has changed.
+    fn note(&mut self, part: Part, from: Status, load: f64) {
+        let (time, to) = (self.time(), self.mode.status(part));
+        // What passes through another state without staying there goes straight.
+        let passed = |e: &Event| e.time == time && e.part == part && e.body().is_none();
+        let from = match self.events.iter().rev().take_while(|e| e.time == time).position(passed) {
+            Some(back) => self.events.remove(self.events.len() - 1 - back).from,
+            None => from,
+        };
+        if from.code() != to.code() {
+            self.events.push(Event { time, part, from, to, load });
+        }
+    }
+
+    /// Takes what has just become the condition on a part for zero where it is that but for rounding.
+    fn forgive(&mut self, cause: Cause) {
+        let index = watched(cause);
+        (self.slack[index], self.fresh[index]) = (0.0, 0);
+        for guard in self.law.guards.iter().filter(|guard| is_element(guard.cause) && watched(guard.cause) == index) {
+            let (now, noise) = (guard.value(&self.z), guard.noise(&self.z));
+            if now.abs() <= 20.0 * noise {
+                self.slack[index] = f64::max(self.slack[index], -now);
+                self.fresh[index] = 1;
+            }
+        }
     }
 
     /// Takes up the equations of the present mode.
@@ -546,9 +634,6 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             match fallen {
                 Some(guard) => self.change(guard.cause),
                 None => {
-                    self.fresh[3] = usize::from(
-                        self.gear_torque().is_some_and(|torque| self.slack[3] > 0.0 || torque.is_zero(&self.z)),
-                    );
                     if self.events.len() as f64
                         > f64::min(EVENTS_AT_LEAST + EVENTS_PER_SECOND * self.time(), EVENTS_AT_MOST)
                     {

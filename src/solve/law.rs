@@ -2,22 +2,32 @@
 
 use super::propagator::{Matrix, SERIES_ORDER, SERIES_REACH};
 use crate::friction::Motion;
-use crate::plant::{Body, Cause, Form, Mode, Plant, ROUNDING, place};
+use crate::plant::{Body, Cause, Form, Mode, Plant, ROTOR, ROUNDING, SPEEDS, STRETCHES, arms, place};
 use crate::signal::DEGREE;
 use std::cell::OnceCell;
 
-/// Where the input stands behind the states.
-const INPUT: usize = place::COUNT;
+/// Number of states: without the rotor's two with eight rows, else all.
+pub(super) const fn states<const R: usize>() -> usize {
+    if R == 8 { place::ROTOR_ANGLE } else { place::COUNT }
+}
 
 /// Place of the k-th derivative of the input: the moving ones behind the states, the highest, constant, behind all that moves.
 pub(super) const fn chain<const R: usize>(k: usize) -> usize {
-    if k < highest::<R>() { INPUT + k } else { R }
+    if k < highest::<R>() { states::<R>() + k } else { R }
 }
 
-/// Order of the highest derivative that is carried along: 1 with eight rows, [`DEGREE`] with sixteen.
-const fn highest<const R: usize>() -> usize {
-    if R == 8 { 1 } else { DEGREE }
+/// Order of the highest derivative that is carried along: [`DEGREE`] with sixteen rows, 1 with fewer.
+pub(super) const fn highest<const R: usize>() -> usize {
+    if R == 16 { DEGREE } else { 1 }
 }
+
+/// Growth rate, 1/s, that is put up with where a part that stores no energy has to be bounded: at least this, and about
+/// this share of an output interval.
+const GROWTH: f64 = 20.0;
+const GROWTH_PER_INTERVAL: f64 = 0.05;
+
+/// The same for a current that the motion does not act back on.
+const GROWTH_OF_CURRENT: f64 = 1e-2;
 
 /// The size of a rate of change: √(2V), or per unit of it, of the mechanical and of the magnetic energy.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,27 +88,26 @@ pub(super) struct Law<const R: usize, const C: usize> {
     h: f64,
     rate: Matrix<R, C>,
     steps: Vec<OnceCell<Box<Matrix<R, C>>>>,
-    /// Rate at which √V may grow by itself; zero for any motor whose K_e is not negligible against K_t.
+    /// Rate at which √V may grow by itself; zero for most machines.
     growth: f64,
-    radius: f64,
-    inertia: [f64; 3],
-    stiffness: [f64; 3],
-    /// w L of the current's share in V.
+    arms: [[f64; SPEEDS]; STRETCHES],
+    inertia: [f64; SPEEDS],
+    stiffness: [f64; STRETCHES],
+    /// Weight of (di/dt)² in 2V.
     magnetic: f64,
-    /// Whether the current moves the drive pulley, and the drive pulley the current.
+    /// Whether the current moves anything, or anything the current.
     coupled: bool,
 }
 
 impl<const R: usize, const C: usize> Law<R, C> {
     pub(super) fn new(plant: &Plant, mode: Mode, h: f64) -> Self {
         let stage = plant.stage();
-        let motor = &stage.motor;
         let r = stage.pulley_radius;
         let mut equations = plant.equations(mode);
         // What is stuck has no speed, and a span between two stuck bodies does not change: leaving both out of the
         // conditions lets the bounds know it.
         let stuck = mode.motion.map(|motion| motion == Motion::Stuck);
-        let at_rest = [stuck[0] && stuck[1], stuck[1] && stuck[2], stuck[2] && stuck[0]];
+        let at_rest = [stuck[0] && stuck[1], stuck[1] && stuck[2], stuck[2] && stuck[0], false, stuck[1]];
         for form in equations.guards.iter_mut().map(|guard| &mut guard.form).chain(&mut equations.acceleration) {
             for (speed, stuck) in form.speed.iter_mut().zip(stuck) {
                 if stuck {
@@ -109,8 +118,8 @@ impl<const R: usize, const C: usize> Law<R, C> {
 
         let row_of = |form: &Form| {
             let mut row = [0.0; C];
-            row[..place::COUNT].copy_from_slice(&form.on_state(r));
-            row[INPUT] = form.input;
+            row[..states::<R>()].copy_from_slice(&form.on_state(r)[..states::<R>()]);
+            row[chain::<R>(0)] = form.input;
             row[C - 1] = form.constant;
             row
         };
@@ -126,35 +135,62 @@ impl<const R: usize, const C: usize> Law<R, C> {
                 put(body.speed_place(), &equations.acceleration[body.index()]);
             }
         }
+        if plant.has_rotor() {
+            put(place::ROTOR_ANGLE, &Form::speed(ROTOR));
+            put(place::ROTOR_SPEED, &equations.acceleration[ROTOR]);
+        }
         put(place::CURRENT, &equations.current_rate);
         for k in 0..highest::<R>() {
             rate.set(chain::<R>(k), chain::<R>(k + 1), 1.0);
         }
 
-        // The motor turns e n K_t i φ̇₁ into motion and takes K_e n φ̇₁ i for it: with the weight w = e K_t / K_e on ½ L i²
-        // the two cancel in V. Without back-EMF a very large weight leaves next to nothing.
-        let e_kt = (equations.acceleration[0].current * equations.inertia[0] / motor.gear_ratio).max(0.0);
-        let ke = motor.back_emf_constant;
-        let has_current = plant.has_current_state();
-        let weight = if e_kt > 0.0 { e_kt / ke.max(1e-6 * motor.torque_constant) } else { 1.0 };
-        let magnetic = if has_current { weight * motor.inductance } else { 0.0 };
-        let cross = motor.gear_ratio * (e_kt - weight * ke);
-        let growth = if e_kt > 0.0 && cross.abs() > 1e-12 * e_kt {
-            cross * cross / (4.0 * weight * motor.resistance * equations.inertia[0])
-        } else {
-            0.0
-        };
-
+        // The current does g i φ̇ of work, and its own rate is −δ i − β φ̇. With the weight w = g/β on its share ½ w i² in V the
+        // two cancel. Where there is no β to speak of, a large weight leaves next to nothing.
         let inertia = equations.inertia;
-        let stiffness = stage.belt.stiffness;
+        let shaft = if plant.has_rotor() { ROTOR } else { 0 };
+        let moved: f64 = (0..SPEEDS).map(|j| inertia[j] * equations.acceleration[j].current.powi(2)).sum();
+        let moves = equations.acceleration[shaft].current;
+        let has_current = plant.has_current_state();
+        let (decay, back) = (-equations.current_rate.current, -equations.current_rate.speed[shaft]);
+        let (mut magnetic, mut growth, mut exchange) = (if has_current { 1.0 } else { 0.0 }, 0.0, 0.0);
+        if has_current && moves != 0.0 && decay > 0.0 {
+            let g = moved / moves;
+            let mass = g / moves;
+            // What is left of the exchange feeds V at (g − w β)²/(4 w δ m).
+            let enough = g * g / (4.0 * GROWTH_OF_CURRENT * decay * mass);
+            magnetic = if back > 0.0 { f64::min(g / back, enough) } else { enough };
+            let left = g - magnetic * back;
+            growth = if left.abs() > 1e-12 * g { left * left / (4.0 * magnetic * decay * mass) } else { 0.0 };
+            exchange = f64::max(g / (magnetic * mass).sqrt(), back * (magnetic / mass).sqrt());
+        }
+
+        // What a condition watches and no spring holds is bounded by a small stiffness κ that is not there: it feeds V, at
+        // a rate of ½ √(κ Σ arm²/m).
+        let arms = arms(r);
+        let mut stiffness = equations.stiffness;
+        for (j, stiffness) in stiffness.iter_mut().enumerate() {
+            let watched = equations.guards.iter().any(|guard| guard.form.stretch[j] != 0.0) && !at_rest[j];
+            if *stiffness == 0.0 && watched {
+                let own = GROWTH.max(GROWTH_PER_INTERVAL / h);
+                let lightness: f64 =
+                    (0..SPEEDS).filter(|&i| arms[j][i] != 0.0).map(|i| arms[j][i] * arms[j][i] / inertia[i]).sum();
+                *stiffness = 4.0 * own * own / lightness;
+                growth += own;
+            }
+        }
+
         // A little more, for the rounding of all that is compared with it.
         let dual = |form: &Form| {
             let mut sum = 0.0;
-            for j in 0..3 {
-                if !at_rest[j] {
+            for j in 0..STRETCHES {
+                if form.stretch[j] != 0.0 && !at_rest[j] {
                     sum += form.stretch[j] * form.stretch[j] / stiffness[j];
                 }
-                sum += form.speed[j] * form.speed[j] / inertia[j];
+            }
+            for j in 0..SPEEDS {
+                if form.speed[j] != 0.0 {
+                    sum += form.speed[j] * form.speed[j] / inertia[j];
+                }
             }
             let magnetic = if form.current == 0.0 { 0.0 } else { form.current.abs() / magnetic.sqrt() };
             Size { mechanical: sum.sqrt() * (1.0 + 1e-9), magnetic: magnetic * (1.0 + 1e-9) }
@@ -169,27 +205,19 @@ impl<const R: usize, const C: usize> Law<R, C> {
                 cause: guard.cause,
             })
             .collect();
-        let push: f64 = (0..3).map(|j| inertia[j] * equations.acceleration[j].input.powi(2)).sum();
+        let push: f64 = (0..SPEEDS).map(|j| inertia[j] * equations.acceleration[j].input.powi(2)).sum();
         let forcing = (push + magnetic * equations.current_rate.input.powi(2)).sqrt();
 
-        // ‖A‖ in the norm of V, from above: stiffness by its Frobenius norm, then all that damps.
-        let arms = [[r, 1.0, 0.0], [0.0, 1.0, r], [r, 0.0, r]];
-        let (mut swing, mut damp) = (0.0, 0.0);
-        for body in Body::ALL {
-            let i = body.index();
-            if mode.motion[i] == Motion::Stuck {
-                continue;
+        // ‖A‖ in the norm of V, from above: stiffness by its Frobenius norm, then all that damps by its trace.
+        let (mut swing, mut damp) = (0.0, growth);
+        for (i, form) in equations.acceleration.iter().enumerate() {
+            for (stretch, arm) in form.stretch.iter().zip(&arms) {
+                swing += (stretch * arm[i]).abs();
             }
-            for (span, arm) in arms.iter().enumerate() {
-                swing += stiffness[span] * arm[i] * arm[i] / inertia[i];
-                damp += stage.belt.damping[span] * arm[i] * arm[i] / inertia[i];
-            }
-            damp += equations.acceleration[i].speed[i].abs();
+            damp += form.speed[i].abs();
         }
         if has_current {
-            damp += motor.resistance / motor.inductance
-                + motor.gear_ratio * (e_kt * ke / (inertia[0] * motor.inductance)).sqrt()
-                + growth;
+            damp += decay + exchange;
         }
         let speed: f64 = f64::sqrt(swing) + damp;
         let finest = (speed * h / SERIES_REACH).log2().ceil().clamp(0.0, 1000.0) as usize;
@@ -203,11 +231,11 @@ impl<const R: usize, const C: usize> Law<R, C> {
             rate,
             steps: (0..=finest).map(|_| OnceCell::new()).collect(),
             growth,
-            radius: r,
+            arms,
             inertia,
             stiffness,
             magnetic,
-            coupled: has_current && !stuck[0],
+            coupled: exchange > 0.0 && equations.acceleration[shaft].current != 0.0,
         }
     }
 
@@ -223,14 +251,19 @@ impl<const R: usize, const C: usize> Law<R, C> {
 
     /// √(2V) of ż.
     pub(super) fn size(&self, y: &[f64; R]) -> Size {
-        let r = self.radius;
-        let [v1, a1, v2, a2, v3, a3, di] = std::array::from_fn::<f64, { place::COUNT }, _>(|j| y[j]);
-        let [m1, m2, m3] = self.inertia;
-        let [k1, k2, k3] = self.stiffness;
+        let [v1, a1, v2, a2, v3, a3, di] = std::array::from_fn::<f64, 7, _>(|j| y[j]);
+        let [m1, m2, m3, rotor] = self.inertia;
+        let [k1, k2, k3, gear, position] = self.stiffness;
+        let r = self.arms[0][0];
         let (d1, d2, d3) = (r * v1 - v2, v2 - r * v3, r * v3 - r * v1);
-        // 2V = Σ m a² + Σ k (Δv)² + w L (di/dt)²
-        let kinetic = m1 * a1 * a1 + m2 * a2 * a2 + m3 * a3 * a3;
-        let elastic = k1 * d1 * d1 + k2 * d2 * d2 + k3 * d3 * d3;
+        // 2V = Σ m a² + Σ k (Δv)² + w (di/dt)²
+        let mut kinetic = m1 * a1 * a1 + m2 * a2 * a2 + m3 * a3 * a3;
+        let mut elastic = k1 * d1 * d1 + k2 * d2 * d2 + k3 * d3 * d3 + position * v2 * v2;
+        if states::<R>() == place::COUNT {
+            let (v, a) = (y[place::ROTOR_ANGLE], y[place::ROTOR_SPEED]);
+            kinetic += rotor * a * a;
+            elastic += gear * (v - v1) * (v - v1);
+        }
         Size { mechanical: (kinetic + elastic).sqrt(), magnetic: (self.magnetic * di * di).sqrt() }
     }
 

@@ -10,8 +10,7 @@ mod table3;
 
 use crate::case::Experiment;
 use crate::error::Result;
-use crate::friction::Motion;
-use crate::plant::{Body, Plant};
+use crate::plant::{Body, Part, Plant, Status};
 use crate::stage::Stage;
 use crate::trajectory::Trajectory;
 
@@ -40,19 +39,29 @@ pub enum Method {
     DormandPrince5,
 }
 
-/// A body that starts to slide, stops, or turns back.
+/// A body that starts to slide, stops, or turns back, or another part that begins to do something else.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
     /// When, s.
     pub time: f64,
-    /// Which body.
-    pub body: Body,
+    /// Which part.
+    pub part: Part,
     /// What it did before.
-    pub from: Motion,
+    pub from: Status,
     /// What it does after.
-    pub to: Motion,
-    /// The force (N) or torque (N m) on it at that moment, friction apart.
+    pub to: Status,
+    /// The force (N) or torque (N m) on a body at that moment, friction apart; 0 for other parts.
     pub load: f64,
+}
+
+impl Event {
+    /// The body, if it is one.
+    pub fn body(&self) -> Option<Body> {
+        match self.part {
+            Part::Body(body) => Some(body),
+            _ => None,
+        }
+    }
 }
 
 /// How a run ended.
@@ -62,6 +71,11 @@ pub enum Ending {
     Complete,
     /// More events than the bound allows.
     TooManyEvents {
+        /// Time reached, s.
+        time: f64,
+    },
+    /// The cart left its travel, and nothing stands there to stop it.
+    LeftTravel {
         /// Time reached, s.
         time: f64,
     },
@@ -220,8 +234,8 @@ pub fn stream(
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<Outcome> {
     check::stage(stage)?;
-    check::experiment(experiment)?;
     let plant = Plant::new(stage);
+    check::experiment(&plant, experiment)?;
     match solver {
         Solver::Exact => Ok(exact::run(&plant, experiment, sink)),
         Solver::Table3 { step, method } => table3::run(&plant, experiment, step, method, sink),

@@ -2,8 +2,8 @@
 
 use super::{Flow, Grid};
 use crate::friction::Motion;
-use crate::plant::{Body, Plant, place};
-use crate::stage::{AmplifierMode, EncoderPlace};
+use crate::plant::{Body, Form, Mode, Part, Plant, SPEEDS, STRETCHES, State, place};
+use crate::stage::{AmplifierMode, BeltModel, EncoderPlace};
 use crate::trajectory::{Column, Trajectory};
 use std::f64::consts::PI;
 
@@ -14,9 +14,11 @@ const BLOCK: usize = 256;
 pub(crate) struct Recorder<'a> {
     plant: &'a Plant,
     grid: Grid,
-    /// States in the order of [`place`], then the input.
-    raw: Vec<[f64; place::COUNT + 1]>,
-    motion: Vec<[Motion; 3]>,
+    /// States, with the input.
+    raw: Vec<(State, f64)>,
+    modes: Vec<Mode>,
+    /// Columns that are only needed on the way: stretches, rotor, current and input, gear torque and force of the stops.
+    scratch: [Vec<f64>; 9],
     block: Trajectory,
     sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
     /// Rows handed on.
@@ -31,7 +33,8 @@ impl<'a> Recorder<'a> {
             plant,
             grid,
             raw: Vec::with_capacity(BLOCK),
-            motion: Vec::with_capacity(BLOCK),
+            modes: Vec::with_capacity(BLOCK),
+            scratch: Default::default(),
             block: Trajectory { columns: headings(plant) },
             sink,
             rows: 0,
@@ -44,11 +47,11 @@ impl<'a> Recorder<'a> {
         self.rows + self.raw.len() as u64
     }
 
-    /// Adds the next row: states, then the input.
+    /// Adds the next row.
     #[inline]
-    pub(crate) fn push(&mut self, row: [f64; place::COUNT + 1], motion: [Motion; 3]) {
-        self.raw.push(row);
-        self.motion.push(motion);
+    pub(crate) fn push(&mut self, state: State, input: f64, mode: Mode) {
+        self.raw.push((state, input));
+        self.modes.push(mode);
         if self.raw.len() == BLOCK {
             self.hand_on();
         }
@@ -68,17 +71,15 @@ impl<'a> Recorder<'a> {
             self.flow = (self.sink)(&self.block);
         }
         self.raw.clear();
-        self.motion.clear();
+        self.modes.clear();
     }
 
     /// Computes every column of the block from the states, column by column so that the loops become vector instructions.
     fn fill(&mut self) {
-        let raw = &self.raw;
+        let plant = self.plant;
+        let stage = plant.stage();
+        let (raw, modes) = (&self.raw, &self.modes);
         let rows = raw.len();
-        let stage = self.plant.stage();
-        let motor = &stage.motor;
-        let r = stage.pulley_radius;
-        let gain = stage.amplifier.gain;
         let mut columns = self.block.columns.iter_mut().map(|column| &mut column.values);
         let mut next = || {
             let values = columns.next().expect("one column for each heading");
@@ -89,7 +90,7 @@ impl<'a> Recorder<'a> {
         put(next(), |j| self.grid.time(first + j as u64));
         let voltage = next();
         let (p1, w1, x, v, p3, w3) = (next(), next(), next(), next(), next(), next());
-        for (j, &[phi1, omega1, position, speed, phi3, omega3, ..]) in raw.iter().enumerate() {
+        for (j, &([phi1, omega1, position, speed, phi3, omega3, ..], _)) in raw.iter().enumerate() {
             p1[j] = phi1;
             w1[j] = omega1;
             x[j] = position;
@@ -98,74 +99,164 @@ impl<'a> Recorder<'a> {
             w3[j] = omega3;
         }
         let (p1, w1, x, v, p3, w3) = (&*p1, &*w1, &*x, &*v, &*p3, &*w3);
-        let kn = motor.back_emf_constant * motor.gear_ratio;
-        let current = next();
-        match stage.amplifier.mode {
-            AmplifierMode::Voltage => {
-                put(voltage, |j| gain * raw[j][INPUT]);
-                if self.plant.has_current_state() {
-                    put(current, |j| raw[j][place::CURRENT]);
-                } else {
-                    // i = (V_in − K_e n φ̇₁) / R                                  in (4)
-                    put(current, |j| (gain * raw[j][INPUT] - kn * w1[j]) / motor.resistance);
-                }
-            }
-            AmplifierMode::Current => {
-                put(current, |j| gain * raw[j][INPUT]);
-                // What the terminals show at this current, the inductance apart: R i + K_e n φ̇₁
-                put(voltage, |j| motor.resistance * current[j] + kn * w1[j]);
+        let r = stage.pulley_radius;
+        let [d1, d2, d3, twist, rotor, armature, input, torque, stop] = &mut self.scratch;
+        let sized = |column: &mut Vec<f64>| column.resize(rows, 0.0);
+        [&mut *d1, d2, d3, twist, rotor, armature, input, torque, stop].into_iter().for_each(sized);
+        put(d1, |j| r * p1[j] - x[j]);
+        put(d2, |j| x[j] - r * p3[j]);
+        put(d3, |j| r * p3[j] - r * p1[j]);
+        put(input, |j| raw[j].1);
+        if plant.has_current_state() {
+            put(armature, |j| raw[j].0[place::CURRENT]);
+        }
+        if plant.has_rotor() {
+            put(twist, |j| raw[j].0[place::ROTOR_ANGLE] - p1[j]);
+            put(rotor, |j| raw[j].0[place::ROTOR_SPEED]);
+        }
+        let source = Source { stretch: [d1, d2, d3, twist, x], speed: [w1, v, w3, rotor], current: armature, input };
+        let (current, f1, f2, f3) = (next(), next(), next(), next());
+        let alike = |same: fn(&Mode, &Mode) -> bool| {
+            modes.chunk_by(same).scan(0, |start, rows| {
+                *start += rows.len();
+                Some((*start - rows.len()..*start, &rows[0]))
+            })
+        };
+        // Amplifier, gear, belt and stops: rows in the same state of all of them follow one formula.
+        let elements =
+            |a: &Mode, b: &Mode| Mode { motion: b.motion, gear_torque_positive: b.gear_torque_positive, ..*a } == *b;
+        for (rows, mode) in alike(elements) {
+            source.put(&mut voltage[rows.clone()], rows.start, &plant.voltage(mode));
+            source.put(&mut current[rows.clone()], rows.start, &plant.current(mode));
+            for (force, form) in [&mut *f1, &mut *f2, &mut *f3].into_iter().zip(plant.span_forces(mode)) {
+                source.put(&mut force[rows.clone()], rows.start, &form);
             }
         }
-        let current = &*current;
-        let [k1, k2, k3] = stage.belt.stiffness;
-        let [c1, c2, c3] = stage.belt.damping;
-        // f₁, f₂, f₃ after (1)-(3)
-        let (f1, f2, f3) = (next(), next(), next());
-        put(f1, |j| k1 * (r * p1[j] - x[j]) + c1 * (r * w1[j] - v[j]));
-        put(f2, |j| k2 * (x[j] - r * p3[j]) + c2 * (v[j] - r * w3[j]));
-        put(f3, |j| k3 * (r * p3[j] - r * p1[j]) + c3 * (r * w3[j] - r * w1[j]));
-        let (f1, f2, f3) = (&*f1, &*f2, &*f3);
+        // What a limit holds is not beyond it by one bit.
+        for (column, limit) in
+            [(&mut *voltage, stage.amplifier.voltage_limit), (&mut *current, stage.amplifier.current_limit)]
+        {
+            if let Some(limit) = limit {
+                column.iter_mut().for_each(|value| *value = value.clamp(-limit, limit));
+            }
+        }
+        let (current, f1, f2, f3) = (&*current, &*f1, &*f2, &*f3);
+        for (column, there, form) in [
+            (&mut *torque, plant.has_rotor(), Plant::gear_torque as fn(&Plant, &Mode) -> Form),
+            (&mut *stop, stage.travel.is_some(), Plant::stop_force),
+        ] {
+            if there {
+                for (rows, mode) in alike(elements) {
+                    source.put(&mut column[rows.clone()], rows.start, &form(plant, mode));
+                }
+            }
+        }
+        let (torque, stop) = (&*torque, &*stop);
 
-        let one = |load: f64| (load, load);
-        for (body, speed) in Body::ALL.into_iter().zip([w1, v, w3]) {
+        let constant = stage.cart.constant_force();
+        // What acts on each body beside friction, the least and the most of it: the inner brackets of (16)-(18)
+        let own = |body: Body, j: usize| match body {
+            Body::DrivePulley => {
+                let pull = r * f3[j] - r * f1[j];
+                let (least, most) =
+                    if plant.has_rotor() { (torque[j], torque[j]) } else { plant.holding_torque(current[j]) };
+                (least + pull, most + pull)
+            }
+            Body::Cart => {
+                let load = f1[j] - f2[j] + (constant + stop[j]);
+                (load, load)
+            }
+            Body::IdlerPulley => {
+                let load = r * f2[j] - r * f3[j];
+                (load, load)
+            }
+        };
+        let alone = stage.belt.model == BeltModel::Elastic;
+        for body in Body::ALL {
             let friction = next();
-            // Stretches of rows in the same motion follow one formula.
+            let speed = source.speed[body.index()];
             let mut start = 0;
-            for same in self.motion.chunk_by(|a, b| a[body.index()] == b[body.index()]) {
-                let stretch = start..start + same.len();
-                let motion = same[0][body.index()];
-                let law = |j: usize, load| self.plant.friction_value(body, motion, speed[j], load);
-                let out = &mut friction[stretch];
-                match (motion, body) {
-                    (Motion::Stuck, Body::DrivePulley) => put(out, |j| {
-                        let j = start + j;
-                        let (least, most) = self.plant.holding_torque(current[j]);
-                        let pull = r * f3[j] - r * f1[j];
-                        law(j, (least + pull, most + pull))
-                    }),
-                    (Motion::Stuck, Body::Cart) => put(out, |j| law(start + j, one(f1[start + j] - f2[start + j]))),
-                    (Motion::Stuck, Body::IdlerPulley) => {
-                        put(out, |j| law(start + j, one(r * f2[start + j] - r * f3[start + j])))
+            for same in modes.chunk_by(|a, b| a.motion[body.index()] == b.motion[body.index()]) {
+                let motion = same[0].motion[body.index()];
+                let out = &mut friction[start..start + same.len()];
+                match motion {
+                    Motion::Stuck if alone => {
+                        put(out, |j| plant.friction_value(body, motion, 0.0, own(body, start + j)));
                     }
-                    _ => put(out, |j| law(start + j, (0.0, 0.0))),
+                    Motion::Stuck => put(out, |j| {
+                        let sum = |(least, most): (f64, f64), follower| {
+                            let (load, ratio) = (own(follower, start + j), plant.ratio(follower));
+                            (least + ratio * load.0, most + ratio * load.1)
+                        };
+                        plant.friction_value(body, motion, 0.0, plant.followers(body).fold((0.0, 0.0), sum))
+                    }),
+                    _ => put(out, |j| plant.friction_value(body, motion, speed[start + j], (0.0, 0.0))),
                 }
                 start += same.len();
             }
         }
         for body in 0..3 {
-            put(next(), |j| f64::from(self.motion[j][body].code()));
+            put(next(), |j| f64::from(modes[j].motion[body].code()));
         }
-        if shows_input(self.plant) {
-            put(next(), |j| raw[j][INPUT]);
+        if shows_input(plant) {
+            next().copy_from_slice(input);
+        }
+        if plant.has_rotor() {
+            put(next(), |j| raw[j].0[place::ROTOR_ANGLE]);
+            next().copy_from_slice(rotor);
+            next().copy_from_slice(torque);
+            put(next(), |j| f64::from(modes[j].gear.code()));
+        }
+        if stage.belt.pretension.is_some() {
+            for span in 0..3 {
+                put(next(), |j| f64::from(modes[j].status(Part::Span(span)).code()));
+            }
+        }
+        if shows_stop(plant) {
+            next().copy_from_slice(stop);
         }
         if let Some(encoder) = stage.encoder {
             // In quadrature every line gives four counts; the nearest count is shown.
-            let (position, counts) = match encoder.at {
-                EncoderPlace::Motor => (p1, 4.0 * encoder.lines * motor.gear_ratio / (2.0 * PI)),
-                EncoderPlace::DrivePulley => (p1, 4.0 * encoder.lines / (2.0 * PI)),
-                EncoderPlace::Cart => (x, 4.0 * encoder.lines),
+            let (place, counts) = match encoder.at {
+                EncoderPlace::Motor => (place::ROTOR_ANGLE, 4.0 * encoder.lines * stage.motor.gear_ratio / (2.0 * PI)),
+                EncoderPlace::DrivePulley => (place::DRIVE_ANGLE, 4.0 * encoder.lines / (2.0 * PI)),
+                EncoderPlace::Cart => (place::CART_POSITION, 4.0 * encoder.lines),
             };
-            put(next(), |j| (position[j] * counts).round());
+            put(next(), |j| (raw[j].0[place] * counts).round());
+        }
+    }
+}
+
+/// What forms are made of, row by row.
+struct Source<'a> {
+    stretch: [&'a [f64]; STRETCHES],
+    speed: [&'a [f64]; SPEEDS],
+    current: &'a [f64],
+    input: &'a [f64],
+}
+
+impl Source<'_> {
+    /// The values of a form in the rows from `start` on.
+    fn put(&self, out: &mut [f64], start: usize, form: &Form) {
+        let mut first = true;
+        let mut add = |factor: f64, column: &[f64]| {
+            if factor == 0.0 {
+                return;
+            }
+            let terms = out.iter_mut().zip(&column[start..]);
+            if first {
+                terms.for_each(|(out, value)| *out = factor * value + form.constant);
+            } else {
+                terms.for_each(|(out, value)| *out += factor * value);
+            }
+            first = false;
+        };
+        self.stretch.iter().zip(form.stretch).for_each(|(column, factor)| add(factor, column));
+        self.speed.iter().zip(form.speed).for_each(|(column, factor)| add(factor, column));
+        add(form.current, self.current);
+        add(form.input, self.input);
+        if first {
+            out.fill(form.constant);
         }
     }
 }
@@ -176,13 +267,18 @@ fn put(column: &mut [f64], value: impl Fn(usize) -> f64) {
     column.iter_mut().enumerate().for_each(|(j, entry)| *entry = value(j));
 }
 
-/// Where the input stands in a row, behind the states.
-const INPUT: usize = place::COUNT;
-
 /// Whether the amplifier's input differs from the column of voltages and is worth a column of its own.
 fn shows_input(plant: &Plant) -> bool {
     let amplifier = &plant.stage().amplifier;
-    amplifier.gain != 1.0 || amplifier.mode == AmplifierMode::Current
+    amplifier.gain != 1.0
+        || amplifier.mode == AmplifierMode::Current
+        || amplifier.voltage_limit.is_some()
+        || amplifier.current_limit.is_some()
+}
+
+/// Whether there are end stops to show the force of.
+fn shows_stop(plant: &Plant) -> bool {
+    plant.stage().travel.is_some_and(|travel| travel.stop.is_some())
 }
 
 /// The columns of a run on this stage, without rows.
@@ -212,6 +308,19 @@ pub(crate) fn headings(plant: &Plant) -> Vec<Column> {
     if shows_input(plant) {
         let unit = if plant.stage().amplifier.mode == AmplifierMode::Current { "A" } else { "V" };
         columns.push(Column::new("input", unit));
+    }
+    if plant.has_rotor() {
+        for (name, unit) in
+            [("rotor_angle", "rad"), ("rotor_speed", "rad/s"), ("gear_torque", "N m"), ("gear_state", "")]
+        {
+            columns.push(Column::new(name, unit));
+        }
+    }
+    if plant.stage().belt.pretension.is_some() {
+        columns.extend(["span1_slack", "span2_slack", "span3_slack"].map(|name| Column::new(name, "")));
+    }
+    if shows_stop(plant) {
+        columns.push(Column::new("stop_force", "N"));
     }
     if plant.stage().encoder.is_some() {
         columns.push(Column::new("encoder_count", ""));

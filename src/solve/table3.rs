@@ -8,7 +8,7 @@ use super::{Cost, Ending, Flow, Grid, Method, Outcome};
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::Motion;
-use crate::plant::{Body, Form, Plant, State, place};
+use crate::plant::{Body, Form, Mode, Plant, SPEEDS, State, place};
 use crate::signal::Piece;
 use crate::trajectory::Trajectory;
 
@@ -48,7 +48,7 @@ pub(crate) fn run(
         }
         let input = experiment.input.value(time);
         let motion = model.motion(&state, input);
-        recorder.push(std::array::from_fn(|j| if j < place::COUNT { state[j] } else { input }), motion);
+        recorder.push(state, input, Mode::of(motion));
         if recorder.flow == Flow::Stop {
             ending = Ending::Interrupted { time };
             break;
@@ -78,7 +78,7 @@ struct Model<'a> {
     plant: &'a Plant,
     load: [Form; 3],
     current_rate: Form,
-    inertia: [f64; 3],
+    inertia: [f64; SPEEDS],
     viscous: [f64; 3],
     coulomb: [f64; 3],
 }
@@ -106,11 +106,14 @@ impl<'a> Model<'a> {
         if plant.gear_loses() {
             return Err(unfit("the paper's Table 3 does not know a gear efficiency below 1".into()));
         }
-        let free = crate::plant::Mode { motion: [Motion::Free; 3], gear_torque_positive: true };
+        if let Some(part) = plant.stage().beyond_the_paper() {
+            return Err(unfit(format!("the paper's Table 3 does not know {part}")));
+        }
+        let free = Mode::of([Motion::Free; 3]);
         let equations = plant.equations(free);
         Ok(Self {
             plant,
-            load: Body::ALL.map(|body| plant.load(body, true, true)),
+            load: Body::ALL.map(|body| plant.load(body, true, &free)),
             current_rate: equations.current_rate,
             inertia: equations.inertia,
             viscous,
@@ -139,6 +142,8 @@ impl<'a> Model<'a> {
             rate[2 * body + 1] = (computed - self.friction(body, speed, computed)) / self.inertia[body];
         }
         rate[place::CURRENT] = self.current_rate.value(self.plant, state, input);
+        // The rotor turns with the drive pulley.
+        (rate[place::ROTOR_ANGLE], rate[place::ROTOR_SPEED]) = (rate[place::DRIVE_ANGLE], rate[place::DRIVE_SPEED]);
         rate
     }
 

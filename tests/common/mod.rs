@@ -27,13 +27,15 @@ pub fn paper_stage(stiffness: [f64; 3], inertia: f64, pulley: Friction, cart: Fr
             rotor_inertia: 0.0,
             gear_ratio: 1.0,
             gear_efficiency: 1.0,
+            gear_play: None,
         },
-        amplifier: Amplifier { mode: AmplifierMode::Voltage, gain: 1.0 },
+        amplifier: Amplifier::ideal(AmplifierMode::Voltage, 1.0),
         pulley_radius: 0.0194,
         drive_pulley: pulley,
         idler_pulley: pulley,
-        cart: Cart { mass: 0.362, friction: cart },
-        belt: Belt { stiffness, damping: [0.0; 3], make: None },
+        cart: Cart { mass: 0.362, friction: cart, load: 0.0, inclination: 0.0 },
+        belt: Belt::given(stiffness, [0.0; 3]),
+        travel: None,
         encoder: None,
     }
 }

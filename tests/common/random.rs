@@ -57,17 +57,23 @@ pub fn stage(dry: Dry) -> impl Strategy<Value = Stage> {
             rotor_inertia,
             gear_ratio,
             gear_efficiency,
+            gear_play: None,
         });
     let amplifier = (prop_oneof![5 => Just(AmplifierMode::Voltage), 1 => Just(AmplifierMode::Current)], 0.5..2.0)
-        .prop_map(|(mode, gain)| Amplifier { mode, gain });
+        .prop_map(|(mode, gain)| Amplifier::ideal(mode, gain));
     let pulley = move || {
         (decades(1e-5, 5e-4), friction(0.0016, 0.015, dry)).prop_map(|(inertia, friction)| Pulley { inertia, friction })
     };
-    let cart = (decades(0.05, 3.0), friction(19.0, 0.2, dry)).prop_map(|(mass, friction)| Cart { mass, friction });
+    let cart = (decades(0.05, 3.0), friction(19.0, 0.2, dry)).prop_map(|(mass, friction)| Cart {
+        mass,
+        friction,
+        load: 0.0,
+        inclination: 0.0,
+    });
     let stiffness = || decades(2e3, 5e5);
     let damping = || prop_oneof![2 => Just(0.0), 1 => decades(0.1, 30.0)];
     let belt = ([stiffness(), stiffness(), stiffness()], [damping(), damping(), damping()])
-        .prop_map(|(stiffness, damping)| Belt { stiffness, damping, make: None });
+        .prop_map(|(stiffness, damping)| Belt::given(stiffness, damping));
     (motor, amplifier, decades(0.005, 0.04), pulley(), cart, pulley(), belt).prop_map(
         |(motor, amplifier, pulley_radius, drive_pulley, cart, idler_pulley, belt)| Stage {
             motor,
@@ -77,6 +83,7 @@ pub fn stage(dry: Dry) -> impl Strategy<Value = Stage> {
             cart,
             idler_pulley,
             belt,
+            travel: None,
             encoder: None,
         },
     )

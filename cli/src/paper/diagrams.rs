@@ -1,7 +1,8 @@
 //! Figures 18 and 19: block diagrams whose coefficients are read from the equations that run.
 
+use taut::friction::Motion;
 use taut::number::engineering;
-use taut::plant::{Body, Form, Plant, place};
+use taut::plant::{Body, Form, Mode, Plant, place};
 use taut::report::diagram::Sign;
 use taut::report::{BodyEquation, FrictionTerm, Inertia, MotorEquation, Term, axis_diagram, body_diagram};
 use taut::stage::Stage;
@@ -15,7 +16,7 @@ pub fn drive_pulley(stage: &Stage) -> String {
 pub fn whole(stage: &Stage) -> String {
     let plant = Plant::new(stage);
     let [drive, cart, idler] = Body::ALL.map(|b| body(&plant, b));
-    let load = plant.load(Body::DrivePulley, true, true);
+    let load = plant.load(Body::DrivePulley, true, &Mode::of([Motion::Free; 3]));
     let motor = MotorEquation {
         input: "V_in".into(),
         torque: "τ_M".into(),
@@ -42,7 +43,7 @@ const INPUTS: [(&str, usize); 6] = [
 /// Eq. (16), (17) or (18), with symbols beside the coefficients of the form that the solver uses.
 fn body(plant: &Plant, body: Body) -> BodyEquation {
     let stage = plant.stage();
-    let form: Form = plant.load(body, true, true);
+    let form: Form = plant.load(body, true, &Mode::of([Motion::Free; 3]));
     let row = form.on_state(stage.pulley_radius);
     // What the coefficients of φ₁, x, φ₃ and φ̇₁ are called.
     let (gains, unit, torque) = match body {

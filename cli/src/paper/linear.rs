@@ -12,7 +12,7 @@ pub type Matrix = SMatrix<f64, 6, 6>;
 /// A and b of the equations that run, without dry friction: φ₁, φ₁′, x, x′, φ₃, φ₃′.
 pub fn matrices(stage: &Stage) -> (Matrix, SVector<f64, 6>) {
     let plant = Plant::new(stage);
-    let equations = plant.equations(Mode { motion: [Motion::Free; 3], gear_torque_positive: true });
+    let equations = plant.equations(Mode::of([Motion::Free; 3]));
     let mut a = Matrix::zeros();
     let mut b = SVector::<f64, 6>::zeros();
     for body in 0..3 {

@@ -38,10 +38,10 @@ impl Folder {
 
     /// The events as CSV; returns the file's name.
     pub fn write_events(&self, experiment: &Experiment, events: &[Event]) -> Result<String> {
-        let mut text = String::from("time_s,body,from,to,load\n");
+        let mut text = String::from("time_s,part,from,to,load\n");
         for e in events {
             // Rust's own form of a number reads back to the same bits.
-            let _ = writeln!(text, "{},{},{},{},{}", e.time, e.body.key(), e.from.word(), e.to.word(), e.load);
+            let _ = writeln!(text, "{},{},{},{},{}", e.time, e.part.key(), e.from.word(), e.to.word(), e.load);
         }
         let name = format!("{}.events.csv", experiment.file_name());
         write_atomically(self.path(&name), text)?;

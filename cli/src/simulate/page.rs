@@ -55,15 +55,18 @@ fn events(page: &mut Page, run: &Run) {
         return;
     }
     page.subsection("Events");
-    let mut table = Table::new("").column("Time", "s").column("Body", "").column("From", "").column("To", "");
+    let mut table = Table::new("").column("Time", "s").column("Part", "").column("From", "").column("To", "");
     table = table.column("Load", "");
     for event in events.iter().take(MOST_EVENTS) {
         table.row([
             Cell::fixed(event.time, 9),
-            Cell::from(event.body.name()),
+            Cell::from(event.part.name()),
             Cell::from(event.from.word()),
             Cell::from(event.to.word()),
-            Cell::Number(number::engineering(event.load, load_unit(event.body), 4)),
+            match event.body() {
+                Some(body) => Cell::Number(number::engineering(event.load, load_unit(body), 4)),
+                None => Cell::from(""),
+            },
         ]);
     }
     page.table(&table);

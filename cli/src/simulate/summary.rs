@@ -115,7 +115,7 @@ struct CountTold {
 #[derive(Serialize)]
 struct EventTold {
     time_s: f64,
-    body: &'static str,
+    part: &'static str,
     from: &'static str,
     to: &'static str,
     load: f64,
@@ -193,6 +193,7 @@ impl ExperimentFigures {
         let (word, time_s) = match outcome.ending {
             Ending::Complete => ("complete", metrics.end),
             Ending::TooManyEvents { time } => ("too_many_events", time),
+            Ending::LeftTravel { time } => ("left_travel", time),
             Ending::Diverged { time } => ("diverged", time),
             Ending::Interrupted { time } => ("interrupted", time),
         };
@@ -270,11 +271,11 @@ impl EventTold {
     fn of(event: &Event) -> Self {
         Self {
             time_s: event.time,
-            body: event.body.key(),
+            part: event.part.key(),
             from: event.from.word(),
             to: event.to.word(),
             load: event.load,
-            load_unit: load_unit(event.body),
+            load_unit: event.body().map_or("", load_unit),
         }
     }
 }

@@ -79,6 +79,9 @@ pub fn early_end(ending: &Ending) -> Option<String> {
         Ending::Diverged { time: at } => {
             Some(format!("ended at {}: its state is no number any more; a smaller --step may help", time(at)))
         }
+        Ending::LeftTravel { time: at } => {
+            Some(format!("ended at {}: the cart leaves its travel there, and nothing stops it", time(at)))
+        }
         Ending::Interrupted { time: at } => Some(format!("was interrupted at {}", time(at))),
     }
 }
