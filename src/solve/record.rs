@@ -5,7 +5,6 @@ use crate::friction::Motion;
 use crate::plant::{Body, Plant, place};
 use crate::stage::{AmplifierMode, EncoderPlace};
 use crate::trajectory::{Column, Trajectory};
-use std::f64::consts::PI;
 
 /// Rows handed on at a time; small enough to stay in the processor's cache.
 const BLOCK: usize = 256;
@@ -159,12 +158,9 @@ impl<'a> Recorder<'a> {
             put(next(), |j| raw[j][INPUT]);
         }
         if let Some(encoder) = stage.encoder {
-            // In quadrature every line gives four counts; the nearest count is shown.
-            let (position, counts) = match encoder.at {
-                EncoderPlace::Motor => (p1, 4.0 * encoder.lines * motor.gear_ratio / (2.0 * PI)),
-                EncoderPlace::DrivePulley => (p1, 4.0 * encoder.lines / (2.0 * PI)),
-                EncoderPlace::Cart => (x, 4.0 * encoder.lines),
-            };
+            // The nearest count is shown.
+            let counts = encoder.counts_per_unit(motor.gear_ratio);
+            let position = if encoder.at == EncoderPlace::Cart { x } else { p1 };
             put(next(), |j| (position[j] * counts).round());
         }
     }
