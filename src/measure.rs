@@ -39,12 +39,7 @@ const FARTHEST: f64 = 0.5;
 /// assert_eq!(headings, ["time_s", "voltage_V", "encoder_count", "drive_angle_rad"]);
 /// # Ok::<(), taut::Error>(())
 /// ```
-pub fn measure(
-    stage: &Stage,
-    measurement: &Measurement,
-    experiment: &Experiment,
-    solver: Solver,
-) -> Result<Solution> {
+pub fn measure(stage: &Stage, measurement: &Measurement, experiment: &Experiment, solver: Solver) -> Result<Solution> {
     let mut trajectory = Trajectory::default();
     let outcome = stream(stage, measurement, experiment, solver, &mut |block| {
         trajectory.append(block);
@@ -70,7 +65,8 @@ pub fn stream(
     let devices = Device::all(stage, measurement, experiment);
 
     // At rest before time zero: the first row without an input.
-    let still = Experiment { input: Signal::Step { value: 0.0, at: 0.0 }, until: grid.interval(), ..experiment.clone() };
+    let still =
+        Experiment { input: Signal::Step { value: 0.0, at: 0.0 }, until: grid.interval(), ..experiment.clone() };
     let still = Experiment { every: still.until, ..still };
     let mut before = Vec::new();
     solve::stream(stage, &still, solver, &mut |block| {
@@ -293,9 +289,8 @@ fn convert(value: f64, channel: &Channel) -> f64 {
 fn random(seed: u64, experiment: &str, device: &str) -> Pcg64 {
     // FNV-1a, 64 bits; the generator spreads it over its own seed.
     let bytes = seed.to_le_bytes().into_iter().chain(experiment.bytes()).chain([0]).chain(device.bytes());
-    let hash = bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    });
+    let hash = bytes
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
     Pcg64::seed_from_u64(hash)
 }
 
