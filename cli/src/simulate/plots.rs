@@ -76,18 +76,18 @@ struct Plot<'a> {
 }
 
 impl Plot<'_> {
-    /// A panel with these curves, and what was logged of these columns as points over them.
+    /// A panel with these curves, and what was logged of these columns as points, which the thinner curves cross.
     fn measured(&self, axis: Axis, curves: &[(&str, &str)], columns: &[&str]) -> Panel {
         let mut panel = self.panel(axis, curves);
         let logged = |column: &&str| self.samples.and_then(|samples| samples.get(column));
-        for (column, colour) in columns.iter().zip([Colour::Purple, Colour::Amber]) {
+        for (column, colour) in columns.iter().zip([Colour::Amber, Colour::Sky]) {
             if let Some((x, y)) = logged(column) {
                 let name = match *column {
                     "drive_angle" | "drive_speed" => "measured at the drive pulley",
                     "cart_position" | "cart_speed" => "measured at the cart",
                     _ => "measured",
                 };
-                panel = panel.series(Series::new(name, x, y).colour(colour).style(Style::Points));
+                panel.series.insert(0, Series::new(name, x, y).colour(colour).style(Style::Points));
             }
         }
         panel
