@@ -104,7 +104,7 @@ pub fn stream(
 struct Raster {
     /// Points per interval.
     points: u32,
-    /// Delay in points, and whether it is a whole number of them with every instant on a point.
+    /// Delay in points; a whole number where every instant lies on a point.
     delay: f64,
     /// Standard deviation of an instant, in points.
     jitter: f64,
