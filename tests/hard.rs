@@ -8,11 +8,11 @@ use common::{experiment, table4};
 use proptest::prelude::*;
 use std::time::Instant;
 use taut::case::{Experiment, Initial};
-use taut::friction::{Friction, Motion};
+use taut::friction::{Friction, Motion, Side};
 use taut::plant::Body;
 use taut::signal::{Hold, Signal, Slot};
 use taut::solve::{Ending, Flow, Solution, Solver, simulate, stream};
-use taut::stage::Stage;
+use taut::stage::{Amplifier, AmplifierMode, Stage};
 use taut::trajectory::Trajectory;
 
 const STATES: [&str; 6] = ["drive_angle", "drive_speed", "cart_position", "cart_speed", "idler_angle", "idler_speed"];
@@ -472,4 +472,35 @@ fn table3_that_runs_away_is_told() {
     let solution = simulate(&table4(), &experiment, solver).unwrap();
     assert!(matches!(solution.outcome.ending, Ending::Diverged { .. }), "{:?}", solution.outcome.ending);
     assert!(solution.trajectory.get("cart_position").unwrap().iter().all(|x| x.abs() <= 1e9));
+}
+
+/// A gear's torque that is zero counted as negative by its last bits, whichever way the gear carried, and the run went back
+/// and forth at one instant until it gave up.
+#[test]
+fn a_gear_whose_torque_is_zero_but_for_rounding() {
+    let side = |viscous, coulomb, breakaway| Side { viscous, coulomb, breakaway };
+    let mut stage = table4();
+    stage.motor.torque_constant = 0.05208461186091644;
+    stage.motor.rotor_inertia = 7.803031526692751e-7;
+    stage.motor.gear_efficiency = 0.954513808626461;
+    stage.amplifier = Amplifier { mode: AmplifierMode::Current, gain: 1.0460908509847053 };
+    stage.pulley_radius = 0.005046775092618381;
+    stage.drive_pulley.inertia = 0.00042132278224457344;
+    stage.cart.mass = 0.4559614569640354;
+    stage.idler_pulley.inertia = 0.00013362595977205803;
+    stage.belt.stiffness = [12617.547858467795, 15616.28024091606, 67333.92593411065];
+    let laws = [
+        (
+            side(0.0029053388374507983, 0.01642142650741023, 0.01642142650741023),
+            side(0.0, 0.02043414567247829, 0.02043414567247829),
+        ),
+        (
+            side(0.0, 0.0639291791947865, 0.100642839423133),
+            side(4.864983687527905, 0.5758776930608349, 0.7421612231061537),
+        ),
+        (side(0.0, 0.075, 0.075), side(0.001497581210236506, 0.01693911090990089, 0.022323434819222106)),
+    ];
+    set_friction(&mut stage, laws.map(|(forward, backward)| Friction { forward, backward }));
+    let input = Signal::Triangle { amplitude: -1.9295822438179058, frequency: 27.727307116916247 };
+    complete(&stage, &Experiment { every: 0.01, ..experiment(input, 0.3) });
 }

@@ -11,6 +11,7 @@ mod tree;
 pub use template::TEMPLATE;
 
 use crate::error::{Error, Result};
+use crate::plant::{Plant, State};
 use crate::signal::Signal;
 use crate::stage::{AmplifierMode, Measurement, Stage};
 use reader::{Field, Table};
@@ -88,6 +89,21 @@ pub struct Initial {
     pub idler_speed: f64,
     /// Armature current, A; matters only with an inductance.
     pub motor_current: f64,
+}
+
+impl Initial {
+    /// The state vector that it stands for.
+    pub fn state(&self, plant: &Plant) -> State {
+        [
+            self.drive_angle,
+            self.drive_speed,
+            self.cart_position,
+            self.cart_speed,
+            self.idler_angle,
+            self.idler_speed,
+            if plant.has_current_state() { self.motor_current } else { 0.0 },
+        ]
+    }
 }
 
 impl Case {

@@ -5,7 +5,7 @@
 //! certain, and looks closer (halves the step, and at last expands the state into a Taylor series) only where the bound does not decide.
 //!
 //! The bound. y = ż obeys ẏ = A y + b u̇, and friction, resistance and damping only take energy away, so its energy
-//! V(y) = ½ Σ m a² + ½ Σ k (Δv)² + ½ w L (di/dt)² can only grow by the input's rate: √V(τ) ≤ √V(0) + |b|·|u̇|·τ. A guard
+//! V(y) = ½ Σ m a² + ½ Σ k (Δv)² + ½ w L (di/dt)² can only grow by the input's rate: √(2V)(τ) ≤ √(2V)(0) + |b|·|u̇|·τ. A guard
 //! g = w·z therefore changes no faster than |w|·√(2V), |w| being the norm dual to V; and likewise its slope, with ẏ.
 
 use super::law::{Law, Size, Watch, chain};
@@ -20,9 +20,10 @@ use crate::signal::{DEGREE, Piece};
 use crate::trajectory::Trajectory;
 use std::rc::Rc;
 
-/// Events allowed at once, and per simulated second: more is an accumulation, not a machine.
+/// Events allowed at once, per simulated second, and in all: more is an accumulation, not a machine, or fills the memory.
 const EVENTS_AT_LEAST: f64 = 1e5;
 const EVENTS_PER_SECOND: f64 = 1e7;
+const EVENTS_AT_MOST: f64 = 2e7;
 
 /// Mode changes allowed at one instant.
 const CHANGES_AT_ONCE: usize = 100;
@@ -59,8 +60,9 @@ struct Run<'a, const R: usize, const C: usize> {
     /// 1 where it is accelerated, 2 where the load has only just reached its friction. Last, the same for the gear's torque.
     fresh: [usize; 4],
     /// By how much the load on a stuck body may pass its breakaway before it counts: what rounding can do to the load.
-    /// Without it a body that comes to rest just at its limit would chatter on the last bit.
-    slack: [f64; 3],
+    /// Without it a body that comes to rest just at its limit would chatter on the last bit. Last, the same for the gear's
+    /// torque, which is zero but for rounding where it counts as wrong whichever way the gear carries.
+    slack: [f64; 4],
     /// Bounds of |u̇| and |ü| on the present piece.
     input_rate: f64,
     input_curvature: f64,
@@ -88,17 +90,8 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     fn new(plant: &'a Plant, experiment: &Experiment, sink: &'a mut dyn FnMut(&Trajectory) -> Flow) -> Self {
         let grid = Grid::new(experiment.every, experiment.until);
         let h = grid.interval();
-        let start = &experiment.initial;
         let mut z = [0.0; C];
-        z[..place::COUNT].copy_from_slice(&[
-            start.drive_angle,
-            start.drive_speed,
-            start.cart_position,
-            start.cart_speed,
-            start.idler_angle,
-            start.idler_speed,
-            if plant.has_current_state() { start.motor_current } else { 0.0 },
-        ]);
+        z[..place::COUNT].copy_from_slice(&experiment.initial.state(plant));
         z[C - 1] = 1.0;
         let motion = Body::ALL.map(|body| match z[body.speed_place()] {
             _ if !plant.has_modes(body) => Motion::Free,
@@ -117,7 +110,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             laws: vec![Rc::clone(&law)],
             law,
             fresh: [0; 4],
-            slack: [0.0; 3],
+            slack: [0.0; 4],
             input_rate: 0.0,
             input_curvature: 0.0,
             row: 0,
@@ -237,7 +230,8 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
 
     /// Puts out the present row, once, and looks whether all is well.
     fn put_out(&mut self) {
-        if self.recorder.next_row() == self.row {
+        self.check();
+        if self.recorder.next_row() == self.row && self.trouble.is_none() {
             self.recorder.push(std::array::from_fn(|j| self.z[j]), self.mode.motion);
         }
         if self.recorder.flow == Flow::Stop {
@@ -305,7 +299,8 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         guard.standing(&self.z)
             + match guard.cause {
                 Cause::BreakForward(body) | Cause::BreakBackward(body) => self.slack[body.index()],
-                Cause::Stop(_) | Cause::GearTorque => 0.0,
+                Cause::GearTorque => self.slack[3],
+                Cause::Stop(_) => 0.0,
             }
     }
 
@@ -477,6 +472,9 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             Cause::GearTorque => {
                 self.mode.gear_torque_positive = !self.mode.gear_torque_positive;
                 self.enter();
+                let (now, noise) =
+                    self.gear_torque().map_or((0.0, 0.0), |torque| (torque.value(&self.z), torque.noise(&self.z)));
+                self.slack[3] = if (-20.0 * noise..0.0).contains(&now) { -now } else { 0.0 };
                 return;
             }
             Cause::Stop(body) => {
@@ -504,6 +502,11 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             self.events.push(Event { time: self.time(), body, from, to, load });
         }
         self.enter();
+    }
+
+    /// The condition on the gear's torque in the present mode.
+    fn gear_torque(&self) -> Option<&Watch<C>> {
+        self.law.guards.iter().find(|guard| guard.cause == Cause::GearTorque)
     }
 
     /// Takes up the equations of the present mode.
@@ -543,10 +546,12 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             match fallen {
                 Some(guard) => self.change(guard.cause),
                 None => {
-                    if let Some(torque) = law.guards.iter().find(|guard| guard.cause == Cause::GearTorque) {
-                        self.fresh[3] = usize::from(torque.is_zero(&self.z));
-                    }
-                    if self.events.len() as f64 > EVENTS_AT_LEAST + EVENTS_PER_SECOND * self.time() {
+                    self.fresh[3] = usize::from(
+                        self.gear_torque().is_some_and(|torque| self.slack[3] > 0.0 || torque.is_zero(&self.z)),
+                    );
+                    if self.events.len() as f64
+                        > f64::min(EVENTS_AT_LEAST + EVENTS_PER_SECOND * self.time(), EVENTS_AT_MOST)
+                    {
                         self.trouble = Some(Ending::TooManyEvents { time: self.time() });
                     }
                     return;

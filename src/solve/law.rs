@@ -53,8 +53,12 @@ impl<const C: usize> Watch<C> {
 
     /// Whether its value is zero but for rounding.
     pub(super) fn is_zero(&self, z: &[f64; C]) -> bool {
-        let size = self.row.iter().zip(z).fold(0.0, |sum, (w, z)| sum + (w * z).abs());
-        self.value(z).abs() <= 2.0 * ROUNDING * size
+        self.value(z).abs() <= 2.0 * self.noise(z)
+    }
+
+    /// What rounding may do to its value.
+    pub(super) fn noise(&self, z: &[f64; C]) -> f64 {
+        ROUNDING * self.row.iter().zip(z).fold(0.0, |sum, (w, z)| sum + (w * z).abs())
     }
 
     /// Its rate of change, `y` being ż.

@@ -35,16 +35,7 @@ pub(crate) fn run(
             .next("choose a larger step"));
     }
     let h = grid.interval() / substeps;
-    let start = &experiment.initial;
-    let mut state = [
-        start.drive_angle,
-        start.drive_speed,
-        start.cart_position,
-        start.cart_speed,
-        start.idler_angle,
-        start.idler_speed,
-        if plant.has_current_state() { start.motor_current } else { 0.0 },
-    ];
+    let mut state = experiment.initial.state(plant);
     let mut recorder = Recorder::new(plant, grid, sink);
     let mut cost = Cost { modes: 1, ..Cost::default() };
     let mut ending = Ending::Complete;

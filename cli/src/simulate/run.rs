@@ -107,8 +107,8 @@ impl<'a> Setting<'a> {
 
     fn writers(&self, experiment: &Experiment) -> Result<Vec<Writer>> {
         let Some(folder) = self.folder else { return Ok(Vec::new()) };
-        let mut formats = self.args.format.clone();
-        formats.dedup();
+        let asked = &self.args.format;
+        let formats = asked.iter().enumerate().filter(|&(k, format)| !asked[..k].contains(format)).map(|(_, f)| f);
         let create = |format: &Format| match format {
             Format::Csv => CsvWriter::create(folder.path(&format!("{}.csv", experiment.file_name()))).map(Writer::Csv),
             #[cfg(feature = "parquet")]
@@ -117,7 +117,7 @@ impl<'a> Setting<'a> {
                 ParquetWriter::create(path).map(|writer| Writer::Parquet(Box::new(writer)))
             }
         };
-        formats.iter().map(create).collect()
+        formats.map(create).collect()
     }
 }
 
