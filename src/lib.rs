@@ -46,7 +46,7 @@
 //! - [`signal`]: what is fed into it.
 //! - [`plant`]: its equations of motion, mode by mode.
 //! - [`log`]: measured columns in. [`case`]: the case file in.
-//! - [`solve`]: the motion. [`metrics`]: what it shows.
+//! - [`solve`]: the motion. [`measure`]: what a recorder makes of it. [`metrics`]: what it shows.
 //! - `report`: figures, drawings and an HTML page of them (feature `report`, on by default).
 //!
 //! # Features
@@ -58,6 +58,7 @@ pub mod error;
 pub mod files;
 pub mod friction;
 pub mod log;
+pub mod measure;
 pub mod metrics;
 pub mod number;
 pub mod parameter;

@@ -132,6 +132,8 @@ const NOT_NEGATIVE: Range = Range::NOT_NEGATIVE;
 const TIME: Range = Range::new(0.0, 1e9);
 const DURATION: Range = Range::new(1e-12, 1e9);
 const FREQUENCY: Range = Range::new(1e-9, 1e9);
+/// Whole numbers that a double holds.
+const SEED: Range = Range::whole(0.0, 9_007_199_254_740_991.0);
 const UP_TO_ONE: Range = Range { above: true, ..Range::new(0.0, 1.0) };
 
 /// Friction of one body: the six rows with that body's key, symbols and units.
@@ -242,6 +244,41 @@ macro_rules! pulley {
     };
 }
 
+/// A recorded quantity: the three rows of its analogue-to-digital converter.
+macro_rules! channel {
+    ($quantity:literal, $unit:literal, $step:literal, $noise:literal, $range:literal) => {
+        [
+            row(
+                concat!("measurement.", $quantity, ".step"),
+                "",
+                $unit,
+                Words("not rounded"),
+                POSITIVE,
+                $step,
+                "Step of the converter; the nearest one is recorded.",
+            ),
+            row(
+                concat!("measurement.", $quantity, ".noise"),
+                "",
+                $unit,
+                Value(0.0),
+                NOT_NEGATIVE,
+                $noise,
+                "Standard deviation of Gaussian noise, added before the converter.",
+            ),
+            row(
+                concat!("measurement.", $quantity, ".range"),
+                "",
+                $unit,
+                Words("not clipped"),
+                POSITIVE,
+                $range,
+                "Greatest absolute value that the converter gives; at least `step`.",
+            ),
+        ]
+    };
+}
+
 #[rustfmt::skip]
 const MOTOR: &[Parameter] = &[
     row("motor.torque_constant", "K_t", "N m/A", Required, NOT_NEGATIVE, "23 mN m/A", "Torque per ampere, at the motor's own shaft."),
@@ -310,6 +347,14 @@ const ENCODER: &[Parameter] = &[
 ];
 
 #[rustfmt::skip]
+const MEASUREMENT: &[Parameter] = &[
+    row("measurement.every", "", "s", Words("the experiment's `every`"), DURATION, "1 ms", "Interval between samples."),
+    row("measurement.delay", "", "s", Value(0.0), TIME, "2 ms", "The row of time t shows what was at t minus this."),
+    row("measurement.jitter", "", "s", Value(0.0), TIME, "20 us", "Standard deviation of a sample's instant; at most a quarter of the interval."),
+    row("measurement.seed", "", "", Value(1.0), SEED, "1", "Which noise and jitter; the same seed gives the same ones."),
+];
+
+#[rustfmt::skip]
 const EXPERIMENT: &[Parameter] = &[
     row("experiment.until", "", "s", Required, DURATION, "1 s", "End of the run."),
     row("experiment.every", "", "s", Required, DURATION, "1 ms", "Interval between the rows of the result; it does not affect the accuracy."),
@@ -356,7 +401,7 @@ const INPUTS: &[Parameter] = &[
     row("input.multisine.tones", "", "", Words("not used with `frequencies`"), Range::whole(2.0, 1000.0), "50", "How many sines, equally spaced in frequency."),
     row("input.prbs", "", INPUT, Required, ANY, "3 V", "Height of a pseudo-random binary sequence, which jumps between plus and minus this."),
     row("input.prbs.bit", "", "s", Required, DURATION, "20 ms", "Shortest time between jumps."),
-    row("input.prbs.seed", "", "", Value(1.0), Range::whole(0.0, 9_007_199_254_740_991.0), "1", "Which sequence; the same seed gives the same one."),
+    row("input.prbs.seed", "", "", Value(1.0), SEED, "1", "Which sequence; the same seed gives the same one."),
     row("input.point.time", "", "s", Required, TIME, "0.1 s", "First number of each point of a `table`, growing from point to point."),
     row("input.point.value", "", INPUT, Required, ANY, "5 V", "Second number of each point; straight lines between points, the last one held."),
     row("input.element.lasts", "", "s", Words("as long as a `pulse`, `ramp`, `chirp`, `table` or `file` takes"), DURATION, "1 s", "How long an element of a `sequence` has its turn."),
@@ -405,6 +450,18 @@ const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     ("belt", &[BELT]),
     ("travel", &[TRAVEL]),
     ("encoder", &[ENCODER]),
+    (
+        "measurement",
+        &[
+            MEASUREMENT,
+            &channel!("motor_current", "A", "10 mA", "5 mA", "10 A"),
+            &channel!("motor_voltage", "V", "10 mV", "5 mV", "24 V"),
+            &channel!("drive_angle", "rad", "0.1 deg", "0.05 deg", "180 deg"),
+            &channel!("drive_speed", "rad/s", "0.1 rad/s", "0.05 rad/s", "100 rad/s"),
+            &channel!("cart_position", "m", "5 um", "2 um", "0.5 m"),
+            &channel!("cart_speed", "m/s", "1 mm/s", "0.5 mm/s", "2 m/s"),
+        ],
+    ),
     ("experiment", &[EXPERIMENT]),
     ("experiment.initial", &[INITIAL]),
     ("input", &[INPUTS]),

@@ -1,4 +1,4 @@
-//! What the machine is: motor, amplifier, pulleys, belt, cart, encoder. Everything in SI units.
+//! What the machine is: motor, amplifier, pulleys, belt, cart, encoder, recorder. Everything in SI units.
 
 use crate::friction::Friction;
 use std::f64::consts::PI;
@@ -142,7 +142,7 @@ impl Cart {
 /// Three spans: 1 drive pulley to cart, 2 cart to idler pulley, 3 idler pulley back to drive pulley.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Belt {
-    /// Span stiffness k₁, k₂, k₃, N/m.
+    /// Span stiffness k₁, k₂, k₃, N/m; infinite in a rigid model that is given none.
     pub stiffness: [f64; 3],
     /// Span damping c₁, c₂, c₃, N s/m.
     pub damping: [f64; 3],
@@ -267,4 +267,103 @@ pub enum EncoderPlace {
     DrivePulley,
     /// The cart, on a linear scale.
     Cart,
+}
+
+impl Encoder {
+    /// Counts per radian of the drive pulley, or at the cart per metre; in quadrature every line gives four.
+    pub fn counts_per_unit(&self, gear_ratio: f64) -> f64 {
+        match self.at {
+            EncoderPlace::Motor => 4.0 * self.lines * gear_ratio / (2.0 * PI),
+            EncoderPlace::DrivePulley => 4.0 * self.lines / (2.0 * PI),
+            EncoderPlace::Cart => 4.0 * self.lines,
+        }
+    }
+}
+
+/// How a run is recorded: when samples are taken, and what converters make of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measurement {
+    /// Interval between samples, s; the experiment's where there is none.
+    pub every: Option<f64>,
+    /// How old a sample is when it is recorded, s.
+    pub delay: f64,
+    /// Standard deviation of the instant of a sample, s.
+    pub jitter: f64,
+    /// Which noise and jitter; the same seed gives the same ones.
+    pub seed: u64,
+    /// What is recorded beside the encoder's counts.
+    pub channels: Vec<Channel>,
+}
+
+impl Default for Measurement {
+    /// An ideal recorder of the encoder alone.
+    fn default() -> Self {
+        Self { every: None, delay: 0.0, jitter: 0.0, seed: 1, channels: Vec::new() }
+    }
+}
+
+/// A recorded quantity and its analogue-to-digital converter, all in the quantity's own unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Channel {
+    /// What is recorded.
+    pub quantity: Quantity,
+    /// Step of the converter; none where it does not round.
+    pub step: Option<f64>,
+    /// Standard deviation of the noise before the converter.
+    pub noise: f64,
+    /// Greatest absolute value that the converter gives; none where it does not clip.
+    pub range: Option<f64>,
+}
+
+/// What a recorder can record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Current of the armature, A.
+    MotorCurrent,
+    /// Voltage at the motor, V.
+    MotorVoltage,
+    /// φ₁, rad.
+    DriveAngle,
+    /// φ₁′, rad/s.
+    DriveSpeed,
+    /// x, m.
+    CartPosition,
+    /// x′, m/s.
+    CartSpeed,
+}
+
+impl Quantity {
+    /// All of them, in the order of a log.
+    pub const ALL: [Quantity; 6] = [
+        Quantity::MotorCurrent,
+        Quantity::MotorVoltage,
+        Quantity::DriveAngle,
+        Quantity::DriveSpeed,
+        Quantity::CartPosition,
+        Quantity::CartSpeed,
+    ];
+
+    /// Its name, in case files and as a column.
+    pub fn name(self) -> &'static str {
+        match self {
+            Quantity::MotorCurrent => "motor_current",
+            Quantity::MotorVoltage => "motor_voltage",
+            Quantity::DriveAngle => "drive_angle",
+            Quantity::DriveSpeed => "drive_speed",
+            Quantity::CartPosition => "cart_position",
+            Quantity::CartSpeed => "cart_speed",
+        }
+    }
+
+    /// Its unit.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Quantity::MotorCurrent => "A",
+            Quantity::MotorVoltage => "V",
+            Quantity::DriveAngle => "rad",
+            Quantity::DriveSpeed => "rad/s",
+            Quantity::CartPosition => "m",
+            Quantity::CartSpeed => "m/s",
+        }
+    }
 }

@@ -66,6 +66,10 @@ fn every_remark_of_the_template_that_shows_a_line_is_a_line() {
         shown = shown.replace(&format!("\n# {key} "), &format!("\n{key} "));
     }
     assert!(Case::from_text("axis.toml", &shown).is_ok_and(|case| case.stage == with(&[]).stage));
+    let recorded = ["[measurement]", "delay ", "motor_current "]
+        .iter()
+        .fold(TEMPLATE.to_string(), |t, k| t.replace(&format!("\n# {k}"), &format!("\n{k}")));
+    assert!(Case::from_text("axis.toml", &recorded).unwrap().measurement.is_some_and(|m| m.channels.len() == 1));
 
     let made = TEMPLATE.replace("\nstiffness", "\n# stiffness");
     let made =

@@ -88,6 +88,9 @@ pub struct Simulate {
     /// Formats of the quantities over time, separated by commas
     #[arg(long, value_enum, value_delimiter = ',', value_name = "FORMAT", default_value = "csv")]
     pub format: Vec<Format>,
+    /// Also write each run as a recorder logs it: [encoder] and [measurement] of the case
+    #[arg(long, requires = "out")]
+    pub as_measured: bool,
     /// Leave out the report and the plots
     #[arg(long)]
     pub no_report: bool,
@@ -105,6 +108,7 @@ Examples:
   taut simulate axis.toml --out results
   taut simulate axis.toml --set cart.mass=\"0.5 kg\" --set experiment.0.until=2s
   taut simulate axis.toml --experiment \"5 V pulse\" --json | jq .experiments[0].metrics
+  taut simulate axis.toml --as-measured --out results
   taut simulate axis.toml --solver table3 --step 1ms --out as-printed
 
 Ctrl-C ends a run early: what was computed until then is written and reported, with exit status 130.";

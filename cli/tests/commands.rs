@@ -171,6 +171,45 @@ fn the_written_case_brings_its_input_files_along() {
     assert!(read("results/one") == read("two"));
 }
 
+/// A log of a run is what a real one would be: it reads, drives the next run, and shows in the report.
+#[test]
+fn a_run_as_measured() {
+    let folder = TempDir::new().unwrap();
+    let here = folder.path();
+    taut(here).args(["init", "axis.toml"]).assert().success();
+    let noisy = "measurement.motor_current={ step = \"10 mA\", noise = \"20 mA\" }";
+    let args = ["simulate", "axis.toml", "--experiment", "5 V pulse", "--set", noisy, "--as-measured", "--out", "out"];
+    taut(here).args(args).args(["--set", "measurement.delay=2ms"]).assert().success();
+    let out = here.join("out");
+    assert!(names(&out).contains(&"5-v-pulse.measured.csv".to_string()));
+    assert_eq!(json(&out.join("summary.json"))["experiments"][0]["files"][2], "5-v-pulse.measured.csv");
+    let log = out.join("5-v-pulse.measured.csv");
+    let columns = ["time_s", "voltage_V", "encoder_count", "drive_angle_rad", "motor_current_A"];
+    assert!(fs::read_to_string(&log).unwrap().starts_with(&(columns.join(",") + "\n")));
+    let read = taut::log::read_columns(&log, &columns).unwrap();
+    let exact = taut::log::read_columns(&out.join("5-v-pulse.csv"), &["drive_angle_rad"]).unwrap();
+    assert_eq!(read[0].len(), 1001);
+    for (k, counts) in read[2].iter().enumerate() {
+        let then = exact[0][k.saturating_sub(2)];
+        assert!((counts / 2048.0 * std::f64::consts::TAU - then).abs() <= std::f64::consts::PI / 2048.0 + 1e-12);
+    }
+    let report = fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(report.contains("measured at the drive pulley"));
+
+    // The logged input drives the same run.
+    let input =
+        "experiment.0.input={ file = \"out/5-v-pulse.measured.csv\", time = \"time_s\", column = \"voltage_V\" }";
+    let again = ["simulate", "axis.toml", "--experiment", "5 V pulse", "--set", input, "--no-report", "--out", "two"];
+    taut(here).args(again).assert().success();
+    let cart = |run: &str| {
+        let file = here.join(run).join("5-v-pulse.csv");
+        taut::log::read_columns(&file, &["cart_position_m"]).unwrap().remove(0)
+    };
+    for (a, b) in cart("out").iter().zip(cart("two")) {
+        assert!((a - b).abs() < 1e-12);
+    }
+}
+
 #[test]
 fn json_on_the_terminal_is_the_summary_in_the_folder() {
     let folder = TempDir::new().unwrap();
@@ -198,7 +237,7 @@ fn wrong_input_is_told_on_stderr_with_status_2() {
     fs::write(folder.path().join("file"), "").unwrap();
     let table4 = table4();
     let table4 = table4.to_str().unwrap();
-    let wrong: [(&[&str], &str); 9] = [
+    let wrong: [(&[&str], &str); 12] = [
         (&["simulate", "nowhere.toml"], "error: nowhere.toml: this case file cannot be read: there is no such file"),
         (&["simulate", "axis.toml"], "did you mean `torque_constant`?"),
         (&["simulate", table4, "--set", "cart.mass=0.5 m"], "a length"),
@@ -208,6 +247,22 @@ fn wrong_input_is_told_on_stderr_with_status_2() {
         (&["simulate", table4, "--out", "file"], "error: file: this is a file, not a folder"),
         (&["simulate", table4, "--frobnicate"], "unexpected argument '--frobnicate'"),
         (&["init", "."], "this is a folder"),
+        (&["simulate", table4, "--as-measured", "--out", "out"], "add [encoder] with for example at = \"motor\""),
+        (&["simulate", table4, "--as-measured"], "--out <DIR>"),
+        (
+            &[
+                "simulate",
+                table4,
+                "--as-measured",
+                "--solver",
+                "table3",
+                "--out",
+                "out",
+                "--set",
+                "encoder={ at = \"motor\", lines = 512 }",
+            ],
+            "leave --solver table3 out, or --as-measured",
+        ),
     ];
     for (args, message) in wrong {
         let run = taut(folder.path()).args(args).assert().code(2);

@@ -120,6 +120,11 @@ fn what_the_documents_name_is_there() {
         "docs/paper.md",
         "docs/solver.md",
         "stages/sollmann-jouaneh/README.md",
+        "stages/printer-axis/README.md",
+        "stages/laser-gantry/README.md",
+        "stages/pendulepi/README.md",
+        "stages/emps/README.md",
+        "stages/two-mass/README.md",
     ];
     let folders = ["src", "cli", "stages", "tests", "examples", "docs", "authorities", "xtask", ".ci"];
     let mut missing = Vec::new();

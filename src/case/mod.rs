@@ -1,6 +1,7 @@
 //! The case file: TOML in, a [`Case`] out, and every mistake told with its line.
 
 mod input;
+mod measurement;
 mod reader;
 mod set;
 mod stage;
@@ -12,7 +13,7 @@ pub use template::TEMPLATE;
 use crate::error::{Error, Result};
 use crate::plant::{Plant, State};
 use crate::signal::Signal;
-use crate::stage::{AmplifierMode, Stage};
+use crate::stage::{AmplifierMode, Measurement, Stage};
 use reader::{Field, Table};
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -37,6 +38,8 @@ pub struct Case {
     pub title: String,
     /// The machine.
     pub stage: Stage,
+    /// How its runs are recorded, where the file says so.
+    pub measurement: Option<Measurement>,
     /// What is done with it, in the file's order.
     pub experiments: Vec<Experiment>,
     /// The text it was read from, with `--set` applied: read again, it gives the same case.
@@ -176,6 +179,7 @@ impl Case {
             "belt",
             "travel",
             "encoder",
+            "measurement",
             "experiment",
         ];
         root.check_keys(&tables, PLANNED)?;
@@ -187,9 +191,10 @@ impl Case {
         let stage = stage::stage(&root)?;
         let folder = Folder { path: name.parent().unwrap_or(Path::new("")), read: RefCell::default() };
         let experiments = experiments(&root, &stage, &folder)?;
+        let measurement = measurement::measurement(&root, &stage, &experiments)?;
         let mut files = folder.read.into_inner();
         files.sort_by_key(|file| file.place.start);
-        Ok(Self { title, stage, experiments, text: source.text.clone(), files })
+        Ok(Self { title, stage, measurement, experiments, text: source.text.clone(), files })
     }
 
     /// The text with other names for the files of its inputs; it is to lie where these names lead to them.

@@ -238,7 +238,11 @@ fn belt(table: &Table) -> Result<Belt> {
         }
         return Ok(Belt { stiffness: stiffness.three()?, damping, make: None, pretension, model });
     }
-    if make.iter().all(|key| table.optional(key).is_none()) {
+    let none = make.iter().all(|key| table.optional(key).is_none());
+    if none && model == BeltModel::Rigid {
+        return Ok(Belt { stiffness: [f64::INFINITY; 3], damping, make: None, pretension, model });
+    }
+    if none {
         return Err(table.missing(
             "stiffness",
             "for example stiffness = [\"132.76 kN/m\", \"132.76 kN/m\", \"58.885 kN/m\"], or modulus, section and spans",

@@ -5,7 +5,7 @@
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::plant::{Body, Plant};
-use crate::stage::{AmplifierMode, Stage};
+use crate::stage::{AmplifierMode, BeltModel, Stage};
 use std::f64::consts::PI;
 
 /// The range of anything that has to be above zero, as in a case file.
@@ -39,7 +39,10 @@ pub(super) fn stage(stage: &Stage) -> Result<()> {
     let finite = |what, values: &[f64]| all(what, values, |v| v.abs() <= MOST, "from -1e15 to 1e15, in SI units");
 
     positive("a mass or inertia", &bodies)?;
-    positive("the stiffness of a span", &stage.belt.stiffness)?;
+    let rigid = stage.belt.model == BeltModel::Rigid;
+    if !rigid {
+        positive("the stiffness of a span", &stage.belt.stiffness)?;
+    }
     positive("the pulleys' radius", &[r])?;
     positive("the armature's resistance", &[motor.resistance])?;
     positive("the gear ratio", &[motor.gear_ratio])?;
@@ -88,7 +91,7 @@ pub(super) fn stage(stage: &Stage) -> Result<()> {
             return Err(too_fast("the current", rate).next("leave the inductance out: it does not show at this size"));
         }
     }
-    let [k1, k2, k3] = stage.belt.stiffness;
+    let [k1, k2, k3] = if rigid { [0.0; 3] } else { stage.belt.stiffness };
     let [c1, c2, c3] = stage.belt.damping;
     let n = motor.gear_ratio;
     let brake = motor.torque_constant * motor.back_emf_constant * n * n / motor.resistance / motor.gear_efficiency;

@@ -634,6 +634,11 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             match fallen {
                 Some(guard) => self.change(guard.cause),
                 None => {
+                    // A torque that starts from zero does so whichever way the gear counts as carrying.
+                    let torque = law.guards.iter().find(|guard| guard.cause == Cause::GearTorque);
+                    if torque.is_some_and(|torque| torque.is_zero(&self.z)) {
+                        self.fresh[3] = 1;
+                    }
                     if self.events.len() as f64
                         > f64::min(EVENTS_AT_LEAST + EVENTS_PER_SECOND * self.time(), EVENTS_AT_MOST)
                     {

@@ -5,7 +5,6 @@ use crate::friction::Motion;
 use crate::plant::{Body, Form, Mode, Part, Plant, SPEEDS, STRETCHES, State, place};
 use crate::stage::{AmplifierMode, BeltModel, EncoderPlace};
 use crate::trajectory::{Column, Trajectory};
-use std::f64::consts::PI;
 
 /// Rows handed on at a time; small enough to stay in the processor's cache.
 const BLOCK: usize = 256;
@@ -216,12 +215,12 @@ impl<'a> Recorder<'a> {
             next().copy_from_slice(stop);
         }
         if let Some(encoder) = stage.encoder {
-            // In quadrature every line gives four counts; the nearest count is shown.
-            let (place, counts) = match encoder.at {
-                EncoderPlace::Motor => (place::ROTOR_ANGLE, 4.0 * encoder.lines * stage.motor.gear_ratio / (2.0 * PI)),
-                EncoderPlace::DrivePulley => (place::DRIVE_ANGLE, 4.0 * encoder.lines / (2.0 * PI)),
-                EncoderPlace::Cart => (place::CART_POSITION, 4.0 * encoder.lines),
+            let place = match encoder.at {
+                EncoderPlace::Motor => place::ROTOR_ANGLE,
+                EncoderPlace::DrivePulley => place::DRIVE_ANGLE,
+                EncoderPlace::Cart => place::CART_POSITION,
             };
+            let counts = encoder.counts_per_unit(stage.motor.gear_ratio);
             put(next(), |j| (raw[j].0[place] * counts).round());
         }
     }

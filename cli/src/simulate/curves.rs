@@ -43,6 +43,45 @@ const SOURCES: [(&str, Source); 21] = [
     ("idler state", Source::Column("idler_state")),
 ];
 
+/// What a log can show over the curves: the column, and whether it is an angle at the drive pulley, or its rate.
+const LOGGED: [(&str, bool); 6] = [
+    ("drive_angle", true),
+    ("cart_position", false),
+    ("drive_speed", true),
+    ("cart_speed", false),
+    ("motor_current", false),
+    ("motor_voltage", false),
+];
+
+/// The samples of one log, thinned out like the curves.
+pub struct Samples {
+    radius: f64,
+    thinned: Vec<Decimator>,
+}
+
+impl Samples {
+    /// No samples yet.
+    pub fn new(stage: &Stage) -> Self {
+        Self { radius: stage.pulley_radius, thinned: LOGGED.iter().map(|_| Decimator::new(POINTS)).collect() }
+    }
+
+    /// Takes the next rows of the log.
+    pub fn take(&mut self, block: &Trajectory) {
+        let time = block.get("time").unwrap_or(&[]);
+        for (&(name, turns), thinned) in LOGGED.iter().zip(&mut self.thinned) {
+            let factor = if turns { self.radius } else { 1.0 };
+            let values: Vec<f64> = block.get(name).unwrap_or(&[]).iter().map(|value| factor * value).collect();
+            thinned.push(time, &values);
+        }
+    }
+
+    /// Times and values of what was logged under `name`, angles at the belt; none if it was not.
+    pub fn get(&self, name: &str) -> Option<(Vec<f64>, Vec<f64>)> {
+        let place = LOGGED.iter().position(|(n, _)| *n == name)?;
+        Some(self.thinned[place].points()).filter(|(times, _)| !times.is_empty())
+    }
+}
+
 /// The curves of one run.
 pub struct Curves {
     radius: f64,

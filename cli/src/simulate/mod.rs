@@ -16,7 +16,7 @@ use folder::Folder;
 use run::{Run, Setting};
 use summary::Summary;
 use taut::case::{Case, Experiment};
-use taut::solve::Ending;
+use taut::solve::{Ending, Solver};
 use taut::{Error, Result};
 
 /// Reads the case, simulates, measures, reports.
@@ -25,6 +25,9 @@ pub fn run(args: &Simulate) -> Outcome {
     let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
     let case = Case::read_with(&args.case, &changes)?;
     let experiments = chosen(&case, &args.experiments)?;
+    if args.as_measured {
+        measurable(&case, args)?;
+    }
     let folder = args.out.as_deref().map(Folder::create).transpose()?;
     let interrupt = Interrupt::listen();
     let setting = Setting { args, case: &case, solver, folder: folder.as_ref(), interrupt: &interrupt };
@@ -46,6 +49,24 @@ pub fn run(args: &Simulate) -> Outcome {
         terminal::show(&table::text(&case, solver, &runs, folder.as_ref()));
     }
     Ok(status(&runs, &interrupt))
+}
+
+/// Refuses to log what nobody measures, and what would not be the run.
+fn measurable(case: &Case, args: &Simulate) -> Result<()> {
+    if case.stage.encoder.is_none() && case.measurement.is_none() {
+        return Err(Error::new("--as-measured: this case does not say how it is measured").in_file(&args.case).next(
+            "add [encoder] with for example at = \"motor\" and lines = 512, \
+             or [measurement] with a quantity such as motor_current = { step = \"10 mA\" }",
+        ));
+    }
+    match args.solver()? {
+        Solver::Exact => Ok(()),
+        Solver::Table3 { .. } => {
+            Err(Error::new("the steps of --solver table3 follow the rows, and a log has rows of its own")
+                .in_file("--as-measured")
+                .next("leave --solver table3 out, or --as-measured"))
+        }
+    }
 }
 
 /// The experiments named on the command line, in the file's order; all if none is named.

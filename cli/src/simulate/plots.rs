@@ -1,6 +1,6 @@
 //! The plots of a run.
 
-use super::curves::Curves;
+use super::curves::{Curves, Samples};
 use super::run::Run;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -17,7 +17,7 @@ pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
     let Some(curves) = &run.curves else { return Vec::new() };
     let figure = |name: &str| Figure::new(format!("{}: {name}", run.experiment.name), Axis::new("Time", "s"));
     let millimetres = || Axis::new("Position", "m").shown_as("mm", 1e3);
-    let plot = Plot { curves };
+    let plot = Plot { curves, samples: run.samples.as_ref() };
 
     let mut input = figure("input");
     let commanded = case.stage.amplifier.mode == AmplifierMode::Current;
@@ -26,13 +26,13 @@ pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
         input = input.panel(plot.panel(axis, &[("input", "u")]));
     }
     input = input
-        .panel(plot.panel(Axis::new("Voltage", "V"), &[("voltage", "motor voltage")]))
-        .panel(plot.panel(Axis::new("Current", "A"), &[("current", "motor current")]))
+        .panel(plot.measured(Axis::new("Voltage", "V"), &[("voltage", "motor voltage")], &["motor_voltage"]))
+        .panel(plot.measured(Axis::new("Current", "A"), &[("current", "motor current")], &["motor_current"]))
         .caption("What the motor gets, and the current it draws.");
 
     let bodies = [("drive", "drive pulley r φ₁"), ("cart", "cart x"), ("idler", "idler pulley r φ₃")];
     let positions = figure("positions")
-        .panel(plot.panel(millimetres(), &bodies).weight(2.0))
+        .panel(plot.measured(millimetres(), &bodies, &["drive_angle", "cart_position"]).weight(2.0))
         .panel(plot.panel(Axis::new("r φ₁ − x", "m").shown_as("µm", 1e6), &[("stretch 1", "r φ₁ − x")]))
         .caption(
             "Positions along the belt, and by how much an encoder at the drive pulley misses the cart. \
@@ -40,7 +40,7 @@ pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
         );
     let speeds = [("drive speed", "drive pulley r φ̇₁"), ("cart speed", "cart ẋ"), ("idler speed", "idler pulley r φ̇₃")];
     let speeds = figure("speeds")
-        .panel(plot.panel(Axis::new("Speed", "m/s").shown_as("mm/s", 1e3), &speeds))
+        .panel(plot.measured(Axis::new("Speed", "m/s").shown_as("mm/s", 1e3), &speeds, &["drive_speed", "cart_speed"]))
         .caption("Speeds along the belt.");
     let spans = [("stretch 1", "span 1"), ("stretch 2", "span 2"), ("stretch 3", "span 3")];
     let stretch = figure("stretch").panel(plot.panel(Axis::new("Stretch", "m").shown_as("µm", 1e6), &spans)).caption(
@@ -72,9 +72,27 @@ pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
 
 struct Plot<'a> {
     curves: &'a Curves,
+    samples: Option<&'a Samples>,
 }
 
 impl Plot<'_> {
+    /// A panel with these curves, and what was logged of these columns as points, which the thinner curves cross.
+    fn measured(&self, axis: Axis, curves: &[(&str, &str)], columns: &[&str]) -> Panel {
+        let mut panel = self.panel(axis, curves);
+        let logged = |column: &&str| self.samples.and_then(|samples| samples.get(column));
+        for (column, colour) in columns.iter().zip([Colour::Amber, Colour::Sky]) {
+            if let Some((x, y)) = logged(column) {
+                let name = match *column {
+                    "drive_angle" | "drive_speed" => "measured at the drive pulley",
+                    "cart_position" | "cart_speed" => "measured at the cart",
+                    _ => "measured",
+                };
+                panel.series.insert(0, Series::new(name, x, y).colour(colour).style(Style::Points));
+            }
+        }
+        panel
+    }
+
     /// A panel with these curves and their names in the legend.
     fn panel(&self, axis: Axis, curves: &[(&str, &str)]) -> Panel {
         let colours = [Colour::Blue, Colour::Vermillion, Colour::Green];

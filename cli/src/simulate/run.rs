@@ -1,6 +1,6 @@
 //! One experiment: its rows go to files, meter and plots as they come, and none is kept.
 
-use super::curves::Curves;
+use super::curves::{Curves, Samples};
 use super::folder::Folder;
 use crate::args::{Format, Simulate};
 use crate::failure::Failure;
@@ -9,6 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 use taut::case::{Case, Experiment};
+use taut::measure;
 use taut::metrics::{Meter, Metrics};
 use taut::solve::{self, Flow, Solver};
 #[cfg(feature = "parquet")]
@@ -35,6 +36,8 @@ pub struct Run<'a> {
     pub metrics: Metrics,
     /// Its curves, where plots are wanted.
     pub curves: Option<Curves>,
+    /// Its samples, where they and plots are wanted.
+    pub samples: Option<Samples>,
     /// Its files, as paths within the folder.
     pub files: Vec<String>,
     /// How long solving and writing took.
@@ -75,8 +78,31 @@ impl<'a> Setting<'a> {
         if let Some(folder) = self.folder {
             files.push(folder.write_events(experiment, &outcome.events).map_err(Failure::work)?);
         }
+        let mut samples = None;
+        if let Some(folder) = self.folder.filter(|_| self.args.as_measured && self.interrupt.signal().is_none()) {
+            samples = Some(self.record(experiment, folder)?).filter(|_| curves.is_some());
+            files.push(log_name(experiment));
+        }
         let metrics = meter.finish(&outcome.events);
-        Ok(Run { experiment, outcome, metrics, curves, files, took: begin.elapsed() })
+        Ok(Run { experiment, outcome, metrics, curves, samples, files, took: begin.elapsed() })
+    }
+
+    /// Runs it once more, as its recorder sees it, and writes the log.
+    fn record(&self, experiment: &Experiment, folder: &Folder) -> std::result::Result<Samples, Failure> {
+        let Case { stage, measurement, .. } = self.case;
+        let mut writer = CsvWriter::create(folder.path(&log_name(experiment))).map_err(Failure::work)?;
+        let mut samples = Samples::new(stage);
+        let mut trouble: Option<Error> = None;
+        let mut take = |block: &Trajectory| {
+            samples.take(block);
+            trouble = writer.write(block).err();
+            if trouble.is_some() || self.interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue }
+        };
+        measure::stream(stage, &measurement.clone().unwrap_or_default(), experiment, self.solver, &mut take)?;
+        match trouble {
+            Some(trouble) => Err(Failure::work(trouble)),
+            None => writer.finish().map(|()| samples).map_err(Failure::work),
+        }
     }
 
     fn writers(&self, experiment: &Experiment) -> Result<Vec<Writer>> {
@@ -93,6 +119,11 @@ impl<'a> Setting<'a> {
         };
         formats.map(create).collect()
     }
+}
+
+/// The file of an experiment's log.
+fn log_name(experiment: &Experiment) -> String {
+    format!("{}.measured.csv", experiment.file_name())
 }
 
 /// A file that rows go to.

@@ -1,0 +1,143 @@
+//! Every machine under `stages/` gives the curves beside it.
+//!
+//! `UPDATE_EXPECT=1 cargo test --test stages` writes the curves anew.
+
+mod common;
+
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+use taut::case::{Case, Experiment};
+use taut::log::read_columns;
+use taut::signal::Signal;
+use taut::solve::{Ending, Solver, simulate};
+
+/// Intervals between the rows that are kept of each experiment.
+const KEPT: usize = 5;
+
+/// How far a position may be off, m.
+const TOLERANCE: f64 = 1e-9;
+
+fn stages() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("stages")
+}
+
+/// What is in a folder, sorted.
+fn entries(folder: &Path) -> Vec<PathBuf> {
+    let mut entries: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    entries.sort();
+    entries
+}
+
+/// The case files of a machine, with its name and theirs: `emps/emps.toml`.
+fn cases(machine: &Path) -> Vec<(String, PathBuf)> {
+    let toml = |path: &PathBuf| path.extension().is_some_and(|e| e == "toml");
+    let name = |path: &Path| path.strip_prefix(stages()).unwrap().to_string_lossy().into_owned();
+    entries(machine).into_iter().filter(toml).map(|path| (name(&path), path)).collect()
+}
+
+/// A few rows of every experiment of a case: what must not change.
+fn curve(path: &Path) -> String {
+    let case = Case::read(path).unwrap_or_else(|error| panic!("{error}"));
+    let mut text = String::new();
+    for experiment in &case.experiments {
+        let run = simulate(&case.stage, experiment, Solver::Exact).unwrap();
+        assert_eq!(run.outcome.ending, Ending::Complete, "{}: {}", path.display(), experiment.name);
+        let column = |name: &str| run.trajectory.get(name).unwrap();
+        for kept in 0..=KEPT {
+            let row = (run.trajectory.len() - 1) * kept / KEPT;
+            let drive = case.stage.pulley_radius * column("drive_angle")[row];
+            let (time, cart) = (column("time")[row], column("cart_position")[row]);
+            let file = path.file_name().unwrap().to_string_lossy();
+            let _ = writeln!(text, "{file},{},{time},{drive:e},{cart:e}", experiment.name);
+        }
+    }
+    text
+}
+
+#[test]
+fn every_machine_gives_its_curves() {
+    let mut wrong = Vec::new();
+    for machine in entries(&stages()) {
+        let mut text = String::from("case,experiment,time_s,drive_travel_m,cart_position_m\n");
+        cases(&machine).iter().for_each(|(_, path)| text += &curve(path));
+        let file = machine.join("expected.csv");
+        if std::env::var_os("UPDATE_EXPECT").is_some() {
+            fs::write(&file, &text).unwrap();
+        }
+        let expected = fs::read_to_string(&file).unwrap_or_default();
+        if expected.lines().count() != text.lines().count() {
+            wrong.push(format!("{}: other cases or experiments", file.display()));
+            continue;
+        }
+        for (want, got) in expected.lines().zip(text.lines()).skip(1) {
+            let numbers = |line: &str| -> Vec<f64> { line.split(',').skip(2).map(|n| n.parse().unwrap()).collect() };
+            let same = want.split(',').take(2).eq(got.split(',').take(2));
+            if !same || numbers(want).iter().zip(numbers(got)).any(|(a, b)| (a - b).abs() > TOLERANCE) {
+                wrong.push(format!("{}\n  expected {want}\n  is       {got}", file.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}\nUPDATE_EXPECT=1 cargo test --test stages writes them anew", wrong.join("\n"));
+}
+
+#[test]
+fn every_machine_says_what_it_is_and_where_its_numbers_are_from() {
+    for machine in entries(&stages()) {
+        let readme = fs::read_to_string(machine.join("README.md")).unwrap_or_default();
+        assert!(readme.starts_with("# ") && readme.contains("ource"), "{}", machine.display());
+        assert!(!cases(&machine).is_empty(), "{}", machine.display());
+        for (name, path) in cases(&machine) {
+            assert!(readme.contains(path.file_name().unwrap().to_str().unwrap()), "{name} is not in its README");
+        }
+    }
+}
+
+/// The rig is Table 4 seen from before the gear: motion differs by what 19.404 mm instead of 19.4 mm of radius makes.
+#[test]
+fn the_rig_moves_as_table_4_says() {
+    let [rig, table4] =
+        ["rig", "table4"].map(|name| Case::read(stages().join(format!("sollmann-jouaneh/{name}.toml"))).unwrap());
+    for (a, b) in rig.stage.belt.stiffness.iter().zip([1.3276e5, 1.3276e5, 5.8885e4]) {
+        assert!((a / b - 1.0).abs() < 1e-5, "{a}");
+    }
+    for (mine, theirs) in rig.experiments.iter().zip(&table4.experiments) {
+        let end = |case: &Case, experiment: &Experiment| {
+            let run = simulate(&case.stage, experiment, Solver::Exact).unwrap();
+            *run.trajectory.get("cart_position").unwrap().last().unwrap()
+        };
+        let (mine, theirs) = (end(&rig, mine), end(&table4, theirs));
+        assert!((mine / theirs - 1.0).abs() < 1e-3, "{mine} {theirs}");
+    }
+}
+
+/// The numbers that the authors of pendule_pi published meet their 42 records to 3.8 mm.
+#[test]
+fn the_cart_of_pendule_pi_moves_as_recorded() {
+    let Some(folder) = common::shared("data/pendulepi") else {
+        println!("skipped: no records of pendule_pi here");
+        return;
+    };
+    let columns = read_columns(&folder.join("february.csv"), &["pwm", "time_us", "position"]).unwrap();
+    let case = Case::read(stages().join("pendulepi/pendulepi.toml")).unwrap();
+    let (mut squares, mut count, mut runs, mut first) = (0.0, 0.0, 0, 0);
+    while first < columns[0].len() {
+        let pwm = columns[0][first];
+        let rows = columns[0][first..].iter().take_while(|p| **p == pwm).count();
+        let (times, positions) = (&columns[1][first..first + rows], &columns[2][first..first + rows]);
+        let input = Signal::Step { value: pwm, at: 0.0 };
+        let until = (rows - 1) as f64 * 5e-3;
+        let experiment = Experiment { input, until, every: 5e-3, ..case.experiments[0].clone() };
+        let run = simulate(&case.stage, &experiment, Solver::Exact).unwrap().trajectory;
+        let travel = run.get("cart_position").unwrap();
+        for (time, position) in times.iter().zip(positions) {
+            let row = ((time - times[0]) * 1e-6 / 5e-3).round() as usize;
+            squares += (position - positions[0] - travel[row.min(rows - 1)]).powi(2);
+            count += 1.0;
+        }
+        runs += 1;
+        first += rows;
+    }
+    let deviation = f64::sqrt(squares / count);
+    assert!(runs == 42 && (deviation - 3.76e-3).abs() < 0.05e-3, "{runs} runs, {deviation} m");
+}
