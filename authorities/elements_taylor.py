@@ -436,7 +436,10 @@ class Solver:
                                 found = bisect(p, low, self.looks[1])
                                 break
                         else:
-                            raise Doubt(f"{guard.part} is pushed back as it leaves")
+                            if not guard.part.startswith("lean_"):
+                                raise Doubt(f"{guard.part} is pushed back as it leaves")
+                            # Nothing jumps there: the other sign will do.
+                            begin, found = 1, number(0) if g[1] > 0 else None
                 elif g[0] > 0:
                     found = number(0)
                 if found is None:
@@ -449,7 +452,7 @@ class Solver:
                             inner = np.arange(1, ORDER + 1) * p[1:]
                             top = bisect(inner, self.looks[k], self.looks[k + 1])
                             height = horner(p, top)
-                            if abs(height) < NEAR * scale:
+                            if abs(height) < NEAR * scale and not guard.part.startswith("lean_"):
                                 automaton.doubts.append(f"{guard.part} grazed to {float(height) / scale:.0e}")
                             if height > 0:
                                 found = bisect(p, self.looks[k], top)
@@ -514,6 +517,8 @@ class Solver:
     def handle(self, guard, z, t):
         if guard.part in BODIES and guard.to is None:
             z[SPEED[BODIES[guard.part]]] = self.number(0)
+        if guard.part.startswith("lean_"):
+            z[SPEED[int(guard.part[-1])]] = self.number(0)
         if guard.part == "current" and guard.to and self.case.current_is_state and self.case.commands == "voltage":
             z[I] = guard.to * self.number(self.case.I)
         self.automaton.fire(t, float(z[X]), guard, self.value(z))
