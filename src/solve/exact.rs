@@ -15,7 +15,7 @@ use super::roots;
 use super::{Cost, Ending, Event, Flow, Grid, Outcome};
 use crate::case::Experiment;
 use crate::friction::Motion;
-use crate::plant::{Body, Cause, Form, Limit, Mode, Part, Plant, State, Status, Switch, place};
+use crate::plant::{Body, Cause, Contact, Form, Limit, Mode, Part, Plant, State, Status, Switch, place};
 use crate::signal::Piece;
 use crate::stage::AmplifierMode;
 use crate::trajectory::Trajectory;
@@ -47,28 +47,41 @@ pub(crate) fn run(plant: &Plant, experiment: &Experiment, sink: &mut dyn FnMut(&
     }
 }
 
-/// Conditions that are told apart: on the three bodies, the gear's torque, three spans, gear, voltage, current, end stop.
-const WATCHED: usize = 11;
+/// Conditions that are told apart: on the three bodies, the gear's torque, three spans, and for each of gear, voltage,
+/// current and end stop one for each state that it may lead to.
+const WATCHED: usize = 7 + 4 * 3;
 
 /// Which of them a cause belongs to; breakaway stands with the body.
 fn watched(cause: Cause) -> usize {
+    let limit = |limit| match limit {
+        Limit::Inside => 0,
+        Limit::High => 1,
+        Limit::Low => 2,
+    };
+    let contact = |contact| match contact {
+        Contact::Apart => 0,
+        Contact::High | Contact::HighLoose => 1,
+        Contact::Low | Contact::LowLoose => 2,
+    };
     match cause {
         Cause::Stop(body) | Cause::BreakForward(body) | Cause::BreakBackward(body) => body.index(),
         Cause::GearTorque => 3,
-        Cause::Switch(switch) => match switch {
-            Switch::Span(span, _) => 4 + span,
-            Switch::Gear(_) => 7,
-            Switch::Voltage(_) => 8,
-            Switch::Current(_) => 9,
-            Switch::Stop(_) => 10,
-        },
-        Cause::LeaveTravel => 10,
+        Cause::Switch(Switch::Span(span, _)) => 4 + span,
+        Cause::Switch(Switch::Gear(to)) => 7 + contact(to),
+        Cause::Switch(Switch::Voltage(to)) => 10 + limit(to),
+        Cause::Switch(Switch::Current(to)) => 13 + limit(to),
+        Cause::Switch(Switch::Stop(to)) => 16 + contact(to),
+        Cause::LeaveTravel => 16,
     }
 }
 
-/// Whether a cause is on a part other than a body, or on the torque through the gear.
-fn is_element(cause: Cause) -> bool {
-    matches!(cause, Cause::GearTorque | Cause::Switch(_))
+/// Whether two causes, neither of them a body's, are of the same part.
+fn same_part(a: Cause, b: Cause) -> bool {
+    match (a, b) {
+        (Cause::GearTorque, Cause::GearTorque) => true,
+        (Cause::Switch(a), Cause::Switch(b)) => a.part() == b.part(),
+        _ => false,
+    }
 }
 
 /// A run under way.
@@ -557,8 +570,8 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
                 self.z[place::CURRENT] = side.sign() * self.plant.stage().amplifier.current_limit.unwrap_or(0.0);
             }
             self.forgive(Cause::Switch(switch));
-            if side == Limit::Inside && gently {
-                self.fresh[watched(Cause::Switch(switch))] = 2;
+            if let (Status::Limit(left), true) = (before, side == Limit::Inside && gently) {
+                self.fresh[watched(Cause::Switch(Switch::Current(left)))] = 2;
             }
         } else {
             self.forgive(Cause::Switch(switch));
@@ -584,16 +597,15 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         }
     }
 
-    /// Takes what has just become the condition on a part for zero where it is that but for rounding.
+    /// Takes what has just become a condition on a part for zero where it is that but for rounding.
     fn forgive(&mut self, cause: Cause) {
-        let index = watched(cause);
-        (self.slack[index], self.fresh[index]) = (0.0, 0);
-        for guard in self.law.guards.iter().filter(|guard| is_element(guard.cause) && watched(guard.cause) == index) {
+        let law = Rc::clone(&self.law);
+        for guard in law.guards.iter().filter(|guard| same_part(guard.cause, cause)) {
             let (now, noise) = (guard.value(&self.z), guard.noise(&self.z));
-            if now.abs() <= 20.0 * noise {
-                self.slack[index] = f64::max(self.slack[index], -now);
-                self.fresh[index] = 1;
-            }
+            let zero = now.abs() <= 20.0 * noise;
+            let index = watched(guard.cause);
+            self.slack[index] = if zero { f64::max(-now, 0.0) } else { 0.0 };
+            self.fresh[index] = usize::from(zero);
         }
     }
 
