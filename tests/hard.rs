@@ -62,7 +62,7 @@ fn load_at(stage: &Stage, voltage: f64) -> f64 {
 // --- extreme parameters ---------------------------------------------------------------------------------------------
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 150, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(common::random::cases(150))]
 
     /// Stiffness from 1 to 1e9 N/m, masses from a gram to a tonne, inductance none to 1 mH: complete, and finite.
     #[test]

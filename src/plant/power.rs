@@ -83,21 +83,22 @@ impl Plant {
             if self.stiffness_in(&Mode::of([crate::friction::Motion::Free; 3]))[j] == 0.0 {
                 continue;
             }
-            let strain = match stage.belt.pretension {
-                Some(pretension) => (stretch[j] + pretension / k[j]).max(0.0),
-                None => stretch[j],
+            let (way, strain) = match stage.belt.pretension {
+                Some(pretension) => (stretch[j] + pretension / k[j], (stretch[j] + pretension / k[j]).max(0.0)),
+                None => (stretch[j], stretch[j]),
             };
-            *spring = Spring { stiffness: k[j], damping: c[j], strain, rate: rate[j] };
+            *spring = Spring { stiffness: k[j], damping: c[j], way, strain, rate: rate[j] };
         }
         let beyond = |way: f64, high: f64, low: f64| (way - high).max(0.0) + (way - low).min(0.0);
         if let Some(play) = stage.motor.gear_play {
             let strain = beyond(stretch[TWIST], 0.5 * play.backlash, -0.5 * play.backlash);
-            springs[TWIST] = Spring { stiffness: play.stiffness, damping: play.damping, strain, rate: rate[TWIST] };
+            springs[TWIST] =
+                Spring { stiffness: play.stiffness, damping: play.damping, way: strain, strain, rate: rate[TWIST] };
         }
         if let Some((travel, stop)) = stage.travel.and_then(|travel| travel.stop.map(|stop| (travel, stop))) {
             let strain = beyond(stretch[POSITION], travel.max, travel.min);
             springs[POSITION] =
-                Spring { stiffness: stop.stiffness, damping: stop.damping, strain, rate: rate[POSITION] };
+                Spring { stiffness: stop.stiffness, damping: stop.damping, way: strain, strain, rate: rate[POSITION] };
         }
         springs
     }
@@ -128,7 +129,8 @@ impl Plant {
         // Whatever a spring takes up and does not keep is lost in its damper; so is all that one holds that lets go early.
         let lost = |j: usize, carries: bool| {
             let s = springs[j];
-            if carries { s.damping * s.rate * s.rate } else { -s.stiffness * s.strain * s.rate }
+            let force = if carries { s.stiffness * s.way + s.damping * s.rate } else { 0.0 };
+            (force - s.stiffness * s.strain) * s.rate
         };
         let gear = if self.has_rotor() {
             kinetic += rotor * speed[ROTOR] * acceleration[ROTOR];
@@ -162,6 +164,9 @@ impl Plant {
 struct Spring {
     stiffness: f64,
     damping: f64,
+    /// What its force follows.
+    way: f64,
+    /// What its energy follows: nothing where a span that is not straight yet is pulled tight against its damping.
     strain: f64,
     rate: f64,
 }

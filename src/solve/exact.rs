@@ -604,8 +604,12 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             let (now, noise) = (guard.value(&self.z), guard.noise(&self.z));
             let zero = now.abs() <= 20.0 * noise;
             let index = watched(guard.cause);
-            self.slack[index] = if zero { f64::max(-now, 0.0) } else { 0.0 };
-            self.fresh[index] = usize::from(zero);
+            (self.slack[index], self.fresh[index]) = match zero {
+                false => (0.0, 0),
+                true if self.changes <= TURNS_AT_ONCE => (f64::max(-now, 0.0), 1),
+                // Where rounding moves a part back and forth without a moment passing, it stays where it is.
+                true => (40.0 * noise, 0),
+            };
         }
     }
 
