@@ -64,6 +64,7 @@ pub mod number;
 pub mod parameter;
 pub mod plant;
 pub mod quantity;
+pub mod reduction;
 #[cfg(feature = "report")]
 pub mod report;
 pub mod signal;

@@ -278,34 +278,43 @@ impl Plateau {
 
 /// The cart's speed, m/s, at which a constant `input` (V or A) just makes up for all losses; the belt's stretch is constant then.
 ///
-/// Everything slides in the direction of the input. Zero where that input cannot keep it sliding; none where nothing
+/// Everything slides in the direction of the input, and limits of voltage and current hold. Zero where that input cannot keep it sliding; none where nothing
 /// limits the speed (a commanded current, and no viscous friction).
 pub fn balanced_speed(stage: &Stage, input: f64) -> Option<f64> {
-    let motor = &stage.motor;
+    let (motor, amplifier) = (&stage.motor, &stage.amplifier);
     let (r, n, eta) = (stage.pulley_radius, motor.gear_ratio, motor.gear_efficiency);
-    let output = stage.amplifier.gain * input;
+    let output = amplifier.gain * input;
     let direction = if output < 0.0 { -1.0 } else { 1.0 };
     let friction = [&stage.drive_pulley.friction, &stage.cart.friction, &stage.idler_pulley.friction];
     let [b1, b, b2] = friction.map(|law| if direction < 0.0 { law.backward } else { law.forward });
-    // Sum of (16), r (17) and (18) without accelerations, with ẋ = r φ̇₁ = r φ̇₃:
-    //   τ_M = (B₁ + B₂ + r² b) φ̇ + τ_c1 + τ_c2 + r F_c
-    let coulomb = b1.coulomb + b2.coulomb + r * b.coulomb;
-    let mut viscous = b1.viscous + b2.viscous + r * r * b.viscous;
-    let drive = match stage.amplifier.mode {
-        AmplifierMode::Current => eta * n * motor.torque_constant * output.abs(),
+    // Sum of (16), r (17) and (18) without accelerations, with ẋ = r φ̇₁ = r φ̇₃ and the constant force F on the cart:
+    //   τ_M + r F = (B₁ + B₂ + r² b) φ̇ + τ_c1 + τ_c2 + r F_c
+    let coulomb = b1.coulomb + b2.coulomb + r * b.coulomb - direction * r * stage.cart.constant_force();
+    let viscous = b1.viscous + b2.viscous + r * r * b.viscous;
+    let speed = |drive: f64, brake: f64| {
+        let excess = (drive - coulomb).max(0.0);
+        if excess == 0.0 { 0.0 } else { r * excess / (viscous + brake) }
+    };
+    let least = |a: f64, b: Option<f64>| b.map_or(a, |b| a.min(b));
+    // τ_M = η n K_t i
+    let at_current = |current: f64| speed(eta * n * motor.torque_constant * current, 0.0);
+    // τ_M = η n K_t (V_in − K_e n φ̇) / R                                          (4) with a gear
+    let at_voltage = |voltage: f64| {
+        let per_volt = eta * n * motor.torque_constant / motor.resistance;
+        speed(per_volt * voltage, per_volt * motor.back_emf_constant * n)
+    };
+    // Of the command and the limit on the other quantity, the one that gives less.
+    let balance = match amplifier.mode {
+        AmplifierMode::Current => {
+            let bound = amplifier.voltage_limit.map(at_voltage);
+            least(at_current(least(output.abs(), amplifier.current_limit)), bound)
+        }
         AmplifierMode::Voltage => {
-            // τ_M = η n K_t (V_in − K_e n φ̇) / R                                  (4) with a gear
-            let per_volt = eta * n * motor.torque_constant / motor.resistance;
-            viscous += per_volt * motor.back_emf_constant * n;
-            per_volt * output.abs()
+            let bound = amplifier.current_limit.map(at_current);
+            least(at_voltage(least(output.abs(), amplifier.voltage_limit)), bound)
         }
     };
-    let excess = (drive - coulomb).max(0.0);
-    if excess == 0.0 {
-        return Some(0.0);
-    }
-    let speed = direction * r * excess / viscous;
-    speed.is_finite().then_some(speed)
+    balance.is_finite().then_some(direction * balance)
 }
 
 /// The three peaks' largest, with the number (1 to 3) of its span.

@@ -141,6 +141,18 @@ impl Part {
         }
     }
 
+    /// Its place in lists: bodies, spans, gear, limits, end stops.
+    pub fn order(self) -> usize {
+        match self {
+            Part::Body(body) => body.index(),
+            Part::Span(span) => 3 + span,
+            Part::Gear => 6,
+            Part::Voltage => 7,
+            Part::Current => 8,
+            Part::Stop => 9,
+        }
+    }
+
     /// Its name in column headings and keys.
     pub fn key(self) -> &'static str {
         match self {

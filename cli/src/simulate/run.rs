@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use taut::case::{Case, Experiment};
 use taut::measure;
 use taut::metrics::{Meter, Metrics};
+use taut::reduction::Reduction;
 use taut::solve::{self, Flow, Solver};
 #[cfg(feature = "parquet")]
 use taut::trajectory::ParquetWriter;
@@ -38,6 +39,8 @@ pub struct Run<'a> {
     pub curves: Option<Curves>,
     /// Its samples, where they and plots are wanted.
     pub samples: Option<Samples>,
+    /// How far its model is from the elastic one, where it is a reduced one.
+    pub reduction: Option<Reduction>,
     /// Its files, as paths within the folder.
     pub files: Vec<String>,
     /// How long solving and writing took.
@@ -84,7 +87,9 @@ impl<'a> Setting<'a> {
             files.push(log_name(experiment));
         }
         let metrics = meter.finish(&outcome.events);
-        Ok(Run { experiment, outcome, metrics, curves, samples, files, took: begin.elapsed() })
+        let took = begin.elapsed();
+        let reduction = Reduction::of(stage, experiment, self.solver)?;
+        Ok(Run { experiment, outcome, metrics, curves, samples, reduction, files, took })
     }
 
     /// Runs it once more, as its recorder sees it, and writes the log.

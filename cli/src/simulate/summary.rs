@@ -49,6 +49,9 @@ struct ExperimentFigures {
     files: Vec<String>,
     ending: EndingTold,
     metrics: MetricsTold,
+    /// None for the elastic model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reduction: Option<ReductionTold>,
     events: Vec<EventTold>,
     events_not_listed: usize,
     cost: CostTold,
@@ -84,6 +87,20 @@ struct MetricsTold {
     stop_time_s: Option<f64>,
     settled: bool,
     event_counts: [CountTold; 3],
+}
+
+/// A reduced model beside the elastic one.
+#[derive(Serialize)]
+struct ReductionTold {
+    #[serde(rename = "peak_cart_difference_m")]
+    cart: PeakTold,
+    #[serde(rename = "peak_drive_travel_difference_m")]
+    drive: PeakTold,
+    final_cart_difference_m: f64,
+    #[serde(rename = "elastic_peak_drive_travel_minus_cart_m")]
+    encoder_error: PeakTold,
+    #[serde(rename = "elastic_peak_span_stretch_m")]
+    stretch: PeakTold,
 }
 
 #[derive(Serialize)]
@@ -203,6 +220,13 @@ impl ExperimentFigures {
             files: run.files.clone(),
             ending: EndingTold { word, time_s },
             metrics: MetricsTold::of(metrics, mode),
+            reduction: run.reduction.map(|reduction| ReductionTold {
+                cart: reduction.cart.into(),
+                drive: reduction.drive.into(),
+                final_cart_difference_m: reduction.final_cart,
+                encoder_error: reduction.encoder_error.into(),
+                stretch: reduction.stretch.into(),
+            }),
             events: outcome.events.iter().take(MOST_EVENTS).map(EventTold::of).collect(),
             events_not_listed: outcome.events.len().saturating_sub(MOST_EVENTS),
             cost: CostTold {

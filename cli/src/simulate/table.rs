@@ -8,7 +8,8 @@ use std::time::Duration;
 use taut::case::Case;
 use taut::metrics::{Metrics, largest};
 use taut::number;
-use taut::plant::Body;
+use taut::plant::Part;
+use taut::reduction::Reduction;
 use taut::solve::{Ending, Method, Solver};
 
 /// The text on the terminal.
@@ -93,7 +94,7 @@ pub fn lines(run: &Run, solver: Solver) -> Vec<(&'static str, String)> {
     let (force_span, force) = largest(&metrics.peak_force);
     let error = metrics.peak_encoder_error;
     let left = metrics.final_drive_travel - metrics.final_cart_position;
-    vec![
+    let mut lines = vec![
         (
             "final position",
             format!("cart {}, r φ₁ {}", travel(metrics.final_cart_position), travel(metrics.final_drive_travel)),
@@ -107,13 +108,28 @@ pub fn lines(run: &Run, solver: Solver) -> Vec<(&'static str, String)> {
         ("peak force", format!("{} in span {force_span} at {}", value(force.value, "N"), time(force.time))),
         ("peak current", format!("{} at {}", value(metrics.peak_current.value, "A"), time(metrics.peak_current.time))),
         ("stop time", stop(metrics, solver)),
-        ("events", events(metrics, solver)),
+        ("events", events(run, solver)),
         (
             "r φ₁ - x",
             format!("at most {} at {}, {} at the end", value(error.value, "m"), time(error.time), value(left, "m")),
         ),
         ("cost", cost(run)),
-    ]
+    ];
+    if let Some(reduction) = run.reduction {
+        lines.insert(lines.len() - 1, ("reduced model", reduced(&reduction)));
+    }
+    lines
+}
+
+/// How far a reduced model is from the elastic one.
+fn reduced(reduction: &Reduction) -> String {
+    format!(
+        "cart at most {} from the elastic model's, at {}; {} at the end; its r φ₁ - x is up to {}",
+        value(reduction.cart.value.abs(), "m"),
+        time(reduction.cart.time),
+        value(reduction.final_cart, "m"),
+        value(reduction.encoder_error.value.abs(), "m"),
+    )
 }
 
 fn steady(metrics: &Metrics) -> String {
@@ -143,21 +159,24 @@ fn stop(metrics: &Metrics, solver: Solver) -> String {
     }
 }
 
-fn events(metrics: &Metrics, solver: Solver) -> String {
+fn events(run: &Run, solver: Solver) -> String {
     if matches!(solver, Solver::Table3 { .. }) {
         return "none: a fixed step locates none".into();
     }
-    let total: u64 = metrics.events.iter().map(|count| count.total()).sum();
-    if total == 0 {
+    let events = &run.outcome.events;
+    if events.is_empty() {
         return "none".into();
     }
-    let each: Vec<String> = Body::ALL
-        .iter()
-        .map(|body| (body, metrics.events[body.index()].total()))
-        .filter(|(_, count)| *count > 0)
-        .map(|(body, count)| format!("{} {count}", body.name()))
-        .collect();
-    format!("{total}: {}", each.join(", "))
+    let mut counts: Vec<(Part, usize)> = Vec::new();
+    for event in events {
+        match counts.iter_mut().find(|(part, _)| *part == event.part) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((event.part, 1)),
+        }
+    }
+    counts.sort_by_key(|(part, _)| part.order());
+    let each: Vec<String> = counts.iter().map(|(part, count)| format!("{} {count}", part.name())).collect();
+    format!("{}: {}", events.len(), each.join(", "))
 }
 
 fn cost(run: &Run) -> String {
