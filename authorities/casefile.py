@@ -139,10 +139,14 @@ class Case:
             self.bodies = {1: (j1 + j2, added([laws[0], laws[2]], [1, 1])), 2: (mass, laws[1])}
         else:
             r = self.r
-            self.bodies = {2: (mass + (j1 + j2) / r**2, added(laws, [r, 1, r]))}
+            bare = not (drive.get("friction") or idler.get("friction"))
+            self.bodies = {2: (mass + (j1 + j2) / r**2, laws[1] if bare else added(laws, [r, 1, r]))}
 
         self.until, self.every = experiment["until"], experiment["every"]
         self.signal = signal(experiment["input"])
+        start = experiment.get("initial", {})
+        names = ("drive_angle", "drive_speed", "cart_position", "cart_speed", "idler_angle", "idler_speed")
+        self.initial = [start.get(name, 0.0) for name in names]
         self.times = [k * self.every for k in range(round(self.until / self.every) + 1)]
 
     def fastest(self):
@@ -168,7 +172,9 @@ class Case:
             rates.append(self.wb)
         if not self.current_is_state and self.commands == "voltage":
             rates.append(self.kt * self.ke * self.n**2 / self.R / (self.rotor if self.backlash else j1))
-        return max(rates)
+        for inertia, friction in self.bodies.values():
+            rates += [math.sqrt(friction.stiffness / inertia), friction.damping / inertia]
+        return max(1.0, *rates)
 
 
 def signal(table):

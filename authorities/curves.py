@@ -151,7 +151,7 @@ def family():
         0.8,
         0.01,
     )
-    travel = {"min": -0.33, "max": 0.33}
+    travel = {"min": -0.34, "max": 0.34}
     yield "follows_cart", "5 V pulse", stage(belt=FOLLOWS, travel=travel), pulse(5.0), 0.6, 0.012
     yield "follows_cart", "far to the drive pulley", stage(belt=FOLLOWS, travel=travel), pulse(24.0, 0.26), 0.6, 0.012
     yield (

@@ -213,7 +213,7 @@ class Axis:
 
 
 def solve(case, rtol=RTOL, longest=0.2):
-    """From rest."""
+    """From rest, or where the experiment begins (bodies without dry friction only)."""
     axis, automaton = Axis(case), Automaton(case)
     axis.modes = automaton.modes
     chain = pieces(case.signal, case.until)
@@ -222,6 +222,7 @@ def solve(case, rtol=RTOL, longest=0.2):
     stride = longest / case.fastest()
     blind = 1e-3 / case.fastest()
     y, rows = np.zeros(SIZE), {}
+    y[:6] = case.initial
 
     def guard_value(guard, t, y):
         values = [sign * axis.value(quantity, t, y) - offset for sign, quantity, offset in guard.terms]

@@ -483,6 +483,7 @@ class Solver:
         starts = {piece.start: piece for piece in self.chain}
         stops = sorted(set(starts) | {case.until})
         z = np.zeros(SIZE, dtype=number)
+        z[:6] = case.initial
         rows, waiting = [], [number(t) for t in case.times]
         for stop, end in zip(stops, stops[1:]):
             t, end = number(stop), number(end)
