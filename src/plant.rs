@@ -7,7 +7,7 @@ mod form;
 mod power;
 
 pub use form::Form;
-pub(crate) use form::ROUNDING;
+pub(crate) use form::{ROUNDING, stretches};
 pub use power::Power;
 
 use crate::friction::{Friction, Motion, Side};
@@ -182,7 +182,7 @@ impl Plant {
 
     /// Whether a body can stick or has a direction-dependent law, so that its motion has modes at all.
     pub fn has_modes(&self, body: Body) -> bool {
-        !self.friction(body).is_linear() || (body == Body::DrivePulley && self.gear_loses())
+        self.friction(body).sticks() || (body == Body::DrivePulley && self.gear_loses())
     }
 
     /// Whether the gear's efficiency is below one.

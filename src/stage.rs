@@ -1,6 +1,6 @@
 //! What the machine is: motor, amplifier, pulleys, belt, cart, encoder. Everything in SI units.
 
-use crate::friction::Friction;
+use crate::friction::{Along, Friction};
 use std::f64::consts::PI;
 
 /// A single-axis belt drive (paper, Fig. 1 and 2).
@@ -20,6 +20,8 @@ pub struct Stage {
     pub idler_pulley: Pulley,
     /// The belt's three spans.
     pub belt: Belt,
+    /// How far the cart may go, if that is known.
+    pub travel: Option<Travel>,
     /// How the motion is measured, if it is.
     pub encoder: Option<Encoder>,
 }
@@ -71,12 +73,14 @@ pub struct Pulley {
 }
 
 /// The cart.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Cart {
     /// Mass M with its load, kg.
     pub mass: f64,
     /// Friction force, N over m/s.
     pub friction: Friction,
+    /// How its dry friction changes along the travel, if it does.
+    pub along: Option<Along>,
 }
 
 /// Three spans: 1 drive pulley to cart, 2 cart to idler pulley, 3 idler pulley back to drive pulley.
@@ -88,6 +92,8 @@ pub struct Belt {
     pub damping: [f64; 3],
     /// What the stiffness was computed from, where it was not given as such.
     pub make: Option<BeltMake>,
+    /// Whether spans 1 and 2 get shorter and longer, and so stiffer and softer, as the cart moves; needs `make`.
+    pub follows_cart: bool,
 }
 
 /// What a belt is made of; gives its stiffness by eq. (11).
@@ -107,6 +113,30 @@ impl BeltMake {
         let &BeltMake { modulus: e, section: a, spans } = self;
         // k = A E / l                                                              (11)
         spans.map(|l| a * e / l)
+    }
+
+    /// Stiffness of spans 1 and 2 with the cart at `x`, m: the drive pulley is at the positive end.
+    pub fn stiffness_at(&self, x: f64) -> [f64; 2] {
+        let &BeltMake { modulus: e, section: a, spans: [l1, l2, _] } = self;
+        // k₁ = A E / (l₁ − x), k₂ = A E / (l₂ + x)                                (11)
+        [a * e / (l1 - x), a * e / (l2 + x)]
+    }
+}
+
+/// How far the cart may go.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Travel {
+    /// Least position, m.
+    pub min: f64,
+    /// Greatest position, m.
+    pub max: f64,
+}
+
+impl Stage {
+    /// Whether its equations are linear but for stick, slip and other changes of mode: what the exact solver takes.
+    pub fn is_piecewise_linear(&self) -> bool {
+        let laws = [self.drive_pulley.friction, self.cart.friction, self.idler_pulley.friction];
+        laws.iter().all(Friction::is_piecewise_linear) && self.cart.along.is_none() && !self.belt.follows_cart
     }
 }
 

@@ -24,7 +24,7 @@ fn friction(value: &Value) -> Friction {
         coulomb: number(value, &format!("coulomb_{direction}")),
         breakaway: number(value, &format!("breakaway_{direction}")),
     };
-    Friction { forward: side("forward"), backward: side("backward") }
+    Friction::sided(side("forward"), side("backward"))
 }
 
 fn stage(value: &Value) -> Stage {
@@ -50,9 +50,15 @@ fn stage(value: &Value) -> Stage {
         },
         pulley_radius: get("pulley_radius"),
         drive_pulley: pulley("drive_inertia", "drive_friction"),
-        cart: Cart { mass: get("cart_mass"), friction: friction(&value["cart_friction"]) },
+        cart: Cart { mass: get("cart_mass"), friction: friction(&value["cart_friction"]), along: None },
         idler_pulley: pulley("idler_inertia", "idler_friction"),
-        belt: Belt { stiffness: ["k1", "k2", "k3"].map(get), damping: ["c1", "c2", "c3"].map(get), make: None },
+        belt: Belt {
+            stiffness: ["k1", "k2", "k3"].map(get),
+            damping: ["c1", "c2", "c3"].map(get),
+            make: None,
+            follows_cart: false,
+        },
+        travel: None,
         encoder: None,
     }
 }

@@ -25,9 +25,15 @@ fn stage(encoder: Option<Encoder>) -> Stage {
         amplifier: Amplifier { mode: AmplifierMode::Voltage, gain: 2.0 },
         pulley_radius: 0.0194,
         drive_pulley: pulley,
-        cart: Cart { mass: 0.362, friction: Friction::symmetric(19.0424, 0.2) },
+        cart: Cart { mass: 0.362, friction: Friction::symmetric(19.0424, 0.2), along: None },
         idler_pulley: pulley,
-        belt: Belt { stiffness: [132.76e3, 132.76e3, f64::NAN], damping: [0.0, 3.0, 0.0], make: None },
+        belt: Belt {
+            stiffness: [132.76e3, 132.76e3, f64::NAN],
+            damping: [0.0, 3.0, 0.0],
+            make: None,
+            follows_cart: false,
+        },
+        travel: None,
         encoder,
     }
 }

@@ -1,5 +1,6 @@
 //! The case file: TOML in, a [`Case`] out, and every mistake told with its line.
 
+mod friction;
 mod input;
 mod reader;
 mod set;
@@ -148,7 +149,7 @@ impl Case {
                 .next("write a commented one to start from with `taut init`"));
         }
         let tables =
-            ["title", "motor", "amplifier", "drive_pulley", "idler_pulley", "cart", "belt", "encoder", "experiment"];
+            ["title", "motor", "amplifier", "drive_pulley", "idler_pulley", "cart", "belt", "travel", "encoder", "experiment"];
         root.check_keys(&tables, PLANNED)?;
 
         let title = match root.optional("title") {

@@ -1,15 +1,14 @@
 //! The machine's tables: motor, amplifier, pulleys, belt, cart, encoder.
 
+use super::friction::{along, friction};
 use super::reader::{Field, Table};
 use crate::error::Result;
-use crate::friction::{Friction, Side};
 use crate::quantity::{rounded, show};
 use crate::stage::*;
 
 /// Keys that stand in the plan and not yet in the program.
 const PLANNED_AMPLIFIER: &[&str] = &["voltage_limit", "current_limit"];
-const PLANNED_BELT: &[&str] = &["follows_cart", "model"];
-const PLANNED_FRICTION: &[&str] = &["stribeck", "lugre"];
+const PLANNED_BELT: &[&str] = &["model"];
 
 pub(super) fn stage(root: &Table) -> Result<Stage> {
     let table = |name: &str, holds: &str| root.required(name, &format!("a table [{name}] with {holds}"))?.table();
@@ -19,6 +18,7 @@ pub(super) fn stage(root: &Table) -> Result<Stage> {
     let idler = table("idler_pulley", "inertia")?;
     let cart = table("cart", "mass")?;
     let belt = table("belt", "stiffness")?;
+    let travel = root.optional("travel").map(|field| field.table()).transpose()?;
     let encoder = root.optional("encoder").map(|field| field.table()).transpose()?;
 
     drive.check_keys(&[], &[])?;
@@ -29,9 +29,10 @@ pub(super) fn stage(root: &Table) -> Result<Stage> {
         amplifier: self::amplifier(amplifier.as_ref())?,
         pulley_radius: radius(&drive)?,
         drive_pulley: pulley(&drive)?,
-        cart: Cart { mass: cart.number("mass")?, friction: friction(&cart)? },
+        cart: Cart { mass: cart.number("mass")?, friction: friction(&cart)?, along: along(&cart)? },
         idler_pulley: pulley(&idler)?,
-        belt: self::belt(&belt)?,
+        travel: travel.as_ref().map(self::travel).transpose()?,
+        belt: self::belt(&belt, travel.as_ref())?,
         encoder: encoder.map(|table| self::encoder(&table)).transpose()?,
     })
 }
@@ -96,49 +97,19 @@ fn pulley(table: &Table) -> Result<Pulley> {
     Ok(Pulley { inertia, friction: friction(table)? })
 }
 
-/// The friction of a body; all zero where the table says nothing.
-fn friction(body: &Table) -> Result<Friction> {
-    let Some(field) = body.optional("friction") else { return Ok(Friction::default()) };
-    let table = field.table()?;
-    table.check_keys(&[], PLANNED_FRICTION)?;
-    let viscous = table.number("viscous")?;
-    let coulomb = table.number("coulomb")?;
-    let coulomb_backward = table.number_if_given("coulomb_backward")?.unwrap_or(coulomb);
-    let breakaway = table.number_if_given("static")?;
-    let breakaway_backward = table.number_if_given("static_backward")?.or(breakaway);
-
-    // At rest a body holds at least what it resists with in motion.
-    let unit = if body.field.section == "cart" { "N" } else { "N m" };
-    let at_least = |key: &str, breakaway: Option<f64>, allowed: &str, coulomb: f64| match breakaway {
-        Some(value) if value < coulomb => {
-            let field = table.optional(key).unwrap_or_else(|| table.field.clone());
-            let (value, coulomb) = (show(value, unit), show(coulomb, unit));
-            Err(field
-                .fail(format!("a breakaway of {value} is less than the Coulomb friction of {coulomb}"))
-                .allowed(allowed))
-        }
-        _ => Ok(()),
-    };
-    at_least("static", breakaway, "at least coulomb", coulomb)?;
-    let (backward, allowed) = match table.optional("static_backward") {
-        Some(_) => ("static_backward", "at least coulomb_backward, which is coulomb where it is not given"),
-        None => ("static", "at least coulomb_backward, unless static_backward is given"),
-    };
-    at_least(backward, breakaway_backward, allowed, coulomb_backward)?;
-
-    let viscous_backward = table.number_if_given("viscous_backward")?.unwrap_or(viscous);
-    Ok(Friction {
-        forward: Side { viscous, coulomb, breakaway: breakaway.unwrap_or(coulomb) },
-        backward: Side {
-            viscous: viscous_backward,
-            coulomb: coulomb_backward,
-            breakaway: breakaway_backward.unwrap_or(coulomb_backward),
-        },
-    })
+fn travel(table: &Table) -> Result<Travel> {
+    table.check_keys(&[], &[])?;
+    let (min, max) = (table.number("min")?, table.number("max")?);
+    if min >= max {
+        let field = table.optional("max").unwrap_or_else(|| table.field.clone());
+        return Err(field.fail("the travel ends before it begins").allowed("above min"));
+    }
+    Ok(Travel { min, max })
 }
 
-fn belt(table: &Table) -> Result<Belt> {
-    table.check_keys(&[], PLANNED_BELT)?;
+fn belt(table: &Table, travel: Option<&Table>) -> Result<Belt> {
+    table.check_keys(&["follows_cart"], PLANNED_BELT)?;
+    let follows_cart = table.optional("follows_cart").map_or(Ok(false), |field| field.truth())?;
     let make = ["modulus", "section", "spans"];
     let damping = table.optional("damping").map_or(Ok([0.0; 3]), |field| field.three())?;
     if let Some(stiffness) = table.optional("stiffness") {
@@ -147,7 +118,12 @@ fn belt(table: &Table) -> Result<Belt> {
                 .fail("the stiffness is given already")
                 .next("give either stiffness, or modulus, section and spans"));
         }
-        return Ok(Belt { stiffness: stiffness.three()?, damping, make: None });
+        if let Some(field) = table.optional("follows_cart").filter(|_| follows_cart) {
+            return Err(field
+                .fail("a given stiffness does not say how it changes with the length of a span")
+                .next("give modulus, section and spans instead of stiffness"));
+        }
+        return Ok(Belt { stiffness: stiffness.three()?, damping, make: None, follows_cart });
     }
     if make.iter().all(|key| table.optional(key).is_none()) {
         return Err(table.missing(
@@ -164,7 +140,28 @@ fn belt(table: &Table) -> Result<Belt> {
     for k in stiffness {
         table.computed("stiffness", &table.field, k)?;
     }
-    Ok(Belt { stiffness, damping, make: Some(make) })
+    if let Some(field) = table.optional("follows_cart").filter(|_| follows_cart) {
+        spans_left(&field, &make, travel)?;
+    }
+    Ok(Belt { stiffness, damping, make: Some(make), follows_cart })
+}
+
+/// Within its travel the cart must leave something of the spans on either side: −l₂ < min, max < l₁.
+fn spans_left(follows: &Field, make: &BeltMake, travel: Option<&Table>) -> Result<()> {
+    let Some(table) = travel else {
+        return Err(follows
+            .fail("how far the cart may go is not said")
+            .next("add a table [travel] with min and max, such as min = \"-0.3 m\" and max = \"0.3 m\""));
+    };
+    let Travel { min, max } = self::travel(table)?;
+    let [l1, l2, _] = make.spans;
+    let (key, what, allowed) = match (min > -l2, max < l1) {
+        (true, true) => return Ok(()),
+        (false, _) => ("min", "span 2 would have no length left", format!("above {}", show(-l2, "m"))),
+        (true, false) => ("max", "span 1 would have no length left", format!("below {}", show(l1, "m"))),
+    };
+    let field = table.optional(key).unwrap_or_else(|| table.field.clone());
+    Err(field.fail(what).allowed(format!("{allowed}, the length of the span at x = 0")))
 }
 
 /// One modulus, or the parts of a composite.

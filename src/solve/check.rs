@@ -4,6 +4,8 @@
 
 use crate::case::Experiment;
 use crate::error::{Error, Result};
+use crate::friction::Law;
+use crate::plant::Body;
 use crate::stage::{AmplifierMode, Stage};
 
 /// The range of anything that has to be above zero, as in a case file.
@@ -54,6 +56,39 @@ pub(super) fn stage(stage: &Stage) -> Result<()> {
         }
     }
 
+    for (body, law) in Body::ALL.into_iter().zip(laws) {
+        match law.law {
+            Law::Coulomb => {}
+            Law::Stribeck { velocity, .. } => positive("a Stribeck velocity", &[velocity])?,
+            Law::Smooth { breakaway_velocity } => positive("a breakaway velocity", &[breakaway_velocity])?,
+            Law::LuGre { stiffness, damping, velocity } => {
+                positive("a Stribeck velocity, or the bristles' stiffness", &[velocity, stiffness])?;
+                not_negative("the bristles' damping", &[damping])?;
+                positive("Coulomb friction under bristles", &[law.forward.coulomb, law.backward.coulomb])?;
+                if let Some(along) = stage.cart.along.as_ref().filter(|_| body == Body::Cart) {
+                    let factors: Vec<f64> = along.points().iter().map(|point| point[1]).collect();
+                    positive("the factor of friction along the travel, under bristles,", &factors)?;
+                }
+            }
+        }
+        let never_sticks = matches!(law.law, Law::Smooth { .. } | Law::LuGre { .. });
+        if body == Body::DrivePulley && never_sticks && motor.gear_efficiency < 1.0 {
+            return Err(Error::new("a gear that loses power, and a friction law that never sticks at the drive pulley")
+                .allowed("one of the two")
+                .next("set gear_efficiency to 1, or give the drive pulley Coulomb friction or a Stribeck curve"));
+        }
+    }
+    if stage.belt.follows_cart {
+        let (Some(make), Some(travel)) = (stage.belt.make, stage.travel) else {
+            return Err(Error::new("spans that follow the cart need modulus, section, spans and a travel"));
+        };
+        let [l1, l2, _] = make.spans;
+        if !(-l2 < travel.min && travel.min < travel.max && travel.max < l1) {
+            let what = format!("a travel from {} m to {} m leaves no span", travel.min, travel.max);
+            return Err(Error::new(what).allowed(format!("above {} m, below {l1} m", -l2)));
+        }
+    }
+
     // Whatever is by itself this fast: the current, and each body against its springs, dampers, friction and the motor.
     if motor.inductance > 0.0 && stage.amplifier.mode == AmplifierMode::Voltage {
         let rate = motor.resistance / motor.inductance;
@@ -76,6 +111,52 @@ pub(super) fn stage(stage: &Stage) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Refuses what is not linear between its changes of mode.
+pub(super) fn piecewise_linear(stage: &Stage) -> Result<()> {
+    if stage.is_piecewise_linear() {
+        return Ok(());
+    }
+    let bent = [
+        (stage.drive_pulley.friction, "drive pulley"),
+        (stage.cart.friction, "cart"),
+        (stage.idler_pulley.friction, "idler pulley"),
+    ];
+    let what = match bent.iter().find(|(law, _)| !law.is_piecewise_linear()) {
+        Some((_, body)) => format!("the friction law of the {body} is no straight line"),
+        None if stage.cart.along.is_some() => "the cart's friction changes along the travel".into(),
+        None => "the belt's spans follow the cart".into(),
+    };
+    Err(Error::new(format!("{what}: this solver does not take it"))
+        .next("leave --solver out, or write --solver general: it takes all of these"))
+}
+
+/// The fastest rate, 1/s, that is known beforehand: of the current, and of each body against all that holds or damps it.
+pub(super) fn fastest_rate(stage: &Stage) -> f64 {
+    let motor = &stage.motor;
+    let r2 = stage.pulley_radius * stage.pulley_radius;
+    let [k1, k2, k3] = stage.belt.stiffness;
+    let [c1, c2, c3] = stage.belt.damping;
+    let bodies = [
+        (stage.drive_pulley.inertia, stage.drive_pulley.friction, (k1 + k3) * r2, (c1 + c3) * r2),
+        (stage.cart.mass, stage.cart.friction, k1 + k2, c1 + c2),
+        (stage.idler_pulley.inertia, stage.idler_pulley.friction, (k2 + k3) * r2, (c2 + c3) * r2),
+    ];
+    let mut fastest: f64 = match stage.amplifier.mode {
+        AmplifierMode::Voltage if motor.inductance > 0.0 => motor.resistance / motor.inductance,
+        _ => 0.0,
+    };
+    for (inertia, friction, k, c) in bodies {
+        let (k, c) = match friction.law {
+            Law::Coulomb | Law::Stribeck { .. } => (k, c),
+            Law::Smooth { .. } => (k, c + friction.slope(0.0)),
+            Law::LuGre { stiffness, damping, .. } => (k + stiffness, c + damping),
+        };
+        let viscous = friction.forward.viscous.max(friction.backward.viscous);
+        fastest = fastest.max((k / inertia).sqrt()).max((c + viscous) / inertia);
+    }
+    fastest
 }
 
 fn too_fast(what: &str, rate: f64) -> Error {

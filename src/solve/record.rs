@@ -1,7 +1,7 @@
 //! From states to the columns that a user sees, block by block.
 
 use super::{Flow, Grid};
-use crate::friction::Motion;
+use crate::friction::{Law, Motion};
 use crate::plant::{Body, Plant, place};
 use crate::stage::{AmplifierMode, EncoderPlace};
 use crate::trajectory::{Column, Trajectory};
@@ -10,6 +10,17 @@ use std::f64::consts::PI;
 /// Rows handed on at a time; small enough to stay in the processor's cache.
 const BLOCK: usize = 256;
 
+/// What a row shows that does not follow from its state by the linear equations.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Extra {
+    /// Friction beyond b v ± F_c, N or N m.
+    pub(crate) friction: [f64; 3],
+    /// Forces of spans 1 and 2 beyond those with the stiffness at x = 0, N.
+    pub(crate) span: [f64; 2],
+    /// Deflection of the bristles, m or rad.
+    pub(crate) bristle: [f64; 3],
+}
+
 /// Collects rows of states and hands them on as blocks of columns.
 pub(crate) struct Recorder<'a> {
     plant: &'a Plant,
@@ -17,6 +28,8 @@ pub(crate) struct Recorder<'a> {
     /// States in the order of [`place`], then the input.
     raw: Vec<[f64; place::COUNT + 1]>,
     motion: Vec<[Motion; 3]>,
+    /// One for each row, or none at all where the linear equations say everything.
+    extra: Vec<Extra>,
     block: Trajectory,
     sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
     /// Rows handed on.
@@ -32,6 +45,7 @@ impl<'a> Recorder<'a> {
             grid,
             raw: Vec::with_capacity(BLOCK),
             motion: Vec::with_capacity(BLOCK),
+            extra: Vec::new(),
             block: Trajectory { columns: headings(plant) },
             sink,
             rows: 0,
@@ -54,6 +68,12 @@ impl<'a> Recorder<'a> {
         }
     }
 
+    /// Adds the next row with what its state does not tell.
+    pub(crate) fn push_with(&mut self, row: [f64; place::COUNT + 1], motion: [Motion; 3], extra: Extra) {
+        self.extra.push(extra);
+        self.push(row, motion);
+    }
+
     /// Hands on what is left.
     pub(crate) fn finish(&mut self) {
         if !self.raw.is_empty() {
@@ -69,6 +89,7 @@ impl<'a> Recorder<'a> {
         }
         self.raw.clear();
         self.motion.clear();
+        self.extra.clear();
     }
 
     /// Computes every column of the block from the states, column by column so that the loops become vector instructions.
@@ -124,6 +145,10 @@ impl<'a> Recorder<'a> {
         put(f1, |j| k1 * (r * p1[j] - x[j]) + c1 * (r * w1[j] - v[j]));
         put(f2, |j| k2 * (x[j] - r * p3[j]) + c2 * (v[j] - r * w3[j]));
         put(f3, |j| k3 * (r * p3[j] - r * p1[j]) + c3 * (r * w3[j] - r * w1[j]));
+        for (j, extra) in self.extra.iter().enumerate() {
+            f1[j] += extra.span[0];
+            f2[j] += extra.span[1];
+        }
         let (f1, f2, f3) = (&*f1, &*f2, &*f3);
 
         let one = |load: f64| (load, load);
@@ -151,6 +176,9 @@ impl<'a> Recorder<'a> {
                 }
                 start += same.len();
             }
+            for (value, extra) in friction.iter_mut().zip(&self.extra) {
+                *value += extra.friction[body.index()];
+            }
         }
         for body in 0..3 {
             put(next(), |j| f64::from(self.motion[j][body].code()));
@@ -166,6 +194,9 @@ impl<'a> Recorder<'a> {
                 EncoderPlace::Cart => (x, 4.0 * encoder.lines),
             };
             put(next(), |j| (position[j] * counts).round());
+        }
+        for body in bristles(self.plant) {
+            put(next(), |j| self.extra[j].bristle[body.index()]);
         }
     }
 }
@@ -183,6 +214,11 @@ const INPUT: usize = place::COUNT;
 fn shows_input(plant: &Plant) -> bool {
     let amplifier = &plant.stage().amplifier;
     amplifier.gain != 1.0 || amplifier.mode == AmplifierMode::Current
+}
+
+/// The bodies whose friction is that of bristles.
+fn bristles(plant: &Plant) -> impl Iterator<Item = Body> {
+    Body::ALL.into_iter().filter(|body| matches!(plant.friction(*body).law, Law::LuGre { .. }))
 }
 
 /// The columns of a run on this stage, without rows.
@@ -215,6 +251,10 @@ pub(crate) fn headings(plant: &Plant) -> Vec<Column> {
     }
     if plant.stage().encoder.is_some() {
         columns.push(Column::new("encoder_count", ""));
+    }
+    for body in bristles(plant) {
+        let unit = if body == Body::Cart { "m" } else { "rad" };
+        columns.push(Column::new(format!("{}_bristle", body.key()), unit));
     }
     columns
 }

@@ -32,8 +32,9 @@ pub fn paper_stage(stiffness: [f64; 3], inertia: f64, pulley: Friction, cart: Fr
         pulley_radius: 0.0194,
         drive_pulley: pulley,
         idler_pulley: pulley,
-        cart: Cart { mass: 0.362, friction: cart },
-        belt: Belt { stiffness, damping: [0.0; 3], make: None },
+        cart: Cart { mass: 0.362, friction: cart, along: None },
+        belt: Belt { stiffness, damping: [0.0; 3], make: None, follows_cart: false },
+        travel: None,
         encoder: None,
     }
 }

@@ -31,9 +31,9 @@ fn side(viscous: f64, coulomb: f64) -> impl Strategy<Value = Side> {
 fn friction(viscous: f64, coulomb: f64, dry: Dry) -> BoxedStrategy<Friction> {
     let one = side(viscous, coulomb);
     match dry {
-        Dry::Symmetric => one.prop_map(|side| Friction { forward: side, backward: side }).boxed(),
+        Dry::Symmetric => one.prop_map(|side| Friction::sided(side, side)).boxed(),
         Dry::Any => {
-            (one, side(viscous, coulomb)).prop_map(|(forward, backward)| Friction { forward, backward }).boxed()
+            (one, side(viscous, coulomb)).prop_map(|(forward, backward)| Friction::sided(forward, backward)).boxed()
         }
     }
 }
@@ -63,11 +63,11 @@ pub fn stage(dry: Dry) -> impl Strategy<Value = Stage> {
     let pulley = move || {
         (decades(1e-5, 5e-4), friction(0.0016, 0.015, dry)).prop_map(|(inertia, friction)| Pulley { inertia, friction })
     };
-    let cart = (decades(0.05, 3.0), friction(19.0, 0.2, dry)).prop_map(|(mass, friction)| Cart { mass, friction });
+    let cart = (decades(0.05, 3.0), friction(19.0, 0.2, dry)).prop_map(|(mass, friction)| Cart { mass, friction, along: None });
     let stiffness = || decades(2e3, 5e5);
     let damping = || prop_oneof![2 => Just(0.0), 1 => decades(0.1, 30.0)];
     let belt = ([stiffness(), stiffness(), stiffness()], [damping(), damping(), damping()])
-        .prop_map(|(stiffness, damping)| Belt { stiffness, damping, make: None });
+        .prop_map(|(stiffness, damping)| Belt { stiffness, damping, make: None, follows_cart: false });
     (motor, amplifier, decades(0.005, 0.04), pulley(), cart, pulley(), belt).prop_map(
         |(motor, amplifier, pulley_radius, drive_pulley, cart, idler_pulley, belt)| Stage {
             motor,
@@ -77,6 +77,7 @@ pub fn stage(dry: Dry) -> impl Strategy<Value = Stage> {
             cart,
             idler_pulley,
             belt,
+            travel: None,
             encoder: None,
         },
     )

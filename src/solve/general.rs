@@ -1,0 +1,509 @@
+//! The general solver: any friction law, and spans that follow the cart.
+//!
+//! Between mode changes and edges of the input the equations are smooth, and an adaptive formula of order eight (Dormand and
+//! Prince's DOP853, from a library) integrates them. The modes and their guards are those of the exact solver. Each
+//! step's dense output is a polynomial, and so are the guards along it: their first fall is searched for as the exact solver does, so
+//! that two crossings within a step are seen; the step is then taken again up to the event.
+
+mod fall;
+mod model;
+mod stretch;
+
+use super::record::Recorder;
+use super::{Cost, Ending, Event, Flow, Grid, Outcome, check};
+use crate::case::Experiment;
+use crate::error::{Error, Result};
+use crate::friction::{Law, Motion};
+use crate::plant::{Body, Cause, Mode, Plant, place};
+use crate::trajectory::Trajectory;
+use fall::NODES;
+use ivp::dense::StepInterpolant;
+use ivp::methods::{DOP853, Tolerance};
+use ivp::solout::{ControlFlag, SolOut};
+use model::{Field, MOST, Model, Vector, Watch};
+use stretch::Stretch;
+
+/// Events allowed at once, and per simulated second: more is an accumulation, not a machine.
+const EVENTS_AT_LEAST: f64 = 1e5;
+const EVENTS_PER_SECOND: f64 = 1e7;
+
+/// Mode changes allowed at one instant.
+const CHANGES_AT_ONCE: usize = 100;
+
+/// Turns of a body at one instant after which it is taken to rest.
+const TURNS_AT_ONCE: usize = 20;
+
+/// Most steps of a run, by what is known beforehand of its fastest rate.
+const MOST_STEPS: f64 = 1e10;
+
+/// Runs the experiment; `tolerance` is the error allowed in each step, relative and, of small quantities, absolute.
+pub(crate) fn run(
+    plant: &Plant,
+    experiment: &Experiment,
+    tolerance: f64,
+    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+) -> Result<Outcome> {
+    if !(1e-14..=1e-2).contains(&tolerance) {
+        return Err(Error::new(format!("a tolerance of {tolerance:e} is of no use"))
+            .allowed("from 1e-14 to 0.01")
+            .next("take 1e-9, which keeps positions to about 1e-11 m"));
+    }
+    let steps = check::fastest_rate(plant.stage()) * experiment.until / REACH;
+    if steps > MOST_STEPS {
+        return Err(Error::new(format!(
+            "the general solver would need some {steps:.0e} steps: something here changes within a fraction of {:.0e} s",
+            experiment.until / steps * REACH
+        ))
+        .allowed(format!("up to {MOST_STEPS:e} steps"))
+        .next("leave out the inductance, the damping or the friction that is as fast as that, or shorten the run"));
+    }
+    let model = Model::new(plant);
+    Ok(Run::new(&model, experiment, tolerance, sink).finish(experiment))
+}
+
+/// h·|λ| up to which the formula is stable.
+const REACH: f64 = 6.0;
+
+/// A run under way.
+struct Run<'a> {
+    model: &'a Model<'a>,
+    grid: Grid,
+    recorder: Recorder<'a>,
+    solver: DOP853,
+    relative: f64,
+    absolute: Vector,
+    y: Vector,
+    mode: Mode,
+    /// Where the run stands, counted from the beginning of the present stretch, s.
+    tau: f64,
+    /// How many leading coefficients of a sliding body's speed, over the next step, are zero by definition; last, the
+    /// same for the gear's torque.
+    fresh: [usize; 4],
+    /// By how much the load on a stuck body, or the torque of a gear, may pass its limit before it counts.
+    slack: [f64; 4],
+    changed_at: f64,
+    changes: usize,
+    events: Vec<Event>,
+    modes: Vec<Mode>,
+    cost: Cost,
+    trouble: Option<Ending>,
+}
+
+/// A guard that fell.
+struct Hit {
+    tau: f64,
+    y: Vector,
+    watch: Watch,
+}
+
+impl<'a> Run<'a> {
+    fn new(
+        model: &'a Model<'a>,
+        experiment: &Experiment,
+        tolerance: f64,
+        sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
+    ) -> Self {
+        let plant = model.plant;
+        let grid = Grid::new(experiment.every, experiment.until);
+        let start = &experiment.initial;
+        let mut y = [0.0; MOST];
+        y[..place::CURRENT].copy_from_slice(&[
+            start.drive_angle,
+            start.drive_speed,
+            start.cart_position,
+            start.cart_speed,
+            start.idler_angle,
+            start.idler_speed,
+        ]);
+        if plant.has_current_state() {
+            y[place::CURRENT] = start.motor_current;
+        }
+        // An angle of 1 rad is as much as r at the belt.
+        let r = plant.stage().pulley_radius;
+        let mut absolute = [tolerance; MOST];
+        absolute[place::CART_POSITION] *= r;
+        absolute[place::CART_SPEED] *= r;
+        for body in Body::ALL {
+            let friction = plant.friction(body);
+            if let (Some(place), Law::LuGre { stiffness, .. }) = (model.bristle[body.index()], friction.law) {
+                // Bristles bend by F_b/σ₀ at most.
+                absolute[place] = tolerance * friction.forward.breakaway.max(friction.backward.breakaway) / stiffness;
+            }
+        }
+        let motion = Body::ALL.map(|body| match y[body.speed_place()] {
+            _ if !plant.has_modes(body) => Motion::Free,
+            v if v > 0.0 => Motion::Forward,
+            v if v < 0.0 => Motion::Backward,
+            _ => Motion::Stuck,
+        });
+        let mode = Mode { motion, gear_torque_positive: true };
+        Self {
+            model,
+            grid,
+            recorder: Recorder::new(plant, grid, sink),
+            // It is stopped from outside: by its observer.
+            solver: DOP853 { max_steps: usize::MAX - 1, stiff_test: usize::MAX, ..DOP853::default() },
+            relative: tolerance,
+            absolute,
+            y,
+            mode,
+            tau: 0.0,
+            fresh: [0; 4],
+            slack: [0.0; 4],
+            changed_at: f64::NEG_INFINITY,
+            changes: 0,
+            events: Vec::new(),
+            modes: vec![mode],
+            cost: Cost::default(),
+            trouble: None,
+        }
+    }
+
+    /// The recipe: from edge to edge of the input, event by event, to the end.
+    fn finish(mut self, experiment: &Experiment) -> Outcome {
+        let end = self.grid.end();
+        let mut time = 0.0;
+        let mut stretch = Stretch::new(&experiment.input, time, end);
+        loop {
+            self.cost.pieces += stretch.pieces() as u64;
+            self.tau = 0.0;
+            self.resolve(&stretch);
+            if self.trouble.is_none() && time >= end {
+                let field = Field::new(self.model, self.mode, &stretch);
+                let y = self.y;
+                self.put_out(&field, 0.0, &y);
+            }
+            if self.trouble.is_some() || time >= end {
+                break;
+            }
+            self.reach(&stretch);
+            time = stretch.begin + self.tau;
+            if self.trouble.is_some() {
+                break;
+            }
+            time = stretch.end;
+            let next = Stretch::new(&experiment.input, time, end);
+            if !next.continues(&stretch) {
+                self.solver.first_step = None;
+            }
+            stretch = next;
+        }
+        self.recorder.finish();
+        self.cost.samples = self.recorder.rows;
+        self.cost.modes = self.modes.len() as u64;
+        let ending = match (self.trouble, self.recorder.flow) {
+            (Some(trouble), _) => trouble,
+            (None, Flow::Stop) => Ending::Interrupted { time },
+            (None, Flow::Continue) => Ending::Complete,
+        };
+        Outcome { events: self.events, ending, cost: self.cost }
+    }
+
+    /// Advances to the end of the stretch, event by event.
+    fn reach(&mut self, stretch: &Stretch) {
+        while self.tau < stretch.length() && self.trouble.is_none() {
+            let Some(hit) = self.integrate(stretch) else { continue };
+            self.y = hit.y;
+            self.tau = hit.tau;
+            self.solver.first_step = None;
+            match hit.watch {
+                Watch::Mode(cause) => {
+                    self.change(cause, stretch);
+                    self.resolve(stretch);
+                }
+                Watch::Min | Watch::Max => {
+                    self.trouble = Some(Ending::LeftTravel { time: stretch.begin + self.tau });
+                }
+            }
+        }
+    }
+
+    /// Integrates to the end of the stretch, or to the first guard that falls.
+    fn integrate(&mut self, stretch: &Stretch) -> Option<Hit> {
+        let field = Field::new(self.model, self.mode, stretch);
+        let length = stretch.length();
+        let mut solver = DOP853 { max_step: Some(stretch.longest_step()), ..self.solver.clone() };
+        solver.first_step = solver.first_step.map(|step| step.min(length - self.tau));
+        let (relative, absolute, y) = (self.relative(), self.absolute(), self.y);
+        let (from, size) = (self.tau, self.model.size);
+        let mut observer = Observer { watches: field.watches(), run: self, field: &field, hit: None };
+        let result = solver.solve(&field, from, &y[..size], length, relative, absolute, Some(&mut observer));
+        let hit = observer.hit;
+        self.cost.evaluations += field.evaluations();
+        match result {
+            Ok(result) if result.is_ok() && hit.is_none() && self.trouble.is_none() => {
+                self.tau = length;
+                self.solver.first_step = Some(result.h.abs()).filter(|step| *step > 0.0);
+            }
+            Ok(result) if result.is_ok() => {}
+            // Not even the smallest step will do: this is no motion any more.
+            _ => self.trouble = Some(Ending::Diverged { time: stretch.begin + self.tau }),
+        }
+        hit
+    }
+
+    fn relative(&self) -> Tolerance {
+        Tolerance::Scalar(self.relative)
+    }
+
+    fn absolute(&self) -> Tolerance {
+        Tolerance::Vector(self.absolute[..self.model.size].to_vec())
+    }
+
+    /// Puts out the row that is at `tau`.
+    fn put_out(&mut self, field: &Field, tau: f64, y: &Vector) {
+        let state = self.model.state(y);
+        let input = field.input(tau);
+        let row = std::array::from_fn(|j| if j < place::COUNT { state[j] } else { input });
+        if self.model.adds {
+            let (extra, _) = self.model.extra(&self.mode.motion, &state, y);
+            self.recorder.push_with(row, self.mode.motion, extra);
+        } else {
+            self.recorder.push(row, self.mode.motion);
+        }
+    }
+
+    /// What a body at zero speed does under its present load.
+    fn decide(&self, body: Body, input: f64) -> Motion {
+        let (model, state) = (self.model, self.model.state(&self.y));
+        let noise = model.noise(body, &state, input);
+        if model.load(body, true, &state, input) > model.breakaway(body, true, &state) + noise {
+            Motion::Forward
+        } else if model.load(body, false, &state, input) < -model.breakaway(body, false, &state) - noise {
+            Motion::Backward
+        } else {
+            Motion::Stuck
+        }
+    }
+
+    /// Goes into the mode that follows when `cause` ends the present one.
+    fn change(&mut self, cause: Cause, stretch: &Stretch) {
+        let time = stretch.begin + self.tau;
+        let at_once = time - self.changed_at <= 1e-15 + 4.0 * f64::EPSILON * time;
+        self.changes = if at_once { self.changes + 1 } else { 0 };
+        self.changed_at = time;
+        if self.changes > CHANGES_AT_ONCE {
+            self.trouble = Some(Ending::TooManyEvents { time });
+        }
+        let again = self.changes > TURNS_AT_ONCE;
+        let input = stretch.input(self.tau);
+        let (body, to) = match cause {
+            Cause::GearTorque => {
+                self.mode.gear_torque_positive = !self.mode.gear_torque_positive;
+                // Where rounding calls it negative either way it is zero.
+                self.slack[3] = if again { f64::INFINITY } else { 0.0 };
+                self.fresh[3] = 1;
+                self.enter();
+                return;
+            }
+            Cause::Stop(body) => {
+                self.y[body.speed_place()] = 0.0;
+                (body, if again { Motion::Stuck } else { self.decide(body, input) })
+            }
+            Cause::BreakForward(body) => (body, Motion::Forward),
+            Cause::BreakBackward(body) => (body, Motion::Backward),
+        };
+        let (index, state) = (body.index(), self.model.state(&self.y));
+        let from = self.mode.motion[index];
+        let side = if to == Motion::Stuck { from } else { to };
+        let forward = side != Motion::Backward;
+        let load = self.model.load(body, forward, &state, input);
+        let (holds, resists) =
+            (self.model.breakaway(body, forward, &state), self.model.resistance(body, forward, &state));
+        self.fresh[index] = match (to, cause) {
+            (Motion::Stuck | Motion::Free, _) => 0,
+            (_, Cause::Stop(_)) => 1,
+            // Where the breakaway equals the friction that follows, the acceleration starts from zero.
+            _ if (load.abs() - resists).abs() <= NEAR * holds => 2,
+            _ => 1,
+        };
+        let noise = f64::max(2.0 * self.model.noise(body, &state, input), 1e-12 * holds);
+        self.slack[index] = if again { 10.0 } else { 1.0 } * noise;
+        self.mode.motion[index] = to;
+        if from != to {
+            self.events.push(Event { time, body, from, to, load });
+        }
+        self.enter();
+    }
+
+    fn enter(&mut self) {
+        if !self.modes.contains(&self.mode) {
+            self.modes.push(self.mode);
+        }
+    }
+
+    /// Changes modes, without time passing, until every load that is held can be.
+    fn resolve(&mut self, stretch: &Stretch) {
+        let time = stretch.begin + self.tau;
+        for _ in 0..CHANGES_AT_ONCE {
+            let field = Field::new(self.model, self.mode, stretch);
+            let guards = field.guards(self.tau, &self.y);
+            let fallen = field.watches().into_iter().zip(guards).find(|&(watch, value)| match watch {
+                // A speed tells by itself, over the next step.
+                Watch::Mode(Cause::Stop(_)) => false,
+                Watch::Mode(Cause::GearTorque) => self.fresh[3] == 0 && value < -self.slack[3],
+                Watch::Mode(Cause::BreakForward(body) | Cause::BreakBackward(body)) => value < -self.slack[body.index()],
+                Watch::Min | Watch::Max => value < 0.0,
+            });
+            match fallen {
+                Some((Watch::Mode(cause), _)) => self.change(cause, stretch),
+                Some(_) => {
+                    self.trouble = Some(Ending::LeftTravel { time });
+                    return;
+                }
+                None => {
+                    if self.events.len() as f64 > EVENTS_AT_LEAST + EVENTS_PER_SECOND * time {
+                        self.trouble = Some(Ending::TooManyEvents { time });
+                    }
+                    return;
+                }
+            }
+        }
+        self.trouble = Some(Ending::TooManyEvents { time });
+    }
+}
+
+/// How near, as a share, a load has to be to the friction that follows a breakaway to be the same.
+const NEAR: f64 = 1e-6;
+
+/// Looks at every step: finds the guard that falls first, and puts out the rows until there.
+struct Observer<'r, 'a> {
+    run: &'r mut Run<'a>,
+    field: &'r Field<'r>,
+    watches: Vec<Watch>,
+    hit: Option<Hit>,
+}
+
+impl SolOut for Observer<'_, '_> {
+    fn solout(&mut self, from: f64, to: &mut f64, y: &mut [f64], dense: Option<&StepInterpolant<'_>>) -> ControlFlag {
+        let (to, Some(dense)) = (*to, dense) else { return ControlFlag::Continue };
+        let size = y.len();
+        let mut end = [0.0; MOST];
+        end[..size].copy_from_slice(y);
+        if self.field.is_broken() || !end.iter().sum::<f64>().is_finite() {
+            self.run.trouble = Some(Ending::Diverged { time: self.field.stretch.begin + from });
+            return ControlFlag::Interrupt;
+        }
+        self.run.cost.steps += 1;
+        let begin = self.run.y;
+        let at = |tau: f64| {
+            let mut y = [0.0; MOST];
+            dense.interpolate(tau, &mut y[..size]);
+            y
+        };
+        self.hit = self.first_fall(from, to, &begin, &end, &at);
+        let until = self.hit.as_ref().map_or(to, |hit| hit.tau);
+        // A row on an edge or an event shows what comes after it.
+        let stretch = self.field.stretch;
+        let near = (8.0 * f64::EPSILON * stretch.end).min(1e-9 * self.run.grid.interval());
+        let until = if until >= stretch.length() { stretch.length() - near } else { until };
+        loop {
+            let row = self.run.recorder.next_row();
+            let tau = self.run.grid.time(row) - stretch.begin;
+            if row > self.run.grid.intervals() || tau >= until {
+                break;
+            }
+            let y = if tau <= from { begin } else { at(tau) };
+            self.run.put_out(self.field, tau, &y);
+        }
+        if self.run.recorder.flow == Flow::Stop {
+            self.run.trouble = Some(Ending::Interrupted { time: stretch.begin + to });
+        }
+        self.run.y = end;
+        self.run.tau = to;
+        self.run.fresh = [0; 4];
+        if self.hit.is_some() || self.run.trouble.is_some() { ControlFlag::Interrupt } else { ControlFlag::Continue }
+    }
+}
+
+impl Observer<'_, '_> {
+    /// The first guard to fall between `from` and `to`, and the state there.
+    fn first_fall(
+        &mut self,
+        from: f64,
+        to: f64,
+        begin: &Vector,
+        end: &Vector,
+        at: &impl Fn(f64) -> Vector,
+    ) -> Option<Hit> {
+        if self.watches.is_empty() {
+            return None;
+        }
+        self.run.cost.looks += 1;
+        let mut values = [[0.0; NODES]; model::MOST_GUARDS];
+        for node in 0..NODES {
+            let tau = from + (to - from) * node as f64 / (NODES - 1) as f64;
+            let guards = match node {
+                0 => self.field.guards(from, begin),
+                7 => self.field.guards(to, end),
+                _ => self.field.guards(tau, &at(tau)),
+            };
+            for (values, guard) in values.iter_mut().zip(guards) {
+                values[node] = guard;
+            }
+        }
+        let mut first: Option<(f64, f64, usize)> = None;
+        for (index, watch) in self.watches.iter().enumerate() {
+            let run = &self.run;
+            let (zeros, slack) = match *watch {
+                // What the integrator may be off by is no stop.
+                Watch::Mode(Cause::Stop(body)) => match run.fresh[body.index()] {
+                    0 => (0, run.absolute[body.speed_place()]),
+                    zeros => (zeros, 0.0),
+                },
+                Watch::Mode(Cause::BreakForward(body) | Cause::BreakBackward(body)) => (0, run.slack[body.index()]),
+                Watch::Mode(Cause::GearTorque) => (run.fresh[3], run.slack[3]),
+                Watch::Min | Watch::Max => (0, 0.0),
+            };
+            if slack.is_infinite() {
+                continue;
+            }
+            if let Some((s, slope)) = fall::first_fall(&values[index].map(|value| value + slack), zeros)
+                && first.is_none_or(|(earliest, ..)| s < earliest)
+            {
+                first = Some((s, slope, index));
+            }
+        }
+        let (s, slope, index) = first?;
+        let slack = match self.watches[index] {
+            Watch::Mode(Cause::BreakForward(body) | Cause::BreakBackward(body)) => self.run.slack[body.index()],
+            _ => 0.0,
+        };
+        let mut tau = from + s * (to - from);
+        let mut y = self.leap(from, begin, tau);
+        // Newton's method along the formula itself, which is more accurate than its dense output.
+        for _ in 0..3 {
+            let value = self.field.guards(tau, &y)[index] + slack;
+            let change = -value * (to - from) / slope;
+            if !(slope < 0.0 && change.abs() <= 0.01 * (to - from)) || change.abs() <= 1e-15 + f64::EPSILON * tau {
+                break;
+            }
+            tau = (tau + change).clamp(from, to);
+            y = self.leap(from, begin, tau);
+        }
+        Some(Hit { tau, y, watch: self.watches[index] })
+    }
+
+    /// One step of the formula to where it is wanted.
+    fn leap(&self, from: f64, begin: &Vector, to: f64) -> Vector {
+        if to <= from {
+            return *begin;
+        }
+        let solver = DOP853 { first_step: Some(to - from), dense_output: true, ..self.run.solver.clone() };
+        let mut arrival = Arrival(*begin);
+        let y = &begin[..self.run.model.size];
+        let (relative, absolute) = (self.run.relative(), self.run.absolute());
+        let _ = solver.solve(self.field, from, y, to, relative, absolute, Some(&mut arrival));
+        arrival.0
+    }
+}
+
+/// Keeps the state at the end of a step.
+struct Arrival(Vector);
+
+impl SolOut for Arrival {
+    fn solout(&mut self, _: f64, _: &mut f64, y: &mut [f64], _: Option<&StepInterpolant<'_>>) -> ControlFlag {
+        self.0[..y.len()].copy_from_slice(y);
+        ControlFlag::Continue
+    }
+}

@@ -1,0 +1,266 @@
+//! The equations as the integrator sees them: the linear ones of a mode, and what a law or a belt adds to them.
+
+use crate::friction::{Law, Motion};
+use crate::plant::{Body, Cause, Equations, Form, Mode, Plant, State, place, stretches};
+use super::stretch::Stretch;
+use crate::solve::record::Extra;
+use crate::stage::BeltMake;
+use ivp::prelude::FirstOrderSystem;
+use std::cell::Cell;
+
+/// Most quantities that are integrated: positions and speeds, current, three bristles.
+pub(super) const MOST: usize = place::COUNT + 3;
+
+/// The integrated quantities: the mechanical ones in the order of [`place`], the current if it is a state, bristles.
+pub(super) type Vector = [f64; MOST];
+
+/// Most conditions watched at once: two for each body, the gear's torque, the ends of the travel.
+pub(super) const MOST_GUARDS: usize = 9;
+
+/// What ends a mode, or the run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Watch {
+    /// A condition of the mode.
+    Mode(Cause),
+    /// The cart goes below its least position.
+    Min,
+    /// The cart goes beyond its greatest position.
+    Max,
+}
+
+/// A stage made ready for the integrator.
+pub(super) struct Model<'a> {
+    pub(super) plant: &'a Plant,
+    /// Number of integrated quantities.
+    pub(super) size: usize,
+    /// Where a body's bristle deflection stands, if it has one.
+    pub(super) bristle: [Option<usize>; 3],
+    /// The belt whose spans follow the cart.
+    follows: Option<BeltMake>,
+    /// Whether anything is added to the linear equations at all.
+    pub(super) adds: bool,
+}
+
+impl<'a> Model<'a> {
+    pub(super) fn new(plant: &'a Plant) -> Self {
+        let mut size = if plant.has_current_state() { place::COUNT } else { place::CURRENT };
+        let bristle = Body::ALL.map(|body| {
+            matches!(plant.friction(body).law, Law::LuGre { .. }).then(|| {
+                size += 1;
+                size - 1
+            })
+        });
+        let belt = &plant.stage().belt;
+        let adds = !plant.stage().is_piecewise_linear();
+        Self { plant, size, bristle, follows: belt.make.filter(|_| belt.follows_cart), adds }
+    }
+
+    /// The state of the stage.
+    #[inline]
+    pub(super) fn state(&self, y: &[f64]) -> State {
+        let mut state = [0.0; place::COUNT];
+        let known = if self.plant.has_current_state() { place::COUNT } else { place::CURRENT };
+        state[..known].copy_from_slice(&y[..known]);
+        state
+    }
+
+    /// By how much the cart's dry friction is multiplied where it is.
+    fn factor(&self, body: Body, state: &State) -> f64 {
+        match &self.plant.stage().cart.along {
+            Some(along) if body == Body::Cart => along.factor(state[place::CART_POSITION]),
+            _ => 1.0,
+        }
+    }
+
+    /// What the spans' forces are beyond (k d + c ḋ) with the stiffness at x = 0.
+    fn beyond(&self, state: &State) -> [f64; 2] {
+        let Some(make) = self.follows else { return [0.0; 2] };
+        let stage = self.plant.stage();
+        let [k1, k2, _] = stage.belt.stiffness;
+        let [d1, d2, _] = stretches(stage.pulley_radius, state);
+        let [k1x, k2x] = make.stiffness_at(state[place::CART_POSITION]);
+        // (k_j(x) − k_j) d_j
+        [(k1x - k1) * d1, (k2x - k2) * d2]
+    }
+
+    /// What they put on the three bodies.
+    fn loads(&self, [e1, e2]: [f64; 2]) -> [f64; 3] {
+        let r = self.plant.stage().pulley_radius;
+        // As f₁ and f₂ in (16)-(18)
+        [-r * e1, e1 - e2, r * e2]
+    }
+
+    /// All forces on a body but its friction, for a body that goes, or is about to go, forward or backward.
+    pub(super) fn load(&self, body: Body, forward: bool, state: &State, input: f64) -> f64 {
+        let positive = self.plant.current().value(self.plant, state, input) >= 0.0;
+        self.plant.load(body, forward, positive).value(self.plant, state, input)
+            + self.loads(self.beyond(state))[body.index()]
+    }
+
+    /// What rounding may have done to it.
+    pub(super) fn noise(&self, body: Body, state: &State, input: f64) -> f64 {
+        self.plant.load(body, true, true).noise(self.plant, state, input)
+    }
+
+    /// What a body at rest holds this way, where it is.
+    pub(super) fn breakaway(&self, body: Body, forward: bool, state: &State) -> f64 {
+        self.factor(body, state) * self.plant.friction(body).breakaway(forward)
+    }
+
+    /// What resists a body that begins to slide this way, where it is.
+    pub(super) fn resistance(&self, body: Body, forward: bool, state: &State) -> f64 {
+        self.factor(body, state) * self.plant.friction(body).dry(forward, 0.0)
+    }
+
+    /// What the laws and the belt add to the linear equations, and how the bristles move.
+    #[inline]
+    pub(super) fn extra(&self, motion: &[Motion; 3], state: &State, y: &[f64]) -> (Extra, [f64; 3]) {
+        let mut rates = [0.0; 3];
+        if !self.adds {
+            return (Extra::default(), rates);
+        }
+        let mut extra = Extra { span: self.beyond(state), ..Extra::default() };
+        for body in Body::ALL {
+            let index = body.index();
+            let friction = self.plant.friction(body);
+            let v = state[body.speed_place()];
+            extra.friction[index] = match (motion[index], friction.law) {
+                (Motion::Stuck, _) => 0.0,
+                // In the equations there is b v ± F_c; here what the law differs by.
+                (Motion::Forward, _) => self.factor(body, state) * friction.dry(true, v) - friction.forward.coulomb,
+                (Motion::Backward, _) => friction.backward.coulomb - self.factor(body, state) * friction.dry(false, -v),
+                // In the equations there is b v.
+                (Motion::Free, Law::Coulomb | Law::Stribeck { .. }) => 0.0,
+                (Motion::Free, law) => {
+                    let forward = v >= 0.0;
+                    let dry = self.factor(body, state) * friction.dry(forward, v.abs());
+                    let viscous = (friction.side(forward).viscous - friction.forward.viscous) * v;
+                    match (law, self.bristle[index]) {
+                        (Law::LuGre { stiffness, damping, .. }, Some(place)) => {
+                            let z = y[place];
+                            // ż = v − σ₀ |v| z / g(v)
+                            rates[index] = v - stiffness * v.abs() * z / dry;
+                            extra.bristle[index] = z;
+                            // σ₀ z + σ₁ ż
+                            stiffness * z + damping * rates[index] + viscous
+                        }
+                        _ => dry.copysign(v) + viscous,
+                    }
+                }
+            };
+        }
+        (extra, rates)
+    }
+}
+
+/// The equations of one mode under one stretch of the input: ẏ = f(τ, y), τ counted from the beginning of the stretch.
+pub(super) struct Field<'a> {
+    model: &'a Model<'a>,
+    mode: Mode,
+    equations: Equations,
+    pub(super) stretch: &'a Stretch,
+    evaluations: Cell<u64>,
+    broken: Cell<bool>,
+}
+
+impl<'a> Field<'a> {
+    pub(super) fn new(model: &'a Model<'a>, mode: Mode, stretch: &'a Stretch) -> Self {
+        let equations = model.plant.equations(mode);
+        Self { model, mode, equations, stretch, evaluations: Cell::new(0), broken: Cell::new(false) }
+    }
+
+    pub(super) fn evaluations(&self) -> u64 {
+        self.evaluations.get()
+    }
+
+    /// Whether a rate was no number.
+    pub(super) fn is_broken(&self) -> bool {
+        self.broken.get()
+    }
+
+    /// The input at τ.
+    pub(super) fn input(&self, tau: f64) -> f64 {
+        self.stretch.input(tau)
+    }
+
+    /// What is watched.
+    pub(super) fn watches(&self) -> Vec<Watch> {
+        let mut watches: Vec<Watch> = self.equations.guards.iter().map(|guard| Watch::Mode(guard.cause)).collect();
+        if self.model.plant.stage().travel.is_some() {
+            watches.extend([Watch::Min, Watch::Max]);
+        }
+        watches
+    }
+
+    /// The values that must not become negative, in the order of [`Field::watches`].
+    pub(super) fn guards(&self, tau: f64, y: &[f64]) -> [f64; MOST_GUARDS] {
+        let model = self.model;
+        let (plant, state, input) = (model.plant, model.state(y), self.input(tau));
+        let (extra, _) = model.extra(&self.mode.motion, &state, y);
+        let load = model.loads(extra.span);
+        let mut values = [0.0; MOST_GUARDS];
+        let guards = &self.equations.guards;
+        for (value, guard) in values.iter_mut().zip(guards) {
+            *value = guard.form.value(plant, &state, input)
+                + match guard.cause {
+                    Cause::Stop(_) => 0.0,
+                    // a(x) F_b − (load + what the belt adds)
+                    Cause::BreakForward(body) => {
+                        model.breakaway(body, true, &state) - plant.friction(body).forward.breakaway - load[body.index()]
+                    }
+                    Cause::BreakBackward(body) => {
+                        model.breakaway(body, false, &state) - plant.friction(body).backward.breakaway + load[body.index()]
+                    }
+                    Cause::GearTorque => {
+                        let motor = &plant.stage().motor;
+                        let sign = if self.mode.gear_torque_positive { 1.0 } else { -1.0 };
+                        let change = match self.mode.motion[0] {
+                            Motion::Stuck => 0.0,
+                            _ => (load[0] - extra.friction[0]) / self.equations.inertia[0],
+                        };
+                        -sign * motor.rotor_inertia * motor.gear_ratio * change
+                    }
+                };
+        }
+        if let Some(travel) = plant.stage().travel {
+            values[guards.len()] = state[place::CART_POSITION] - travel.min;
+            values[guards.len() + 1] = travel.max - state[place::CART_POSITION];
+        }
+        values
+    }
+}
+
+impl FirstOrderSystem for Field<'_> {
+    fn derivative(&self, tau: f64, y: &[f64], rate: &mut [f64]) {
+        self.evaluations.set(self.evaluations.get() + 1);
+        let model = self.model;
+        let (plant, state, input) = (model.plant, model.state(y), self.input(tau));
+        let (extra, bristles) = model.extra(&self.mode.motion, &state, y);
+        let load = model.loads(extra.span);
+        let value = |form: &Form| form.value(plant, &state, input);
+        for body in Body::ALL {
+            let index = body.index();
+            let (position, speed) = (body.speed_place() - 1, body.speed_place());
+            (rate[position], rate[speed]) = match self.mode.motion[index] {
+                Motion::Stuck => (0.0, 0.0),
+                // J φ̈ = what is linear + what the belt adds − what the law adds
+                _ => (
+                    state[speed],
+                    value(&self.equations.acceleration[index])
+                        + (load[index] - extra.friction[index]) / self.equations.inertia[index],
+                ),
+            };
+            if let Some(place) = model.bristle[index] {
+                rate[place] = bristles[index];
+            }
+        }
+        if plant.has_current_state() {
+            rate[place::CURRENT] = value(&self.equations.current_rate);
+        }
+        if !rate.iter().sum::<f64>().is_finite() {
+            // The formula would shorten its step for ever; so it goes on, and its observer ends the run.
+            self.broken.set(true);
+            rate.fill(0.0);
+        }
+    }
+}
