@@ -103,7 +103,8 @@ fn stribeck(table: &Table, law: &Table, friction: Friction) -> Result<Friction> 
         }
     };
     let raised = |side: Side| Side { breakaway: side.coulomb + force, ..side };
-    Ok(Friction::sided(raised(friction.forward), raised(friction.backward)).following(Law::Stribeck { velocity, shape }))
+    Ok(Friction::sided(raised(friction.forward), raised(friction.backward))
+        .following(Law::Stribeck { velocity, shape }))
 }
 
 /// How the cart's friction changes along its travel.

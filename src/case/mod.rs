@@ -148,8 +148,18 @@ impl Case {
                 .in_file(name)
                 .next("write a commented one to start from with `taut init`"));
         }
-        let tables =
-            ["title", "motor", "amplifier", "drive_pulley", "idler_pulley", "cart", "belt", "travel", "encoder", "experiment"];
+        let tables = [
+            "title",
+            "motor",
+            "amplifier",
+            "drive_pulley",
+            "idler_pulley",
+            "cart",
+            "belt",
+            "travel",
+            "encoder",
+            "experiment",
+        ];
         root.check_keys(&tables, PLANNED)?;
 
         let title = match root.optional("title") {

@@ -73,9 +73,11 @@ pub(super) fn stage(stage: &Stage) -> Result<()> {
         }
         let never_sticks = matches!(law.law, Law::Smooth { .. } | Law::LuGre { .. });
         if body == Body::DrivePulley && never_sticks && motor.gear_efficiency < 1.0 {
-            return Err(Error::new("a gear that loses power, and a friction law that never sticks at the drive pulley")
-                .allowed("one of the two")
-                .next("set gear_efficiency to 1, or give the drive pulley Coulomb friction or a Stribeck curve"));
+            return Err(Error::new(
+                "a gear that loses power, and a friction law that never sticks at the drive pulley",
+            )
+            .allowed("one of the two")
+            .next("set gear_efficiency to 1, or give the drive pulley Coulomb friction or a Stribeck curve"));
         }
     }
     if stage.belt.follows_cart {

@@ -48,21 +48,25 @@ pub(crate) fn run(
             .allowed("from 1e-14 to 0.01")
             .next("take 1e-9, which keeps positions to about 1e-11 m"));
     }
-    let steps = check::fastest_rate(plant.stage()) * experiment.until / REACH;
+    let fastest = check::fastest_rate(plant.stage());
+    let steps = fastest * experiment.until / REACH;
     if steps > MOST_STEPS {
         return Err(Error::new(format!(
-            "the general solver would need some {steps:.0e} steps: something here changes within a fraction of {:.0e} s",
-            experiment.until / steps * REACH
+            "the general solver would need some {steps:.0e} steps: something here changes within {:.0e} s",
+            1.0 / fastest
         ))
         .allowed(format!("up to {MOST_STEPS:e} steps"))
         .next("leave out the inductance, the damping or the friction that is as fast as that, or shorten the run"));
     }
     let model = Model::new(plant);
-    Ok(Run::new(&model, experiment, tolerance, sink).finish(experiment))
+    Ok(Run::new(&model, experiment, tolerance, FIRST / fastest, sink).finish(experiment))
 }
 
 /// h·|λ| up to which the formula is stable.
 const REACH: f64 = 6.0;
+
+/// h·|λ| of the first step after an event or an edge.
+const FIRST: f64 = 0.3;
 
 /// A run under way.
 struct Run<'a> {
@@ -70,17 +74,20 @@ struct Run<'a> {
     grid: Grid,
     recorder: Recorder<'a>,
     solver: DOP853,
+    /// The step to begin with after an event or an edge, s.
+    first_step: f64,
     relative: f64,
     absolute: Vector,
     y: Vector,
     mode: Mode,
     /// Where the run stands, counted from the beginning of the present stretch, s.
     tau: f64,
-    /// How many leading coefficients of a sliding body's speed, over the next step, are zero by definition; last, the
-    /// same for the gear's torque.
-    fresh: [usize; 4],
-    /// By how much the load on a stuck body, or the torque of a gear, may pass its limit before it counts.
-    slack: [f64; 4],
+    /// By how much the load on a stuck body may pass its limit before it counts.
+    slack: [f64; 3],
+    /// The same for a gear's torque.
+    torque_slack: f64,
+    /// The largest torque that the gear has carried, N m at the motor's shaft.
+    torque: f64,
     changed_at: f64,
     changes: usize,
     events: Vec<Event>,
@@ -101,6 +108,7 @@ impl<'a> Run<'a> {
         model: &'a Model<'a>,
         experiment: &Experiment,
         tolerance: f64,
+        first_step: f64,
         sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
     ) -> Self {
         let plant = model.plant;
@@ -142,14 +150,21 @@ impl<'a> Run<'a> {
             grid,
             recorder: Recorder::new(plant, grid, sink),
             // It is stopped from outside: by its observer.
-            solver: DOP853 { max_steps: usize::MAX - 1, stiff_test: usize::MAX, ..DOP853::default() },
+            solver: DOP853 {
+                max_steps: usize::MAX - 1,
+                stiff_test: usize::MAX,
+                first_step: Some(first_step),
+                ..DOP853::default()
+            },
+            first_step,
             relative: tolerance,
             absolute,
             y,
             mode,
             tau: 0.0,
-            fresh: [0; 4],
-            slack: [0.0; 4],
+            slack: [0.0; 3],
+            torque_slack: 0.0,
+            torque: 0.0,
             changed_at: f64::NEG_INFINITY,
             changes: 0,
             events: Vec::new(),
@@ -184,7 +199,7 @@ impl<'a> Run<'a> {
             time = stretch.end;
             let next = Stretch::new(&experiment.input, time, end);
             if !next.continues(&stretch) {
-                self.solver.first_step = None;
+                self.solver.first_step = Some(self.first_step);
             }
             stretch = next;
         }
@@ -205,7 +220,7 @@ impl<'a> Run<'a> {
             let Some(hit) = self.integrate(stretch) else { continue };
             self.y = hit.y;
             self.tau = hit.tau;
-            self.solver.first_step = None;
+            self.solver.first_step = Some(self.first_step);
             match hit.watch {
                 Watch::Mode(cause) => {
                     self.change(cause, stretch);
@@ -222,6 +237,11 @@ impl<'a> Run<'a> {
     fn integrate(&mut self, stretch: &Stretch) -> Option<Hit> {
         let field = Field::new(self.model, self.mode, stretch);
         let length = stretch.length();
+        if length - self.tau <= 64.0 * f64::EPSILON * length {
+            // What is left is no step, but rounding.
+            self.tau = length;
+            return None;
+        }
         let mut solver = DOP853 { max_step: Some(stretch.longest_step()), ..self.solver.clone() };
         solver.first_step = solver.first_step.map(|step| step.min(length - self.tau));
         let (relative, absolute, y) = (self.relative(), self.absolute(), self.y);
@@ -233,7 +253,7 @@ impl<'a> Run<'a> {
         match result {
             Ok(result) if result.is_ok() && hit.is_none() && self.trouble.is_none() => {
                 self.tau = length;
-                self.solver.first_step = Some(result.h.abs()).filter(|step| *step > 0.0);
+                self.solver.first_step = Some(result.h.abs().max(self.first_step));
             }
             Ok(result) if result.is_ok() => {}
             // Not even the smallest step will do: this is no motion any more.
@@ -291,8 +311,7 @@ impl<'a> Run<'a> {
             Cause::GearTorque => {
                 self.mode.gear_torque_positive = !self.mode.gear_torque_positive;
                 // Where rounding calls it negative either way it is zero.
-                self.slack[3] = if again { f64::INFINITY } else { 0.0 };
-                self.fresh[3] = 1;
+                self.torque_slack = if again { f64::INFINITY } else { self.relative * self.torque };
                 self.enter();
                 return;
             }
@@ -308,15 +327,7 @@ impl<'a> Run<'a> {
         let side = if to == Motion::Stuck { from } else { to };
         let forward = side != Motion::Backward;
         let load = self.model.load(body, forward, &state, input);
-        let (holds, resists) =
-            (self.model.breakaway(body, forward, &state), self.model.resistance(body, forward, &state));
-        self.fresh[index] = match (to, cause) {
-            (Motion::Stuck | Motion::Free, _) => 0,
-            (_, Cause::Stop(_)) => 1,
-            // Where the breakaway equals the friction that follows, the acceleration starts from zero.
-            _ if (load.abs() - resists).abs() <= NEAR * holds => 2,
-            _ => 1,
-        };
+        let holds = self.model.breakaway(body, forward, &state);
         let noise = f64::max(2.0 * self.model.noise(body, &state, input), 1e-12 * holds);
         self.slack[index] = if again { 10.0 } else { 1.0 } * noise;
         self.mode.motion[index] = to;
@@ -341,8 +352,10 @@ impl<'a> Run<'a> {
             let fallen = field.watches().into_iter().zip(guards).find(|&(watch, value)| match watch {
                 // A speed tells by itself, over the next step.
                 Watch::Mode(Cause::Stop(_)) => false,
-                Watch::Mode(Cause::GearTorque) => self.fresh[3] == 0 && value < -self.slack[3],
-                Watch::Mode(Cause::BreakForward(body) | Cause::BreakBackward(body)) => value < -self.slack[body.index()],
+                Watch::Mode(Cause::GearTorque) => value < -self.torque_slack,
+                Watch::Mode(Cause::BreakForward(body) | Cause::BreakBackward(body)) => {
+                    value < -self.slack[body.index()]
+                }
                 Watch::Min | Watch::Max => value < 0.0,
             });
             match fallen {
@@ -362,9 +375,6 @@ impl<'a> Run<'a> {
         self.trouble = Some(Ending::TooManyEvents { time });
     }
 }
-
-/// How near, as a share, a load has to be to the friction that follows a breakaway to be the same.
-const NEAR: f64 = 1e-6;
 
 /// Looks at every step: finds the guard that falls first, and puts out the rows until there.
 struct Observer<'r, 'a> {
@@ -411,7 +421,6 @@ impl SolOut for Observer<'_, '_> {
         }
         self.run.y = end;
         self.run.tau = to;
-        self.run.fresh = [0; 4];
         if self.hit.is_some() || self.run.trouble.is_some() { ControlFlag::Interrupt } else { ControlFlag::Continue }
     }
 }
@@ -442,33 +451,31 @@ impl Observer<'_, '_> {
                 values[node] = guard;
             }
         }
-        let mut first: Option<(f64, f64, usize)> = None;
+        if let Some(gear) = self.watches.iter().position(|watch| *watch == Watch::Mode(Cause::GearTorque)) {
+            let run = &mut self.run;
+            run.torque = values[gear].iter().fold(run.torque, |most, value| most.max(value.abs()));
+            // What was told by nothing but rounding is told by the step.
+            run.torque_slack = run.relative * run.torque;
+        }
+        let mut first: Option<(f64, f64, usize, f64)> = None;
         for (index, watch) in self.watches.iter().enumerate() {
             let run = &self.run;
-            let (zeros, slack) = match *watch {
-                // What the integrator may be off by is no stop.
-                Watch::Mode(Cause::Stop(body)) => match run.fresh[body.index()] {
-                    0 => (0, run.absolute[body.speed_place()]),
-                    zeros => (zeros, 0.0),
-                },
-                Watch::Mode(Cause::BreakForward(body) | Cause::BreakBackward(body)) => (0, run.slack[body.index()]),
-                Watch::Mode(Cause::GearTorque) => (run.fresh[3], run.slack[3]),
-                Watch::Min | Watch::Max => (0, 0.0),
+            let slack = match *watch {
+                // What the integrator may be off by is no stop, least of all where a body has just begun to slide.
+                Watch::Mode(Cause::Stop(body)) => run.absolute[body.speed_place()],
+                Watch::Mode(Cause::BreakForward(body) | Cause::BreakBackward(body)) => run.slack[body.index()],
+                Watch::Mode(Cause::GearTorque) => run.torque_slack,
+                Watch::Min | Watch::Max => 0.0,
             };
-            if slack.is_infinite() {
-                continue;
-            }
-            if let Some((s, slope)) = fall::first_fall(&values[index].map(|value| value + slack), zeros)
+            if let Some((s, slope)) = fall::first_fall(&values[index].map(|value| value + slack))
                 && first.is_none_or(|(earliest, ..)| s < earliest)
             {
-                first = Some((s, slope, index));
+                first = Some((s, slope, index, slack));
             }
         }
-        let (s, slope, index) = first?;
-        let slack = match self.watches[index] {
-            Watch::Mode(Cause::BreakForward(body) | Cause::BreakBackward(body)) => self.run.slack[body.index()],
-            _ => 0.0,
-        };
+        let (s, slope, index, slack) = first?;
+        // A speed that has fallen through is looked for where it was zero.
+        let slack = if matches!(self.watches[index], Watch::Mode(Cause::Stop(_))) { 0.0 } else { slack };
         let mut tau = from + s * (to - from);
         let mut y = self.leap(from, begin, tau);
         // Newton's method along the formula itself, which is more accurate than its dense output.

@@ -63,7 +63,11 @@ pub fn stage(dry: Dry) -> impl Strategy<Value = Stage> {
     let pulley = move || {
         (decades(1e-5, 5e-4), friction(0.0016, 0.015, dry)).prop_map(|(inertia, friction)| Pulley { inertia, friction })
     };
-    let cart = (decades(0.05, 3.0), friction(19.0, 0.2, dry)).prop_map(|(mass, friction)| Cart { mass, friction, along: None });
+    let cart = (decades(0.05, 3.0), friction(19.0, 0.2, dry)).prop_map(|(mass, friction)| Cart {
+        mass,
+        friction,
+        along: None,
+    });
     let stiffness = || decades(2e3, 5e5);
     let damping = || prop_oneof![2 => Just(0.0), 1 => decades(0.1, 30.0)];
     let belt = ([stiffness(), stiffness(), stiffness()], [damping(), damping(), damping()])

@@ -1,8 +1,8 @@
 //! The equations as the integrator sees them: the linear ones of a mode, and what a law or a belt adds to them.
 
+use super::stretch::Stretch;
 use crate::friction::{Law, Motion};
 use crate::plant::{Body, Cause, Equations, Form, Mode, Plant, State, place, stretches};
-use super::stretch::Stretch;
 use crate::solve::record::Extra;
 use crate::stage::BeltMake;
 use ivp::prelude::FirstOrderSystem;
@@ -107,11 +107,6 @@ impl<'a> Model<'a> {
         self.factor(body, state) * self.plant.friction(body).breakaway(forward)
     }
 
-    /// What resists a body that begins to slide this way, where it is.
-    pub(super) fn resistance(&self, body: Body, forward: bool, state: &State) -> f64 {
-        self.factor(body, state) * self.plant.friction(body).dry(forward, 0.0)
-    }
-
     /// What the laws and the belt add to the linear equations, and how the bristles move.
     #[inline]
     pub(super) fn extra(&self, motion: &[Motion; 3], state: &State, y: &[f64]) -> (Extra, [f64; 3]) {
@@ -206,10 +201,13 @@ impl<'a> Field<'a> {
                     Cause::Stop(_) => 0.0,
                     // a(x) F_b − (load + what the belt adds)
                     Cause::BreakForward(body) => {
-                        model.breakaway(body, true, &state) - plant.friction(body).forward.breakaway - load[body.index()]
+                        model.breakaway(body, true, &state)
+                            - plant.friction(body).forward.breakaway
+                            - load[body.index()]
                     }
                     Cause::BreakBackward(body) => {
-                        model.breakaway(body, false, &state) - plant.friction(body).backward.breakaway + load[body.index()]
+                        model.breakaway(body, false, &state) - plant.friction(body).backward.breakaway
+                            + load[body.index()]
                     }
                     Cause::GearTorque => {
                         let motor = &plant.stage().motor;
