@@ -98,8 +98,8 @@ fn stribeck(table: &Table, law: &Table, friction: Friction) -> Result<Friction> 
         (Some(decay), None) => velocity_of_decay(decay.number()?),
         (None, Some(velocity)) => velocity.number()?,
         (None, None) => {
-            let unit = if table.field.section.starts_with("cart") { "m/s" } else { "rad/s" };
-            return Err(law.missing("velocity", &format!("for example velocity = \"0.01 {unit}\", or decay")));
+            let example = if table.field.section.starts_with("cart") { "0.01 m/s" } else { "0.5 rad/s" };
+            return Err(law.missing("velocity", &format!("for example velocity = \"{example}\", or decay")));
         }
     };
     let raised = |side: Side| Side { breakaway: side.coulomb + force, ..side };

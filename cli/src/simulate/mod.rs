@@ -21,9 +21,9 @@ use taut::{Error, Result};
 
 /// Reads the case, simulates, measures, reports.
 pub fn run(args: &Simulate) -> Outcome {
-    let solver = args.solver()?;
     let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
     let case = Case::read_with(&args.case, &changes)?;
+    let solver = args.solver(&case.stage)?;
     let experiments = chosen(&case, &args.experiments)?;
     let folder = args.out.as_deref().map(Folder::create).transpose()?;
     let interrupt = Interrupt::listen();

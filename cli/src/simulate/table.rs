@@ -79,6 +79,7 @@ pub fn early_end(ending: &Ending) -> Option<String> {
         Ending::Diverged { time: at } => {
             Some(format!("ended at {}: its state is no number any more; a smaller --step may help", time(at)))
         }
+        Ending::LeftTravel { time: at } => Some(format!("ended at {}: the cart left its travel", time(at))),
         Ending::Interrupted { time: at } => Some(format!("was interrupted at {}", time(at))),
     }
 }
@@ -170,6 +171,7 @@ fn cost(run: &Run) -> String {
 fn solver_words(solver: Solver) -> String {
     match solver {
         Solver::Exact => "solved exactly".into(),
+        Solver::General { tolerance } => format!("the general solver, tolerance {tolerance:e}"),
         Solver::Table3 { step, method } => {
             let method = match method {
                 Method::RungeKutta4 => "Runge-Kutta 4",
