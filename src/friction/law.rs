@@ -99,7 +99,7 @@ impl Friction {
     }
 
     /// The part of it that is not viscous, at the speed `v` ≥ 0 in the given direction.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn dry(&self, forward: bool, v: f64) -> f64 {
         let side = self.side(forward);
         let above = side.breakaway - side.coulomb;

@@ -31,6 +31,8 @@ pub(super) enum Watch {
 /// A stage made ready for the integrator.
 pub(super) struct Model<'a> {
     pub(super) plant: &'a Plant,
+    /// Whether the current is a state.
+    has_current: bool,
     /// Number of integrated quantities.
     pub(super) size: usize,
     /// Where a body's bristle deflection stands, if it has one.
@@ -43,7 +45,8 @@ pub(super) struct Model<'a> {
 
 impl<'a> Model<'a> {
     pub(super) fn new(plant: &'a Plant) -> Self {
-        let mut size = if plant.has_current_state() { place::COUNT } else { place::CURRENT };
+        let has_current = plant.has_current_state();
+        let mut size = if has_current { place::COUNT } else { place::CURRENT };
         let bristle = Body::ALL.map(|body| {
             matches!(plant.friction(body).law, Law::LuGre { .. }).then(|| {
                 size += 1;
@@ -52,19 +55,24 @@ impl<'a> Model<'a> {
         });
         let belt = &plant.stage().belt;
         let adds = !plant.stage().is_piecewise_linear();
-        Self { plant, size, bristle, follows: belt.make.filter(|_| belt.follows_cart), adds }
+        Self { plant, has_current, size, bristle, follows: belt.make.filter(|_| belt.follows_cart), adds }
     }
 
     /// The state of the stage.
     #[inline]
     pub(super) fn state(&self, y: &[f64]) -> State {
         let mut state = [0.0; place::COUNT];
-        let known = if self.plant.has_current_state() { place::COUNT } else { place::CURRENT };
-        state[..known].copy_from_slice(&y[..known]);
+        for (state, y) in state[..place::CURRENT].iter_mut().zip(y) {
+            *state = *y;
+        }
+        if self.has_current {
+            state[place::CURRENT] = y[place::CURRENT];
+        }
         state
     }
 
     /// By how much the cart's dry friction is multiplied where it is.
+    #[inline(always)]
     fn factor(&self, body: Body, state: &State) -> f64 {
         match &self.plant.stage().cart.along {
             Some(along) if body == Body::Cart => along.factor(state[place::CART_POSITION]),
@@ -73,6 +81,7 @@ impl<'a> Model<'a> {
     }
 
     /// What the spans' forces are beyond (k d + c ḋ) with the stiffness at x = 0.
+    #[inline(always)]
     fn beyond(&self, state: &State) -> [f64; 2] {
         let Some(make) = self.follows else { return [0.0; 2] };
         let stage = self.plant.stage();
@@ -84,6 +93,7 @@ impl<'a> Model<'a> {
     }
 
     /// What they put on the three bodies.
+    #[inline(always)]
     fn loads(&self, [e1, e2]: [f64; 2]) -> [f64; 3] {
         let r = self.plant.stage().pulley_radius;
         // As f₁ and f₂ in (16)-(18)
@@ -108,7 +118,7 @@ impl<'a> Model<'a> {
     }
 
     /// What the laws and the belt add to the linear equations, and how the bristles move.
-    #[inline]
+    #[inline(always)]
     pub(super) fn extra(&self, motion: &[Motion; 3], state: &State, y: &[f64]) -> (Extra, [f64; 3]) {
         let mut rates = [0.0; 3];
         if !self.adds {
@@ -252,7 +262,7 @@ impl FirstOrderSystem for Field<'_> {
                 rate[place] = bristles[index];
             }
         }
-        if plant.has_current_state() {
+        if model.has_current {
             rate[place::CURRENT] = value(&self.equations.current_rate);
         }
         if !rate.iter().sum::<f64>().is_finite() {
