@@ -15,7 +15,7 @@ use super::roots;
 use super::{Cost, Ending, Event, Flow, Grid, Outcome};
 use crate::case::Experiment;
 use crate::friction::Motion;
-use crate::plant::{Body, Cause, Contact, Form, Limit, Mode, Part, Plant, State, Status, Switch, place};
+use crate::plant::{Body, Cause, Form, Limit, Mode, Part, Plant, State, Status, Switch, place};
 use crate::signal::Piece;
 use crate::stage::AmplifierMode;
 use crate::trajectory::Trajectory;
@@ -47,43 +47,6 @@ pub(crate) fn run(plant: &Plant, experiment: &Experiment, sink: &mut dyn FnMut(&
     }
 }
 
-/// Conditions that are told apart: on the three bodies, the gear's torque, three spans, and for each of gear, voltage,
-/// current and end stop one for each state that it may lead to.
-const WATCHED: usize = 7 + 4 * 3;
-
-/// Which of them a cause belongs to; breakaway stands with the body.
-fn watched(cause: Cause) -> usize {
-    let limit = |limit| match limit {
-        Limit::Inside => 0,
-        Limit::High => 1,
-        Limit::Low => 2,
-    };
-    let contact = |contact| match contact {
-        Contact::Apart => 0,
-        Contact::High | Contact::HighLoose => 1,
-        Contact::Low | Contact::LowLoose => 2,
-    };
-    match cause {
-        Cause::Stop(body) | Cause::BreakForward(body) | Cause::BreakBackward(body) => body.index(),
-        Cause::GearTorque => 3,
-        Cause::Switch(Switch::Span(span, _)) => 4 + span,
-        Cause::Switch(Switch::Gear(to)) => 7 + contact(to),
-        Cause::Switch(Switch::Voltage(to)) => 10 + limit(to),
-        Cause::Switch(Switch::Current(to)) => 13 + limit(to),
-        Cause::Switch(Switch::Stop(to)) => 16 + contact(to),
-        Cause::LeaveTravel => 16,
-    }
-}
-
-/// Whether two causes, neither of them a body's, are of the same part.
-fn same_part(a: Cause, b: Cause) -> bool {
-    match (a, b) {
-        (Cause::GearTorque, Cause::GearTorque) => true,
-        (Cause::Switch(a), Cause::Switch(b)) => a.part() == b.part(),
-        _ => false,
-    }
-}
-
 /// A run under way.
 struct Run<'a, const R: usize, const C: usize> {
     plant: &'a Plant,
@@ -97,11 +60,11 @@ struct Run<'a, const R: usize, const C: usize> {
     laws: Vec<Rc<Law<R, C>>>,
     /// How many leading Taylor coefficients of a sliding body's speed are zero by definition, because it starts from rest:
     /// 1 where it is accelerated, 2 where the load has only just reached its friction. The same for all else that is watched.
-    fresh: [usize; WATCHED],
+    fresh: [usize; Cause::KINDS],
     /// By how much the load on a stuck body may pass its breakaway before it counts: what rounding can do to the load.
     /// Without it a body that comes to rest just at its limit would chatter on the last bit. The same for all else that is
     /// watched where it is zero but for rounding, and would count as wrong in either state.
-    slack: [f64; WATCHED],
+    slack: [f64; Cause::KINDS],
     /// Bounds of |u̇| and |ü| on the present piece.
     input_rate: f64,
     input_curvature: f64,
@@ -143,8 +106,8 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             mode,
             laws: vec![Rc::clone(&law)],
             law,
-            fresh: [0; WATCHED],
-            slack: [0.0; WATCHED],
+            fresh: [0; Cause::KINDS],
+            slack: [0.0; Cause::KINDS],
             input_rate: 0.0,
             input_curvature: 0.0,
             row: 0,
@@ -234,7 +197,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         }
         self.input_rate = rate;
         self.input_curvature = curvature;
-        self.fresh = [0; WATCHED];
+        self.fresh = [0; Cause::KINDS];
     }
 
     /// Advances to `offset` behind row `row`, event by event.
@@ -333,21 +296,21 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         guard.standing(&self.z)
             + match guard.cause {
                 Cause::Stop(_) => 0.0,
-                cause => self.slack[watched(cause)],
+                cause => self.slack[cause.kind()],
             }
     }
 
     fn fresh_order(&self, cause: Cause) -> usize {
         match cause {
             Cause::BreakForward(_) | Cause::BreakBackward(_) => 0,
-            cause => self.fresh[watched(cause)],
+            cause => self.fresh[cause.kind()],
         }
     }
 
     /// Advances by `distance`, at most an interval; stops at the first guard that falls and says why.
     fn advance(&mut self, mut distance: f64) -> Option<Cause> {
         let law = Rc::clone(&self.law);
-        if self.fresh != [0; WATCHED] && distance > 0.0 {
+        if self.fresh != [0; Cause::KINDS] && distance > 0.0 {
             // A speed that starts from zero is told apart from one that falls to zero by its series.
             let first = distance.min(law.reach());
             if let Some(cause) = self.creep(&law, first) {
@@ -458,7 +421,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         }
         self.offset += s * distance;
         if s * distance > SOON * law.reach() {
-            self.fresh = [0; WATCHED];
+            self.fresh = [0; Cause::KINDS];
         }
         first.map(|(_, cause)| cause)
     }
@@ -571,7 +534,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             }
             self.forgive(Cause::Switch(switch));
             if let (Status::Limit(left), true) = (before, side == Limit::Inside && gently) {
-                self.fresh[watched(Cause::Switch(Switch::Current(left)))] = 2;
+                self.fresh[Cause::Switch(Switch::Current(left)).kind()] = 2;
             }
         } else {
             self.forgive(Cause::Switch(switch));
@@ -585,25 +548,17 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
 
     /// Notes an event, unless nothing that shows has changed.
     fn note(&mut self, part: Part, from: Status, load: f64) {
-        let (time, to) = (self.time(), self.mode.status(part));
-        // What passes through another state without staying there goes straight.
-        let passed = |e: &Event| e.time == time && e.part == part && e.body().is_none();
-        let from = match self.events.iter().rev().take_while(|e| e.time == time).position(passed) {
-            Some(back) => self.events.remove(self.events.len() - 1 - back).from,
-            None => from,
-        };
-        if from.code() != to.code() {
-            self.events.push(Event { time, part, from, to, load });
-        }
+        let event = Event { time: self.time(), part, from, to: self.mode.status(part), load };
+        event.note(&mut self.events);
     }
 
     /// Takes what has just become a condition on a part for zero where it is that but for rounding.
     fn forgive(&mut self, cause: Cause) {
         let law = Rc::clone(&self.law);
-        for guard in law.guards.iter().filter(|guard| same_part(guard.cause, cause)) {
+        for guard in law.guards.iter().filter(|guard| guard.cause.is_of_same_part(cause)) {
             let (now, noise) = (guard.value(&self.z), guard.noise(&self.z));
             let zero = now.abs() <= 20.0 * noise;
-            let index = watched(guard.cause);
+            let index = guard.cause.kind();
             (self.slack[index], self.fresh[index]) = match zero {
                 false => (0.0, 0),
                 true if self.changes <= TURNS_AT_ONCE => (f64::max(-now, 0.0), 1),

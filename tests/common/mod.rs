@@ -33,7 +33,7 @@ pub fn paper_stage(stiffness: [f64; 3], inertia: f64, pulley: Friction, cart: Fr
         pulley_radius: 0.0194,
         drive_pulley: pulley,
         idler_pulley: pulley,
-        cart: Cart { mass: 0.362, friction: cart, load: 0.0, inclination: 0.0 },
+        cart: Cart::new(0.362, cart),
         belt: Belt::given(stiffness, [0.0; 3]),
         travel: None,
         encoder: None,

@@ -197,6 +197,7 @@ fn cost(run: &Run) -> String {
 fn solver_words(solver: Solver) -> String {
     match solver {
         Solver::Exact => "solved exactly".into(),
+        Solver::General { tolerance } => format!("the general solver, tolerance {tolerance:e}"),
         Solver::Table3 { step, method } => {
             let method = match method {
                 Method::RungeKutta4 => "Runge-Kutta 4",
