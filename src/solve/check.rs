@@ -250,11 +250,8 @@ pub(super) fn experiment(plant: &Plant, experiment: &Experiment) -> Result<()> {
         initial.idler_speed,
         initial.motor_current,
     ];
-    match state.iter().find(|v| !v.is_finite()) {
-        Some(value) => {
-            return Err(Error::new(format!("the state at the start cannot be {value}")).allowed("any finite number"));
-        }
-        None => {}
+    if let Some(value) = state.iter().find(|v| !v.is_finite()) {
+        return Err(Error::new(format!("the state at the start cannot be {value}")).allowed("any finite number"));
     }
     // What moves as one begins as one.
     let state = initial.state(plant);
