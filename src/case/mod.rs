@@ -1,5 +1,6 @@
 //! The case file: TOML in, a [`Case`] out, and every mistake told with its line.
 
+mod friction;
 mod input;
 mod log;
 mod measurement;

@@ -204,23 +204,26 @@ fn factor(sheet: &Sheet, i: usize, role: Role, source: &Source) -> Result<f64> {
         });
     }
     // A name such as time_us may say the unit, or not.
-    let Some((unit, factor)) = suspected(source.column.name().unwrap_or_default(), wanted) else { return Ok(1.0) };
-    if factor == 1.0 {
-        return Ok(1.0);
-    }
+    let Some(unit) = suspected(source.column.name().unwrap_or_default(), wanted) else { return Ok(1.0) };
     Err(sheet
         .heading_error(i, format!("column {name} seems to be in {unit}, by its name; the case file does not say so"))
-        .next(format!("write {} in the log's table, or {} if that is what it is in", say(&unit), say(wanted))))
+        .next(format!("write {} in the log's table, or {} if that is what it is in", say(unit), say(wanted))))
 }
 
-/// A unit at the end of a name, if it is one of the wanted dimension.
-fn suspected(name: &str, wanted: &str) -> Option<(String, f64)> {
+/// Units, other than SI, that people put at the end of a name.
+const IN_NAMES: [&str; 22] = [
+    "ns", "us", "ms", "min", "mV", "kV", "mA", "uA", "um", "mm", "cm", "in", "inch", "deg", "mrad", "rev", "rpm",
+    "deg/s", "mrad/s", "mm/s", "cm/s", "mm/min",
+];
+
+/// A unit other than SI at the end of a name, if it is one of the wanted dimension.
+fn suspected(name: &str, wanted: &str) -> Option<&'static str> {
     let parts: Vec<&str> = name.split('_').collect();
-    let last = parts.last()?.to_string();
-    // cart_speed_mm_s
-    let quotient = parts.len().checked_sub(2).map(|k| format!("{}/{last}", parts[k]));
-    let of = |unit: String| quantity::read(&format!("1 {unit}"), wanted).ok().map(|factor| (unit, factor));
-    quotient.and_then(of).or_else(|| of(last))
+    let last = parts.last().copied().unwrap_or_default();
+    // As in cart_speed_mm_s.
+    let quotient = parts.len().checked_sub(2).map(|k| format!("{}/{last}", parts[k])).unwrap_or_default();
+    let known = |text: &str| IN_NAMES.into_iter().find(|unit| *unit == text);
+    known(&quotient).or_else(|| known(last)).filter(|unit| quantity::read(&format!("1 {unit}"), wanted).is_ok())
 }
 
 impl Columns<'_> {

@@ -7,10 +7,12 @@ mod matlab;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod sheet;
+mod survey;
 
 pub use crate::stage::Quantity;
 pub use mapping::{Clock, Mapping, Source, Unit};
 pub use sheet::{ColumnId, Dialect, Filter};
+pub use survey::{Channel, Clipped, Gap, Motion, Note, Outlier, Severity, Steady, Survey, Timing};
 
 use crate::error::Result;
 use crate::signal::{Hold, Signal};
