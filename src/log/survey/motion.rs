@@ -14,6 +14,9 @@ const AT_REST: f64 = 0.2;
 /// A steady speed changes by less than this share of itself.
 const STEADY: f64 = 0.03;
 
+/// It begins where its first samples change by less than this share from one half to the other.
+const SETTLED: f64 = 0.005;
+
 /// Fewest samples of a steady speed.
 const SHORTEST: usize = 20;
 
@@ -108,8 +111,12 @@ impl Motion {
         let mut steady: Vec<Steady> = Vec::new();
         let mut begin = 0;
         while begin + SHORTEST <= log.len() {
-            let (v, u) = (self.speed[begin], log.input[begin]);
-            if v.is_nan() || v.abs() <= (0.1 * self.peak_speed).max(3.0 * fuzz) {
+            let u = log.input[begin];
+            let (early, late) = self.speed[begin..begin + SHORTEST].split_at(SHORTEST / 2);
+            let [early, late] = [early, late].map(|half| half.iter().sum::<f64>() / half.len() as f64);
+            let v = 0.5 * (early + late);
+            let settled = (late - early).abs() <= (SETTLED * v.abs()).max(fuzz);
+            if v.is_nan() || !settled || v.abs() <= (0.1 * self.peak_speed).max(3.0 * fuzz) {
                 begin += 1;
                 continue;
             }
