@@ -254,3 +254,58 @@ fn measured_data_of_others() {
         assert!(log.outputs[0].absolute && (ced[0].until - 9.98).abs() < 0.03);
     }
 }
+
+/// Every byte of a file wrong in turn, and every length of it: an answer each time, and no panic.
+#[test]
+fn damaged_files_are_told_or_read() {
+    let folder = folder("damaged");
+    let stored = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/logs");
+    let kinds: &[(&str, &str)] = &[
+        ("columns.mat", r#"time = "t", input = "u", cart_position = "data(:,3)""#),
+        ("rows.mat", r#"time = "t", input = "u", cart_position = "x""#),
+        ("big-endian.mat", r#"time = "t", input = "u", cart_position = "x""#),
+        #[cfg(feature = "parquet")]
+        ("none.parquet", r#"time = "t", input = "u", cart_position = "x""#),
+        #[cfg(feature = "parquet")]
+        ("snappy.parquet", r#"time = "stamp", input = "u", cart_position = "x32""#),
+    ];
+    for (file, log) in kinds {
+        let bytes = fs::read(stored.join(file)).unwrap();
+        let path = folder.join(file);
+        let text = case_text(&format!("log = {{ file = \"{file}\", {log} }}"));
+        let mut told = 0;
+        let mut try_out = |bytes: &[u8]| {
+            fs::write(&path, bytes).unwrap();
+            told += usize::from(Case::from_text(folder.join("case.toml"), &text).is_err());
+        };
+        for at in 0..bytes.len() {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 1 << (at % 8);
+            try_out(&damaged);
+        }
+        for length in (0..bytes.len()).step_by(7) {
+            try_out(&bytes[..length]);
+        }
+        assert!(told > bytes.len() / 7, "{file}: {told}");
+    }
+}
+
+/// What Parquet can hold and a log cannot.
+#[cfg(feature = "parquet")]
+#[test]
+fn parquet_files_that_are_no_logs() {
+    let message = |file: &str, x: &str| {
+        let error = stored(&format!(r#"file = "{file}", time = "t", input = "u", cart_position = "{x}""#)).unwrap_err();
+        error.split_once("tests/logs/").map(|(_, rest)| rest.to_string()).unwrap_or(error)
+    };
+    assert_eq!(
+        message("snappy.parquet", "note"),
+        "snappy.parquet: column `note` holds text or another kind of bytes\n  \
+         allowed: whole or floating-point numbers, truth values, time stamps\n  \
+         next: convert it to numbers before writing the file"
+    );
+    assert!(message("snappy.parquet", "lists.list.element").contains("holds lists"));
+    assert!(message("snappy.parquet", "X").contains("did you mean `x`?"), "{}", message("snappy.parquet", "X"));
+    let brotli = message("brotli.parquet", "x");
+    assert!(brotli.contains("cannot be read") && brotli.contains("next: write it again"), "{brotli}");
+}

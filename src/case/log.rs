@@ -111,7 +111,13 @@ impl<'a> Sources<'a> {
         let sources = Self { units: part("units")?, scale: part("scale")?, offset: part("offset")?, table, stage };
         for part in [&sources.units, &sources.scale, &sources.offset].into_iter().flatten() {
             let columns = ["time", "input"].into_iter().chain(Quantity::ALL.map(Quantity::name));
-            let named: Vec<&'static str> = columns.filter(|key| table.optional(key).is_some()).collect();
+            let named: Vec<&'static str> = columns.clone().filter(|key| table.optional(key).is_some()).collect();
+            // A quantity without a column, rather than a word that is none.
+            let other = part.keys().find(|key| !named.contains(key) && columns.clone().any(|column| column == *key));
+            if let Some(field) = other.and_then(|key| part.optional(key)) {
+                let error = field.fail("the log names no column for this").allowed(named.join(", "));
+                return Err(error.next(format!("name its column: {} = \"...\"", field.key())));
+            }
             part.check_keys(&named, &[])?;
         }
         Ok(sources)
@@ -245,7 +251,11 @@ fn filter(field: &Field) -> Result<Filter> {
 
 /// What parts the columns.
 fn separator(field: &Field) -> Result<char> {
-    field.choice(&[(",", ','), (";", ';'), ("tab", '\t'), ("\t", '\t'), ("space", ' '), (" ", ' ')])
+    match &field.node.kind {
+        Kind::Text(text) if text == "\t" => Ok('\t'),
+        Kind::Text(text) if text == " " => Ok(' '),
+        _ => field.choice(&[(",", ','), (";", ';'), ("tab", '\t'), ("space", ' ')]),
+    }
 }
 
 /// The quantities whose sign was lost.

@@ -12,6 +12,8 @@ use std::path::Path;
 
 const NUMBER: &str = "a number such as 0.25 or -1.5e-3";
 
+const EMPTY: &str = "correct the value, or leave the field empty: it then counts as missing";
+
 /// How many lines may stand above the names.
 const PREAMBLE: usize = 200;
 
@@ -115,7 +117,12 @@ impl<R: BufRead> Row<'_, R> {
             let i = rest.next().unwrap_or_default();
             let text = self.fields.get(self.layout.wanted[i]);
             if is_missing(text) {
-                return Err(self.not_a_number(i, text, false));
+                let column = self.layout.shown_name(i);
+                let error =
+                    self.error(i, format!("column {column}, which tells the runs apart, has no value in this row"));
+                return Err(error
+                    .allowed("a number or a word in every row")
+                    .next("fill in the value, or delete the row"));
             }
             let label = text.parse::<f64>().map_or_else(|_| text.to_string(), crate::quantity::shortest);
             sheet.note_run(&label);
@@ -141,13 +148,15 @@ impl<R: BufRead> Row<'_, R> {
     fn not_a_number(&self, i: usize, text: &str, infinite: bool) -> Error {
         let column = self.layout.shown_name(i);
         let value = shown(text);
+        let may_miss = i >= self.request.complete;
         if text.is_empty() {
             let what = format!("column {column} has no value in this row");
             return self.error(i, what).allowed(NUMBER).next("fill in the value, or delete the row");
         }
         if infinite {
             let what = format!("{value} in column {column} is not a finite number");
-            return self.error(i, what).allowed(NUMBER).next("fill in the value, or delete the row");
+            let next = if may_miss { EMPTY } else { "fill in the value, or delete the row" };
+            return self.error(i, what).allowed(NUMBER).next(next);
         }
         let comma = self.request.dialect.decimal_comma;
         if !comma && text.matches(',').count() == 1 && text.replace(',', ".").parse::<f64>().is_ok() {
@@ -164,14 +173,16 @@ impl<R: BufRead> Row<'_, R> {
         }
         let what = format!("{value} in column {column} is not a number");
         let digits = text.trim_end_matches(|c: char| c.is_alphabetic() || "%°/^·*²³ ".contains(c));
-        let next = if text.contains(':') {
+        let next = if comma && text.parse::<f64>().is_ok() {
+            "leave decimal = \",\" out of the case file: this number has a decimal point"
+        } else if text.contains(':') {
             "give times as seconds, not as a date or a time of day"
         } else if text.starts_with("0x") || text.starts_with("0X") {
             "export the numbers as decimal ones"
         } else if digits.parse::<f64>().is_ok() {
             "leave the number alone in its field; a unit belongs in the column's name"
-        } else if i >= self.request.complete {
-            "correct the value, or leave the field empty: it then counts as missing"
+        } else if may_miss {
+            EMPTY
         } else {
             "correct the value, or delete the row"
         };
@@ -266,6 +277,10 @@ struct Layout {
     heading_line: Option<usize>,
     /// What stands between the names and the first row, where columns go by number.
     below: Vec<String>,
+    /// The separator, if the case file says it.
+    said: Option<char>,
+    /// Whether columns may be asked for by number.
+    by_number: bool,
 }
 
 /// The separators, the most telling first.
@@ -284,13 +299,13 @@ impl Layout {
             // As some programs write it, the names stand in a remark above the numbers.
             let remark = Self::candidate(lines, &lines.remark, request, &names)?;
             if remark.hits == names.len() {
-                let layout = Self { separator: remark.separator, names: remark.names, ..Self::of_numbers() };
+                let layout = Self { separator: remark.separator, names: remark.names, ..Self::of_numbers(request) };
                 return layout.find_all(lines, &ids);
             }
         }
         let unknown = match first.hits == names.len() {
-            true => return Self::of_heading(first, lines.number).find_all(lines, &ids),
-            false => Self::of_heading(first, lines.number).find_all(lines, &ids).err(),
+            true => return Self::of_heading(first, lines.number, request).find_all(lines, &ids),
+            false => Self::of_heading(first, lines.number, request).find_all(lines, &ids).err(),
         };
         // Something may stand above the names.
         let (mut most, mut told) = (0, unknown);
@@ -300,14 +315,14 @@ impl Layout {
             let Ok(candidate) = Self::candidate(lines, &lines.text, request, &names) else { continue };
             let hits = candidate.hits;
             if hits == names.len() {
-                return Self::of_heading(candidate, lines.number).find_all(lines, &ids);
+                return Self::of_heading(candidate, lines.number, request).find_all(lines, &ids);
             }
             if passed == 2 {
                 most = most.max(hits);
             }
             if hits > most {
                 most = hits;
-                told = Self::of_heading(candidate, lines.number).find_all(lines, &ids).err();
+                told = Self::of_heading(candidate, lines.number, request).find_all(lines, &ids).err();
             }
         }
         Err(told.unwrap_or_else(|| lines.error("the columns cannot be found")))
@@ -328,7 +343,7 @@ impl Layout {
                     heading_line: heading_line.filter(|_| named),
                     names: if named { names } else { candidate.names.iter().map(|_| String::new()).collect() },
                     below: if named { below } else { Vec::new() },
-                    ..Self::of_numbers()
+                    ..Self::of_numbers(request)
                 };
                 return layout.find_all(lines, ids);
             }
@@ -350,7 +365,7 @@ impl Layout {
     }
 
     /// The current line is the first row.
-    fn of_numbers() -> Self {
+    fn of_numbers(request: &Request<'_>) -> Self {
         Self {
             separator: b',',
             names: Vec::new(),
@@ -358,12 +373,14 @@ impl Layout {
             is_heading: false,
             heading_line: None,
             below: Vec::new(),
+            said: request.dialect.separator,
+            by_number: request.units_row,
         }
     }
 
-    fn of_heading(candidate: Candidate, line: usize) -> Self {
+    fn of_heading(candidate: Candidate, line: usize, request: &Request<'_>) -> Self {
         let Candidate { separator, names, .. } = candidate;
-        Self { separator, names, is_heading: true, heading_line: Some(line), ..Self::of_numbers() }
+        Self { separator, names, is_heading: true, heading_line: Some(line), ..Self::of_numbers(request) }
     }
 
     /// A line cut by the separator that yields the most of the wanted names; then by the one there is.
@@ -434,6 +451,7 @@ impl Layout {
     }
 
     fn unknown<R: BufRead>(&self, lines: &Lines<'_, R>, name: &str) -> Error {
+        let by_number = self.by_number;
         let mut list: Vec<String> = self.names.iter().take(10).map(|n| shown(n)).collect();
         if self.names.len() > list.len() {
             list.push(format!("and {} more", self.names.len() - list.len()));
@@ -441,9 +459,17 @@ impl Layout {
         let error = lines.error(format!("there is no column {}", shown(name)));
         if self.names.iter().all(|n| numeric(n)) {
             let error = error.allowed("a first row that names the columns; here it holds numbers");
-            return error.next("put a row of names above the numbers");
+            return error.next(match by_number {
+                true => "put a row of names above the numbers, or name columns by number, as in time = 1",
+                false => "put a row of names above the numbers",
+            });
         }
         let error = error.allowed(list.join(", "));
+        if let (Some(said), 1) = (self.said, self.names.len()) {
+            let next =
+                format!("the case file says that `{said}` parts the columns, and line {} has none", lines.number);
+            return error.next(next);
+        }
         match near(name, self.names.iter().map(String::as_str)) {
             Some(near) => error.next(format!("did you mean {}?", shown(near))),
             _ => error.next("name one of these columns"),

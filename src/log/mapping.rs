@@ -194,13 +194,15 @@ fn factor(sheet: &Sheet, i: usize, role: Role, source: &Source) -> Result<f64> {
     let name = &sheet.names[i];
     if let Some(unit) = &sheet.units[i] {
         return of(unit).map_err(|_| {
-            sheet
-                .heading_error(
-                    i,
-                    format!("column {name} is in {}, by its file; {key} is wanted in {wanted}", shown(unit)),
-                )
-                .allowed(format!("{wanted}, or a unit convertible to it"))
-                .next(format!("say in the case file what the unit is: {}", say(wanted)))
+            let what = format!("column {name} is in {}, by its file; {key} is wanted in {wanted}", shown(unit));
+            let error = sheet.heading_error(i, what).allowed(format!("{wanted}, or a unit convertible to it"));
+            error.next(match quantity::parse(&format!("1 {unit}")) {
+                Ok(_) => format!("name another column, or say that this one is not in {unit}: {}", say(wanted)),
+                Err(_) => format!(
+                    "say in the case file what it is: {}, and scale = {{ {key} = ... }} where a factor is needed",
+                    say(wanted)
+                ),
+            })
         });
     }
     // A name such as time_us may say the unit, or not.
@@ -351,7 +353,15 @@ impl Columns<'_> {
             }
         }
         if time[row] <= time[first] + step {
-            return "a second recording begins here: split the file by a column (split = \"...\"), or cut it".into();
+            return match &self.mapping.split {
+                Some(column) => format!(
+                    "a second recording begins here, with the same value in column {}: give it another",
+                    column.shown()
+                ),
+                None => {
+                    "a second recording begins here: split the file by a column (split = \"...\"), or cut it".into()
+                }
+            };
         }
         "sort the rows by time, or leave out the rows where the clock was set".into()
     }

@@ -135,12 +135,8 @@ impl Wanted {
         let size = variable.size();
         let Content::Numbers(values) = &variable.content else {
             let kind = variable.kind();
-            return Err(fail(format!("{name} is {kind}, which is not read")).allowed("arrays of real numbers").next(
-                format!(
-                    "save what is in it as variables of their own: t = {}.t; save('log.mat', 't', '-v7')",
-                    self.name
-                ),
-            ));
+            let error = fail(format!("{name} is {kind}, which is not read")).allowed("arrays of real numbers");
+            return Err(error.next(variable.remedy()));
         };
         let &[rows, columns] = &variable.dimensions[..] else {
             return Err(fail(format!("{name} has {} dimensions ({size})", variable.dimensions.len()))
@@ -197,6 +193,18 @@ impl Variable {
             (_, Content::Complex) => "an array of complex numbers",
             _ => "an object",
         }
+    }
+
+    fn remedy(&self) -> String {
+        let name = &self.name;
+        let made = match (self.class, &self.content) {
+            (1, _) => format!("t = cell2mat({name}(:,1))"),
+            (4, _) => format!("t = str2double({name})"),
+            (5, _) => format!("t = full({name})"),
+            (_, Content::Complex) => format!("t = real({name})"),
+            _ => format!("t = {name}.t"),
+        };
+        format!("save its numbers as a variable of their own: {made}; save('log.mat', 't', '-v7')")
     }
 
     fn is_numeric(&self) -> bool {

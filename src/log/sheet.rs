@@ -153,15 +153,13 @@ impl Sheet {
             for (i, theirs) in columns[..wanted].iter().enumerate() {
                 let value = theirs[row];
                 if value.is_infinite() || (value.is_nan() && i < request.complete) {
-                    let name = &sheet.names[i];
-                    let error = Error::new(match value.is_nan() {
-                        true => format!("row {} of {name} has no value", row + 1),
-                        false => format!("row {} of {name} is infinite", row + 1),
-                    });
-                    return Err(error
-                        .in_file(file)
-                        .allowed("a finite number")
-                        .next("fill in the value, or leave out the row"));
+                    let what = if value.is_nan() { "has no value" } else { "is infinite" };
+                    let error = Error::new(format!("row {} of {} {what}", row + 1, sheet.names[i])).in_file(file);
+                    let next = match i < request.complete {
+                        true => "fill in the value, or leave out the row",
+                        false => "write NaN where there is no value",
+                    };
+                    return Err(error.allowed("a finite number").next(next));
                 }
                 sheet.columns[i].push(value);
             }
