@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use taut::case::{Case, TEMPLATE};
-use taut::log::{Log, Quantity};
+use taut::log::{Log, Mapping, Quantity, Source};
 
 /// The machine of the template with this experiment.
 fn case_text(experiment: &str) -> String {
@@ -255,38 +255,42 @@ fn measured_data_of_others() {
     }
 }
 
-/// Every byte of a file wrong in turn, and every length of it: an answer each time, and no panic.
+/// Many bytes of a file wrong in turn, and many lengths of it: an answer each time, and no panic.
 #[test]
 fn damaged_files_are_told_or_read() {
     let folder = folder("damaged");
     let stored = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/logs");
-    let kinds: &[(&str, &str)] = &[
-        ("columns.mat", r#"time = "t", input = "u", cart_position = "data(:,3)""#),
-        ("rows.mat", r#"time = "t", input = "u", cart_position = "x""#),
-        ("big-endian.mat", r#"time = "t", input = "u", cart_position = "x""#),
+    let kinds: &[(&str, [&str; 3])] = &[
+        ("columns.mat", ["t", "u", "data(:,3)"]),
+        ("rows.mat", ["t", "u", "x"]),
+        ("big-endian.mat", ["t", "u", "x"]),
         #[cfg(feature = "parquet")]
-        ("none.parquet", r#"time = "t", input = "u", cart_position = "x""#),
+        ("none.parquet", ["t", "u", "x"]),
         #[cfg(feature = "parquet")]
-        ("snappy.parquet", r#"time = "stamp", input = "u", cart_position = "x32""#),
+        ("snappy.parquet", ["stamp", "u", "x32"]),
     ];
-    for (file, log) in kinds {
+    for (file, columns) in kinds {
         let bytes = fs::read(stored.join(file)).unwrap();
         let path = folder.join(file);
-        let text = case_text(&format!("log = {{ file = \"{file}\", {log} }}"));
+        let [time, input, x] = *columns;
+        let mut mapping = Mapping::new(&path, Source::column(time));
+        mapping.input = Some(Source::column(input));
+        mapping.outputs = vec![(Quantity::CartPosition, Source::column(x))];
         let mut told = 0;
         let mut try_out = |bytes: &[u8]| {
             fs::write(&path, bytes).unwrap();
-            told += usize::from(Case::from_text(folder.join("case.toml"), &text).is_err());
+            told += usize::from(mapping.read().is_err());
         };
-        for at in 0..bytes.len() {
+        let stride = (bytes.len() / 400).max(1);
+        for at in (0..bytes.len()).step_by(stride) {
             let mut damaged = bytes.clone();
             damaged[at] ^= 1 << (at % 8);
             try_out(&damaged);
         }
-        for length in (0..bytes.len()).step_by(7) {
+        for length in (0..bytes.len()).step_by(5 * stride) {
             try_out(&bytes[..length]);
         }
-        assert!(told > bytes.len() / 7, "{file}: {told}");
+        assert!(told > 80, "{file}: {told}");
     }
 }
 
@@ -308,4 +312,39 @@ fn parquet_files_that_are_no_logs() {
     assert!(message("snappy.parquet", "X").contains("did you mean `x`?"), "{}", message("snappy.parquet", "X"));
     let brotli = message("brotli.parquet", "x");
     assert!(brotli.contains("cannot be read") && brotli.contains("next: write it again"), "{brotli}");
+}
+
+/// The examples of `docs/logs.md`, each with the file that stands above it.
+#[test]
+fn the_examples_of_the_documents_read() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/logs.md");
+    let text = fs::read_to_string(page).unwrap();
+    let folder = folder("documents");
+    let (mut csv, mut read) = ("", 0);
+    for block in text.split("\n```").skip(1) {
+        if let Some(rows) = block.strip_prefix("csv\n") {
+            csv = rows;
+        }
+        let Some(example) = block.strip_prefix("toml\n") else { continue };
+        let (_, file) = example.split_once("file = \"").unwrap();
+        let file = file.split('"').next().unwrap();
+        let mut example = example.to_string();
+        if let Some(path) = file.strip_prefix("../../shared/") {
+            let Some(path) =
+                common::shared(path.rsplit_once('/').unwrap().0).map(|at| at.join(file.rsplit('/').next().unwrap()))
+            else {
+                eprintln!("skipped: {file} is not there");
+                continue;
+            };
+            example = example.replace(file, path.to_str().unwrap());
+        } else {
+            fs::write(folder.join(file), csv).unwrap();
+        }
+        let machine = &TEMPLATE[..TEMPLATE.find("[[experiment]]").unwrap()];
+        let case = Case::from_text(folder.join("case.toml"), &format!("{machine}\n{example}"));
+        let case = case.unwrap_or_else(|error| panic!("{error}"));
+        assert!(case.experiments.iter().all(|experiment| experiment.log.is_some()));
+        read += 1;
+    }
+    assert!(read >= 2);
 }

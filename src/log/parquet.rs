@@ -11,6 +11,7 @@ use ::parquet::errors::{ParquetError, Result as ParquetResult};
 use ::parquet::file::reader::{FileReader, SerializedFileReader};
 use ::parquet::schema::types::ColumnDescriptor;
 use std::fs::File;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 /// Most rows.
@@ -35,7 +36,10 @@ pub(super) fn read(file: &Path, request: &Request<'_>) -> Result<Sheet> {
     let mut columns = Vec::new();
     for (&place, name) in places.iter().zip(&names) {
         check_kind(file, &schema.column(place), name)?;
-        columns.push(column(&reader, place).map_err(|error| damaged(file, &error))?);
+        // The library behind this does not withstand every damage: what it cannot read ends as an error all the same.
+        let read = catch_unwind(AssertUnwindSafe(|| column(&reader, place)));
+        let read = read.unwrap_or_else(|_| Err(ParquetError::General("it is damaged".into())));
+        columns.push(read.map_err(|error| damaged(file, &error))?);
     }
     let wanted = request.columns.len();
     let mut sheet = Sheet::from_columns(file, names[..wanted].to_vec(), &columns, request)?;
