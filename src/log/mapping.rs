@@ -419,7 +419,7 @@ impl Columns<'_> {
         let mut inputs = Vec::with_capacity(window.len());
         for row in window.clone() {
             let value = column[row];
-            if value.is_nan() && !(self.mapping.hold_missing && !last.is_nan()) {
+            if value.is_nan() && (last.is_nan() || !self.mapping.hold_missing) {
                 let name = &self.sheet.names[i];
                 let missing = column[window.clone()].iter().filter(|x| x.is_nan()).count();
                 let here = self.sheet.row(row);

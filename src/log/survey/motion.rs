@@ -219,13 +219,11 @@ fn speeds(log: &Log, quantity: Quantity, timing: &Timing, channel: &Channel) -> 
     }
     // Half a window on either side, wide enough that noise does not matter.
     let half = (values.len() / 200).clamp(2, 25);
-    let mut speeds = vec![f64::NAN; values.len()];
-    for k in 0..values.len() {
+    let slope = |k: usize| {
         let (a, b) = (k.saturating_sub(half), (k + half).min(values.len() - 1));
-        if b > a {
-            speeds[k] = (values[b] - values[a]) / (log.time[b] - log.time[a]);
-        }
-    }
+        if b > a { (values[b] - values[a]) / (log.time[b] - log.time[a]) } else { f64::NAN }
+    };
+    let speeds = (0..values.len()).map(slope).collect();
     let fuzz = 2f64.sqrt() * channel.resolution() / (2.0 * half as f64 * timing.interval).max(f64::MIN_POSITIVE);
     (speeds, fuzz)
 }
