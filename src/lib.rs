@@ -63,6 +63,8 @@ pub mod metrics;
 pub mod number;
 pub mod parameter;
 pub mod plant;
+#[cfg(feature = "posterior")]
+pub mod posterior;
 pub mod quantity;
 pub mod reduction;
 #[cfg(feature = "report")]
