@@ -63,7 +63,7 @@ impl Range {
     /// Zero or above.
     const NOT_NEGATIVE: Self = Self::new(0.0, 1e15);
     /// Of either sign.
-    const ANY: Self = Self::new(-1e15, 1e15);
+    pub(crate) const ANY: Self = Self::new(-1e15, 1e15);
 
     const fn whole(low: f64, high: f64) -> Self {
         Self { whole: true, ..Self::new(low, high) }
@@ -432,6 +432,13 @@ const EXPERIMENT: &[Parameter] = &[
 ];
 
 #[rustfmt::skip]
+const LOG: &[Parameter] = &[
+    row("experiment.log.time.every", "", "s", Required, DURATION, "20 ms", "Interval between rows, for a file without a column of times."),
+    row("experiment.log.from", "", "s", Words("the first row"), ANY, "0.1 s", "Where the log begins, on its own clock; this is time zero."),
+    row("experiment.log.to", "", "s", Words("the last row"), ANY, "2 s", "Where it ends."),
+];
+
+#[rustfmt::skip]
 const INITIAL: &[Parameter] = &[
     row("experiment.initial.drive_angle", "φ₁", "rad", Value(0.0), ANY, "0 rad", "Angle of the drive pulley at time zero."),
     row("experiment.initial.drive_speed", "φ₁′", "rad/s", Value(0.0), ANY, "0 rad/s", "Its speed."),
@@ -570,6 +577,7 @@ const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     ),
     ("experiment", &[EXPERIMENT]),
     ("experiment.initial", &[INITIAL]),
+    ("experiment.log", &[LOG]),
     ("input", &[INPUTS]),
 ];
 

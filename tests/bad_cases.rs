@@ -8,7 +8,17 @@ use taut::case::Case;
 
 #[test]
 fn every_wrong_case_gives_its_message() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bad/case");
+    compare("case");
+}
+
+/// Logs that cannot be used, and tables that say wrongly what a log holds.
+#[test]
+fn every_wrong_log_of_a_case_gives_its_message() {
+    compare("mapping");
+}
+
+fn compare(folder: &str) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bad").join(folder);
     let mut files: Vec<PathBuf> = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.retain(|path| path.extension().is_some_and(|e| e == "toml"));
     files.sort();
@@ -36,10 +46,12 @@ fn every_wrong_case_gives_its_message() {
 
 #[test]
 fn no_message_is_left_without_its_file() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bad/case");
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        assert!(path.with_extension("toml").exists(), "{}", path.display());
+    for folder in ["case", "mapping"] {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bad").join(folder);
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            assert!(path.with_extension("toml").exists(), "{}", path.display());
+        }
     }
 }
 

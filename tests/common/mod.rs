@@ -9,9 +9,10 @@ use taut::friction::Friction;
 use taut::signal::Signal;
 use taut::stage::{Amplifier, AmplifierMode, Belt, Cart, Motor, Pulley, Stage};
 
-/// The folder of data that are read in place, beside the repository; `None` where it is absent.
+/// The folder of data that are read in place, beside the repository or where `TAUT_SHARED` says; `None` where it is absent.
 pub fn shared(folder: &str) -> Option<PathBuf> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared").join(folder);
+    let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared");
+    let path = std::env::var_os("TAUT_SHARED").map_or_else(beside, PathBuf::from).join(folder);
     path.is_dir().then_some(path)
 }
 
@@ -60,5 +61,5 @@ pub fn table4() -> Stage {
 
 /// An experiment from rest with an output every millisecond.
 pub fn experiment(input: Signal, until: f64) -> Experiment {
-    Experiment { name: "test".into(), input, until, every: 1e-3, initial: Initial::default() }
+    Experiment { name: "test".into(), input, until, every: 1e-3, initial: Initial::default(), log: None }
 }
