@@ -315,8 +315,8 @@ pub struct Channel {
     pub range: Option<f64>,
 }
 
-/// What a recorder can record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// What can be measured; a recorder takes those up to [`Quantity::CartSpeed`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Quantity {
     /// Current of the armature, A.
     MotorCurrent,
@@ -330,17 +330,29 @@ pub enum Quantity {
     CartPosition,
     /// x′, m/s.
     CartSpeed,
+    /// φ₃, rad.
+    IdlerAngle,
+    /// φ₃′, rad/s.
+    IdlerSpeed,
+    /// φ_r, rad: the rotor's, divided by the gear ratio.
+    RotorAngle,
+    /// φ_r′, rad/s.
+    RotorSpeed,
 }
 
 impl Quantity {
     /// All of them, in the order of a log.
-    pub const ALL: [Quantity; 6] = [
+    pub const ALL: [Quantity; 10] = [
         Quantity::MotorCurrent,
         Quantity::MotorVoltage,
         Quantity::DriveAngle,
         Quantity::DriveSpeed,
         Quantity::CartPosition,
         Quantity::CartSpeed,
+        Quantity::IdlerAngle,
+        Quantity::IdlerSpeed,
+        Quantity::RotorAngle,
+        Quantity::RotorSpeed,
     ];
 
     /// Its name, in case files and as a column.
@@ -352,6 +364,10 @@ impl Quantity {
             Quantity::DriveSpeed => "drive_speed",
             Quantity::CartPosition => "cart_position",
             Quantity::CartSpeed => "cart_speed",
+            Quantity::IdlerAngle => "idler_angle",
+            Quantity::IdlerSpeed => "idler_speed",
+            Quantity::RotorAngle => "rotor_angle",
+            Quantity::RotorSpeed => "rotor_speed",
         }
     }
 
@@ -360,8 +376,8 @@ impl Quantity {
         match self {
             Quantity::MotorCurrent => "A",
             Quantity::MotorVoltage => "V",
-            Quantity::DriveAngle => "rad",
-            Quantity::DriveSpeed => "rad/s",
+            Quantity::DriveAngle | Quantity::IdlerAngle | Quantity::RotorAngle => "rad",
+            Quantity::DriveSpeed | Quantity::IdlerSpeed | Quantity::RotorSpeed => "rad/s",
             Quantity::CartPosition => "m",
             Quantity::CartSpeed => "m/s",
         }

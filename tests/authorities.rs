@@ -110,6 +110,7 @@ fn compare(text: &str) -> usize {
             until: number(case, "until"),
             every: number(case, "every"),
             initial: Initial::default(),
+            log: None,
         };
         let solution = simulate(&stage(&case["stage"]), &experiment, Solver::Exact).unwrap();
         if solution.outcome.ending != Ending::Complete {

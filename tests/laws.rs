@@ -15,7 +15,8 @@ use taut::trajectory::Trajectory;
 const STATES: [&str; 6] = ["drive_angle", "drive_speed", "cart_position", "cart_speed", "idler_angle", "idler_speed"];
 
 fn run(stage: &Stage, input: &Signal, until: f64, every: f64) -> Solution {
-    let experiment = Experiment { name: "law".into(), input: input.clone(), until, every, initial: Initial::default() };
+    let experiment =
+        Experiment { name: "law".into(), input: input.clone(), until, every, initial: Initial::default(), log: None };
     let solution = simulate(stage, &experiment, Solver::Exact).unwrap();
     assert_eq!(solution.outcome.ending, Ending::Complete);
     solution
@@ -302,7 +303,7 @@ proptest! {
             ..Initial::default()
         };
         let experiment =
-            Experiment { name: "law".into(), input: Signal::Step { value: 0.0, at: 0.0 }, until: 0.3, every: 1e-3, initial };
+            Experiment { name: "law".into(), input: Signal::Step { value: 0.0, at: 0.0 }, until: 0.3, every: 1e-3, initial, log: None };
         let solution = simulate(&stage, &experiment, Solver::Exact).unwrap();
         let first = plant.energy(&state(&solution.trajectory, 0));
         let mut before = f64::INFINITY;

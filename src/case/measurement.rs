@@ -3,6 +3,7 @@
 use super::reader::{Field, Table};
 use super::{Experiment, MOST_SAMPLES};
 use crate::error::Result;
+use crate::parameter;
 use crate::quantity::{rounded, show};
 use crate::stage::{Channel, EncoderPlace, Measurement, Quantity, Stage};
 
@@ -46,7 +47,8 @@ fn channel(field: &Field, quantity: Quantity, stage: &Stage) -> Result<Channel> 
         EncoderPlace::Cart => Quantity::CartPosition,
     });
     if counted == Some(quantity) {
-        let others = Quantity::ALL.iter().filter(|q| **q != quantity).map(|q| q.name());
+        let others = parameter::names_in("measurement");
+        let others = Quantity::ALL.iter().map(|q| q.name()).filter(|q| *q != quantity.name() && others.contains(q));
         return Err(field
             .fail("the encoder gives this quantity already")
             .allowed(others.collect::<Vec<_>>().join(", "))

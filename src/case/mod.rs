@@ -1,6 +1,7 @@
 //! The case file: TOML in, a [`Case`] out, and every mistake told with its line.
 
 mod input;
+mod log;
 mod measurement;
 mod reader;
 mod set;
@@ -11,6 +12,7 @@ mod tree;
 pub use template::TEMPLATE;
 
 use crate::error::{Error, Result};
+use crate::log::Log;
 use crate::plant::{Plant, State};
 use crate::signal::Signal;
 use crate::stage::{AmplifierMode, Measurement, Stage};
@@ -20,6 +22,7 @@ use std::collections::HashMap;
 use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Most rows of a result.
 const MOST_SAMPLES: f64 = 1e9;
@@ -29,7 +32,6 @@ const LONGEST_NAME: usize = 100;
 
 /// Keys that stand in the plan and not yet in the program.
 const PLANNED: &[&str] = &["controller", "fit", "sweep"];
-const PLANNED_EXPERIMENT: &[&str] = &["log"];
 
 /// Everything needed to repeat a run.
 #[derive(Debug, Clone)]
@@ -44,11 +46,11 @@ pub struct Case {
     pub experiments: Vec<Experiment>,
     /// The text it was read from, with `--set` applied: read again, it gives the same case.
     pub text: String,
-    /// The files that its inputs name, in the text's order.
+    /// The files that its inputs and logs name, in the text's order.
     pub files: Vec<InputFile>,
 }
 
-/// A file that an input is read from.
+/// A file that an input or a log is read from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InputFile {
     /// Where it is: the path in the text, from the case's folder on.
@@ -70,6 +72,8 @@ pub struct Experiment {
     pub every: f64,
     /// Where it starts from.
     pub initial: Initial,
+    /// What was measured in it, if the file names a log. Its times are the experiment's.
+    pub log: Option<Arc<Log>>,
 }
 
 /// The state at time zero; at rest at the origin unless said otherwise.
@@ -266,23 +270,25 @@ fn experiments(root: &Table, stage: &Stage, folder: &Folder) -> Result<Vec<Exper
     let mut experiments: Vec<Experiment> = Vec::new();
     let mut files: HashMap<String, usize> = HashMap::new();
     for field in list {
-        let experiment = experiment(&field.clone().named("experiment"), stage, folder)?;
-        let file = experiment.file_name();
-        if let Some(other) = files.insert(file.clone(), experiments.len()).and_then(|i| experiments.get(i)) {
-            let (name, other) = (&experiment.name, &other.name);
-            let what = match name == other {
-                true => format!("\"{name}\" is the name of two experiments"),
-                false => format!("\"{other}\" and \"{name}\" would both be written to {file}.csv"),
-            };
-            let field = field.table()?.required("name", "a name")?;
-            return Err(field.fail(what).next("give each experiment a name of its own"));
+        for experiment in experiment(&field.clone().named("experiment"), stage, folder)? {
+            let file = experiment.file_name();
+            if let Some(other) = files.insert(file.clone(), experiments.len()).and_then(|i| experiments.get(i)) {
+                let (name, other) = (&experiment.name, &other.name);
+                let what = match name == other {
+                    true => format!("\"{name}\" is the name of two experiments"),
+                    false => format!("\"{other}\" and \"{name}\" would both be written to {file}.csv"),
+                };
+                let field = field.table()?.required("name", "a name")?;
+                return Err(field.fail(what).next("give each experiment a name of its own"));
+            }
+            experiments.push(experiment);
         }
-        experiments.push(experiment);
     }
     Ok(experiments)
 }
 
-fn experiment(field: &Field, stage: &Stage, folder: &Folder) -> Result<Experiment> {
+/// The experiment of a table; several, if its log is split into runs.
+fn experiment(field: &Field, stage: &Stage, folder: &Folder) -> Result<Vec<Experiment>> {
     let field = Field {
         input_unit: match stage.amplifier.mode {
             AmplifierMode::Voltage => "V",
@@ -291,33 +297,61 @@ fn experiment(field: &Field, stage: &Stage, folder: &Folder) -> Result<Experimen
         ..field.clone()
     };
     let table = field.table()?;
-    table.check_keys(&["name", "input"], PLANNED_EXPERIMENT)?;
+    table.check_keys(&["name", "input", "log"], &[])?;
     let name = table.required("name", "for example name = \"5 V pulse\"")?;
     check_name(&name)?;
-    let until = table.number("until")?;
-    let every = table.number("every")?;
-    if every > until {
-        let field = table.optional("every").unwrap_or(field);
-        return Err(field
-            .fail(format!("an interval of {every} s is longer than the run of {until} s"))
-            .allowed(format!("up to {until} s")));
-    }
-    if until / every > MOST_SAMPLES {
-        let field = table.optional("every").unwrap_or(field);
-        return Err(field
-            .fail(format!("this makes {} rows", crate::quantity::rounded(until / every)))
-            .allowed(format!("up to {} rows", crate::quantity::rounded(MOST_SAMPLES)))
-            .next("take a longer interval: it does not affect the accuracy"));
-    }
-    let unit = field.input_unit;
-    let input =
-        table.required("input", &format!("for example input = {{ pulse = \"5 {unit}\", for = \"0.25 s\" }}"))?;
-    let input = input::signal(&input, &input::Context { folder, until })?;
+    let name = name.text()?.to_string();
     let initial = match table.optional("initial") {
         Some(field) => initial(&field.table()?, stage)?,
         None => Initial::default(),
     };
-    Ok(Experiment { name: name.text()?.to_string(), input, until, every, initial })
+    let input = table.optional("input");
+    let Some(log) = table.optional("log") else {
+        let (until, every) = times(&table, None)?;
+        let unit = field.input_unit;
+        let such_as = format!("for example input = {{ pulse = \"5 {unit}\", for = \"0.25 s\" }}");
+        let input =
+            input::signal(&input.ok_or_else(|| table.missing("input", &such_as))?, &input::Context { folder, until })?;
+        return Ok(vec![Experiment { name, input, until, every, initial, log: None }]);
+    };
+    let runs = log::logs(&log, folder, input.is_some())?;
+    let of_run = |(run, mut log): (Option<String>, Log)| {
+        let (until, every) = times(&table, Some(&log))?;
+        let input = match &input {
+            Some(field) => {
+                let signal = input::signal(field, &input::Context { folder, until })?;
+                log.input = log.time.iter().map(|&t| signal.value(t)).collect();
+                signal
+            }
+            None => log.signal(),
+        };
+        log.name = run.map_or(name.clone(), |run| format!("{name}/{run}"));
+        Ok(Experiment { name: log.name.clone(), input, until, every, initial, log: Some(Arc::new(log)) })
+    };
+    runs.into_iter().map(of_run).collect()
+}
+
+/// `until` and `every`; those of the log where the table does not say.
+fn times(table: &Table, log: Option<&Log>) -> Result<(f64, f64)> {
+    let of_log = |key: &str, value: fn(&Log) -> f64| match (table.optional(key), log) {
+        (None, Some(log)) => Ok(value(log)),
+        _ => table.number(key),
+    };
+    let until = of_log("until", |log| log.time.last().copied().unwrap_or_default())?;
+    let every = of_log("every", Log::interval)?;
+    let at = |key: &str| table.optional(key).unwrap_or_else(|| table.field.clone());
+    if every > until {
+        return Err(at("every")
+            .fail(format!("an interval of {every} s is longer than the run of {until} s"))
+            .allowed(format!("up to {until} s")));
+    }
+    if until / every > MOST_SAMPLES {
+        return Err(at("every")
+            .fail(format!("this makes {} rows", crate::quantity::rounded(until / every)))
+            .allowed(format!("up to {} rows", crate::quantity::rounded(MOST_SAMPLES)))
+            .next("take a longer interval: it does not affect the accuracy"));
+    }
+    Ok((until, every))
 }
 
 fn check_name(field: &Field) -> Result<()> {

@@ -60,5 +60,5 @@ pub fn table4() -> Stage {
 
 /// An experiment from rest with an output every millisecond.
 pub fn experiment(input: Signal, until: f64) -> Experiment {
-    Experiment { name: "test".into(), input, until, every: 1e-3, initial: Initial::default() }
+    Experiment { name: "test".into(), input, until, every: 1e-3, initial: Initial::default(), log: None }
 }

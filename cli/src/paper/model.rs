@@ -140,6 +140,7 @@ pub fn pulse(volts: f64, every: f64) -> Experiment {
         until: UNTIL,
         every,
         initial: Initial::default(),
+        log: None,
     }
 }
 
