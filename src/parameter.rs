@@ -361,6 +361,14 @@ const EXPERIMENT: &[Parameter] = &[
 ];
 
 #[rustfmt::skip]
+const FIT: &[Parameter] = &[
+    row("fit.starts", "", "", Value(1.0), Range::whole(1.0, 1000.0), "8", "From how many points the search starts: that of the file, and others within the bounds."),
+    row("fit.seed", "", "", Value(1.0), SEED, "1", "Which other points."),
+    row("fit.until", "", "s", Words("all of each log"), DURATION, "8 s", "Time in each log after which it is only compared, not fitted."),
+    row("fit.windows", "", "s", Words("each log is one"), DURATION, "1 s", "Length of the windows into which logs are cut, each with a start of its own."),
+];
+
+#[rustfmt::skip]
 const INITIAL: &[Parameter] = &[
     row("experiment.initial.drive_angle", "φ₁", "rad", Value(0.0), ANY, "0 rad", "Angle of the drive pulley at time zero."),
     row("experiment.initial.drive_speed", "φ₁′", "rad/s", Value(0.0), ANY, "0 rad/s", "Its speed."),
@@ -465,6 +473,7 @@ const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     ("experiment", &[EXPERIMENT]),
     ("experiment.initial", &[INITIAL]),
     ("input", &[INPUTS]),
+    ("fit", &[FIT]),
 ];
 
 /// All parameters, in the order of the case file.

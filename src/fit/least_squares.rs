@@ -11,10 +11,23 @@
 //! `tolerance` of a standard error, and no variable at its bound is pushed inwards.
 //!
 //! Logs with dry friction make the cost kinked where sticks and slips change their order. Where no damped step helps and
-//! the test is not passed, single variables are tried, a standard error and less to both sides, before it is called stalled.
+//! the test is not passed, derivatives over longer steps are tried, and then an evolution strategy that needs none, before it
+//! is called stalled.
 
 use crate::solve::Flow;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+
+/// Steps of coarse derivatives, in standard errors of a variable by itself, tried one after the other.
+const COARSER: [f64; 2] = [1.0, 10.0];
+
+/// Most variables that are searched by evolution, and how often.
+const MOST_EVOLVED: usize = 16;
+const MOST_EVOLUTIONS: usize = 3;
+
+/// Where the cost has kinks, the standard errors that the last step may promise: no step of any length fulfilled it.
+const KINK: f64 = 0.1;
 
 /// Residuals as a function of the variables.
 pub trait Residuals {
@@ -24,13 +37,13 @@ pub trait Residuals {
     /// r(x); false where it cannot be computed.
     fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool;
 
-    /// ∂r/∂x by differences within the bounds: central ones, or where only that is asked for, one-sided ones from `r` = r(x).
-    fn jacobian(&mut self, x: &[f64], r: &[f64], bounds: &Bounds, central: bool) -> Option<DMatrix<f64>> {
+    /// ∂r/∂x by differences within the bounds; `r` = r(x).
+    fn jacobian(&mut self, x: &[f64], r: &[f64], bounds: &Bounds, how: &Differences) -> Option<DMatrix<f64>> {
         let mut jacobian = DMatrix::zeros(self.rows(), x.len());
         let mut moved = x.to_vec();
         let (mut a, mut b) = (vec![0.0; r.len()], vec![0.0; r.len()]);
         for j in 0..x.len() {
-            let step = Step::new(x[j], bounds.low[j], bounds.high[j], central);
+            let step = Step::new(x, bounds, j, how);
             moved[j] = step.first;
             let mut good = self.evaluate(&moved, &mut a);
             if let Some(second) = step.second {
@@ -49,8 +62,20 @@ pub trait Residuals {
     }
 }
 
-/// Where a derivative is measured. The step is the cube root of the rounding unit for central differences, where the
+/// How derivatives are measured. The step is the cube root of the rounding unit for central differences, where the
 /// error of the formula and that of rounding balance (1e-10 of the value), and the square root for one-sided ones.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Differences {
+    /// One-sided, from the values at hand.
+    Forward,
+    /// To both sides.
+    Central,
+    /// To both sides by these steps. Where a body sticks and slips with every sample of its input, the outputs have a
+    /// kink for each of them; steps of about a standard error see the slope that matters and not that between two kinks.
+    Coarse(Vec<f64>),
+}
+
+/// Where a derivative is measured.
 #[derive(Debug, Clone, Copy)]
 pub struct Step {
     /// The first point.
@@ -62,9 +87,15 @@ pub struct Step {
 
 impl Step {
     /// Points around `x` within its bounds.
-    pub fn new(x: f64, low: f64, high: f64, central: bool) -> Self {
+    pub fn new(x: &[f64], bounds: &Bounds, j: usize, how: &Differences) -> Self {
+        let (x, low, high) = (x[j], bounds.low[j], bounds.high[j]);
         let size = x.abs().max(1.0);
-        let h = if central { 6e-6 } else { 1e-7 } * size;
+        let central = *how != Differences::Forward;
+        let h = match how {
+            Differences::Forward => 1e-7 * size,
+            Differences::Central => 6e-6 * size,
+            Differences::Coarse(steps) => f64::min(steps[j].max(6e-6 * size), (high - low) / 3.0),
+        };
         match (x + h <= high, x - h >= low, central) {
             (true, true, true) => Self { first: x + h, second: Some(x - h), at: x },
             (true, _, false) => Self { first: x + h, second: None, at: x },
@@ -168,6 +199,8 @@ pub struct Minimum {
     pub at_bound: Vec<bool>,
     /// How it ended.
     pub ending: Ending,
+    /// Steps of the derivatives, in standard errors, where the cost has kinks; 0 where it is smooth.
+    pub coarse: f64,
     /// Jacobians computed.
     pub iterations: usize,
     /// Trial points.
@@ -197,6 +230,7 @@ pub fn minimise(
         decrement: f64::INFINITY,
         at_bound: vec![false; n],
         ending: Ending::Failed,
+        coarse: 0.0,
         iterations: 0,
         evaluations: 1,
         x,
@@ -205,18 +239,18 @@ pub fn minimise(
         return best;
     }
     best.cost = cost_of(&best.residuals, options.huber);
-    let mut central = !options.frugal;
+    let mut how = if options.frugal { Differences::Forward } else { Differences::Central };
     let mut lambda: Option<f64> = None;
     let mut grow = 2.0;
     let mut scale = DVector::zeros(n);
     let mut trial = vec![0.0; rows];
-    let mut rescued = 0;
+    let (mut evolved, mut coarser) = (0, 0);
     loop {
         if watch(&best.x, best.cost) == Flow::Stop {
             best.ending = Ending::Interrupted;
             return best;
         }
-        let Some(jacobian) = problem.jacobian(&best.x, &best.residuals, bounds, central) else {
+        let Some(jacobian) = problem.jacobian(&best.x, &best.residuals, bounds, &how) else {
             best.ending = Ending::Stalled;
             return best;
         };
@@ -236,19 +270,19 @@ pub fn minimise(
         best.at_bound.clone_from(&held);
         let newton = model.step(&held, &scale, 0.0);
         let freedom = (rows.saturating_sub(n)).max(1) as f64;
-        let deviation = (2.0 * best.cost / freedom).sqrt();
+        let deviation = (2.0 * best.cost / freedom).sqrt() * inflation(&best.residuals, n);
         best.decrement = model.reach(&newton) / deviation.max(f64::MIN_POSITIVE);
         let tiny = (0..n).all(|j| newton[j].abs() <= 1e-11 * best.x[j].abs().max(1.0));
         if best.decrement <= options.tolerance || tiny {
-            if central {
+            if how != Differences::Forward {
                 best.ending = Ending::Converged;
                 return best;
             }
-            central = true;
+            how = Differences::Central;
             continue;
         }
-        if best.decrement < 100.0 * options.tolerance {
-            central = true;
+        if best.decrement < 100.0 * options.tolerance && how == Differences::Forward {
+            how = Differences::Central;
         }
         if best.iterations >= options.iterations {
             best.ending = Ending::OutOfIterations;
@@ -294,48 +328,140 @@ pub fn minimise(
         if accepted {
             continue;
         }
-        if !central {
-            // The coarse derivatives may be to blame.
-            (central, lambda) = (true, None);
+        if how == Differences::Forward {
+            // The cheap derivatives may be to blame.
+            (how, lambda) = (Differences::Central, None);
             continue;
         }
-        let errors = model.errors(&held, deviation);
-        rescued += 1;
-        if rescued > 20 || !rescue(problem, &mut best, bounds, &errors, options.huber) {
+        if best.decrement <= KINK {
+            best.ending = Ending::Converged;
+            return best;
+        }
+        if coarser < COARSER.len() {
+            let errors = model.errors(&held, deviation);
+            how = Differences::Coarse(errors.iter().map(|error| COARSER[coarser] * error).collect());
+            best.coarse = COARSER[coarser];
+            coarser += 1;
+        } else if evolved < MOST_EVOLUTIONS
+            && evolve(problem, &mut best, bounds, &model, &held, deviation, options.huber)
+        {
+            evolved += 1;
+            coarser = COARSER.len() - 1;
+        } else {
             best.ending = Ending::Stalled;
             return best;
         }
-        lambda = None;
-        grow = 2.0;
+        (lambda, grow) = (None, 2.0);
     }
 }
 
-/// Tries single variables around a kink; whether one of them lowered the cost by more than rounding.
-fn rescue(problem: &mut dyn Residuals, best: &mut Minimum, bounds: &Bounds, errors: &[f64], huber: f64) -> bool {
-    let mut trial = vec![0.0; best.residuals.len()];
+/// By how much standard errors are greater than those of as many independent residuals, roughly: √((1 + ρ)/(1 − ρ)) with ρ
+/// the correlation of neighbours, as if no fewer than ten residuals for each variable were independent.
+fn inflation(residuals: &[f64], variables: usize) -> f64 {
+    let own: f64 = residuals.iter().map(|r| r * r).sum();
+    let next: f64 = residuals.windows(2).map(|pair| pair[0] * pair[1]).sum();
+    let rho = if own > 0.0 { (next / own).clamp(0.0, 0.999_999) } else { 0.0 };
+    let most = residuals.len() as f64 / (10.0 * variables.max(1) as f64);
+    ((1.0 + rho) / (1.0 - rho)).min(most.max(1.0)).sqrt()
+}
+
+/// Searches around a kink by evolution (CMA-ES, Hansen 2016) in coordinates in which the smooth part of the cost is a
+/// sphere with the standard error for its unit; whether that lowered the cost by more than rounding.
+fn evolve(
+    problem: &mut dyn Residuals,
+    best: &mut Minimum,
+    bounds: &Bounds,
+    model: &Linear,
+    held: &[bool],
+    deviation: f64,
+    huber: f64,
+) -> bool {
+    let free: Vec<usize> = (0..held.len()).filter(|&j| !held[j] && model.norm(j) > 0.0).collect();
+    let n = free.len();
+    if n == 0 || n > MOST_EVOLVED {
+        return false;
+    }
+    let r = model.r.select_columns(&free).qr().unpack_r();
+    let Some(unit) = r.solve_upper_triangular(&DMatrix::identity(n, n)) else { return false };
+    let unit = unit * deviation;
+    let size = n as f64;
+    // Hansen's default constants.
+    let lambda = 4 + (3.0 * size.ln()).floor() as usize;
+    let mu = lambda / 2;
+    let raw: Vec<f64> = (0..mu).map(|i| (lambda as f64 / 2.0 + 0.5).ln() - (i as f64 + 1.0).ln()).collect();
+    let sum: f64 = raw.iter().sum();
+    let weights: Vec<f64> = raw.iter().map(|w| w / sum).collect();
+    let mass = 1.0 / weights.iter().map(|w| w * w).sum::<f64>();
+    let along = (4.0 + mass / size) / (size + 4.0 + 2.0 * mass / size);
+    let paced = (mass + 2.0) / (size + mass + 5.0);
+    let one = 2.0 / ((size + 1.3).powi(2) + mass);
+    let rest = f64::min(1.0 - one, 2.0 * (mass - 2.0 + 1.0 / mass) / ((size + 2.0).powi(2) + mass));
+    let damp = 1.0 + 2.0 * f64::max(0.0, ((mass - 1.0) / (size + 1.0)).sqrt() - 1.0) + paced;
+    let expected = size.sqrt() * (1.0 - 1.0 / (4.0 * size) + 1.0 / (21.0 * size * size));
+
     let before = best.cost;
-    for share in [1.0, 0.3, 0.1, 0.03, 0.01] {
-        for (j, error) in errors.iter().enumerate() {
-            for sign in [1.0, -1.0] {
-                let mut x = best.x.clone();
-                x[j] = (x[j] + sign * share * error).clamp(bounds.low[j], bounds.high[j]);
-                if x[j] == best.x[j] {
-                    continue;
-                }
-                best.evaluations += 1;
-                if problem.evaluate(&x, &mut trial) && cost_of(&trial, huber) < best.cost * (1.0 - 1e-12) {
-                    best.cost = cost_of(&trial, huber);
-                    best.x = x;
-                    best.residuals.copy_from_slice(&trial);
-                    break;
-                }
-            }
+    let centre = best.x.clone();
+    let mut mean = DVector::zeros(n);
+    let mut pace = best.decrement.clamp(0.3, 10.0) / size.sqrt();
+    let mut shape = DMatrix::<f64>::identity(n, n);
+    let (mut path, mut drift) = (DVector::<f64>::zeros(n), DVector::<f64>::zeros(n));
+    let mut random = Pcg64::seed_from_u64(1);
+    let mut trial = vec![0.0; best.residuals.len()];
+    let generations = (60 * n + 60) / lambda;
+    for generation in 1..=generations {
+        let Some(eigen) = SymmetricEigen::try_new(shape.clone(), 1e-14, 1000) else { break };
+        let lengths = eigen.eigenvalues.map(|value| value.max(1e-20).sqrt());
+        if pace * lengths.max() < 0.01 {
+            break;
         }
-        if best.cost < before * (1.0 - 1e-9) {
-            return true;
+        let mut born: Vec<(f64, DVector<f64>)> = Vec::with_capacity(lambda);
+        for _ in 0..lambda {
+            let z = DVector::from_fn(n, |_, _| normal(&mut random));
+            let y = &eigen.eigenvectors * z.component_mul(&lengths);
+            let step = &unit * (&mean + &y * pace);
+            let mut x = centre.clone();
+            for (i, &j) in free.iter().enumerate() {
+                x[j] = (x[j] + step[i]).clamp(bounds.low[j], bounds.high[j]);
+            }
+            best.evaluations += 1;
+            let good = problem.evaluate(&x, &mut trial);
+            let cost = if good { cost_of(&trial, huber) } else { f64::INFINITY };
+            if cost < best.cost {
+                best.cost = cost;
+                best.x = x;
+                best.residuals.copy_from_slice(&trial);
+            }
+            born.push((cost, y));
+        }
+        if born.iter().all(|(cost, _)| cost.is_infinite()) {
+            break;
+        }
+        born.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let step = weights.iter().zip(&born).fold(DVector::zeros(n), |sum, (w, (_, y))| sum + y * *w);
+        mean += &step * pace;
+        let white = &eigen.eigenvectors * (eigen.eigenvectors.tr_mul(&step)).component_div(&lengths);
+        path = path * (1.0 - paced) + white * (paced * (2.0 - paced) * mass).sqrt();
+        let calm = path.norm() / (1.0 - (1.0 - paced).powi(2 * generation as i32)).sqrt() < (1.4 + 2.0 / (size + 1.0)) * expected;
+        drift = drift * (1.0 - along) + if calm { step * (along * (2.0 - along) * mass).sqrt() } else { DVector::zeros(n) };
+        shape *= 1.0 - one - rest + if calm { 0.0 } else { one * along * (2.0 - along) };
+        shape += &drift * drift.transpose() * one;
+        for (w, (_, y)) in weights.iter().zip(&born) {
+            shape += y * y.transpose() * (rest * w);
+        }
+        pace *= ((paced / damp) * (path.norm() / expected - 1.0)).exp();
+    }
+    best.cost < before * (1.0 - 1e-6)
+}
+
+/// A normally distributed number.
+fn normal(random: &mut Pcg64) -> f64 {
+    loop {
+        let [u, v] = std::array::from_fn(|_| (random.next_u64() >> 11) as f64 * 2f64.powi(-52) - 1.0);
+        let s = u * u + v * v;
+        if s > 0.0 && s < 1.0 {
+            return u * (-2.0 * libm::log(s) / s).sqrt();
         }
     }
-    false
 }
 
 /// The step that keeps within the box: what would leave it is put on its edge, and the rest solved anew.

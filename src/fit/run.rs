@@ -96,6 +96,8 @@ pub struct Run {
     pub fitted_rows: usize,
     /// What is fitted along.
     pub extras: Vec<Extra>,
+    /// What is fitted along for all logs at once; its values stand behind those of `extras`.
+    shared: Vec<Extra>,
     input: Signal,
     initial: Initial,
     every: f64,
@@ -147,11 +149,6 @@ impl Run {
         let shift = if whole { 0.0 } else { log.time[rows.start] };
         let time: Vec<f64> = log.time[rows.clone()].iter().map(|t| t - shift).collect();
         let logged = log.input[rows.clone()].to_vec();
-        let input = if whole {
-            experiment.input.clone()
-        } else {
-            Signal::Sampled { times: time.clone(), values: logged.clone(), hold: log.hold }
-        };
         let n = time.len();
         let (first, last) = (time[0], time[n - 1]);
         let interval = (last - first) / (n - 1) as f64;
@@ -164,6 +161,15 @@ impl Run {
             let middle = steps.len() / 2;
             let every = *steps.select_nth_unstable_by(middle, f64::total_cmp).1 / RASTER;
             (every, every * (last / every).ceil().max(1.0))
+        };
+        // On the raster, where the solver need not stop twice for a sample.
+        let times = if even { (0..n).map(|k| k as f64 * until / (n - 1) as f64).collect() } else { time.clone() };
+        let input = match &experiment.input {
+            Signal::Sampled { times: own, .. } if *own == log.time => {
+                Signal::Sampled { times, values: logged.clone(), hold: log.hold }
+            }
+            _ if whole => experiment.input.clone(),
+            _ => Signal::Sampled { times, values: logged.clone(), hold: log.hold },
         };
         let limit = setting.fitted_until.map_or(f64::INFINITY, |until| until - shift);
         let fitted_rows = if setting.held_out { 0 } else { time.partition_point(|&t| t < limit) };
@@ -192,12 +198,18 @@ impl Run {
             held_out: setting.held_out,
             fitted_rows,
             extras: Vec::new(),
+            shared: Vec::new(),
             input,
             initial: experiment.initial,
             every,
             until,
             even,
         }
+    }
+
+    /// Says what is fitted along for all logs.
+    pub fn share(&mut self, shared: &[Extra]) {
+        self.shared = shared.to_vec();
     }
 
     /// Number of residuals: every output at every time.
@@ -219,7 +231,7 @@ impl Run {
     pub fn experiment(&self, stage: &mut Stage, extras: &[f64]) -> Experiment {
         let (mut delay, mut offset) = (0.0, 0.0);
         let (mut position, mut speed) = (None, None);
-        for (extra, &value) in self.extras.iter().zip(extras) {
+        for (extra, &value) in self.extras.iter().chain(&self.shared).zip(extras) {
             match extra.what {
                 Nuisance::Delay => delay = value,
                 Nuisance::InputGain => stage.amplifier.gain *= value,
