@@ -1,8 +1,14 @@
 //! The friction laws: what resists a body that slides, and how much a body at rest can hold.
 
-/// Viscous and Coulomb friction with breakaway, each side of zero speed with its own values.
+mod along;
+mod law;
+
+pub use along::Along;
+pub use law::{Law, Shape, decay_of_velocity, velocity_of_decay};
+
+/// Friction with breakaway, each side of zero speed with its own values, and the law that joins them.
 ///
-/// Sliding forward: F_f = b v + F_c, sliding backward: F_f = b v − F_c (eq. 15); at rest: whatever
+/// By the paper's law, sliding forward: F_f = b v + F_c, sliding backward: F_f = b v − F_c (eq. 15); at rest: whatever
 /// holds the body, up to the breakaway. Units: for a cart N s/m and N, for a pulley N m s and N m.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Friction {
@@ -10,6 +16,8 @@ pub struct Friction {
     pub forward: Side,
     /// While moving in the negative direction; its values are positive, too.
     pub backward: Side,
+    /// What it does between breakaway and Coulomb friction.
+    pub law: Law,
 }
 
 /// Friction in one direction.
@@ -27,13 +35,23 @@ impl Friction {
     /// The same in both directions, breakaway equal to Coulomb: the paper's law, eq. (15).
     pub fn symmetric(viscous: f64, coulomb: f64) -> Self {
         let side = Side { viscous, coulomb, breakaway: coulomb };
-        Self { forward: side, backward: side }
+        Self { forward: side, backward: side, law: Law::Coulomb }
     }
 
     /// The same in both directions with a higher breakaway.
     pub fn with_breakaway(viscous: f64, coulomb: f64, breakaway: f64) -> Self {
         let side = Side { viscous, coulomb, breakaway };
-        Self { forward: side, backward: side }
+        Self { forward: side, backward: side, law: Law::Coulomb }
+    }
+
+    /// Each direction with its own values, after the paper's law.
+    pub fn sided(forward: Side, backward: Side) -> Self {
+        Self { forward, backward, law: Law::Coulomb }
+    }
+
+    /// The same values after another law.
+    pub fn following(self, law: Law) -> Self {
+        Self { law, ..self }
     }
 
     /// Adds the friction of another body that goes `ratio` times as far.
@@ -49,6 +67,21 @@ impl Friction {
     /// Whether it is b v and no more, so that nothing ever sticks and the direction makes no difference.
     pub fn is_linear(&self) -> bool {
         self.forward == self.backward && self.forward.breakaway == 0.0 && self.forward.coulomb == 0.0
+    }
+
+    /// Whether it is made of straight lines and jumps: what the exact solver takes.
+    pub fn is_piecewise_linear(&self) -> bool {
+        self.law == Law::Coulomb || self.is_linear()
+    }
+
+    /// Whether a body can be held at rest by it, so that its motion has modes.
+    pub fn sticks(&self) -> bool {
+        matches!(self.law, Law::Coulomb | Law::Stribeck { .. }) && !self.is_linear()
+    }
+
+    /// The values for this direction.
+    pub fn side(&self, forward: bool) -> Side {
+        if forward { self.forward } else { self.backward }
     }
 }
 

@@ -63,7 +63,7 @@ impl Range {
     /// Zero or above.
     const NOT_NEGATIVE: Self = Self::new(0.0, 1e15);
     /// Of either sign.
-    const ANY: Self = Self::new(-1e15, 1e15);
+    pub(crate) const ANY: Self = Self::new(-1e15, 1e15);
 
     const fn whole(low: f64, high: f64) -> Self {
         Self { whole: true, ..Self::new(low, high) }
@@ -136,10 +136,12 @@ const FREQUENCY: Range = Range::new(1e-9, 1e9);
 const SEED: Range = Range::whole(0.0, 9_007_199_254_740_991.0);
 const UP_TO_ONE: Range = Range { above: true, ..Range::new(0.0, 1.0) };
 
-/// Friction of one body: the six rows with that body's key, symbols and units.
+/// Friction of one body: the rows with that body's key, symbols, units and examples.
 macro_rules! friction {
     ($body:literal, $viscous:literal, $coulomb:literal, $static:literal, $slope:literal, $load:literal,
-     $slope_example:literal, $load_example:literal, $static_example:literal) => {
+     $slope_example:literal, $load_example:literal, $static_example:literal,
+     $velocity:literal, $velocity_example:literal, $decay:literal, $decay_example:literal,
+     $stiffness:literal, $stiffness_example:literal) => {
         [
             row(
                 concat!($body, ".friction.viscous"),
@@ -194,6 +196,69 @@ macro_rules! friction {
                 NOT_NEGATIVE,
                 $static_example,
                 "Breakaway in the negative direction; at least `coulomb_backward`.",
+            ),
+            row(
+                concat!($body, ".friction.stribeck.force"),
+                "F_s",
+                $load,
+                Required,
+                NOT_NEGATIVE,
+                $load_example,
+                "By how much the breakaway exceeds `coulomb`, on each side, eq. (14); instead of `static`.",
+            ),
+            row(
+                concat!($body, ".friction.stribeck.decay"),
+                "F_τ",
+                $decay,
+                Words("from `velocity`"),
+                POSITIVE,
+                $decay_example,
+                "How fast that excess is gone: e^(−F_τ v²), eq. (14); 1 / velocity².",
+            ),
+            row(
+                concat!($body, ".friction.stribeck.velocity"),
+                "v_s",
+                $velocity,
+                Words("from `decay`"),
+                POSITIVE,
+                $velocity_example,
+                "Speed at which 1/e of it is left. With `shape = \"exponential\"` it goes as e^(−v/v_s), else as e^(−(v/v_s)²).",
+            ),
+            row(
+                concat!($body, ".friction.smooth.breakaway_velocity"),
+                "v_b",
+                $velocity,
+                Required,
+                POSITIVE,
+                $velocity_example,
+                "Speed at which a smooth law peaks, near `static`; it never sticks (Simscape's law).",
+            ),
+            row(
+                concat!($body, ".friction.lugre.stiffness"),
+                "σ₀",
+                $stiffness,
+                Required,
+                POSITIVE,
+                $stiffness_example,
+                "Stiffness of the bristles, which hold where others stick.",
+            ),
+            row(
+                concat!($body, ".friction.lugre.damping"),
+                "σ₁",
+                $slope,
+                Required,
+                NOT_NEGATIVE,
+                $slope_example,
+                "Damping of the bristles.",
+            ),
+            row(
+                concat!($body, ".friction.lugre.velocity"),
+                "v_s",
+                $velocity,
+                Required,
+                POSITIVE,
+                $velocity_example,
+                "Stribeck velocity of the way from `static` to `coulomb`.",
             ),
         ]
     };
@@ -342,6 +407,12 @@ const TRAVEL: &[Parameter] = &[
 ];
 
 #[rustfmt::skip]
+const ALONG: &[Parameter] = &[
+    row("cart.friction.along.position", "x", "m", Required, ANY, "0.1 m", "First number of each point of `along`: where along the travel, growing from point to point."),
+    row("cart.friction.along.factor", "", "", Required, NOT_NEGATIVE, "1.5", "Second number: what Coulomb friction, breakaway and `stribeck.force` are multiplied by there; straight lines between points."),
+];
+
+#[rustfmt::skip]
 const ENCODER: &[Parameter] = &[
     row("encoder.lines", "", "", Required, POSITIVE, "512", "Lines per turn, or at the cart per metre; in quadrature each gives four counts."),
 ];
@@ -366,6 +437,13 @@ const FIT: &[Parameter] = &[
     row("fit.seed", "", "", Value(1.0), SEED, "1", "Which other points."),
     row("fit.until", "", "s", Words("all of each log"), DURATION, "8 s", "Time in each log after which it is only compared, not fitted."),
     row("fit.windows", "", "s", Words("each log is one"), DURATION, "1 s", "Length of the windows into which logs are cut, each with a start of its own."),
+];
+
+#[rustfmt::skip]
+const LOG: &[Parameter] = &[
+    row("experiment.log.time.every", "", "s", Required, DURATION, "20 ms", "Interval between rows, for a file without a column of times."),
+    row("experiment.log.from", "", "s", Words("the first row"), ANY, "0.1 s", "Where the log begins, on its own clock; this is time zero."),
+    row("experiment.log.to", "", "s", Words("the last row"), ANY, "2 s", "Where it ends."),
 ];
 
 #[rustfmt::skip]
@@ -433,7 +511,13 @@ const SECTIONS: &[(&str, &[&[Parameter]])] = &[
                 "N m",
                 "0.0016 N m s",
                 "0.0150 N m",
-                "0.02 N m"
+                "0.02 N m",
+                "rad/s",
+                "0.5 rad/s",
+                "s^2/rad^2",
+                "4 s^2/rad^2",
+                "N m/rad",
+                "40 N m/rad"
             ),
         ],
     ),
@@ -450,11 +534,40 @@ const SECTIONS: &[(&str, &[&[Parameter]])] = &[
                 "N m",
                 "0.0016 N m s",
                 "0.0150 N m",
-                "0.02 N m"
+                "0.02 N m",
+                "rad/s",
+                "0.5 rad/s",
+                "s^2/rad^2",
+                "4 s^2/rad^2",
+                "N m/rad",
+                "40 N m/rad"
             ),
         ],
     ),
-    ("cart", &[CART, &friction!("cart", "b", "F_c", "F_b", "N s/m", "N", "19.0424 N s/m", "0.2 N", "0.3 N")]),
+    (
+        "cart",
+        &[
+            CART,
+            &friction!(
+                "cart",
+                "b",
+                "F_c",
+                "F_b",
+                "N s/m",
+                "N",
+                "19.0424 N s/m",
+                "0.2 N",
+                "0.3 N",
+                "m/s",
+                "0.01 m/s",
+                "s^2/m^2",
+                "1e4 s^2/m^2",
+                "N/m",
+                "100 kN/m"
+            ),
+            ALONG,
+        ],
+    ),
     ("belt", &[BELT]),
     ("travel", &[TRAVEL]),
     ("encoder", &[ENCODER]),
@@ -472,6 +585,7 @@ const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     ),
     ("experiment", &[EXPERIMENT]),
     ("experiment.initial", &[INITIAL]),
+    ("experiment.log", &[LOG]),
     ("input", &[INPUTS]),
     ("fit", &[FIT]),
 ];

@@ -9,7 +9,7 @@ mod mode;
 mod power;
 
 pub use form::Form;
-pub(crate) use form::{POSITION, ROTOR, ROUNDING, SPEEDS, STRETCHES, arms};
+pub(crate) use form::{POSITION, ROTOR, ROUNDING, SPEEDS, STRETCHES, arms, stretches};
 pub use mode::{Cause, Contact, Guard, Limit, Mode, Part, Status, Switch};
 pub use power::Power;
 
@@ -136,7 +136,11 @@ impl Plant {
         let laws = [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction];
         for (body, law) in Body::ALL.into_iter().zip(laws) {
             let ratio = plant.ratio(body);
-            plant.friction[plant.leader(body).index()].add(&law, ratio);
+            let leader = plant.leader(body);
+            plant.friction[leader.index()].add(&law, ratio);
+            if leader == body {
+                plant.friction[body.index()].law = law.law;
+            }
         }
         plant
     }
@@ -194,7 +198,7 @@ impl Plant {
     /// Whether a body can stick or has a direction-dependent law, so that its motion has modes at all.
     pub fn has_modes(&self, body: Body) -> bool {
         let leader = self.leader(body);
-        !self.friction(leader).is_linear() || (self.gear_loses() && leader == self.leader(Body::DrivePulley))
+        self.friction(leader).sticks() || (self.gear_loses() && leader == self.leader(Body::DrivePulley))
     }
 
     /// Whether the gear's efficiency is below one.

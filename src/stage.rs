@@ -1,6 +1,6 @@
 //! What the machine is: motor, amplifier, pulleys, belt, cart, encoder, recorder. Everything in SI units.
 
-use crate::friction::Friction;
+use crate::friction::{Along, Friction};
 use std::f64::consts::PI;
 
 /// A single-axis belt drive (paper, Fig. 1 and 2).
@@ -27,6 +27,12 @@ pub struct Stage {
 }
 
 impl Stage {
+    /// Whether its equations are linear but for stick, slip and other changes of mode: what the exact solver takes.
+    pub fn is_piecewise_linear(&self) -> bool {
+        let laws = [self.drive_pulley.friction, self.cart.friction, self.idler_pulley.friction];
+        laws.iter().all(Friction::is_piecewise_linear) && self.cart.along.is_none() && !self.belt.follows_cart
+    }
+
     /// The first part of it that the paper's equations do not have, in words.
     pub fn beyond_the_paper(&self) -> Option<&'static str> {
         let amplifier = &self.amplifier;
@@ -117,12 +123,14 @@ pub struct Pulley {
 }
 
 /// The cart.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Cart {
     /// Mass M with its load, kg.
     pub mass: f64,
     /// Friction force, N over m/s.
     pub friction: Friction,
+    /// How its dry friction changes along the travel, if it does.
+    pub along: Option<Along>,
     /// A constant force on the cart F_L, N, positive towards larger x: what a hanging mass or a spring of constant force pulls.
     pub load: f64,
     /// Inclination of the axis, rad: positive if the cart climbs towards larger x.
@@ -133,6 +141,11 @@ pub struct Cart {
 pub const GRAVITY: f64 = 9.80665;
 
 impl Cart {
+    /// A cart on a level axis with nothing pulling at it.
+    pub fn new(mass: f64, friction: Friction) -> Self {
+        Self { mass, friction, along: None, load: 0.0, inclination: 0.0 }
+    }
+
     /// The constant force on the cart, N: F_L − M g sin θ.
     pub fn constant_force(&self) -> f64 {
         self.load - self.mass * GRAVITY * self.inclination.sin()
@@ -150,6 +163,8 @@ pub struct Belt {
     pub make: Option<BeltMake>,
     /// Tension T₀ of every span at rest, N. A span whose tension is used up goes slack; none for spans that can push.
     pub pretension: Option<f64>,
+    /// Whether spans 1 and 2 get shorter and longer, and so stiffer and softer, as the cart moves; needs `make`.
+    pub follows_cart: bool,
     /// How many of the three inertias move by themselves.
     pub model: BeltModel,
 }
@@ -157,7 +172,7 @@ pub struct Belt {
 impl Belt {
     /// Spans of given stiffness (N/m) and damping (N s/m) and no more.
     pub fn given(stiffness: [f64; 3], damping: [f64; 3]) -> Self {
-        Self { stiffness, damping, make: None, pretension: None, model: BeltModel::Elastic }
+        Self { stiffness, damping, make: None, pretension: None, follows_cart: false, model: BeltModel::Elastic }
     }
 }
 
@@ -221,6 +236,13 @@ impl BeltMake {
         let &BeltMake { modulus: e, section: a, spans } = self;
         // k = A E / l                                                              (11)
         spans.map(|l| a * e / l)
+    }
+
+    /// Stiffness of spans 1 and 2 with the cart at `x`, m: the drive pulley is at the positive end.
+    pub fn stiffness_at(&self, x: f64) -> [f64; 2] {
+        let &BeltMake { modulus: e, section: a, spans: [l1, l2, _] } = self;
+        // k₁ = A E / (l₁ − x), k₂ = A E / (l₂ + x)                                (11)
+        [a * e / (l1 - x), a * e / (l2 + x)]
     }
 }
 

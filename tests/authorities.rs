@@ -24,7 +24,7 @@ fn friction(value: &Value) -> Friction {
         coulomb: number(value, &format!("coulomb_{direction}")),
         breakaway: number(value, &format!("breakaway_{direction}")),
     };
-    Friction { forward: side("forward"), backward: side("backward") }
+    Friction::sided(side("forward"), side("backward"))
 }
 
 fn stage(value: &Value) -> Stage {
@@ -51,7 +51,7 @@ fn stage(value: &Value) -> Stage {
         ),
         pulley_radius: get("pulley_radius"),
         drive_pulley: pulley("drive_inertia", "drive_friction"),
-        cart: Cart { mass: get("cart_mass"), friction: friction(&value["cart_friction"]), load: 0.0, inclination: 0.0 },
+        cart: Cart::new(get("cart_mass"), friction(&value["cart_friction"])),
         idler_pulley: pulley("idler_inertia", "idler_friction"),
         belt: Belt::given(["k1", "k2", "k3"].map(get), ["c1", "c2", "c3"].map(get)),
         travel: None,

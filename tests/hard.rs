@@ -500,7 +500,7 @@ fn a_gear_whose_torque_is_zero_but_for_rounding() {
         ),
         (side(0.0, 0.075, 0.075), side(0.001497581210236506, 0.01693911090990089, 0.022323434819222106)),
     ];
-    set_friction(&mut stage, laws.map(|(forward, backward)| Friction { forward, backward }));
+    set_friction(&mut stage, laws.map(|(forward, backward)| Friction::sided(forward, backward)));
     let input = Signal::Triangle { amplitude: -1.9295822438179058, frequency: 27.727307116916247 };
     complete(&stage, &Experiment { every: 0.01, ..experiment(input, 0.3) });
 }

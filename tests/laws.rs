@@ -224,8 +224,7 @@ proptest! {
         input in random::input()
     ) {
         // Flanks and spans that rattle undamped are chaotic: an error of the last bit grows tenfold every few impacts.
-        let rattles = stage.motor.gear_play.is_some() || stage.travel.is_some() || stage.belt.pretension.is_some();
-        let until = if rattles { 0.06 } else { 0.3 };
+        let until = if random::rattles(&stage) { 0.06 } else { 0.3 };
         let coarse = run(&stage, &input, until, 0.01);
         let fine = run(&stage, &input, until, 0.01 / 16.0);
         let [length, speed] = extents(&fine.trajectory);

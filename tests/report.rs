@@ -26,7 +26,7 @@ fn stage(encoder: Option<Encoder>) -> Stage {
         amplifier: Amplifier::ideal(AmplifierMode::Voltage, 2.0),
         pulley_radius: 0.0194,
         drive_pulley: pulley,
-        cart: Cart { mass: 0.362, friction: Friction::symmetric(19.0424, 0.2), load: 0.0, inclination: 0.0 },
+        cart: Cart::new(0.362, Friction::symmetric(19.0424, 0.2)),
         idler_pulley: pulley,
         belt: Belt::given([132.76e3, 132.76e3, f64::NAN], [0.0, 3.0, 0.0]),
         travel: None,

@@ -4,6 +4,7 @@ use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use taut::quantity;
 use taut::solve::{Method, Solver};
+use taut::stage::Stage;
 
 /// Belt-driven axes: described in a file, simulated exactly.
 #[derive(Debug, Parser)]
@@ -78,9 +79,12 @@ pub struct Simulate {
     /// Run only the experiment of this name, as often as needed
     #[arg(long = "experiment", value_name = "NAME")]
     pub experiments: Vec<String>,
-    /// How the equations are solved
-    #[arg(long, value_enum, default_value_t)]
-    pub solver: SolverName,
+    /// How the equations are solved [default: exact, or general where the stage needs it]
+    #[arg(long, value_enum)]
+    pub solver: Option<SolverName>,
+    /// Error that --solver general allows in each step [default: 1e-9]
+    #[arg(long, value_name = "NUMBER")]
+    pub tolerance: Option<f64>,
     /// Step of --solver table3 [default: 0.1 ms]
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     pub step: Option<f64>,
@@ -166,11 +170,12 @@ Examples:
 Ctrl-C ends a fit early: the best so far is written and said not to be converged, with exit status 130.";
 
 /// How the equations are solved.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum SolverName {
     /// Exact to rounding: stick, slip and matrix exponentials
-    #[default]
     Exact,
+    /// An adaptive formula of order 8 between located events: any friction law, spans that follow the cart
+    General,
     /// The friction function of the paper's Table 3 with a fixed step, to reproduce the paper
     Table3,
 }
@@ -196,25 +201,40 @@ pub enum Format {
 }
 
 impl Simulate {
-    /// The solver that is asked for.
-    pub fn solver(&self) -> taut::Result<Solver> {
-        match self.solver {
-            SolverName::Exact => match (self.step, self.method) {
-                (None, None) => Ok(Solver::Exact),
-                (step, _) => {
-                    let option = if step.is_some() { "--step" } else { "--method" };
-                    Err(taut::Error::new("the exact solver has no step and no formula to choose")
-                        .in_file(option)
-                        .next(format!("leave {option} out, or add --solver table3")))
-                }
-            },
-            SolverName::Table3 => Ok(Solver::Table3 {
+    /// The solver that is asked for, or else the one for this stage.
+    pub fn solver(&self, stage: &Stage) -> taut::Result<Solver> {
+        let solver = match (self.solver, Solver::of(stage)) {
+            (Some(SolverName::Table3), _) => Solver::Table3 {
                 step: self.step.unwrap_or(1e-4),
                 method: match self.method.unwrap_or_default() {
                     MethodName::Rk4 => Method::RungeKutta4,
                     MethodName::Dp5 => Method::DormandPrince5,
                 },
-            }),
+            },
+            (Some(SolverName::Exact), _) => Solver::Exact,
+            (Some(SolverName::General), _) => Solver::GENERAL,
+            (None, solver) => solver,
+        };
+        let misplaced = |option: &str, what: &str, other: &str| {
+            Err(taut::Error::new(what).in_file(option).next(format!("leave {option} out, or add --solver {other}")))
+        };
+        let fixed = match (self.step, self.method) {
+            (Some(_), _) => Some("--step"),
+            (None, Some(_)) => Some("--method"),
+            (None, None) => None,
+        };
+        match (solver, fixed, self.tolerance) {
+            (Solver::Exact, Some(option), _) => {
+                misplaced(option, "the exact solver has no step and no formula to choose", "table3")
+            }
+            (Solver::General { .. }, Some(option), _) => {
+                misplaced(option, "the general solver chooses its own steps, by one formula", "table3")
+            }
+            (Solver::General { .. }, None, Some(tolerance)) => Ok(Solver::General { tolerance }),
+            (Solver::Exact | Solver::Table3 { .. }, _, Some(_)) => {
+                misplaced("--tolerance", "only the general solver has a tolerance", "general")
+            }
+            _ => Ok(solver),
         }
     }
 }

@@ -119,6 +119,7 @@ fn what_the_documents_name_is_there() {
         "docs/commands.md",
         "docs/paper.md",
         "docs/solver.md",
+        "docs/general-solver.md",
         "stages/sollmann-jouaneh/README.md",
         "stages/printer-axis/README.md",
         "stages/laser-gantry/README.md",

@@ -1,33 +1,47 @@
 //! The log of an experiment: `log = { file = "pulse5.csv", time = "time_s", input = "voltage_V", drive_angle = "angle_rad" }`.
 
 use super::reader::{Field, Table};
+use super::tree::Kind;
 use super::{Folder, InputFile};
 use crate::error::Result;
-use crate::log::{Log, Mapping, Quantity, Source};
-use crate::quantity;
+use crate::log::{Clock, ColumnId, Dialect, Filter, Log, Mapping, Quantity, Source, Unit};
+use crate::parameter::Parameter;
+use crate::quantity::{self, shortest};
 use crate::signal::Hold;
+use crate::stage::{EncoderPlace, Stage};
+
+/// Keys of the table beside its quantities.
+const KEYS: &[&str] = &[
+    "file",
+    "input",
+    "units",
+    "scale",
+    "offset",
+    "absolute",
+    "where",
+    "split",
+    "hold",
+    "missing_input",
+    "separator",
+    "decimal",
+];
 
 /// Reads the runs of a log; `driven` says that the experiment has an input of its own.
-pub(super) fn logs(field: &Field, folder: &Folder, driven: bool) -> Result<Vec<(Option<String>, Log)>> {
+pub(super) fn logs(field: &Field, stage: &Stage, folder: &Folder, driven: bool) -> Result<Vec<(Option<String>, Log)>> {
     let table = field.table()?;
-    let mut keys = vec!["file", "time", "input", "units", "absolute", "hold"];
-    keys.extend(Quantity::ALL.iter().map(|quantity| quantity.name()));
+    let keys: Vec<&str> = KEYS.iter().copied().chain(Quantity::ALL.map(Quantity::name)).collect();
     table.check_keys(&keys, &[])?;
     let file = table.required("file", "file = \"...\" with the path of the log")?;
     let path = folder.path.join(file.text()?);
-    let units = table.optional("units").map(|field| field.table()).transpose()?;
-    let source = |key: &str, unit: &str| -> Result<Option<Source>> {
-        let Some(field) = table.optional(key) else { return Ok(None) };
-        let unit =
-            units.as_ref().and_then(|units| units.optional(key)).map(|field| factor(&field, unit)).transpose()?;
-        Ok(Some(Source { column: field.text()?.to_string(), unit, scale: 1.0, offset: 0.0 }))
-    };
-    let time = source("time", "s")?;
-    let time = time.ok_or_else(|| table.missing("time", "time = \"...\" with the name of the time's column"))?;
-    let input = source("input", field.input_unit)?;
+    let sources = Sources::new(&table, stage)?;
+
+    let input = sources.source("input", field.input_unit)?;
     match (&input, driven) {
         (None, false) => {
-            return Err(table.missing("input", "input = \"...\" with the name of the input's column"));
+            return Err(table.missing(
+                "input",
+                "input = \"...\" with the name of the input's column; or an input to the experiment",
+            ));
         }
         (Some(_), true) => {
             let field = table.optional("input").unwrap_or_else(|| field.clone());
@@ -39,7 +53,7 @@ pub(super) fn logs(field: &Field, folder: &Folder, driven: bool) -> Result<Vec<(
     }
     let mut outputs = Vec::new();
     for quantity in Quantity::ALL {
-        outputs.extend(source(quantity.name(), quantity.unit())?.map(|source| (quantity, source)));
+        outputs.extend(sources.source(quantity.name(), quantity.unit())?.map(|source| (quantity, source)));
     }
     if outputs.is_empty() {
         let names: Vec<&str> = Quantity::ALL.iter().map(|quantity| quantity.name()).collect();
@@ -48,13 +62,190 @@ pub(super) fn logs(field: &Field, folder: &Folder, driven: bool) -> Result<Vec<(
             .allowed(names.join(", "))
             .next("add for example drive_angle = \"...\" with the name of its column"));
     }
-    let holds = [("zero", Hold::Zero), ("linear", Hold::Linear)];
-    let hold = table.optional("hold").map_or(Ok(Hold::Zero), |field| field.choice(&holds))?;
-    let absolute = absolute(&table, &outputs)?;
-    let mapping = Mapping { file: path.clone(), time, input, outputs, absolute, hold };
+    let time = clock(&table, &sources)?;
+    let (from, to) = (table.number_if_given("from")?, table.number_if_given("to")?);
+    if let (Some(from), Some(to), Some(field)) = (from, to, table.optional("to"))
+        && to <= from
+    {
+        let (from, to) = (quantity::show(from, "s"), quantity::show(to, "s"));
+        return Err(field.fail(format!("{to} does not come after `from`, {from}")));
+    }
+    let word = |key: &str, words: &[(&str, bool)]| table.optional(key).map_or(Ok(false), |field| field.choice(words));
+    let linear = word("hold", &[("zero", false), ("linear", true)])?;
+    let dialect = Dialect {
+        separator: table.optional("separator").map(|field| separator(&field)).transpose()?,
+        decimal_comma: word("decimal", &[(".", false), (",", true)])?,
+    };
+    let mapping = Mapping {
+        file: path.clone(),
+        time,
+        input,
+        input_unit: field.input_unit,
+        hold_missing: word("missing_input", &[("refuse", false), ("hold", true)])?,
+        absolute: absolute(&table, &outputs)?,
+        outputs,
+        hold: if linear { Hold::Linear } else { Hold::Zero },
+        from,
+        to,
+        filter: table.optional("where").map(|field| filter(&field)).transpose()?,
+        split: table.optional("split").map(|field| column(&field)).transpose()?,
+        dialect,
+    };
     let runs = mapping.read()?;
     folder.read.borrow_mut().push(InputFile { path, place: file.node.span.clone() });
     Ok(runs)
+}
+
+/// The columns of a log, and what makes their numbers SI.
+struct Sources<'a> {
+    table: &'a Table<'a>,
+    units: Option<Table<'a>>,
+    scale: Option<Table<'a>>,
+    offset: Option<Table<'a>>,
+    stage: &'a Stage,
+}
+
+impl<'a> Sources<'a> {
+    fn new(table: &'a Table<'a>, stage: &'a Stage) -> Result<Self> {
+        let part = |key: &str| table.optional(key).map(|field| field.table()).transpose();
+        let sources = Self { units: part("units")?, scale: part("scale")?, offset: part("offset")?, table, stage };
+        for part in [&sources.units, &sources.scale, &sources.offset].into_iter().flatten() {
+            let columns = ["time", "input"].into_iter().chain(Quantity::ALL.map(Quantity::name));
+            let named: Vec<&'static str> = columns.filter(|key| table.optional(key).is_some()).collect();
+            part.check_keys(&named, &[])?;
+        }
+        Ok(sources)
+    }
+
+    fn source(&self, key: &str, unit: &'static str) -> Result<Option<Source>> {
+        let Some(field) = self.table.optional(key) else { return Ok(None) };
+        let number = |part: &Option<Table>, unit: &'static str, example: &'static str| {
+            let field = part.as_ref().and_then(|part| part.optional(key));
+            field.map(|field| field.number_of(&Parameter { unit, example, ..NUMBER })).transpose()
+        };
+        let given = self.units.as_ref().and_then(|units| units.optional(key));
+        Ok(Some(Source {
+            column: column(&field)?,
+            unit: given.map(|field| self.unit(&field, unit)).transpose()?,
+            scale: number(&self.scale, "", "-1")?.unwrap_or(1.0),
+            offset: number(&self.offset, unit, example(unit))?.unwrap_or(0.0),
+        }))
+    }
+
+    fn unit(&self, field: &Field, unit: &str) -> Result<Unit> {
+        let text = field.text()?;
+        if matches!(text, "count" | "counts") {
+            return self.count(field).map(Unit::Factor);
+        }
+        match quantity::read(&format!("1 {text}"), unit) {
+            Ok(_) => Ok(Unit::Name(text.to_string())),
+            Err(e) => {
+                let what = format!("\"{text}\" is no unit of this column, which is wanted in {unit}");
+                let such_as =
+                    format!("write for example {} = \"{}\"", field.key(), example(unit).trim_start_matches("1 "));
+                Err(field.fail(what).next(e.next.filter(|next| next.starts_with("1 ")).unwrap_or(such_as)))
+            }
+        }
+    }
+
+    /// What a count of the encoder is.
+    fn count(&self, field: &Field) -> Result<f64> {
+        let Some(encoder) = self.stage.encoder else {
+            return Err(field
+                .fail("there is no encoder whose counts these could be")
+                .next("add [encoder] with at and lines"));
+        };
+        let counted: &[&str] = match encoder.at {
+            EncoderPlace::Motor => &["drive_angle", "rotor_angle"],
+            EncoderPlace::DrivePulley => &["drive_angle"],
+            EncoderPlace::Cart => &["cart_position"],
+        };
+        if !counted.contains(&field.key()) {
+            let at = counted.join(" or ");
+            return Err(field
+                .fail(format!("the encoder of this case counts {at}"))
+                .next("name the unit of this column"));
+        }
+        Ok(1.0 / encoder.counts_per_unit(self.stage.motor.gear_ratio))
+    }
+}
+
+/// A factor or an offset.
+const NUMBER: Parameter = Parameter {
+    key: "",
+    symbol: "",
+    unit: "",
+    default: crate::parameter::Fallback::Required,
+    range: crate::parameter::Range::ANY,
+    sentence: "",
+    example: "",
+};
+
+/// How a value of that unit may be written.
+fn example(unit: &str) -> &'static str {
+    match unit {
+        "s" => "1 ms",
+        "V" => "1 mV",
+        "A" => "1 mA",
+        "rad" => "1 deg",
+        "rad/s" => "1 rpm",
+        "m" => "1 mm",
+        _ => "1 mm/s",
+    }
+}
+
+/// A column by name, or by number from 1.
+fn column(field: &Field) -> Result<ColumnId> {
+    match &field.node.kind {
+        Kind::Integer(number) if *number >= 1 => Ok(ColumnId::Number(*number as usize)),
+        Kind::Integer(number) => Err(field.fail(format!("{number} is no column")).allowed("columns count from 1")),
+        Kind::Text(name) if name.trim().is_empty() => Err(field
+            .fail("the name of the column is empty")
+            .next("a column without a name goes by its number, from 1")),
+        Kind::Text(name) => Ok(ColumnId::from(name.as_str())),
+        other => Err(field
+            .fail(format!("{} stands where a column is wanted", other.word()))
+            .next("write the column's name in quotes, or its number, from 1")),
+    }
+}
+
+/// When the samples were taken: a column, or `{ every = "20 ms" }`.
+fn clock(table: &Table, sources: &Sources) -> Result<Clock> {
+    let field =
+        table.required("time", "time = \"...\" with the name of the time's column, or time = { every = \"1 ms\" }")?;
+    if field.is_table() {
+        let time = field.table()?;
+        time.check_keys(&[], &[])?;
+        return time.number("every").map(Clock::Every);
+    }
+    let source = sources.source("time", "s")?;
+    source.map(Clock::Column).ok_or_else(|| table.missing("time", "a column"))
+}
+
+/// Which rows count: `{ column = "pwm", is = 100 }`.
+fn filter(field: &Field) -> Result<Filter> {
+    let table = field.clone().named("").table()?;
+    table.check_keys(&["column", "is", "is_not"], &[])?;
+    let column = column(&table.required("column", "column = \"...\" with the name of the column")?)?;
+    let (values, keep) = match (table.optional("is"), table.optional("is_not")) {
+        (Some(is), None) => (is, true),
+        (None, Some(is_not)) => (is_not, false),
+        (Some(_), Some(both)) => return Err(both.fail("`is` is given already").next("give the one or the other")),
+        (None, None) => return Err(table.missing("is", "is = 100, or is = [100, 200], or is_not")),
+    };
+    let list = if values.is_list() { values.filled_list()? } else { vec![values] };
+    let text = |field: &Field| match &field.node.kind {
+        Kind::Integer(number) => Ok(number.to_string()),
+        Kind::Float(number) if number.is_finite() => Ok(shortest(*number)),
+        Kind::Text(text) => Ok(text.trim().to_string()),
+        other => Err(field.fail(format!("{} stands where a number or a text is wanted", other.word()))),
+    };
+    Ok(Filter { column, values: list.iter().map(text).collect::<Result<_>>()?, keep })
+}
+
+/// What parts the columns.
+fn separator(field: &Field) -> Result<char> {
+    field.choice(&[(",", ','), (";", ';'), ("tab", '\t'), ("\t", '\t'), ("space", ' '), (" ", ' ')])
 }
 
 /// The quantities whose sign was lost.
@@ -62,16 +253,4 @@ fn absolute(table: &Table, outputs: &[(Quantity, Source)]) -> Result<Vec<Quantit
     let Some(field) = table.optional("absolute") else { return Ok(Vec::new()) };
     let known: Vec<(&str, Quantity)> = outputs.iter().map(|(quantity, _)| (quantity.name(), *quantity)).collect();
     field.filled_list()?.iter().map(|field| field.choice(&known)).collect()
-}
-
-/// What one of the unit in `field` is in `unit`.
-fn factor(field: &Field, unit: &str) -> Result<f64> {
-    let text = field.text()?;
-    quantity::read(&format!("1 {text}"), unit).map_err(|e| {
-        let error = field.fail(format!("\"{text}\" is no unit of this column: {unit} is wanted, or a multiple of it"));
-        match e.next {
-            Some(next) if next.contains("1 ") => error.next(next),
-            _ => error.next(format!("write for example {} = \"m{unit}\"", field.key())),
-        }
-    })
 }

@@ -1,6 +1,7 @@
 //! The case file: TOML in, a [`Case`] out, and every mistake told with its line.
 
 mod fit;
+mod friction;
 mod input;
 mod log;
 mod measurement;
@@ -322,7 +323,7 @@ fn experiment(field: &Field, stage: &Stage, folder: &Folder) -> Result<Vec<Exper
             input::signal(&input.ok_or_else(|| table.missing("input", &such_as))?, &input::Context { folder, until })?;
         return Ok(vec![Experiment { name, input, until, every, initial, log: None }]);
     };
-    let runs = log::logs(&log, folder, input.is_some())?;
+    let runs = log::logs(&log, stage, folder, input.is_some())?;
     let of_run = |(run, mut log): (Option<String>, Log)| {
         let (until, every) = times(&table, Some(&log))?;
         let input = match &input {

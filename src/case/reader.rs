@@ -106,6 +106,16 @@ impl<'a> Field<'a> {
         }
     }
 
+    /// `true` or `false`.
+    pub fn truth(&self) -> Result<bool> {
+        match &self.node.kind {
+            Kind::Bool(value) => Ok(*value),
+            other => Err(self
+                .fail(format!("{} stands where true or false is wanted", other.word()))
+                .next("write true or false, without quotes")),
+        }
+    }
+
     /// One of a few words.
     pub fn choice<T: Copy>(&self, options: &[(&str, T)]) -> Result<T> {
         let words: Vec<&str> = options.iter().map(|(word, _)| *word).collect();

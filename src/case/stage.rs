@@ -1,14 +1,10 @@
 //! The machine's tables: motor, amplifier, pulleys, belt, cart, encoder.
 
+use super::friction::{along, friction};
 use super::reader::{Field, Table};
 use crate::error::Result;
-use crate::friction::{Friction, Side};
 use crate::quantity::{rounded, show};
 use crate::stage::*;
-
-/// Keys that stand in the plan and not yet in the program.
-const PLANNED_BELT: &[&str] = &["follows_cart"];
-const PLANNED_FRICTION: &[&str] = &["stribeck", "lugre"];
 
 pub(super) fn stage(root: &Table) -> Result<Stage> {
     let table = |name: &str, holds: &str| root.required(name, &format!("a table [{name}] with {holds}"))?.table();
@@ -32,12 +28,13 @@ pub(super) fn stage(root: &Table) -> Result<Stage> {
         cart: Cart {
             mass: cart.number("mass")?,
             friction: friction(&cart)?,
+            along: along(&cart)?,
             load: cart.number("load")?,
             inclination: cart.number("inclination")?,
         },
         idler_pulley: pulley(&idler)?,
-        belt: self::belt(&belt)?,
-        travel: travel.map(|table| self::travel(&table)).transpose()?,
+        belt: self::belt(&belt, travel.as_ref())?,
+        travel: travel.as_ref().map(self::travel).transpose()?,
         encoder: encoder.map(|table| self::encoder(&table)).transpose()?,
     })
 }
@@ -175,49 +172,8 @@ fn pulley(table: &Table) -> Result<Pulley> {
     Ok(Pulley { inertia, friction: friction(table)? })
 }
 
-/// The friction of a body; all zero where the table says nothing.
-fn friction(body: &Table) -> Result<Friction> {
-    let Some(field) = body.optional("friction") else { return Ok(Friction::default()) };
-    let table = field.table()?;
-    table.check_keys(&[], PLANNED_FRICTION)?;
-    let viscous = table.number("viscous")?;
-    let coulomb = table.number("coulomb")?;
-    let coulomb_backward = table.number_if_given("coulomb_backward")?.unwrap_or(coulomb);
-    let breakaway = table.number_if_given("static")?;
-    let breakaway_backward = table.number_if_given("static_backward")?.or(breakaway);
-
-    // At rest a body holds at least what it resists with in motion.
-    let unit = if body.field.section == "cart" { "N" } else { "N m" };
-    let at_least = |key: &str, breakaway: Option<f64>, allowed: &str, coulomb: f64| match breakaway {
-        Some(value) if value < coulomb => {
-            let field = table.optional(key).unwrap_or_else(|| table.field.clone());
-            let (value, coulomb) = (show(value, unit), show(coulomb, unit));
-            Err(field
-                .fail(format!("a breakaway of {value} is less than the Coulomb friction of {coulomb}"))
-                .allowed(allowed))
-        }
-        _ => Ok(()),
-    };
-    at_least("static", breakaway, "at least coulomb", coulomb)?;
-    let (backward, allowed) = match table.optional("static_backward") {
-        Some(_) => ("static_backward", "at least coulomb_backward, which is coulomb where it is not given"),
-        None => ("static", "at least coulomb_backward, unless static_backward is given"),
-    };
-    at_least(backward, breakaway_backward, allowed, coulomb_backward)?;
-
-    let viscous_backward = table.number_if_given("viscous_backward")?.unwrap_or(viscous);
-    Ok(Friction {
-        forward: Side { viscous, coulomb, breakaway: breakaway.unwrap_or(coulomb) },
-        backward: Side {
-            viscous: viscous_backward,
-            coulomb: coulomb_backward,
-            breakaway: breakaway_backward.unwrap_or(coulomb_backward),
-        },
-    })
-}
-
-fn belt(table: &Table) -> Result<Belt> {
-    table.check_keys(&["model"], PLANNED_BELT)?;
+fn belt(table: &Table, travel: Option<&Table>) -> Result<Belt> {
+    table.check_keys(&["model", "follows_cart"], &[])?;
     let models = [BeltModel::Elastic, BeltModel::TwoMass, BeltModel::Rigid].map(|model| (model.word(), model));
     let model = table.optional("model").map_or(Ok(BeltModel::Elastic), |field| field.choice(&models))?;
     let pretension = table.number_if_given("pretension")?;
@@ -228,6 +184,17 @@ fn belt(table: &Table) -> Result<Belt> {
             .fail("a rigid belt has no tension that could be used up")
             .next("leave it out, or set model = \"two-mass\" or \"elastic\""));
     }
+    let follows_cart = table.optional("follows_cart").map_or(Ok(false), |field| field.truth())?;
+    let follows = table.optional("follows_cart").filter(|_| follows_cart);
+    if let Some(field) = &follows {
+        let clash = [("pretension", pretension.is_some()), ("model", model != BeltModel::Elastic)];
+        if let Some((key, _)) = clash.into_iter().find(|(_, there)| *there) {
+            return Err(field
+                .fail(format!("spans that follow the cart do not go together with `{key}` yet"))
+                .next(format!("leave one of the two out: belt.follows_cart or belt.{key}")));
+        }
+    }
+    let given = |stiffness| Belt { stiffness, damping: [0.0; 3], make: None, pretension, follows_cart: false, model };
     let make = ["modulus", "section", "spans"];
     let damping = table.optional("damping").map_or(Ok([0.0; 3]), |field| field.three())?;
     if let Some(stiffness) = table.optional("stiffness") {
@@ -236,11 +203,16 @@ fn belt(table: &Table) -> Result<Belt> {
                 .fail("the stiffness is given already")
                 .next("give either stiffness, or modulus, section and spans"));
         }
-        return Ok(Belt { stiffness: stiffness.three()?, damping, make: None, pretension, model });
+        if let Some(field) = follows {
+            return Err(field
+                .fail("a given stiffness does not say how it changes with the length of a span")
+                .next("give modulus, section and spans instead of stiffness"));
+        }
+        return Ok(Belt { damping, ..given(stiffness.three()?) });
     }
     let none = make.iter().all(|key| table.optional(key).is_none());
     if none && model == BeltModel::Rigid {
-        return Ok(Belt { stiffness: [f64::INFINITY; 3], damping, make: None, pretension, model });
+        return Ok(Belt { damping, ..given([f64::INFINITY; 3]) });
     }
     if none {
         return Err(table.missing(
@@ -257,7 +229,28 @@ fn belt(table: &Table) -> Result<Belt> {
     for k in stiffness {
         table.computed("stiffness", &table.field, k)?;
     }
-    Ok(Belt { stiffness, damping, make: Some(make), pretension, model })
+    if let Some(field) = follows {
+        spans_left(&field, &make, travel)?;
+    }
+    Ok(Belt { damping, make: Some(make), follows_cart, ..given(stiffness) })
+}
+
+/// Within its travel the cart must leave something of the spans on either side: −l₂ < min, max < l₁.
+fn spans_left(follows: &Field, make: &BeltMake, travel: Option<&Table>) -> Result<()> {
+    let Some(table) = travel else {
+        return Err(follows
+            .fail("how far the cart may go is not said")
+            .next("add a table [travel] with min and max, such as min = \"-0.3 m\" and max = \"0.3 m\""));
+    };
+    let Travel { min, max, .. } = self::travel(table)?;
+    let [l1, l2, _] = make.spans;
+    let (key, what, allowed) = match (min > -l2, max < l1) {
+        (true, true) => return Ok(()),
+        (false, _) => ("min", "span 2 would have no length left", format!("above {}", show(-l2, "m"))),
+        (true, false) => ("max", "span 1 would have no length left", format!("below {}", show(l1, "m"))),
+    };
+    let field = table.optional(key).unwrap_or_else(|| table.field.clone());
+    Err(field.fail(what).allowed(format!("{allowed}, the length of the span at x = 0")))
 }
 
 /// One modulus, or the parts of a composite.

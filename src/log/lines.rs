@@ -29,8 +29,20 @@ impl Fields {
 
     /// Cuts the current line.
     pub fn split<R: BufRead>(&mut self, lines: &Lines<'_, R>) -> Result<()> {
+        self.split_text(lines, &lines.text)
+    }
+
+    /// Cuts a text as if it were the current line.
+    pub fn split_text<R: BufRead>(&mut self, lines: &Lines<'_, R>, text: &str) -> Result<()> {
         use csv_core::ReadRecordResult::{InputEmpty, OutputEndsFull, Record};
-        let line = &lines.text;
+        let blanks;
+        let line = match self.separator {
+            b' ' => {
+                blanks = single_blanks(text);
+                blanks.as_str()
+            }
+            _ => text,
+        };
         if self.text.len() < line.len() + 1 {
             self.text.resize(line.len() + 1, 0);
         }
@@ -73,9 +85,13 @@ impl Fields {
     pub fn extent(&self, line: &str, k: usize) -> Range<usize> {
         let (mut field, mut start, mut quoted) = (0, 0, false);
         let mut end = line.len();
+        let blank = |byte: u8| self.separator == b' ' && matches!(byte, b' ' | b'\t');
+        let mut before = b' ';
         for (i, byte) in line.bytes().enumerate() {
             quoted ^= byte == b'"';
-            if byte == self.separator && !quoted {
+            let parts = if blank(byte) { !blank(before) } else { byte == self.separator };
+            before = byte;
+            if parts && !quoted {
                 if field == k {
                     end = i;
                     break;
@@ -93,6 +109,27 @@ impl Fields {
     }
 }
 
+/// The line with one space where there are blanks, and none at its ends; quotes are left alone.
+fn single_blanks(line: &str) -> String {
+    let mut text = String::with_capacity(line.len());
+    let (mut quoted, mut pending) = (false, false);
+    for c in line.trim().chars() {
+        quoted ^= c == '"';
+        if !quoted && matches!(c, ' ' | '\t') {
+            pending = true;
+            continue;
+        }
+        if std::mem::take(&mut pending) {
+            text.push(' ');
+        }
+        text.push(c);
+    }
+    text
+}
+
+/// What a line may begin with that is a remark.
+const REMARKS: [&str; 3] = ["#", "%", "//"];
+
 /// The lines of a file, one at a time.
 pub(super) struct Lines<'a, R> {
     file: &'a Path,
@@ -102,12 +139,14 @@ pub(super) struct Lines<'a, R> {
     pub text: String,
     /// Whether the current line ended as lines do.
     pub complete: bool,
+    /// The last remark before the current line, without its mark.
+    pub remark: String,
 }
 
 impl<'a, R: BufRead> Lines<'a, R> {
     /// Before the first line.
     pub fn new(file: &'a Path, input: R) -> Self {
-        Self { file, input, number: 0, text: String::new(), complete: true }
+        Self { file, input, number: 0, text: String::new(), complete: true, remark: String::new() }
     }
 
     /// Goes to the next line that is neither blank nor a comment; false at the end.
@@ -150,19 +189,21 @@ impl<'a, R: BufRead> Lines<'a, R> {
                 let what = format!("byte {} of line {} is not UTF-8", at + 1, self.number);
                 self.error(what).allowed("text in UTF-8").next("save the file again as UTF-8")
             })?;
-            if !self.text.trim().is_empty() && !self.text.starts_with('#') {
-                return Ok(true);
+            if self.text.trim().is_empty() {
+                continue;
+            }
+            match REMARKS.iter().find_map(|mark| self.text.trim_start().strip_prefix(mark)) {
+                Some(remark) => self.remark = remark.to_string(),
+                None => return Ok(true),
             }
         }
     }
 
     /// Other kinds of file that people have at hand, by how they begin.
     fn check_kind(&self, bytes: &[u8]) -> Result<()> {
-        let kinds: [(&[u8], &str); 7] = [
+        let kinds: [(&[u8], &str); 5] = [
             (b"PK\x03\x04", "a ZIP archive, such as a spreadsheet"),
-            (b"PAR1", "a Parquet file"),
-            (b"MATLAB", "a MATLAB file"),
-            (b"\x89HDF", "an HDF5 file, such as MATLAB writes"),
+            (b"\xD0\xCF\x11\xE0", "an old spreadsheet"),
             (b"\x1F\x8B", "a compressed file"),
             (b"\xFF\xFE", "text in UTF-16"),
             (b"\xFE\xFF", "text in UTF-16"),
@@ -209,11 +250,18 @@ pub(super) fn open(file: &Path) -> Result<BufReader<File>> {
     Ok(BufReader::with_capacity(1 << 16, File::open(file).map_err(|error| unreadable(file, &error))?))
 }
 
-fn unreadable(file: &Path, error: &io::Error) -> Error {
+/// The first bytes of a file, enough to tell what kind it is.
+pub(super) fn beginning(file: &Path) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(file)?.take(1024).read_to_end(&mut bytes).map_err(|error| unreadable(file, &error))?;
+    Ok(bytes)
+}
+
+pub(super) fn unreadable(file: &Path, error: &io::Error) -> Error {
     let (what, next) = match error.kind() {
         io::ErrorKind::NotFound => ("there is no such file".into(), "check the name and the folder it is in"),
         io::ErrorKind::PermissionDenied => ("you may not read this file".into(), "check its permissions"),
-        io::ErrorKind::IsADirectory => ("this is a folder, not a file".into(), "name a CSV file in it"),
+        io::ErrorKind::IsADirectory => ("this is a folder, not a file".into(), "name a file in it"),
         _ => (format!("the file cannot be read: {error}"), "check the disk or the connection to it"),
     };
     Error::new(what).in_file(file).next(next)

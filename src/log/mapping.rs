@@ -1,76 +1,445 @@
 //! From a file's columns to logs: what each column is, in which unit, and which rows belong to which run.
 
-use super::csv;
+use super::csv::{count, shown};
+use super::sheet::{ColumnId, Dialect, Filter, Request, Run, Sheet};
 use super::{Log, Output, Quantity};
 use crate::error::{Error, Result};
+use crate::quantity::{self, show};
 use crate::signal::Hold;
+use std::ops::Range;
 use std::path::PathBuf;
 
+/// Most runs of one file.
+const MOST_RUNS: usize = 1000;
+
 /// What the columns of a file are.
+///
+/// ```no_run
+/// use taut::log::{Mapping, Quantity, Source};
+/// let mut mapping = Mapping::new("pulse5.csv", Source::column("time_s"));
+/// mapping.input = Some(Source::column("voltage_V"));
+/// mapping.outputs = vec![(Quantity::DriveAngle, Source::column("angle_deg").unit("deg"))];
+/// let (_, log) = mapping.read()?.remove(0);
+/// println!("{} samples in {} s", log.len(), log.time.last().unwrap());
+/// # Ok::<(), taut::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mapping {
-    /// The file.
+    /// The file: CSV, Parquet or MATLAB, told by its content.
     pub file: PathBuf,
-    /// The column of times.
-    pub time: Source,
+    /// When the samples were taken.
+    pub time: Clock,
     /// The column of what was fed into the amplifier, unless it is known otherwise.
     pub input: Option<Source>,
+    /// Unit of the input, V or A.
+    pub input_unit: &'static str,
+    /// Whether an input that is missing is the one before it; otherwise it is an error.
+    pub hold_missing: bool,
     /// The columns of what was seen.
     pub outputs: Vec<(Quantity, Source)>,
     /// Quantities whose sign was lost.
     pub absolute: Vec<Quantity>,
     /// What the input did between its samples.
     pub hold: Hold,
+    /// Where the window begins, s on the file's clock, and where time zero is; the first row without.
+    pub from: Option<f64>,
+    /// Where it ends.
+    pub to: Option<f64>,
+    /// Which rows count; all without.
+    pub filter: Option<Filter>,
+    /// The column that tells runs apart.
+    pub split: Option<ColumnId>,
+    /// How a text file is written.
+    pub dialect: Dialect,
 }
 
-/// A column and how its numbers become SI: value = `scale` · `unit` · number + `offset`.
+/// When samples were taken.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Clock {
+    /// As a column says.
+    Column(Source),
+    /// At this interval, s.
+    Every(f64),
+}
+
+/// A column and how its numbers become SI: value = `scale` · unit · number + `offset`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Source {
-    /// The column's name.
-    pub column: String,
-    /// What one of its unit is in SI; none where the file says it or it is SI.
-    pub unit: Option<f64>,
+    /// Which column.
+    pub column: ColumnId,
+    /// Its unit; without it the one that the file states, or SI.
+    pub unit: Option<Unit>,
     /// A factor beside the unit, such as −1.
     pub scale: f64,
     /// What is added in the end, SI.
     pub offset: f64,
 }
 
+/// The unit of a column.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Unit {
+    /// By name: `mm`.
+    Name(String),
+    /// So much in SI, such as a count of an encoder.
+    Factor(f64),
+}
+
 impl Source {
-    fn convert(&self, numbers: &[f64]) -> Vec<f64> {
-        let factor = self.scale * self.unit.unwrap_or(1.0);
-        numbers.iter().map(|x| factor * x + self.offset).collect()
+    /// The column of that name, in the unit that the file states, or SI.
+    pub fn column(name: &str) -> Self {
+        Self { column: ColumnId::from(name), unit: None, scale: 1.0, offset: 0.0 }
+    }
+
+    /// The same, in `unit`.
+    pub fn unit(self, unit: &str) -> Self {
+        Self { unit: Some(Unit::Name(unit.to_string())), ..self }
     }
 }
 
+/// What a column is used for.
+#[derive(Clone, Copy)]
+enum Role {
+    Time,
+    Input(&'static str),
+    Output(Quantity),
+}
+
+impl Role {
+    fn key(self) -> &'static str {
+        match self {
+            Role::Time => "time",
+            Role::Input(_) => "input",
+            Role::Output(quantity) => quantity.name(),
+        }
+    }
+
+    fn unit(self) -> &'static str {
+        match self {
+            Role::Time => "s",
+            Role::Input(unit) => unit,
+            Role::Output(quantity) => quantity.unit(),
+        }
+    }
+}
+
+/// A sheet, its columns in SI, and what they are.
+struct Columns<'a> {
+    mapping: &'a Mapping,
+    sheet: Sheet,
+    roles: Vec<Role>,
+    values: Vec<Vec<f64>>,
+}
+
 impl Mapping {
-    /// Reads the runs; the first of each pair is what tells a run of a split file from the others.
+    /// A file and its clock; inputs and outputs are still to be named.
+    pub fn new(file: impl Into<PathBuf>, time: Source) -> Self {
+        Self {
+            file: file.into(),
+            time: Clock::Column(time),
+            input: None,
+            input_unit: "V",
+            hold_missing: false,
+            outputs: Vec::new(),
+            absolute: Vec::new(),
+            hold: Hold::Zero,
+            from: None,
+            to: None,
+            filter: None,
+            split: None,
+            dialect: Dialect::default(),
+        }
+    }
+
+    /// Reads the runs; the text tells a run of a split file from the others.
     pub fn read(&self) -> Result<Vec<(Option<String>, Log)>> {
-        let (times, _) = csv::read_samples(&self.file, &self.time.column, &self.time.column)?;
-        let mut names: Vec<&str> = self.outputs.iter().map(|(_, source)| source.column.as_str()).collect();
-        names.extend(self.input.iter().map(|source| source.column.as_str()));
-        let columns = csv::read_columns(&self.file, &names)?;
-        let time = self.time.convert(&times);
-        let [first, .., _] = time[..] else {
-            return Err(Error::new("the log has a single row").in_file(&self.file).allowed("at least two rows"));
+        let mut sources: Vec<(Role, &Source)> = Vec::new();
+        if let Clock::Column(source) = &self.time {
+            sources.push((Role::Time, source));
+        }
+        let complete = sources.len();
+        sources.extend(self.input.iter().map(|source| (Role::Input(self.input_unit), source)));
+        sources.extend(self.outputs.iter().map(|(quantity, source)| (Role::Output(*quantity), source)));
+        let ids: Vec<ColumnId> = sources.iter().map(|(_, source)| source.column.clone()).collect();
+        let request = Request {
+            columns: &ids,
+            complete,
+            units_row: true,
+            dialect: self.dialect,
+            filter: self.filter.as_ref(),
+            split: self.split.as_ref(),
         };
-        let input = match (&self.input, columns.last()) {
-            (Some(source), Some(numbers)) => source.convert(numbers),
-            _ => vec![0.0; time.len()],
-        };
-        let outputs = self.outputs.iter().zip(&columns).map(|((quantity, source), numbers)| Output {
-            quantity: *quantity,
-            absolute: self.absolute.contains(quantity),
-            values: source.convert(numbers),
+        let mut sheet = Sheet::read(&self.file, &request)?;
+        let mut values = Vec::new();
+        for (i, &(role, source)) in sources.iter().enumerate() {
+            let factor = source.scale * factor(&sheet, i, role, source)?;
+            let mut column = std::mem::take(&mut sheet.columns[i]);
+            column.iter_mut().for_each(|x| *x = factor * *x + source.offset);
+            values.push(column);
+        }
+        let roles = sources.iter().map(|(role, _)| *role).collect();
+        Columns { mapping: self, sheet, roles, values }.logs()
+    }
+}
+
+/// What one of the i-th column's unit is in SI.
+fn factor(sheet: &Sheet, i: usize, role: Role, source: &Source) -> Result<f64> {
+    let (key, wanted) = (role.key(), role.unit());
+    let of = |unit: &str| quantity::read(&format!("1 {unit}"), wanted);
+    let say = |unit: &str| format!("units = {{ {key} = \"{unit}\" }}");
+    match &source.unit {
+        Some(Unit::Factor(factor)) => return Ok(*factor),
+        Some(Unit::Name(name)) => return of(name),
+        None => {}
+    }
+    let name = &sheet.names[i];
+    if let Some(unit) = &sheet.units[i] {
+        return of(unit).map_err(|_| {
+            sheet
+                .heading_error(
+                    i,
+                    format!("column {name} is in {}, by its file; {key} is wanted in {wanted}", shown(unit)),
+                )
+                .allowed(format!("{wanted}, or a unit convertible to it"))
+                .next(format!("say in the case file what the unit is: {}", say(wanted)))
         });
-        let log = Log {
-            name: String::new(),
-            file: self.file.clone(),
-            input,
-            hold: self.hold,
-            outputs: outputs.collect(),
-            time: time.iter().map(|t| t - first).collect(),
+    }
+    // A name such as time_us may say the unit, or not.
+    let Some(unit) = suspected(source.column.name().unwrap_or_default(), wanted) else { return Ok(1.0) };
+    Err(sheet
+        .heading_error(i, format!("column {name} seems to be in {unit}, by its name; the case file does not say so"))
+        .next(format!("write {} in the log's table, or {} if that is what it is in", say(unit), say(wanted))))
+}
+
+/// Units, other than SI, that people put at the end of a name.
+const IN_NAMES: [&str; 22] = [
+    "ns", "us", "ms", "min", "mV", "kV", "mA", "uA", "um", "mm", "cm", "in", "inch", "deg", "mrad", "rev", "rpm",
+    "deg/s", "mrad/s", "mm/s", "cm/s", "mm/min",
+];
+
+/// A unit other than SI at the end of a name, if it is one of the wanted dimension.
+fn suspected(name: &str, wanted: &str) -> Option<&'static str> {
+    let parts: Vec<&str> = name.split('_').collect();
+    let last = parts.last().copied().unwrap_or_default();
+    // As in cart_speed_mm_s.
+    let quotient = parts.len().checked_sub(2).map(|k| format!("{}/{last}", parts[k])).unwrap_or_default();
+    let known = |text: &str| IN_NAMES.into_iter().find(|unit| *unit == text);
+    known(&quotient).or_else(|| known(last)).filter(|unit| quantity::read(&format!("1 {unit}"), wanted).is_ok())
+}
+
+impl Columns<'_> {
+    fn logs(&self) -> Result<Vec<(Option<String>, Log)>> {
+        if self.mapping.split.is_none() {
+            return Ok(vec![(None, self.log(0..self.sheet.rows.len(), None)?)]);
+        }
+        let runs = &self.sheet.runs;
+        if runs.len() > MOST_RUNS {
+            let column = self.mapping.split.as_ref().map(ColumnId::shown).unwrap_or_default();
+            return Err(Error::new(format!("column {column} changes {} times", runs.len() - 1))
+                .in_file(&self.sheet.file)
+                .allowed(format!("up to {MOST_RUNS} runs"))
+                .next("split by a column that holds one value for each run"));
+        }
+        let ends = runs.iter().skip(1).map(|run| run.begin).chain([self.sheet.rows.len()]);
+        let mut logs: Vec<(Option<String>, Log)> = Vec::new();
+        for (k, (run, end)) in runs.iter().zip(ends).enumerate() {
+            let before = runs[..k].iter().filter(|other| other.label == run.label).count();
+            let name = match before {
+                0 => run.label.clone(),
+                n => format!("{} ({})", run.label, n + 1),
+            };
+            let log = self.log(run.begin..end, Some(run))?;
+            logs.push((Some(name.replace(|c: char| c.is_control() || matches!(c, '/' | '\\'), "-")), log));
+        }
+        Ok(logs)
+    }
+
+    /// The log in these rows.
+    fn log(&self, rows: Range<usize>, run: Option<&Run>) -> Result<Log> {
+        let mapping = self.mapping;
+        let time = match &mapping.time {
+            Clock::Column(_) => self.times(rows.clone())?,
+            Clock::Every(every) => (0..rows.len()).map(|k| k as f64 * every).collect(),
         };
-        Ok(vec![(None, log)])
+        // Runs count from their own beginnings.
+        let first = time.first().copied().unwrap_or_default();
+        let zero = if run.is_some() { first } else { 0.0 };
+        let window = self.window(&time, zero, &rows, run)?;
+        let start = mapping.from.map_or(first, |from| zero + from);
+        let within = rows.start + window.start..rows.start + window.end;
+        let mut outputs = Vec::new();
+        for (i, role) in self.roles.iter().enumerate() {
+            let Role::Output(quantity) = *role else { continue };
+            let values = self.values[i][within.clone()].to_vec();
+            if values.iter().all(|x| x.is_nan()) {
+                let name = &self.sheet.names[i];
+                let error = self.sheet.heading_error(i, format!("column {name} has no value{}", self.in_what(run)));
+                return Err(error
+                    .allowed("at least one number")
+                    .next("leave it out of the log's table, or check the recording"));
+            }
+            outputs.push(Output { quantity, absolute: mapping.absolute.contains(&quantity), values });
+        }
+        let mut log = Log {
+            name: String::new(),
+            file: mapping.file.clone(),
+            time: time[window.clone()].iter().map(|t| t - start).collect(),
+            input: vec![0.0; within.len()],
+            hold: mapping.hold,
+            outputs,
+        };
+        if let Some(i) = self.roles.iter().position(|role| matches!(role, Role::Input(_))) {
+            log.input = self.inputs(i, &rows, &within)?;
+            // A window that begins between two rows begins with the input of that moment, when nothing was seen.
+            if let (Some(held), true) = (self.held(i, &rows, &within), log.time[0] > 0.0) {
+                let before = time[window.start - 1] - start;
+                let share = match mapping.hold {
+                    Hold::Zero => 0.0,
+                    Hold::Linear => before / (before - log.time[0]),
+                };
+                log.input.insert(0, held + share * (log.input[0] - held));
+                log.time.insert(0, 0.0);
+                log.outputs.iter_mut().for_each(|output| output.values.insert(0, f64::NAN));
+            }
+        }
+        Ok(log)
+    }
+
+    fn in_what(&self, run: Option<&Run>) -> String {
+        let run = run.map(|run| format!(" in the run {}", shown(&run.label))).unwrap_or_default();
+        let window = self.mapping.from.is_some() || self.mapping.to.is_some();
+        format!("{run}{}", if window { " between `from` and `to`" } else { "" })
+    }
+
+    /// The times of these rows, which increase.
+    fn times(&self, rows: Range<usize>) -> Result<Vec<f64>> {
+        let time = &self.values[0];
+        for row in rows.clone().skip(1) {
+            let (before, t) = (time[row - 1], time[row]);
+            if t > before {
+                continue;
+            }
+            let (here, there) = (self.sheet.row(row), self.sheet.row(row - 1));
+            let name = &self.sheet.names[0];
+            let seconds = |t: f64| show(t, "s");
+            let (what, next) = if t == before {
+                let what = format!("the time {} in {here} repeats that of {there}", seconds(t));
+                (what, "keep one row of each time, or say the interval: time = { every = \"1 ms\" }".to_string())
+            } else {
+                let what = format!(
+                    "the clock {name} goes back: from {} in {there} to {} in {here}",
+                    seconds(before),
+                    seconds(t)
+                );
+                (what, self.backward(rows.start, row))
+            };
+            return Err(self.sheet.error(0, row, what).allowed("times that increase from row to row").next(next));
+        }
+        Ok(time[rows].to_vec())
+    }
+
+    /// What to do about a clock that goes back in this row.
+    fn backward(&self, first: usize, row: usize) -> String {
+        let time = &self.values[0];
+        let drop = time[row - 1] - time[row];
+        let step = (time[row - 1] - time[first]) / (row - first - 1).max(1) as f64;
+        // A counter that overflows falls by nearly all of its range, in its own unit.
+        for bits in [16, 32] {
+            let range = 2f64.powi(bits);
+            let factor = self.time_factor();
+            if factor > 0.0 && ((drop + step) / factor - range).abs() <= 0.01 * range + 10.0 * step / factor {
+                return format!("its {bits}-bit counter overflows here: add {range} to it from this row on");
+            }
+        }
+        if time[row] <= time[first] + step {
+            return "a second recording begins here: split the file by a column (split = \"...\"), or cut it".into();
+        }
+        "sort the rows by time, or leave out the rows where the clock was set".into()
+    }
+
+    /// What one of the clock's own unit is, s.
+    fn time_factor(&self) -> f64 {
+        let Clock::Column(source) = &self.mapping.time else { return 1.0 };
+        factor(&self.sheet, 0, Role::Time, source).map_or(1.0, |factor| factor * source.scale)
+    }
+
+    /// The rows between `from` and `to`, counted within the run.
+    fn window(&self, time: &[f64], zero: f64, rows: &Range<usize>, run: Option<&Run>) -> Result<Range<usize>> {
+        let &Mapping { from, to, ref input, ref file, .. } = self.mapping;
+        let fail = |what: String| Error::new(what).in_file(file);
+        let (first, last) = (time.first().copied().unwrap_or_default(), time.last().copied().unwrap_or_default());
+        let [first, last] = [first - zero, last - zero];
+        let of = run.map(|run| format!("the run {}", shown(&run.label))).unwrap_or("the log".into());
+        let extent = format!("from {} to {}", show(first, "s"), show(last, "s"));
+        if let Some(from) = from.filter(|&from| from < first && input.is_some()) {
+            let what = format!(
+                "{of} begins at {}; what was fed in from {} on is not known",
+                show(first, "s"),
+                show(from, "s")
+            );
+            return Err(fail(what).allowed(extent).next("correct `from`, or leave it out"));
+        }
+        let begin = from.map_or(0, |from| time.partition_point(|&t| t - zero < from));
+        let end = to.map_or(time.len(), |to| time.partition_point(|&t| t - zero <= to));
+        match end.saturating_sub(begin) {
+            n if n >= 2 => Ok(begin..end),
+            n if from.is_some() || to.is_some() => {
+                let what = format!(
+                    "{of} has {} between `from` and `to`",
+                    if n == 0 { "no row".into() } else { count(n, "row") }
+                );
+                Err(fail(what)
+                    .allowed(format!("at least two; it goes {extent}"))
+                    .next("correct `from` and `to`, which are on its own clock"))
+            }
+            _ => {
+                let what = format!("{of} has a single row, {}", self.sheet.row(rows.start));
+                let next = match run {
+                    Some(_) => "split by a column that holds one value for each run",
+                    None => "check that the recording was saved",
+                };
+                Err(fail(what).allowed("at least two").next(next))
+            }
+        }
+    }
+
+    /// The inputs in a window of a run.
+    fn inputs(&self, i: usize, rows: &Range<usize>, window: &Range<usize>) -> Result<Vec<f64>> {
+        let column = &self.values[i];
+        let mut last = self.held(i, rows, window).unwrap_or(f64::NAN);
+        let mut inputs = Vec::with_capacity(window.len());
+        for row in window.clone() {
+            let value = column[row];
+            if value.is_nan() && !(self.mapping.hold_missing && !last.is_nan()) {
+                let name = &self.sheet.names[i];
+                let missing = column[window.clone()].iter().filter(|x| x.is_nan()).count();
+                let here = self.sheet.row(row);
+                let what = match missing {
+                    1 => format!("the input {name} has no value in {here}"),
+                    n => format!("the input {name} has no value in {here}, nor in {} after it", count(n - 1, "row")),
+                };
+                let error = self.sheet.error(i, row, what).allowed("a value in every row, for the model needs it");
+                let next = match self.mapping.hold_missing {
+                    true => "nothing came before it that could hold: begin later with `from`",
+                    false => {
+                        "fill it in; or write missing_input = \"hold\" in the log's table if the last one held; or leave these rows out with `from` and `to`"
+                    }
+                };
+                return Err(error.next(next));
+            }
+            if !value.is_nan() {
+                last = value;
+            }
+            inputs.push(last);
+        }
+        Ok(inputs)
+    }
+
+    /// The last input before a window.
+    fn held(&self, i: usize, rows: &Range<usize>, window: &Range<usize>) -> Option<f64> {
+        let before = &self.values[i][rows.start..window.start];
+        match self.mapping.hold_missing {
+            true => before.iter().rev().copied().find(|x| !x.is_nan()),
+            false => before.last().copied().filter(|x| !x.is_nan()),
+        }
     }
 }

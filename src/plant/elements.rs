@@ -222,12 +222,11 @@ impl Plant {
                 watch(if slack { -tension } else { tension }, Switch::Span(j, !slack));
             }
         }
-        match (self.ends(), self.stage.travel) {
-            (Some(ends), Some(travel)) => match travel.stop {
+        if let (Some(ends), Some(travel)) = (self.ends(), self.stage.travel) {
+            match travel.stop {
                 Some(stop) => watch_contact(mode.stop, &ends, stop.damping > 0.0, Switch::Stop, &mut watch),
                 None => guards.extend(ends.map(|(beyond, _)| Guard { form: -beyond, cause: Cause::LeaveTravel })),
-            },
-            _ => {}
+            }
         }
     }
 }

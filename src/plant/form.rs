@@ -87,6 +87,7 @@ impl Form {
     }
 
     /// Its value, from stretches rather than from large positions, so that little is lost to cancellation.
+    #[inline]
     pub fn value(&self, plant: &Plant, state: &State, input: f64) -> f64 {
         let stretch = stretches(plant.stage().pulley_radius, state);
         let mut sum = 0.0;

@@ -237,6 +237,45 @@ pub enum Cause {
     LeaveTravel,
 }
 
+impl Cause {
+    /// Number of kinds that [`Cause::kind`] tells apart: on the three bodies, the gear's torque, three spans, and for each of gear, voltage,
+    /// current and end stop one for each state that it may lead to.
+    pub(crate) const KINDS: usize = 7 + 4 * 3;
+
+    /// Which condition it belongs to; breakaway stands with the body.
+    pub(crate) fn kind(self) -> usize {
+        let limit = |limit| match limit {
+            Limit::Inside => 0,
+            Limit::High => 1,
+            Limit::Low => 2,
+        };
+        let contact = |contact| match contact {
+            Contact::Apart => 0,
+            Contact::High | Contact::HighLoose => 1,
+            Contact::Low | Contact::LowLoose => 2,
+        };
+        match self {
+            Cause::Stop(body) | Cause::BreakForward(body) | Cause::BreakBackward(body) => body.index(),
+            Cause::GearTorque => 3,
+            Cause::Switch(Switch::Span(span, _)) => 4 + span,
+            Cause::Switch(Switch::Gear(to)) => 7 + contact(to),
+            Cause::Switch(Switch::Voltage(to)) => 10 + limit(to),
+            Cause::Switch(Switch::Current(to)) => 13 + limit(to),
+            Cause::Switch(Switch::Stop(to)) => 16 + contact(to),
+            Cause::LeaveTravel => 16,
+        }
+    }
+
+    /// Whether both are of the same part, and it is no body.
+    pub(crate) fn is_of_same_part(self, other: Cause) -> bool {
+        match (self, other) {
+            (Cause::GearTorque, Cause::GearTorque) => true,
+            (Cause::Switch(a), Cause::Switch(b)) => a.part() == b.part(),
+            _ => false,
+        }
+    }
+}
+
 /// What a part other than a body does next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Switch {

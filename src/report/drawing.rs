@@ -151,8 +151,9 @@ fn draw_cart(out: &mut Svg, x: f64, top: f64) {
     let y = rail + 27.0;
     let arrow = Colour::Vermillion.paint();
     out.line((x, y - 6.0), (x, y + 6.0), arrow, 1.6);
-    out.arrow((x, y), (x + 64.0, y), arrow, 1.6);
-    out.symbol((x + 72.0, y + 4.5), 14.0, Anchor::Start, arrow, "", "x");
+    // Towards the drive pulley: there a positive stretch r φ₁ − x makes span 1 longer, and pulls.
+    out.arrow((x, y), (x - 64.0, y), arrow, 1.6);
+    out.symbol((x - 72.0, y + 4.5), 14.0, Anchor::End, arrow, "", "x");
     out.symbol((x, top + 5.0), 14.0, Anchor::Middle, svg::INK, "", "M");
 }
 
@@ -164,10 +165,10 @@ fn pulley(out: &mut Svg, (x, y): (f64, f64), symbol: &str) {
         let a = degrees * PI / 180.0;
         (x + r * a.cos(), y + r * a.sin())
     };
-    let ((ax, ay), (bx, by)) = (at(-160.0), at(-33.0));
-    out.path(&format!("M{} {}A{} {} 0 0 1 {} {}", n(ax), n(ay), n(r), n(r), n(bx), n(by)), arrow, 1.6, "");
-    let a = -24.0 * PI / 180.0;
-    out.head(at(-20.0), (-a.sin(), a.cos()), 7.6, arrow);
+    let ((ax, ay), (bx, by)) = (at(-20.0), at(-147.0));
+    out.path(&format!("M{} {}A{} {} 0 0 0 {} {}", n(ax), n(ay), n(r), n(r), n(bx), n(by)), arrow, 1.6, "");
+    let a = -156.0 * PI / 180.0;
+    out.head(at(-160.0), (a.sin(), -a.cos()), 7.6, arrow);
     out.symbol((x, y - 13.0), 14.0, Anchor::Middle, arrow, "", symbol);
 }
 

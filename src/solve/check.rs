@@ -4,6 +4,7 @@
 
 use crate::case::Experiment;
 use crate::error::{Error, Result};
+use crate::friction::{Friction, Law};
 use crate::plant::{Body, Plant};
 use crate::stage::{AmplifierMode, BeltModel, Stage};
 use std::f64::consts::PI;
@@ -81,6 +82,48 @@ pub(super) fn stage(stage: &Stage) -> Result<()> {
         }
     }
 
+    for (body, law) in Body::ALL.into_iter().zip(laws) {
+        match law.law {
+            Law::Coulomb => {}
+            Law::Stribeck { velocity, .. } => positive("a Stribeck velocity", &[velocity])?,
+            Law::Smooth { breakaway_velocity } => positive("a breakaway velocity", &[breakaway_velocity])?,
+            Law::LuGre { stiffness, damping, velocity } => {
+                positive("a Stribeck velocity, or the bristles' stiffness", &[velocity, stiffness])?;
+                not_negative("the bristles' damping", &[damping])?;
+                positive("Coulomb friction under bristles", &[law.forward.coulomb, law.backward.coulomb])?;
+                if let Some(along) = stage.cart.along.as_ref().filter(|_| body == Body::Cart) {
+                    let factors: Vec<f64> = along.points().iter().map(|point| point[1]).collect();
+                    positive("the factor of friction along the travel, under bristles,", &factors)?;
+                }
+            }
+        }
+        let never_sticks = matches!(law.law, Law::Smooth { .. } | Law::LuGre { .. });
+        if body == Body::DrivePulley && never_sticks && motor.gear_efficiency < 1.0 {
+            return Err(Error::new(
+                "a gear that loses power, and a friction law that never sticks at the drive pulley",
+            )
+            .allowed("one of the two")
+            .next("set gear_efficiency to 1, or give the drive pulley Coulomb friction or a Stribeck curve"));
+        }
+    }
+    let reduced = stage.belt.model != BeltModel::Elastic;
+    if reduced {
+        one_law_each(stage)?;
+    }
+    if stage.belt.follows_cart {
+        if reduced || stage.belt.pretension.is_some() {
+            return Err(Error::new("spans that follow the cart do not go together with pretension or a reduced model"));
+        }
+        let (Some(make), Some(travel)) = (stage.belt.make, stage.travel) else {
+            return Err(Error::new("spans that follow the cart need modulus, section, spans and a travel"));
+        };
+        let [l1, l2, _] = make.spans;
+        if !(-l2 < travel.min && travel.min < travel.max && travel.max < l1) {
+            let what = format!("a travel from {} m to {} m leaves no span", travel.min, travel.max);
+            return Err(Error::new(what).allowed(format!("above {} m, below {l1} m", -l2)));
+        }
+    }
+
     // Whatever is by itself this fast: the current, and each body against its springs, dampers, friction and the motor.
     if let Some(bandwidth) = amplifier.bandwidth.filter(|bandwidth| 2.0 * PI * bandwidth > FASTEST) {
         return Err(too_fast("the current", 2.0 * PI * bandwidth).next("leave the bandwidth out: it does not show"));
@@ -103,6 +146,80 @@ pub(super) fn stage(stage: &Stage) -> Result<()> {
         let rate = f64::max((k * arm / inertia).sqrt(), drag / inertia);
         if rate > FASTEST {
             return Err(too_fast("a body", rate).next("give it more inertia, or less stiffness, damping and friction"));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses what is not linear between its changes of mode.
+pub(super) fn piecewise_linear(stage: &Stage) -> Result<()> {
+    if stage.is_piecewise_linear() {
+        return Ok(());
+    }
+    let bent = [
+        (stage.drive_pulley.friction, "drive pulley"),
+        (stage.cart.friction, "cart"),
+        (stage.idler_pulley.friction, "idler pulley"),
+    ];
+    let what = match bent.iter().find(|(law, _)| !law.is_piecewise_linear()) {
+        Some((_, body)) => format!("the friction law of the {body} is no straight line"),
+        None if stage.cart.along.is_some() => "the cart's friction changes along the travel".into(),
+        None => "the belt's spans follow the cart".into(),
+    };
+    Err(Error::new(format!("{what}: this solver does not take it"))
+        .next("leave --solver out, or write --solver general: it takes all of these"))
+}
+
+/// The fastest rate, 1/s, that is known beforehand: of the current, and of each body against all that holds or damps it.
+pub(super) fn fastest_rate(stage: &Stage) -> f64 {
+    let motor = &stage.motor;
+    let r2 = stage.pulley_radius * stage.pulley_radius;
+    let rigid = stage.belt.model == BeltModel::Rigid;
+    let [k1, k2, k3] = if rigid { [0.0; 3] } else { stage.belt.stiffness };
+    let [c1, c2, c3] = if rigid { [0.0; 3] } else { stage.belt.damping };
+    let bodies = [
+        (stage.drive_pulley.inertia, stage.drive_pulley.friction, (k1 + k3) * r2, (c1 + c3) * r2),
+        (stage.cart.mass, stage.cart.friction, k1 + k2, c1 + c2),
+        (stage.idler_pulley.inertia, stage.idler_pulley.friction, (k2 + k3) * r2, (c2 + c3) * r2),
+    ];
+    let mut fastest: f64 = match stage.amplifier.mode {
+        _ if motor.inductance > 0.0 => motor.resistance / motor.inductance,
+        _ => 0.0,
+    };
+    fastest = fastest.max(2.0 * PI * stage.amplifier.bandwidth.unwrap_or(0.0));
+    if let Some(play) = motor.gear_play {
+        let light = (motor.gear_ratio.powi(2) * motor.rotor_inertia).min(stage.drive_pulley.inertia);
+        fastest = fastest.max((2.0 * play.stiffness / light).sqrt()).max(2.0 * play.damping / light);
+    }
+    if let Some(stop) = stage.travel.and_then(|travel| travel.stop) {
+        fastest = fastest.max((stop.stiffness / stage.cart.mass).sqrt()).max(stop.damping / stage.cart.mass);
+    }
+    for (inertia, friction, k, c) in bodies {
+        let (k, c) = match friction.law {
+            Law::Coulomb | Law::Stribeck { .. } => (k, c),
+            Law::Smooth { .. } => (k, c + friction.slope(0.0)),
+            Law::LuGre { stiffness, damping, .. } => (k + stiffness, c + damping),
+        };
+        let viscous = friction.forward.viscous.max(friction.backward.viscous);
+        fastest = fastest.max((k / inertia).sqrt()).max((c + viscous) / inertia);
+    }
+    fastest
+}
+
+/// Where several bodies move as one, a law other than Coulomb's stands for all of them, at the one that leads.
+fn one_law_each(stage: &Stage) -> Result<()> {
+    let plant = Plant::new(stage);
+    let laws = [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction];
+    for leader in plant.leaders() {
+        let followers = || plant.followers(leader).filter(|&body| body != leader);
+        let plain = |body: Body| laws[body.index()].law == Law::Coulomb;
+        let none = |body: Body| laws[body.index()] == Friction::default();
+        if !(followers().all(plain) && (plain(leader) || followers().all(none))) {
+            return Err(Error::new(format!(
+                "in this model of the belt the {} moves as one with others, whose friction laws cannot be added up",
+                leader.name()
+            ))
+            .allowed(format!("such a law for the {} alone, or Coulomb friction for all of them", leader.name())));
         }
     }
     Ok(())
@@ -133,11 +250,8 @@ pub(super) fn experiment(plant: &Plant, experiment: &Experiment) -> Result<()> {
         initial.idler_speed,
         initial.motor_current,
     ];
-    match state.iter().find(|v| !v.is_finite()) {
-        Some(value) => {
-            return Err(Error::new(format!("the state at the start cannot be {value}")).allowed("any finite number"));
-        }
-        None => {}
+    if let Some(value) = state.iter().find(|v| !v.is_finite()) {
+        return Err(Error::new(format!("the state at the start cannot be {value}")).allowed("any finite number"));
     }
     // What moves as one begins as one.
     let state = initial.state(plant);

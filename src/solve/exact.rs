@@ -8,29 +8,18 @@
 //! V(y) = ½ Σ m a² + ½ Σ k (Δv)² + ½ w L (di/dt)² can only grow by the input's rate: √(2V)(τ) ≤ √(2V)(0) + |b|·|u̇|·τ. A guard
 //! g = w·z therefore changes no faster than |w|·√(2V), |w| being the norm dual to V; and likewise its slope, with ẏ.
 
+mod change;
+
 use super::law::{Law, Size, Watch, chain, highest, states};
 use super::propagator::SERIES_ORDER;
 use super::record::Recorder;
 use super::roots;
 use super::{Cost, Ending, Event, Flow, Grid, Outcome};
 use crate::case::Experiment;
-use crate::friction::Motion;
-use crate::plant::{Body, Cause, Contact, Form, Limit, Mode, Part, Plant, State, Status, Switch, place};
+use crate::plant::{Cause, Form, Mode, Plant, State, place};
 use crate::signal::Piece;
-use crate::stage::AmplifierMode;
 use crate::trajectory::Trajectory;
 use std::rc::Rc;
-
-/// Events allowed at once, per simulated second, and in all: more is an accumulation, not a machine, or fills the memory.
-const EVENTS_AT_LEAST: f64 = 1e5;
-const EVENTS_PER_SECOND: f64 = 1e7;
-const EVENTS_AT_MOST: f64 = 2e7;
-
-/// Mode changes allowed at one instant.
-const CHANGES_AT_ONCE: usize = 100;
-
-/// Turns of a body at one instant after which it is taken to rest.
-const TURNS_AT_ONCE: usize = 20;
 
 /// For so small a part of the series' reach a speed that has left zero is still told by its series alone.
 const SOON: f64 = 1e-6;
@@ -47,43 +36,6 @@ pub(crate) fn run(plant: &Plant, experiment: &Experiment, sink: &mut dyn FnMut(&
     }
 }
 
-/// Conditions that are told apart: on the three bodies, the gear's torque, three spans, and for each of gear, voltage,
-/// current and end stop one for each state that it may lead to.
-const WATCHED: usize = 7 + 4 * 3;
-
-/// Which of them a cause belongs to; breakaway stands with the body.
-fn watched(cause: Cause) -> usize {
-    let limit = |limit| match limit {
-        Limit::Inside => 0,
-        Limit::High => 1,
-        Limit::Low => 2,
-    };
-    let contact = |contact| match contact {
-        Contact::Apart => 0,
-        Contact::High | Contact::HighLoose => 1,
-        Contact::Low | Contact::LowLoose => 2,
-    };
-    match cause {
-        Cause::Stop(body) | Cause::BreakForward(body) | Cause::BreakBackward(body) => body.index(),
-        Cause::GearTorque => 3,
-        Cause::Switch(Switch::Span(span, _)) => 4 + span,
-        Cause::Switch(Switch::Gear(to)) => 7 + contact(to),
-        Cause::Switch(Switch::Voltage(to)) => 10 + limit(to),
-        Cause::Switch(Switch::Current(to)) => 13 + limit(to),
-        Cause::Switch(Switch::Stop(to)) => 16 + contact(to),
-        Cause::LeaveTravel => 16,
-    }
-}
-
-/// Whether two causes, neither of them a body's, are of the same part.
-fn same_part(a: Cause, b: Cause) -> bool {
-    match (a, b) {
-        (Cause::GearTorque, Cause::GearTorque) => true,
-        (Cause::Switch(a), Cause::Switch(b)) => a.part() == b.part(),
-        _ => false,
-    }
-}
-
 /// A run under way.
 struct Run<'a, const R: usize, const C: usize> {
     plant: &'a Plant,
@@ -97,11 +49,11 @@ struct Run<'a, const R: usize, const C: usize> {
     laws: Vec<Rc<Law<R, C>>>,
     /// How many leading Taylor coefficients of a sliding body's speed are zero by definition, because it starts from rest:
     /// 1 where it is accelerated, 2 where the load has only just reached its friction. The same for all else that is watched.
-    fresh: [usize; WATCHED],
+    fresh: [usize; Cause::KINDS],
     /// By how much the load on a stuck body may pass its breakaway before it counts: what rounding can do to the load.
     /// Without it a body that comes to rest just at its limit would chatter on the last bit. The same for all else that is
     /// watched where it is zero but for rounding, and would count as wrong in either state.
-    slack: [f64; WATCHED],
+    slack: [f64; Cause::KINDS],
     /// Bounds of |u̇| and |ü| on the present piece.
     input_rate: f64,
     input_curvature: f64,
@@ -143,8 +95,8 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             mode,
             laws: vec![Rc::clone(&law)],
             law,
-            fresh: [0; WATCHED],
-            slack: [0.0; WATCHED],
+            fresh: [0; Cause::KINDS],
+            slack: [0.0; Cause::KINDS],
             input_rate: 0.0,
             input_curvature: 0.0,
             row: 0,
@@ -234,7 +186,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         }
         self.input_rate = rate;
         self.input_curvature = curvature;
-        self.fresh = [0; WATCHED];
+        self.fresh = [0; Cause::KINDS];
     }
 
     /// Advances to `offset` behind row `row`, event by event.
@@ -333,21 +285,21 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         guard.standing(&self.z)
             + match guard.cause {
                 Cause::Stop(_) => 0.0,
-                cause => self.slack[watched(cause)],
+                cause => self.slack[cause.kind()],
             }
     }
 
     fn fresh_order(&self, cause: Cause) -> usize {
         match cause {
             Cause::BreakForward(_) | Cause::BreakBackward(_) => 0,
-            cause => self.fresh[watched(cause)],
+            cause => self.fresh[cause.kind()],
         }
     }
 
     /// Advances by `distance`, at most an interval; stops at the first guard that falls and says why.
     fn advance(&mut self, mut distance: f64) -> Option<Cause> {
         let law = Rc::clone(&self.law);
-        if self.fresh != [0; WATCHED] && distance > 0.0 {
+        if self.fresh != [0; Cause::KINDS] && distance > 0.0 {
             // A speed that starts from zero is told apart from one that falls to zero by its series.
             let first = distance.min(law.reach());
             if let Some(cause) = self.creep(&law, first) {
@@ -458,7 +410,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         }
         self.offset += s * distance;
         if s * distance > SOON * law.reach() {
-            self.fresh = [0; WATCHED];
+            self.fresh = [0; Cause::KINDS];
         }
         first.map(|(_, cause)| cause)
     }
@@ -479,191 +431,5 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
 
     fn value(&self, form: &Form) -> f64 {
         form.value(self.plant, &self.state(), self.input())
-    }
-
-    /// Load on a body at rest that would go forward, or backward (the same unless the gear loses power); what friction
-    /// would then take of it; and what rounding may have done to it.
-    fn load(&self, body: Body, forward: bool) -> (f64, f64, f64) {
-        let positive = self.value(&self.plant.current(&self.mode)) >= 0.0;
-        let mode = Mode { gear_torque_positive: positive, ..self.mode };
-        let form = self.plant.load(body, forward, &mode);
-        let law = self.plant.friction(body);
-        let resistance = if forward { law.forward.coulomb } else { -law.backward.coulomb };
-        (self.value(&form), resistance, form.noise(self.plant, &self.state(), self.input()))
-    }
-
-    /// What a body at zero speed does under its present load.
-    fn decide(&self, body: Body) -> Motion {
-        let law = self.plant.friction(body);
-        let (forward, _, noise) = self.load(body, true);
-        if forward > law.forward.breakaway + noise {
-            return Motion::Forward;
-        }
-        let (backward, _, noise) = self.load(body, false);
-        if backward < -law.backward.breakaway - noise { Motion::Backward } else { Motion::Stuck }
-    }
-
-    /// Goes into the mode that follows when `cause` ends the present one.
-    fn change(&mut self, cause: Cause) {
-        let here = (self.row, self.offset);
-        self.changes = if here == self.changed_at { self.changes + 1 } else { 0 };
-        self.changed_at = here;
-        if self.changes > CHANGES_AT_ONCE {
-            self.trouble = Some(Ending::TooManyEvents { time: self.time() });
-        }
-        let (body, to) = match cause {
-            Cause::GearTorque => {
-                self.mode.gear_torque_positive = !self.mode.gear_torque_positive;
-                self.enter();
-                self.forgive(cause);
-                return;
-            }
-            Cause::Switch(switch) => {
-                self.switch(switch);
-                return;
-            }
-            Cause::LeaveTravel => {
-                self.trouble = Some(Ending::LeftTravel { time: self.time() });
-                return;
-            }
-            Cause::Stop(body) => {
-                for follower in self.plant.followers(body) {
-                    self.z[follower.speed_place()] = 0.0;
-                }
-                // Where rounding turns a body back again and again without a moment passing, it rests.
-                (body, if self.changes > TURNS_AT_ONCE { Motion::Stuck } else { self.decide(body) })
-            }
-            Cause::BreakForward(body) => (body, Motion::Forward),
-            Cause::BreakBackward(body) => (body, Motion::Backward),
-        };
-        // Where it stops, the load is the one on the side it came from.
-        let from = self.mode.motion[body.index()];
-        let side = if to == Motion::Stuck { from } else { to };
-        let (load, resistance, noise) = self.load(body, side != Motion::Backward);
-        self.fresh[body.index()] = match (to, cause) {
-            (Motion::Stuck | Motion::Free, _) => 0,
-            (_, Cause::Stop(_)) => 1,
-            // Where breakaway equals Coulomb friction the acceleration starts from zero, but for rounding.
-            _ if (load - resistance).abs() <= 2.0 * noise => 2,
-            _ => 1,
-        };
-        for follower in self.plant.followers(body) {
-            self.mode.motion[follower.index()] = to;
-        }
-        self.slack[body.index()] = if self.changes > TURNS_AT_ONCE { 20.0 } else { 2.0 } * noise;
-        self.note(Part::Body(body), Status::Motion(from), load);
-        self.enter();
-    }
-
-    /// Lets a part other than a body do something else.
-    fn switch(&mut self, switch: Switch) {
-        let before = self.mode.status(switch.part());
-        // Let go by the motion and not by an edge of the input, a current leaves its limit with no rate of its own.
-        let at_edge = |guard: &Watch<C>| guard.value(&self.z).abs() <= 20.0 * guard.noise(&self.z);
-        let gently = self.law.guards.iter().any(|guard| guard.cause == Cause::Switch(switch) && at_edge(guard));
-        self.mode.switch(switch);
-        self.note(switch.part(), before, 0.0);
-        self.enter();
-        if let (Switch::Current(side), true) = (switch, self.current_stands()) {
-            if side != Limit::Inside {
-                // It stands at its limit, to the last bit.
-                self.z[place::CURRENT] = side.sign() * self.plant.stage().amplifier.current_limit.unwrap_or(0.0);
-            }
-            self.forgive(Cause::Switch(switch));
-            if let (Status::Limit(left), true) = (before, side == Limit::Inside && gently) {
-                self.fresh[watched(Cause::Switch(Switch::Current(left)))] = 2;
-            }
-        } else {
-            self.forgive(Cause::Switch(switch));
-        }
-    }
-
-    /// Whether the current is a state that its limit holds.
-    fn current_stands(&self) -> bool {
-        self.plant.has_current_state() && self.plant.stage().amplifier.mode == AmplifierMode::Voltage
-    }
-
-    /// Notes an event, unless nothing that shows has changed.
-    fn note(&mut self, part: Part, from: Status, load: f64) {
-        let (time, to) = (self.time(), self.mode.status(part));
-        // What passes through another state without staying there goes straight.
-        let passed = |e: &Event| e.time == time && e.part == part && e.body().is_none();
-        let from = match self.events.iter().rev().take_while(|e| e.time == time).position(passed) {
-            Some(back) => self.events.remove(self.events.len() - 1 - back).from,
-            None => from,
-        };
-        if from.code() != to.code() {
-            self.events.push(Event { time, part, from, to, load });
-        }
-    }
-
-    /// Takes what has just become a condition on a part for zero where it is that but for rounding.
-    fn forgive(&mut self, cause: Cause) {
-        let law = Rc::clone(&self.law);
-        for guard in law.guards.iter().filter(|guard| same_part(guard.cause, cause)) {
-            let (now, noise) = (guard.value(&self.z), guard.noise(&self.z));
-            let zero = now.abs() <= 20.0 * noise;
-            let index = watched(guard.cause);
-            (self.slack[index], self.fresh[index]) = match zero {
-                false => (0.0, 0),
-                true if self.changes <= TURNS_AT_ONCE => (f64::max(-now, 0.0), 1),
-                // Where rounding moves a part back and forth without a moment passing, it stays where it is.
-                true => (40.0 * noise, 0),
-            };
-        }
-    }
-
-    /// Takes up the equations of the present mode.
-    fn enter(&mut self) {
-        let known = self.laws.iter().find(|law| law.mode == self.mode);
-        self.law = match known {
-            Some(law) => Rc::clone(law),
-            None => {
-                let law = Rc::new(Law::new(self.plant, self.mode, self.h));
-                self.cost.modes += 1;
-                self.laws.push(Rc::clone(&law));
-                law
-            }
-        };
-    }
-
-    /// Changes modes, without time passing, until every guard holds.
-    fn resolve(&mut self) {
-        for _ in 0..CHANGES_AT_ONCE {
-            let law = Rc::clone(&self.law);
-            let y = law.rate(&self.z);
-            let falls = |guard: &&Watch<C>| {
-                let g = self.standing(guard);
-                let slope = guard.slope(&y);
-                if g != 0.0 || self.fresh_order(guard.cause) > 0 {
-                    return g < 0.0;
-                }
-                if slope != 0.0 {
-                    return slope < 0.0;
-                }
-                // On the edge and not moving off it at once: the first term of its series that is not zero decides.
-                let series = law.series(&self.z, law.reach());
-                let terms = series[2..].iter().map(|term| guard.value(term));
-                terms.into_iter().find(|&term| term != 0.0).is_some_and(|term| term < 0.0)
-            };
-            let fallen = law.guards.iter().find(falls);
-            match fallen {
-                Some(guard) => self.change(guard.cause),
-                None => {
-                    // A torque that starts from zero does so whichever way the gear counts as carrying.
-                    let torque = law.guards.iter().find(|guard| guard.cause == Cause::GearTorque);
-                    if torque.is_some_and(|torque| torque.is_zero(&self.z)) {
-                        self.fresh[3] = 1;
-                    }
-                    if self.events.len() as f64
-                        > f64::min(EVENTS_AT_LEAST + EVENTS_PER_SECOND * self.time(), EVENTS_AT_MOST)
-                    {
-                        self.trouble = Some(Ending::TooManyEvents { time: self.time() });
-                    }
-                    return;
-                }
-            }
-        }
-        self.trouble = Some(Ending::TooManyEvents { time: self.time() });
     }
 }

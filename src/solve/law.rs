@@ -187,10 +187,8 @@ impl<const R: usize, const C: usize> Law<R, C> {
                     sum += form.stretch[j] * form.stretch[j] / stiffness[j];
                 }
             }
-            for j in 0..SPEEDS {
-                if form.speed[j] != 0.0 {
-                    sum += form.speed[j] * form.speed[j] / inertia[j];
-                }
+            for (speed, inertia) in form.speed.iter().zip(inertia).filter(|(speed, _)| **speed != 0.0) {
+                sum += speed * speed / inertia;
             }
             let magnetic = if form.current == 0.0 { 0.0 } else { form.current.abs() / magnetic.sqrt() };
             Size { mechanical: sum.sqrt() * (1.0 + 1e-9), magnetic: magnetic * (1.0 + 1e-9) }

@@ -2,6 +2,7 @@
 
 mod check;
 mod exact;
+mod general;
 mod law;
 mod propagator;
 mod record;
@@ -20,6 +21,11 @@ pub enum Solver {
     /// Modes and matrix exponentials: exact to rounding.
     #[default]
     Exact,
+    /// An adaptive formula between located events: any friction law, spans that follow the cart.
+    General {
+        /// Error allowed in each step: relative, and absolute for what is smaller than 1 rad, rad/s or A, or r and r/s.
+        tolerance: f64,
+    },
     /// The paper's Table 3 with a fixed step: a reproduction, not a recommendation.
     Table3 {
         /// Step, s; shortened so that steps fill the output interval.
@@ -27,6 +33,16 @@ pub enum Solver {
         /// Formula.
         method: Method,
     },
+}
+
+impl Solver {
+    /// The general solver with a tolerance that keeps positions to about 1e-11 m.
+    pub const GENERAL: Self = Self::General { tolerance: 1e-9 };
+
+    /// The solver for this stage: the exact one where it can be.
+    pub fn of(stage: &Stage) -> Self {
+        if stage.is_piecewise_linear() { Self::Exact } else { Self::GENERAL }
+    }
 }
 
 /// A fixed-step formula.
@@ -60,6 +76,19 @@ impl Event {
         match self.part {
             Part::Body(body) => Some(body),
             _ => None,
+        }
+    }
+
+    /// Adds it to `events`, unless nothing that shows has changed. A part other than a body that passes through a state without
+    /// staying there goes straight.
+    fn note(mut self, events: &mut Vec<Event>) {
+        let passed = |e: &Event| e.part == self.part && e.body().is_none();
+        let now = events.iter().rev().take_while(|e| e.time == self.time);
+        if let Some(back) = now.into_iter().position(passed) {
+            self.from = events.remove(events.len() - 1 - back).from;
+        }
+        if self.from.code() != self.to.code() {
+            events.push(self);
         }
     }
 }
@@ -108,7 +137,7 @@ pub struct Cost {
     pub looks: u64,
     /// Taylor series of the state expanded.
     pub series: u64,
-    /// Evaluations of the equations of motion (fixed-step methods).
+    /// Evaluations of the equations of motion (all but the exact solver).
     pub evaluations: u64,
 }
 
@@ -236,7 +265,11 @@ pub fn stream(
     check::stage(stage)?;
     let plant = Plant::new(stage);
     check::experiment(&plant, experiment)?;
+    if !matches!(solver, Solver::General { .. }) {
+        check::piecewise_linear(stage)?;
+    }
     match solver {
+        Solver::General { tolerance } => general::run(&plant, experiment, tolerance, sink),
         Solver::Exact => Ok(exact::run(&plant, experiment, sink)),
         Solver::Table3 { step, method } => table3::run(&plant, experiment, step, method, sink),
     }

@@ -1,13 +1,24 @@
 //! From states to the columns that a user sees, block by block.
 
 use super::{Flow, Grid};
-use crate::friction::Motion;
+use crate::friction::{Law, Motion};
 use crate::plant::{Body, Form, Mode, Part, Plant, SPEEDS, STRETCHES, State, place};
 use crate::stage::{AmplifierMode, BeltModel, EncoderPlace};
 use crate::trajectory::{Column, Trajectory};
 
 /// Rows handed on at a time; small enough to stay in the processor's cache.
 const BLOCK: usize = 256;
+
+/// What a row shows that does not follow from its state by the linear equations.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Extra {
+    /// Friction beyond b v ± F_c, N or N m.
+    pub(crate) friction: [f64; 3],
+    /// Forces of spans 1 and 2 beyond those with the stiffness at x = 0, N.
+    pub(crate) span: [f64; 2],
+    /// Deflection of the bristles, m or rad.
+    pub(crate) bristle: [f64; 3],
+}
 
 /// Collects rows of states and hands them on as blocks of columns.
 pub(crate) struct Recorder<'a> {
@@ -16,6 +27,8 @@ pub(crate) struct Recorder<'a> {
     /// States, with the input.
     raw: Vec<(State, f64)>,
     modes: Vec<Mode>,
+    /// One for each row, or none at all where the linear equations say everything.
+    extra: Vec<Extra>,
     /// Columns that are only needed on the way: stretches, rotor, current and input, gear torque and force of the stops.
     scratch: [Vec<f64>; 9],
     block: Trajectory,
@@ -33,6 +46,7 @@ impl<'a> Recorder<'a> {
             grid,
             raw: Vec::with_capacity(BLOCK),
             modes: Vec::with_capacity(BLOCK),
+            extra: Vec::new(),
             scratch: Default::default(),
             block: Trajectory { columns: headings(plant) },
             sink,
@@ -56,6 +70,12 @@ impl<'a> Recorder<'a> {
         }
     }
 
+    /// Adds the next row with what its state does not tell.
+    pub(crate) fn push_with(&mut self, state: State, input: f64, mode: Mode, extra: Extra) {
+        self.extra.push(extra);
+        self.push(state, input, mode);
+    }
+
     /// Hands on what is left.
     pub(crate) fn finish(&mut self) {
         if !self.raw.is_empty() {
@@ -71,13 +91,14 @@ impl<'a> Recorder<'a> {
         }
         self.raw.clear();
         self.modes.clear();
+        self.extra.clear();
     }
 
     /// Computes every column of the block from the states, column by column so that the loops become vector instructions.
     fn fill(&mut self) {
         let plant = self.plant;
         let stage = plant.stage();
-        let (raw, modes) = (&self.raw, &self.modes);
+        let (raw, modes, extras) = (&self.raw, &self.modes, &self.extra);
         let rows = raw.len();
         let mut columns = self.block.columns.iter_mut().map(|column| &mut column.values);
         let mut next = || {
@@ -130,6 +151,10 @@ impl<'a> Recorder<'a> {
             for (force, form) in [&mut *f1, &mut *f2, &mut *f3].into_iter().zip(plant.span_forces(mode)) {
                 source.put(&mut force[rows.clone()], rows.start, &form);
             }
+        }
+        for (j, extra) in extras.iter().enumerate() {
+            f1[j] += extra.span[0];
+            f2[j] += extra.span[1];
         }
         // What a limit holds is not beyond it by one bit.
         for (column, limit) in
@@ -193,6 +218,9 @@ impl<'a> Recorder<'a> {
                 }
                 start += same.len();
             }
+            for (value, extra) in friction.iter_mut().zip(extras) {
+                *value += extra.friction[body.index()];
+            }
         }
         for body in 0..3 {
             put(next(), |j| f64::from(modes[j].motion[body].code()));
@@ -222,6 +250,9 @@ impl<'a> Recorder<'a> {
             };
             let counts = encoder.counts_per_unit(stage.motor.gear_ratio);
             put(next(), |j| (raw[j].0[place] * counts).round());
+        }
+        for body in bristles(plant) {
+            put(next(), |j| extras[j].bristle[body.index()]);
         }
     }
 }
@@ -280,6 +311,11 @@ fn shows_stop(plant: &Plant) -> bool {
     plant.stage().travel.is_some_and(|travel| travel.stop.is_some())
 }
 
+/// The bodies whose friction is that of bristles.
+fn bristles(plant: &Plant) -> impl Iterator<Item = Body> {
+    Body::ALL.into_iter().filter(|body| matches!(plant.friction(*body).law, Law::LuGre { .. }))
+}
+
 /// The columns of a run on this stage, without rows.
 pub(crate) fn headings(plant: &Plant) -> Vec<Column> {
     let mut columns: Vec<Column> = [
@@ -323,6 +359,10 @@ pub(crate) fn headings(plant: &Plant) -> Vec<Column> {
     }
     if plant.stage().encoder.is_some() {
         columns.push(Column::new("encoder_count", ""));
+    }
+    for body in bristles(plant) {
+        let unit = if body == Body::Cart { "m" } else { "rad" };
+        columns.push(Column::new(format!("{}_bristle", body.key()), unit));
     }
     columns
 }

@@ -9,9 +9,10 @@ use taut::friction::Friction;
 use taut::signal::Signal;
 use taut::stage::{Amplifier, AmplifierMode, Belt, Cart, Motor, Pulley, Stage};
 
-/// The folder of data that are read in place, beside the repository; `None` where it is absent.
+/// The folder of data that are read in place, beside the repository or where `TAUT_SHARED` says; `None` where it is absent.
 pub fn shared(folder: &str) -> Option<PathBuf> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared").join(folder);
+    let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared");
+    let path = std::env::var_os("TAUT_SHARED").map_or_else(beside, PathBuf::from).join(folder);
     path.is_dir().then_some(path)
 }
 
@@ -33,7 +34,7 @@ pub fn paper_stage(stiffness: [f64; 3], inertia: f64, pulley: Friction, cart: Fr
         pulley_radius: 0.0194,
         drive_pulley: pulley,
         idler_pulley: pulley,
-        cart: Cart { mass: 0.362, friction: cart, load: 0.0, inclination: 0.0 },
+        cart: Cart::new(0.362, cart),
         belt: Belt::given(stiffness, [0.0; 3]),
         travel: None,
         encoder: None,

@@ -236,5 +236,5 @@ pub fn frictions(stage: &mut Stage) -> [&mut Friction; 3] {
 fn scaled(law: &Friction, factor: f64) -> Friction {
     let side =
         |s: Side| Side { viscous: s.viscous * factor, coulomb: s.coulomb * factor, breakaway: s.breakaway * factor };
-    Friction { forward: side(law.forward), backward: side(law.backward) }
+    Friction { forward: side(law.forward), backward: side(law.backward), ..*law }
 }

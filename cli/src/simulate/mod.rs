@@ -21,12 +21,12 @@ use taut::{Error, Result};
 
 /// Reads the case, simulates, measures, reports.
 pub fn run(args: &Simulate) -> Outcome {
-    let solver = args.solver()?;
     let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
     let case = Case::read_with(&args.case, &changes)?;
+    let solver = args.solver(&case.stage)?;
     let experiments = chosen(&case, &args.experiments)?;
     if args.as_measured {
-        measurable(&case, args)?;
+        measurable(&case, solver, args)?;
     }
     let folder = args.out.as_deref().map(Folder::create).transpose()?;
     let interrupt = Interrupt::listen();
@@ -52,15 +52,15 @@ pub fn run(args: &Simulate) -> Outcome {
 }
 
 /// Refuses to log what nobody measures, and what would not be the run.
-fn measurable(case: &Case, args: &Simulate) -> Result<()> {
+fn measurable(case: &Case, solver: Solver, args: &Simulate) -> Result<()> {
     if case.stage.encoder.is_none() && case.measurement.is_none() {
         return Err(Error::new("--as-measured: this case does not say how it is measured").in_file(&args.case).next(
             "add [encoder] with for example at = \"motor\" and lines = 512, \
              or [measurement] with a quantity such as motor_current = { step = \"10 mA\" }",
         ));
     }
-    match args.solver()? {
-        Solver::Exact => Ok(()),
+    match solver {
+        Solver::Exact | Solver::General { .. } => Ok(()),
         Solver::Table3 { .. } => {
             Err(Error::new("the steps of --solver table3 follow the rows, and a log has rows of its own")
                 .in_file("--as-measured")

@@ -16,6 +16,7 @@ const MOST_EVENTS: usize = 200;
 pub fn page(case: &Case, text: &str, solver: Solver, runs: &[Run], figures: &[Vec<Named>]) -> Page {
     let how = match solver {
         Solver::Exact => "Solved exactly: modes and matrix exponentials, events located to rounding.",
+        Solver::General { .. } => "Solved with an adaptive formula of order eight between located events.",
         Solver::Table3 { .. } => {
             "Solved with the friction function of the paper's Table 3 and a fixed step: a reproduction, not exact."
         }

@@ -13,6 +13,7 @@ use taut::measure;
 use taut::metrics::{Meter, Metrics};
 use taut::reduction::Reduction;
 use taut::solve::{self, Flow, Solver};
+use taut::stage::BeltModel;
 #[cfg(feature = "parquet")]
 use taut::trajectory::ParquetWriter;
 use taut::trajectory::{CsvWriter, Trajectory};
@@ -39,6 +40,8 @@ pub struct Run<'a> {
     pub curves: Option<Curves>,
     /// Its samples, where they and plots are wanted.
     pub samples: Option<Samples>,
+    /// Its model of the belt.
+    pub model: BeltModel,
     /// How far its model is from the elastic one, where it is a reduced one.
     pub reduction: Option<Reduction>,
     /// Its files, as paths within the folder.
@@ -89,7 +92,7 @@ impl<'a> Setting<'a> {
         let metrics = meter.finish(&outcome.events);
         let took = begin.elapsed();
         let reduction = Reduction::of(stage, experiment, self.solver)?;
-        Ok(Run { experiment, outcome, metrics, curves, samples, reduction, files, took })
+        Ok(Run { experiment, outcome, metrics, curves, samples, model: stage.belt.model, reduction, files, took })
     }
 
     /// Runs it once more, as its recorder sees it, and writes the log.

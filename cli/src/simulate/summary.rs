@@ -25,6 +25,8 @@ pub struct Summary {
 struct SolverUsed {
     name: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
+    tolerance: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     step_s: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     method: Option<&'static str>,
@@ -174,13 +176,16 @@ impl Summary {
 impl SolverUsed {
     fn of(solver: Solver) -> Self {
         match solver {
-            Solver::Exact => Self { name: "exact", step_s: None, method: None },
+            Solver::Exact => Self { name: "exact", tolerance: None, step_s: None, method: None },
+            Solver::General { tolerance } => {
+                Self { name: "general", tolerance: Some(tolerance), step_s: None, method: None }
+            }
             Solver::Table3 { step, method } => {
                 let method = match method {
                     Method::RungeKutta4 => "rk4",
                     Method::DormandPrince5 => "dp5",
                 };
-                Self { name: "table3", step_s: Some(step), method: Some(method) }
+                Self { name: "table3", tolerance: None, step_s: Some(step), method: Some(method) }
             }
         }
     }

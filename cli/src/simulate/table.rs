@@ -11,6 +11,7 @@ use taut::number;
 use taut::plant::Part;
 use taut::reduction::Reduction;
 use taut::solve::{Ending, Method, Solver};
+use taut::stage::BeltModel;
 
 /// The text on the terminal.
 pub fn text(case: &Case, solver: Solver, runs: &[Run], folder: Option<&Folder>) -> String {
@@ -115,6 +116,10 @@ pub fn lines(run: &Run, solver: Solver) -> Vec<(&'static str, String)> {
         ),
         ("cost", cost(run)),
     ];
+    if run.model == BeltModel::Rigid {
+        // Nothing stretches in it.
+        lines.retain(|(name, _)| !["peak stretch", "peak force", "r φ₁ - x"].contains(name));
+    }
     if let Some(reduction) = run.reduction {
         lines.insert(lines.len() - 1, ("reduced model", reduced(&reduction)));
     }
@@ -192,6 +197,7 @@ fn cost(run: &Run) -> String {
 fn solver_words(solver: Solver) -> String {
     match solver {
         Solver::Exact => "solved exactly".into(),
+        Solver::General { tolerance } => format!("the general solver, tolerance {tolerance:e}"),
         Solver::Table3 { step, method } => {
             let method = match method {
                 Method::RungeKutta4 => "Runge-Kutta 4",

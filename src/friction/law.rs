@@ -1,0 +1,197 @@
+//! What friction does between rest and fast sliding: Stribeck curves, a smooth substitute, bristles.
+
+use super::Friction;
+use std::f64::consts::{E, SQRT_2};
+
+/// How friction goes from the breakaway F_b down to Coulomb friction F_c as a body picks up speed; b v comes on top.
+///
+/// Speeds are in m/s for a cart and rad/s for a pulley. The sources disagree on what they call "static force": Armstrong-Hélouvry,
+/// Canudas de Wit and Simscape mean F_b, the level at rest; the paper's F_s in eq. (14) is the height above F_c, F_b − F_c.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Law {
+    /// At once: F_f = b v ± F_c, eq. (15).
+    #[default]
+    Coulomb,
+    /// Along a curve, eq. (14): F_f = b v ± (F_c + (F_b − F_c) e^{−(v/v_s)²}) or e^{−|v|/v_s}. Sticks at zero speed.
+    Stribeck {
+        /// Stribeck velocity v_s.
+        velocity: f64,
+        /// Gaussian or exponential.
+        shape: Shape,
+    },
+    /// Simscape's continuous "Translational Friction":
+    /// F_f = √(2e) (F_b − F_c) e^{−(v/v_St)²} v/v_St + F_c tanh(v/v_Coul) + b v, v_St = √2 v_b, v_Coul = v_b/10.
+    ///
+    /// It never sticks: a body under load creeps. Its greatest resistance, close to F_b, is at v_b.
+    Smooth {
+        /// Breakaway velocity v_b.
+        breakaway_velocity: f64,
+    },
+    /// Bristles that bend before they slip (Canudas de Wit, Olsson, Åström and Lischinsky 1995):
+    /// ż = v − σ₀ |v| z / g(v), F_f = σ₀ z + σ₁ ż + b v, g(v) = F_c + (F_b − F_c) e^{−(v/v_s)²}.
+    ///
+    /// It never sticks either; at rest the bristles hold like springs of stiffness σ₀.
+    LuGre {
+        /// σ₀: N/m for a cart, N m/rad for a pulley.
+        stiffness: f64,
+        /// σ₁: N s/m for a cart, N m s/rad for a pulley.
+        damping: f64,
+        /// Stribeck velocity v_s.
+        velocity: f64,
+    },
+}
+
+/// The shape of a Stribeck curve.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Shape {
+    /// e^{−(v/v_s)²}: the paper's eq. (14), and Armstrong-Hélouvry's with the exponent δ = 2.
+    #[default]
+    Gaussian,
+    /// e^{−|v|/v_s}: Tustin's, Armstrong-Hélouvry's with δ = 1.
+    Exponential,
+}
+
+/// The Stribeck velocity v_s that the paper's F_τ (s²/m² or s²/rad²) stands for: e^{−F_τ v²} = e^{−(v/v_s)²}.
+pub fn velocity_of_decay(decay: f64) -> f64 {
+    // v_s = 1/√F_τ                                                             (14)
+    1.0 / decay.sqrt()
+}
+
+/// The paper's F_τ for a Stribeck velocity v_s.
+pub fn decay_of_velocity(velocity: f64) -> f64 {
+    1.0 / (velocity * velocity)
+}
+
+impl Shape {
+    /// Its name in the case file.
+    pub fn word(self) -> &'static str {
+        match self {
+            Shape::Gaussian => "gaussian",
+            Shape::Exponential => "exponential",
+        }
+    }
+
+    /// The share of F_b − F_c that is left at q = v/v_s, q counted in the direction of motion.
+    #[inline]
+    pub(crate) fn share(self, q: f64) -> f64 {
+        match self {
+            Shape::Gaussian => (-q * q).exp(),
+            Shape::Exponential => (-q).exp(),
+        }
+    }
+}
+
+impl Friction {
+    /// Friction while sliding steadily at `velocity`; at zero, what it tends to from above. Not for a body at rest.
+    ///
+    /// ```
+    /// use taut::friction::{Friction, Law, Shape};
+    /// let law = Law::Stribeck { velocity: 0.01, shape: Shape::Gaussian };
+    /// let friction = Friction::with_breakaway(19.0, 0.2, 0.3).following(law);
+    /// assert_eq!(friction.sliding(0.0), 0.3);
+    /// assert!((friction.sliding(-0.5) + 19.0 * 0.5 + 0.2).abs() < 1e-12);
+    /// ```
+    pub fn sliding(&self, velocity: f64) -> f64 {
+        let forward = velocity >= 0.0;
+        let side = self.side(forward);
+        let sign = if forward { 1.0 } else { -1.0 };
+        side.viscous * velocity + self.dry(forward, sign * velocity) * sign
+    }
+
+    /// The part of it that is not viscous, at the speed `v` ≥ 0 in the given direction.
+    #[inline(always)]
+    pub(crate) fn dry(&self, forward: bool, v: f64) -> f64 {
+        let side = self.side(forward);
+        let above = side.breakaway - side.coulomb;
+        match self.law {
+            Law::Coulomb => side.coulomb,
+            // F_c + F_s e^{−F_τ v²}                                              (14)
+            Law::Stribeck { velocity, shape } => side.coulomb + above * shape.share(v / velocity),
+            Law::Smooth { breakaway_velocity } => {
+                let (q, c) = (v / (SQRT_2 * breakaway_velocity), v / (breakaway_velocity / 10.0));
+                (2.0 * E).sqrt() * above * (-q * q).exp() * q + side.coulomb * c.tanh()
+            }
+            // In steady sliding the bristles carry g(v).
+            Law::LuGre { velocity, .. } => side.coulomb + above * Shape::Gaussian.share(v / velocity),
+        }
+    }
+
+    /// How [`Friction::sliding`] changes with the velocity: negative where stick-slip begins by itself.
+    pub fn slope(&self, velocity: f64) -> f64 {
+        let side = self.side(velocity >= 0.0);
+        let above = side.breakaway - side.coulomb;
+        let v = velocity.abs();
+        side.viscous
+            + match self.law {
+                Law::Coulomb => 0.0,
+                Law::Stribeck { velocity, shape: Shape::Exponential } => -above / velocity * (-v / velocity).exp(),
+                Law::Stribeck { velocity, .. } | Law::LuGre { velocity, .. } => {
+                    let q = v / velocity;
+                    -2.0 * q / velocity * above * (-q * q).exp()
+                }
+                Law::Smooth { breakaway_velocity } => {
+                    let (v_st, v_coul) = (SQRT_2 * breakaway_velocity, breakaway_velocity / 10.0);
+                    let q = v / v_st;
+                    (2.0 * E).sqrt() * above * (-q * q).exp() * (1.0 - 2.0 * q * q) / v_st
+                        + side.coulomb / v_coul / (v / v_coul).cosh().powi(2)
+                }
+            }
+    }
+
+    /// What a body at rest holds before it slides this way: zero for laws that never stick.
+    pub fn breakaway(&self, forward: bool) -> f64 {
+        match self.law {
+            Law::Coulomb | Law::Stribeck { .. } => self.side(forward).breakaway,
+            Law::Smooth { .. } | Law::LuGre { .. } => 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LAWS: [Law; 5] = [
+        Law::Coulomb,
+        Law::Stribeck { velocity: 0.02, shape: Shape::Gaussian },
+        Law::Stribeck { velocity: 0.02, shape: Shape::Exponential },
+        Law::Smooth { breakaway_velocity: 0.01 },
+        Law::LuGre { stiffness: 1e5, damping: 300.0, velocity: 0.02 },
+    ];
+
+    #[test]
+    fn slopes_are_those_of_the_curves() {
+        for law in LAWS {
+            let friction = Friction::with_breakaway(19.0, 0.2, 0.3).following(law);
+            for v in [-0.3, -0.012, 0.0007, 0.01, 0.031] {
+                let h = 1e-7;
+                let slope = (friction.sliding(v + h) - friction.sliding(v - h)) / (2.0 * h);
+                assert!((slope - friction.slope(v)).abs() < 1e-4 * slope.abs().max(1.0), "{law:?} at {v}");
+            }
+        }
+    }
+
+    #[test]
+    fn all_end_at_coulomb_friction() {
+        for law in LAWS {
+            let friction = Friction::with_breakaway(0.0, 0.2, 0.3).following(law);
+            assert!((friction.sliding(0.5) - 0.2).abs() < 1e-8, "{law:?}");
+            assert!((friction.sliding(-0.5) + 0.2).abs() < 1e-8, "{law:?}");
+        }
+    }
+
+    /// Simscape's words: the breakaway force is reached at the breakaway velocity.
+    #[test]
+    fn the_smooth_law_peaks_at_its_breakaway_velocity() {
+        let friction = Friction::with_breakaway(0.0, 0.2, 0.3).following(Law::Smooth { breakaway_velocity: 0.01 });
+        assert!((friction.sliding(0.01) - 0.3).abs() < 1e-8);
+        assert!(friction.slope(0.01).abs() < 1e-4);
+        assert_eq!(friction.sliding(0.0), 0.0);
+    }
+
+    #[test]
+    fn decay_and_velocity_are_two_words_for_one_thing() {
+        assert!((velocity_of_decay(1e4) - 0.01).abs() < 1e-17);
+        assert!((decay_of_velocity(velocity_of_decay(123.0)) - 123.0).abs() < 1e-10);
+    }
+}

@@ -1,0 +1,266 @@
+//! The wanted columns of a file, whatever its kind, and where each of their values stands.
+
+use super::{csv, lines, matlab};
+use crate::error::{Error, Result};
+use crate::quantity::shortest;
+use std::path::{Path, PathBuf};
+
+/// Most values of a column that a message lists.
+const LISTED: usize = 10;
+
+/// A column of a file.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum ColumnId {
+    /// By its name.
+    Name(String),
+    /// By its place, from 1.
+    Number(usize),
+}
+
+impl From<&str> for ColumnId {
+    fn from(name: &str) -> Self {
+        Self::Name(name.trim().to_string())
+    }
+}
+
+/// How a text file is written, where that cannot be seen from itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Dialect {
+    /// What parts the columns; found out where it is not said. A space stands for any number of blanks.
+    pub separator: Option<char>,
+    /// Whether numbers have decimal commas.
+    pub decimal_comma: bool,
+}
+
+/// Rows to keep, by their value in one column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Filter {
+    /// The column.
+    pub column: ColumnId,
+    /// The values; as text, numbers as they are written.
+    pub values: Vec<String>,
+    /// Whether rows with one of the values are kept, or all others.
+    pub keep: bool,
+}
+
+impl Filter {
+    pub(super) fn keeps(&self, text: &str) -> bool {
+        self.values.iter().any(|value| same(value, text)) == self.keep
+    }
+}
+
+/// Whether two texts are the same, as numbers if they are such.
+fn same(a: &str, b: &str) -> bool {
+    match (a.parse::<f64>(), b.parse::<f64>()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => a == b,
+    }
+}
+
+/// What is wanted from a file.
+pub(super) struct Request<'a> {
+    /// Columns of numbers.
+    pub columns: &'a [ColumnId],
+    /// How many of them, from the first on, must have a value in every row.
+    pub complete: usize,
+    /// Whether a row under the header may name the units.
+    pub units_row: bool,
+    pub dialect: Dialect,
+    pub filter: Option<&'a Filter>,
+    /// The column that tells runs apart.
+    pub split: Option<&'a ColumnId>,
+}
+
+impl<'a> Request<'a> {
+    /// These columns, with a value in every row.
+    pub fn complete(columns: &'a [ColumnId]) -> Self {
+        let complete = columns.len();
+        Self { columns, complete, units_row: false, dialect: Dialect::default(), filter: None, split: None }
+    }
+
+    /// The wanted columns, then that of the filter, then that of the split.
+    pub fn all_columns(&self) -> impl Iterator<Item = &'a ColumnId> {
+        self.columns.iter().chain(self.filter.map(|filter| &filter.column)).chain(self.split)
+    }
+}
+
+/// The columns that were asked for.
+#[derive(Debug, Default)]
+pub(super) struct Sheet {
+    pub file: PathBuf,
+    /// What a row is called in messages: a line of a text file has a text to show.
+    pub is_text: bool,
+    /// What the wanted columns are called.
+    pub names: Vec<String>,
+    /// What the file says of their units.
+    pub units: Vec<Option<String>>,
+    /// A value per row; NaN where it is missing.
+    pub columns: Vec<Vec<f64>>,
+    /// The number of each row in its file, from 1: in a text file that of its line.
+    pub rows: Vec<usize>,
+    /// The runs, in the file's order.
+    pub runs: Vec<Run>,
+    /// In a text file, what it takes to find a field again.
+    pub fields: Option<csv::Locator>,
+    /// The values seen in the column of the filter, a few of them.
+    pub filtered: Vec<String>,
+}
+
+/// Rows one after another with the same value in the column that tells runs apart.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Run {
+    pub label: String,
+    /// Its first row, counted among the rows that were read.
+    pub begin: usize,
+}
+
+impl Sheet {
+    /// Reads a file of any kind that there is a reader for.
+    pub fn read(file: &Path, request: &Request<'_>) -> Result<Self> {
+        let beginning = lines::beginning(file)?;
+        let mut sheet = match () {
+            () if matlab::is_matlab(file, &beginning) => matlab::read(file, &beginning, request)?,
+            () if beginning.starts_with(b"PAR1") => read_parquet(file, request)?,
+            () => csv::read(file, request)?,
+        };
+        sheet.file = file.to_path_buf();
+        if sheet.rows.is_empty()
+            && let Some(filter) = request.filter
+        {
+            return Err(sheet.nothing_left(filter));
+        }
+        Ok(sheet)
+    }
+
+    /// From whole columns: the wanted ones, then that of the filter, then that of the split.
+    pub fn from_columns(file: &Path, names: Vec<String>, columns: &[Vec<f64>], request: &Request<'_>) -> Result<Self> {
+        let mut sheet = Self { file: file.to_path_buf(), names, ..Self::default() };
+        sheet.begin(request);
+        let wanted = request.columns.len();
+        let rows = columns.first().map_or(0, Vec::len);
+        for row in 0..rows {
+            let mut rest = columns[wanted..].iter().map(|column| shortest(column[row]));
+            if let Some(filter) = request.filter {
+                let value = rest.next().unwrap_or_default();
+                sheet.note_filtered(&value);
+                if !filter.keeps(&value) {
+                    continue;
+                }
+            }
+            if request.split.is_some() {
+                sheet.note_run(&rest.next().unwrap_or_default());
+            }
+            for (i, theirs) in columns[..wanted].iter().enumerate() {
+                let value = theirs[row];
+                if value.is_infinite() || (value.is_nan() && i < request.complete) {
+                    let name = &sheet.names[i];
+                    let error = Error::new(match value.is_nan() {
+                        true => format!("row {} of {name} has no value", row + 1),
+                        false => format!("row {} of {name} is infinite", row + 1),
+                    });
+                    return Err(error
+                        .in_file(file)
+                        .allowed("a finite number")
+                        .next("fill in the value, or leave out the row"));
+                }
+                sheet.columns[i].push(value);
+            }
+            sheet.rows.push(row + 1);
+        }
+        Ok(sheet)
+    }
+
+    pub fn begin(&mut self, request: &Request<'_>) {
+        self.columns = vec![Vec::new(); request.columns.len()];
+        self.units.resize(request.columns.len(), None);
+    }
+
+    /// Of a row that will follow.
+    pub fn note_run(&mut self, label: &str) {
+        if self.runs.last().is_none_or(|run| run.label != label) {
+            self.runs.push(Run { label: label.to_string(), begin: self.rows.len() });
+        }
+    }
+
+    pub fn note_filtered(&mut self, value: &str) {
+        if self.filtered.len() <= LISTED && !self.filtered.iter().any(|known| known == value) {
+            self.filtered.push(value.to_string());
+        }
+    }
+
+    fn nothing_left(&self, filter: &Filter) -> Error {
+        let column = filter.column.shown();
+        let list: Vec<String> = filter.values.iter().map(|value| csv::shown(value)).collect();
+        let list = list.join(", ");
+        let what = match filter.keep {
+            true => format!("no row has {list} in column {column}"),
+            false => format!("every row has {list} in column {column}"),
+        };
+        let mut seen: Vec<String> = self.filtered.iter().take(LISTED).map(|value| csv::shown(value)).collect();
+        if self.filtered.len() > LISTED {
+            seen.push("and more".into());
+        }
+        let error = Error::new(what).in_file(&self.file);
+        error.allowed(seen.join(", ")).next("correct `where` in the case file, or leave it out")
+    }
+
+    /// `line 7` or `row 7`.
+    pub fn row(&self, row: usize) -> String {
+        let word = if self.is_text { "line" } else { "row" };
+        format!("{word} {}", self.rows[row])
+    }
+
+    /// An error at the value of the i-th column in a row, counted among those read.
+    pub fn error(&self, i: usize, row: usize, what: impl Into<String>) -> Error {
+        let error = Error::new(what);
+        match self.fields.as_ref().and_then(|fields| fields.place(&self.file, self.rows[row], i)) {
+            Some(place) => error.at(place),
+            None => error.in_file(&self.file),
+        }
+    }
+
+    /// An error at the name of the i-th column.
+    pub fn heading_error(&self, i: usize, what: impl Into<String>) -> Error {
+        let error = Error::new(what);
+        match self.fields.as_ref().and_then(|fields| fields.heading(&self.file, i)) {
+            Some(place) => error.at(place),
+            None => error.in_file(&self.file),
+        }
+    }
+}
+
+impl ColumnId {
+    pub(super) fn name(&self) -> Option<&str> {
+        match self {
+            Self::Name(name) => Some(name),
+            Self::Number(_) => None,
+        }
+    }
+
+    pub(super) fn number(&self) -> Option<usize> {
+        match self {
+            Self::Name(_) => None,
+            Self::Number(number) => Some(*number),
+        }
+    }
+
+    /// As messages show it.
+    pub(super) fn shown(&self) -> String {
+        match self {
+            Self::Name(name) => csv::shown(name),
+            Self::Number(number) => number.to_string(),
+        }
+    }
+}
+
+#[cfg(feature = "parquet")]
+fn read_parquet(file: &Path, request: &Request<'_>) -> Result<Sheet> {
+    super::parquet::read(file, request)
+}
+
+#[cfg(not(feature = "parquet"))]
+fn read_parquet(file: &Path, _: &Request<'_>) -> Result<Sheet> {
+    Err(Error::new("this is a Parquet file, and this build of the program does not read them")
+        .in_file(file)
+        .next("build it with the feature `parquet`, or export the data as CSV"))
+}

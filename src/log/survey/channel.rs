@@ -1,0 +1,328 @@
+//! One column of a log: its extent, steps, noise, and the samples that stand out.
+
+use super::super::Output;
+use super::timing::Timing;
+use super::{Note, Severity, is_position, median, percent, quantile, shown};
+
+/// An outlier is off by so many times the usual deviation from its neighbours.
+const OUTLYING: f64 = 10.0;
+
+/// The shortest run at an extreme value that may be a limit, samples.
+const CLIPPED: usize = 5;
+
+/// One column of a log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channel {
+    /// `input`, or the quantity's name.
+    pub name: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Least value.
+    pub least: f64,
+    /// Greatest value.
+    pub greatest: f64,
+    /// Samples without a value.
+    pub missing: usize,
+    /// The most samples without a value one after another.
+    pub longest_missing: usize,
+    /// Time at which those begin, s.
+    pub missing_at: f64,
+    /// Step of its values, where they are multiples of one.
+    pub step: Option<f64>,
+    /// Standard deviation of its noise, from third differences: the part that no smooth curve explains.
+    pub noise: f64,
+    /// Samples that stand out from their neighbours.
+    pub outliers: Vec<Outlier>,
+    /// A run at an extreme value that it reached abruptly.
+    pub clipped: Option<Clipped>,
+    /// Jumps by a full turn, where the column may be an angle that wraps.
+    pub wraps: usize,
+    /// How many different values there are, counted up to 1000.
+    pub levels: usize,
+}
+
+/// A sample that stands out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outlier {
+    /// Which sample, from 0.
+    pub sample: usize,
+    /// Its time, s.
+    pub time: f64,
+    /// Its value.
+    pub value: f64,
+    /// What its neighbours would suggest.
+    pub expected: f64,
+}
+
+/// A run of equal values at an extreme.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clipped {
+    /// The extreme value.
+    pub value: f64,
+    /// Time at which it begins, s.
+    pub at: f64,
+    /// How long it lasts, samples.
+    pub samples: usize,
+}
+
+impl Channel {
+    pub(super) fn new(name: &'static str, unit: &'static str, values: &[f64], time: &[f64]) -> Self {
+        let present: Vec<f64> = values.iter().copied().filter(|x| !x.is_nan()).collect();
+        let least = present.iter().copied().fold(f64::INFINITY, f64::min);
+        let greatest = present.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let (longest_missing, first_missing) = longest_run(values, |x| x.is_nan());
+        let mut sorted = present.clone();
+        sorted.sort_by(f64::total_cmp);
+        sorted.dedup();
+        let mut channel = Self {
+            name,
+            unit,
+            least,
+            greatest,
+            missing: values.len() - present.len(),
+            longest_missing,
+            missing_at: time.get(first_missing).copied().unwrap_or_default(),
+            step: step(&sorted, present.len()),
+            noise: noise(values),
+            outliers: Vec::new(),
+            clipped: None,
+            wraps: 0,
+            levels: sorted.len().min(1000),
+        };
+        channel.wraps = channel.count_wraps(values);
+        channel.outliers = channel.find_outliers(values, time);
+        channel.clipped = channel.find_clipped(values, time);
+        channel
+    }
+
+    /// From the least to the greatest value.
+    pub fn span(&self) -> f64 {
+        self.greatest - self.least
+    }
+
+    /// What cannot be told apart: the noise, or the rounding error of a step, whichever is more.
+    pub fn resolution(&self) -> f64 {
+        // A rounding error is evenly distributed: q / √12.
+        self.noise.max(self.step.map_or(0.0, |q| q / 12f64.sqrt()))
+    }
+
+    /// Whether there is one value only.
+    pub fn is_constant(&self) -> bool {
+        self.levels <= 1
+    }
+
+    fn count_wraps(&self, values: &[f64]) -> usize {
+        let turn = match (self.unit, self.step) {
+            ("rad", _) => std::f64::consts::TAU,
+            (_, Some(q)) => 65536.0 * q,
+            _ => return 0,
+        };
+        let jumps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+        let usual = quantile(&jumps.clone().collect::<Vec<_>>(), 0.95);
+        jumps.filter(|jump| (jump - turn).abs() < 0.1 * turn && *jump > 5.0 * usual).count()
+    }
+
+    /// Single samples that are far from both neighbours, on the same side.
+    fn find_outliers(&self, values: &[f64], time: &[f64]) -> Vec<Outlier> {
+        if self.name == "input" || values.len() < 10 {
+            return Vec::new();
+        }
+        let off = |k: usize| values[k] - 0.5 * (values[k - 1] + values[k + 1]);
+        let mut usual: Vec<f64> = (1..values.len() - 1).map(|k| off(k).abs()).filter(|x| x.is_finite()).collect();
+        let usual = 1.4826 * median(&mut usual);
+        let least = (OUTLYING * usual.max(self.resolution()))
+            .max(0.02 * quantile(values, 0.99) - 0.02 * quantile(values, 0.01));
+        let far = |k: &usize| {
+            let (before, after) = (values[k - 1] - values[*k], values[k + 1] - values[*k]);
+            before * after > 0.0 && before.abs().min(after.abs()) > least
+        };
+        let outlier = |sample: usize| Outlier {
+            sample,
+            time: time[sample],
+            value: values[sample],
+            expected: values[sample] - off(sample),
+        };
+        (1..values.len() - 1).filter(far).map(outlier).collect()
+    }
+
+    /// The longest run at an extreme that was reached abruptly.
+    fn find_clipped(&self, values: &[f64], time: &[f64]) -> Option<Clipped> {
+        if self.name == "input" || self.levels < 10 {
+            return None;
+        }
+        const REACH: usize = 5;
+        let slope = |k: usize| (values[k] - values[k - REACH]).abs();
+        let steepest = quantile(&(REACH..values.len()).map(slope).collect::<Vec<_>>(), 0.95);
+        let tolerance = 1e-9 * self.span();
+        [self.least, self.greatest]
+            .into_iter()
+            .filter_map(|value| {
+                let (samples, first) = longest_run(values, |x| (x - value).abs() <= tolerance);
+                let abrupt = first >= REACH && slope(first) > (0.3 * steepest).max(6.0 * self.resolution());
+                (samples >= CLIPPED && abrupt).then(|| Clipped { value, at: time[first], samples })
+            })
+            .max_by_key(|clipped| clipped.samples)
+    }
+
+    /// Its extent in a line.
+    pub(super) fn line(&self) -> String {
+        let (least, greatest) = (shown(self.least, self.unit), shown(self.greatest, self.unit));
+        if self.is_constant() {
+            return format!("{}: {least} throughout", self.name);
+        }
+        let mut line = format!("{}: {least} to {greatest}", self.name);
+        if let Some(step) = self.step {
+            line += &format!(", in steps of {}", shown(step, self.unit));
+        }
+        if self.name != "input" && self.noise > 1e-4 * self.span() {
+            line += &format!(", noise {}", shown(self.noise, self.unit));
+        }
+        line
+    }
+
+    pub(super) fn notes(&self, output: Option<&Output>, timing: &Timing) -> Vec<Note> {
+        let mut notes = Vec::new();
+        let mut note = |code, severity, text: String| notes.push(Note::new(code, severity, text).on(self.name));
+        let value = |x: f64| shown(x, self.unit);
+        let seconds = |t: f64| shown(t, "s");
+        let samples = timing.samples as f64;
+        if self.is_constant() {
+            let text = format!("it is {} throughout", value(self.least));
+            match output {
+                None if self.least == 0.0 => note("constant", Severity::Warning, format!("{text}: nothing was fed in")),
+                None => {
+                    note("constant", Severity::Fact, "it never changes: the log shows one start and one speed".into());
+                }
+                Some(_) => note(
+                    "constant",
+                    Severity::Suspicion,
+                    format!("{text}: is this the right column, and was it connected?"),
+                ),
+            }
+            return notes;
+        }
+        if self.missing > 0 {
+            let share = percent(self.missing as f64 / samples);
+            let (run, at) = (self.longest_missing, seconds(self.missing_at));
+            let severity = if self.missing as f64 > 0.05 * samples { Severity::Warning } else { Severity::Fact };
+            note(
+                "missing",
+                severity,
+                format!("{} samples have no value ({share}), at most {run} in a row, from {at} on", self.missing),
+            );
+        }
+        if let Some(clipped) = self.clipped {
+            let Clipped { value: limit, at, samples } = clipped;
+            let what = match output {
+                Some(output) if is_position(output.quantity) => "an end stop, or the end of its sensor",
+                _ => "the limit of its sensor, perhaps",
+            };
+            note(
+                "saturation",
+                Severity::Warning,
+                format!(
+                    "it stands at its extreme of {} for {samples} samples from {} on, reached abruptly: {what}",
+                    value(limit),
+                    seconds(at)
+                ),
+            );
+        }
+        if self.wraps > 0 {
+            let turn = if self.unit == "rad" { "a full turn" } else { "65536 steps" };
+            note(
+                "wraps",
+                Severity::Suspicion,
+                format!("it jumps by {turn} {} times: a counter that wraps; unwrap it before use", self.wraps),
+            );
+        } else if let Some(first) = self.outliers.first() {
+            let n = self.outliers.len();
+            let (is, expected, at) = (value(first.value), value(first.expected), seconds(first.time));
+            let text = match n {
+                1 => format!("one sample stands out: {is} at {at}, between neighbours of {expected}"),
+                n => format!(
+                    "{n} samples stand out from their neighbours; the first is {is} at {at}, where {expected} would be usual"
+                ),
+            };
+            note("outliers", Severity::Warning, format!("{text}; a robust fit (loss = \"huber\") minds them less"));
+        }
+        if let Some(step) = self.step
+            && output.is_some()
+        {
+            let steps = self.span() / step;
+            if steps < 20.0 {
+                note(
+                    "quantisation",
+                    Severity::Warning,
+                    format!("its whole span of {} is {steps:.0} steps of {}", value(self.span()), value(step)),
+                );
+            }
+        }
+        if output.is_some() && self.noise > 0.05 * self.span() {
+            let share = percent(self.noise / self.span());
+            note("noise", Severity::Warning, format!("its noise, {}, is {share} of its span", value(self.noise)));
+        }
+        if let Some(output) = output.filter(|output| output.absolute)
+            && self.least < -3.0 * self.resolution()
+        {
+            let negative = output.values.iter().filter(|x| **x < 0.0).count();
+            note(
+                "negative",
+                Severity::Warning,
+                format!(
+                    "it is said to be absolute, and {negative} samples are negative, down to {}",
+                    value(self.least)
+                ),
+            );
+        }
+        notes
+    }
+}
+
+/// Length and first sample of the longest run that satisfies `holds`.
+fn longest_run(values: &[f64], holds: impl Fn(f64) -> bool) -> (usize, usize) {
+    let (mut best, mut run) = ((0, 0), 0);
+    for (k, &value) in values.iter().enumerate() {
+        run = if holds(value) { run + 1 } else { 0 };
+        if run > best.0 {
+            best = (run, k + 1 - run);
+        }
+    }
+    best
+}
+
+/// The step of which all values are multiples, give or take their rounding in print; `sorted` has each once.
+fn step(sorted: &[f64], samples: usize) -> Option<f64> {
+    if sorted.len() < 3 || samples < 10 {
+        return None;
+    }
+    let gaps: Vec<f64> = sorted.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let largest = sorted[0].abs().max(sorted[sorted.len() - 1].abs());
+    let rounding = 1e-12 * largest;
+    let least = gaps.iter().copied().filter(|gap| *gap > rounding).fold(f64::INFINITY, f64::min);
+    let mut q =
+        median(&mut gaps.iter().copied().filter(|gap| *gap > rounding && *gap < 1.5 * least).collect::<Vec<_>>());
+    if !q.is_finite() || q <= 0.0 {
+        return None;
+    }
+    // From one value to the next, the multiple counted so far refines the step.
+    let (mut count, mut off, mut short) = (0.0, 0, 0);
+    for (gap, value) in gaps.iter().zip(&sorted[1..]) {
+        let steps = (gap / q).round();
+        short += usize::from(steps < 20.0);
+        off += usize::from((gap / q - steps).abs() > 0.25 && steps < 20.0);
+        count += steps;
+        if count >= 10.0 {
+            q = (value - sorted[0]) / count;
+        }
+    }
+    // Values of any size have gaps of any size, most of them far longer than the shortest.
+    (off * 50 <= gaps.len() && short * 2 >= gaps.len()).then_some(q)
+}
+
+/// Standard deviation of what is not smooth.
+fn noise(values: &[f64]) -> f64 {
+    // d = y₀ − 3 y₁ + 3 y₂ − y₃ of white noise has the variance (1 + 9 + 9 + 1) σ²
+    let mut thirds: Vec<f64> =
+        values.windows(4).map(|y| (y[0] - 3.0 * y[1] + 3.0 * y[2] - y[3]).abs()).filter(|x| x.is_finite()).collect();
+    1.4826 * median(&mut thirds) / 20f64.sqrt()
+}

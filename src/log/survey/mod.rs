@@ -1,0 +1,195 @@
+//! What a log is like, before anything is fitted to it: its clock, its columns, its motion, and what looks wrong.
+//!
+//! Nothing here changes a log. Speeds are estimated where only positions were measured, to tell rest, reversals and steady
+//! motion apart, and are used for nothing else.
+
+mod channel;
+mod motion;
+mod timing;
+mod units;
+
+pub use channel::{Channel, Clipped, Outlier};
+pub use motion::{Motion, Steady};
+pub use timing::{Gap, Timing};
+
+use super::{Log, Quantity};
+use crate::number::engineering_ascii;
+use crate::stage::Stage;
+use std::fmt;
+
+/// What a log is like.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Survey {
+    /// The log's name.
+    pub log: String,
+    /// Its clock.
+    pub timing: Timing,
+    /// The input, then the outputs.
+    pub channels: Vec<Channel>,
+    /// What moves, and how; none where nothing that was measured is a motion.
+    pub motion: Option<Motion>,
+    /// What is to be said about it, the most serious first.
+    pub notes: Vec<Note>,
+}
+
+/// Something to be known about a log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Note {
+    /// What it is about, in a word for programs: `gaps`, `saturation`.
+    pub code: &'static str,
+    /// How much it matters.
+    pub severity: Severity,
+    /// The column it is about: `input` or a quantity's name; none if it is about all.
+    pub column: Option<&'static str>,
+    /// What was found, in a sentence with numbers, and what to do.
+    pub text: String,
+}
+
+/// How much something matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// Good to know.
+    Fact,
+    /// May make a fit worse.
+    Warning,
+    /// Most likely a mistake: a fit to this would be wrong.
+    Suspicion,
+}
+
+impl Severity {
+    /// In a word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Severity::Fact => "fact",
+            Severity::Warning => "warning",
+            Severity::Suspicion => "suspicion",
+        }
+    }
+}
+
+impl Survey {
+    /// Looks at a log of `stage`, whose parameters may be rough.
+    ///
+    /// ```
+    /// use taut::case::{Case, TEMPLATE};
+    /// use taut::log::{Log, Output, Quantity, Survey};
+    /// use taut::signal::Hold;
+    /// let stage = Case::from_text("axis.toml", TEMPLATE)?.stage;
+    /// // Half a second of 5 V, the cart's position in millimetres by mistake.
+    /// let time: Vec<f64> = (0..500).map(|k| f64::from(k) * 1e-3).collect();
+    /// let values = time.iter().map(|t| 224.0 * (t - 0.01 * (1.0 - (-t / 0.01).exp()))).collect();
+    /// let position = Output { quantity: Quantity::CartPosition, absolute: false, values };
+    /// let input = vec![5.0; 500];
+    /// let log = Log { name: "5 V".into(), file: "log.csv".into(), time, input, hold: Hold::Zero, outputs: vec![position] };
+    /// let survey = Survey::new(&log, &stage);
+    /// assert!(survey.has("unit"));
+    /// # Ok::<(), taut::Error>(())
+    /// ```
+    pub fn new(log: &Log, stage: &Stage) -> Self {
+        let timing = Timing::new(&log.time);
+        let mut channels = vec![Channel::new("input", units::input_unit(stage), &log.input, &log.time)];
+        for output in &log.outputs {
+            channels.push(Channel::new(output.quantity.name(), output.quantity.unit(), &output.values, &log.time));
+        }
+        let motion = Motion::of(log, &channels, &timing);
+        let mut notes = timing.notes();
+        for (k, channel) in channels.iter().enumerate() {
+            let output = k.checked_sub(1).map(|k| &log.outputs[k]);
+            notes.extend(channel.notes(output, &timing));
+        }
+        match &motion {
+            Some(motion) => notes.extend(motion.notes()),
+            None => notes.push(Note::new(
+                "no-motion",
+                Severity::Warning,
+                "neither a position nor a speed was measured: only the electrical side can be fitted",
+            )),
+        }
+        notes.extend(units::notes(log, stage, &channels, motion.as_ref()));
+        notes.sort_by_key(|note| std::cmp::Reverse(note.severity));
+        Self { log: log.name.clone(), timing, channels, motion, notes }
+    }
+
+    /// Whether there is a note of that code.
+    pub fn has(&self, code: &str) -> bool {
+        self.notes.iter().any(|note| note.code == code)
+    }
+
+    /// The channel called `input`, or as a quantity.
+    pub fn channel(&self, name: &str) -> Option<&Channel> {
+        self.channels.iter().find(|channel| channel.name == name)
+    }
+}
+
+impl Note {
+    fn new(code: &'static str, severity: Severity, text: impl Into<String>) -> Self {
+        Self { code, severity, column: None, text: text.into() }
+    }
+
+    fn on(self, column: &'static str) -> Self {
+        Self { column: Some(column), ..self }
+    }
+}
+
+impl fmt::Display for Survey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Timing { samples, duration, interval, .. } = self.timing;
+        let (duration, interval) = (shown(duration, "s"), shown(interval, "s"));
+        write!(f, "{}: {samples} samples in {duration}, every {interval}", self.log)?;
+        for channel in &self.channels {
+            write!(f, "\n  {}", channel.line())?;
+        }
+        for note in &self.notes {
+            let column = note.column.map(|column| format!("{column}: ")).unwrap_or_default();
+            let mark = match note.severity {
+                Severity::Fact => "",
+                Severity::Warning => "warning: ",
+                Severity::Suspicion => "suspicion: ",
+            };
+            write!(f, "\n  {mark}{column}{}", note.text)?;
+        }
+        Ok(())
+    }
+}
+
+/// A value for messages.
+fn shown(value: f64, unit: &str) -> String {
+    engineering_ascii(value, unit, 4)
+}
+
+fn percent(part: f64) -> String {
+    match 100.0 * part {
+        p if p >= 10.0 => format!("{p:.0} %"),
+        p if p >= 0.1 => format!("{p:.1} %"),
+        _ => "under 0.1 %".into(),
+    }
+}
+
+/// The middle one of these; zero if there are none.
+fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// The value below which this share of all lies.
+fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut values: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
+    if values.is_empty() {
+        return 0.0;
+    }
+    let k = ((values.len() - 1) as f64 * share).round() as usize;
+    *values.select_nth_unstable_by(k, f64::total_cmp).1
+}
+
+fn is_speed(quantity: Quantity) -> bool {
+    use Quantity::{CartSpeed, DriveSpeed, IdlerSpeed, RotorSpeed};
+    matches!(quantity, CartSpeed | DriveSpeed | IdlerSpeed | RotorSpeed)
+}
+
+fn is_position(quantity: Quantity) -> bool {
+    use Quantity::{CartPosition, DriveAngle, IdlerAngle, RotorAngle};
+    matches!(quantity, CartPosition | DriveAngle | IdlerAngle | RotorAngle)
+}

@@ -1,0 +1,242 @@
+//! What moves in a log: rest, reversals, steady speeds.
+
+use super::super::{Log, Quantity};
+use super::channel::Channel;
+use super::timing::Timing;
+use super::{Note, Severity, is_position, is_speed, median, quantile, shown};
+
+/// A speed below this share of the largest is rest, as far as reversals go.
+const SLOW: f64 = 0.05;
+
+/// At the ends of a log, where a speed is less certain, it is rest below this share.
+const AT_REST: f64 = 0.2;
+
+/// A steady speed changes by less than this share of itself.
+const STEADY: f64 = 0.03;
+
+/// Fewest samples of a steady speed.
+const SHORTEST: usize = 20;
+
+/// What moves in a log, judged by one of its columns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Motion {
+    /// The column: a position if there is one, or else a speed.
+    pub quantity: Quantity,
+    /// Whether that column has lost its sign.
+    pub absolute: bool,
+    /// Whether it moves at all, beyond noise and steps.
+    pub moves: bool,
+    /// Largest speed, in the unit of a speed: m/s or rad/s.
+    pub peak_speed: f64,
+    /// Whether it is at rest in the first samples.
+    pub begins_at_rest: bool,
+    /// Whether it is at rest in the last samples.
+    pub ends_at_rest: bool,
+    /// Times, s, at which it turns round.
+    pub reversals: Vec<f64>,
+    /// Stretches of steady speed under a steady input.
+    pub steady: Vec<Steady>,
+    /// Speeds as estimated from positions, or as measured; NaN where that is not possible.
+    pub(super) speed: Vec<f64>,
+}
+
+/// A stretch of steady speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Steady {
+    /// Where it begins, s.
+    pub from: f64,
+    /// Where it ends, s.
+    pub to: f64,
+    /// The speed, m/s or rad/s.
+    pub speed: f64,
+    /// The input, V or A.
+    pub input: f64,
+}
+
+impl Motion {
+    /// By the first position there is, or else by the first speed.
+    pub(super) fn of(log: &Log, channels: &[Channel], timing: &Timing) -> Option<Self> {
+        use Quantity::{
+            CartPosition, CartSpeed, DriveAngle, DriveSpeed, IdlerAngle, IdlerSpeed, RotorAngle, RotorSpeed,
+        };
+        let order = [CartPosition, DriveAngle, RotorAngle, IdlerAngle, CartSpeed, DriveSpeed, RotorSpeed, IdlerSpeed];
+        let output = order.iter().find_map(|quantity| log.output(*quantity))?;
+        let channel = channels.iter().find(|channel| channel.name == output.quantity.name())?;
+        let (speed, fuzz) = speeds(log, output.quantity, timing, channel);
+        let peak_speed = quantile(&speed.iter().map(|v| v.abs()).collect::<Vec<_>>(), 0.995);
+        let resolution = channel.resolution();
+        let moves = !channel.is_constant() && channel.span() > 10.0 * resolution && peak_speed > 3.0 * fuzz;
+        let slow = (SLOW * peak_speed).max(3.0 * fuzz);
+        let rest = |from_end: bool| {
+            let (v, fuzz) = end_speed(log, output.quantity, channel, from_end);
+            v.abs() <= (AT_REST * peak_speed).max(3.0 * fuzz)
+        };
+        let mut motion = Self {
+            quantity: output.quantity,
+            absolute: output.absolute,
+            moves,
+            peak_speed,
+            begins_at_rest: !moves || rest(false),
+            ends_at_rest: !moves || rest(true),
+            reversals: Vec::new(),
+            steady: Vec::new(),
+            speed,
+        };
+        if moves {
+            motion.reversals = motion.turns(log, slow);
+            motion.steady = motion.steadiness(log, channels, fuzz);
+        }
+        Some(motion)
+    }
+
+    fn turns(&self, log: &Log, slow: f64) -> Vec<f64> {
+        let (mut turns, mut sign) = (Vec::new(), 0.0);
+        for (&v, &t) in self.speed.iter().zip(&log.time) {
+            if v.is_nan() || v.abs() <= slow {
+                continue;
+            }
+            if sign * v < 0.0 {
+                turns.push(t);
+            }
+            sign = v.signum();
+        }
+        turns
+    }
+
+    fn steadiness(&self, log: &Log, channels: &[Channel], fuzz: f64) -> Vec<Steady> {
+        let input = 0.01 * channels.first().map_or(0.0, Channel::span).max(1e-12);
+        let mut steady: Vec<Steady> = Vec::new();
+        let mut begin = 0;
+        while begin + SHORTEST <= log.len() {
+            let (v, u) = (self.speed[begin], log.input[begin]);
+            if v.is_nan() || v.abs() <= (0.1 * self.peak_speed).max(3.0 * fuzz) {
+                begin += 1;
+                continue;
+            }
+            let allowed = (STEADY * v.abs()).max(2.0 * fuzz);
+            let same = |k: &usize| (self.speed[*k] - v).abs() <= allowed && (log.input[*k] - u).abs() <= input;
+            let end = begin + (begin..log.len()).take_while(same).count();
+            if end - begin >= SHORTEST {
+                let speed = median(&mut self.speed[begin..end].to_vec());
+                steady.push(Steady { from: log.time[begin], to: log.time[end - 1], speed, input: u });
+                begin = end;
+            } else {
+                begin += 1;
+            }
+        }
+        steady
+    }
+
+    /// How many speeds among the steady ones differ by more than a tenth.
+    pub fn steady_speeds(&self) -> usize {
+        let mut speeds: Vec<f64> = self.steady.iter().map(|steady| steady.speed).collect();
+        speeds.sort_by(f64::total_cmp);
+        speeds.dedup_by(|a, b| (*a - *b).abs() <= 0.1 * a.abs().max(b.abs()));
+        speeds.len()
+    }
+
+    /// Unit of its speeds.
+    pub fn unit(&self) -> &'static str {
+        match self.quantity {
+            Quantity::CartPosition | Quantity::CartSpeed => "m/s",
+            _ => "rad/s",
+        }
+    }
+
+    pub(super) fn notes(&self) -> Vec<Note> {
+        let name = self.quantity.name();
+        let mut notes = Vec::new();
+        let mut note = |code, severity, text: String| notes.push(Note::new(code, severity, text).on(name));
+        if !self.moves {
+            note(
+                "still",
+                Severity::Warning,
+                "it does not move beyond its noise and steps: nothing about the mechanics can be learnt".into(),
+            );
+            return notes;
+        }
+        let unit = self.unit();
+        let peak = shown(self.peak_speed, unit);
+        match self.reversals.len() {
+            _ if self.absolute => note(
+                "absolute",
+                Severity::Fact,
+                format!("it moves at up to {peak}; its sign was lost, so reversals are not seen"),
+            ),
+            0 => note(
+                "one-way",
+                Severity::Warning,
+                format!(
+                    "it moves at up to {peak} and never turns round: a constant force and Coulomb friction look the same"
+                ),
+            ),
+            1 => note(
+                "reverses",
+                Severity::Fact,
+                format!("it moves at up to {peak} and turns round once, at {}", shown(self.reversals[0], "s")),
+            ),
+            n => note("reverses", Severity::Fact, format!("it moves at up to {peak} and turns round {n} times")),
+        }
+        let longest = self.steady.iter().max_by(|a, b| (a.to - a.from).total_cmp(&(b.to - b.from)));
+        match (longest, self.steady_speeds()) {
+            (None, _) => note(
+                "unsteady",
+                Severity::Fact,
+                "no stretch of steady speed: friction and inertia are told apart by the transients alone".into(),
+            ),
+            (Some(steady), n) => {
+                let (speed, from, to) = (shown(steady.speed, unit), shown(steady.from, "s"), shown(steady.to, "s"));
+                let others = match n {
+                    1 => "it is the only steady speed, which cannot tell viscous from Coulomb friction".to_string(),
+                    n => format!("there are {n} different steady speeds"),
+                };
+                note("steady", Severity::Fact, format!("it moves steadily at {speed} from {from} to {to}; {others}"));
+            }
+        }
+        if !self.begins_at_rest {
+            note(
+                "begins-moving",
+                Severity::Fact,
+                "it is in motion already when the log begins: the initial state has to be fitted".into(),
+            );
+        }
+        notes
+    }
+}
+
+/// Speeds of an output, and how uncertain they are.
+fn speeds(log: &Log, quantity: Quantity, timing: &Timing, channel: &Channel) -> (Vec<f64>, f64) {
+    let values = log.output(quantity).map_or(&[][..], |output| &output.values);
+    if is_speed(quantity) || !is_position(quantity) {
+        return (values.to_vec(), channel.resolution());
+    }
+    // Half a window on either side, wide enough that noise does not matter.
+    let half = (values.len() / 200).clamp(2, 25);
+    let mut speeds = vec![f64::NAN; values.len()];
+    for k in 0..values.len() {
+        let (a, b) = (k.saturating_sub(half), (k + half).min(values.len() - 1));
+        if b > a {
+            speeds[k] = (values[b] - values[a]) / (log.time[b] - log.time[a]);
+        }
+    }
+    let fuzz = 2f64.sqrt() * channel.resolution() / (2.0 * half as f64 * timing.interval).max(f64::MIN_POSITIVE);
+    (speeds, fuzz)
+}
+
+/// The speed at an end of a log, from its last three samples there, and how uncertain it is.
+fn end_speed(log: &Log, quantity: Quantity, channel: &Channel, from_end: bool) -> (f64, f64) {
+    let values = log.output(quantity).map_or(&[][..], |output| &output.values);
+    let mut there: Vec<usize> = (0..values.len()).filter(|&k| !values[k].is_nan()).take(3).collect();
+    if from_end {
+        there = (0..values.len()).rev().filter(|&k| !values[k].is_nan()).take(3).collect();
+    }
+    let &[a, b, c] = &there[..] else { return (0.0, 0.0) };
+    if is_speed(quantity) {
+        return (values[a], channel.resolution());
+    }
+    // The slope at the end of the parabola through three points.
+    let (h, k) = (log.time[b] - log.time[a], log.time[c] - log.time[a]);
+    let (first, second) = ((values[b] - values[a]) / h, (values[c] - values[a]) / k);
+    let slope = (first * k - second * h) / (k - h);
+    (slope, 2.6 * channel.resolution() / h.abs())
+}

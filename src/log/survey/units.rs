@@ -1,0 +1,342 @@
+//! What a log would be if its units, columns and signs were right: compared with itself, and with a rough run of the machine.
+
+use super::super::{Log, Output, Quantity};
+use super::channel::Channel;
+use super::motion::Motion;
+use super::{Note, Severity, quantile, shown};
+use crate::stage::{AmplifierMode, Stage};
+
+/// Measured and expected may differ by this factor without a suspicion: the machine's parameters may be rough.
+const ROUGH: f64 = 30.0;
+
+/// Largest voltage and current that a drive of this kind takes.
+const MOST_VOLTS: f64 = 800.0;
+const MOST_AMPERES: f64 = 300.0;
+
+pub(super) fn input_unit(stage: &Stage) -> &'static str {
+    match stage.amplifier.mode {
+        AmplifierMode::Voltage => "V",
+        AmplifierMode::Current => "A",
+    }
+}
+
+pub(super) fn notes(log: &Log, stage: &Stage, channels: &[Channel], motion: Option<&Motion>) -> Vec<Note> {
+    let mut notes = Vec::new();
+    let input = input_note(stage, &channels[0]);
+    let swapped = swapped_note(log, channels);
+    let trusted = input.is_none() && swapped.is_none();
+    notes.extend(input);
+    notes.extend(swapped);
+    let pairs = consistency(log, stage, channels);
+    if pairs.is_empty() && trusted {
+        notes.extend(motion.filter(|motion| motion.moves).and_then(|motion| magnitude(log, stage, motion)));
+    }
+    notes.extend(pairs);
+    if trusted {
+        notes.extend(motion.filter(|motion| motion.moves).and_then(|motion| direction(log, stage, motion)));
+        notes.extend(current_note(log, stage));
+    }
+    notes
+}
+
+/// An input that no such amplifier gives.
+fn input_note(stage: &Stage, input: &Channel) -> Option<Note> {
+    let peak = (stage.amplifier.gain * input.greatest).abs().max((stage.amplifier.gain * input.least).abs());
+    let (most, unit, milli) = match stage.amplifier.mode {
+        AmplifierMode::Voltage => (MOST_VOLTS, "V", "mV"),
+        AmplifierMode::Current => (MOST_AMPERES, "A", "mA"),
+    };
+    if peak <= most {
+        return None;
+    }
+    let text = format!(
+        "it reaches {}, beyond any drive of this kind: is the column in {milli}? then say units = {{ input = \"{milli}\" }}",
+        shown(peak, unit)
+    );
+    Some(Note::new("unit", Severity::Suspicion, text).on("input"))
+}
+
+/// An output that looks like a command while the input looks like a measurement.
+fn swapped_note(log: &Log, channels: &[Channel]) -> Option<Note> {
+    let jumpy = |values: &[f64]| {
+        let same = values.windows(2).filter(|pair| pair[0] == pair[1]).count();
+        same as f64 > 0.9 * values.len() as f64
+    };
+    let input = &channels[0];
+    if input.levels < 50 || jumpy(&log.input) {
+        return None;
+    }
+    let (output, channel) =
+        log.outputs.iter().zip(&channels[1..]).find(|(output, channel)| {
+            (2..=8).contains(&channel.levels) && jumpy(&output.values) && channel.missing == 0
+        })?;
+    let name = output.quantity.name();
+    let text = format!(
+        "it has {} values only and jumps between them, as an input does, while the input takes {} or more: are the two columns swapped?",
+        channel.levels, input.levels
+    );
+    Some(Note::new("swapped", Severity::Suspicion, text).on(name))
+}
+
+/// Positions along the belt, m per unit.
+fn lever(quantity: Quantity, stage: &Stage) -> f64 {
+    match quantity {
+        Quantity::CartPosition | Quantity::CartSpeed => 1.0,
+        _ => stage.pulley_radius,
+    }
+}
+
+/// Outputs compared with each other: all positions are the belt's, and speeds their rates.
+fn consistency(log: &Log, stage: &Stage, channels: &[Channel]) -> Vec<Note> {
+    use Quantity::{CartPosition, CartSpeed, DriveAngle, DriveSpeed, IdlerAngle, IdlerSpeed, RotorAngle, RotorSpeed};
+    let usable = |output: &&Output| {
+        let channel = channels.iter().find(|channel| channel.name == output.quantity.name());
+        !output.absolute
+            && channel.is_some_and(|c| !c.is_constant() && c.wraps == 0 && c.span() > 10.0 * c.resolution())
+    };
+    let first = |order: [Quantity; 4]| order.into_iter().filter_map(|q| log.output(q)).find(usable);
+    let positions = [CartPosition, DriveAngle, RotorAngle, IdlerAngle];
+    let speeds = [CartSpeed, DriveSpeed, RotorSpeed, IdlerSpeed];
+    let mut notes = Vec::new();
+    for (group, rest) in [(positions, "position"), (speeds, "speed")] {
+        let Some(base) = first(group) else { continue };
+        for other in group.into_iter().filter_map(|q| log.output(q)).filter(usable) {
+            if other.quantity != base.quantity {
+                let (y, x) = (travel(&base.values), travel(&other.values));
+                let levers = lever(base.quantity, stage) / lever(other.quantity, stage);
+                notes.extend(ratio_note(slope(&x, &y) * levers, base, other, stage, rest));
+            }
+        }
+    }
+    // A speed adds up to the way.
+    if let (Some(position), Some(speed)) = (first(positions), first(speeds)) {
+        let mut way = vec![0.0];
+        let mut sum = 0.0;
+        for k in 1..log.len() {
+            let mean = 0.5 * (speed.values[k] + speed.values[k - 1]);
+            sum += if mean.is_nan() { 0.0 } else { mean * (log.time[k] - log.time[k - 1]) };
+            way.push(sum);
+        }
+        let levers = lever(position.quantity, stage) / lever(speed.quantity, stage);
+        let ratio = slope(&way, &travel(&position.values)) * levers;
+        if let Some(kind) = kind(ratio) {
+            let (p, s) = (position.quantity.name(), speed.quantity.name());
+            let code = if matches!(kind, Kind::Sign) { "sign" } else { "unit" };
+            let text = match kind {
+                Kind::Sign => format!(
+                    "it goes the other way than {s} says: one of the two has the wrong sign; say scale = {{ {s} = -1 }}, or so for {p}"
+                ),
+                Kind::Factor(factor) => {
+                    format!("it goes {factor} what {s} adds up to: is the unit of {p}, of {s} or of the time wrong?")
+                }
+            };
+            notes.push(Note::new(code, Severity::Suspicion, text).on(p));
+        }
+    }
+    notes
+}
+
+/// Counted from the first value there is.
+fn travel(values: &[f64]) -> Vec<f64> {
+    let first = values.iter().copied().find(|x| !x.is_nan()).unwrap_or_default();
+    values.iter().map(|x| x - first).collect()
+}
+
+/// The slope of y over x through the origin; NaN if x does not move, or the two have little in common.
+fn slope(x: &[f64], y: &[f64]) -> f64 {
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for (x, y) in x.iter().zip(y).filter(|(x, y)| x.is_finite() && y.is_finite()) {
+        xx += x * x;
+        xy += x * y;
+        yy += y * y;
+    }
+    if xy * xy < 0.8 * xx * yy { f64::NAN } else { xy / xx }
+}
+
+/// What is wrong with a ratio that should be one.
+enum Kind {
+    Sign,
+    Factor(String),
+}
+
+fn kind(ratio: f64) -> Option<Kind> {
+    let size = ratio.abs();
+    if ratio.is_nan() {
+        return None;
+    }
+    if (0.5..2.0).contains(&size) {
+        return (ratio < 0.0).then_some(Kind::Sign);
+    }
+    let times = if size >= 1.0 { format!("{size:.4} times") } else { format!("1/{:.4} of", 1.0 / size) };
+    Some(Kind::Factor(times.replace(".0000", "")))
+}
+
+fn ratio_note(ratio: f64, base: &Output, other: &Output, stage: &Stage, what: &str) -> Option<Note> {
+    let (b, o) = (base.quantity, other.quantity);
+    // Swapped, the two levers go the wrong way: once too often each.
+    let levers = lever(o, stage) / lever(b, stage);
+    let swapped = ratio.abs() * levers * levers;
+    let (name, other) = (b.name(), o.name());
+    let note = |code, text: String| Some(Note::new(code, Severity::Suspicion, text).on(name));
+    match kind(ratio)? {
+        Kind::Sign => note(
+            "sign",
+            format!(
+                "it goes the other way than {other}: one of the two has the wrong sign; say scale = {{ {other} = -1 }}, or so for {name}"
+            ),
+        ),
+        Kind::Factor(_) if levers != 1.0 && (0.8..1.25).contains(&(1.0 / swapped)) => note(
+            "swapped",
+            format!(
+                "it and {other} look swapped: exchanged they agree with the pulley's radius of {}",
+                shown(stage.pulley_radius, "m")
+            ),
+        ),
+        Kind::Factor(factor) => note(
+            "unit",
+            format!(
+                "it goes {factor} what {other} says of the same {what}, with a pulley of {}: is one of their units wrong?",
+                shown(stage.pulley_radius, "m")
+            ),
+        ),
+    }
+}
+
+/// The units that people confuse, and what a value is wrong by if they do.
+fn confused(quantity: Quantity, ratio: f64) -> Option<&'static str> {
+    let units: &[(&str, f64)] = match quantity {
+        Quantity::CartPosition => &[("mm", 1e3), ("um", 1e6), ("cm", 1e2), ("in", 39.37)],
+        Quantity::CartSpeed => &[("mm/s", 1e3), ("mm/min", 6e4), ("cm/s", 1e2)],
+        Quantity::DriveAngle | Quantity::IdlerAngle | Quantity::RotorAngle => {
+            &[("deg", 57.3), ("mrad", 1e3), ("count", 326.0)]
+        }
+        _ => &[("rpm", 9.55), ("deg/s", 57.3), ("mrad/s", 1e3)],
+    };
+    let distance = |factor: f64| (ratio / factor).ln().abs();
+    units.iter().filter(|(_, f)| distance(*f) < 1.2).min_by(|a, b| distance(a.1).total_cmp(&distance(b.1))).map(|u| u.0)
+}
+
+/// The largest speed, against what the machine of the case would do.
+fn magnitude(log: &Log, stage: &Stage, motion: &Motion) -> Option<Note> {
+    let expected = expected_speed(log, stage)? / lever(motion.quantity, stage);
+    let ratio = motion.peak_speed / expected;
+    if (1.0 / ROUGH..ROUGH).contains(&ratio) {
+        return None;
+    }
+    let (name, unit) = (motion.quantity.name(), motion.unit());
+    let (is, would) = (shown(motion.peak_speed, unit), shown(expected, unit));
+    let times = if ratio > 1.0 { format!("{ratio:.0} times") } else { format!("1/{:.0} of", 1.0 / ratio) };
+    let next = match confused(motion.quantity, ratio) {
+        Some(unit) => format!("is the column in {unit}? then say units = {{ {name} = \"{unit}\" }}"),
+        None if ratio < 1.0 => "are the times in ms or us, or the input in a larger unit? then say so in units".into(),
+        None => "check the units of the time, the input and this column".into(),
+    };
+    let text = format!(
+        "it moves at up to {is}, {times} the {would} that the machine of the case would do with this input: {next}"
+    );
+    Some(Note::new("unit", Severity::Suspicion, text).on(name))
+}
+
+/// The largest speed of the cart, m/s, by the machine as one rigid mass; none if it would hardly move.
+fn expected_speed(log: &Log, stage: &Stage) -> Option<f64> {
+    let r = stage.pulley_radius;
+    let (motor, cart) = (&stage.motor, &stage.cart);
+    let (k_t, k_e, n) = (motor.torque_constant, motor.back_emf_constant, motor.gear_ratio);
+    let pulleys = [&stage.drive_pulley, &stage.idler_pulley];
+    let mass = cart.mass
+        + pulleys.iter().map(|pulley| pulley.inertia).sum::<f64>() / (r * r)
+        + motor.rotor_inertia * (n / r).powi(2);
+    let viscous = cart.friction.forward.viscous
+        + pulleys.iter().map(|pulley| pulley.friction.forward.viscous).sum::<f64>() / (r * r);
+    let coulomb =
+        cart.friction.forward.coulomb + pulleys.iter().map(|pulley| pulley.friction.forward.coulomb).sum::<f64>() / r;
+    let force_per_ampere = k_t * n * motor.gear_efficiency / r;
+    let (mut v, mut peak) = (0.0_f64, 0.0_f64);
+    for k in 1..log.len() {
+        let dt = log.time[k] - log.time[k - 1];
+        let u = stage.amplifier.gain * log.input[k - 1];
+        // F = K i − b v, and with a voltage i = (u − K_e n v / r) / R
+        let (force, slope) = match stage.amplifier.mode {
+            AmplifierMode::Current => (force_per_ampere * u, viscous),
+            AmplifierMode::Voltage => {
+                let per_volt = force_per_ampere / motor.resistance;
+                (per_volt * u, viscous + per_volt * k_e * n / r)
+            }
+        };
+        let driven = force.abs() > coulomb || v != 0.0;
+        let direction = if v == 0.0 { force.signum() } else { v.signum() };
+        if driven {
+            let net = force - direction * coulomb;
+            let next = match slope > 0.0 {
+                true => net / slope + (v - net / slope) * (-slope * dt / mass).exp(),
+                false => v + net * dt / mass,
+            };
+            v = if v != 0.0 && next * v < 0.0 { 0.0 } else { next };
+        }
+        peak = peak.max(v.abs());
+    }
+    let most = log.input.iter().fold(0.0_f64, |most, u| most.max((stage.amplifier.gain * u).abs()));
+    let free = match stage.amplifier.mode {
+        AmplifierMode::Voltage if k_e > 0.0 => most * r / (k_e * n),
+        _ => peak,
+    };
+    (peak > 1e-3 * free && peak > 0.0).then_some(peak)
+}
+
+/// Whether it moves against its input.
+fn direction(log: &Log, stage: &Stage, motion: &Motion) -> Option<Note> {
+    if motion.absolute {
+        return None;
+    }
+    let (mut uu, mut uv, mut vv) = (0.0, 0.0, 0.0);
+    for (u, v) in log.input.iter().zip(&motion.speed).filter(|(_, v)| v.is_finite()) {
+        let u = u * stage.amplifier.gain;
+        uu += u * u;
+        uv += u * v;
+        vv += v * v;
+    }
+    let correlation = uv / (uu * vv).sqrt();
+    if correlation.is_nan() || correlation > -0.6 {
+        return None;
+    }
+    let name = motion.quantity.name();
+    let text = format!(
+        "it moves against its input (correlation of input and speed {correlation:.2}): swapped wires, or a sign; say scale = {{ {name} = -1 }}, or a negative amplifier.gain"
+    );
+    Some(Note::new("sign", Severity::Suspicion, text).on(name))
+}
+
+/// A current that this motor cannot draw from this voltage.
+fn current_note(log: &Log, stage: &Stage) -> Option<Note> {
+    let output = log.output(Quantity::MotorCurrent)?;
+    let peak = quantile(&output.values.iter().map(|i| i.abs()).collect::<Vec<_>>(), 0.995);
+    let most = log.input.iter().fold(0.0_f64, |most, u| most.max((stage.amplifier.gain * u).abs()));
+    let most = match stage.amplifier.mode {
+        AmplifierMode::Voltage => 2.0 * most / stage.motor.resistance,
+        AmplifierMode::Current => most,
+    };
+    if most == 0.0 || peak < ROUGH * most {
+        return None;
+    }
+    let text = format!(
+        "it reaches {}, where this motor draws {} at most: is the column in mA? then say units = {{ motor_current = \"mA\" }}",
+        shown(peak, "A"),
+        shown(most, "A")
+    );
+    Some(Note::new("unit", Severity::Suspicion, text).on("motor_current"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::is_speed;
+    use crate::stage::Quantity;
+
+    #[test]
+    fn every_quantity_is_of_one_kind() {
+        let electrical = [Quantity::MotorCurrent, Quantity::MotorVoltage];
+        for quantity in Quantity::ALL {
+            let kinds = [is_speed(quantity), super::super::is_position(quantity), electrical.contains(&quantity)];
+            assert_eq!(kinds.iter().filter(|kind| **kind).count(), 1);
+        }
+    }
+}
