@@ -47,6 +47,7 @@
 //! - [`plant`]: its equations of motion, mode by mode.
 //! - [`log`]: measured columns in. [`case`]: the case file in.
 //! - [`solve`]: the motion. [`measure`]: what a recorder makes of it. [`metrics`]: what it shows.
+//! - [`fit`]: parameters from logs, and what the logs cannot tell.
 //! - `report`: figures, drawings and an HTML page of them (feature `report`, on by default).
 //!
 //! # Features
@@ -56,6 +57,7 @@
 pub mod case;
 pub mod error;
 pub mod files;
+pub mod fit;
 pub mod friction;
 pub mod log;
 pub mod measure;
@@ -63,6 +65,8 @@ pub mod metrics;
 pub mod number;
 pub mod parameter;
 pub mod plant;
+#[cfg(feature = "posterior")]
+pub mod posterior;
 pub mod quantity;
 pub mod reduction;
 #[cfg(feature = "report")]

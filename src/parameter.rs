@@ -432,6 +432,14 @@ const EXPERIMENT: &[Parameter] = &[
 ];
 
 #[rustfmt::skip]
+const FIT: &[Parameter] = &[
+    row("fit.starts", "", "", Value(1.0), Range::whole(1.0, 1000.0), "8", "From how many points the search starts: that of the file, and others within the bounds."),
+    row("fit.seed", "", "", Value(1.0), SEED, "1", "Which other points."),
+    row("fit.until", "", "s", Words("all of each log"), DURATION, "8 s", "Time in each log after which it is only compared, not fitted."),
+    row("fit.windows", "", "s", Words("each log is one"), DURATION, "1 s", "Length of the windows into which logs are cut, each with a start of its own."),
+];
+
+#[rustfmt::skip]
 const LOG: &[Parameter] = &[
     row("experiment.log.time.every", "", "s", Required, DURATION, "20 ms", "Interval between rows, for a file without a column of times."),
     row("experiment.log.from", "", "s", Words("the first row"), ANY, "0.1 s", "Where the log begins, on its own clock; this is time zero."),
@@ -579,6 +587,7 @@ const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     ("experiment.initial", &[INITIAL]),
     ("experiment.log", &[LOG]),
     ("input", &[INPUTS]),
+    ("fit", &[FIT]),
 ];
 
 /// All parameters, in the order of the case file.

@@ -11,7 +11,7 @@ use taut::solve::{Ending, Solution, Solver, simulate};
 use taut::stage::{BeltMake, Stage, Travel};
 
 fn experiment(input: &Signal, until: f64, every: f64) -> Experiment {
-    Experiment { name: "general".into(), input: input.clone(), until, every, initial: Initial::default() }
+    Experiment { name: "general".into(), input: input.clone(), until, every, initial: Initial::default(), log: None }
 }
 
 fn run(stage: &Stage, experiment: &Experiment, solver: Solver) -> Solution {

@@ -26,6 +26,8 @@ pub enum Command {
     Paper(Paper),
     Init(Init),
     Simulate(Simulate),
+    Check(Check),
+    Fit(Fit),
 }
 
 /// Recompute the paper of Sollmann and Jouaneh (2011): every table, figure and claim.
@@ -116,6 +118,56 @@ Examples:
   taut simulate axis.toml --solver table3 --step 1ms --out as-printed
 
 Ctrl-C ends a run early: what was computed until then is written and reported, with exit status 130.";
+
+/// Say what the logs of a case can tell of the parameters in its [fit], before any fit.
+///
+/// Prints what each log shows, how well each parameter would be known, the combinations that nothing tells apart, and
+/// what one more experiment would tell.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  taut check axis.toml")]
+pub struct Check {
+    /// The case file
+    pub case: PathBuf,
+    /// Change one value of the case for this run, as often as needed
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub changes: Vec<String>,
+    /// Print it as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Find the parameters in [fit] of a case from its logs.
+///
+/// Prints the estimates with 95 % intervals and how each log is met. With --out it also writes fitted.toml, a case that
+/// simulates with the estimates, fit.json, and a report with model and log side by side.
+#[derive(Debug, clap::Args)]
+#[command(after_help = FIT)]
+pub struct Fit {
+    /// The case file
+    pub case: PathBuf,
+    /// The folder to write results into; it is made if it is not there
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Change one value of the case for this run, as often as needed
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub changes: Vec<String>,
+    /// Leave out the report
+    #[arg(long)]
+    pub no_report: bool,
+    /// Print the result as JSON, the same as in fit.json
+    #[arg(long)]
+    pub json: bool,
+    /// Print nothing but errors
+    #[arg(long, short, conflicts_with = "json")]
+    pub quiet: bool,
+}
+
+const FIT: &str = "\
+Examples:
+  taut fit axis.toml --out fitted
+  taut fit axis.toml --set fit.starts=8 --json | jq .parameters
+
+Ctrl-C ends a fit early: the best so far is written and said not to be converged, with exit status 130.";
 
 /// How the equations are solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

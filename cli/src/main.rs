@@ -1,7 +1,9 @@
 //! The program `taut`: reads the command line, does what it says, and tells how it ended.
 
 mod args;
+mod check;
 mod failure;
+mod fit;
 mod init;
 mod interrupt;
 mod paper;
@@ -22,6 +24,8 @@ fn main() -> ExitCode {
         Command::Paper(args) => paper::run(&args),
         Command::Init(args) => init::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Check(args) => check::run(&args),
+        Command::Fit(args) => fit::run(&args),
     };
     match done {
         Ok(Status::Done) => ExitCode::SUCCESS,

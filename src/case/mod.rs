@@ -1,5 +1,6 @@
 //! The case file: TOML in, a [`Case`] out, and every mistake told with its line.
 
+mod fit;
 mod friction;
 mod input;
 mod log;
@@ -10,6 +11,7 @@ mod stage;
 mod template;
 mod tree;
 
+pub use fit::{Nuisances, Plan, Scope, matches};
 pub use template::TEMPLATE;
 
 use crate::error::{Error, Result};
@@ -32,7 +34,7 @@ const MOST_SAMPLES: f64 = 1e9;
 const LONGEST_NAME: usize = 100;
 
 /// Keys that stand in the plan and not yet in the program.
-const PLANNED: &[&str] = &["controller", "fit", "sweep"];
+const PLANNED: &[&str] = &["controller", "sweep"];
 
 /// Everything needed to repeat a run.
 #[derive(Debug, Clone)]
@@ -45,6 +47,8 @@ pub struct Case {
     pub measurement: Option<Measurement>,
     /// What is done with it, in the file's order.
     pub experiments: Vec<Experiment>,
+    /// What is to be found from their logs, where the file says so.
+    pub fit: Option<Plan>,
     /// The text it was read from, with `--set` applied: read again, it gives the same case.
     pub text: String,
     /// The files that its inputs and logs name, in the text's order.
@@ -186,6 +190,9 @@ impl Case {
             "encoder",
             "measurement",
             "experiment",
+            "fit",
+            // What a fit says of its own result; nothing is computed from it.
+            "uncertainty",
         ];
         root.check_keys(&tables, PLANNED)?;
 
@@ -197,9 +204,10 @@ impl Case {
         let folder = Folder { path: name.parent().unwrap_or(Path::new("")), read: RefCell::default() };
         let experiments = experiments(&root, &stage, &folder)?;
         let measurement = measurement::measurement(&root, &stage, &experiments)?;
+        let fit = fit::plan(&root, &experiments)?;
         let mut files = folder.read.into_inner();
         files.sort_by_key(|file| file.place.start);
-        Ok(Self { title, stage, measurement, experiments, text: source.text.clone(), files })
+        Ok(Self { title, stage, measurement, experiments, fit, text: source.text.clone(), files })
     }
 
     /// The text with other names for the files of its inputs; it is to lie where these names lead to them.

@@ -1,0 +1,89 @@
+//! `taut check`: what the logs of a case can tell of its parameters, before any fit.
+
+use crate::args::Check as Args;
+use crate::failure::{Outcome, Status};
+use crate::fit::plan;
+use crate::terminal::{self, bold};
+use serde_json::json;
+use std::fmt::Write;
+use taut::case::Case;
+use taut::fit::{Check, check};
+
+/// Reads the case, looks, tells.
+pub fn run(args: &Args) -> Outcome {
+    let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
+    let case = Case::read_with(&args.case, &changes)?;
+    let plan = plan(&case, &args.case)?;
+    let found = check(&case, &plan)?;
+    terminal::show(&if args.json { data(&case, &found) } else { text(&case, &found) });
+    Ok(Status::Done)
+}
+
+fn text(case: &Case, found: &Check) -> String {
+    let mut text = format!("{}\n", bold(&case.title));
+    let _ = write!(text, "\n{}\n", bold("What the logs show"));
+    for log in &found.logs {
+        let _ = writeln!(text, "  {}: {}", log.name, log.told.join("; "));
+    }
+    let _ = write!(text, "\n{}\n", bold("How well each parameter would be known, all others free"));
+    let known = &found.identifiability;
+    let wide = known.names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
+    for (j, name) in known.names.iter().enumerate() {
+        let error = match known.error[j] {
+            e if e.is_finite() => format!("to {:.2} %", 100.0 * e),
+            _ => "not at all".into(),
+        };
+        let _ = writeln!(text, "  {name:<wide$}  {error}");
+    }
+    let _ = writeln!(
+        text,
+        "  singular values {}",
+        known.singular.iter().map(|s| format!("{s:.2e}")).collect::<Vec<_>>().join(", ")
+    );
+    let _ = writeln!(text, "  {}", found.noise_words);
+    if known.complete() {
+        text.push_str("\neverything that is searched for is determined\n");
+    }
+    for (group, choices) in known.groups.iter().zip(&found.choices) {
+        let _ = write!(text, "\n{}\n  {}\n", bold("Not determined"), group.words);
+        for choice in choices {
+            let _ = writeln!(text, "  - {choice}");
+        }
+    }
+    if !found.experiments.is_empty() {
+        let _ = write!(text, "\n{}\n", bold("What one more experiment would tell, by simulation, the best first"));
+        for experiment in &found.experiments {
+            let _ = writeln!(text, "  {}: {}", experiment.name, experiment.told);
+        }
+    }
+    text
+}
+
+fn data(case: &Case, found: &Check) -> String {
+    let number = |v: f64| if v.is_finite() { json!(v) } else { json!(null) };
+    let known = &found.identifiability;
+    let value = json!({
+        "title": case.title,
+        "complete": known.complete(),
+        "parameters": known.names.iter().enumerate().map(|(j, name)| json!({
+            "name": name,
+            "relative_error": number(known.error[j]),
+            "determined": known.error[j].is_finite(),
+            "sensitivity": number(known.sensitivity[j]),
+        })).collect::<Vec<_>>(),
+        "singular_values": known.singular.iter().map(|s| number(*s)).collect::<Vec<_>>(),
+        "not_determined": known.groups.iter().zip(&found.choices).map(|(group, choices)| json!({
+            "parameters": group.members.iter().map(|&j| &known.names[j]).collect::<Vec<_>>(),
+            "combinations_determined": group.determined,
+            "words": group.words,
+            "choices": choices,
+        })).collect::<Vec<_>>(),
+        "logs": found.logs.iter().map(|log| json!({ "name": log.name, "told": log.told })).collect::<Vec<_>>(),
+        "experiments": found.experiments.iter().map(|experiment| json!({
+            "name": experiment.name,
+            "told": experiment.told,
+            "determined": experiment.determined,
+        })).collect::<Vec<_>>(),
+    });
+    format!("{}\n", serde_json::to_string_pretty(&value).unwrap_or_default())
+}

@@ -1,0 +1,127 @@
+//! `taut fit`: finds parameters from the logs of a case, and says how well they are known.
+
+mod figures;
+mod json;
+mod page;
+pub mod table;
+
+use crate::args::Fit as Args;
+use crate::failure::{Failure, Outcome, Status};
+use crate::interrupt::Interrupt;
+use crate::terminal;
+use indicatif::ProgressBar;
+use std::io::IsTerminal;
+use std::path::{Component, Path, PathBuf};
+use std::time::{Duration, Instant};
+use taut::case::Case;
+use taut::files::write_atomically;
+use taut::fit::{Ending, Fit, fit};
+use taut::solve::Flow;
+use taut::{Error, Result};
+
+/// How long a fit may take before its progress is shown.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Reads the case, fits, writes, tells.
+pub fn run(args: &Args) -> Outcome {
+    let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
+    let case = Case::read_with(&args.case, &changes)?;
+    let plan = plan(&case, &args.case)?;
+    if let Some(folder) = &args.out {
+        std::fs::create_dir_all(folder)
+            .map_err(|e| Error::new(format!("this folder cannot be made: {e}")).in_file(folder))?;
+    }
+    let interrupt = Interrupt::listen();
+    let begin = Instant::now();
+    let mut progress = Progress::new(!args.quiet);
+    let found = fit(&case, &plan, Some(&|| interrupt.signal().is_some()), &mut |cost| {
+        progress.show(cost, begin);
+        if interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue }
+    })?;
+    progress.clear();
+    let took = begin.elapsed();
+    let json = json::text(&case, &found);
+    let mut written = Vec::new();
+    if let Some(folder) = &args.out {
+        written = write(args, folder, &case, &found, &json).map_err(Failure::work)?;
+    }
+    if args.json {
+        terminal::show(&json);
+    } else if !args.quiet {
+        terminal::show(&table::text(&case, &found, took, args.out.as_deref(), &written));
+    }
+    Ok(match (interrupt.signal(), found.ending) {
+        (Some(signal), _) => Status::Interrupted(signal),
+        (None, Ending::Converged | Ending::Stalled) => Status::Done,
+        (None, _) => Status::Incomplete,
+    })
+}
+
+/// What the case asks for.
+pub fn plan(case: &Case, path: &Path) -> Result<taut::case::Plan> {
+    case.fit.clone().ok_or_else(|| {
+        Error::new("this case does not say what is searched for")
+            .in_file(path)
+            .next("add a table [fit] with for example free = [\"cart.friction.viscous\", \"cart.friction.coulomb\"]")
+    })
+}
+
+/// Writes the files; returns their names.
+fn write(args: &Args, folder: &Path, case: &Case, found: &Fit, json: &str) -> Result<Vec<&'static str>> {
+    let text = found.case_text(case, &args.case)?;
+    // Paths in it lead from its own folder to the same files.
+    let fitted = Case::from_text(&args.case, &text)?;
+    let text = fitted.text_with(|file| between(folder, &file.path));
+    write_atomically(folder.join("fitted.toml"), &text)?;
+    write_atomically(folder.join("fit.json"), json)?;
+    let mut names = vec!["fitted.toml", "fit.json"];
+    if !args.no_report {
+        page::page(case, found, &text).write(folder.join("report.html"))?;
+        names.push("report.html");
+    }
+    Ok(names)
+}
+
+/// The way from a folder to a file, with `/` between the parts.
+fn between(folder: &Path, file: &Path) -> String {
+    let whole = |path: &Path| -> PathBuf { std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf()) };
+    let (from, to) = (whole(folder), whole(file));
+    let (from, to): (Vec<Component>, Vec<Component>) = (from.components().collect(), to.components().collect());
+    let same = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
+    if same == 0 {
+        return file.display().to_string();
+    }
+    let up = std::iter::repeat_n("..".to_string(), from.len() - same);
+    let down = to[same..].iter().map(|part| part.as_os_str().to_string_lossy().into_owned());
+    up.chain(down).collect::<Vec<_>>().join("/")
+}
+
+/// What is shown of a fit that takes longer than one likes to wait.
+struct Progress {
+    bar: Option<ProgressBar>,
+    wanted: bool,
+    steps: u64,
+}
+
+impl Progress {
+    fn new(wanted: bool) -> Self {
+        Self { bar: None, wanted: wanted && std::io::stderr().is_terminal(), steps: 0 }
+    }
+
+    fn show(&mut self, cost: f64, begin: Instant) {
+        self.steps += 1;
+        if self.bar.is_none() && self.wanted && begin.elapsed() > PATIENCE {
+            self.bar = Some(ProgressBar::new_spinner());
+        }
+        if let Some(bar) = &self.bar {
+            bar.set_message(format!("step {}, cost {cost:.6e}; Ctrl-C keeps the best so far", self.steps));
+            bar.tick();
+        }
+    }
+
+    fn clear(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

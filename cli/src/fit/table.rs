@@ -1,0 +1,148 @@
+//! The result for people.
+
+use crate::terminal::bold;
+use std::fmt::Write;
+use std::path::Path;
+use std::time::Duration;
+use taut::case::Case;
+use taut::fit::{Ending, Estimate, Fit, Score};
+use taut::number;
+
+/// The text on the terminal.
+pub fn text(case: &Case, fit: &Fit, took: Duration, out: Option<&Path>, written: &[&str]) -> String {
+    let mut text = format!("{}\n", bold(&case.title));
+    let _ = writeln!(text, "{}", ending(fit));
+    let _ = write!(text, "\n{}\n", bold("Parameters"));
+    let wide = fit.estimates.iter().map(|e| e.name.chars().count()).max().unwrap_or(0).max(10);
+    for estimate in &fit.estimates {
+        let [value, error, interval] = words(estimate);
+        let _ = writeln!(text, "  {:<wide$}  {value:>14} ± {error:<10} {interval}", estimate.name);
+    }
+    let _ = write!(text, "\n{}\n", bold("Logs"));
+    let wide = fit.logs.iter().map(|log| name(log).chars().count()).max().unwrap_or(0).min(40);
+    for (word, scores) in scores(fit) {
+        let _ = writeln!(text, "  {word:<wide$}  {scores}");
+    }
+    let _ = writeln!(
+        text,
+        "\n{} values, {} variables; {} steps, {} simulated logs, {}",
+        fit.values,
+        fit.variables,
+        fit.work.iterations,
+        fit.work.simulations,
+        plain(&number::engineering(took.as_secs_f64(), "s", 3)),
+    );
+    match out {
+        Some(folder) => {
+            let _ = writeln!(text, "wrote in {}: {}", folder.display(), written.join("  "));
+        }
+        None => text.push_str("nothing was written: add --out DIR for fitted.toml, fit.json and a report\n"),
+    }
+    text
+}
+
+/// How the search ended, in a sentence.
+pub fn ending(fit: &Fit) -> String {
+    let mut text = match fit.ending {
+        Ending::Converged => {
+            format!("converged: another step would move the estimates by {:.1e} standard errors", fit.decrement)
+        }
+        Ending::Stalled => format!(
+            "ended at a kink, where sticks and slips change their order: no step lowers the cost, though its slope promises {:.1} standard errors",
+            fit.decrement
+        ),
+        Ending::OutOfIterations => "not converged: the steps were used up".to_string(),
+        Ending::Interrupted => "interrupted: the best so far, not converged".to_string(),
+        Ending::Failed => "failed".to_string(),
+    };
+    if fit.starts.len() > 1 {
+        let best = fit.starts.iter().copied().fold(f64::INFINITY, f64::min);
+        let same = fit.starts.iter().filter(|cost| **cost <= best * 1.001 + 1e-12).count();
+        let _ = write!(text, "; {same} of {} starts led to the same cost", fit.starts.len());
+    }
+    text
+}
+
+fn plain(text: &str) -> String {
+    text.replace(['\u{a0}', '\u{202f}'], " ").replace('−', "-")
+}
+
+/// A number with its unit and as many digits as make sense.
+pub fn value(value: f64, unit: &str, digits: usize) -> String {
+    match unit {
+        _ if value == 0.0 => format!("0 {unit}").trim().to_string(),
+        // Prefixes where the unit takes one.
+        "m" | "s" | "N" | "V" | "A" | "H" | "rad" | "N m" | "m/s" | "rad/s" => {
+            plain(&number::engineering(value, unit, digits))
+        }
+        "" => taut::quantity::rounded(value),
+        _ => format!("{} {unit}", significant(value, digits)),
+    }
+}
+
+fn significant(value: f64, digits: usize) -> String {
+    let size = value.abs();
+    if (1e-3..1e5).contains(&size) {
+        let decimals = (digits as i32 - 1 - size.log10().floor() as i32).max(0) as usize;
+        format!("{value:.decimals$}")
+    } else {
+        format!("{value:.*e}", digits - 1)
+    }
+}
+
+/// Value, standard error and interval of an estimate.
+pub fn words(estimate: &Estimate) -> [String; 3] {
+    let shown = |v: f64, digits| value(v, estimate.unit, digits);
+    let own = shown(estimate.value, 5);
+    if estimate.at_bound {
+        return [own, "-".into(), "at its bound: no interval".into()];
+    }
+    match (estimate.error, estimate.interval) {
+        (Some(error), Some([low, high])) if error.is_finite() => {
+            [own, shown(error, 2), format!("95 %: {} to {}", shown(low, 4), shown(high, 4))]
+        }
+        _ => [own, "∞".into(), "not determined by these logs".into()],
+    }
+}
+
+fn name(log: &taut::fit::LogFit) -> String {
+    if log.window == 0 { log.name.clone() } else { format!("{} [{}]", log.name, log.window + 1) }
+}
+
+/// How each log is met, and all of them together.
+fn scores(fit: &Fit) -> Vec<(String, String)> {
+    let mut lines = Vec::new();
+    let mut sums: Vec<(&str, &str, bool, f64, usize)> = Vec::new();
+    for log in &fit.logs {
+        let mut parts = Vec::new();
+        for output in &log.outputs {
+            let quantity = output.quantity;
+            for (score, held) in [(output.fitted, false), (output.held_out, true)] {
+                let Some(score) = score else { continue };
+                parts.push(told(quantity.name(), quantity.unit(), &score, held));
+                let squares = score.rmse * score.rmse * score.count as f64;
+                match sums.iter_mut().find(|sum| sum.0 == quantity.name() && sum.2 == held) {
+                    Some(sum) => (sum.3, sum.4) = (sum.3 + squares, sum.4 + score.count),
+                    None => sums.push((quantity.name(), quantity.unit(), held, squares, score.count)),
+                }
+            }
+        }
+        if !log.complete {
+            parts.push("the model does not reach its end".into());
+        }
+        lines.push((name(log), parts.join("; ")));
+    }
+    if fit.logs.len() > 1 {
+        for (quantity, unit, held, squares, count) in sums {
+            let rmse = value((squares / count as f64).sqrt(), unit, 4);
+            let word = if held { "held out" } else { "fitted" };
+            lines.push(("all together".into(), format!("{quantity} {word}: RMSE {rmse}")));
+        }
+    }
+    lines
+}
+
+fn told(quantity: &str, unit: &str, score: &Score, held: bool) -> String {
+    let word = if held { " held out" } else { "" };
+    format!("{quantity}{word}: RMSE {}, fit {:.2} %", value(score.rmse, unit, 4), score.percent)
+}

@@ -1,0 +1,294 @@
+//! What logs can tell: the sensitivity of all outputs to each parameter, and the combinations that change nothing.
+//!
+//! With J the derivatives of the weighted outputs with respect to relative changes of the parameters, and what else is
+//! fitted along projected out, J = U S Vᵀ: moving the parameters along vᵢ by one changes the outputs by sᵢ standard deviations,
+//! so 1/sᵢ is how far off that combination may be. Where that is more than [`LIMIT`], it is not determined.
+
+use super::knob::{at_pulley, parameter_of, value_of};
+use super::problem::Problem;
+use nalgebra::{DMatrix, SVD};
+
+/// Relative standard error from which on a combination counts as not determined.
+pub const LIMIT: f64 = 1.0;
+
+/// Iterations of a singular value decomposition before it is given up.
+const MOST_SWEEPS: usize = 10_000;
+
+/// What the logs say of the parameters.
+#[derive(Debug, Clone)]
+pub struct Identifiability {
+    /// Names of the parameters, knobs first, then what is shared.
+    pub names: Vec<String>,
+    /// Root mean square of each parameter's column: by how many standard deviations a change by 100 % moves a value.
+    pub sensitivity: Vec<f64>,
+    /// Singular values, falling.
+    pub singular: Vec<f64>,
+    /// Relative standard error of each parameter with all others free; infinite where it is not determined.
+    pub error: Vec<f64>,
+    /// Groups of parameters of which only fewer combinations are determined.
+    pub groups: Vec<Group>,
+}
+
+/// Parameters that the logs do not tell apart.
+#[derive(Debug, Clone)]
+pub struct Group {
+    /// Places among the names.
+    pub members: Vec<usize>,
+    /// How many combinations of them are determined.
+    pub determined: usize,
+    /// What can be said in words and numbers.
+    pub words: String,
+}
+
+impl Identifiability {
+    /// Whether all is determined.
+    pub fn complete(&self) -> bool {
+        self.groups.is_empty()
+    }
+
+    /// From a Jacobian of `problem` at `x`, with residuals of this deviation; none if numbers fail.
+    pub fn new(problem: &Problem, jacobian: &DMatrix<f64>, x: &[f64], deviation: f64) -> Option<Self> {
+        let globals = problem.globals();
+        let mut own = projected(jacobian, globals)?;
+        let mut names: Vec<String> = problem.knobs.iter().map(|knob| knob.name.clone()).collect();
+        names.extend(problem.shared.iter().map(|extra| extra.what.name().to_string()));
+        // Relative changes: of what is searched on a linear scale, of its value or of a tenth of its unit if that is more.
+        for j in 0..globals {
+            let unit = if j < problem.knobs.len() && !problem.is_log(j) { x[j].abs().max(0.1) } else { 1.0 };
+            own.column_mut(j).scale_mut(unit / deviation.max(f64::MIN_POSITIVE));
+        }
+        let rows = problem.counted().max(1) as f64;
+        let sensitivity = (0..globals).map(|j| own.column(j).norm() / rows.sqrt()).collect();
+        let svd = SVD::try_new(own, false, true, 1e-15, MOST_SWEEPS)?;
+        let v = svd.v_t.as_ref()?.transpose();
+        let singular: Vec<f64> = svd.singular_values.iter().copied().collect();
+        let most = singular.iter().copied().fold(0.0, f64::max);
+        // Differences are good to about 1e-9 of the largest column.
+        let floor = 1e-8 * most;
+        let lost: Vec<usize> = (0..globals).filter(|&i| !(singular[i] > floor && 1.0 / singular[i] < LIMIT)).collect();
+        let mut error = Vec::new();
+        for j in 0..globals {
+            let hidden: f64 = lost.iter().map(|&i| v[(j, i)].powi(2)).sum();
+            let squares: f64 =
+                (0..globals).filter(|i| !lost.contains(i)).map(|i| (v[(j, i)] / singular[i]).powi(2)).sum();
+            error.push(if hidden > 1e-3 { f64::INFINITY } else { squares.sqrt() });
+        }
+        let mut result = Self { names, sensitivity, singular, error, groups: Vec::new() };
+        result.groups = result.grouped(problem, &v, &lost, x);
+        Some(result)
+    }
+
+    /// Parameters connected by lost directions, each group with what is left of it.
+    fn grouped(&self, problem: &Problem, v: &DMatrix<f64>, lost: &[usize], x: &[f64]) -> Vec<Group> {
+        let n = self.names.len();
+        let hidden = |i: usize, j: usize| lost.iter().map(|&d| v[(i, d)] * v[(j, d)]).sum::<f64>();
+        let mut groups = Vec::new();
+        let mut seen = vec![false; n];
+        for start in 0..n {
+            if seen[start] || hidden(start, start) < 1e-3 {
+                continue;
+            }
+            let mut members = vec![start];
+            seen[start] = true;
+            let mut next = 0;
+            while next < members.len() {
+                let i = members[next];
+                for j in 0..n {
+                    if !seen[j] && hidden(i, j).abs() > 1e-3 {
+                        seen[j] = true;
+                        members.push(j);
+                    }
+                }
+                next += 1;
+            }
+            members.sort_unstable();
+            let gone = members.iter().map(|&j| hidden(j, j)).sum::<f64>().round() as usize;
+            let determined = members.len().saturating_sub(gone.max(1));
+            let words = self.words(problem, &members, determined, &hidden, x);
+            groups.push(Group { members, determined, words });
+        }
+        groups
+    }
+
+    fn words(
+        &self,
+        problem: &Problem,
+        members: &[usize],
+        determined: usize,
+        hidden: &dyn Fn(usize, usize) -> f64,
+        x: &[f64],
+    ) -> String {
+        let names: Vec<&str> = members.iter().map(|&j| self.names[j].as_str()).collect();
+        if determined == 0 {
+            return match names[..] {
+                [one] => format!("{one} does not show in these logs"),
+                _ => format!("{} do not show in these logs", listed(&names)),
+            };
+        }
+        let knobs = members.iter().all(|&j| j < problem.knobs.len());
+        if determined == 1 && knobs {
+            // The direction that is left, by powers of what is not hidden.
+            let m = members.len();
+            let mut left = DMatrix::from_fn(m, m, |a, b| f64::from(a == b) - hidden(members[a], members[b]));
+            for _ in 0..6 {
+                left = &left * &left;
+                let norm = left.norm();
+                if norm > 0.0 {
+                    left /= norm;
+                }
+            }
+            let best = (0..m).max_by(|&a, &b| left[(a, a)].total_cmp(&left[(b, b)])).unwrap_or(0);
+            let stage = problem.stage_at(x);
+            // ∂/∂p of what is determined
+            let weights: Vec<f64> = members
+                .iter()
+                .enumerate()
+                .map(|(a, &j)| {
+                    let value = problem.value(j, x[j]);
+                    let unit = if problem.is_log(j) { 1.0 } else { x[j].abs().max(0.1) };
+                    left[(a, best)] / (problem.slope(j, value) * unit)
+                })
+                .collect();
+            let knobs: Vec<&super::Knob> = members.iter().map(|&j| &problem.knobs[j]).collect();
+            if let Some(sum) = sum_of(&stage, &knobs, &weights) {
+                return format!("of {} only {sum} is determined", listed(&names));
+            }
+        }
+        let combinations = if determined == 1 { "1 combination".into() } else { format!("{determined} combinations") };
+        let mut text = format!("of {} only {combinations} can be told", listed(&names));
+        if members.len() - determined == 1 {
+            // The one direction that changes nothing.
+            let lead = members.iter().copied().max_by(|&a, &b| hidden(a, a).total_cmp(&hidden(b, b))).unwrap_or(0);
+            let along: Vec<String> = members
+                .iter()
+                .filter(|&&j| j != lead)
+                .map(|&j| {
+                    let percent = 100.0 * 0.01 * hidden(lead, j) / hidden(lead, lead);
+                    format!("{} by {}{:.2} %", self.names[j], if percent < 0.0 { "−" } else { "+" }, percent.abs())
+                })
+                .collect();
+            text.push_str(&format!(
+                ": {} by +1 % with {} changes nothing that they show",
+                self.names[lead],
+                along.join(", ")
+            ));
+        }
+        text
+    }
+
+    /// What to do about a group, each a line.
+    pub fn choices(&self, problem: &Problem, group: &Group) -> Vec<String> {
+        let names: Vec<&str> = group.members.iter().map(|&j| self.names[j].as_str()).collect();
+        let mut choices = Vec::new();
+        let spare = group.members.len() - group.determined;
+        choices.push(match (group.determined, names.len()) {
+            (0, _) => format!("leave {} out of [fit]: the value of the case file stays", listed(&names)),
+            (_, 2) => format!("fix one: leave {} or {} out of [fit]", names[0], names[1]),
+            _ => format!("fix {spare}: leave {spare} of {} out of [fit]", listed(&names)),
+        });
+        if group.determined == 1 && names.len() > 1 {
+            let quoted: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
+            choices.push(format!("tie them: tied = [[{}]]", quoted.join(", ")));
+            for (term, lump) in
+                [("viscous", "total.viscous"), ("coulomb", "total.coulomb"), ("inertia", "total.inertia")]
+            {
+                let fits = |name: &&str| name.contains(term) || (term == "inertia" && *name == "cart.mass");
+                if names.iter().all(|name| fits(&name)) && !problem.knobs.iter().any(|knob| knob.name == lump) {
+                    choices.push(format!("lump them: lumped = [\"{lump}\"]"));
+                }
+            }
+        }
+        choices
+    }
+}
+
+/// Columns of the first `n` variables without what the others can do.
+fn projected(jacobian: &DMatrix<f64>, n: usize) -> Option<DMatrix<f64>> {
+    let all = jacobian.ncols();
+    if all == n {
+        let rows = jacobian.nrows();
+        return if rows > n { Some(jacobian.clone().qr().unpack_r()) } else { Some(jacobian.clone()) };
+    }
+    // Others first: the last block of R is what they leave of the rest.
+    let order: Vec<usize> = (n..all).chain(0..n).collect();
+    let ordered = jacobian.select_columns(&order);
+    if ordered.nrows() < all {
+        return None;
+    }
+    let r = ordered.qr().unpack_r();
+    Some(r.view((all - n, all - n), (n, n)).into_owned())
+}
+
+/// A sum over the bodies that these weights are, in symbols and numbers.
+fn sum_of(stage: &crate::stage::Stage, knobs: &[&super::Knob], weights: &[f64]) -> Option<String> {
+    // Each knob's parameters must be parts of one sum.
+    let kinds = ["viscous", "coulomb", "inertia"];
+    let kind = |key: &str| {
+        kinds.iter().position(|kind| key.contains(kind) || (*kind == "inertia" && key == "cart.mass"))
+    };
+    let kind_of = kind(&knobs.first()?.keys.first()?.0)?;
+    let mut parts = Vec::new();
+    let mut value = 0.0;
+    let mut scale = None;
+    for (knob, weight) in knobs.iter().zip(weights) {
+        let mut own = 0.0;
+        for (key, factor) in &knob.keys {
+            if kind(key)? != kind_of {
+                return None;
+            }
+            let arm = at_pulley(stage, key);
+            own += factor * arm;
+            let symbol = parameter_of(key).map_or("", |row| row.symbol);
+            parts.push(match key.as_str() {
+                "cart.mass" => format!("r² {symbol}"),
+                _ if key.starts_with("cart.friction.viscous") => format!("r² {symbol}"),
+                _ if key.starts_with("cart.friction") => format!("r {symbol}"),
+                "motor.rotor_inertia" => format!("n² {symbol}"),
+                _ => symbol.to_string(),
+            });
+            value += arm * value_of(stage, key)?;
+        }
+        // All weights are the same number of times the arms, within a tenth: the belt gives way a little.
+        let ratio = weight / own;
+        if (ratio / *scale.get_or_insert(ratio) - 1.0).abs() > 0.1 {
+            return None;
+        }
+    }
+    // What is not searched for and adds to it.
+    let turned = |key: &str| knobs.iter().any(|knob| knob.keys.iter().any(|(own, _)| own == key));
+    let others: &[&str] = match kind_of {
+        0 => &["drive_pulley.friction.viscous", "cart.friction.viscous", "idler_pulley.friction.viscous"],
+        1 => &["drive_pulley.friction.coulomb", "cart.friction.coulomb", "idler_pulley.friction.coulomb"],
+        _ => &["motor.rotor_inertia", "drive_pulley.inertia", "cart.mass", "idler_pulley.inertia"],
+    };
+    for key in others.iter().filter(|key| !turned(key)) {
+        let own = at_pulley(stage, key) * value_of(stage, key).unwrap_or(0.0);
+        if own != 0.0 {
+            value += own;
+            let symbol = parameter_of(key).map_or("", |row| row.symbol);
+            let arm = match *key {
+                "cart.mass" | "cart.friction.viscous" => "r² ",
+                "cart.friction.coulomb" => "r ",
+                "motor.rotor_inertia" => "n² ",
+                _ => "",
+            };
+            parts.push(format!("{arm}{symbol}"));
+        }
+    }
+    let motor = &stage.motor;
+    if kind_of == 0 && stage.amplifier.mode == crate::stage::AmplifierMode::Voltage && motor.back_emf_constant != 0.0 {
+        let n2 = motor.gear_ratio * motor.gear_ratio;
+        value += n2 * motor.torque_constant * motor.back_emf_constant / motor.resistance;
+        parts.push(if n2 == 1.0 { "K_t K_e/R".into() } else { "n² K_t K_e/R".into() });
+    }
+    let unit = ["N m s", "N m", "kg m²"][kind_of];
+    Some(format!("{} is: {} {unit}", parts.join(" + "), crate::quantity::rounded(value)).replace(" is: ", " = "))
+}
+
+fn listed(names: &[&str]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.to_string(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}

@@ -1,0 +1,586 @@
+//! Bounded non-linear least squares: Levenberg and Marquardt's method with an active set for the bounds.
+//!
+//! min ½ Σ ρ(rᵢ(x)) with l ≤ x ≤ u. Each step solves
+//!
+//! ```text
+//! min ‖J d + r‖² + λ ‖D d‖²        D = greatest column norms of J so far (Moré 1978)
+//! ```
+//!
+//! by QR, with variables that would leave the box held at its edge. Nothing counts as converged but what passes the test of
+//! the projected gradient: the Gauss-Newton step in the variables that are free to move promises less than
+//! `tolerance` of a standard error, and no variable at its bound is pushed inwards.
+//!
+//! Logs with dry friction make the cost kinked where sticks and slips change their order. Where no damped step helps and
+//! the test is not passed, derivatives over longer steps are tried, and then an evolution strategy that needs none, before it
+//! is called stalled.
+
+use crate::solve::Flow;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+
+/// Steps of coarse derivatives, in standard errors of a variable by itself, tried one after the other.
+const COARSER: [f64; 2] = [1.0, 10.0];
+
+/// Most variables that are searched by evolution, and how often.
+const MOST_EVOLVED: usize = 16;
+const MOST_EVOLUTIONS: usize = 3;
+
+/// Where the cost has kinks, the standard errors that the last step may promise: no step of any length fulfilled it.
+const KINK: f64 = 0.1;
+
+/// Residuals as a function of the variables.
+pub trait Residuals {
+    /// Number of residuals.
+    fn rows(&self) -> usize;
+
+    /// r(x); false where it cannot be computed.
+    fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool;
+
+    /// ∂r/∂x by differences within the bounds; `r` = r(x).
+    fn jacobian(&mut self, x: &[f64], r: &[f64], bounds: &Bounds, how: &Differences) -> Option<DMatrix<f64>> {
+        let mut jacobian = DMatrix::zeros(self.rows(), x.len());
+        let mut moved = x.to_vec();
+        let (mut a, mut b) = (vec![0.0; r.len()], vec![0.0; r.len()]);
+        for j in 0..x.len() {
+            let step = Step::new(x, bounds, j, how);
+            moved[j] = step.first;
+            let mut good = self.evaluate(&moved, &mut a);
+            if let Some(second) = step.second {
+                moved[j] = second;
+                good &= self.evaluate(&moved, &mut b);
+            }
+            moved[j] = x[j];
+            if !good {
+                return None;
+            }
+            for i in 0..r.len() {
+                jacobian[(i, j)] = step.slope(r[i], a[i], b[i]);
+            }
+        }
+        Some(jacobian)
+    }
+}
+
+/// How derivatives are measured. The step is the cube root of the rounding unit for central differences, where the
+/// error of the formula and that of rounding balance (1e-10 of the value), and the square root for one-sided ones.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Differences {
+    /// One-sided, from the values at hand.
+    Forward,
+    /// To both sides.
+    Central,
+    /// To both sides by these steps. Where a body sticks and slips with every sample of its input, the outputs have a
+    /// kink for each of them; steps of about a standard error see the slope that matters and not that between two kinks.
+    Coarse(Vec<f64>),
+}
+
+/// Where a derivative is measured.
+#[derive(Debug, Clone, Copy)]
+pub struct Step {
+    /// The first point.
+    pub first: f64,
+    /// The second point, if there is one.
+    pub second: Option<f64>,
+    at: f64,
+}
+
+impl Step {
+    /// Points around `x` within its bounds.
+    pub fn new(x: &[f64], bounds: &Bounds, j: usize, how: &Differences) -> Self {
+        let (x, low, high) = (x[j], bounds.low[j], bounds.high[j]);
+        let size = x.abs().max(1.0);
+        let central = *how != Differences::Forward;
+        let h = match how {
+            Differences::Forward => 1e-7 * size,
+            Differences::Central => 6e-6 * size,
+            Differences::Coarse(steps) => f64::min(steps[j].max(6e-6 * size), (high - low) / 3.0),
+        };
+        match (x + h <= high, x - h >= low, central) {
+            (true, true, true) => Self { first: x + h, second: Some(x - h), at: x },
+            (true, _, false) => Self { first: x + h, second: None, at: x },
+            (_, _, false) => Self { first: x - h, second: None, at: x },
+            // At a bound: three points on one side.
+            (true, false, true) => Self { first: x + h, second: Some(x + 2.0 * h), at: x },
+            (_, _, true) => Self { first: x - h, second: Some(x - 2.0 * h), at: x },
+        }
+    }
+
+    /// The slope at x of a function with these values at x and at the two points.
+    #[inline]
+    pub fn slope(&self, here: f64, first: f64, second: f64) -> f64 {
+        let h = self.first - self.at;
+        match self.second {
+            None => (first - here) / h,
+            Some(other) if (other - self.at) * h < 0.0 => (first - second) / (self.first - other),
+            // f′ = (−3 f₀ + 4 f₁ − f₂) / 2h
+            Some(_) => (-3.0 * here + 4.0 * first - second) / (2.0 * h),
+        }
+    }
+}
+
+/// The box that the variables stay in.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bounds {
+    /// Least values.
+    pub low: Vec<f64>,
+    /// Greatest values.
+    pub high: Vec<f64>,
+}
+
+impl Bounds {
+    /// No bounds on `n` variables.
+    pub fn none(n: usize) -> Self {
+        Self { low: vec![f64::NEG_INFINITY; n], high: vec![f64::INFINITY; n] }
+    }
+}
+
+/// How far to go.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Standard errors that the last step may promise.
+    pub tolerance: f64,
+    /// Most Jacobians.
+    pub iterations: usize,
+    /// Beyond this many units a residual counts linearly (Huber 1964); infinite for squares.
+    pub huber: f64,
+    /// One-sided differences until the last few steps.
+    pub frugal: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { tolerance: 1e-3, iterations: 100, huber: f64::INFINITY, frugal: true }
+    }
+}
+
+/// How a search ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    /// The projected gradient is zero to within the tolerance.
+    Converged,
+    /// No step lowers the cost, but the projected gradient is not zero: a kink.
+    Stalled,
+    /// The iterations were used up.
+    OutOfIterations,
+    /// It was asked to stop.
+    Interrupted,
+    /// The residuals could not be computed where it started.
+    Failed,
+}
+
+impl Ending {
+    /// For files.
+    pub fn word(self) -> &'static str {
+        match self {
+            Ending::Converged => "converged",
+            Ending::Stalled => "stalled",
+            Ending::OutOfIterations => "out_of_iterations",
+            Ending::Interrupted => "interrupted",
+            Ending::Failed => "failed",
+        }
+    }
+}
+
+/// Where a search ended.
+#[derive(Debug, Clone)]
+pub struct Minimum {
+    /// The variables.
+    pub x: Vec<f64>,
+    /// The residuals there.
+    pub residuals: Vec<f64>,
+    /// ½ Σ ρ(r).
+    pub cost: f64,
+    /// The Jacobian there, by central differences where the search converged.
+    pub jacobian: DMatrix<f64>,
+    /// What the next step promised, in standard errors.
+    pub decrement: f64,
+    /// Variables held at a bound.
+    pub at_bound: Vec<bool>,
+    /// How it ended.
+    pub ending: Ending,
+    /// Steps of the derivatives, in standard errors, where the cost has kinks; 0 where it is smooth.
+    pub coarse: f64,
+    /// Jacobians computed.
+    pub iterations: usize,
+    /// Trial points.
+    pub evaluations: usize,
+}
+
+/// ½ Σ ρ(r), ρ = r² up to the threshold and 2 k |r| − k² beyond.
+fn cost_of(r: &[f64], k: f64) -> f64 {
+    r.iter().map(|&r| if r.abs() <= k { 0.5 * r * r } else { k * r.abs() - 0.5 * k * k }).sum()
+}
+
+/// Searches from `start` for the least cost. `watch` sees the best point and its cost after each step, and may end it.
+pub fn minimise(
+    problem: &mut dyn Residuals,
+    start: &[f64],
+    bounds: &Bounds,
+    options: &Options,
+    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
+) -> Minimum {
+    let (n, rows) = (start.len(), problem.rows());
+    let inside = |x: f64, j: usize| x.clamp(bounds.low[j], bounds.high[j]);
+    let x: Vec<f64> = start.iter().enumerate().map(|(j, &x)| inside(x, j)).collect();
+    let mut best = Minimum {
+        residuals: vec![0.0; rows],
+        cost: f64::INFINITY,
+        jacobian: DMatrix::zeros(rows, n),
+        decrement: f64::INFINITY,
+        at_bound: vec![false; n],
+        ending: Ending::Failed,
+        coarse: 0.0,
+        iterations: 0,
+        evaluations: 1,
+        x,
+    };
+    if !problem.evaluate(&best.x, &mut best.residuals) || !best.residuals.iter().all(|r| r.is_finite()) {
+        return best;
+    }
+    best.cost = cost_of(&best.residuals, options.huber);
+    let mut how = if options.frugal { Differences::Forward } else { Differences::Central };
+    let mut lambda: Option<f64> = None;
+    let mut grow = 2.0;
+    let mut scale = DVector::zeros(n);
+    let mut trial = vec![0.0; rows];
+    let (mut evolved, mut coarser) = (0, 0);
+    loop {
+        if watch(&best.x, best.cost) == Flow::Stop {
+            best.ending = Ending::Interrupted;
+            return best;
+        }
+        let Some(jacobian) = problem.jacobian(&best.x, &best.residuals, bounds, &how) else {
+            best.ending = Ending::Stalled;
+            return best;
+        };
+        best.iterations += 1;
+        best.jacobian = jacobian;
+        let model = Linear::new(&best, options.huber);
+        for j in 0..n {
+            scale[j] = f64::max(scale[j], model.norm(j));
+        }
+        let gradient = model.gradient();
+        // At a bound and pushed outwards: not free.
+        let held: Vec<bool> = (0..n)
+            .map(|j| {
+                (best.x[j] <= bounds.low[j] && gradient[j] >= 0.0) || (best.x[j] >= bounds.high[j] && gradient[j] <= 0.0)
+            })
+            .collect();
+        best.at_bound.clone_from(&held);
+        let newton = model.step(&held, &scale, 0.0);
+        let freedom = (rows.saturating_sub(n)).max(1) as f64;
+        let deviation = (2.0 * best.cost / freedom).sqrt() * inflation(&best.residuals, n);
+        best.decrement = model.reach(&newton) / deviation.max(f64::MIN_POSITIVE);
+        let tiny = (0..n).all(|j| newton[j].abs() <= 1e-11 * best.x[j].abs().max(1.0));
+        if best.decrement <= options.tolerance || tiny {
+            if how != Differences::Forward {
+                best.ending = Ending::Converged;
+                return best;
+            }
+            how = Differences::Central;
+            continue;
+        }
+        if best.decrement < 100.0 * options.tolerance && how == Differences::Forward {
+            how = Differences::Central;
+        }
+        if best.iterations >= options.iterations {
+            best.ending = Ending::OutOfIterations;
+            return best;
+        }
+
+        let mut damping = lambda.unwrap_or(1e-3);
+        let mut accepted = false;
+        for _ in 0..30 {
+            let step = within(&model, &best.x, bounds, &held, &scale, damping);
+            let x: Vec<f64> = (0..n).map(|j| inside(best.x[j] + step[j], j)).collect();
+            let promised = model.promise(&step);
+            if promised <= 0.0 || x == best.x {
+                damping = (damping * grow).max(1e-12);
+                grow *= 2.0;
+                if x == best.x {
+                    break;
+                }
+                continue;
+            }
+            best.evaluations += 1;
+            let good = problem.evaluate(&x, &mut trial);
+            let cost = if good { cost_of(&trial, options.huber) } else { f64::INFINITY };
+            let gain = (best.cost - cost) / promised;
+            if cost < best.cost && gain > 1e-4 {
+                // λ shrinks the better the linear model was (Nielsen 1999).
+                damping *= f64::max(1.0 / 5.0, 1.0 - (2.0 * gain - 1.0).powi(3));
+                grow = 2.0;
+                best.x = x;
+                best.cost = cost;
+                std::mem::swap(&mut best.residuals, &mut trial);
+                accepted = true;
+                break;
+            }
+            damping *= grow;
+            grow *= 2.0;
+            if damping > 1e16 {
+                break;
+            }
+        }
+        lambda = Some(damping.clamp(1e-12, 1e8));
+        grow = grow.min(8.0);
+        if accepted {
+            continue;
+        }
+        if how == Differences::Forward {
+            // The cheap derivatives may be to blame.
+            (how, lambda) = (Differences::Central, None);
+            continue;
+        }
+        if best.decrement <= KINK {
+            best.ending = Ending::Converged;
+            return best;
+        }
+        if coarser < COARSER.len() {
+            let errors = model.errors(&held, deviation);
+            how = Differences::Coarse(errors.iter().map(|error| COARSER[coarser] * error).collect());
+            best.coarse = COARSER[coarser];
+            coarser += 1;
+        } else if evolved < MOST_EVOLUTIONS
+            && evolve(problem, &mut best, bounds, &model, &held, deviation, options.huber)
+        {
+            evolved += 1;
+            coarser = COARSER.len() - 1;
+        } else {
+            best.ending = Ending::Stalled;
+            return best;
+        }
+        (lambda, grow) = (None, 2.0);
+    }
+}
+
+/// By how much standard errors are greater than those of as many independent residuals, roughly: √((1 + ρ)/(1 − ρ)) with ρ
+/// the correlation of neighbours, as if no fewer than ten residuals for each variable were independent.
+fn inflation(residuals: &[f64], variables: usize) -> f64 {
+    let own: f64 = residuals.iter().map(|r| r * r).sum();
+    let next: f64 = residuals.windows(2).map(|pair| pair[0] * pair[1]).sum();
+    let rho = if own > 0.0 { (next / own).clamp(0.0, 0.999_999) } else { 0.0 };
+    let most = residuals.len() as f64 / (10.0 * variables.max(1) as f64);
+    ((1.0 + rho) / (1.0 - rho)).min(most.max(1.0)).sqrt()
+}
+
+/// Searches around a kink by evolution (CMA-ES, Hansen 2016) in coordinates in which the smooth part of the cost is a
+/// sphere with the standard error for its unit; whether that lowered the cost by more than rounding.
+fn evolve(
+    problem: &mut dyn Residuals,
+    best: &mut Minimum,
+    bounds: &Bounds,
+    model: &Linear,
+    held: &[bool],
+    deviation: f64,
+    huber: f64,
+) -> bool {
+    let free: Vec<usize> = (0..held.len()).filter(|&j| !held[j] && model.norm(j) > 0.0).collect();
+    let n = free.len();
+    if n == 0 || n > MOST_EVOLVED {
+        return false;
+    }
+    let r = model.r.select_columns(&free).qr().unpack_r();
+    let Some(unit) = r.solve_upper_triangular(&DMatrix::identity(n, n)) else { return false };
+    let unit = unit * deviation;
+    let size = n as f64;
+    // Hansen's default constants.
+    let lambda = 4 + (3.0 * size.ln()).floor() as usize;
+    let mu = lambda / 2;
+    let raw: Vec<f64> = (0..mu).map(|i| (lambda as f64 / 2.0 + 0.5).ln() - (i as f64 + 1.0).ln()).collect();
+    let sum: f64 = raw.iter().sum();
+    let weights: Vec<f64> = raw.iter().map(|w| w / sum).collect();
+    let mass = 1.0 / weights.iter().map(|w| w * w).sum::<f64>();
+    let along = (4.0 + mass / size) / (size + 4.0 + 2.0 * mass / size);
+    let paced = (mass + 2.0) / (size + mass + 5.0);
+    let one = 2.0 / ((size + 1.3).powi(2) + mass);
+    let rest = f64::min(1.0 - one, 2.0 * (mass - 2.0 + 1.0 / mass) / ((size + 2.0).powi(2) + mass));
+    let damp = 1.0 + 2.0 * f64::max(0.0, ((mass - 1.0) / (size + 1.0)).sqrt() - 1.0) + paced;
+    let expected = size.sqrt() * (1.0 - 1.0 / (4.0 * size) + 1.0 / (21.0 * size * size));
+
+    let before = best.cost;
+    let centre = best.x.clone();
+    let mut mean = DVector::zeros(n);
+    let mut pace = best.decrement.clamp(0.3, 10.0) / size.sqrt();
+    let mut shape = DMatrix::<f64>::identity(n, n);
+    let (mut path, mut drift) = (DVector::<f64>::zeros(n), DVector::<f64>::zeros(n));
+    let mut random = Pcg64::seed_from_u64(1);
+    let mut trial = vec![0.0; best.residuals.len()];
+    let generations = (60 * n + 60) / lambda;
+    for generation in 1..=generations {
+        let Some(eigen) = SymmetricEigen::try_new(shape.clone(), 1e-14, 1000) else { break };
+        let lengths = eigen.eigenvalues.map(|value| value.max(1e-20).sqrt());
+        if pace * lengths.max() < 0.01 {
+            break;
+        }
+        let mut born: Vec<(f64, DVector<f64>)> = Vec::with_capacity(lambda);
+        for _ in 0..lambda {
+            let z = DVector::from_fn(n, |_, _| normal(&mut random));
+            let y = &eigen.eigenvectors * z.component_mul(&lengths);
+            let step = &unit * (&mean + &y * pace);
+            let mut x = centre.clone();
+            for (i, &j) in free.iter().enumerate() {
+                x[j] = (x[j] + step[i]).clamp(bounds.low[j], bounds.high[j]);
+            }
+            best.evaluations += 1;
+            let good = problem.evaluate(&x, &mut trial);
+            let cost = if good { cost_of(&trial, huber) } else { f64::INFINITY };
+            if cost < best.cost {
+                best.cost = cost;
+                best.x = x;
+                best.residuals.copy_from_slice(&trial);
+            }
+            born.push((cost, y));
+        }
+        if born.iter().all(|(cost, _)| cost.is_infinite()) {
+            break;
+        }
+        born.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let step = weights.iter().zip(&born).fold(DVector::zeros(n), |sum, (w, (_, y))| sum + y * *w);
+        mean += &step * pace;
+        let white = &eigen.eigenvectors * (eigen.eigenvectors.tr_mul(&step)).component_div(&lengths);
+        path = path * (1.0 - paced) + white * (paced * (2.0 - paced) * mass).sqrt();
+        let calm = path.norm() / (1.0 - (1.0 - paced).powi(2 * generation as i32)).sqrt() < (1.4 + 2.0 / (size + 1.0)) * expected;
+        drift = drift * (1.0 - along) + if calm { step * (along * (2.0 - along) * mass).sqrt() } else { DVector::zeros(n) };
+        shape *= 1.0 - one - rest + if calm { 0.0 } else { one * along * (2.0 - along) };
+        shape += &drift * drift.transpose() * one;
+        for (w, (_, y)) in weights.iter().zip(&born) {
+            shape += y * y.transpose() * (rest * w);
+        }
+        pace *= ((paced / damp) * (path.norm() / expected - 1.0)).exp();
+    }
+    best.cost < before * (1.0 - 1e-6)
+}
+
+/// A normally distributed number.
+fn normal(random: &mut Pcg64) -> f64 {
+    loop {
+        let [u, v] = std::array::from_fn(|_| (random.next_u64() >> 11) as f64 * 2f64.powi(-52) - 1.0);
+        let s = u * u + v * v;
+        if s > 0.0 && s < 1.0 {
+            return u * (-2.0 * libm::log(s) / s).sqrt();
+        }
+    }
+}
+
+/// The step that keeps within the box: what would leave it is put on its edge, and the rest solved anew.
+fn within(
+    model: &Linear,
+    x: &[f64],
+    bounds: &Bounds,
+    held: &[bool],
+    scale: &DVector<f64>,
+    damping: f64,
+) -> DVector<f64> {
+    let n = x.len();
+    let mut fixed: Vec<Option<f64>> = held.iter().map(|&held| held.then_some(0.0)).collect();
+    loop {
+        let step = model.step_with(&fixed, scale, damping);
+        let mut left = false;
+        for j in 0..n {
+            if fixed[j].is_none() {
+                let to = x[j] + step[j];
+                if to < bounds.low[j] || to > bounds.high[j] {
+                    fixed[j] = Some(to.clamp(bounds.low[j], bounds.high[j]) - x[j]);
+                    left = true;
+                }
+            }
+        }
+        if !left {
+            return step;
+        }
+    }
+}
+
+/// J and r by their QR decomposition: J = Q R, Qᵀ r.
+struct Linear {
+    r: DMatrix<f64>,
+    qtr: DVector<f64>,
+}
+
+impl Linear {
+    fn new(at: &Minimum, huber: f64) -> Self {
+        let n = at.x.len();
+        let mut jacobian = at.jacobian.clone();
+        let mut residual = DVector::from_column_slice(&at.residuals);
+        if huber.is_finite() {
+            // ρ′(r) = ψ: rows of weight √(k/|r|) have the same gradient.
+            for i in 0..residual.len() {
+                let size = residual[i].abs();
+                if size > huber {
+                    let weight = (huber / size).sqrt();
+                    residual[i] *= weight;
+                    jacobian.row_mut(i).scale_mut(weight);
+                }
+            }
+        }
+        if jacobian.nrows() < n {
+            return Self { r: jacobian, qtr: residual };
+        }
+        let qr = jacobian.qr();
+        qr.q_tr_mul(&mut residual);
+        Self { r: qr.unpack_r(), qtr: residual.rows(0, n).into_owned() }
+    }
+
+    fn norm(&self, j: usize) -> f64 {
+        self.r.column(j).norm()
+    }
+
+    fn gradient(&self) -> DVector<f64> {
+        self.r.tr_mul(&self.qtr)
+    }
+
+    fn step(&self, held: &[bool], scale: &DVector<f64>, damping: f64) -> DVector<f64> {
+        let fixed: Vec<Option<f64>> = held.iter().map(|&held| held.then_some(0.0)).collect();
+        self.step_with(&fixed, scale, damping)
+    }
+
+    /// min ‖R d + Qᵀ r‖² + λ ‖D d‖² over the variables that are not fixed.
+    fn step_with(&self, fixed: &[Option<f64>], scale: &DVector<f64>, damping: f64) -> DVector<f64> {
+        let n = fixed.len();
+        let free: Vec<usize> = (0..n).filter(|&j| fixed[j].is_none()).collect();
+        let mut step = DVector::from_iterator(n, fixed.iter().map(|fixed| fixed.unwrap_or(0.0)));
+        if free.is_empty() {
+            return step;
+        }
+        let rows = self.r.nrows();
+        let right = -(&self.qtr + &self.r * &step);
+        let mut matrix = DMatrix::zeros(rows + free.len(), free.len());
+        let mut wanted = DVector::zeros(rows + free.len());
+        wanted.rows_mut(0, rows).copy_from(&right);
+        for (column, &j) in free.iter().enumerate() {
+            // In units of D the columns are of like size. A little damping keeps what the rows do not determine at rest.
+            let unit = if scale[j] > 0.0 { 1.0 / scale[j] } else { 1.0 };
+            matrix.view_mut((0, column), (rows, 1)).copy_from(&(self.r.column(j) * unit));
+            matrix[(rows + column, column)] = f64::max(damping.sqrt(), 1e-11);
+        }
+        let qr = matrix.qr();
+        qr.q_tr_mul(&mut wanted);
+        let solved = qr.unpack_r().solve_upper_triangular(&wanted.rows(0, free.len()).into_owned());
+        if let Some(solved) = solved {
+            for (column, &j) in free.iter().enumerate() {
+                step[j] = solved[column] / if scale[j] > 0.0 { scale[j] } else { 1.0 };
+            }
+        }
+        step
+    }
+
+    /// ‖J d‖.
+    fn reach(&self, step: &DVector<f64>) -> f64 {
+        (&self.r * step).norm()
+    }
+
+    /// By how much the linear model says that the cost falls.
+    fn promise(&self, step: &DVector<f64>) -> f64 {
+        let moved = &self.r * step;
+        -(moved.dot(&self.qtr) + 0.5 * moved.norm_squared())
+    }
+
+    /// Standard errors of the variables that are free, for residuals of this deviation; of one alone where they are not determined together.
+    fn errors(&self, held: &[bool], deviation: f64) -> Vec<f64> {
+        (0..held.len())
+            .map(|j| if held[j] || self.norm(j) == 0.0 { 0.0 } else { deviation / self.norm(j) })
+            .collect()
+    }
+}

@@ -1,0 +1,610 @@
+//! Parameters from logs, and what the logs cannot tell.
+//!
+//! Output error: the model is put through every log's input, and what it would have shown is compared with what was seen,
+//! all logs at once. The recipe is [`fit`]; before it, [`check`] says what the logs can determine.
+
+mod check;
+mod identify;
+mod knob;
+pub mod least_squares;
+mod problem;
+mod run;
+mod uncertainty;
+
+pub use check::{Check, LogFacts, Proposal, check};
+pub use identify::{Group, Identifiability, LIMIT};
+pub use knob::{GROUPS, Knob};
+pub use least_squares::Ending;
+pub use problem::{Problem, Stop};
+pub use run::{Extra, Nuisance, Run, Seen};
+pub use uncertainty::{Covariance, inverse_of_square, student};
+
+use crate::case::{Case, Plan};
+use crate::error::{Error, Result};
+use crate::log::Quantity;
+use crate::solve::Flow;
+use crate::stage::Stage;
+use least_squares::{Minimum, Options, minimise};
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+use std::path::Path;
+
+/// Standard deviations beyond which Huber's loss counts linearly: 95 % efficient with Gaussian noise.
+const HUBER: f64 = 1.345;
+
+/// Rounds in which weights are estimated anew.
+const ROUNDS: usize = 4;
+
+/// Jacobians that a start other than the first may take before the best of them goes on.
+const TRIAL_ITERATIONS: usize = 12;
+
+/// What a fit found.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The machine with the estimates.
+    pub stage: Stage,
+    /// The estimates: knobs, then what all logs share.
+    pub estimates: Vec<Estimate>,
+    /// Correlations of the estimates, row by row; NaN where one is at a bound.
+    pub correlation: Vec<Vec<f64>>,
+    /// What was taken as the standard deviation of each quantity's residuals.
+    pub noise: Vec<(Quantity, f64)>,
+    /// How each log is met: those fitted, then those held out.
+    pub logs: Vec<LogFit>,
+    /// What the logs determine at the estimates.
+    pub identifiability: Option<Identifiability>,
+    /// How the search ended.
+    pub ending: Ending,
+    /// What the last step promised, in standard errors.
+    pub decrement: f64,
+    /// ½ Σ r² of the weighted residuals.
+    pub cost: f64,
+    /// The cost that each start led to, in the first weights; the first start is that of the case.
+    pub starts: Vec<f64>,
+    /// Values that count.
+    pub values: usize,
+    /// Variables, what is fitted along included.
+    pub variables: usize,
+    /// What it took.
+    pub work: Work,
+}
+
+/// What a fit took.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Work {
+    /// Jacobians.
+    pub iterations: usize,
+    /// Trial points.
+    pub evaluations: usize,
+    /// Simulated logs.
+    pub simulations: u64,
+}
+
+/// One parameter's estimate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// Its key, or those of a tie, or the name of a group.
+    pub name: String,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Where the search started.
+    pub start: f64,
+    /// The estimate.
+    pub value: f64,
+    /// Its standard error; infinite where it is not determined, none where it is at a bound.
+    pub error: Option<f64>,
+    /// 95 % interval; none where it is at a bound, infinite where it is not determined.
+    pub interval: Option<[f64; 2]>,
+    /// Its bounds.
+    pub bounds: [f64; 2],
+    /// Whether it ended at one of them.
+    pub at_bound: bool,
+    /// What it sets in the case file: key and value.
+    pub sets: Vec<(String, f64)>,
+}
+
+/// How a log is met.
+#[derive(Debug, Clone)]
+pub struct LogFit {
+    /// The experiment.
+    pub name: String,
+    /// Which window of it.
+    pub window: usize,
+    /// Whether none of it was fitted.
+    pub held_out: bool,
+    /// Times, s.
+    pub time: Vec<f64>,
+    /// First row that was not fitted.
+    pub fitted_rows: usize,
+    /// Each output.
+    pub outputs: Vec<OutputFit>,
+    /// What was fitted along: name, value, standard error.
+    pub extras: Vec<(Nuisance, f64, Option<f64>)>,
+    /// Whether the model reached the end of it.
+    pub complete: bool,
+}
+
+/// How an output is met.
+#[derive(Debug, Clone)]
+pub struct OutputFit {
+    /// What it is.
+    pub quantity: Quantity,
+    /// What was seen.
+    pub seen: Vec<f64>,
+    /// What the model says.
+    pub model: Vec<f64>,
+    /// Over the rows that were fitted.
+    pub fitted: Option<Score>,
+    /// Over those that were not.
+    pub held_out: Option<Score>,
+}
+
+/// How far model and log are apart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Score {
+    /// Values compared.
+    pub count: usize,
+    /// Root mean square of the residuals.
+    pub rmse: f64,
+    /// Largest residual.
+    pub worst: f64,
+    /// 100 (1 − ‖y − ŷ‖/‖y − ȳ‖)
+    pub percent: f64,
+    /// Correlation of neighbouring residuals.
+    pub memory: f64,
+}
+
+/// Finds the parameters of `plan` from the logs of `case`.
+///
+/// `watch` sees the cost after each step; `stop` ends the search, which then gives the best so far.
+pub fn fit(
+    case: &Case,
+    plan: &Plan,
+    stop: Option<Stop>,
+    watch: &mut dyn FnMut(f64) -> Flow,
+) -> Result<Fit> {
+    let mut problem = Problem::new(case, plan)?.stopped_by(stop);
+    let bounds = problem.bounds();
+    // What the logs determine is asked for the noise that they show; the fit itself begins with weights that it can revise.
+    check::weigh_by_noise(&mut problem);
+    let (jacobian, x) = check::sensitivities(&mut problem)?;
+    if let Some(found) = Identifiability::new(&problem, &jacobian, &x, 1.0) {
+        refuse(&problem, &found)?;
+    }
+    problem.weigh_first();
+
+    let mut watch = |_: &[f64], cost: f64| watch(cost);
+    let mut work = Work::default();
+    let mut search = |problem: &mut Problem, x: &[f64], options: &Options| {
+        let minimum = minimise(problem, x, &bounds, options, &mut watch);
+        work.iterations += minimum.iterations;
+        work.evaluations += minimum.evaluations;
+        minimum
+    };
+    let whole = Options::default();
+    let start = problem.start();
+    let mut best = search(&mut problem, &start, &whole);
+    if best.ending == Ending::Failed {
+        return Err(Error::new("the model does not get through these logs with the values of the case file")
+            .next("run `taut simulate` on the case to see why, or start from other values"));
+    }
+    let mut starts = vec![best.cost];
+    let mut random = Pcg64::seed_from_u64(plan.seed);
+    for _ in 1..plan.starts {
+        if problem.is_stopped() || best.ending == Ending::Interrupted {
+            break;
+        }
+        let x = elsewhere(&problem, &mut random);
+        let trial = search(&mut problem, &x, &Options { iterations: TRIAL_ITERATIONS, tolerance: 0.1, ..whole });
+        let near = trial.cost < 1.2 * best.cost;
+        let trial = if near && trial.ending != Ending::Failed { search(&mut problem, &trial.x, &whole) } else { trial };
+        starts.push(trial.cost);
+        if trial.cost < best.cost {
+            best = trial;
+        }
+    }
+
+    // Weights from what the residuals are, until they stay.
+    let mut noise: Vec<(Quantity, f64)> = Vec::new();
+    for round in 0..ROUNDS {
+        if problem.is_stopped() || best.ending == Ending::Interrupted {
+            break;
+        }
+        let fresh = noise_of(&problem, &best, plan.huber);
+        let settled = noise.len() == fresh.len()
+            && noise.iter().zip(&fresh).all(|((_, old), (_, new))| (new / old - 1.0).abs() < 0.05);
+        if settled {
+            break;
+        }
+        for &(quantity, deviation) in &fresh {
+            problem.weigh(quantity, deviation, true);
+        }
+        let alike = fresh.len() == 1 && !plan.huber && uniform(&problem);
+        noise = fresh;
+        let options = Options { huber: if plan.huber { HUBER } else { f64::INFINITY }, ..whole };
+        if alike && round == 0 && best.ending == Ending::Converged {
+            // One weight for all: only the unit of the residuals changes.
+            let factor = problem.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).find(|w| **w > 0.0);
+            let before = first_weight(&problem, &best);
+            if let (Some(now), Some(before)) = (factor, before) {
+                rescale(&mut best, now / before);
+                break;
+            }
+        }
+        best = search(&mut problem, &best.x.clone(), &options);
+    }
+    if problem.is_stopped() {
+        best.ending = Ending::Interrupted;
+    }
+    if noise.is_empty() {
+        noise = noise_of(&problem, &best, plan.huber);
+    }
+    work.simulations = problem.simulations;
+    Ok(result(&problem, &best, noise, starts, work))
+}
+
+impl Fit {
+    /// The text of the case with the estimates in place of what they were, and a table of how well they are known. Paths in
+    /// it are those of `case`; `name` stands in messages.
+    pub fn case_text(&self, case: &Case, name: &Path) -> Result<String> {
+        let mut changes = Vec::new();
+        let mut bodies: Vec<&str> = Vec::new();
+        for (key, value) in self.estimates.iter().flat_map(|estimate| &estimate.sets) {
+            let list = |values: [f64; 3]| format!("[{}, {}, {}]", values[0], values[1], values[2]);
+            changes.push(match key.as_str() {
+                "belt.stiffness" => format!("belt.stiffness={}", list(self.stage.belt.stiffness)),
+                "belt.damping" => format!("belt.damping={}", list(self.stage.belt.damping)),
+                _ => format!("{key}={value}"),
+            });
+            if let Some((body, _)) = key.split_once(".friction.")
+                && !bodies.contains(&body)
+            {
+                bodies.push(body);
+            }
+        }
+        let read = |changes: &[String]| {
+            let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
+            Case::from_text_with(name, &case.text, &changes)
+        };
+        let same = |read: &Result<Case>| read.as_ref().is_ok_and(|read| alike(&read.stage, &self.stage));
+        let mut fitted = read(&changes);
+        if !same(&fitted) {
+            // The other direction, or the breakaway, stands in the text and went with what was fitted.
+            for body in bodies {
+                let law = match body {
+                    "cart" => self.stage.cart.friction,
+                    "drive_pulley" => self.stage.drive_pulley.friction,
+                    _ => self.stage.idler_pulley.friction,
+                };
+                let at = format!("{body}.friction");
+                changes.push(format!("{at}.viscous_backward={}", law.backward.viscous));
+                changes.push(format!("{at}.coulomb_backward={}", law.backward.coulomb));
+                changes.push(format!("{at}.static={}", law.forward.breakaway));
+                changes.push(format!("{at}.static_backward={}", law.backward.breakaway));
+            }
+            fitted = read(&changes);
+        }
+        let text = fitted?.text;
+        let mut document: toml_edit::DocumentMut =
+            text.parse().map_err(|_| Error::new("this is not TOML").in_file(name))?;
+        let mut table = toml_edit::Table::new();
+        let how = format!(
+            "\n# How well the fit knows its estimates: SI units, standard errors, 95 % intervals. How it ended: {}.\n",
+            self.ending.word()
+        );
+        table.decor_mut().set_prefix(how);
+        for estimate in &self.estimates {
+            let mut row = toml_edit::InlineTable::new();
+            let mut put = |key: &str, value: f64| {
+                row.insert(key, toml_edit::Value::from(value));
+            };
+            put("value", estimate.value);
+            match (estimate.error, estimate.interval) {
+                (Some(error), Some([low, high])) if error.is_finite() => {
+                    put("error", error);
+                    put("low", low);
+                    put("high", high);
+                }
+                _ => {
+                    let why = if estimate.at_bound { "at its bound" } else { "not determined" };
+                    row.insert("known", toml_edit::Value::from(why));
+                }
+            }
+            table.insert(&estimate.name, toml_edit::value(row));
+        }
+        document.insert("uncertainty", toml_edit::Item::Table(table));
+        Ok(document.to_string())
+    }
+}
+
+/// Whether two machines are the same but for rounding in text.
+fn alike(a: &Stage, b: &Stage) -> bool {
+    let near = |a: f64, b: f64| a == b || (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
+    let sides = |stage: &Stage| {
+        [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction]
+            .into_iter()
+            .flat_map(|law| [law.forward, law.backward])
+            .flat_map(|side| [side.viscous, side.coulomb, side.breakaway])
+            .collect::<Vec<f64>>()
+    };
+    sides(a).into_iter().zip(sides(b)).all(|(a, b)| near(a, b))
+}
+
+/// What weight the residuals of a minimum were computed with, from one that is not zero.
+fn first_weight(problem: &Problem, at: &Minimum) -> Option<f64> {
+    let stage = problem.stage_at(&at.x);
+    let run = &problem.runs[0];
+    let mut fresh = vec![0.0; run.rows()];
+    if !run.residuals(&stage, &problem.extras_of(0, &at.x), &mut fresh) {
+        return None;
+    }
+    let k = (0..fresh.len()).max_by(|&a, &b| fresh[a].abs().total_cmp(&fresh[b].abs()))?;
+    let now = run.seen[k / run.time.len()].weights[k % run.time.len()];
+    if fresh[k] == 0.0 { None } else { Some(now * at.residuals[k] / fresh[k]) }
+}
+
+fn rescale(minimum: &mut Minimum, factor: f64) {
+    minimum.residuals.iter_mut().for_each(|r| *r *= factor);
+    minimum.jacobian *= factor;
+    minimum.cost *= factor * factor;
+}
+
+/// Whether all that counts has the same weight.
+fn uniform(problem: &Problem) -> bool {
+    let mut weights =
+        problem.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).filter(|w| **w > 0.0);
+    let Some(first) = weights.next() else { return true };
+    weights.all(|w| (w / first - 1.0).abs() < 1e-3)
+}
+
+/// Refuses what the logs do not determine, with the choices there are.
+fn refuse(problem: &Problem, found: &Identifiability) -> Result<()> {
+    let Some(group) = found.groups.first() else { return Ok(()) };
+    let mut told = group.words.clone();
+    for other in &found.groups[1..] {
+        told = format!("{told}; {}", other.words);
+    }
+    let choices: Vec<String> = found.groups.iter().flat_map(|group| found.choices(problem, group)).collect();
+    Err(Error::new(format!("these logs do not determine all that is searched for: {told}"))
+        .next(format!("{}; `taut check` says what another experiment would tell", choices.join("; or "))))
+}
+
+/// A point within the bounds, near enough to the start to be a machine of its kind: within a factor of ten, or for what may
+/// be zero, between zero and three times its start.
+fn elsewhere(problem: &Problem, random: &mut Pcg64) -> Vec<f64> {
+    let mut x = problem.start();
+    let bounds = problem.bounds();
+    for j in 0..problem.globals() {
+        let share = (random.next_u64() >> 11) as f64 * 2f64.powi(-53);
+        let (low, high) = if j >= problem.knobs.len() {
+            (bounds.low[j], bounds.high[j].min(10.0))
+        } else if problem.is_log(j) {
+            (x[j] - std::f64::consts::LN_10, x[j] + std::f64::consts::LN_10)
+        } else {
+            (x[j] - 3.0, x[j] + 3.0)
+        };
+        let (low, high) = (low.max(bounds.low[j]), high.min(bounds.high[j]));
+        x[j] = low + share * (high - low);
+    }
+    x
+}
+
+/// The deviation of each quantity's residuals: root of their mean square, or for a robust fit from their median.
+fn noise_of(problem: &Problem, at: &Minimum, robust: bool) -> Vec<(Quantity, f64)> {
+    let quantities = problem.quantities();
+    let counted = problem.counted() as f64;
+    let freedom = (counted - problem.variables() as f64).max(1.0);
+    let mut noise = Vec::new();
+    for quantity in quantities {
+        let (mut sizes, mut squares, mut weight) = (Vec::new(), 0.0, 0.0);
+        let mut step: f64 = 0.0;
+        for (index, run) in problem.runs.iter().enumerate() {
+            let first = problem.first_row(index);
+            let n = run.time.len();
+            for (output, seen) in run.seen.iter().enumerate().filter(|(_, seen)| seen.quantity == quantity) {
+                step = step.max(seen.step);
+                for k in 0..n {
+                    let w = seen.weights[k];
+                    if w > 0.0 {
+                        let r = at.residuals[first + output * n + k] / w;
+                        // Equal values in a row are one.
+                        let share = 1.0 / seen.repeats[k].max(1.0);
+                        let share = if seen.step > 0.0 { share } else { 1.0 };
+                        squares += share * r * r;
+                        weight += share;
+                        if robust {
+                            sizes.push(r.abs());
+                        }
+                    }
+                }
+            }
+        }
+        let mut deviation = (squares / f64::max(weight, 1.0) * counted / freedom).sqrt();
+        if robust && !sizes.is_empty() {
+            let middle = sizes.len() / 2;
+            deviation = 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+        }
+        noise.push((quantity, deviation.max(step / 12f64.sqrt()).max(f64::MIN_POSITIVE * 1e10)));
+    }
+    noise
+}
+
+/// Everything that is told of a minimum.
+fn result(
+    problem: &Problem,
+    best: &Minimum,
+    noise: Vec<(Quantity, f64)>,
+    starts: Vec<f64>,
+    work: Work,
+) -> Fit {
+    let covariance = Covariance::new(problem, &best.residuals, &best.jacobian, &best.at_bound);
+    let deviation = (2.0 * best.cost / problem.counted().saturating_sub(problem.variables()).max(1) as f64).sqrt();
+    let identifiability = Identifiability::new(problem, &best.jacobian, &best.x, deviation);
+    let bounds = problem.bounds();
+    let t = student(covariance.as_ref().map_or(1, |c| c.freedom));
+    let determined = |j: usize| identifiability.as_ref().is_some_and(|found| found.error[j].is_finite());
+    let error = |j: usize| match &covariance {
+        Some(covariance) if j >= problem.globals() || determined(j) => covariance.error(j),
+        _ if best.at_bound[j] => None,
+        _ => Some(f64::INFINITY),
+    };
+    let mut estimates = Vec::new();
+    for (j, knob) in problem.knobs.iter().enumerate() {
+        let (x, value) = (best.x[j], problem.value(j, best.x[j]));
+        let error = if best.at_bound[j] { None } else { error(j) };
+        let interval = error.map(|e| {
+            if e.is_finite() {
+                let end = |x: f64, j: usize| problem.value(j, x).clamp(knob.low, knob.high);
+                [end(x - t * e, j), end(x + t * e, j)]
+            } else {
+                [f64::NEG_INFINITY, f64::INFINITY]
+            }
+        });
+        estimates.push(Estimate {
+            name: knob.name.clone(),
+            unit: knob.unit,
+            start: knob.start,
+            value,
+            error: error.map(|e| e * problem.slope(j, value)),
+            interval,
+            bounds: [knob.low, knob.high],
+            at_bound: best.at_bound[j],
+            sets: knob.keys.iter().map(|(key, factor)| (key.clone(), factor * value)).collect(),
+        });
+    }
+    for (i, extra) in problem.shared.iter().enumerate() {
+        let j = problem.knobs.len() + i;
+        let value = extra.start + extra.unit * best.x[j];
+        let error = if best.at_bound[j] { None } else { error(j).map(|e| e * extra.unit) };
+        let unit = match extra.what {
+            Nuisance::Delay => "s",
+            Nuisance::InputGain => "",
+            _ => "V",
+        };
+        estimates.push(Estimate {
+            name: extra.what.name().to_string(),
+            unit,
+            start: extra.start,
+            value,
+            error,
+            interval: error.map(|e| [(value - t * e).max(extra.low), (value + t * e).min(extra.high)]),
+            bounds: [extra.low, extra.high],
+            at_bound: best.at_bound[j] && bounds.low[j] < bounds.high[j],
+            sets: Vec::new(),
+        });
+    }
+    let n = problem.globals();
+    let correlation = (0..n)
+        .map(|i| {
+            (0..n)
+                .map(|j| covariance.as_ref().and_then(|c| c.correlation(i, j)).unwrap_or(f64::NAN))
+                .collect()
+        })
+        .collect();
+    let stage = problem.stage_at(&best.x);
+    let mut logs = Vec::new();
+    let mut sums: Vec<(Nuisance, f64, usize)> = Vec::new();
+    for (index, run) in problem.runs.iter().enumerate() {
+        let extras = problem.extras_of(index, &best.x);
+        let mut told = Vec::new();
+        let own = problem.own_variables(index);
+        for (extra, &value) in run.extras.iter().zip(&extras) {
+            let j = own.iter().find(|(_, other)| other.what == extra.what).map(|(j, _)| *j);
+            if let Some(j) = j {
+                told.push((extra.what, value, error(j).map(|e| e * extra.unit)));
+                match sums.iter_mut().find(|(what, ..)| *what == extra.what) {
+                    Some((_, sum, count)) => (*sum, *count) = (*sum + value, *count + 1),
+                    None => sums.push((extra.what, value, 1)),
+                }
+            }
+        }
+        logs.push(compared(run, &stage, &extras, told));
+    }
+    let shared = problem.shared_values(&best.x);
+    for run in &problem.held_out {
+        // Nothing of a log that is held out is fitted: delay, gain and offsets are the mean of the others, and it starts
+        // where its first row is.
+        let extras: Vec<f64> = run
+            .extras
+            .iter()
+            .map(|extra| match extra.what {
+                Nuisance::StartPosition | Nuisance::StartSpeed => extra.start,
+                what => sums.iter().find(|(w, ..)| *w == what).map_or(extra.start, |(_, sum, n)| sum / *n as f64),
+            })
+            .chain(shared.iter().copied())
+            .collect();
+        logs.push(compared(run, &stage, &extras, Vec::new()));
+    }
+    Fit {
+        stage,
+        estimates,
+        correlation,
+        noise,
+        logs,
+        identifiability,
+        ending: best.ending,
+        decrement: best.decrement,
+        cost: best.cost,
+        starts,
+        values: problem.counted(),
+        variables: problem.variables(),
+        work,
+    }
+}
+
+/// Model and log side by side.
+fn compared(run: &Run, stage: &Stage, extras: &[f64], told: Vec<(Nuisance, f64, Option<f64>)>) -> LogFit {
+    let quantities: Vec<Quantity> = run.seen.iter().map(|seen| seen.quantity).collect();
+    let mut columns = vec![Vec::new(); quantities.len()];
+    let complete = run.predict(stage, extras, &quantities, &mut columns);
+    let n = run.time.len();
+    let outputs = run
+        .seen
+        .iter()
+        .zip(columns)
+        .enumerate()
+        .map(|(i, (seen, column))| {
+            let bias = run.bias(i, extras);
+            let mut model: Vec<f64> =
+                column.iter().map(|v| if seen.absolute { v.abs() + bias } else { v + bias }).collect();
+            model.resize(n, f64::NAN);
+            OutputFit {
+                quantity: seen.quantity,
+                fitted: score(&seen.values, &model, 0..run.fitted_rows.min(n)),
+                held_out: score(&seen.values, &model, run.fitted_rows.min(n)..n),
+                seen: seen.values.clone(),
+                model,
+            }
+        })
+        .collect();
+    LogFit {
+        name: run.name.clone(),
+        window: run.window,
+        held_out: run.held_out,
+        time: run.time.clone(),
+        fitted_rows: run.fitted_rows,
+        outputs,
+        extras: told,
+        complete,
+    }
+}
+
+fn score(seen: &[f64], model: &[f64], rows: std::ops::Range<usize>) -> Option<Score> {
+    let rows: Vec<usize> = rows.filter(|&k| seen[k].is_finite() && model[k].is_finite()).collect();
+    if rows.is_empty() {
+        return None;
+    }
+    let n = rows.len() as f64;
+    let residuals: Vec<f64> = rows.iter().map(|&k| model[k] - seen[k]).collect();
+    let squares: f64 = residuals.iter().map(|r| r * r).sum();
+    let mean = rows.iter().map(|&k| seen[k]).sum::<f64>() / n;
+    let spread: f64 = rows.iter().map(|&k| (seen[k] - mean).powi(2)).sum();
+    let places: Vec<usize> = (0..residuals.len()).collect();
+    Some(Score {
+        count: rows.len(),
+        rmse: (squares / n).sqrt(),
+        worst: residuals.iter().fold(0.0, |most: f64, r| most.max(r.abs())),
+        percent: 100.0 * (1.0 - (squares / spread.max(f64::MIN_POSITIVE)).sqrt()),
+        memory: uncertainty::memory_of(&residuals, &places),
+    })
+}

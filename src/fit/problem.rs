@@ -1,0 +1,498 @@
+//! All logs of a case as one least-squares problem.
+
+use super::knob::{Breakaways, Knob};
+use super::least_squares::{Bounds, Differences, Residuals, Step};
+use super::run::{Extra, Nuisance, Run, Setting, is_position};
+use crate::case::{Case, Nuisances, Plan, Scope, matches};
+use crate::error::{Error, Result};
+use crate::log::Quantity;
+use crate::stage::{AmplifierMode, Stage};
+use nalgebra::DMatrix;
+
+/// What is searched for, in which logs.
+pub struct Problem<'a> {
+    /// The machine as the case has it.
+    pub stage: Stage,
+    /// What is turned of it.
+    pub knobs: Vec<Knob>,
+    /// What holds for all logs and is no number of the machine.
+    pub shared: Vec<Extra>,
+    /// The logs that are fitted.
+    pub runs: Vec<Run>,
+    /// Those that are only compared.
+    pub held_out: Vec<Run>,
+    /// Simulated runs so far.
+    pub simulations: u64,
+    units: Vec<Scale>,
+    breakaways: Breakaways,
+    /// Whether to end the work.
+    stop: Option<Stop<'a>>,
+}
+
+/// What says that it is enough: Ctrl-C, say.
+pub type Stop<'a> = &'a dyn Fn() -> bool;
+
+/// How a variable of the search becomes the value of a knob.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Scale {
+    /// p = start · eˣ
+    Log(f64),
+    /// p = unit · x
+    Linear(f64),
+}
+
+impl Scale {
+    fn value(self, x: f64) -> f64 {
+        match self {
+            Scale::Log(start) => start * x.exp(),
+            Scale::Linear(unit) => unit * x,
+        }
+    }
+
+    fn variable(self, value: f64) -> f64 {
+        match self {
+            Scale::Log(start) => (value / start).ln(),
+            Scale::Linear(unit) => value / unit,
+        }
+    }
+
+    /// dp/dx
+    fn slope(self, value: f64) -> f64 {
+        match self {
+            Scale::Log(_) => value,
+            Scale::Linear(unit) => unit,
+        }
+    }
+}
+
+impl<'a> Problem<'a> {
+    /// What `plan` asks of the logs of `case`.
+    pub fn new(case: &Case, plan: &Plan) -> Result<Self> {
+        let stage = case.stage.clone();
+        let all: Vec<&str> =
+            plan.free.iter().chain(plan.tied.iter().flatten()).map(String::as_str).collect();
+        let mut knobs = Vec::new();
+        for key in &plan.free {
+            knobs.push(Knob::free(&stage, key, &all, &plan.bounds)?);
+        }
+        for keys in &plan.tied {
+            let keys: Vec<&str> = keys.iter().map(String::as_str).collect();
+            knobs.push(Knob::tied(&stage, &keys, &all, &plan.bounds)?);
+        }
+        for name in &plan.lumped {
+            knobs.push(Knob::lumped(&stage, name, &plan.bounds)?);
+        }
+        if knobs.is_empty() {
+            return Err(Error::new("nothing is searched for").next("add free = [\"cart.mass\"] to [fit]"));
+        }
+        let mut runs = Vec::new();
+        let mut held_out = Vec::new();
+        for experiment in &case.experiments {
+            let Some(log) = &experiment.log else { continue };
+            let held = plan.held_out.iter().any(|pattern| matches(&experiment.name, pattern));
+            // What is only compared is compared whole.
+            let window = if held { None } else { plan.windows };
+            let setting = Setting { window, fitted_until: plan.until, held_out: held };
+            for run in Run::all(experiment, log, &setting) {
+                if held { held_out.push(run) } else { runs.push(run) }
+            }
+        }
+        if runs.is_empty() {
+            return Err(Error::new("there is no log to fit")
+                .next("add log = { file = \"...\", time = \"...\", input = \"...\", drive_angle = \"...\" } to an experiment"));
+        }
+        let mut problem = Self {
+            breakaways: Breakaways::of(&stage, &all),
+            units: knobs.iter().map(|knob| scale(&stage, knob, &runs)).collect(),
+            stage,
+            knobs,
+            shared: Vec::new(),
+            runs,
+            held_out,
+            simulations: 0,
+            stop: None,
+        };
+        problem.add_extras(case, plan);
+        problem.prepare();
+        problem.weigh_first();
+        Ok(problem)
+    }
+
+    /// Ends the work early once `stop` says so.
+    pub fn stopped_by(mut self, stop: Option<Stop<'a>>) -> Self {
+        self.stop = stop;
+        self
+    }
+
+    /// Whether it is asked to end.
+    pub fn is_stopped(&self) -> bool {
+        self.stop.is_some_and(|stop| stop())
+    }
+
+    fn add_extras(&mut self, case: &Case, plan: &Plan) {
+        let &Nuisances { delay, input_gain, input_offset, initial_state, bias } = &plan.nuisance;
+        let interval = self.runs[0].interval();
+        let most = self.runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
+        let most = if most > 0.0 { most } else { 1.0 };
+        let late = Extra { what: Nuisance::Delay, start: 0.0, unit: interval, low: 0.0, high: 50.0 * interval };
+        let gain = Extra { what: Nuisance::InputGain, start: 1.0, unit: 1.0, low: 0.2, high: 5.0 };
+        let offset = Extra { what: Nuisance::InputOffset, start: 0.0, unit: most, low: -most, high: most };
+        let scopes = [(delay, late), (input_gain, gain), (input_offset, offset)];
+        self.shared = scopes.iter().filter(|(scope, _)| *scope == Scope::Shared).map(|(_, extra)| *extra).collect();
+        let r = self.stage.pulley_radius;
+        for run in self.runs.iter_mut().chain(&mut self.held_out) {
+            let own = scopes.iter().filter(|(scope, _)| *scope == Scope::Each).map(|(_, extra)| *extra);
+            run.extras.extend(own);
+            let given = case.experiments.iter().any(|e| e.name == run.name && e.initial != Default::default());
+            let position = run.seen.iter().find(|seen| is_position(seen.quantity));
+            let first = position.and_then(|seen| {
+                let value = seen.values.iter().copied().find(|v| v.is_finite())?;
+                Some(if seen.quantity == Quantity::CartPosition { value } else { value * r })
+            });
+            let span = position.map_or(0.0, |seen| {
+                let arm = if seen.quantity == Quantity::CartPosition { 1.0 } else { r };
+                arm * extent(&seen.values)
+            });
+            let fastest = run.seen.iter().find(|seen| !is_position(seen.quantity)).map_or(0.0, |seen| {
+                let arm = if seen.quantity == Quantity::CartSpeed { 1.0 } else { r };
+                arm * extent(&seen.values)
+            });
+            let long = run.time.last().copied().unwrap_or(1.0);
+            let fast = f64::max(span / long, fastest).max(1e-6);
+            let wide = span.max(1e-6);
+            let windowed = plan.windows.is_some() && !run.held_out;
+            if let Some(start) = first {
+                let free = initial_state || windowed;
+                let room = if free { 1.0 } else { 0.0 };
+                // Positions count from where the log begins, unless the case says where that is.
+                if free || !given {
+                    run.extras.push(Extra {
+                        what: Nuisance::StartPosition,
+                        start,
+                        unit: 1e-2 * wide,
+                        low: start - room * wide,
+                        high: start + room * wide,
+                    });
+                }
+            }
+            if initial_state || windowed {
+                let start = if windowed { slope_at_start(run, r) } else { 0.0 };
+                let (low, high) = (start - 20.0 * fast, start + 20.0 * fast);
+                run.extras.push(Extra { what: Nuisance::StartSpeed, start, unit: fast, low, high });
+            }
+            for (index, seen) in run.seen.iter().enumerate() {
+                let counted = is_position(seen.quantity) && run.seen.iter().position(|s| is_position(s.quantity)) == Some(index);
+                if bias && !counted {
+                    let wide = extent(&seen.values).max(1e-9);
+                    run.extras.push(Extra {
+                        what: Nuisance::Bias(index),
+                        start: 0.0,
+                        unit: 1e-2 * wide,
+                        low: -wide,
+                        high: wide,
+                    });
+                }
+            }
+            // What has no room is no variable, but a number: see `extras_of`.
+        }
+    }
+
+    /// Weights before anything is fitted: one deviation for each quantity, a hundredth of how far it ranges, or what its
+    /// converter rounds if that is more.
+    pub(super) fn weigh_first(&mut self) {
+        for quantity in self.quantities() {
+            let seen = || self.runs.iter().flat_map(|run| &run.seen).filter(|seen| seen.quantity == quantity);
+            let wide = seen().map(|seen| extent(&seen.values)).fold(0.0, f64::max);
+            let step = seen().map(|seen| seen.step).fold(0.0, f64::max);
+            let deviation = f64::max(1e-2 * wide, step / 12f64.sqrt()).max(1e-12);
+            self.weigh(quantity, deviation, false);
+        }
+    }
+
+    /// Weighs a quantity: each value with the variance σ² of the noise and of what rounding makes of equal values in a row,
+    /// which is one error and not one for each: σ² + (m − 1) Δ²/12.
+    pub fn weigh(&mut self, quantity: Quantity, deviation: f64, rounding: bool) {
+        for run in &mut self.runs {
+            let fitted = run.fitted_rows;
+            for seen in run.seen.iter_mut().filter(|seen| seen.quantity == quantity) {
+                for k in 0..seen.values.len() {
+                    let extra = if rounding { (seen.repeats[k] - 1.0) * seen.step * seen.step / 12.0 } else { 0.0 };
+                    let counts = k < fitted && seen.values[k].is_finite();
+                    seen.weights[k] = if counts { 1.0 / (deviation * deviation + extra).sqrt() } else { 0.0 };
+                }
+            }
+        }
+    }
+
+    /// The quantities that the fitted logs hold.
+    pub fn quantities(&self) -> Vec<Quantity> {
+        let mut all = Vec::new();
+        for seen in self.runs.iter().flat_map(|run| &run.seen) {
+            if !all.contains(&seen.quantity) {
+                all.push(seen.quantity);
+            }
+        }
+        all
+    }
+
+    /// Number of variables: knobs, what is shared, and the extras of each run.
+    pub fn variables(&self) -> usize {
+        self.globals() + self.runs.iter().map(|run| variable_extras(run).count()).sum::<usize>()
+    }
+
+    /// Number of those that concern all runs.
+    pub fn globals(&self) -> usize {
+        self.knobs.len() + self.shared.len()
+    }
+
+    /// Number of values that count.
+    pub fn counted(&self) -> usize {
+        self.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).filter(|w| **w > 0.0).count()
+    }
+
+    /// Where the case starts.
+    pub fn start(&self) -> Vec<f64> {
+        let mut x: Vec<f64> = self.knobs.iter().zip(&self.units).map(|(knob, unit)| unit.variable(knob.start)).collect();
+        x.resize(self.variables(), 0.0);
+        x
+    }
+
+    /// The box of the variables.
+    pub fn bounds(&self) -> Bounds {
+        let knobs = self.knobs.iter().zip(&self.units);
+        let mut bounds = Bounds {
+            low: knobs.clone().map(|(knob, unit)| unit.variable(knob.low)).collect(),
+            high: knobs.map(|(knob, unit)| unit.variable(knob.high)).collect(),
+        };
+        let own = self.runs.iter().flat_map(variable_extras);
+        for extra in self.shared.iter().chain(own) {
+            bounds.low.push((extra.low - extra.start) / extra.unit);
+            bounds.high.push((extra.high - extra.start) / extra.unit);
+        }
+        bounds
+    }
+
+    /// The value of knob `j` for its variable.
+    pub fn value(&self, j: usize, x: f64) -> f64 {
+        self.units[j].value(x)
+    }
+
+    /// The variable of knob `j` for its value.
+    pub fn variable(&self, j: usize, value: f64) -> f64 {
+        self.units[j].variable(value)
+    }
+
+    /// dp/dx of knob `j`.
+    pub fn slope(&self, j: usize, value: f64) -> f64 {
+        self.units[j].slope(value)
+    }
+
+    /// Whether knob `j` is searched for on a logarithmic scale.
+    pub fn is_log(&self, j: usize) -> bool {
+        matches!(self.units[j], Scale::Log(_))
+    }
+
+    /// The machine with these values.
+    pub fn stage_at(&self, x: &[f64]) -> Stage {
+        let mut stage = self.stage.clone();
+        for (j, knob) in self.knobs.iter().enumerate() {
+            knob.set(&mut stage, self.units[j].value(x[j]));
+        }
+        self.breakaways.follow(&mut stage);
+        stage
+    }
+
+    /// Where the extras of run `index` begin among the variables.
+    fn place(&self, index: usize) -> usize {
+        self.globals() + self.runs[..index].iter().map(|run| variable_extras(run).count()).sum::<usize>()
+    }
+
+    /// The values of a run's extras, and of the shared ones, as [`Run::experiment`] wants them.
+    pub fn extras_of(&self, index: usize, x: &[f64]) -> Vec<f64> {
+        let mut at = self.place(index);
+        let own = self.runs[index].extras.iter().map(|extra| {
+            if extra.low < extra.high {
+                at += 1;
+                extra.start + extra.unit * x[at - 1]
+            } else {
+                extra.start
+            }
+        });
+        let own: Vec<f64> = own.collect();
+        own.into_iter().chain(self.shared_values(x)).collect()
+    }
+
+    /// Values of what is shared.
+    pub fn shared_values(&self, x: &[f64]) -> Vec<f64> {
+        let first = self.knobs.len();
+        self.shared.iter().enumerate().map(|(i, extra)| extra.start + extra.unit * x[first + i]).collect()
+    }
+
+    /// The names of a run's variables and the places of the variables.
+    pub fn own_variables(&self, index: usize) -> Vec<(usize, Extra)> {
+        let first = self.place(index);
+        variable_extras(&self.runs[index]).enumerate().map(|(i, extra)| (first + i, *extra)).collect()
+    }
+
+    fn prepare(&mut self) {
+        let shared = self.shared.clone();
+        for run in self.runs.iter_mut().chain(&mut self.held_out) {
+            run.share(&shared);
+        }
+    }
+
+    /// Where the residuals of run `index` begin.
+    pub fn first_row(&self, index: usize) -> usize {
+        self.runs[..index].iter().map(Run::rows).sum()
+    }
+
+    fn one(&mut self, index: usize, stage: &Stage, x: &[f64], out: &mut [f64]) -> bool {
+        if self.is_stopped() {
+            return false;
+        }
+        self.simulations += 1;
+        let extras = self.extras_of(index, x);
+        self.runs[index].residuals(stage, &extras, out)
+    }
+}
+
+/// Extras that have room to vary and belong to the run alone.
+fn variable_extras(run: &Run) -> impl Iterator<Item = &Extra> {
+    run.extras.iter().filter(|extra| extra.low < extra.high)
+}
+
+/// Greatest minus least.
+pub(super) fn extent(values: &[f64]) -> f64 {
+    let finite = values.iter().filter(|v| v.is_finite());
+    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)));
+    if high >= low { high - low } else { 0.0 }
+}
+
+/// Speed of the cart at the start of a window, m/s, from a line through its first rows.
+fn slope_at_start(run: &Run, r: f64) -> f64 {
+    let Some(seen) = run.seen.iter().find(|seen| is_position(seen.quantity)) else { return 0.0 };
+    let rows: Vec<usize> = (0..run.time.len().min(15)).filter(|&k| seen.values[k].is_finite()).collect();
+    let n = rows.len().max(1) as f64;
+    let (t, y) = (rows.iter().map(|&k| run.time[k]).sum::<f64>() / n, rows.iter().map(|&k| seen.values[k]).sum::<f64>() / n);
+    let (mut above, mut below) = (0.0, 0.0);
+    for &k in &rows {
+        above += (run.time[k] - t) * (seen.values[k] - y);
+        below += (run.time[k] - t).powi(2);
+    }
+    let slope = if below > 0.0 { above / below } else { 0.0 };
+    if seen.quantity == Quantity::CartPosition { slope } else { slope * r }
+}
+
+/// The scale on which a knob is searched for.
+fn scale(stage: &Stage, knob: &Knob, runs: &[Run]) -> Scale {
+    if knob.logarithmic() && knob.start > 0.0 {
+        return Scale::Log(knob.start);
+    }
+    if knob.start != 0.0 {
+        return Scale::Linear(knob.start.abs());
+    }
+    // From zero: a tenth of what the motor gives at the greatest input.
+    let most = runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
+    let motor = &stage.motor;
+    let per_unit = match stage.amplifier.mode {
+        AmplifierMode::Voltage => motor.torque_constant / motor.resistance,
+        AmplifierMode::Current => motor.torque_constant,
+    };
+    let torque = (0.1 * per_unit * motor.gear_ratio * stage.amplifier.gain * most).abs();
+    let r = stage.pulley_radius;
+    let speed = runs
+        .iter()
+        .flat_map(|run| run.seen.iter().map(move |seen| (run, seen)))
+        .map(|(run, seen)| {
+            let along = if seen.quantity.name().starts_with("cart") { 1.0 / r } else { 1.0 };
+            let wide = extent(&seen.values) * along;
+            if is_position(seen.quantity) { 2.0 * wide / run.time.last().copied().unwrap_or(1.0) } else { wide }
+        })
+        .fold(0.0, f64::max)
+        .max(1e-3);
+    let unit = match knob.unit {
+        "N m" => torque,
+        "N" => torque / r,
+        "N m s/rad" => torque / speed,
+        "N s/m" => torque / (speed * r * r),
+        "rad" => 0.01,
+        "H" => 1e-3 * motor.resistance,
+        _ if knob.high.is_finite() && knob.high < 1e14 => 0.1 * knob.high.abs().max(knob.low.abs()),
+        _ => 1.0,
+    };
+    Scale::Linear(if unit > 0.0 && unit.is_finite() { unit } else { 1.0 })
+}
+
+impl Residuals for Problem<'_> {
+    fn rows(&self) -> usize {
+        self.runs.iter().map(Run::rows).sum()
+    }
+
+    fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool {
+        let stage = self.stage_at(x);
+        let mut first = 0;
+        for index in 0..self.runs.len() {
+            let rows = self.runs[index].rows();
+            if !self.one(index, &stage, x, &mut r[first..first + rows]) {
+                return false;
+            }
+            first += rows;
+        }
+        true
+    }
+
+    fn jacobian(&mut self, x: &[f64], r: &[f64], bounds: &Bounds, how: &Differences) -> Option<DMatrix<f64>> {
+        let (rows, n, globals) = (r.len(), x.len(), self.globals());
+        let mut jacobian = DMatrix::zeros(rows, n);
+        let mut moved = x.to_vec();
+        let (mut a, mut b) = (vec![0.0; rows], vec![0.0; rows]);
+        for j in 0..globals {
+            let step = Step::new(x, bounds, j, how);
+            moved[j] = step.first;
+            let mut good = self.evaluate(&moved, &mut a);
+            if let Some(second) = step.second {
+                moved[j] = second;
+                good &= self.evaluate(&moved, &mut b);
+            }
+            moved[j] = x[j];
+            if !good {
+                return None;
+            }
+            let mut column = jacobian.column_mut(j);
+            for (slope, ((r, a), b)) in column.iter_mut().zip(r.iter().zip(&a).zip(&b)) {
+                *slope = step.slope(*r, *a, *b);
+            }
+        }
+        // What belongs to one run moves its residuals alone.
+        let stage = self.stage_at(x);
+        let mut first = 0;
+        for index in 0..self.runs.len() {
+            let rows = self.runs[index].rows();
+            for (j, extra) in self.own_variables(index) {
+                if let Nuisance::Bias(output) = extra.what {
+                    let n = self.runs[index].time.len();
+                    for k in 0..n {
+                        jacobian[(first + output * n + k, j)] = extra.unit * self.runs[index].seen[output].weights[k];
+                    }
+                    continue;
+                }
+                let step = Step::new(x, bounds, j, how);
+                moved[j] = step.first;
+                let mut good = self.one(index, &stage, &moved, &mut a[..rows]);
+                if let Some(second) = step.second {
+                    moved[j] = second;
+                    good &= self.one(index, &stage, &moved, &mut b[..rows]);
+                }
+                moved[j] = x[j];
+                if !good {
+                    return None;
+                }
+                for k in 0..rows {
+                    jacobian[(first + k, j)] = step.slope(r[first + k], a[k], b[k]);
+                }
+            }
+            first += rows;
+        }
+        Some(jacobian)
+    }
+}

@@ -1,0 +1,425 @@
+//! A log made ready to be compared: when the model is asked, what it is told, and what its answer is weighed with.
+
+use crate::case::{Experiment, Initial};
+use crate::log::{Log, Quantity};
+use crate::signal::Signal;
+use crate::solve::{self, Ending, Flow, Solver};
+use crate::stage::Stage;
+
+/// Share of an interval by which times may be off an even raster and still count as on it: the solver then answers at the
+/// raster's times. What that makes of a value is at most its rate of change times this share of an interval.
+const EVEN: f64 = 1e-3;
+
+/// Points of the raster per interval where times are uneven; between them positions follow cubics through positions and
+/// speeds, all else straight lines. With h the raster, that is off by at most h⁴|x⁗|/384, and h²|ÿ|/8.
+const RASTER: f64 = 8.0;
+
+/// What is known of a log beside what is looked for: fitted along, one for each log.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Nuisance {
+    /// The input acts this much later, s.
+    Delay,
+    /// Factor on the input.
+    InputGain,
+    /// Added to the input.
+    InputOffset,
+    /// Position at the start, m of the cart.
+    StartPosition,
+    /// Speed at the start, m/s of the cart.
+    StartSpeed,
+    /// Added to an output.
+    Bias(usize),
+}
+
+impl Nuisance {
+    /// Its name in results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Nuisance::Delay => "delay",
+            Nuisance::InputGain => "input_gain",
+            Nuisance::InputOffset => "input_offset",
+            Nuisance::StartPosition => "start_position",
+            Nuisance::StartSpeed => "start_speed",
+            Nuisance::Bias(_) => "bias",
+        }
+    }
+}
+
+/// A nuisance of a run, and how it is searched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extra {
+    /// Which.
+    pub what: Nuisance,
+    /// Value at zero of its variable.
+    pub start: f64,
+    /// What one of its variable is.
+    pub unit: f64,
+    /// Least and greatest value.
+    pub low: f64,
+    /// The greatest.
+    pub high: f64,
+}
+
+/// One output of a log with its weights.
+#[derive(Debug, Clone)]
+pub struct Seen {
+    /// What it is.
+    pub quantity: Quantity,
+    /// Whether its sign was lost.
+    pub absolute: bool,
+    /// The values, NaN where missing.
+    pub values: Vec<f64>,
+    /// 1/σ of each; zero for what does not count.
+    pub weights: Vec<f64>,
+    /// Step of the converter as far as the values show it; 0 where they show none.
+    pub step: f64,
+    /// How many equal values stand in a row here: what rounds them is the same for all of them.
+    pub repeats: Vec<f64>,
+}
+
+/// A log, or a window of one, and the model's side of it.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// The experiment's name.
+    pub name: String,
+    /// Which window of it, from 0; 0 where it is whole.
+    pub window: usize,
+    /// Times, s.
+    pub time: Vec<f64>,
+    /// The input at these times.
+    pub logged: Vec<f64>,
+    /// The outputs.
+    pub seen: Vec<Seen>,
+    /// Whether none of it is fitted.
+    pub held_out: bool,
+    /// From which row on nothing is fitted.
+    pub fitted_rows: usize,
+    /// What is fitted along.
+    pub extras: Vec<Extra>,
+    /// What is fitted along for all logs at once; its values stand behind those of `extras`.
+    shared: Vec<Extra>,
+    input: Signal,
+    initial: Initial,
+    every: f64,
+    until: f64,
+    even: bool,
+}
+
+/// How a run is made of a log.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Setting {
+    /// Length of a window, s; the whole log without.
+    pub window: Option<f64>,
+    /// After this time nothing is fitted.
+    pub fitted_until: Option<f64>,
+    /// Whether none of it is fitted.
+    pub held_out: bool,
+}
+
+impl Run {
+    /// The runs of an experiment's log: one, or one for each window.
+    pub fn all(experiment: &Experiment, log: &Log, setting: &Setting) -> Vec<Self> {
+        let end = log.time.last().copied().unwrap_or(0.0);
+        let Some(window) = setting.window.filter(|window| *window < end) else {
+            return vec![Self::of(experiment, log, 0..log.time.len(), 0, setting)];
+        };
+        let count = (end / window).round().max(1.0) as usize;
+        let mut runs = Vec::new();
+        let mut first = 0;
+        for k in 0..count {
+            let until = if k + 1 == count { f64::INFINITY } else { end * (k + 1) as f64 / count as f64 };
+            let last = log.time.partition_point(|&t| t < until);
+            if last > first + 4 {
+                // The row at the seam belongs to both.
+                runs.push(Self::of(experiment, log, first..(last + 1).min(log.time.len()), k, setting));
+                first = last;
+            }
+        }
+        runs
+    }
+
+    fn of(
+        experiment: &Experiment,
+        log: &Log,
+        rows: std::ops::Range<usize>,
+        window: usize,
+        setting: &Setting,
+    ) -> Self {
+        let whole = rows.len() == log.time.len();
+        let shift = if whole { 0.0 } else { log.time[rows.start] };
+        let time: Vec<f64> = log.time[rows.clone()].iter().map(|t| t - shift).collect();
+        let logged = log.input[rows.clone()].to_vec();
+        let n = time.len();
+        let (first, last) = (time[0], time[n - 1]);
+        let interval = (last - first) / (n - 1) as f64;
+        let even = first.abs() <= EVEN * interval
+            && time.iter().enumerate().all(|(k, t)| (t - first - k as f64 * interval).abs() <= EVEN * interval);
+        let (every, until) = if even {
+            (interval, interval * (n - 1) as f64)
+        } else {
+            let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+            let middle = steps.len() / 2;
+            let every = *steps.select_nth_unstable_by(middle, f64::total_cmp).1 / RASTER;
+            (every, every * (last / every).ceil().max(1.0))
+        };
+        // On the raster, where the solver need not stop twice for a sample.
+        let times = if even { (0..n).map(|k| k as f64 * until / (n - 1) as f64).collect() } else { time.clone() };
+        let input = match &experiment.input {
+            Signal::Sampled { times: own, .. } if *own == log.time => {
+                Signal::Sampled { times, values: logged.clone(), hold: log.hold }
+            }
+            _ if whole => experiment.input.clone(),
+            _ => Signal::Sampled { times, values: logged.clone(), hold: log.hold },
+        };
+        let limit = setting.fitted_until.map_or(f64::INFINITY, |until| until - shift);
+        let fitted_rows = if setting.held_out { 0 } else { time.partition_point(|&t| t < limit) };
+        let seen = log
+            .outputs
+            .iter()
+            .map(|output| {
+                let values = output.values[rows.clone()].to_vec();
+                let step = step_of(&values);
+                Seen {
+                    quantity: output.quantity,
+                    absolute: output.absolute,
+                    weights: vec![0.0; n],
+                    repeats: repeats(&values),
+                    values,
+                    step,
+                }
+            })
+            .collect();
+        Self {
+            name: experiment.name.clone(),
+            window,
+            time,
+            logged,
+            seen,
+            held_out: setting.held_out,
+            fitted_rows,
+            extras: Vec::new(),
+            shared: Vec::new(),
+            input,
+            initial: experiment.initial,
+            every,
+            until,
+            even,
+        }
+    }
+
+    /// Says what is fitted along for all logs.
+    pub fn share(&mut self, shared: &[Extra]) {
+        self.shared = shared.to_vec();
+    }
+
+    /// Number of residuals: every output at every time.
+    pub fn rows(&self) -> usize {
+        self.seen.len() * self.time.len()
+    }
+
+    /// Mean interval between its samples, s.
+    pub fn interval(&self) -> f64 {
+        self.time.last().unwrap_or(&0.0) / (self.time.len().max(2) - 1) as f64
+    }
+
+    /// Whether it is solved at its own times.
+    pub fn is_even(&self) -> bool {
+        self.even
+    }
+
+    /// The experiment that the model is put through, with these values of the extras.
+    pub fn experiment(&self, stage: &mut Stage, extras: &[f64]) -> Experiment {
+        let (mut delay, mut offset) = (0.0, 0.0);
+        let (mut position, mut speed) = (None, None);
+        for (extra, &value) in self.extras.iter().chain(&self.shared).zip(extras) {
+            match extra.what {
+                Nuisance::Delay => delay = value,
+                Nuisance::InputGain => stage.amplifier.gain *= value,
+                Nuisance::InputOffset => offset = value,
+                Nuisance::StartPosition => position = Some(value),
+                Nuisance::StartSpeed => speed = Some(value),
+                Nuisance::Bias(_) => {}
+            }
+        }
+        let mut input = match &self.input {
+            Signal::Sampled { times, values, hold } if delay != 0.0 || offset != 0.0 => Signal::Sampled {
+                times: times.iter().map(|t| t + delay).collect(),
+                values: values.iter().map(|u| u + offset).collect(),
+                hold: *hold,
+            },
+            other => other.clone(),
+        };
+        if !matches!(input, Signal::Sampled { .. }) {
+            if delay > 0.0 {
+                let nothing = solve_slot(Signal::Step { value: 0.0, at: 0.0 }, delay);
+                input = Signal::Sequence(vec![nothing, solve_slot(input, f64::INFINITY)]);
+            }
+            if offset != 0.0 {
+                input = Signal::Sum(vec![input, Signal::Step { value: offset, at: 0.0 }]);
+            }
+        }
+        let r = stage.pulley_radius;
+        let mut initial = self.initial;
+        if let Some(position) = position {
+            (initial.cart_position, initial.drive_angle, initial.idler_angle) = (position, position / r, position / r);
+        }
+        if let Some(speed) = speed {
+            (initial.cart_speed, initial.drive_speed, initial.idler_speed) = (speed, speed / r, speed / r);
+        }
+        Experiment { input, initial, until: self.until, every: self.every, ..empty() }
+    }
+
+    /// What the model says at the log's times, one column for each output, biases not yet added; false where it does not
+    /// reach the end.
+    pub fn predict(&self, stage: &Stage, extras: &[f64], quantities: &[Quantity], out: &mut [Vec<f64>]) -> bool {
+        let mut stage = stage.clone();
+        stage.encoder = None;
+        let experiment = self.experiment(&mut stage, extras);
+        let mut slopes: Vec<Vec<f64>> = vec![Vec::new(); quantities.len()];
+        out.iter_mut().for_each(Vec::clear);
+        let outcome = solve::stream(&stage, &experiment, Solver::Exact, &mut |block| {
+            for (i, quantity) in quantities.iter().enumerate() {
+                out[i].extend_from_slice(column(block, *quantity));
+                if !self.even
+                    && let Some(speed) = speed_of(*quantity)
+                {
+                    slopes[i].extend_from_slice(column(block, speed));
+                }
+            }
+            Flow::Continue
+        });
+        if !outcome.is_ok_and(|outcome| outcome.ending == Ending::Complete) {
+            return false;
+        }
+        if !self.even {
+            for (values, slopes) in out.iter_mut().zip(&slopes) {
+                *values = self.time.iter().map(|&t| between(values, slopes, t / self.every, self.every)).collect();
+            }
+        }
+        out.iter().all(|values| values.len() == self.time.len())
+    }
+
+    /// Weighted residuals, model minus log, with this model and these extras.
+    pub fn residuals(&self, stage: &Stage, extras: &[f64], out: &mut [f64]) -> bool {
+        let quantities: Vec<Quantity> = self.seen.iter().map(|seen| seen.quantity).collect();
+        let mut columns = vec![Vec::with_capacity(self.time.len()); self.seen.len()];
+        if !self.predict(stage, extras, &quantities, &mut columns) {
+            return false;
+        }
+        let n = self.time.len();
+        for (i, (seen, column)) in self.seen.iter().zip(&columns).enumerate() {
+            let bias = self.bias(i, extras);
+            let out = &mut out[i * n..(i + 1) * n];
+            for k in 0..n {
+                let value = if seen.absolute { column[k].abs() } else { column[k] } + bias;
+                out[k] = if seen.weights[k] == 0.0 { 0.0 } else { seen.weights[k] * (value - seen.values[k]) };
+            }
+        }
+        true
+    }
+
+    /// What is added to output `index`.
+    pub fn bias(&self, index: usize, extras: &[f64]) -> f64 {
+        let own = self.extras.iter().zip(extras).filter(|(extra, _)| extra.what == Nuisance::Bias(index));
+        own.map(|(_, bias)| bias).sum()
+    }
+}
+
+/// An experiment without anything.
+fn empty() -> Experiment {
+    Experiment {
+        name: String::new(),
+        input: Signal::Step { value: 0.0, at: 0.0 },
+        until: 1.0,
+        every: 1.0,
+        initial: Initial::default(),
+        log: None,
+    }
+}
+
+fn solve_slot(signal: Signal, lasts: f64) -> crate::signal::Slot {
+    crate::signal::Slot { signal, lasts }
+}
+
+/// The column of a run that an output is compared with.
+fn column(block: &crate::trajectory::Trajectory, quantity: Quantity) -> &[f64] {
+    let name = quantity.name();
+    let other = match name {
+        "motor_voltage" => "voltage",
+        "rotor_angle" => "drive_angle",
+        "rotor_speed" => "drive_speed",
+        _ => name,
+    };
+    block.get(name).or_else(|| block.get(other)).unwrap_or(&[])
+}
+
+/// The speed that belongs to a position.
+fn speed_of(quantity: Quantity) -> Option<Quantity> {
+    match quantity {
+        Quantity::DriveAngle => Some(Quantity::DriveSpeed),
+        Quantity::CartPosition => Some(Quantity::CartSpeed),
+        _ => None,
+    }
+}
+
+/// Whether it is a way, so that a constant added to it changes nothing else.
+pub fn is_position(quantity: Quantity) -> bool {
+    quantity.name().ends_with("_angle") || quantity.name().ends_with("_position")
+}
+
+/// The value at `at` rows of a raster of `h`.
+fn between(values: &[f64], slopes: &[f64], at: f64, h: f64) -> f64 {
+    let cell = (at.floor().max(0.0) as usize).min(values.len().saturating_sub(2));
+    let s = at - cell as f64;
+    let (a, b) = (values[cell], values[cell + 1]);
+    if slopes.is_empty() {
+        return a + s * (b - a);
+    }
+    let (va, vb) = (h * slopes[cell], h * slopes[cell + 1]);
+    // Hermite's cubic.
+    let (s2, s3) = (s * s, s * s * s);
+    a + (3.0 * s2 - 2.0 * s3) * (b - a) + (s - 2.0 * s2 + s3) * va + (s3 - s2) * vb
+}
+
+/// The step of which all differences between neighbours are multiples; 0 if there is none.
+fn step_of(values: &[f64]) -> f64 {
+    let differences: Vec<f64> =
+        values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|d| d.is_finite() && *d > 0.0).collect();
+    let size = values.iter().filter(|v| v.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()));
+    let real: Vec<f64> = differences.into_iter().filter(|d| *d > 1e-9 * size).collect();
+    let Some(least) = real.iter().copied().min_by(f64::total_cmp) else { return 0.0 };
+    // Numbers in files are rounded themselves.
+    let whole = |d: &&f64| (*d / least - (*d / least).round()).abs() <= 0.05;
+    let many = real.iter().filter(whole).count();
+    if many as f64 >= 0.98 * real.len() as f64 && real.len() >= 3 { least } else { 0.0 }
+}
+
+/// For each value how many equal ones stand around it in a row.
+fn repeats(values: &[f64]) -> Vec<f64> {
+    values.chunk_by(|a, b| a == b).flat_map(|same| std::iter::repeat_n(same.len() as f64, same.len())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_of_converters_are_found() {
+        let counts: Vec<f64> = (0..200).map(|k| (f64::from(k) * 1.37).round() * 0.01).collect();
+        assert!((step_of(&counts) - 0.01).abs() < 1e-12);
+        let smooth: Vec<f64> = (0..200).map(|k| (f64::from(k) * 0.1).sin()).collect();
+        assert_eq!(step_of(&smooth), 0.0);
+    }
+
+    #[test]
+    fn cubics_go_through_cubics() {
+        let (h, f) = (0.5, |t: f64| 1.0 + t - 2.0 * t * t + 0.5 * t * t * t);
+        let slope = |t: f64| 1.0 - 4.0 * t + 1.5 * t * t;
+        let at = |k: usize| k as f64 * h;
+        let values: Vec<f64> = (0..5).map(|k| f(at(k))).collect();
+        let slopes: Vec<f64> = (0..5).map(|k| slope(at(k))).collect();
+        for t in [0.0, 0.2, 0.77, 1.9, 2.0] {
+            assert!((between(&values, &slopes, t / h, h) - f(t)).abs() < 1e-12);
+        }
+    }
+}
