@@ -6,7 +6,7 @@ use crate::terminal::bold;
 use std::fmt::Write;
 use std::time::Duration;
 use taut::case::Case;
-use taut::metrics::{Metrics, largest};
+use taut::metrics::{Balance, Metrics, largest};
 use taut::number;
 use taut::plant::Part;
 use taut::reduction::Reduction;
@@ -142,8 +142,9 @@ fn steady(metrics: &Metrics) -> String {
         return "none: no constant input lasts 20 samples".into();
     };
     let balance = match steady.analytic {
-        Some(balance) => format!("forces balance at {}", speed(balance)),
-        None => "nothing limits the speed".into(),
+        Balance::At(balance) => format!("forces balance at {}", speed(balance)),
+        Balance::Never => "nothing limits the speed".into(),
+        Balance::Changing => "no balance computed: it changes along the travel".into(),
     };
     if steady.reached {
         format!("{}; {balance}", speed(steady.value))
