@@ -1,10 +1,12 @@
 /* SUNDIALS CVODE with root finding on the paper's machine: Table 4 friction, the rest of Table 2, a pulse of 5 V for 0.25 s,
- * 1 s, 1000 output samples. Usage: cvode bdf|adams|adams-fixed RTOL RUNS (adams-fixed: fixed-point iteration instead of
- * Newton's with the Jacobian). Prints the best run's seconds, the number of events, and the 1001 samples of phi1, x, phi3.
+ * 1 s, 1000 output samples. Usage: cvode coulomb|stribeck bdf|adams|adams-fixed RTOL RUNS (stribeck: with F_s = 0.3 F_c on top of
+ * each Coulomb friction, v_s = 0.05 m/s at the belt; adams-fixed: fixed-point iteration instead of Newton's with the Jacobian).
+ * Prints the best run's seconds, the number of events, and the 1001 samples of phi1, x, phi3.
  *
  *   J phi1'' = -r f1 + r f3 - tau_f1 + K_t i     f1 = k1 (r phi1 - x)      i = (u - K_e w1) / R
  *   M x''    =  f1 - f2 - F_f                    f2 = k2 (x - r phi3)
  *   J phi3'' =  r f2 - r f3 - tau_f2             f3 = k3 (r phi3 - r phi1)
+ *   F_f = b v + sign(v) (F_c + F_s exp(-(v/v_s)^2))
  *
  * Integrated mode by mode: each inertia slides forward (+1), backward (-1) or is stuck (0). Restarted at mode changes and edges.
  */
@@ -29,11 +31,17 @@
 static const double r = 0.0194, k1 = 1.3276e5, k2 = 1.3276e5, k3 = 5.8885e4, M = 0.362, J = 6.3e-5;
 static const double Kt = 23e-3, Ke = 23e-3, R = 0.71;
 static const double viscous[3] = {0.0016, 19.0424, 0.0016}, coulomb[3] = {0.015, 0.2, 0.015};
+static const double above[3] = {0.3 * 0.015, 0.3 * 0.2, 0.3 * 0.015}, vs[3] = {0.05 / 0.0194, 0.05, 0.05 / 0.0194};
 
 typedef struct {
     int mode[3], left; /* left: the inertia that has just left zero, not asked for BLIND seconds whether it is there */
     double u, since;
+    int curve;
+    double breakaway[3];
 } Machine;
+
+/* F_s exp(-(v/v_s)^2) of a body that slides. */
+static inline double curve(int b, double v) { return above[b] * exp(-(v / vs[b]) * (v / vs[b])); }
 
 /* Loads on the three inertias: every force but friction. */
 static inline void loads(const Machine *m, const double *y, double load[3]) {
@@ -52,13 +60,15 @@ static int rhs(realtype t, N_Vector yv, N_Vector dv, void *data) {
     for (int b = 0; b < 3; b++) {
         d[2 * b] = y[2 * b + 1];
         d[2 * b + 1] = m->mode[b] ? (load[b] - viscous[b] * y[2 * b + 1] - m->mode[b] * coulomb[b]) / inertia[b] : 0.0;
+        if (m->curve && m->mode[b]) d[2 * b + 1] -= m->mode[b] * curve(b, y[2 * b + 1]) / inertia[b];
     }
     return 0;
 }
 
 static int jacobian(realtype t, N_Vector yv, N_Vector f, SUNMatrix a, void *data, N_Vector t1, N_Vector t2, N_Vector t3) {
-    (void)t, (void)yv, (void)f, (void)t1, (void)t2, (void)t3;
+    (void)t, (void)f, (void)t1, (void)t2, (void)t3;
     const Machine *m = data;
+    const double *y = NV_DATA_S(yv), inertia[3] = {J, M, J};
     SUNMatZero(a);
     SM_ELEMENT_D(a, 0, 1) = SM_ELEMENT_D(a, 2, 3) = SM_ELEMENT_D(a, 4, 5) = 1.0;
     if (m->mode[0]) {
@@ -79,6 +89,10 @@ static int jacobian(realtype t, N_Vector yv, N_Vector f, SUNMatrix a, void *data
         SM_ELEMENT_D(a, 5, 4) = -r * r * (k2 + k3) / J;
         SM_ELEMENT_D(a, 5, 5) = -viscous[2] / J;
     }
+    for (int b = 0; m->curve && b < 3; b++) {
+        double v = y[2 * b + 1];
+        if (m->mode[b]) SM_ELEMENT_D(a, 2 * b + 1, 2 * b + 1) += m->mode[b] * curve(b, v) * 2 * v / (vs[b] * vs[b]) / inertia[b];
+    }
     return 0;
 }
 
@@ -89,15 +103,17 @@ static int roots(realtype t, N_Vector yv, realtype *g, void *data) {
     double load[3];
     loads(m, y, load);
     for (int b = 0; b < 3; b++) {
-        g[2 * b] = m->mode[b] ? m->mode[b] * y[2 * b + 1] : coulomb[b] - load[b];
-        g[2 * b + 1] = m->mode[b] ? 1.0 : coulomb[b] + load[b];
+        g[2 * b] = m->mode[b] ? m->mode[b] * y[2 * b + 1] : m->breakaway[b] - load[b];
+        g[2 * b + 1] = m->mode[b] ? 1.0 : m->breakaway[b] + load[b];
         if (b == m->left && t < m->since + BLIND) g[2 * b] = 1.0;
     }
     return 0;
 }
 
 /* Mode of an inertia at zero speed under a load. */
-static int at_rest(int b, double load) { return load > coulomb[b] ? 1 : load < -coulomb[b] ? -1 : 0; }
+static int at_rest(const Machine *m, int b, double load) {
+    return load > m->breakaway[b] ? 1 : load < -m->breakaway[b] ? -1 : 0;
+}
 
 static void check(int status, const char *what) {
     if (status < 0) {
@@ -120,7 +136,7 @@ static int simulate(void *cvode, N_Vector y, Machine *m, double (*samples)[STATE
         m->left = -1, m->since = t;
         loads(m, state, load);
         for (int b = 0; b < 3; b++)
-            if (!m->mode[b] && (m->mode[b] = at_rest(b, load[b]))) events++, m->left = b;
+            if (!m->mode[b] && (m->mode[b] = at_rest(m, b, load[b]))) events++, m->left = b;
         check(CVodeReInit(cvode, t, y), "CVodeReInit");
         check(CVodeSetStopTime(cvode, edges[piece]), "CVodeSetStopTime");
         while (t < edges[piece]) {
@@ -138,7 +154,7 @@ static int simulate(void *cvode, N_Vector y, Machine *m, double (*samples)[STATE
                         if (found[2 * b]) {
                             state[2 * b + 1] = 0.0;
                             loads(m, state, load);
-                            m->mode[b] = at_rest(b, load[b]);
+                            m->mode[b] = at_rest(m, b, load[b]);
                             m->left = m->mode[b] ? b : -1;
                             events++;
                         }
@@ -162,11 +178,12 @@ static int simulate(void *cvode, N_Vector y, Machine *m, double (*samples)[STATE
 }
 
 int main(int argc, char **argv) {
-    if (argc != 4) return fprintf(stderr, "usage: cvode bdf|adams|adams-fixed RTOL RUNS\n"), 2;
-    int adams = !strncmp(argv[1], "adams", 5), fixed = !strcmp(argv[1], "adams-fixed"), runs = atoi(argv[3]), events = 0;
-    double rtol = atof(argv[2]);
+    if (argc != 5) return fprintf(stderr, "usage: cvode coulomb|stribeck bdf|adams|adams-fixed RTOL RUNS\n"), 2;
+    int adams = !strncmp(argv[2], "adams", 5), fixed = !strcmp(argv[2], "adams-fixed"), runs = atoi(argv[4]), events = 0;
+    double rtol = atof(argv[3]);
     static double samples[SAMPLES + 1][STATES];
-    Machine m = {{0, 0, 0}, -1, 0.0, 0.0};
+    Machine m = {{0, 0, 0}, -1, 0.0, 0.0, !strcmp(argv[1], "stribeck"), {0.0, 0.0, 0.0}};
+    for (int b = 0; b < 3; b++) m.breakaway[b] = coulomb[b] + (m.curve ? above[b] : 0.0);
 
     SUNContext context;
     check(SUNContext_Create(NULL, &context), "SUNContext_Create");

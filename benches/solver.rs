@@ -1,4 +1,4 @@
-//! What the exact solver costs: the paper's machine, per sample, per event, per edge.
+//! What the solvers cost: the exact one on the paper's machine, per sample, per event, per edge; the general one per friction law.
 //!
 //! `cargo bench --package taut`; rivals (SciPy, CVODE) are timed beside it by `authorities/speed.py`.
 
@@ -8,16 +8,21 @@ mod common;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
 use taut::case::Experiment;
+use taut::friction::{Friction, Law, Shape};
 use taut::signal::{Hold, Signal};
 use taut::solve::{Flow, Solver, simulate, stream};
-use taut::stage::Stage;
+use taut::stage::{BeltMake, Stage, Travel};
 
 fn pulse() -> Signal {
     Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 }
 }
 
 fn streamed(stage: &Stage, experiment: &Experiment) -> usize {
-    let outcome = stream(stage, experiment, Solver::Exact, &mut |block| {
+    streamed_by(Solver::Exact, stage, experiment)
+}
+
+fn streamed_by(solver: Solver, stage: &Stage, experiment: &Experiment) -> usize {
+    let outcome = stream(stage, experiment, solver, &mut |block| {
         black_box(block);
         Flow::Continue
     });
@@ -72,5 +77,40 @@ fn edges(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, table4, rows, events, edges);
+/// The general solver with its default tolerance: the same pulse with what the exact solver knows, and with what it does not.
+fn general(c: &mut Criterion) {
+    let experiment = common::experiment(pulse(), 1.0);
+    let dry = |law: Law| {
+        let mut stage = common::table4();
+        let r = stage.pulley_radius;
+        stage.cart.friction = Friction::with_breakaway(19.0424, 0.2, 0.26).following(law);
+        let pulley = Friction::with_breakaway(0.0016, 0.015, 0.0195);
+        (stage.drive_pulley.friction, stage.idler_pulley.friction) = (pulley, pulley);
+        if let Law::Stribeck { velocity, shape } = law {
+            let law = Law::Stribeck { velocity: velocity / r, shape };
+            (stage.drive_pulley.friction.law, stage.idler_pulley.friction.law) = (law, law);
+        }
+        stage
+    };
+    let mut follows = common::table4();
+    let make = BeltMake { modulus: 8.335e9, section: 5.5626e-6, spans: [0.34925, 0.34925, 0.7874] };
+    (follows.belt.make, follows.belt.follows_cart) = (Some(make), true);
+    follows.travel = Some(Travel { min: -0.3, max: 0.3, stop: None });
+    let curve = Law::Stribeck { velocity: 0.05, shape: Shape::Gaussian };
+    let bristles = Law::LuGre { stiffness: 1e4, damping: 60.0, velocity: 0.01 };
+    let cases = [
+        ("Coulomb", common::table4()),
+        ("Stribeck", dry(curve)),
+        ("smooth, on the cart", dry(Law::Smooth { breakaway_velocity: 0.01 })),
+        ("LuGre, on the cart", dry(bristles)),
+        ("spans that follow the cart", follows),
+    ];
+    let mut group = c.benchmark_group("general, 5 V pulse, 1 s, 1001 rows");
+    for (name, stage) in &cases {
+        group.bench_function(*name, |b| b.iter(|| streamed_by(Solver::GENERAL, stage, &experiment)));
+    }
+    group.finish();
+}
+
+criterion_group!(benches, table4, rows, events, edges, general);
 criterion_main!(benches);

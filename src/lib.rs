@@ -46,7 +46,8 @@
 //! - [`signal`]: what is fed into it.
 //! - [`plant`]: its equations of motion, mode by mode.
 //! - [`log`]: measured columns in. [`case`]: the case file in.
-//! - [`solve`]: the motion. [`measure`]: what a recorder makes of it. [`metrics`]: what it shows.
+//! - [`solve`]: the motion. [`measure`]: what a recorder makes of it. [`metrics`]: what it shows. [`reduction`]: how far a reduced model
+//!   is from the elastic one.
 //! - [`fit`]: parameters from logs, and what the logs cannot tell.
 //! - `report`: figures, drawings and an HTML page of them (feature `report`, on by default).
 //!

@@ -75,9 +75,8 @@ pub struct SteadySpeed {
     pub change: f64,
     /// Whether that change is at most 1 % of the speed; if not, there was no time to become steady.
     pub reached: bool,
-    /// The speed at which all forces balance under that input, m/s, with everything sliding its way:
-    /// [`balanced_speed`].
-    pub analytic: Option<f64>,
+    /// The speed at which all forces balance under that input, with everything sliding its way: [`balanced_speed`].
+    pub analytic: Balance,
     /// The input, V or A.
     pub input: f64,
     /// Times of the first and last row of that stretch, s.
@@ -269,53 +268,112 @@ impl Plateau {
             value: self.last,
             change: greatest - least,
             reached: greatest - least <= STEADY * self.last.abs(),
-            analytic: balanced_speed(stage, self.input),
+            analytic: balanced_speed(stage, self.input, self.last),
             input: self.input,
             stretch: (self.begin, self.end),
         }
     }
 }
 
-/// The cart's speed, m/s, at which a constant `input` (V or A) just makes up for all losses; the belt's stretch is constant then.
+/// At which speed of the cart all forces balance under a constant input.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Balance {
+    /// At this one, m/s; zero where that input cannot keep the axis sliding.
+    At(f64),
+    /// At none: nothing limits the speed (a commanded current, and no viscous friction).
+    Never,
+    /// At no single one: friction or the belt changes along the travel.
+    Changing,
+}
+
+impl Balance {
+    /// The speed, if there is one.
+    pub fn speed(self) -> Option<f64> {
+        match self {
+            Balance::At(speed) => Some(speed),
+            Balance::Never | Balance::Changing => None,
+        }
+    }
+}
+
+/// The cart's speed at which a constant `input` (V or A) just makes up for all losses; the belt's stretch is constant then.
 ///
-/// Everything slides in the direction of the input, and limits of voltage and current hold. Zero where that input cannot keep it sliding; none where nothing
-/// limits the speed (a commanded current, and no viscous friction).
-pub fn balanced_speed(stage: &Stage, input: f64) -> Option<f64> {
+/// Everything slides in the direction of the input, by its friction law, and limits of voltage and current hold. Where a law's curve
+/// lets the forces balance at several speeds, it is the one that the axis comes to from `near`, m/s.
+pub fn balanced_speed(stage: &Stage, input: f64, near: f64) -> Balance {
+    if stage.cart.along.is_some() || stage.belt.follows_cart {
+        return Balance::Changing;
+    }
     let (motor, amplifier) = (&stage.motor, &stage.amplifier);
     let (r, n, eta) = (stage.pulley_radius, motor.gear_ratio, motor.gear_efficiency);
     let output = amplifier.gain * input;
-    let direction = if output < 0.0 { -1.0 } else { 1.0 };
-    let friction = [&stage.drive_pulley.friction, &stage.cart.friction, &stage.idler_pulley.friction];
-    let [b1, b, b2] = friction.map(|law| if direction < 0.0 { law.backward } else { law.forward });
-    // Sum of (16), r (17) and (18) without accelerations, with ẋ = r φ̇₁ = r φ̇₃ and the constant force F on the cart:
-    //   τ_M + r F = (B₁ + B₂ + r² b) φ̇ + τ_c1 + τ_c2 + r F_c
-    let coulomb = b1.coulomb + b2.coulomb + r * b.coulomb - direction * r * stage.cart.constant_force();
-    let viscous = b1.viscous + b2.viscous + r * r * b.viscous;
-    let speed = |drive: f64, brake: f64| {
-        let excess = (drive - coulomb).max(0.0);
-        if excess == 0.0 { 0.0 } else { r * excess / (viscous + brake) }
-    };
+    let forward = output >= 0.0;
+    let direction = if forward { 1.0 } else { -1.0 };
+
+    // What drives, as lines τ = a − s φ̇ of which the least counts: the command, and the limit on the other quantity.
     let least = |a: f64, b: Option<f64>| b.map_or(a, |b| a.min(b));
     // τ_M = η n K_t i
-    let at_current = |current: f64| speed(eta * n * motor.torque_constant * current, 0.0);
+    let at_current = |current: f64| (eta * n * motor.torque_constant * current, 0.0);
     // τ_M = η n K_t (V_in − K_e n φ̇) / R                                          (4) with a gear
     let at_voltage = |voltage: f64| {
         let per_volt = eta * n * motor.torque_constant / motor.resistance;
-        speed(per_volt * voltage, per_volt * motor.back_emf_constant * n)
+        (per_volt * voltage, per_volt * motor.back_emf_constant * n)
     };
-    // Of the command and the limit on the other quantity, the one that gives less.
-    let balance = match amplifier.mode {
+    let (command, bound) = match amplifier.mode {
         AmplifierMode::Current => {
-            let bound = amplifier.voltage_limit.map(at_voltage);
-            least(at_current(least(output.abs(), amplifier.current_limit)), bound)
+            (at_current(least(output.abs(), amplifier.current_limit)), amplifier.voltage_limit.map(at_voltage))
         }
         AmplifierMode::Voltage => {
-            let bound = amplifier.current_limit.map(at_current);
-            least(at_voltage(least(output.abs(), amplifier.voltage_limit)), bound)
+            (at_voltage(least(output.abs(), amplifier.voltage_limit)), amplifier.current_limit.map(at_current))
         }
     };
-    balance.is_finite().then_some(direction * balance)
+
+    // Sum of (16), r (17) and (18) without accelerations, with v = ẋ = r φ̇₁ = r φ̇₃ and the constant force F on the cart:
+    //   excess(v) = τ_M + r F − τ_f1 − τ_f2 − r F_f
+    let bodies = [(stage.drive_pulley.friction, r), (stage.cart.friction, 1.0), (stage.idler_pulley.friction, r)];
+    let load = direction * r * stage.cart.constant_force();
+    let viscous: f64 = bodies.iter().map(|(law, radius)| r / radius * (r / radius) * law.side(forward).viscous).sum();
+    let dry = |v: f64| bodies.iter().map(|(law, radius)| r / radius * law.dry(forward, v / radius)).sum::<f64>();
+    let excess = |v: f64| {
+        let drive = [Some(command), bound].into_iter().flatten().map(|(a, s)| a - s * v / r);
+        drive.fold(f64::INFINITY, f64::min) + load - viscous * v / r - dry(v)
+    };
+
+    // Without dry friction it would go this fast, and with it no faster.
+    let fastest = |(a, s): (f64, f64)| if s + viscous > 0.0 { r * (a + load) / (s + viscous) } else { f64::INFINITY };
+    let fastest = bound.map_or(f64::INFINITY, fastest).min(fastest(command));
+    let scales: Vec<f64> = bodies.iter().filter_map(|(law, radius)| law.law.velocity().map(|v| radius * v)).collect();
+    let slowest = scales.iter().copied().fold(f64::INFINITY, f64::min) / SLOWER;
+    let past = scales.iter().copied().fold(0.0, f64::max) * FASTER;
+    let top = if fastest.is_finite() { 2.0 * fastest.max(0.0) } else { past.max(direction * near) };
+
+    // Between neighbours of these speeds the excess changes its sign no more than once.
+    let curve = std::iter::successors(Some(slowest), |v| Some(v * FINER)).take_while(|v| *v < past.min(top));
+    let near = (direction * near).clamp(0.0, top);
+    let mut speeds: Vec<f64> = curve.chain([0.0, near, top]).collect();
+    speeds.sort_by(f64::total_cmp);
+    let from = speeds.partition_point(|v| *v < near);
+    let drives = |v: &f64| excess(*v) > 0.0;
+    let (mut low, mut high) = if drives(&near) {
+        let Some(beyond) = speeds[from..].iter().position(|v| !drives(v)) else { return Balance::Never };
+        (speeds[from + beyond - 1], speeds[from + beyond])
+    } else {
+        let Some(below) = speeds[..from].iter().rposition(drives) else { return Balance::At(0.0) };
+        (speeds[below], speeds[below + 1])
+    };
+    loop {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            return Balance::At(direction * middle);
+        }
+        if drives(&middle) { low = middle } else { high = middle }
+    }
 }
+
+/// Speeds at which a friction curve is looked at: from this share of its own speed, to this many times it, each so many times the last.
+const SLOWER: f64 = 1e4;
+const FASTER: f64 = 50.0;
+const FINER: f64 = 1.05;
 
 /// The three peaks' largest, with the number (1 to 3) of its span.
 pub fn largest(peaks: &[Peak; 3]) -> (usize, Peak) {

@@ -328,14 +328,18 @@ fn bristles_hold_like_springs() {
     assert!(solution.outcome.events.is_empty());
 }
 
+/// The exact solver once called this too many events: having left its travel, the cart left it a hundred times more.
 #[test]
 fn the_cart_ends_the_run_where_its_travel_ends() {
-    let mut stage = following(Law::Coulomb);
-    stage.travel = Some(Travel { min: -0.2, max: 0.05, stop: None });
-    let solution = simulate(&stage, &experiment(&pulse(), 1.0, 1e-3), Solver::GENERAL).unwrap();
-    let Ending::LeftTravel { time } = solution.outcome.ending else { panic!("{:?}", solution.outcome.ending) };
-    let x = solution.trajectory.get("cart_position").unwrap();
-    assert!(x.iter().all(|x| *x <= 0.05) && x[x.len() - 1] > 0.049 && (time * 1e3) as usize + 1 == x.len());
+    let fixed = Stage { travel: Some(Travel { min: -0.2, max: 0.05, stop: None }), ..common::table4() };
+    let mut follows = following(Law::Coulomb);
+    follows.travel = fixed.travel;
+    for (stage, solver) in [(&fixed, Solver::Exact), (&fixed, Solver::GENERAL), (&follows, Solver::GENERAL)] {
+        let solution = simulate(stage, &experiment(&pulse(), 1.0, 1e-3), solver).unwrap();
+        let Ending::LeftTravel { time } = solution.outcome.ending else { panic!("{:?}", solution.outcome.ending) };
+        let x = solution.trajectory.get("cart_position").unwrap();
+        assert!(x.iter().all(|x| *x <= 0.05) && x[x.len() - 1] > 0.049 && (time * 1e3) as usize + 1 == x.len());
+    }
 }
 
 #[test]

@@ -5,8 +5,8 @@ mod common;
 use common::random::{self, Dry};
 use common::{experiment, table1, table4};
 use proptest::prelude::*;
-use taut::friction::Friction;
-use taut::metrics::{Meter, Metrics, Peak, balanced_speed, largest};
+use taut::friction::{Along, Friction, Law, Shape};
+use taut::metrics::{Balance, Meter, Metrics, Peak, balanced_speed, largest};
 use taut::signal::{Signal, Slot};
 use taut::solve::{Method, Solution, Solver, simulate};
 use taut::stage::{AmplifierMode, Stage};
@@ -130,7 +130,7 @@ proptest! {
         let long = simulate(&stage, &experiment(Signal::Step { value: input, at: 0.0 }, 5.0), Solver::Exact).unwrap();
         let metrics = measure(&stage, &long, 256);
         let steady = metrics.steady_speed.unwrap();
-        if let Some(analytic) = steady.analytic
+        if let Balance::At(analytic) = steady.analytic
             && steady.reached
             && steady.change < 1e-9 * steady.value.abs()
             && steady.value != 0.0
@@ -152,7 +152,7 @@ fn the_five_volt_pulse_of_the_paper() {
     let steady = metrics.steady_speed.unwrap();
     // The rise takes 26 ms: after ten times that nothing changes any more.
     assert!(steady.reached && steady.stretch == (0.0, 0.249), "{steady:?}");
-    assert!((steady.value / steady.analytic.unwrap() - 1.0).abs() < 1e-3, "{steady:?}");
+    assert!((steady.value / steady.analytic.speed().unwrap() - 1.0).abs() < 1e-3, "{steady:?}");
     assert_eq!(metrics.peak_encoder_error, metrics.peak_stretch[0]);
 }
 
@@ -162,26 +162,80 @@ fn the_balance_by_hand() {
     let stage = table4();
     let total = 2.0 * 0.0016 + 19.0424 * 0.0194 * 0.0194 + 0.023 * 0.023 / 0.71;
     let speed = 0.0194 * (0.023 * 5.0 / 0.71 - 2.0 * 0.015 - 0.0194 * 0.2) / total;
-    assert!((balanced_speed(&stage, 5.0).unwrap() - speed).abs() < 1e-12);
-    assert!((balanced_speed(&stage, -5.0).unwrap() + speed).abs() < 1e-12);
-    assert_eq!(balanced_speed(&stage, 1.0), Some(0.0));
-    assert_eq!(balanced_speed(&stage, 0.0), Some(0.0));
+    assert!((balanced_speed(&stage, 5.0, 0.0).speed().unwrap() - speed).abs() < 1e-12);
+    assert!((balanced_speed(&stage, -5.0, 0.0).speed().unwrap() + speed).abs() < 1e-12);
+    assert_eq!(balanced_speed(&stage, 1.0, 0.0), Balance::At(0.0));
+    assert_eq!(balanced_speed(&stage, 0.0, 0.0), Balance::At(0.0));
 
     let mut stage = table1();
     stage.amplifier.mode = AmplifierMode::Current;
     stage.drive_pulley.friction = Friction::default();
     stage.idler_pulley.friction = Friction::default();
     let speed = 0.0194 * 0.023 * 2.0 / (40.6518 * 0.0194 * 0.0194);
-    assert!((balanced_speed(&stage, 2.0).unwrap() - speed).abs() < 1e-12);
+    assert!((balanced_speed(&stage, 2.0, 0.0).speed().unwrap() - speed).abs() < 1e-12);
     stage.cart.friction = Friction::default();
-    assert_eq!(balanced_speed(&stage, 2.0), None);
+    assert_eq!(balanced_speed(&stage, 2.0, 0.0), Balance::Never);
+}
+
+/// Once the balance left out what a friction law adds to b v + F_c, and what changes along the travel.
+#[test]
+fn a_friction_curve_counts_in_the_balance() {
+    let of = |law| {
+        let mut stage = table4();
+        let r = stage.pulley_radius;
+        stage.cart.friction = Friction::with_breakaway(19.0424, 0.2, 1.2).following(law);
+        let pulley = Friction::with_breakaway(0.0016, 0.015, 0.02);
+        (stage.drive_pulley.friction, stage.idler_pulley.friction) = (pulley, pulley);
+        stage.drive_pulley.friction.law = match law {
+            Law::Smooth { breakaway_velocity: v } => Law::Smooth { breakaway_velocity: v / r },
+            _ => Law::Coulomb,
+        };
+        stage
+    };
+    let laws = [
+        Law::Stribeck { velocity: 0.1, shape: Shape::Gaussian },
+        Law::Stribeck { velocity: 0.1, shape: Shape::Exponential },
+        Law::Smooth { breakaway_velocity: 0.05 },
+        Law::LuGre { stiffness: 1e4, damping: 60.0, velocity: 0.1 },
+    ];
+    for law in laws {
+        for volts in [4.0, -4.0] {
+            let stage = of(law);
+            let step = experiment(Signal::Step { value: volts, at: 0.0 }, 2.0);
+            let long = simulate(&stage, &step, Solver::GENERAL).unwrap();
+            let steady = measure(&stage, &long, 256).steady_speed.unwrap();
+            let balance = steady.analytic.speed().unwrap();
+            assert!((steady.value - balance).abs() < 1e-9, "{law:?}: {steady:?}");
+            // The curve is worth more than a millimetre per second there.
+            let without = balanced_speed(&of(Law::Coulomb), volts, 0.0).speed().unwrap();
+            assert!((balance - without).abs() > 1e-3, "{law:?}: {balance} and {without}");
+        }
+    }
+}
+
+#[test]
+fn where_a_curve_has_several_balances_the_one_nearby_counts() {
+    let mut stage = table4();
+    stage.cart.friction =
+        Friction::with_breakaway(5.0, 0.2, 1.2).following(Law::Stribeck { velocity: 0.01, shape: Shape::Gaussian });
+    // 1.5 V: too little to set out, enough to keep sliding.
+    let (slow, fast) = (balanced_speed(&stage, 1.5, 0.0), balanced_speed(&stage, 1.5, 0.2));
+    assert_eq!(slow, Balance::At(0.0));
+    // All forces by hand at the speed found: the curve is over there.
+    let v = fast.speed().unwrap();
+    let (drive, load) =
+        (0.023 * (1.5 - 0.023 * v / 0.0194) / 0.71, 0.03 + 0.0032 * v / 0.0194 + 0.0194 * (0.2 + 5.0 * v));
+    assert!(v > 0.04 && (drive - load).abs() < 1e-9, "{v}: {drive} and {load}");
+
+    stage.cart.along = Along::new(vec![[0.0, 1.0], [0.1, 2.0]]);
+    assert_eq!(balanced_speed(&stage, 1.5, 0.0), Balance::Changing);
 }
 
 #[test]
 fn a_short_pulse_does_not_become_steady_and_a_triangle_has_no_constant_stretch() {
     let (_, short) = run(&table4(), Signal::Pulse { value: 5.0, duration: 0.03, at: 0.0 }, 0.5);
     let steady = short.steady_speed.unwrap();
-    assert!(!steady.reached && steady.value < 0.8 * steady.analytic.unwrap(), "{steady:?}");
+    assert!(!steady.reached && steady.value < 0.8 * steady.analytic.speed().unwrap(), "{steady:?}");
     let (_, triangle) = run(&table4(), Signal::Triangle { amplitude: 5.0, frequency: 2.0 }, 1.0);
     assert_eq!(triangle.steady_speed, None);
 }
@@ -202,7 +256,7 @@ fn what_never_moves_has_stopped_at_once_and_what_has_no_dry_friction_never_stops
     let (_, held) = run(&table4(), Signal::Step { value: 0.4, at: 0.0 }, 0.5);
     assert_eq!((held.stop_time, held.settled), (Some(0.0), true));
     let steady = held.steady_speed.unwrap();
-    assert_eq!((steady.value, steady.reached, steady.analytic), (0.0, true, Some(0.0)));
+    assert_eq!((steady.value, steady.reached, steady.analytic), (0.0, true, Balance::At(0.0)));
     let (_, free) = run(&table1(), Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 }, 1.0);
     assert_eq!((free.stop_time, free.settled), (None, false));
 }

@@ -95,6 +95,8 @@ fn the_pictures_are_those_that_the_commands_draw() {
     for (picture, made) in [
         ("encoder-and-cart.svg", "out/table4/plots/5-v-pulse-positions.svg"),
         ("stage.svg", "out/paper/figures/figure-01-02.svg"),
+        ("friction-laws.svg", "out/paper/figures/friction-laws.svg"),
+        ("modes-along-the-travel.svg", "out/paper/figures/modes-along-the-travel.svg"),
     ] {
         let made = fs::read_to_string(folder.path().join(made)).unwrap();
         let committed = root().join("docs/pictures").join(picture);

@@ -129,7 +129,9 @@ fn every_figure_is_there_as_svg_png_and_data() {
         let columns = data.lines().next().unwrap().split(',').count();
         assert!(columns >= 2 && data.lines().all(|l| l.split(',').count() == columns), "{name}");
     }
-    for name in ["figure-01-02", "figure-03", "figure-18", "figure-19", "table-3", "modes-along-the-travel"] {
+    for name in
+        ["figure-01-02", "figure-03", "figure-18", "figure-19", "table-3", "modes-along-the-travel", "friction-laws"]
+    {
         assert!(FOLDER.join(format!("figures/{name}.svg")).exists(), "{name}");
     }
     let last = read("data/figure-20.csv").lines().last().unwrap().to_string();

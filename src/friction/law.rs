@@ -41,6 +41,17 @@ pub enum Law {
     },
 }
 
+impl Law {
+    /// The speed on whose scale friction changes, where it is a curve.
+    pub fn velocity(self) -> Option<f64> {
+        match self {
+            Law::Coulomb => None,
+            Law::Stribeck { velocity, .. } | Law::LuGre { velocity, .. } => Some(velocity),
+            Law::Smooth { breakaway_velocity } => Some(breakaway_velocity),
+        }
+    }
+}
+
 /// The shape of a Stribeck curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Shape {

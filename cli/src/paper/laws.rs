@@ -1,9 +1,12 @@
-//! Figures 3, 16 and 17: curves that need no run, from the equations alone.
+//! Figures 3, 16 and 17, and the friction laws beyond them: curves that need no run, from the equations alone.
 
 use super::belt::{series_over_plain, series_over_plain_stretches};
 use super::findings::Findings;
 use super::plots::{Curve, Plot};
 use super::words::{share, si};
+use std::cmp::Ordering;
+use std::f64::consts::FRAC_1_SQRT_2;
+use taut::friction::{Friction, Law, Shape, velocity_of_decay};
 use taut::report::{Axis, Colour, Style};
 
 /// F_s of eq. (14), N: chosen, since the paper gives none.
@@ -42,21 +45,23 @@ pub fn toothed(f: &Findings) -> Plot {
     ))
 }
 
+/// Both sides of zero, and between them a place for what holds at rest.
+fn speeds(widest: f64, steps: u32) -> (Vec<f64>, usize) {
+    let half: Vec<f64> = (0..=steps).map(|i| widest * f64::from(i) / f64::from(steps)).collect();
+    (half.iter().rev().map(|v| -v).chain([0.0]).chain(half.iter().copied()).collect(), half.len())
+}
+
 /// Eq. (14) and (15).
 pub fn laws(f: &Findings) -> [Plot; 2] {
     let side = f.sets.table4.stage.cart.friction.forward;
     let (b, fc) = (side.viscous, side.coulomb);
-    // Both sides of zero, and a gap between them.
-    let steps = 200;
-    let half: Vec<f64> = (0..=steps).map(|i| WIDEST * f64::from(i) / f64::from(steps)).collect();
-    let v: Vec<f64> = half.iter().rev().map(|v| -v).chain([0.0]).chain(half.iter().copied()).collect();
-    let middle = half.len();
+    let (v, middle) = speeds(WIDEST, 200);
     let sided = |law: &dyn Fn(f64, f64) -> f64| -> Vec<f64> {
         (0..v.len())
             .map(|i| match i.cmp(&middle) {
-                std::cmp::Ordering::Less => law(v[i], -1.0),
-                std::cmp::Ordering::Equal => f64::NAN,
-                std::cmp::Ordering::Greater => law(v[i], 1.0),
+                Ordering::Less => law(v[i], -1.0),
+                Ordering::Equal => f64::NAN,
+                Ordering::Greater => law(v[i], 1.0),
             })
             .collect()
     };
@@ -99,4 +104,61 @@ pub fn laws(f: &Findings) -> [Plot; 2] {
                 si(fc, "N", 4)
             )),
     ]
+}
+
+/// Every friction law of the case file, as the solvers have it.
+pub fn beyond(f: &Findings) -> Plot {
+    let side = f.sets.table4.stage.cart.friction.forward;
+    let (b, fc, fb) = (side.viscous, side.coulomb, side.coulomb + STATIC);
+    let velocity = velocity_of_decay(DECAY);
+    let stribeck = |shape| Law::Stribeck { velocity, shape };
+    // So that its exponential falls as the Stribeck curve does: √2 v_b = v_s.
+    let smooth = Law::Smooth { breakaway_velocity: FRAC_1_SQRT_2 * velocity };
+    // Of bristles only g(v) shows while they slide steadily.
+    let lugre = Law::LuGre { stiffness: 1e5, damping: 190.0, velocity };
+    let laws = [
+        ("Coulomb, eq. (15)", "coulomb", Law::Coulomb, Colour::Grey, Style::Solid),
+        ("Stribeck, eq. (14)", "stribeck", stribeck(Shape::Gaussian), Colour::Blue, Style::Solid),
+        ("Stribeck, exponential", "exponential", stribeck(Shape::Exponential), Colour::Vermillion, Style::Solid),
+        ("smooth (Simscape)", "smooth", smooth, Colour::Green, Style::Solid),
+        ("LuGre, steady", "lugre", lugre, Colour::Amber, Style::Dashed),
+    ];
+    let (v, middle) = speeds(0.5 * WIDEST, 800);
+    let values = |law: Law, viscous: f64| -> Vec<f64> {
+        let friction = Friction::with_breakaway(viscous, fc, fb).following(law);
+        let value = |(i, &v): (usize, &f64)| match i.cmp(&middle) {
+            Ordering::Less => friction.sliding(v.min(-f64::MIN_POSITIVE)),
+            // At rest: anything between, so that the line is closed.
+            Ordering::Equal => 0.0,
+            Ordering::Greater => friction.sliding(v),
+        };
+        v.iter().enumerate().map(value).collect()
+    };
+    let panel = |viscous: f64, suffix: &str| -> Vec<(String, Vec<f64>)> {
+        laws.iter().map(|(_, key, law, ..)| (format!("{key}{suffix}_N"), values(*law, viscous))).collect()
+    };
+    let (whole, dry) = (panel(b, ""), panel(0.0, "_dry"));
+    fn curves<'a>(
+        values: &'a [(String, Vec<f64>)],
+        laws: &[(&str, &str, Law, Colour, Style)],
+        named: bool,
+    ) -> Vec<Curve<'a>> {
+        let curve = |((heading, values), law): (&'a (String, Vec<f64>), &(&str, &str, Law, Colour, Style))| {
+            Curve::new(if named { law.0 } else { "" }, heading, values, law.3).style(law.4)
+        };
+        values.iter().zip(laws).map(curve).collect()
+    }
+    let x = Axis::new("Velocity", "m/s").shown_as("mm/s", 1e3);
+    Plot::new("friction-laws", "The friction laws of a case file", x, "velocity_m_s", &v)
+        .panel(Axis::new("Friction force", "N"), 1.0, curves(&whole, &laws, true))
+        .panel(Axis::new("Without b v", "N"), 1.0, curves(&dry, &laws, false))
+        .caption(format!(
+            "One set of parameters in every law: Table 4's {} and {}, and of figure 16 the breakaway {} and the Stribeck \
+             velocity {}. Coulomb and Stribeck friction hold at rest, where the line is upright; the smooth law lets a body creep, and \
+             bristles bend before they slip, which curves of velocity do not show.",
+            si(b, "N s/m", 6),
+            si(fc, "N", 4),
+            si(fb, "N", 2),
+            si(velocity, "m/s", 3)
+        ))
 }

@@ -60,7 +60,7 @@ fn claims(findings: &Findings) -> Vec<Claim> {
 }
 
 fn plots(findings: &Findings) -> Vec<Plot> {
-    let mut all = vec![laws::toothed(findings), figures::travel(findings)];
+    let mut all = vec![laws::toothed(findings), figures::travel(findings), laws::beyond(findings)];
     all.extend(figures::figures(findings));
     all.push(figures::table3(findings));
     all

@@ -266,6 +266,7 @@ impl Report<'_> {
         let f = self.f;
         self.page.section("Friction with a threshold");
         self.figures(16..=17);
+        self.figure("friction-laws");
         self.claim("stribeck-minor");
         self.claim("viscous-at-rest");
         self.page.subsection("The equations that run");

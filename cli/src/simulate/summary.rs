@@ -287,7 +287,7 @@ impl SteadyTold {
             cart_speed_m_s: steady.value,
             change_m_s: steady.change,
             reached: steady.reached,
-            analytic_m_s: steady.analytic,
+            analytic_m_s: steady.analytic.speed(),
             input: steady.input,
             input_unit: if mode == AmplifierMode::Current { "A" } else { "V" },
             from_s: steady.stretch.0,

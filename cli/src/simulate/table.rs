@@ -6,7 +6,7 @@ use crate::terminal::bold;
 use std::fmt::Write;
 use std::time::Duration;
 use taut::case::Case;
-use taut::metrics::{Metrics, largest};
+use taut::metrics::{Balance, Metrics, largest};
 use taut::number;
 use taut::plant::Part;
 use taut::reduction::Reduction;
@@ -19,7 +19,7 @@ pub fn text(case: &Case, solver: Solver, runs: &[Run], folder: Option<&Folder>) 
     for run in runs {
         let _ = write!(text, "\n{}\n", bold(&run.experiment.name));
         if let Some(told) = early_end(&run.outcome.ending) {
-            let _ = writeln!(text, "  {:<16}{told}", "ended early");
+            let _ = writeln!(text, "  {:<16}{}", "ended early", told.trim_start_matches("ended "));
         }
         for (name, words) in lines(run, solver) {
             let _ = writeln!(text, "  {name:<16}{words}");
@@ -75,7 +75,7 @@ pub fn early_end(ending: &Ending) -> Option<String> {
     match *ending {
         Ending::Complete => None,
         Ending::TooManyEvents { time: at } => Some(format!(
-            "ended at {}: bodies stick and slip without end there, more often than a machine does",
+            "ended at {}: sticks, slips and strikes pile up there, more often than a machine has them",
             time(at)
         )),
         Ending::Diverged { time: at } => {
@@ -129,7 +129,7 @@ pub fn lines(run: &Run, solver: Solver) -> Vec<(&'static str, String)> {
 /// How far a reduced model is from the elastic one.
 fn reduced(reduction: &Reduction) -> String {
     format!(
-        "cart at most {} from the elastic model's, at {}; {} at the end; its r φ₁ - x is up to {}",
+        "cart at most {} from the elastic model's, at {}; {} at the end; the elastic model's r φ₁ - x is up to {}",
         value(reduction.cart.value.abs(), "m"),
         time(reduction.cart.time),
         value(reduction.final_cart, "m"),
@@ -142,8 +142,9 @@ fn steady(metrics: &Metrics) -> String {
         return "none: no constant input lasts 20 samples".into();
     };
     let balance = match steady.analytic {
-        Some(balance) => format!("forces balance at {}", speed(balance)),
-        None => "nothing limits the speed".into(),
+        Balance::At(balance) => format!("forces balance at {}", speed(balance)),
+        Balance::Never => "nothing limits the speed".into(),
+        Balance::Changing => "no balance computed: it changes along the travel".into(),
     };
     if steady.reached {
         format!("{}; {balance}", speed(steady.value))

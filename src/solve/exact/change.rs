@@ -179,7 +179,12 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
             };
             let fallen = law.guards.iter().find(falls);
             match fallen {
-                Some(guard) => self.change(guard.cause),
+                Some(guard) => {
+                    self.change(guard.cause);
+                    if self.trouble.is_some() {
+                        return;
+                    }
+                }
                 None => {
                     // A torque that starts from zero does so whichever way the gear counts as carrying.
                     let torque = law.guards.iter().find(|guard| guard.cause == Cause::GearTorque);
