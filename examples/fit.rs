@@ -28,7 +28,13 @@ fn main() -> taut::Result<()> {
             let shown = |score: Option<taut::fit::Score>| {
                 score.map_or("-".into(), |s| format!("{:.4e} ({:.2} %, memory {:.3})", s.rmse, s.percent, s.memory))
             };
-            println!("{} {:?}: fitted {}, held out {}", log.name, output.quantity, shown(output.fitted), shown(output.held_out));
+            println!(
+                "{} {:?}: fitted {}, held out {}",
+                log.name,
+                output.quantity,
+                shown(output.fitted),
+                shown(output.held_out)
+            );
         }
     }
     println!("{:?} {:.1e}, {:?}, starts {:?}, {took:?}", fit.ending, fit.decrement, fit.work, fit.starts);

@@ -45,9 +45,8 @@ pub fn memory(log: &LogFit, output: &OutputFit) -> Option<Figure> {
         return None;
     }
     let lags = (n / 4).min(400);
-    let correlation: Vec<f64> = (0..=lags)
-        .map(|lag| residual.iter().zip(&residual[lag..]).map(|(a, b)| a * b).sum::<f64>() / own)
-        .collect();
+    let correlation: Vec<f64> =
+        (0..=lags).map(|lag| residual.iter().zip(&residual[lag..]).map(|(a, b)| a * b).sum::<f64>() / own).collect();
     let interval = (log.time[log.time.len() - 1] - log.time[0]) / (log.time.len() - 1) as f64;
     let at: Vec<f64> = (0..=lags).map(|lag| lag as f64 * interval).collect();
     let chance = 1.96 / (n as f64).sqrt();
