@@ -160,7 +160,9 @@ fn bounds(table: &Table, names: &[&str]) -> Result<Vec<(String, [f64; 2])>> {
         let row = parameter::find(key).or_else(|| parameter::find(key.rsplit_once('.')?.0));
         let ends = field.list()?;
         let [low, high] = &ends[..] else {
-            return Err(field.fail(format!("the list has {} values", ends.len())).allowed("two: the least and the most"));
+            return Err(field
+                .fail(format!("the list has {} values", ends.len()))
+                .allowed("two: the least and the most"));
         };
         let value = |end: &Field| match row {
             Some(row) => end.number_of(row),

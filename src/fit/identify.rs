@@ -223,9 +223,8 @@ fn projected(jacobian: &DMatrix<f64>, n: usize) -> Option<DMatrix<f64>> {
 fn sum_of(stage: &crate::stage::Stage, knobs: &[&super::Knob], weights: &[f64]) -> Option<String> {
     // Each knob's parameters must be parts of one sum.
     let kinds = ["viscous", "coulomb", "inertia"];
-    let kind = |key: &str| {
-        kinds.iter().position(|kind| key.contains(kind) || (*kind == "inertia" && key == "cart.mass"))
-    };
+    let kind =
+        |key: &str| kinds.iter().position(|kind| key.contains(kind) || (*kind == "inertia" && key == "cart.mass"));
     let kind_of = kind(&knobs.first()?.keys.first()?.0)?;
     let mut parts = Vec::new();
     let mut value = 0.0;

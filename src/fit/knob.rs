@@ -220,8 +220,7 @@ impl Knob {
         }
         let name = keys.join(" = ");
         let row = parameter_of(keys[0]);
-        let keys: Vec<(String, f64)> =
-            keys.iter().zip(&ratios).map(|(key, ratio)| (key.to_string(), *ratio)).collect();
+        let keys: Vec<(String, f64)> = keys.iter().zip(&ratios).map(|(key, ratio)| (key.to_string(), *ratio)).collect();
         let range = row.map_or((f64::NEG_INFINITY, f64::INFINITY), |row| (row.range.low, row.range.high));
         let unit = row.map_or("", |row| row.unit);
         let (low, high) = limits(&name, keys.first().map(|(key, _)| key.as_str()), first, range, bounds)?;
@@ -278,7 +277,9 @@ fn group(name: &str) -> Option<(&'static [&'static str], &'static str)> {
         "total.coulomb" => {
             (&["drive_pulley.friction.coulomb", "cart.friction.coulomb", "idler_pulley.friction.coulomb"], "N m")
         }
-        "total.inertia" => (&["motor.rotor_inertia", "drive_pulley.inertia", "cart.mass", "idler_pulley.inertia"], "kg m^2"),
+        "total.inertia" => {
+            (&["motor.rotor_inertia", "drive_pulley.inertia", "cart.mass", "idler_pulley.inertia"], "kg m^2")
+        }
         "total.stiffness" => (&["belt.stiffness.0", "belt.stiffness.1", "belt.stiffness.2"], "N/m"),
         _ => return None,
     })

@@ -24,10 +24,13 @@ const COARSER: [f64; 2] = [1.0, 10.0];
 
 /// Most variables that are searched by evolution, and how often.
 const MOST_EVOLVED: usize = 16;
-const MOST_EVOLUTIONS: usize = 3;
+const MOST_EVOLUTIONS: usize = 2;
 
 /// Where the cost has kinks, the standard errors that the last step may promise: no step of any length fulfilled it.
 const KINK: f64 = 0.1;
+
+/// Two steps after each other that gain less than this many standard errors, and little of what they promised, are at a kink.
+const SHOWS: f64 = 0.1;
 
 /// Residuals as a function of the variables.
 pub trait Residuals {
@@ -244,7 +247,7 @@ pub fn minimise(
     let mut grow = 2.0;
     let mut scale = DVector::zeros(n);
     let mut trial = vec![0.0; rows];
-    let (mut evolved, mut coarser) = (0, 0);
+    let (mut evolved, mut coarser, mut slow) = (0, 0, 0);
     loop {
         if watch(&best.x, best.cost) == Flow::Stop {
             best.ending = Ending::Interrupted;
@@ -264,7 +267,8 @@ pub fn minimise(
         // At a bound and pushed outwards: not free.
         let held: Vec<bool> = (0..n)
             .map(|j| {
-                (best.x[j] <= bounds.low[j] && gradient[j] >= 0.0) || (best.x[j] >= bounds.high[j] && gradient[j] <= 0.0)
+                (best.x[j] <= bounds.low[j] && gradient[j] >= 0.0)
+                    || (best.x[j] >= bounds.high[j] && gradient[j] <= 0.0)
             })
             .collect();
         best.at_bound.clone_from(&held);
@@ -311,10 +315,13 @@ pub fn minimise(
                 // λ shrinks the better the linear model was (Nielsen 1999).
                 damping *= f64::max(1.0 / 5.0, 1.0 - (2.0 * gain - 1.0).powi(3));
                 grow = 2.0;
+                // Far less than was promised, and less than shows: a kink is near.
+                let shows = 0.5 * (SHOWS * deviation).powi(2);
+                slow = if best.cost - cost < shows && gain < 0.25 { slow + 1 } else { 0 };
                 best.x = x;
                 best.cost = cost;
                 std::mem::swap(&mut best.residuals, &mut trial);
-                accepted = true;
+                accepted = slow < 2;
                 break;
             }
             damping *= grow;
@@ -328,6 +335,7 @@ pub fn minimise(
         if accepted {
             continue;
         }
+        slow = 0;
         if how == Differences::Forward {
             // The cheap derivatives may be to blame.
             (how, lambda) = (Differences::Central, None);
@@ -342,7 +350,8 @@ pub fn minimise(
             how = Differences::Coarse(errors.iter().map(|error| COARSER[coarser] * error).collect());
             best.coarse = COARSER[coarser];
             coarser += 1;
-        } else if evolved < MOST_EVOLUTIONS
+        } else if best.decrement > 1.0
+            && evolved < MOST_EVOLUTIONS
             && evolve(problem, &mut best, bounds, &model, &held, deviation, options.huber)
         {
             evolved += 1;
@@ -441,8 +450,10 @@ fn evolve(
         mean += &step * pace;
         let white = &eigen.eigenvectors * (eigen.eigenvectors.tr_mul(&step)).component_div(&lengths);
         path = path * (1.0 - paced) + white * (paced * (2.0 - paced) * mass).sqrt();
-        let calm = path.norm() / (1.0 - (1.0 - paced).powi(2 * generation as i32)).sqrt() < (1.4 + 2.0 / (size + 1.0)) * expected;
-        drift = drift * (1.0 - along) + if calm { step * (along * (2.0 - along) * mass).sqrt() } else { DVector::zeros(n) };
+        let calm = path.norm() / (1.0 - (1.0 - paced).powi(2 * generation as i32)).sqrt()
+            < (1.4 + 2.0 / (size + 1.0)) * expected;
+        drift =
+            drift * (1.0 - along) + if calm { step * (along * (2.0 - along) * mass).sqrt() } else { DVector::zeros(n) };
         shape *= 1.0 - one - rest + if calm { 0.0 } else { one * along * (2.0 - along) };
         shape += &drift * drift.transpose() * one;
         for (w, (_, y)) in weights.iter().zip(&born) {
@@ -579,8 +590,6 @@ impl Linear {
 
     /// Standard errors of the variables that are free, for residuals of this deviation; of one alone where they are not determined together.
     fn errors(&self, held: &[bool], deviation: f64) -> Vec<f64> {
-        (0..held.len())
-            .map(|j| if held[j] || self.norm(j) == 0.0 { 0.0 } else { deviation / self.norm(j) })
-            .collect()
+        (0..held.len()).map(|j| if held[j] || self.norm(j) == 0.0 { 0.0 } else { deviation / self.norm(j) }).collect()
     }
 }

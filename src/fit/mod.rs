@@ -157,12 +157,7 @@ pub struct Score {
 /// Finds the parameters of `plan` from the logs of `case`.
 ///
 /// `watch` sees the cost after each step; `stop` ends the search, which then gives the best so far.
-pub fn fit(
-    case: &Case,
-    plan: &Plan,
-    stop: Option<Stop>,
-    watch: &mut dyn FnMut(f64) -> Flow,
-) -> Result<Fit> {
+pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f64) -> Flow) -> Result<Fit> {
     let mut problem = Problem::new(case, plan)?.stopped_by(stop);
     let bounds = problem.bounds();
     // What the logs determine is asked for the noise that they show; the fit itself begins with weights that it can revise.
@@ -224,7 +219,8 @@ pub fn fit(
         let options = Options { huber: if plan.huber { HUBER } else { f64::INFINITY }, ..whole };
         if alike && round == 0 && best.ending == Ending::Converged {
             // One weight for all: only the unit of the residuals changes.
-            let factor = problem.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).find(|w| **w > 0.0);
+            let factor =
+                problem.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).find(|w| **w > 0.0);
             let before = first_weight(&problem, &best);
             if let (Some(now), Some(before)) = (factor, before) {
                 rescale(&mut best, now / before);
@@ -430,13 +426,7 @@ fn noise_of(problem: &Problem, at: &Minimum, robust: bool) -> Vec<(Quantity, f64
 }
 
 /// Everything that is told of a minimum.
-fn result(
-    problem: &Problem,
-    best: &Minimum,
-    noise: Vec<(Quantity, f64)>,
-    starts: Vec<f64>,
-    work: Work,
-) -> Fit {
+fn result(problem: &Problem, best: &Minimum, noise: Vec<(Quantity, f64)>, starts: Vec<f64>, work: Work) -> Fit {
     let covariance = Covariance::new(problem, &best.residuals, &best.jacobian, &best.at_bound);
     let deviation = (2.0 * best.cost / problem.counted().saturating_sub(problem.variables()).max(1) as f64).sqrt();
     let identifiability = Identifiability::new(problem, &best.jacobian, &best.x, deviation);
@@ -495,11 +485,7 @@ fn result(
     }
     let n = problem.globals();
     let correlation = (0..n)
-        .map(|i| {
-            (0..n)
-                .map(|j| covariance.as_ref().and_then(|c| c.correlation(i, j)).unwrap_or(f64::NAN))
-                .collect()
-        })
+        .map(|i| (0..n).map(|j| covariance.as_ref().and_then(|c| c.correlation(i, j)).unwrap_or(f64::NAN)).collect())
         .collect();
     let stage = problem.stage_at(&best.x);
     let mut logs = Vec::new();

@@ -69,8 +69,7 @@ impl<'a> Problem<'a> {
     /// What `plan` asks of the logs of `case`.
     pub fn new(case: &Case, plan: &Plan) -> Result<Self> {
         let stage = case.stage.clone();
-        let all: Vec<&str> =
-            plan.free.iter().chain(plan.tied.iter().flatten()).map(String::as_str).collect();
+        let all: Vec<&str> = plan.free.iter().chain(plan.tied.iter().flatten()).map(String::as_str).collect();
         let mut knobs = Vec::new();
         for key in &plan.free {
             knobs.push(Knob::free(&stage, key, &all, &plan.bounds)?);
@@ -98,8 +97,9 @@ impl<'a> Problem<'a> {
             }
         }
         if runs.is_empty() {
-            return Err(Error::new("there is no log to fit")
-                .next("add log = { file = \"...\", time = \"...\", input = \"...\", drive_angle = \"...\" } to an experiment"));
+            return Err(Error::new("there is no log to fit").next(
+                "add log = { file = \"...\", time = \"...\", input = \"...\", drive_angle = \"...\" } to an experiment",
+            ));
         }
         let mut problem = Self {
             breakaways: Breakaways::of(&stage, &all),
@@ -181,7 +181,8 @@ impl<'a> Problem<'a> {
                 run.extras.push(Extra { what: Nuisance::StartSpeed, start, unit: fast, low, high });
             }
             for (index, seen) in run.seen.iter().enumerate() {
-                let counted = is_position(seen.quantity) && run.seen.iter().position(|s| is_position(s.quantity)) == Some(index);
+                let counted =
+                    is_position(seen.quantity) && run.seen.iter().position(|s| is_position(s.quantity)) == Some(index);
                 if bias && !counted {
                     let wide = extent(&seen.values).max(1e-9);
                     run.extras.push(Extra {
@@ -252,7 +253,8 @@ impl<'a> Problem<'a> {
 
     /// Where the case starts.
     pub fn start(&self) -> Vec<f64> {
-        let mut x: Vec<f64> = self.knobs.iter().zip(&self.units).map(|(knob, unit)| unit.variable(knob.start)).collect();
+        let mut x: Vec<f64> =
+            self.knobs.iter().zip(&self.units).map(|(knob, unit)| unit.variable(knob.start)).collect();
         x.resize(self.variables(), 0.0);
         x
     }
@@ -373,7 +375,8 @@ fn slope_at_start(run: &Run, r: f64) -> f64 {
     let Some(seen) = run.seen.iter().find(|seen| is_position(seen.quantity)) else { return 0.0 };
     let rows: Vec<usize> = (0..run.time.len().min(15)).filter(|&k| seen.values[k].is_finite()).collect();
     let n = rows.len().max(1) as f64;
-    let (t, y) = (rows.iter().map(|&k| run.time[k]).sum::<f64>() / n, rows.iter().map(|&k| seen.values[k]).sum::<f64>() / n);
+    let (t, y) =
+        (rows.iter().map(|&k| run.time[k]).sum::<f64>() / n, rows.iter().map(|&k| seen.values[k]).sum::<f64>() / n);
     let (mut above, mut below) = (0.0, 0.0);
     for &k in &rows {
         above += (run.time[k] - t) * (seen.values[k] - y);

@@ -138,13 +138,7 @@ impl Run {
         runs
     }
 
-    fn of(
-        experiment: &Experiment,
-        log: &Log,
-        rows: std::ops::Range<usize>,
-        window: usize,
-        setting: &Setting,
-    ) -> Self {
+    fn of(experiment: &Experiment, log: &Log, rows: std::ops::Range<usize>, window: usize, setting: &Setting) -> Self {
         let whole = rows.len() == log.time.len();
         let shift = if whole { 0.0 } else { log.time[rows.start] };
         let time: Vec<f64> = log.time[rows.clone()].iter().map(|t| t - shift).collect();
@@ -277,7 +271,7 @@ impl Run {
         let experiment = self.experiment(&mut stage, extras);
         let mut slopes: Vec<Vec<f64>> = vec![Vec::new(); quantities.len()];
         out.iter_mut().for_each(Vec::clear);
-        let outcome = solve::stream(&stage, &experiment, Solver::Exact, &mut |block| {
+        let outcome = solve::stream(&stage, &experiment, Solver::of(&stage), &mut |block| {
             for (i, quantity) in quantities.iter().enumerate() {
                 out[i].extend_from_slice(column(block, *quantity));
                 if !self.even

@@ -50,8 +50,7 @@ impl Covariance {
             let grown = counted as f64 / freedom as f64;
             let robust = &inverse * sum * &inverse * grown;
             // Correlations as with white residuals, variances the greater ones.
-            let factor: Vec<f64> =
-                (0..free.len()).map(|j| (robust[(j, j)] / white[(j, j)]).max(1.0).sqrt()).collect();
+            let factor: Vec<f64> = (0..free.len()).map(|j| (robust[(j, j)] / white[(j, j)]).max(1.0).sqrt()).collect();
             DMatrix::from_fn(free.len(), free.len(), |i, j| white[(i, j)] * factor[i] * factor[j])
         } else {
             white
