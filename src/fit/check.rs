@@ -172,11 +172,14 @@ fn facts(run: &Run) -> LogFacts {
     LogFacts { name, told }
 }
 
+/// What is measured of a problem whose logs have these deviations, and with which deviations.
+type Measured = fn(&Problem, &[(Quantity, f64)]) -> Vec<(Quantity, f64)>;
+
 /// What is done once more, and how.
 struct Idea {
     name: &'static str,
     /// What is measured beside what the logs hold; a deviation for each.
-    measured: fn(&Problem, &[(Quantity, f64)]) -> Vec<(Quantity, f64)>,
+    measured: Measured,
     /// What is done to the machine.
     change: fn(&mut Stage),
     /// Whether the input is turned round.
@@ -259,7 +262,7 @@ fn proposals(
     noise: &[(Quantity, f64)],
 ) -> Vec<Proposal> {
     let score = |found: &Identifiability| {
-        found.error.iter().map(|e| if e.is_finite() { e.min(super::LIMIT).max(1e-12).ln() } else { 0.0 }).sum::<f64>()
+        found.error.iter().map(|e| if e.is_finite() { e.clamp(1e-12, super::LIMIT).ln() } else { 0.0 }).sum::<f64>()
     };
     let count = |found: &Identifiability| found.error.iter().filter(|e| e.is_finite()).count();
     let before = (count(now), score(now));

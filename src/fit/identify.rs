@@ -53,8 +53,8 @@ impl Identifiability {
         let mut names: Vec<String> = problem.knobs.iter().map(|knob| knob.name.clone()).collect();
         names.extend(problem.shared.iter().map(|extra| extra.what.name().to_string()));
         // Relative changes: of what is searched on a linear scale, of its value or of a tenth of its unit if that is more.
-        for j in 0..globals {
-            let unit = if j < problem.knobs.len() && !problem.is_log(j) { x[j].abs().max(0.1) } else { 1.0 };
+        for (j, x) in x.iter().enumerate().take(globals) {
+            let unit = if j < problem.knobs.len() && !problem.is_log(j) { x.abs().max(0.1) } else { 1.0 };
             own.column_mut(j).scale_mut(unit / deviation.max(f64::MIN_POSITIVE));
         }
         let rows = problem.counted().max(1) as f64;
@@ -93,9 +93,9 @@ impl Identifiability {
             let mut next = 0;
             while next < members.len() {
                 let i = members[next];
-                for j in 0..n {
-                    if !seen[j] && hidden(i, j).abs() > 1e-3 {
-                        seen[j] = true;
+                for (j, seen) in seen.iter_mut().enumerate() {
+                    if !*seen && hidden(i, j).abs() > 1e-3 {
+                        *seen = true;
                         members.push(j);
                     }
                 }
@@ -193,7 +193,7 @@ impl Identifiability {
                 [("viscous", "total.viscous"), ("coulomb", "total.coulomb"), ("inertia", "total.inertia")]
             {
                 let fits = |name: &&str| name.contains(term) || (term == "inertia" && *name == "cart.mass");
-                if names.iter().all(|name| fits(&name)) && !problem.knobs.iter().any(|knob| knob.name == lump) {
+                if names.iter().all(fits) && !problem.knobs.iter().any(|knob| knob.name == lump) {
                     choices.push(format!("lump them: lumped = [\"{lump}\"]"));
                 }
             }

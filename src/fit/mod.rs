@@ -370,17 +370,17 @@ fn refuse(problem: &Problem, found: &Identifiability) -> Result<()> {
 fn elsewhere(problem: &Problem, random: &mut Pcg64) -> Vec<f64> {
     let mut x = problem.start();
     let bounds = problem.bounds();
-    for j in 0..problem.globals() {
+    for (j, x) in x.iter_mut().enumerate().take(problem.globals()) {
         let share = (random.next_u64() >> 11) as f64 * 2f64.powi(-53);
         let (low, high) = if j >= problem.knobs.len() {
             (bounds.low[j], bounds.high[j].min(10.0))
         } else if problem.is_log(j) {
-            (x[j] - std::f64::consts::LN_10, x[j] + std::f64::consts::LN_10)
+            (*x - std::f64::consts::LN_10, *x + std::f64::consts::LN_10)
         } else {
-            (x[j] - 3.0, x[j] + 3.0)
+            (*x - 3.0, *x + 3.0)
         };
         let (low, high) = (low.max(bounds.low[j]), high.min(bounds.high[j]));
-        x[j] = low + share * (high - low);
+        *x = low + share * (high - low);
     }
     x
 }

@@ -81,8 +81,8 @@ pub fn inverse_of_square(jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         return None;
     }
     let mut scaled = jacobian.clone();
-    for j in 0..n {
-        scaled.column_mut(j).scale_mut(1.0 / norms[j]);
+    for (j, norm) in norms.iter().enumerate() {
+        scaled.column_mut(j).scale_mut(1.0 / norm);
     }
     let r = scaled.qr().unpack_r();
     if (0..n).any(|j| r[(j, j)].abs() < 1e-10) {
