@@ -63,8 +63,8 @@ fn holds_the_samples(log: &str) {
     let log = case.experiments[0].log.as_ref().unwrap();
     let x = output(log, Quantity::CartPosition);
     assert_eq!(log.len(), 20);
-    for k in 0..20 {
-        assert_eq!([log.time[k], log.input[k], x[k]], expected(k), "{k}");
+    for (k, x) in x.iter().enumerate() {
+        assert_eq!([log.time[k], log.input[k], *x], expected(k), "{k}");
     }
 }
 
