@@ -43,11 +43,12 @@
 //! - [`parameter`]: the one table of everything a case file can say.
 //! - [`trajectory`]: columns with units, and their files.
 //! - [`friction`], [`stage`]: what the machine is.
-//! - [`signal`]: what is fed into it.
+//! - [`signal`]: what is fed into it, and the references of its moves. [`controller`]: what a controller is, in data.
 //! - [`plant`]: its equations of motion, mode by mode.
 //! - [`log`]: measured columns in. [`case`]: the case file in.
 //! - [`solve`]: the motion. [`measure`]: what a recorder makes of it. [`metrics`]: what it shows. [`reduction`]: how far a reduced model
 //!   is from the elastic one.
+//! - [`control`]: controllers stepped in time around the exact plant.
 //! - [`fit`]: parameters from logs, and what the logs cannot tell.
 //! - `report`: figures, drawings and an HTML page of them (feature `report`, on by default).
 //!
@@ -56,6 +57,8 @@
 //! `report` (default) adds figures and reports; `parquet` adds Parquet files. Without both the library is the physics alone.
 
 pub mod case;
+pub mod control;
+pub mod controller;
 pub mod error;
 pub mod files;
 pub mod fit;

@@ -177,6 +177,13 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
 
     fn set_input(&mut self, piece: &Piece) {
         self.cost.pieces += 1;
+        self.fresh = [0; Cause::KINDS];
+        if piece.coefficients[1..].iter().all(|&c| c == 0.0) {
+            (0..=highest::<R>()).for_each(|k| self.z[chain::<R>(k)] = 0.0);
+            self.z[chain::<R>(0)] = piece.coefficients[0];
+            (self.input_rate, self.input_curvature) = (0.0, 0.0);
+            return;
+        }
         let length = if piece.end.is_finite() { piece.end - piece.start } else { 0.0 };
         let (mut factorial, mut rate, mut curvature) = (1.0, 0.0, 0.0);
         let (mut power1, mut power2) = (1.0, 1.0);
@@ -198,7 +205,6 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         }
         self.input_rate = rate;
         self.input_curvature = curvature;
-        self.fresh = [0; Cause::KINDS];
     }
 
     /// Advances to `offset` behind row `row`, event by event.

@@ -1,0 +1,23 @@
+//! Controllers stepped in time, around the exact plant.
+//!
+//! [`closed_loop`] runs a [`Design`] on a stage along a [`Profile`]; [`close`] does so with any [`Controller`], a user's own too.
+//!
+//! [`Design`]: crate::controller::Design
+//! [`Profile`]: crate::signal::profile::Profile
+
+pub mod compensation;
+pub mod filter;
+pub mod fuzzy;
+pub mod model;
+pub mod observer;
+mod outcome;
+pub mod pid;
+pub mod riccati;
+mod sampled;
+pub mod sliding;
+mod standard;
+pub mod state_feedback;
+
+pub use outcome::{Deviation, Figures, MoveRun, Rows, Setup, close, closed_loop, stream};
+pub use sampled::{Controller, Loop, Sample, Seen, measures_cart};
+pub use standard::Standard;
