@@ -188,35 +188,31 @@ fn greatest(fits: impl Fn(f64) -> bool, distance: f64, limits: &[f64]) -> f64 {
     low
 }
 
-/// The pieces of the first half: the highest derivative jumps at each sum of some of the lengths, up or down as there are an even or odd number of them.
+/// The pieces of the first half. The highest derivative jumps up or down at each sum of some of the lengths but T₁, and these come in
+/// the order of binary numbers: 0, T₄, T₃, T₃ + T₄, T₂, …; then it cruises.
 fn pieces(distance: f64, times: &[f64]) -> Vec<(f64, [f64; 5])> {
     let order = times.len();
     let height = distance / times.iter().product::<f64>();
-    let mut jumps: Vec<(f64, f64)> = (0..1_u32 << order)
-        .map(|set| {
-            let time = (0..order).rev().filter(|k| set >> k & 1 == 1).map(|k| times[k]).sum();
-            (time, if set.count_ones() % 2 == 0 { height } else { -height })
-        })
-        .collect();
-    jumps.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let half = 0.5 * times.iter().sum::<f64>();
-    let mut pieces: Vec<(f64, [f64; 5])> = Vec::new();
-    let (mut begin, mut state, mut level) = (0.0, [0.0; 5], 0.0);
-    for (time, jump) in jumps {
-        if time > half {
-            break;
-        }
-        state = moved(&state, time - begin);
-        begin = time;
-        // Sums that meet are one jump: what rounding leaves of them is none.
-        level += jump;
-        if level.abs() < 1e-6 * height.abs() {
-            level = 0.0;
-        }
+    let count = 1_usize << (order - 1);
+    let mut pieces = Vec::with_capacity(count);
+    let (mut begin, mut state) = (0.0, [0.0; 5]);
+    for k in 0..count {
+        let level = match (k % 2, k.count_ones() % 2) {
+            (1, _) => 0.0,
+            (_, 0) => height,
+            _ => -height,
+        };
+        // Where one pulse, two, or four have done their part, as many derivatives are zero, to the last bit.
+        let lowest = (k + 1).trailing_zeros() as usize;
+        state[order + 1 - lowest..=order].fill(0.0);
         state[order] = level;
-        match pieces.last_mut() {
-            Some(last) if last.0 == begin => last.1 = state,
-            _ => pieces.push((begin, state)),
+        pieces.push((begin, state));
+        // The next jump is where the lowest bit that is not set is: after its length less those below it.
+        if k + 1 < count {
+            let below: f64 = times[order - lowest..].iter().sum();
+            let length = times[order - 1 - lowest] - below;
+            state = moved(&state, length);
+            begin += length;
         }
     }
     pieces
@@ -247,8 +243,8 @@ pub enum Leg {
 /// Moves one after another, each from rest to rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profile {
-    /// When each stroke begins, where from, and the stroke.
-    strokes: Vec<(f64, f64, Stroke)>,
+    /// When each stroke begins, where from, where to, and the stroke.
+    strokes: Vec<(f64, [f64; 2], Stroke)>,
     start: f64,
     end: f64,
     /// Impulses (time, s; amplitude) that it is convolved with; empty for none.
@@ -271,7 +267,7 @@ impl Profile {
                 Leg::To(target, ref limits) => {
                     let stroke = Stroke::new(target - position, limits)?;
                     let duration = stroke.duration();
-                    strokes.push((time, position, stroke));
+                    strokes.push((time, [position, target], stroke));
                     (time, position) = (time + duration, target);
                 }
             }
@@ -295,9 +291,12 @@ impl Profile {
 
     fn plain(&self, t: f64) -> Reference {
         let index = self.strokes.partition_point(|(begin, ..)| *begin <= t);
-        let Some((begin, from, stroke)) = index.checked_sub(1).and_then(|index| self.strokes.get(index)) else {
+        let Some((begin, [from, to], stroke)) = index.checked_sub(1).and_then(|index| self.strokes.get(index)) else {
             return Reference::at(self.start);
         };
+        if t - begin >= stroke.duration {
+            return Reference::at(*to);
+        }
         let mut reference = stroke.at(t - begin);
         reference.position += from;
         reference
@@ -315,11 +314,11 @@ impl Profile {
 
     /// Where it ends, m.
     pub fn target(&self) -> f64 {
-        self.strokes.last().map_or(self.start, |(_, from, stroke)| from + stroke.distance)
+        self.strokes.last().map_or(self.start, |(_, [_, to], _)| *to)
     }
 
     /// Begin (s), start (m), distance (m) and duration (s) of each stroke.
     pub fn strokes(&self) -> impl Iterator<Item = (f64, f64, f64, f64)> {
-        self.strokes.iter().map(|(begin, from, stroke)| (*begin, *from, stroke.distance, stroke.duration))
+        self.strokes.iter().map(|(begin, [from, _], stroke)| (*begin, *from, stroke.distance, stroke.duration))
     }
 }
