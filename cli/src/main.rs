@@ -6,6 +6,7 @@ mod failure;
 mod fit;
 mod init;
 mod interrupt;
+mod motion;
 mod paper;
 mod simulate;
 mod terminal;
@@ -24,6 +25,7 @@ fn main() -> ExitCode {
         Command::Paper(args) => paper::run(&args),
         Command::Init(args) => init::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Move(args) => motion::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Fit(args) => fit::run(&args),
     };

@@ -15,9 +15,11 @@ pub mod pid;
 pub mod riccati;
 mod sampled;
 pub mod sliding;
+mod spread;
 mod standard;
 pub mod state_feedback;
 
 pub use outcome::{Deviation, Figures, MoveRun, Rows, Setup, close, closed_loop, stream};
 pub use sampled::{Controller, Loop, Sample, Seen, measures_cart};
+pub use spread::spread;
 pub use standard::Standard;
