@@ -82,8 +82,8 @@ pub fn continuous(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMat
     for _ in 0..MOST_SCALINGS {
         let (sa, sb, sq) = scaled(a, b, q, &scale);
         let g = &sb * &inverse * sb.transpose();
-        // The transform's γ: as fast as the system.
-        let gamma = sa.norm().max((g.norm() * sq.norm()).sqrt()).max(f64::MIN_POSITIVE);
+        // The transform's γ: a little faster than anything in the system, so that A − γ I can be inverted.
+        let gamma = 1.5 * sa.norm().max((g.norm() * sq.norm()).sqrt()).max(f64::MIN_POSITIVE);
         let identity = DMatrix::identity(n, n);
         let shifted = &sa - &identity * gamma;
         let Some(inverse_shifted) = shifted.clone().try_inverse() else { break };
