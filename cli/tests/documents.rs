@@ -84,6 +84,11 @@ fn the_reference_of_the_commands_shows_their_help() {
 }
 
 #[test]
+fn the_page_on_control_shows_what_the_program_prints() {
+    check("docs/control.md");
+}
+
+#[test]
 fn the_pictures_are_those_that_the_commands_draw() {
     let folder = workplace();
     for line in [
@@ -119,6 +124,7 @@ fn what_the_documents_name_is_there() {
         "CHANGELOG.md",
         "docs/case-file.md",
         "docs/commands.md",
+        "docs/control.md",
         "docs/paper.md",
         "docs/solver.md",
         "docs/general-solver.md",
