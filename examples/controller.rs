@@ -3,7 +3,7 @@
 use std::time::Instant;
 use taut::case::{Case, TEMPLATE};
 use taut::control::{Controller, Loop, Seen, Setup, close, closed_loop};
-use taut::controller::{Design, FeedForward, Pid, Structure};
+use taut::design::{Design, FeedForward, Pid, Structure};
 use taut::signal::profile::{Leg, Limits, Profile};
 use taut::solve::Solver;
 

@@ -43,7 +43,7 @@
 //! - [`parameter`]: the one table of everything a case file can say.
 //! - [`trajectory`]: columns with units, and their files.
 //! - [`friction`], [`stage`]: what the machine is.
-//! - [`signal`]: what is fed into it, and the references of its moves. [`controller`]: what a controller is, in data.
+//! - [`signal`]: what is fed into it, and the references of its moves. [`design`]: what a controller is, in data.
 //! - [`plant`]: its equations of motion, mode by mode.
 //! - [`log`]: measured columns in. [`case`]: the case file in.
 //! - [`solve`]: the motion. [`measure`]: what a recorder makes of it. [`metrics`]: what it shows. [`reduction`]: how far a reduced model
@@ -58,7 +58,7 @@
 
 pub mod case;
 pub mod control;
-pub mod controller;
+pub mod design;
 pub mod error;
 pub mod files;
 pub mod fit;

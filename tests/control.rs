@@ -9,7 +9,7 @@ use serde_json::Value;
 use taut::case::Case;
 use taut::control::compensation::{Compensation, Rigid};
 use taut::control::{Loop, Rows, Setup, Standard, closed_loop, riccati, sliding, spread, stream};
-use taut::controller::*;
+use taut::design::*;
 use taut::signal::profile::{Leg, Limits, Profile, Reference, Stroke};
 use taut::solve::{Ending, Flow, Solver};
 use taut::stage::{Encoder, EncoderPlace, Stage};

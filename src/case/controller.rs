@@ -1,7 +1,7 @@
 //! The controller's table.
 
 use super::reader::{Field, Table};
-use crate::controller::*;
+use crate::design::*;
 use crate::error::Result;
 use crate::stage::{AmplifierMode, EncoderPlace, Stage};
 

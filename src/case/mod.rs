@@ -17,7 +17,7 @@ pub use fit::{Nuisances, Plan, Scope, matches};
 pub use motion::Move;
 pub use template::TEMPLATE;
 
-use crate::controller::Design;
+use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::log::Log;
 use crate::plant::{Plant, State};

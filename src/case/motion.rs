@@ -2,7 +2,7 @@
 
 use super::reader::{Field, Table};
 use super::{MOST_SAMPLES, check_name, file_name};
-use crate::controller::Design;
+use crate::design::Design;
 use crate::error::Result;
 use crate::quantity::{rounded, show};
 use crate::signal::gcode;

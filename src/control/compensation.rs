@@ -1,6 +1,6 @@
 //! What the reference alone tells: the command for an axis of one mass, and for one whose belt stretches.
 
-use crate::controller::{FeedForward, FeedForwardModel};
+use crate::design::{FeedForward, FeedForwardModel};
 use crate::signal::profile::Reference;
 use crate::stage::{AmplifierMode, BeltModel, EncoderPlace, Stage};
 

@@ -1,6 +1,6 @@
 //! Filters on the command.
 
-use crate::controller::Filter;
+use crate::design::Filter;
 use std::f64::consts::PI;
 
 /// A filter of second order, stepped once a sample.

@@ -2,7 +2,7 @@
 //! systems", IEEE Transactions on Energy Conversion 16, 2001).
 
 use super::sampled::Speed;
-use crate::controller::Fuzzy;
+use crate::design::Fuzzy;
 use crate::signal::profile::Reference;
 
 /// Triangular sets at equal distances that add up to 1, products of memberships, and the mean of the rules' values they weigh.

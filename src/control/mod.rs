@@ -2,7 +2,7 @@
 //!
 //! [`closed_loop`] runs a [`Design`] on a stage along a [`Profile`]; [`close`] does so with any [`Controller`], a user's own too.
 //!
-//! [`Design`]: crate::controller::Design
+//! [`Design`]: crate::design::Design
 //! [`Profile`]: crate::signal::profile::Profile
 
 pub mod compensation;

@@ -3,7 +3,7 @@
 use super::sampled::{Controller, Loop, Sample, Sampled};
 use super::standard::Standard;
 use crate::case::{Experiment, Initial};
-use crate::controller::Design;
+use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::metrics::{Meter, Metrics, Peak};
 use crate::signal::Signal;

@@ -1,7 +1,7 @@
 //! PID, and cascades of P and PI.
 
 use super::sampled::Speed;
-use crate::controller::{Cascade, Pid};
+use crate::design::{Cascade, Pid};
 use crate::signal::profile::Reference;
 
 /// A PID controller: u = K_p e + K_i ∫e dt + K_d ė.

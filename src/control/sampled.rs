@@ -215,7 +215,7 @@ pub fn measures_cart(stage: &Stage) -> bool {
 
 impl Loop {
     /// That of a design.
-    pub fn of(design: &crate::controller::Design) -> Self {
+    pub fn of(design: &crate::design::Design) -> Self {
         let lead = design.feed_forward.lead.unwrap_or(design.delay + 0.5 * design.every);
         Self { every: design.every, delay: design.delay, limit: design.limit, lead }
     }

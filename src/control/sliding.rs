@@ -2,7 +2,7 @@
 
 use super::compensation::Rigid;
 use super::sampled::Speed;
-use crate::controller::SlidingMode;
+use crate::design::SlidingMode;
 use crate::signal::profile::Reference;
 
 /// A sliding-mode controller on the side of the encoder: σ = ė + λ e + κ ∫e dt (A. Hace et al., "Robust motion control and

@@ -8,7 +8,7 @@ use super::pid::{CascadeState, PidState};
 use super::sampled::{Controller, Seen};
 use super::sliding::SlidingState;
 use super::state_feedback::StateFeedbackState;
-use crate::controller::{Design, Structure};
+use crate::design::{Design, Structure};
 use crate::error::{Error, Result};
 use crate::signal::profile::Reference;
 use crate::stage::{AmplifierMode, Stage};

@@ -4,7 +4,7 @@ use super::compensation::{Compensation, Rigid};
 use super::model::Linear;
 use super::riccati;
 use super::sampled::Sensor;
-use crate::controller::{Design, StateFeedback};
+use crate::design::{Design, StateFeedback};
 use crate::error::Result;
 use crate::plant::place;
 use crate::signal::profile::Reference;

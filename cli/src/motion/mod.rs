@@ -17,7 +17,7 @@ use std::fmt::Write;
 use std::path::Path;
 use taut::case::{Case, Move};
 use taut::control::{Loop, MoveRun, Rows, Setup, Standard, closed_loop, spread, stream};
-use taut::controller::Design;
+use taut::design::Design;
 use taut::files::write_atomically;
 use taut::solve::{Ending, Flow, Solver};
 use taut::trajectory::{CsvWriter, Trajectory};

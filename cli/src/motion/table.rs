@@ -7,7 +7,7 @@ use crate::terminal::bold;
 use std::fmt::Write;
 use taut::control::compensation::Rigid;
 use taut::control::sliding;
-use taut::controller::{Design, FeedForwardModel, Structure};
+use taut::design::{Design, FeedForwardModel, Structure};
 use taut::metrics::largest;
 use taut::stage::{AmplifierMode, EncoderPlace, Stage};
 
