@@ -84,7 +84,7 @@ impl Stroke {
             return Err(Error::new("these limits of a move are none")
                 .allowed("speed, acceleration, jerk and snap above zero; snap only with jerk"));
         }
-        if !(distance.abs() <= 1e9) {
+        if distance.is_nan() || distance.abs() > 1e9 {
             return Err(Error::new(format!("a move over {distance} m")).allowed("a finite distance"));
         }
         let far = distance.abs();
