@@ -15,7 +15,7 @@ pub struct Covariance {
     pub matrix: DMatrix<f64>,
     /// Standard deviation of the weighted residuals.
     pub deviation: f64,
-    /// Values minus variables.
+    /// Independent values minus variables.
     pub freedom: usize,
 }
 
@@ -23,10 +23,10 @@ impl Covariance {
     /// At a minimum with these residuals and this Jacobian, its variables at bounds left out.
     pub fn new(problem: &Problem, residuals: &[f64], jacobian: &DMatrix<f64>, at_bound: &[bool]) -> Option<Self> {
         let free: Vec<usize> = (0..at_bound.len()).filter(|&j| !at_bound[j]).collect();
-        let counted = problem.counted();
-        let freedom = counted.saturating_sub(free.len()).max(1);
+        let counted = problem.independent();
+        let freedom = (counted - free.len() as f64).max(1.0);
         let squares: f64 = residuals.iter().map(|r| r * r).sum();
-        let deviation = (squares / freedom as f64).sqrt();
+        let deviation = (squares / freedom).sqrt();
         let own = jacobian.select_columns(&free);
         let inverse = inverse_of_square(&own)?;
         let white = &inverse * (deviation * deviation);
@@ -47,7 +47,7 @@ impl Covariance {
             first += run.rows();
         }
         let matrix = if coloured {
-            let grown = counted as f64 / freedom as f64;
+            let grown = counted / freedom;
             let robust = &inverse * sum * &inverse * grown;
             // Correlations as with white residuals, variances the greater ones.
             let factor: Vec<f64> = (0..free.len()).map(|j| (robust[(j, j)] / white[(j, j)]).max(1.0).sqrt()).collect();
@@ -55,7 +55,7 @@ impl Covariance {
         } else {
             white
         };
-        Some(Self { free, matrix, deviation, freedom })
+        Some(Self { free, matrix, deviation, freedom: freedom.round() as usize })
     }
 
     /// Standard deviation of variable `j`; none for one at a bound.
