@@ -5,7 +5,7 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 use std::sync::Arc;
 use taut::case::{Case, Plan, TEMPLATE};
 use taut::fit::least_squares::{Bounds, Ending, Options, Residuals, minimise};
-use taut::fit::{check, fit, inverse_of_square};
+use taut::fit::{Fit, check, fit, inverse_of_square};
 use taut::log::{Log, Output, Quantity};
 use taut::signal::Hold;
 use taut::solve::{Flow, Solver, simulate};
@@ -198,6 +198,8 @@ struct Coverage {
     all: usize,
     /// Estimates without one: at a bound, or not determined.
     lost: usize,
+    /// Fits that the truth as a start would have led further down, by more than 0.1 % of the residuals.
+    astray: usize,
     /// Σ ((estimate − truth)/error)², by parameter.
     squares: [f64; 3],
 }
@@ -213,7 +215,7 @@ impl Coverage {
             let rms = (3.0 * self.squares[j] / self.all as f64).sqrt();
             format!("{} {:.1} % (errors {:.2} standard errors)", KEYS[j], 100.0 * self.share(j), rms)
         };
-        format!("{}, {}, {}; {} without an interval", each(0), each(1), each(2), self.lost)
+        format!("{}, {}, {}; {} without an interval, {} astray", each(0), each(1), each(2), self.lost, self.astray)
     }
 }
 
@@ -228,8 +230,11 @@ fn coverage(machines: u64, noise: f64) -> Coverage {
         let truth = [between(10.0, 35.0), between(0.1, 1.5), between(0.2, 1.0)];
         let changes: Vec<String> = KEYS.iter().zip(truth).map(|(key, value)| format!("{key}={value}")).collect();
         let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-        let case = with_logs_of(recorded(&changes, seed, noise));
-        let found = fit(&case, &plan(&KEYS), None, &mut |_| Flow::Continue).unwrap();
+        let own = recorded(&changes, seed, noise);
+        let from_truth = fit(&own, &plan(&KEYS), None, &mut |_| Flow::Continue).unwrap();
+        let found = fit(&with_logs_of(own), &plan(&KEYS), None, &mut |_| Flow::Continue).unwrap();
+        let far = |fit: &Fit| -> f64 { fit.logs.iter().map(|log| log.outputs[0].fitted.unwrap().rmse.powi(2)).sum() };
+        result.astray += usize::from(far(&found) > 1.002 * far(&from_truth));
         for (j, (estimate, value)) in found.estimates.iter().zip(truth).enumerate() {
             match (estimate.interval, estimate.error) {
                 (Some([low, high]), error) if low.is_finite() => {
@@ -250,7 +255,7 @@ fn coverage(machines: u64, noise: f64) -> Coverage {
 fn intervals_hold_the_truth_about_as_often_as_they_say() {
     let found = coverage(40, 1e-3);
     let share = (0..3).map(|j| found.share(j)).sum::<f64>() / 3.0;
-    assert!((0.88..=1.0).contains(&share) && found.lost == 0, "{}", found.told());
+    assert!((0.88..=1.0).contains(&share) && found.lost + found.astray == 0, "{}", found.told());
 }
 
 /// The whole run; `cargo test --test fit -- --ignored --nocapture` prints the shares.
@@ -262,7 +267,10 @@ fn intervals_hold_the_truth_of_a_thousand_machines() {
     for noise in [0.0, 1e-3, 3e-3, 1e-2] {
         let found = coverage(machines, noise);
         println!("{noise} rad: {}", found.told());
-        good &= found.lost == 0 && (0..3).all(|j| (0.93..=0.97).contains(&found.share(j)));
+        // Counts without any noise are the worst case: their errors of rounding go with the motion.
+        let least = if noise == 0.0 { 0.9 } else { 0.93 };
+        good &= found.lost == 0 && (0..3).all(|j| (least..=0.97).contains(&found.share(j)));
+        good &= found.astray * 100 <= machines as usize;
     }
     assert!(good);
 }

@@ -184,7 +184,7 @@ fn cart_noise(problem: &Problem, noise: &[(Quantity, f64)]) -> f64 {
 const IDEAS: &[Idea] = &[
     Idea { name: "the same inputs again, the other way round", measured: same, change: |_| {}, reversed: true },
     Idea {
-        name: "an encoder at the cart, as fine as what is there",
+        name: "an encoder at the cart, as fine as the one there is, or to 10 µm",
         measured: |problem, noise| vec![(Quantity::CartPosition, cart_noise(problem, noise))],
         change: |_| {},
         reversed: false,

@@ -216,11 +216,10 @@ pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f
         for &(quantity, deviation) in &fresh {
             problem.weigh(quantity, deviation, true);
         }
-        let known = problem.runs.iter().flat_map(|run| &run.extras).any(|extra| extra.known.is_some());
-        let alike = fresh.len() == 1 && !plan.huber && !known && uniform(&problem);
+        let alike = fresh.len() == 1 && !plan.huber && !told_beforehand(&problem, &fresh) && uniform(&problem);
         noise = fresh;
         let options = Options { huber: if plan.huber { HUBER } else { f64::INFINITY }, ..whole };
-        if alike && round == 0 && best.ending == Ending::Converged {
+        if alike && round == 0 && matches!(best.ending, Ending::Converged | Ending::Stalled) {
             // One weight for all: only the unit of the residuals changes.
             let factor =
                 problem.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).find(|w| **w > 0.0);
@@ -360,6 +359,13 @@ fn uniform(problem: &Problem) -> bool {
     weights.all(|w| (w / first - 1.0).abs() < 1e-3)
 }
 
+/// Whether what is known beforehand of the start could be as wrong as the residuals are: then it depends on their weight.
+fn told_beforehand(problem: &Problem, noise: &[(Quantity, f64)]) -> bool {
+    let most = noise.iter().map(|(_, deviation)| *deviation).fold(0.0, f64::max);
+    let arm = problem.stage.pulley_radius.min(1.0);
+    problem.runs.iter().flat_map(|run| &run.extras).any(|extra| extra.known.is_some_and(|own| own > 0.1 * arm * most))
+}
+
 /// Refuses what the logs do not determine, with the choices there are.
 fn refuse(problem: &Problem, found: &Identifiability) -> Result<()> {
     let Some(group) = found.groups.first() else { return Ok(()) };
@@ -410,9 +416,9 @@ fn noise_of(problem: &Problem, at: &Minimum, robust: bool) -> Vec<(Quantity, f64
                     let w = seen.weights[k];
                     if w > 0.0 {
                         let r = at.residuals[first + output * n + k] / w;
-                        // Equal values in a row are one.
-                        let share = 1.0 / seen.repeats[k].max(1.0);
-                        let share = if seen.step > 0.0 { share } else { 1.0 };
+                        // Equal values in a row are one, unless they tremble.
+                        let equal = seen.step > 0.0 && seen.alike[k] <= 1.0;
+                        let share = if equal { 1.0 / seen.repeats[k].max(1.0) } else { 1.0 };
                         squares += share * r * r;
                         weight += share;
                         if robust {
@@ -438,7 +444,7 @@ fn result(problem: &Problem, best: &Minimum, noise: Vec<(Quantity, f64)>, starts
     let deviation = (2.0 * best.cost / (problem.independent() - problem.variables() as f64).max(1.0)).sqrt();
     let identifiability = Identifiability::new(problem, &best.jacobian, &best.x, deviation);
     let bounds = problem.bounds();
-    let t = student(covariance.as_ref().map_or(1, |c| c.freedom));
+    let t = covariance.as_ref().map_or(student(1), |c| c.reach);
     let determined = |j: usize| identifiability.as_ref().is_some_and(|found| found.error[j].is_finite());
     let error = |j: usize| match &covariance {
         Some(covariance) if j >= problem.globals() || determined(j) => covariance.error(j),

@@ -304,16 +304,7 @@ impl<'a> Problem<'a> {
 
     /// As how many independent values they count: those that share an error of rounding count for less.
     pub fn independent(&self) -> f64 {
-        let quantities = self.quantities();
-        let of = |quantity| {
-            let seen = self.runs.iter().flat_map(|run| &run.seen).filter(move |seen| seen.quantity == quantity);
-            seen.flat_map(|seen| seen.weights.iter().copied())
-        };
-        let count = |quantity| {
-            let most = of(quantity).fold(f64::MIN_POSITIVE, f64::max);
-            of(quantity).map(|weight| (weight / most).powi(2)).sum::<f64>()
-        };
-        quantities.into_iter().map(count).sum()
+        self.runs.iter().flat_map(|run| (0..run.seen.len()).map(|output| run.independent(output))).sum()
     }
 
     /// Where the case starts.

@@ -10,6 +10,9 @@ use crate::stage::Stage;
 /// raster's times. What that makes of a value is at most its rate of change times this share of an interval.
 const EVEN: f64 = 1e-3;
 
+/// So often up and so often down, and that in every hundred, go values at rest that tremble.
+const FEWEST: usize = 2;
+
 /// Points of the raster per interval where times are uneven; between them positions follow cubics through positions and
 /// speeds, all else straight lines. With h the raster, that is off by at most h⁴|x⁗|/384, and h²|ÿ|/8.
 const RASTER: f64 = 8.0;
@@ -214,6 +217,13 @@ impl Run {
     /// Number of residuals: every output at every time, and what is known of extras beforehand.
     pub fn rows(&self) -> usize {
         self.seen.len() * self.time.len() + self.extras.iter().filter(|extra| extra.known.is_some()).count()
+    }
+
+    /// As how many independent values those of an output count: those that share an error of rounding count for less.
+    pub fn independent(&self, output: usize) -> f64 {
+        let weights = &self.seen[output].weights;
+        let most = weights.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        weights.iter().map(|weight| (weight / most).powi(2)).sum()
     }
 
     /// Residuals of the extras of which something is known, in standard deviations.
@@ -427,13 +437,13 @@ fn repeats(values: &[f64]) -> Vec<f64> {
     values.chunk_by(|a, b| a == b).flat_map(|same| std::iter::repeat_n(same.len() as f64, same.len())).collect()
 }
 
-/// For each value how many stand around it in a row within two steps, to and fro; 1 where they only go one way.
+/// For each value how many stand around it in a row within two steps, often to and fro; 1 where they do not.
 fn alike(values: &[f64], step: f64) -> Vec<f64> {
     let mut alike = vec![1.0; values.len()];
     let mut first = 0;
     while step > 0.0 && first < values.len() {
         let (mut low, mut high) = (values[first], values[first]);
-        let (mut up, mut down) = (false, false);
+        let (mut up, mut down) = (0, 0);
         let mut last = first + 1;
         while last < values.len() && values[last].is_finite() {
             let (least, most) = (low.min(values[last]), high.max(values[last]));
@@ -441,11 +451,11 @@ fn alike(values: &[f64], step: f64) -> Vec<f64> {
                 break;
             }
             (low, high) = (least, most);
-            up |= values[last] > values[last - 1];
-            down |= values[last] < values[last - 1];
+            up += usize::from(values[last] > values[last - 1]);
+            down += usize::from(values[last] < values[last - 1]);
             last += 1;
         }
-        if up && down {
+        if up.min(down) >= FEWEST.max((last - first) / 100) {
             alike[first..last].fill((last - first) as f64);
         }
         first = last;

@@ -17,6 +17,8 @@ pub struct Covariance {
     pub deviation: f64,
     /// Independent values minus variables.
     pub freedom: usize,
+    /// How many standard errors a 95 % interval reaches to each side.
+    pub reach: f64,
 }
 
 impl Covariance {
@@ -27,12 +29,13 @@ impl Covariance {
         let freedom = (counted - free.len() as f64).max(1.0);
         let squares: f64 = residuals.iter().map(|r| r * r).sum();
         let deviation = (squares / freedom).sqrt();
-        let own = jacobian.select_columns(&free);
-        let inverse = inverse_of_square(&own)?;
+        let columns = jacobian.select_columns(&free);
+        let inverse = inverse_of_square(&columns)?;
         let white = &inverse * (deviation * deviation);
 
         let mut sum = DMatrix::zeros(free.len(), free.len());
         let mut coloured = false;
+        let (mut lagged, mut counting) = (0.0, 0.0);
         let mut first = 0;
         for run in &problem.runs {
             let n = run.time.len();
@@ -40,9 +43,12 @@ impl Covariance {
                 let rows: Vec<usize> =
                     (0..n).filter(|&k| run.seen[output].weights[k] > 0.0).map(|k| first + output * n + k).collect();
                 let memory = memory_of(residuals, &rows);
-                let lags = bandwidth(memory, rows.len());
+                let own = run.independent(output);
+                let lags = bandwidth(memory, own as usize);
                 coloured |= lags > 0;
-                add_products(&mut sum, &own, residuals, &rows, lags);
+                lagged += lags as f64;
+                counting += own;
+                add_products(&mut sum, &columns, residuals, &rows, lags);
             }
             first += run.rows();
         }
@@ -55,7 +61,12 @@ impl Covariance {
         } else {
             white
         };
-        Some(Self { free, matrix, deviation, freedom: freedom.round() as usize })
+        // How far an interval reaches with a covariance summed over the share b of the lags (Kiefer and Vogelsang 2005, for
+        // Bartlett weights), instead of 1.96.
+        let b: f64 = if counting > 0.0 { lagged / counting } else { 0.0 };
+        let wider = (1.96 + 2.9694 * b + 0.416 * b.powi(2) - 0.5324 * b.powi(3)) / 1.96;
+        let reach = student(freedom.round() as usize) * wider;
+        Some(Self { free, matrix, deviation, freedom: freedom.round() as usize, reach })
     }
 
     /// Standard deviation of variable `j`; none for one at a bound.
