@@ -57,10 +57,12 @@ pub fn read_accelerometer(file: &Path) -> Result<Accelerometer> {
         return Err(error.allowed(FORMS).next("keep the columns of one of them"));
     }
     if spectrum {
+        heading.check(&SPECTRUM)?;
         let shapers = ["shapers", "zv"].iter().any(|word| names.contains(word));
         return read_spectrum(file, shapers);
     }
     if samples {
+        heading.check(&SAMPLES)?;
         return read_samples(file);
     }
     let numbers = heading.text.split([',', ';', '\t', ' ']).any(|field| field.trim().parse::<f64>().is_ok());
@@ -87,7 +89,7 @@ impl Heading {
         let there = lines.advance()?;
         // A remark names them where the first line has numbers already.
         let remark = lines.remark.to_lowercase();
-        if remark.contains("accel") || remark.contains("psd") {
+        if there && (remark.contains("accel") || remark.contains("psd")) {
             return Ok(Self { text: lines.remark.clone(), place: Place::file(file) });
         }
         if !there {
@@ -96,6 +98,17 @@ impl Heading {
             return Err(error.next("check that the test ran to its end and that its file was copied whole"));
         }
         Ok(Self { text: lines.text.clone(), place: lines.place(0..lines.text.len()) })
+    }
+}
+
+impl Heading {
+    /// Whether all of these columns are there.
+    fn check(&self, names: &[&str]) -> Result<()> {
+        let fields: Vec<&str> = self.text.split([',', ';', '\t', ' ']).map(|f| f.trim().trim_matches('"')).collect();
+        let Some(missing) = names.iter().find(|name| !fields.contains(*name)) else { return Ok(()) };
+        let error = Error::new(format!("there is no column {missing}")).at(self.place.clone());
+        let next = "name the columns exactly so; if one was not measured, measure again with all of them";
+        Err(error.allowed(names.join(", ")).next(next))
     }
 }
 
@@ -162,7 +175,10 @@ fn read_samples(file: &Path) -> Result<Accelerometer> {
     if rate < RATE {
         let error = sheet.error(0, 1, format!("{} samples a second are too few", rounded(rate)));
         let error = error.allowed(format!("at least {RATE}, which show frequencies up to {}", RATE / 2.0));
-        return Err(error.next("give times in seconds; if they are, raise the accelerometer's rate"));
+        return Err(error.next(match rate < 10.0 {
+            true => "give times in seconds; if the first column is frequency, name it freq and the others psd_x, psd_y, psd_z, psd_xyz",
+            false => "give times in seconds; if they are, raise the accelerometer's rate",
+        }));
     }
     if let Some(row) = (1..rows).find(|&row| time[row] - time[row - 1] > PAUSE) {
         let pause = rounded(time[row] - time[row - 1]);
