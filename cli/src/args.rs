@@ -204,6 +204,9 @@ pub struct Shape {
     /// Shapers to choose from, separated by commas: zv, mzv, zvd, ei, 2hump_ei, 3hump_ei [default: all but zvd]
     #[arg(long, value_delimiter = ',', value_name = "NAMES", value_parser = shaper)]
     pub shapers: Vec<Kind>,
+    /// Of a case file: by which part its frequencies may be wrong [default: 0.1]
+    #[arg(long, value_name = "PART", value_parser = uncertainty)]
+    pub uncertainty: Option<f64>,
     /// Of a case file: what the motor does [default: held]
     #[arg(long, value_enum)]
     pub motor: Option<MotorName>,
@@ -324,6 +327,9 @@ fn seconds(text: &str) -> Result<f64, String> {
 }
 
 fn smoothing(text: &str) -> Result<f64, String> {
+    if text.trim().parse::<f64>().is_ok() {
+        return Err("a length with its unit is needed, such as \"0.1 mm\"".into());
+    }
     let length = quantity::read(text, "m").map_err(|e| e.to_string())?;
     if (1e-7..=0.1).contains(&length) {
         return Ok(length);
@@ -332,6 +338,9 @@ fn smoothing(text: &str) -> Result<f64, String> {
 }
 
 fn corner_speed(text: &str) -> Result<f64, String> {
+    if text.trim().parse::<f64>().is_ok() {
+        return Err("a speed with its unit is needed, such as \"5 mm/s\"".into());
+    }
     let speed = quantity::read(text, "m/s").map_err(|e| e.to_string())?;
     if (0.0..=10.0).contains(&speed) {
         Ok(speed)
@@ -343,4 +352,11 @@ fn corner_speed(text: &str) -> Result<f64, String> {
 fn shaper(text: &str) -> Result<Kind, String> {
     let names = || Kind::ALL.map(Kind::name).join(", ");
     Kind::from_name(text).ok_or_else(|| format!("there is no such shaper; there are {}", names()))
+}
+
+fn uncertainty(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(part) if (0.0..=0.5).contains(&part) => Ok(part),
+        _ => Err("a part from 0 to 0.5 is needed, such as 0.1 for 10 %".into()),
+    }
 }

@@ -1,9 +1,12 @@
 //! Two spectra side by side: belts A and B, or before and after a change.
 
-use super::spectrum::{LOWEST, Spectrum};
+use super::spectrum::{Axis, LOWEST, Spectrum};
 
 /// Peaks so near each other, by frequency, are taken for the same one.
 const NEAR: f64 = 0.25;
+
+/// Frequencies in files are rounded to this, Hz.
+const ROUNDING: f64 = 0.1;
 
 /// A peak of the first spectrum and its like in the second.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +33,8 @@ pub struct Comparison {
     pub level: f64,
     /// The highest peaks of both.
     pub main: Option<Pair>,
+    /// The axes along which those peaks vibrate most, where the spectra sum all axes.
+    pub main_axes: Option<(Axis, Axis)>,
     /// Peaks that are in both, by frequency.
     pub pairs: Vec<Pair>,
     /// Peaks of the first alone: Hz and density.
@@ -55,6 +60,11 @@ pub fn compare(first: &Spectrum, second: &Spectrum) -> Comparison {
     let (mine, theirs) = (first.peaks(), second.peaks());
     let highest = |peaks: &[(f64, f64)]| peaks.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1));
     let main = highest(&mine).zip(highest(&theirs)).map(|(first, second)| Pair { first, second });
+    let along = |spectrum: &Spectrum, f: f64| match spectrum.axis {
+        Axis::All => spectrum.main_axis(f).map(|(axis, _)| axis),
+        _ => None,
+    };
+    let main_axes = main.and_then(|main| along(first, main.first.0).zip(along(second, main.second.0)));
     let nearest = |f: f64, peaks: &[(f64, f64)]| {
         let far = |peak: &(f64, f64)| (peak.0 / f).ln().abs();
         let near = peaks.iter().copied().min_by(|a, b| far(a).total_cmp(&far(b)))?;
@@ -71,7 +81,7 @@ pub fn compare(first: &Spectrum, second: &Spectrum) -> Comparison {
     };
     let (only_first, only_second) = (alone(&mine, |pair| pair.first), alone(&theirs, |pair| pair.second));
     let similarity = if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 0.0 };
-    Comparison { similarity, level: b_all / a_all, main, pairs, only_first, only_second, resolution }
+    Comparison { similarity, level: b_all / a_all, main, main_axes, pairs, only_first, only_second, resolution }
 }
 
 fn step(spectrum: &Spectrum) -> f64 {
@@ -94,7 +104,7 @@ impl Comparison {
             let (f, g) = (main.first.0, main.second.0);
             let same = self.pairs.iter().any(|pair| pair == main);
             let change = 100.0 * (main.stiffness_per_mass() - 1.0);
-            told.push(if (g - f).abs() <= self.resolution {
+            told.push(if (g - f).abs() <= self.resolution + ROUNDING {
                 format!("The highest peaks, {f:.1} and {g:.1} Hz, are not told apart at steps of {:.1} Hz.", self.resolution)
             } else if same {
                 let word = if g > f { "stiffer, or moves less mass" } else { "softer, or moves more mass" };
@@ -110,6 +120,13 @@ impl Comparison {
                      excited most has changed, and tension cannot be told from that."
                 )
             });
+        }
+        if let Some((one, other)) = self.main_axes {
+            let along = match one == other {
+                true => format!("Both are mostly along {}", one.word()),
+                false => format!("The first is mostly along {}, the second along {}", one.word(), other.word()),
+            };
+            told.push(format!("{along}; a belt acts along its own axis, which --axis looks at alone."));
         }
         let vibration = 100.0 * (self.level - 1.0);
         if vibration.abs() >= 10.0 {

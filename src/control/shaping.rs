@@ -16,13 +16,21 @@ const STEPS: f64 = 5.0;
 /// Smoothing that is not too much, m: what the greatest acceleration is suggested for.
 pub const ALLOWED_SMOOTHING: f64 = 0.12e-3;
 
+/// Where within the uncertainty of its frequency a mode is looked at.
+const PARTS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
+
 /// What vibrates.
 #[derive(Debug, Clone, Copy)]
 pub enum Target<'a> {
     /// Density over frequency; damping is not known.
     Spectrum(&'a Spectrum),
-    /// Modes of known frequency and damping, each at its own time: the one that keeps the most counts.
-    Modes(&'a [Resonance]),
+    /// Modes of known damping, each at its own time: the one that keeps the most counts.
+    Modes {
+        /// At all places of the travel.
+        modes: &'a [Resonance],
+        /// By which part their true frequencies may be higher or lower.
+        uncertainty: f64,
+    },
 }
 
 /// By what shapers are chosen.
@@ -88,7 +96,7 @@ impl Criterion {
 pub struct Fitted {
     /// The shaper.
     pub shaper: Shaper,
-    /// Vibration that remains, of that without a shaper, above a twentieth of the highest peak: 0 to 1.
+    /// Vibration that remains, of that without a shaper: 0 to 1, see [`Target::remaining`].
     pub vibration: f64,
     /// Smoothing at the criterion's corner, m.
     pub smoothing: f64,
@@ -119,7 +127,7 @@ impl Choice {
 }
 
 impl Target<'_> {
-    /// Vibration that a shaper leaves, of that without one, above a twentieth of the highest: 0 to 1.
+    /// Vibration that a shaper leaves, of that without one: 0 to 1; of a spectrum what is above a twentieth of the highest peak.
     pub fn remaining(&self, shaper: &Shaper, dampings: &[f64]) -> f64 {
         match self {
             // Σ max(V P − P_max/20, 0) / Σ max(P − P_max/20, 0), at the worst of the damping ratios
@@ -132,14 +140,15 @@ impl Target<'_> {
                     |zeta: &f64| -> f64 { lines().map(|(f, p)| above(shaper.residual_vibration(*f, *zeta) * p)).sum() };
                 dampings.iter().map(left).fold(0.0, f64::max) / whole
             }
-            // max over modes of (V w − w_max/20) / (w_max (1 − 1/20))
-            Target::Modes(modes) => {
+            // max V w / w_max over modes and over f (1 − u) to f (1 + u); nothing is taken off, as a model has no noise
+            Target::Modes { modes, uncertainty } => {
                 let most = modes.iter().map(|mode| mode.share).fold(0.0, f64::max);
-                let left = |mode: &Resonance| {
-                    let v = shaper.residual_vibration(mode.frequency, mode.damping);
-                    (v * mode.share - TOLERANCE * most).max(0.0)
+                let at = |mode: &Resonance, part: f64| {
+                    let f = mode.frequency * (1.0 + part * uncertainty);
+                    shaper.residual_vibration(f, mode.damping) * mode.share / most
                 };
-                modes.iter().map(left).fold(0.0, f64::max) / (most * (1.0 - TOLERANCE))
+                let worst = |mode: &Resonance| PARTS.iter().map(|part| at(mode, *part)).fold(0.0, f64::max);
+                modes.iter().map(worst).fold(0.0, f64::max)
             }
         }
     }
@@ -158,10 +167,10 @@ impl Target<'_> {
                 let count = (HIGHEST * STEPS - first) as usize;
                 (0..count).map(|k| (first + k as f64) / STEPS).collect()
             }
-            Target::Modes(modes) => {
+            Target::Modes { modes, .. } => {
                 let low = modes.iter().map(|mode| mode.frequency).fold(f64::INFINITY, f64::min);
                 let high = modes.iter().map(|mode| mode.frequency).fold(0.0, f64::max);
-                let step = low / 400.0;
+                let step = low / 200.0;
                 let count = ((3.0 * high - 0.5 * low) / step) as usize;
                 (0..count.min(20_000)).map(|k| 0.5 * low + k as f64 * step).collect()
             }
@@ -182,7 +191,7 @@ fn lowest(kind: Kind) -> f64 {
 
 /// Fits every kind, and recommends one.
 pub fn choose(target: Target<'_>, criterion: &Criterion) -> Result<Choice> {
-    if let Target::Modes([]) = target {
+    if let Target::Modes { modes: [], .. } = target {
         return Err(Error::new("there is no mode to shape for").next("give a model whose belt stretches"));
     }
     let fitted: Vec<Fitted> = criterion.kinds.iter().filter_map(|kind| fit(target, *kind, criterion)).collect();
@@ -237,21 +246,27 @@ fn fit(target: Target<'_>, kind: Kind, criterion: &Criterion) -> Option<Fitted> 
 fn reason(fitted: &[Fitted], recommended: usize) -> String {
     let best = &fitted[recommended];
     let told = |one: &Fitted| {
-        let (name, vibration, smoothing) = (one.shaper.kind.name(), 100.0 * one.vibration, 1e3 * one.smoothing);
-        format!("{name} leaves {vibration:.1} % of the vibration and smooths by {smoothing:.3} mm")
+        format!("leaves {:.1} % of the vibration and smooths by {:.3} mm", 100.0 * one.vibration, 1e3 * one.smoothing)
     };
+    let name = |one: &Fitted| one.shaper.kind.name();
     let other = |i: &usize| *i != recommended && fitted[*i].is_candidate;
     let next = (0..fitted.len()).filter(other).min_by(|a, b| fitted[*a].score.total_cmp(&fitted[*b].score));
-    match next.map(|i| &fitted[i]) {
-        None => format!("{}; no other was a candidate", told(best)),
-        Some(next) => {
-            let ratio = next.score / best.score;
-            let words = match ratio {
-                r if r >= 1.2 => format!("the next best, and its score is {r:.2} times as high"),
-                r if r >= 1.0 => format!("nearly as good: its score is {r:.2} times as high"),
-                r => format!("its score is {:.2} of that, too little gained for another shaper", r),
-            };
-            format!("{}; {}: {words}", told(best), told(next))
+    let Some(next) = next.map(|i| &fitted[i]) else {
+        return format!("{} {}; no other is a candidate", name(best), told(best));
+    };
+    let ratio = next.score / best.score;
+    let words = match ratio {
+        r if r >= 1.2 => {
+            format!("the next best, {}, {}, and its score is {r:.2} times as high", name(next), told(next))
         }
-    }
+        r if r >= 1.0 => {
+            format!("{} is nearly as good: it {}, and its score is {r:.2} times as high", name(next), told(next))
+        }
+        r => format!(
+            "{} {}, and its score is {r:.2} of that: too little gained for a longer one",
+            name(next),
+            told(next)
+        ),
+    };
+    format!("{} {}; {words}", name(best), told(best))
 }

@@ -122,6 +122,15 @@ impl Spectrum {
         (0..d.len()).filter(is_peak).map(|k| (self.frequency[k], d[k])).collect()
     }
 
+    /// The axis of the accelerometer that vibrates most at one of the spectrum's frequencies, and its part of the three.
+    pub fn main_axis(&self, frequency: f64) -> Option<(Axis, f64)> {
+        let k = self.frequency.iter().position(|f| *f == frequency)?;
+        let all: f64 = self.axes.iter().map(|axis| axis[k]).sum();
+        let named = [Axis::X, Axis::Y, Axis::Z].into_iter().zip(&self.axes);
+        let (axis, most) = named.map(|(axis, values)| (axis, values[k])).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        (all > 0.0).then_some((axis, most / all))
+    }
+
     /// The density at a frequency, joined linearly; 0 outside.
     pub fn at(&self, f: f64) -> f64 {
         let above = self.frequency.partition_point(|x| *x < f);

@@ -18,6 +18,9 @@ use taut::files::write_atomically;
 use taut::log::read_accelerometer;
 use taut::{Error, Result};
 
+/// By how much a model's frequencies may be wrong where the user does not say: masses are known to some 20 %.
+const UNCERTAINTY: f64 = 0.1;
+
 /// What a shaper is looked for.
 enum Source {
     Spectrum(Spectrum),
@@ -85,7 +88,7 @@ fn find(args: &Args, file: &Path) -> Result<Found> {
     }
     let target = match &source {
         Source::Spectrum(spectrum) => Target::Spectrum(spectrum),
-        Source::Model { modes, .. } => Target::Modes(modes),
+        Source::Model { modes, .. } => Target::Modes { modes, uncertainty: args.uncertainty.unwrap_or(UNCERTAINTY) },
     };
     let choice = choose(target, &criterion).map_err(|e| e.in_file(file))?;
     Ok(Found { file: file.to_path_buf(), source, criterion, choice })
@@ -112,7 +115,11 @@ fn model(args: &Args, file: &Path) -> Result<Source> {
 }
 
 fn measured(args: &Args, file: &Path) -> Result<Source> {
-    let only_models = [("--set", !args.changes.is_empty()), ("--motor", args.motor.is_some())];
+    let only_models = [
+        ("--set", !args.changes.is_empty()),
+        ("--motor", args.motor.is_some()),
+        ("--uncertainty", args.uncertainty.is_some()),
+    ];
     let both_measured = |path: &Path| path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("toml"));
     let no_case = both_measured(&args.spectrum) && args.second.as_deref().is_none_or(both_measured);
     if let (true, Some((option, _))) = (no_case, only_models.into_iter().find(|(_, given)| *given)) {
@@ -162,8 +169,14 @@ impl Found {
     fn told(&self) -> String {
         match &self.source {
             Source::Spectrum(spectrum) => {
-                let peaks: Vec<String> = spectrum.peaks().iter().map(|peak| format!("{:.1}", peak.0)).collect();
-                format!("{}; axis {}; peaks at {} Hz", spectrum.origin, spectrum.axis.word(), peaks.join(", "))
+                let peak = |peak: &(f64, f64)| match spectrum.main_axis(peak.0) {
+                    Some((axis, part)) if spectrum.axis == Axis::All => {
+                        format!("{:.1} Hz ({:.0} % along {})", peak.0, 100.0 * part, axis.word())
+                    }
+                    _ => format!("{:.1} Hz", peak.0),
+                };
+                let peaks: Vec<String> = spectrum.peaks().iter().map(peak).collect();
+                format!("{}; axis {}; peaks at {}", spectrum.origin, spectrum.axis.word(), peaks.join(", "))
             }
             Source::Model { title, drive, modes } => {
                 let word = match drive {
