@@ -41,10 +41,8 @@ pub struct Resonance {
 /// ζ = φᵀ C φ / (2 ω φᵀ M φ) hold for light damping. Modes that are damped so much that they do not vibrate are left out.
 pub fn resonances(stage: &Stage, drive: Drive) -> Result<Vec<Resonance>> {
     if stage.belt.model == BeltModel::Rigid {
-        let error = Error::new("belt.model is \"rigid\", and a rigid belt has no resonance");
-        return Err(error
-            .allowed("elastic, two-mass")
-            .next("describe the belt's stiffness, or give a measured spectrum"));
+        let error = Error::new("a rigid belt has no resonance").allowed("belt.model = \"elastic\" or \"two-mass\"");
+        return Err(error.next("describe the belt's stiffness, or give a measured spectrum"));
     }
     let places = match (&stage.travel, stage.belt.follows_cart) {
         (Some(travel), true) => {

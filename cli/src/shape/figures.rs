@@ -90,12 +90,14 @@ fn axes(one: &Found, spectrum: &Spectrum) -> Figure {
 fn model(one: &Found, modes: &[Resonance]) -> Figure {
     let high = modes.iter().filter(|mode| mode.share > 0.05).map(|mode| mode.frequency).fold(0.0, f64::max);
     let main = super::main_mode(modes).map_or(0.1, |mode| mode.damping);
-    let lines = Series::new(
-        "modes",
-        modes.iter().map(|mode| mode.frequency).filter(|f| *f <= 1.5 * high).collect::<Vec<_>>(),
-        modes.iter().filter(|mode| mode.frequency <= 1.5 * high).map(|mode| mode.share).collect::<Vec<_>>(),
-    );
-    let above = Panel::new(Axis::new("Motion of the cart", "")).series(lines.style(Style::Points).colour(Colour::Ink));
+    // A line for each mode, from zero up.
+    let (mut at, mut height) = (Vec::new(), Vec::new());
+    for mode in modes.iter().filter(|mode| mode.frequency <= 1.5 * high) {
+        at.extend([mode.frequency; 3]);
+        height.extend([0.0, mode.share, f64::NAN]);
+    }
+    let lines = Series::new("modes", at, height);
+    let above = Panel::new(Axis::new("Motion of the cart", "")).series(lines.colour(Colour::Ink));
     let mut legend = responses(one, &[0.0, 1.5 * high], &[main]);
     for (series, fitted) in legend.series.iter_mut().zip(&one.choice.fitted) {
         series.name = format!("{} {:.1} Hz", fitted.shaper.kind.name(), fitted.shaper.frequency);
