@@ -89,7 +89,6 @@ fn axes(one: &Found, spectrum: &Spectrum) -> Figure {
 /// Frequencies of a model, and what shapers leave there.
 fn model(one: &Found, modes: &[Resonance]) -> Figure {
     let high = modes.iter().filter(|mode| mode.share > 0.05).map(|mode| mode.frequency).fold(0.0, f64::max);
-    let main = super::main_mode(modes).map_or(0.1, |mode| mode.damping);
     // A line for each mode, from zero up.
     let (mut at, mut height) = (Vec::new(), Vec::new());
     for mode in modes.iter().filter(|mode| mode.frequency <= 1.5 * high) {
@@ -98,7 +97,7 @@ fn model(one: &Found, modes: &[Resonance]) -> Figure {
     }
     let lines = Series::new("modes", at, height);
     let above = Panel::new(Axis::new("Motion of the cart", "")).series(lines.colour(Colour::Ink));
-    let mut legend = responses(one, &[0.0, 1.5 * high], &[main]);
+    let mut legend = responses(one, &[0.0, 1.5 * high], &[super::damping(modes)]);
     for (series, fitted) in legend.series.iter_mut().zip(&one.choice.fitted) {
         series.name = format!("{} {:.1} Hz", fitted.shaper.kind.name(), fitted.shaper.frequency);
     }
@@ -108,7 +107,7 @@ fn model(one: &Found, modes: &[Resonance]) -> Figure {
         .vertical(one.choice.best().shaper.frequency, "")
         .caption(
             "Above the modes at all places of the travel, by how far each moves the cart, of the strongest; below what each \
-             shaper leaves of a mode with the damping ratio of the strongest. The solid line is the recommended one.",
+             shaper leaves of a mode with the strongest ones' mean damping ratio. The solid line is the recommended one.",
         )
 }
 

@@ -79,7 +79,7 @@ fn find(args: &Args, file: &Path) -> Result<Found> {
     let source = if is_case { model(args, file)? } else { measured(args, file)? };
     // What the model knows is better than a guess; what the user says, better still.
     let known = match &source {
-        Source::Model { modes, .. } => main_mode(modes).map(|mode| mode.damping),
+        Source::Model { modes, .. } => Some(damping(modes)),
         Source::Spectrum(_) => None,
     };
     if let Some(damping) = args.damping.or(known) {
@@ -94,9 +94,10 @@ fn find(args: &Args, file: &Path) -> Result<Found> {
     Ok(Found { file: file.to_path_buf(), source, criterion, choice })
 }
 
-/// The mode that moves the cart most.
-fn main_mode(modes: &[Resonance]) -> Option<&Resonance> {
-    modes.iter().max_by(|a, b| a.share.total_cmp(&b.share))
+/// The mean damping ratio of the modes that move the cart most, over the travel.
+fn damping(modes: &[Resonance]) -> f64 {
+    let main: Vec<f64> = modes.iter().filter(|mode| mode.share == 1.0).map(|mode| mode.damping).collect();
+    main.iter().sum::<f64>() / main.len().max(1) as f64
 }
 
 fn model(args: &Args, file: &Path) -> Result<Source> {
@@ -192,7 +193,7 @@ impl Found {
                     d if d < 0.05 => format!("{high:.1} Hz wherever the cart is"),
                     _ => format!("{low:.1} to {high:.1} Hz along the travel"),
                 };
-                let damping = main_mode(modes).map_or(0.0, |mode| mode.damping);
+                let damping = damping(modes);
                 format!(
                     "the model of \"{title}\", motor {word}; the cart vibrates at {range}, damping ratio {damping:.3}"
                 )
