@@ -114,9 +114,12 @@ fn humps_are_as_high_as_the_tolerance() {
     }
 }
 
+/// In % below and above.
+type Range = (f64, f64);
+
 /// Klipper's documentation, "Resonance Compensation", Technical details: ranges in % of the shaper's frequency within which
 /// vibration is reduced 20 and 10 times, said to be approximate, for shapers of ζ = 0.1 and machines around that.
-const PUBLISHED: [(Kind, Option<(f64, f64)>, (f64, f64)); 6] = [
+const PUBLISHED: [(Kind, Option<Range>, Range); 6] = [
     (Kind::Zv, None, (-5.0, 5.0)),
     (Kind::Mzv, Some((-4.0, 4.0)), (-10.0, 15.0)),
     (Kind::Zvd, Some((-15.0, 15.0)), (-22.0, 22.0)),
