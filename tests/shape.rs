@@ -205,6 +205,55 @@ fn what_klipper_printed() {
     }
 }
 
+fn temporary(name: &str, text: &str) -> PathBuf {
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    fs::write(&file, text).unwrap();
+    file
+}
+
+/// A file that names shapers holds densities that are divided by frequency already, with a column that marks them or without.
+#[test]
+fn spectra_with_shapers_are_divided_already() {
+    let plain: Vec<(f64, f64)> =
+        (0..140).map(|k| 1.5 * f64::from(k)).map(|f| (f, 1e5 / (1.0 + ((f - 44.0) / 4.0).powi(2)))).collect();
+    let mut text = String::from("freq,psd_x,psd_y,psd_z,psd_xyz\n");
+    let mut divided = [
+        "freq,psd_x,psd_y,psd_z,psd_xyz,zv(44.0),mzv(44.0)\n",
+        "# accelerometer x\nfreq,psd_x,psd_y,psd_z,psd_xyz,shapers:,mzv(44.0)\n",
+    ]
+    .map(String::from);
+    for (f, p) in plain {
+        text += &format!("{f},{p},0,0,{p}\n");
+        let (q, kept) = (p / (f + 0.1), if f < 5.0 { 0.0 } else { 1.0 });
+        divided[0] += &format!("{f},{0},0,0,{0},0.5,0.4\n", q * kept);
+        divided[1] += &format!("{f},{0},0,0,{0},,0.4\n", q * kept);
+    }
+    let expected = spectrum(&temporary("resonances_x.csv", &text));
+    for (name, text) in ["calibration_data_x.csv", "calibration_data_y.csv"].iter().zip(&divided) {
+        let read = spectrum(&temporary(name, text));
+        let far = read.density.iter().zip(&expected.density).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(far < 1e-12 * expected.greatest(), "{name}: {far}");
+    }
+}
+
+/// Samples from a file, as Klipper writes them: the names stand in a remark.
+#[test]
+fn samples_from_a_file() {
+    let mut text = String::from("#time,accel_x,accel_y,accel_z\n");
+    for k in 0..3200 {
+        let t = f64::from(k) / 1600.0;
+        text += &format!("{:.6},{:.6},0.5,9806.65\n", 100.0 + t, 700.0 * (2.0 * PI * 50.0 * t).sin());
+    }
+    let spectrum = spectrum(&temporary("raw_data_x.csv", &text));
+    let peaks = spectrum.peaks();
+    assert!(peaks.len() == 1 && (peaks[0].0 - 50.0).abs() < 0.1, "{peaks:?}");
+    assert_eq!(spectrum.main_axis(peaks[0].0).unwrap().0, Axis::X);
+    // Half the squared amplitude, spread over a few frequencies.
+    let width = spectrum.frequency[1] - spectrum.frequency[0];
+    let power: f64 = spectrum.frequency.iter().zip(&spectrum.density).map(|(f, p)| p * (f + 0.1) * width).sum();
+    assert!((power / (0.5 * 700.0 * 700.0) - 1.0).abs() < 1e-3, "{power}");
+}
+
 /// The lighter motor: the first peak goes from 40.0 to 45.0 Hz (../shared/data/README.md).
 #[test]
 fn two_motors_compared() {

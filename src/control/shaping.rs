@@ -106,6 +106,8 @@ pub struct Fitted {
     pub score: f64,
     /// Whether it may be recommended.
     pub is_candidate: bool,
+    /// Whether its frequency is the lowest that is tried: a lower one might leave less, and would smooth more.
+    pub is_lowest: bool,
 }
 
 /// All kinds at their best, and the one to take.
@@ -214,7 +216,8 @@ pub fn choose(target: Target<'_>, criterion: &Criterion) -> Result<Choice> {
 
 /// A kind at its best frequency; none if it always smooths too much.
 fn fit(target: Target<'_>, kind: Kind, criterion: &Criterion) -> Option<Fitted> {
-    let tried = target.grid(kind).into_iter().filter_map(|frequency| {
+    let grid = target.grid(kind);
+    let tried = grid.iter().copied().filter_map(|frequency| {
         let shaper = Shaper::of(kind, frequency, criterion.damping);
         let smoothing = shaper.smoothing(&criterion.corner);
         if criterion.max_smoothing.is_some_and(|most| smoothing > most) {
@@ -240,6 +243,7 @@ fn fit(target: Target<'_>, kind: Kind, criterion: &Criterion) -> Option<Fitted> 
         max_acceleration: shaper.max_acceleration(ALLOWED_SMOOTHING, criterion.corner.speed),
         score: *score,
         is_candidate: criterion.candidates.contains(&kind),
+        is_lowest: grid.first() == Some(&shaper.frequency),
     })
 }
 

@@ -87,9 +87,9 @@ impl Heading {
     fn read(file: &Path) -> Result<Self> {
         let mut lines = Lines::new(file, open(file)?);
         let there = lines.advance()?;
+        let names = |text: &str| ["accel", "psd"].iter().any(|word| text.to_lowercase().contains(word));
         // A remark names them where the first line has numbers already.
-        let remark = lines.remark.to_lowercase();
-        if there && (remark.contains("accel") || remark.contains("psd")) {
+        if there && !names(&lines.text) && names(&lines.remark) {
             return Ok(Self { text: lines.remark.clone(), place: Place::file(file) });
         }
         if !there {

@@ -61,6 +61,7 @@ fn fitted(fitted: &Fitted) -> Value {
         "max_acceleration": fitted.max_acceleration,
         "score": fitted.score,
         "candidate": fitted.is_candidate,
+        "lowest_tried": fitted.is_lowest,
         "impulses": impulses,
     })
 }

@@ -45,8 +45,7 @@ fn shapers(page: &mut Page, one: &Found) {
     for (i, fitted) in one.choice.fitted.iter().enumerate() {
         let word = match () {
             () if i == one.choice.recommended => Cell::Badge(Callout::Holds, "recommended".into()),
-            () if !fitted.is_candidate => Cell::from("not a candidate"),
-            () => Cell::from(""),
+            () => Cell::from(table::remark(fitted)),
         };
         let name = Cell::from(fitted.shaper.kind.name());
         let numbers = table::words(fitted).map(Cell::Number);

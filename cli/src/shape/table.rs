@@ -37,11 +37,20 @@ fn shapers(text: &mut String, one: &Found) {
     for fitted in &one.choice.fitted {
         let [frequency, vibration, smoothing, acceleration] = words(fitted);
         let name = fitted.shaper.kind.name();
-        let remark = if fitted.is_candidate { "" } else { "  not a candidate" };
-        let _ = writeln!(
-            text,
-            "  {name:<8} {frequency:>7} Hz {vibration:>8} % {smoothing:>7} mm {acceleration:>9} mm/s^2{remark}"
+        let row = format!(
+            "  {name:<8} {frequency:>7} Hz {vibration:>8} % {smoothing:>7} mm {acceleration:>9} mm/s^2  {}",
+            remark(fitted)
         );
+        let _ = writeln!(text, "{}", row.trim_end());
+    }
+}
+
+/// What else there is to say.
+pub fn remark(fitted: &Fitted) -> &'static str {
+    match (fitted.is_candidate, fitted.is_lowest) {
+        (false, _) => "not a candidate",
+        (true, true) => "the lowest frequency tried",
+        (true, false) => "",
     }
 }
 
