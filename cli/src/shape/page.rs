@@ -12,7 +12,7 @@ pub fn page(found: &Findings, figures: &[(String, Figure)]) -> Page {
         page.section(&one.name());
         let best = one.choice.best();
         let recommended = format!("{} at {:.1} Hz", best.shaper.kind.name(), best.shaper.frequency);
-        page.callout(Callout::Holds, recommended, format!("{}.", one.choice.reason));
+        page.callout(Callout::Note, recommended, format!("{}.", one.choice.reason));
         page.prose(format!("{}.", one.told()));
         shapers(&mut page, one);
         for (name, figure) in figures.iter().filter(|(name, _)| name != "compared") {
