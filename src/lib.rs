@@ -48,6 +48,7 @@
 //! - [`log`]: measured columns in. [`case`]: the case file in.
 //! - [`solve`]: the motion. [`measure`]: what a recorder makes of it. [`metrics`]: what it shows. [`reduction`]: how far a reduced model
 //!   is from the elastic one.
+//! - [`control`]: input shapers, from spectra and from the model.
 //! - [`fit`]: parameters from logs, and what the logs cannot tell.
 //! - `report`: figures, drawings and an HTML page of them (feature `report`, on by default).
 //!
@@ -56,6 +57,7 @@
 //! `report` (default) adds figures and reports; `parquet` adds Parquet files. Without both the library is the physics alone.
 
 pub mod case;
+pub mod control;
 pub mod error;
 pub mod files;
 pub mod fit;

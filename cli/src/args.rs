@@ -2,6 +2,7 @@
 
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
+use taut::control::shaper::Kind;
 use taut::quantity;
 use taut::solve::{Method, Solver};
 use taut::stage::Stage;
@@ -28,6 +29,7 @@ pub enum Command {
     Simulate(Simulate),
     Check(Check),
     Fit(Fit),
+    Shape(Shape),
 }
 
 /// Recompute the paper of Sollmann and Jouaneh (2011): every table, figure and claim.
@@ -169,6 +171,83 @@ Examples:
 
 Ctrl-C ends a fit early: the best so far is written and said not to be converged, with exit status 130.";
 
+/// Recommend an input shaper, from a measured spectrum or from a model.
+///
+/// Takes a spectrum (Klipper's resonances_*.csv, calibration_data_*.csv), raw accelerometer samples (raw_data_*.csv), or a case
+/// file, whose resonances along the travel are computed. Prints for each shaper the best frequency, the vibration that
+/// remains, smoothing and the greatest acceleration, and which one to take. A second spectrum is compared with the first.
+#[derive(Debug, clap::Args)]
+#[command(after_help = SHAPE)]
+pub struct Shape {
+    /// A spectrum, accelerometer samples, or a case file (.toml)
+    pub spectrum: PathBuf,
+    /// Another one to compare: the other belt, or after a change
+    pub second: Option<PathBuf>,
+    /// The folder to write results into; it is made if it is not there
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Change one value of a case file, as often as needed
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub changes: Vec<String>,
+    /// Axis of the accelerometer [default: the sum of x, y and z]
+    #[arg(long, value_enum)]
+    pub axis: Option<AxisName>,
+    /// Damping ratio that shapers are designed for [default: 0.1, or the model's]
+    #[arg(long, value_name = "RATIO")]
+    pub damping: Option<f64>,
+    /// Most smoothing that is allowed, such as "0.1 mm" [default: any]
+    #[arg(long, value_name = "LENGTH", value_parser = smoothing)]
+    pub max_smoothing: Option<f64>,
+    /// Speed at right-angled corners, of which smoothing is computed [default: "5 mm/s"]
+    #[arg(long, value_name = "SPEED", value_parser = corner_speed)]
+    pub corner_speed: Option<f64>,
+    /// Shapers to choose from, separated by commas: zv, mzv, zvd, ei, 2hump_ei, 3hump_ei [default: all but zvd]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES", value_parser = shaper)]
+    pub shapers: Vec<Kind>,
+    /// Of a case file: by which part its frequencies may be wrong [default: 0.1]
+    #[arg(long, value_name = "PART", value_parser = uncertainty)]
+    pub uncertainty: Option<f64>,
+    /// Of a case file: what the motor does [default: held]
+    #[arg(long, value_enum)]
+    pub motor: Option<MotorName>,
+    /// Leave out the report and the pictures
+    #[arg(long)]
+    pub no_report: bool,
+    /// Print the result as JSON, the same as in shape.json
+    #[arg(long)]
+    pub json: bool,
+    /// Print nothing but errors
+    #[arg(long, short, conflicts_with = "json")]
+    pub quiet: bool,
+}
+
+const SHAPE: &str = "\
+Examples:
+  taut shape resonances_x_20210821_152037.csv --out shaped
+  taut shape raw_data_x.csv --axis x --max-smoothing \"0.15 mm\"
+  taut shape belt_a.csv belt_b.csv
+  taut shape axis.toml --set cart.mass=\"0.5 kg\" --json | jq .recommended";
+
+/// An axis of the accelerometer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum AxisName {
+    /// x alone
+    X,
+    /// y alone
+    Y,
+    /// z alone
+    Z,
+}
+
+/// What the motor does while the cart vibrates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MotorName {
+    /// It follows its command, as a stepper motor or a stiff position loop makes it
+    Held,
+    /// It gives way, as with a commanded voltage or current
+    Free,
+}
+
 /// How the equations are solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum SolverName {
@@ -245,4 +324,39 @@ fn seconds(text: &str) -> Result<f64, String> {
         Err(_) => quantity::read(text, "s").map_err(|e| e.to_string())?,
     };
     if step > 0.0 && f64::is_finite(step) { Ok(step) } else { Err("a step above zero is needed, such as 0.1ms".into()) }
+}
+
+fn smoothing(text: &str) -> Result<f64, String> {
+    if text.trim().parse::<f64>().is_ok() {
+        return Err("a length with its unit is needed, such as \"0.1 mm\"".into());
+    }
+    let length = quantity::read(text, "m").map_err(|e| e.to_string())?;
+    if (1e-7..=0.1).contains(&length) {
+        return Ok(length);
+    }
+    Err("a length from 0.0001 mm to 100 mm is needed, such as \"0.1 mm\"".into())
+}
+
+fn corner_speed(text: &str) -> Result<f64, String> {
+    if text.trim().parse::<f64>().is_ok() {
+        return Err("a speed with its unit is needed, such as \"5 mm/s\"".into());
+    }
+    let speed = quantity::read(text, "m/s").map_err(|e| e.to_string())?;
+    if (0.0..=10.0).contains(&speed) {
+        Ok(speed)
+    } else {
+        Err("a speed from 0 to 10 m/s is needed, such as \"5 mm/s\"".into())
+    }
+}
+
+fn shaper(text: &str) -> Result<Kind, String> {
+    let names = || Kind::ALL.map(Kind::name).join(", ");
+    Kind::from_name(text).ok_or_else(|| format!("there is no such shaper; there are {}", names()))
+}
+
+fn uncertainty(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(part) if (0.0..=0.5).contains(&part) => Ok(part),
+        _ => Err("a part from 0 to 0.5 is needed, such as 0.1 for 10 %".into()),
+    }
 }

@@ -7,6 +7,7 @@ mod fit;
 mod init;
 mod interrupt;
 mod paper;
+mod shape;
 mod simulate;
 mod terminal;
 
@@ -26,6 +27,7 @@ fn main() -> ExitCode {
         Command::Simulate(args) => simulate::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Fit(args) => fit::run(&args),
+        Command::Shape(args) => shape::run(&args),
     };
     match done {
         Ok(Status::Done) => ExitCode::SUCCESS,
