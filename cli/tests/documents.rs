@@ -119,6 +119,8 @@ fn what_the_documents_name_is_there() {
         "CHANGELOG.md",
         "docs/case-file.md",
         "docs/commands.md",
+        "docs/fit.md",
+        "docs/logs.md",
         "docs/paper.md",
         "docs/shape.md",
         "docs/solver.md",
@@ -127,6 +129,7 @@ fn what_the_documents_name_is_there() {
         "stages/printer-axis/README.md",
         "stages/laser-gantry/README.md",
         "stages/pendulepi/README.md",
+        "stages/ced/README.md",
         "stages/emps/README.md",
         "stages/two-mass/README.md",
     ];
