@@ -6,6 +6,7 @@ mod failure;
 mod fit;
 mod init;
 mod interrupt;
+mod modes;
 mod paper;
 mod simulate;
 mod terminal;
@@ -26,6 +27,7 @@ fn main() -> ExitCode {
         Command::Simulate(args) => simulate::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Fit(args) => fit::run(&args),
+        Command::Modes(args) => modes::run(&args),
     };
     match done {
         Ok(Status::Done) => ExitCode::SUCCESS,

@@ -13,12 +13,14 @@ mod frame;
 mod model;
 mod response;
 mod travel;
+mod words;
 mod zeros;
 
 pub use discrete::{Discrete, Hold};
 pub use model::{Operation, StateSpace, Variable};
 pub use response::{Range, Response, Transfer};
 pub use travel::{Place, places, travel, undamped};
+pub use words::{assumptions, sticks};
 pub use zeros::Zeros;
 
 use crate::error::Result;
