@@ -241,7 +241,7 @@ fn spans_that_follow_the_cart() {
     assert!((positions[0] + 0.38).abs() < 1e-12 && (positions[4] - 0.38).abs() < 1e-12);
     let along = travel(&stage, Operation::default(), &positions).unwrap();
     // Near the drive pulley the cart hangs on a short span.
-    assert!(along[4].undamped_antiresonances[0] > 2.0 * along[2].undamped_antiresonances[0], "{along:?}");
+    assert!(along[4].undamped_antiresonances[1] > 2.0 * along[2].undamped_antiresonances[1], "{along:?}");
     // Where the axis is built symmetric it is so for the anti-resonance with both pulleys held.
     let both = Operation { held: [true, false, true], ..Operation::default() };
     let at = |position| hertz(&StateSpace::of(&stage, Operation { position, ..both }).unwrap());
@@ -265,9 +265,9 @@ fn phases_run_on_from_where_they_begin() {
     let ends = |name: &str| (of(name).degrees()[0], *of(name).degrees().last().unwrap());
     // An integrator begins at −90°. Four poles more than zeros, or two, where it ends.
     let (begin, end) = ends("drive_angle");
-    assert!((begin + 90.0).abs() < 5.0 && (end + 180.0).abs() < 5.0, "{begin} {end}");
+    assert!((begin + 90.0).abs() < 10.0 && (end + 180.0).abs() < 5.0, "{begin} {end}");
     let (begin, end) = ends("cart_position");
-    assert!((begin + 90.0).abs() < 5.0 && (end + 360.0).abs() < 5.0, "{begin} {end}");
+    assert!((begin + 90.0).abs() < 10.0 && (end + 360.0).abs() < 5.0, "{begin} {end}");
     for response in &responses {
         let jump = response.phase.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
         assert!(jump < 1.0, "{jump}");

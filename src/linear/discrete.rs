@@ -3,7 +3,7 @@
 use super::StateSpace;
 use super::eigen::{balance, norm, scaled};
 use super::response::solve;
-use super::zeros::{Zeros, zeros};
+use super::zeros::{Zeros, relative_degree, zeros};
 use crate::error::{Error, Result};
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -182,7 +182,8 @@ impl Discrete {
         let d = *self.d.get(output)?;
         let (change, input, rows) = &self.inner;
         // Of z − 1, which is where A − I has its eigenvalues.
-        let found = zeros(change, input, &rows.row(output).transpose(), d);
+        let row = rows.row(output).transpose();
+        let found = zeros(change, input, &row, d, relative_degree(change, input, &row, d));
         Some(found.map(|found| Zeros { values: found.values.into_iter().map(|v| v + 1.0).collect(), gain: found.gain }))
     }
 

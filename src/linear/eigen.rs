@@ -85,6 +85,15 @@ pub(crate) fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
     Ok(values)
 }
 
+/// The same as the Schur form gives them: each within a few roundings of the largest.
+pub(crate) fn rough(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
+    let (mut values, rest) = taken_apart(matrix);
+    if rest.nrows() > 0 {
+        values.extend(schur(&scaled(&rest, &balance(&rest)))?);
+    }
+    Ok(values)
+}
+
 /// By absolute value, then conjugates together.
 pub(crate) fn sort(values: &mut [Complex<f64>]) {
     values.sort_by(|p, q| p.norm().total_cmp(&q.norm()).then(q.im.total_cmp(&p.im)));
@@ -154,6 +163,7 @@ pub(crate) fn polished(matrix: &DMatrix<f64>, count: usize, s: Complex<f64>, apa
     };
     let kept =
         |v: &DVector<Complex<f64>>| DVector::from_fn(n, |i, _| if i < count { v[i] } else { Complex::new(0.0, 0.0) });
+    let size = norm(matrix);
     let start = DVector::from_fn(n, |i, _| Complex::new(1.0 + 0.1 * i as f64, 0.3));
     let mut best = s;
     for _ in 0..2 {
@@ -165,7 +175,7 @@ pub(crate) fn polished(matrix: &DMatrix<f64>, count: usize, s: Complex<f64>, apa
             (x, y) = (next_x.unscale(next_x.norm()), next_y.unscale(next_y.norm()));
         }
         let change = y.dotc(&(&at * &x)) / y.dotc(&kept(&x));
-        if !(change.norm() <= 0.1 * apart && change.norm() <= 1e-3 * best.norm()) {
+        if !(change.norm() <= 0.1 * apart && change.norm() <= 1e-3 * best.norm() + 1e-8 * size) {
             return best;
         }
         best += change;

@@ -24,7 +24,7 @@ pub use words::{assumptions, sticks};
 pub use zeros::Zeros;
 
 use crate::error::Result;
-use nalgebra::Complex;
+use nalgebra::{Complex, DMatrix};
 use std::f64::consts::PI;
 
 impl StateSpace {
@@ -37,8 +37,9 @@ impl StateSpace {
     /// takes the integrator away. None for an output that there is not.
     pub fn zeros(&self, output: usize) -> Option<Result<Zeros>> {
         let d = *self.d.get(output)?;
-        let c = self.inner.c.row(output).transpose();
-        Some(zeros::zeros(&self.inner.a, &self.inner.b, &c, d))
+        let row = |c: &DMatrix<f64>| c.row(output).transpose();
+        let degree = zeros::relative_degree(&self.a, &self.b, &row(&self.c), d);
+        Some(zeros::zeros(&self.inner.a, &self.inner.b, &row(&self.inner.c), d, degree))
     }
 }
 
