@@ -71,7 +71,7 @@ fn bode(analysis: &Analysis, title: &str, outputs: &[&str]) -> Option<Figure> {
 
 /// Resonance and anti-resonance over the cart's position.
 fn map(travel: &[Place]) -> Figure {
-    let mut panel = Panel::new(Axis::new("Frequency", "Hz")).weight(1.2);
+    let mut panel = Panel::new(Axis::new("Frequency", "Hz").logarithmic()).weight(1.4);
     let mut damping = Panel::new(Axis::new("Damping ratio", ""));
     let count = travel.iter().map(|place| place.resonances.len().max(place.antiresonances.len())).max().unwrap_or(0);
     let position = || -> Vec<f64> { travel.iter().map(|place| place.position).collect() };
