@@ -9,6 +9,7 @@ use proptest::prelude::*;
 use serde_json::Value;
 use std::f64::consts::PI;
 use taut::case::Case;
+use taut::friction::{Friction, Law, Shape};
 use taut::linear::{Hold, Operation, Range, Root, StateSpace, places, travel, undamped};
 use taut::signal::Signal;
 use taut::solve::{Solver, simulate};
@@ -213,6 +214,30 @@ fn the_response_is_what_a_run_shows() {
     }
 }
 
+/// Bristles that slide steadily carry what a Stribeck curve says; at rest they hold the cart like a spring.
+#[test]
+fn bristles_slide_like_the_curve_and_hold_like_a_spring() {
+    let with = |law: Law| {
+        let mut stage = undamped(&table2());
+        stage.cart.friction = Friction::with_breakaway(19.0, 0.2, 0.3).following(law);
+        stage
+    };
+    let bristles = with(Law::LuGre { stiffness: 1e5, damping: 30.0, velocity: 0.1 });
+    let curve = with(Law::Stribeck { velocity: 0.1, shape: Shape::Gaussian });
+    let gain = |stage: &Stage, speed: f64| {
+        let system = StateSpace::of(stage, Operation { speed, ..Operation::default() }).unwrap();
+        system.transfers().unwrap()[system.output("cart_speed").unwrap()].low_frequency()
+    };
+    for speed in [0.02, 0.1, -0.3] {
+        let ((zero, a), (none, b)) = (gain(&bristles, speed), gain(&curve, speed));
+        assert!(zero == 0 && none == 0 && (a / b - 1.0).abs() < 1e-9, "{speed}: {a} {b}");
+    }
+    let rest = Operation { speed: 0.0, held: [true, false, true], ..Operation::default() };
+    let [k1, k2, _] = bristles.belt.stiffness;
+    let swing = StateSpace::of(&bristles, rest).unwrap().poles().unwrap().pop().unwrap().norm_sqr();
+    assert!((swing / ((k1 + k2 + 1e5) / bristles.cart.mass) - 1.0).abs() < 1e-12, "{swing}");
+}
+
 /// Two inertias on one spring: ω² = k (1/J + 1/J′), clamped k/J′.
 #[test]
 fn two_masses_by_hand() {
@@ -229,7 +254,7 @@ fn two_masses_by_hand() {
     assert!((found.undamped_antiresonances[0] / by_hand(k / m) - 1.0).abs() < 1e-12);
 }
 
-/// The resonances of Table 1 and 2 that the paper's own matrices have.
+/// k = A E / l with the length that is left of a span.
 #[test]
 fn spans_that_follow_the_cart() {
     let make = BeltMake { modulus: 4e9, section: 4e-6, spans: [0.4, 0.4, 0.8] };

@@ -1,7 +1,7 @@
 //! Discrete-time models: the stage as a controller with a sample time sees it.
 
 use super::StateSpace;
-use super::eigen::{balance, norm, scaled};
+use super::eigen::norm;
 use super::response::solve;
 use super::zeros::{Zeros, relative_degree, zeros};
 use crate::error::{Error, Result};
@@ -70,10 +70,7 @@ impl StateSpace {
             );
         }
         let n = self.a.nrows();
-        let scale = balance(&self.inner.a);
-        let a = scaled(&self.inner.a, &scale);
-        let b = self.inner.b.component_div(&scale);
-        let c = DMatrix::from_fn(self.inner.c.nrows(), n, |i, j| self.inner.c[(i, j)] * scale[j]);
+        let (a, b, c, scale) = self.balanced();
         let (change, input, output, direct) = match hold {
             Hold::Zero => {
                 let (change, gamma, _) = held(&a, &b, t);

@@ -146,13 +146,13 @@ impl Range {
 impl StateSpace {
     /// G(jω) of every output; ω in rad/s, not on a pole.
     pub fn at(&self, omega: f64) -> Vec<Complex<f64>> {
-        let (a, b, c) = self.balanced();
+        let (a, b, c, _) = self.balanced();
         solve(&a, &b, &c, &self.d, Complex::new(0.0, omega))
     }
 
     /// The responses of the outputs whose `transfers` are given, in the same order, at frequencies in rad/s.
     pub fn responses(&self, transfers: &[Transfer], frequencies: &[f64]) -> Vec<Response> {
-        let (a, b, c) = self.balanced();
+        let (a, b, c, _) = self.balanced();
         let at = |omega: &f64| solve(&a, &b, &c, &self.d, Complex::new(0.0, *omega));
         let values: Vec<Vec<Complex<f64>>> = frequencies.iter().map(at).collect();
         let response = |(output, transfer): (usize, &Transfer)| {
@@ -174,11 +174,11 @@ impl StateSpace {
         each.map(|zeros| Ok(Transfer { poles: poles.clone(), zeros: zeros? })).collect()
     }
 
-    /// The inner system, balanced.
-    fn balanced(&self) -> (DMatrix<f64>, DVector<f64>, DMatrix<f64>) {
+    /// The inner system, balanced: A, b, C, and by what each state was divided.
+    pub(super) fn balanced(&self) -> (DMatrix<f64>, DVector<f64>, DMatrix<f64>, DVector<f64>) {
         let scale = balance(&self.inner.a);
         let c = DMatrix::from_fn(self.inner.c.nrows(), self.inner.c.ncols(), |i, j| self.inner.c[(i, j)] * scale[j]);
-        (scaled(&self.inner.a, &scale), self.inner.b.component_div(&scale), c)
+        (scaled(&self.inner.a, &scale), self.inner.b.component_div(&scale), c, scale)
     }
 }
 

@@ -45,7 +45,7 @@ pub fn text(analysis: &Analysis) -> String {
         "B": column(&system.b),
         "C": matrix(&system.c),
         "D": column(&system.d),
-        "poles": analysis.transfers.first().map_or(Vec::new(), |t| poles(t)),
+        "poles": analysis.transfers.first().map_or(Vec::new(), poles),
         "stiffness_depends_on_position": analysis.travel.is_some(),
         "here": place(&analysis.here),
         "travel": analysis.travel.as_ref().map(|travel| travel.iter().map(place).collect::<Vec<_>>()),
