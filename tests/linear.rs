@@ -306,6 +306,19 @@ fn stages_without_losses() {
     assert!(poles.iter().all(|p| p.re.abs() <= 1e-12 * p.norm()), "{poles:?}");
 }
 
+/// With every body held the current alone is left, and without an inductance it is no state: a system without states.
+#[test]
+fn nothing_is_left_to_move() {
+    let held = Operation { held: [true; 3], ..Operation::default() };
+    let system = StateSpace::of(&table4(), held).unwrap();
+    assert_eq!((system.states.len(), system.poles().unwrap().len()), (0, 0));
+    let transfers = system.transfers().unwrap();
+    let current = system.output("motor_current").unwrap();
+    assert!((transfers[current].low_frequency().1 * 0.71 - 1.0).abs() < 1e-15);
+    assert_eq!(system.responses(&transfers, &[1.0])[current].value[0].re, 1.0 / 0.71);
+    assert!(system.discrete(1e-3, Hold::Zero, 0.0).is_err());
+}
+
 #[test]
 fn what_cannot_be_sampled_is_said() {
     let system = StateSpace::of(&table2(), Operation::default()).unwrap();

@@ -70,6 +70,12 @@ impl StateSpace {
             );
         }
         let n = self.a.nrows();
+        if n == 0 {
+            return allowed(
+                "nothing is left to move, and so nothing to sample".into(),
+                "a stage of which a body moves",
+            );
+        }
         let (a, b, c, scale) = self.balanced();
         let (change, input, output, direct) = match hold {
             Hold::Zero => {

@@ -190,6 +190,9 @@ pub(super) fn solve(
     d: &DVector<f64>,
     s: Complex<f64>,
 ) -> Vec<Complex<f64>> {
+    if a.nrows() == 0 {
+        return d.iter().map(|d| Complex::new(*d, 0.0)).collect();
+    }
     let mut shifted = a.map(|v| Complex::new(-v, 0.0));
     for i in 0..a.nrows() {
         shifted[(i, i)] += s;

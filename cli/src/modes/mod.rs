@@ -16,6 +16,7 @@ use taut::files::write_atomically;
 use taut::linear::{
     Discrete, Hold, Operation, Place, Range, Response, StateSpace, Transfer, assumptions, places, sticks, travel,
 };
+use taut::stage::BeltModel;
 use taut::{Error, Result};
 
 /// Places along the travel.
@@ -88,6 +89,9 @@ impl<'a> Analysis<'a> {
     fn along(&self) -> &'static str {
         let stage = &self.case.stage;
         match (&self.travel, stage.belt.make) {
+            _ if stage.belt.model == BeltModel::Rigid => {
+                "a rigid belt has no spans that could change with the position"
+            }
             (Some(_), _) => "spans 1 and 2 follow the cart: k = A E / l with the length that is left",
             (None, Some(_)) => {
                 "the same along the travel: this file's stiffness does not depend on the position \
