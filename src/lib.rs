@@ -49,6 +49,7 @@
 //! - [`solve`]: the motion. [`measure`]: what a recorder makes of it. [`metrics`]: what it shows. [`reduction`]: how far a reduced model
 //!   is from the elastic one.
 //! - [`control`]: input shapers, from spectra and from the model.
+//! - [`linear`]: state space, poles, zeros, frequency response, resonance along the travel.
 //! - [`fit`]: parameters from logs, and what the logs cannot tell.
 //! - `report`: figures, drawings and an HTML page of them (feature `report`, on by default).
 //!
@@ -62,6 +63,7 @@ pub mod error;
 pub mod files;
 pub mod fit;
 pub mod friction;
+pub mod linear;
 pub mod log;
 pub mod measure;
 pub mod metrics;

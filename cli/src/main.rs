@@ -6,6 +6,7 @@ mod failure;
 mod fit;
 mod init;
 mod interrupt;
+mod modes;
 mod paper;
 mod shape;
 mod simulate;
@@ -28,6 +29,7 @@ fn main() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::Fit(args) => fit::run(&args),
         Command::Shape(args) => shape::run(&args),
+        Command::Modes(args) => modes::run(&args),
     };
     match done {
         Ok(Status::Done) => ExitCode::SUCCESS,

@@ -84,6 +84,11 @@ fn the_reference_of_the_commands_shows_their_help() {
 }
 
 #[test]
+fn the_page_on_modes_shows_what_the_program_prints() {
+    check("docs/modes.md");
+}
+
+#[test]
 fn the_pictures_are_those_that_the_commands_draw() {
     let folder = workplace();
     for line in [
@@ -125,6 +130,7 @@ fn what_the_documents_name_is_there() {
         "docs/shape.md",
         "docs/solver.md",
         "docs/general-solver.md",
+        "docs/modes.md",
         "stages/sollmann-jouaneh/README.md",
         "stages/printer-axis/README.md",
         "stages/laser-gantry/README.md",
