@@ -79,6 +79,11 @@ fn the_readme_shows_what_the_program_prints() {
 }
 
 #[test]
+fn the_documentation_of_the_fit_shows_what_it_prints() {
+    check("docs/fit.md");
+}
+
+#[test]
 fn the_reference_of_the_commands_shows_their_help() {
     check("docs/commands.md");
 }

@@ -25,7 +25,7 @@ pub fn text(case: &Case, fit: &Fit, took: Duration, out: Option<&Path>, written:
     }
     let _ = writeln!(
         text,
-        "\n{} values, {} variables; {} steps, {} simulated logs, {}",
+        "\n{} values, {} variables; {} steps, {} simulated logs\n  took {}",
         fit.values,
         fit.variables,
         fit.work.iterations,
