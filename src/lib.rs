@@ -48,7 +48,8 @@
 //! - [`log`]: measured columns in. [`case`]: the case file in.
 //! - [`solve`]: the motion. [`measure`]: what a recorder makes of it. [`metrics`]: what it shows. [`reduction`]: how far a reduced model
 //!   is from the elastic one.
-//! - [`control`]: controllers stepped in time around the exact plant.
+//! - [`linear`]: state space, poles, zeros, frequency response, resonance along the travel.
+//! - [`control`]: controllers stepped in time around the exact plant; input shapers, from spectra and from the model.
 //! - [`fit`]: parameters from logs, and what the logs cannot tell.
 //! - `report`: figures, drawings and an HTML page of them (feature `report`, on by default).
 //!
@@ -63,6 +64,7 @@ pub mod error;
 pub mod files;
 pub mod fit;
 pub mod friction;
+pub mod linear;
 pub mod log;
 pub mod measure;
 pub mod metrics;

@@ -206,9 +206,9 @@ fn a_friction_curve_counts_in_the_balance() {
             let steady = measure(&stage, &long, 256).steady_speed.unwrap();
             let balance = steady.analytic.speed().unwrap();
             assert!((steady.value - balance).abs() < 1e-9, "{law:?}: {steady:?}");
-            // The curve is worth more than a millimetre per second there.
+            // The curve is worth more than half a millimetre per second there.
             let without = balanced_speed(&of(Law::Coulomb), volts, 0.0).speed().unwrap();
-            assert!((balance - without).abs() > 1e-3, "{law:?}: {balance} and {without}");
+            assert!((balance - without).abs() > 5e-4, "{law:?}: {balance} and {without}");
         }
     }
 }

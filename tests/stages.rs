@@ -36,10 +36,13 @@ fn cases(machine: &Path) -> Vec<(String, PathBuf)> {
     entries(machine).into_iter().filter(toml).map(|path| (name(&path), path)).collect()
 }
 
-/// A few rows of every experiment of a case: what must not change.
+/// A few rows of every experiment of a case: what must not change. A case that is there to be fitted has none.
 fn curve(path: &Path) -> String {
     let case = Case::read(path).unwrap_or_else(|error| panic!("{error}"));
     let mut text = String::new();
+    if case.fit.is_some() {
+        return text;
+    }
     for experiment in &case.experiments {
         let run = simulate(&case.stage, experiment, Solver::Exact).unwrap();
         assert_eq!(run.outcome.ending, Ending::Complete, "{}: {}", path.display(), experiment.name);

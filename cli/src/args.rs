@@ -2,6 +2,7 @@
 
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
+use taut::control::shaper::Kind;
 use taut::quantity;
 use taut::solve::{Method, Solver};
 use taut::stage::Stage;
@@ -29,6 +30,8 @@ pub enum Command {
     Move(Move),
     Check(Check),
     Fit(Fit),
+    Shape(Shape),
+    Modes(Modes),
 }
 
 /// Recompute the paper of Sollmann and Jouaneh (2011): every table, figure and claim.
@@ -87,7 +90,7 @@ pub struct Simulate {
     #[arg(long, value_name = "NUMBER")]
     pub tolerance: Option<f64>,
     /// Step of --solver table3 [default: 0.1 ms]
-    #[arg(long, value_name = "TIME", value_parser = seconds)]
+    #[arg(long, value_name = "TIME", value_parser = step)]
     pub step: Option<f64>,
     /// Formula of --solver table3 [default: rk4]
     #[arg(long, value_enum)]
@@ -211,6 +214,165 @@ Examples:
 
 Ctrl-C ends a fit early: the best so far is written and said not to be converged, with exit status 130.";
 
+/// Recommend an input shaper, from a measured spectrum or from a model.
+///
+/// Takes a spectrum (Klipper's resonances_*.csv, calibration_data_*.csv), raw accelerometer samples (raw_data_*.csv), or a case
+/// file, whose resonances along the travel are computed. Prints for each shaper the best frequency, the vibration that
+/// remains, smoothing and the greatest acceleration, and which one to take. A second spectrum is compared with the first.
+#[derive(Debug, clap::Args)]
+#[command(after_help = SHAPE)]
+pub struct Shape {
+    /// A spectrum, accelerometer samples, or a case file (.toml)
+    pub spectrum: PathBuf,
+    /// Another one to compare: the other belt, or after a change
+    pub second: Option<PathBuf>,
+    /// The folder to write results into; it is made if it is not there
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Change one value of a case file, as often as needed
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub changes: Vec<String>,
+    /// Axis of the accelerometer [default: the sum of x, y and z]
+    #[arg(long, value_enum)]
+    pub axis: Option<AxisName>,
+    /// Damping ratio that shapers are designed for [default: 0.1, or the model's]
+    #[arg(long, value_name = "RATIO")]
+    pub damping: Option<f64>,
+    /// Most smoothing that is allowed, such as "0.1 mm" [default: any]
+    #[arg(long, value_name = "LENGTH", value_parser = smoothing)]
+    pub max_smoothing: Option<f64>,
+    /// Speed at right-angled corners, of which smoothing is computed [default: "5 mm/s"]
+    #[arg(long, value_name = "SPEED", value_parser = corner_speed)]
+    pub corner_speed: Option<f64>,
+    /// Shapers to choose from, separated by commas: zv, mzv, zvd, ei, 2hump_ei, 3hump_ei [default: all but zvd]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES", value_parser = shaper)]
+    pub shapers: Vec<Kind>,
+    /// Of a case file: by which part its frequencies may be wrong [default: 0.1]
+    #[arg(long, value_name = "PART", value_parser = uncertainty)]
+    pub uncertainty: Option<f64>,
+    /// Of a case file: what the motor does [default: held]
+    #[arg(long, value_enum)]
+    pub motor: Option<MotorName>,
+    /// Leave out the report and the pictures
+    #[arg(long)]
+    pub no_report: bool,
+    /// Print the result as JSON, the same as in shape.json
+    #[arg(long)]
+    pub json: bool,
+    /// Print nothing but errors
+    #[arg(long, short, conflicts_with = "json")]
+    pub quiet: bool,
+}
+
+/// Say how a stage swings: poles, zeros, frequency response, resonance along the travel.
+///
+/// Linearises the stage of a case while everything slides, and prints its poles with frequency and damping, the gain and
+/// the zeros of each output, and resonance and anti-resonance along the travel; with --sample-time also its discrete-time
+/// model. With --out it also writes modes.json with the matrices, frequency-response.csv, and a report with a Bode
+/// diagram, a map of the travel and a map of poles and zeros.
+#[derive(Debug, clap::Args)]
+#[command(after_help = MODES)]
+pub struct Modes {
+    /// The case file
+    pub case: PathBuf,
+    /// The folder to write results into; it is made if it is not there
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Change one value of the case for this run, as often as needed
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub changes: Vec<String>,
+    /// Where the cart is; matters to spans that follow it and to friction along the travel [default: 0 m]
+    #[arg(long, value_name = "POSITION", value_parser = metres, allow_hyphen_values = true)]
+    pub at: Option<f64>,
+    /// Speed of the cart at which everything slides; 0 is at rest, below 0 backward [default: 0.1 m/s]
+    #[arg(long, value_name = "SPEED", value_parser = metres_per_second, allow_hyphen_values = true)]
+    pub speed: Option<f64>,
+    /// Bodies that stick and are held where they are, separated by commas
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "BODY")]
+    pub stuck: Vec<BodyName>,
+    /// Also give the discrete-time model for this sample time
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
+    pub sample_time: Option<f64>,
+    /// What the input does between samples [default: zero]
+    #[arg(long, value_enum, requires = "sample_time")]
+    pub hold: Option<HoldName>,
+    /// By how much the input is late, computing time for one [default: 0 s]
+    #[arg(long, value_name = "TIME", value_parser = seconds, requires = "sample_time")]
+    pub delay: Option<f64>,
+    /// Lowest frequency of the response, in Hz [default: below the slowest pole or zero]
+    #[arg(long, value_name = "FREQUENCY", value_parser = hertz)]
+    pub from: Option<f64>,
+    /// Highest frequency of the response, in Hz [default: above the fastest resonance]
+    #[arg(long, value_name = "FREQUENCY", value_parser = hertz)]
+    pub to: Option<f64>,
+    /// Leave out the report and the plots
+    #[arg(long)]
+    pub no_report: bool,
+    /// Print the result as JSON, the same as in modes.json
+    #[arg(long)]
+    pub json: bool,
+    /// Print nothing but errors
+    #[arg(long, short, conflicts_with = "json")]
+    pub quiet: bool,
+}
+
+const SHAPE: &str = "\
+Examples:
+  taut shape resonances_x_20210821_152037.csv --out shaped
+  taut shape raw_data_x.csv --axis x --max-smoothing \"0.15 mm\"
+  taut shape belt_a.csv belt_b.csv
+  taut shape axis.toml --set cart.mass=\"0.5 kg\" --json | jq .recommended";
+
+/// An axis of the accelerometer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum AxisName {
+    /// x alone
+    X,
+    /// y alone
+    Y,
+    /// z alone
+    Z,
+}
+
+/// What the motor does while the cart vibrates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MotorName {
+    /// It follows its command, as a stepper motor or a stiff position loop makes it
+    Held,
+    /// It gives way, as with a commanded voltage or current
+    Free,
+}
+
+const MODES: &str = "\
+Examples:
+  taut modes axis.toml
+  taut modes axis.toml --out modes --sample-time 1ms --delay 0.5ms
+  taut modes axis.toml --at \"120 mm\" --speed \"20 mm/s\"
+  taut modes axis.toml --stuck cart,idler --json | jq .poles";
+
+/// A body that can be held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum BodyName {
+    /// The drive pulley
+    Drive,
+    /// The cart
+    Cart,
+    /// The idler pulley
+    Idler,
+}
+
+/// What the input does between samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum HoldName {
+    /// It stands: what a converter puts out
+    #[default]
+    Zero,
+    /// It goes straight from sample to sample
+    First,
+    /// The bilinear rule, an approximation
+    Tustin,
+}
+
 /// How the equations are solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum SolverName {
@@ -289,10 +451,73 @@ fn share(text: &str) -> Result<f64, String> {
     if share > 0.0 && share < 1.0 { Ok(share) } else { Err("a share between 0 and 1 is needed, such as 20%".into()) }
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
-    let step = match text.parse() {
+/// A number in the SI unit, or with a unit of its own.
+fn number(text: &str, unit: &str) -> Result<f64, String> {
+    let value = match text.parse() {
         Ok(number) => number,
-        Err(_) => quantity::read(text, "s").map_err(|e| e.to_string())?,
+        Err(_) => quantity::read(text, unit).map_err(|e| e.to_string())?,
     };
-    if step > 0.0 && f64::is_finite(step) { Ok(step) } else { Err("a step above zero is needed, such as 0.1ms".into()) }
+    if f64::is_finite(value) { Ok(value) } else { Err("a finite number is needed".into()) }
+}
+
+fn metres(text: &str) -> Result<f64, String> {
+    number(text, "m")
+}
+
+fn metres_per_second(text: &str) -> Result<f64, String> {
+    number(text, "m/s")
+}
+
+fn positive(text: &str, unit: &str, needed: &str) -> Result<f64, String> {
+    match number(text, unit)? {
+        value if value > 0.0 => Ok(value),
+        _ => Err(format!("a {needed} is needed")),
+    }
+}
+
+fn step(text: &str) -> Result<f64, String> {
+    positive(text, "s", "step above zero, such as 0.1ms,")
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    positive(text, "s", "time above zero, such as 0.1ms,")
+}
+
+fn hertz(text: &str) -> Result<f64, String> {
+    positive(text, "Hz", "frequency above zero, such as 10Hz,")
+}
+
+fn smoothing(text: &str) -> Result<f64, String> {
+    if text.trim().parse::<f64>().is_ok() {
+        return Err("a length with its unit is needed, such as \"0.1 mm\"".into());
+    }
+    let length = quantity::read(text, "m").map_err(|e| e.to_string())?;
+    if (1e-7..=0.1).contains(&length) {
+        return Ok(length);
+    }
+    Err("a length from 0.0001 mm to 100 mm is needed, such as \"0.1 mm\"".into())
+}
+
+fn corner_speed(text: &str) -> Result<f64, String> {
+    if text.trim().parse::<f64>().is_ok() {
+        return Err("a speed with its unit is needed, such as \"5 mm/s\"".into());
+    }
+    let speed = quantity::read(text, "m/s").map_err(|e| e.to_string())?;
+    if (0.0..=10.0).contains(&speed) {
+        Ok(speed)
+    } else {
+        Err("a speed from 0 to 10 m/s is needed, such as \"5 mm/s\"".into())
+    }
+}
+
+fn shaper(text: &str) -> Result<Kind, String> {
+    let names = || Kind::ALL.map(Kind::name).join(", ");
+    Kind::from_name(text).ok_or_else(|| format!("there is no such shaper; there are {}", names()))
+}
+
+fn uncertainty(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(part) if (0.0..=0.5).contains(&part) => Ok(part),
+        _ => Err("a part from 0 to 0.5 is needed, such as 0.1 for 10 %".into()),
+    }
 }

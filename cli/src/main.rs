@@ -6,8 +6,10 @@ mod failure;
 mod fit;
 mod init;
 mod interrupt;
+mod modes;
 mod motion;
 mod paper;
+mod shape;
 mod simulate;
 mod terminal;
 
@@ -28,6 +30,8 @@ fn main() -> ExitCode {
         Command::Move(args) => motion::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Fit(args) => fit::run(&args),
+        Command::Shape(args) => shape::run(&args),
+        Command::Modes(args) => modes::run(&args),
     };
     match done {
         Ok(Status::Done) => ExitCode::SUCCESS,

@@ -346,3 +346,35 @@ fn moves_that_cannot_be() {
     let output = taut(folder.path()).arg("move").arg(&case).args(["--spread", "150%"]).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
 }
+
+/// Poles, matrices and files of `taut modes`; wrong places and ranges are told.
+#[test]
+fn modes_of_the_papers_machine() {
+    let folder = TempDir::new().unwrap();
+    let case = table4();
+    let file = case.to_str().unwrap();
+    let args = ["modes", file, "--out", "out", "--sample-time", "1ms", "--json"];
+    let run = taut(folder.path()).args(args).assert().success();
+    let found: Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
+    assert_eq!(found, json(&folder.path().join("out/modes.json")));
+    let poles = found["poles"].as_array().unwrap();
+    assert_eq!(poles.iter().filter(|pole| pole["integrator"] == true).count(), 1);
+    assert_eq!((poles.len(), found["A"].as_array().unwrap().len()), (6, 6));
+    // r K_t/R / (B₁ + B₂ + b r² + K_t K_e/R): what a volt moves in the long run
+    let r = 0.0194_f64;
+    let speed = r * 0.023 / 0.71 / (2.0 * 0.0016 + 19.0424 * r * r + 0.023 * 0.023 / 0.71);
+    let gain = found["outputs"][1]["low_frequency_gain"].as_f64().unwrap();
+    assert!((gain / speed - 1.0).abs() < 1e-9, "{gain} {speed}");
+    assert!(found["operation"]["sticks_at_rest"] == true && found["stiffness_depends_on_position"] == false);
+    assert_eq!(names(&folder.path().join("out")), ["frequency-response.csv", "modes.json", "plots", "report.html"]);
+    let rest = taut(folder.path()).args(["modes", file, "--speed", "0"]).assert().success();
+    assert!(text(&rest.get_output().stdout).contains("at rest this stage sticks"));
+    for (wrong, told) in [
+        (["--from", "10", "--to", "5"], "before it begins"),
+        (["--sample-time", "1ms", "--delay", "1s"], "late by 1 s"),
+        (["--stuck", "rotor", "--speed", "0"], "invalid value"),
+    ] {
+        let run = taut(folder.path()).args(["modes", file]).args(wrong).assert().code(2);
+        assert!(text(&run.get_output().stderr).contains(told), "{wrong:?}");
+    }
+}

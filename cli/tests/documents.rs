@@ -79,6 +79,11 @@ fn the_readme_shows_what_the_program_prints() {
 }
 
 #[test]
+fn the_documentation_of_the_fit_shows_what_it_prints() {
+    check("docs/fit.md");
+}
+
+#[test]
 fn the_reference_of_the_commands_shows_their_help() {
     check("docs/commands.md");
 }
@@ -86,6 +91,11 @@ fn the_reference_of_the_commands_shows_their_help() {
 #[test]
 fn the_page_on_control_shows_what_the_program_prints() {
     check("docs/control.md");
+}
+
+#[test]
+fn the_page_on_modes_shows_what_the_program_prints() {
+    check("docs/modes.md");
 }
 
 #[test]
@@ -125,13 +135,18 @@ fn what_the_documents_name_is_there() {
         "docs/case-file.md",
         "docs/commands.md",
         "docs/control.md",
+        "docs/fit.md",
+        "docs/logs.md",
         "docs/paper.md",
+        "docs/shape.md",
         "docs/solver.md",
         "docs/general-solver.md",
+        "docs/modes.md",
         "stages/sollmann-jouaneh/README.md",
         "stages/printer-axis/README.md",
         "stages/laser-gantry/README.md",
         "stages/pendulepi/README.md",
+        "stages/ced/README.md",
         "stages/emps/README.md",
         "stages/two-mass/README.md",
     ];

@@ -80,26 +80,9 @@ pub fn check(case: &Case, plan: &Plan) -> Result<Check> {
 
 /// Weighs each quantity by what its values do from one to the next and what its converter rounds; gives these deviations.
 pub(super) fn weigh_by_noise(problem: &mut Problem) -> Vec<(Quantity, f64)> {
-    let mut noise = Vec::new();
-    for quantity in problem.quantities() {
-        let mut sizes = Vec::new();
-        let (mut step, mut wide): (f64, f64) = (0.0, 0.0);
-        for seen in problem.runs.iter().flat_map(|run| &run.seen).filter(|seen| seen.quantity == quantity) {
-            step = step.max(seen.step);
-            wide = wide.max(extent(&seen.values));
-            // Third differences of noise have √20 times its deviation, those of smooth motion next to nothing.
-            let third = |w: &[f64]| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs();
-            sizes.extend(seen.values.windows(4).map(third).filter(|d| d.is_finite()));
-        }
-        let middle = sizes.len() / 2;
-        let rough = if sizes.is_empty() {
-            0.0
-        } else {
-            1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 / 20f64.sqrt()
-        };
-        let sigma = rough.max(step / 12f64.sqrt()).max(1e-6 * wide).max(1e-12);
-        problem.weigh(quantity, sigma, true);
-        noise.push((quantity, sigma));
+    let noise = problem.noise().0;
+    for &(quantity, deviation) in &noise {
+        problem.weigh(quantity, deviation, true);
     }
     noise
 }
@@ -201,7 +184,7 @@ fn cart_noise(problem: &Problem, noise: &[(Quantity, f64)]) -> f64 {
 const IDEAS: &[Idea] = &[
     Idea { name: "the same inputs again, the other way round", measured: same, change: |_| {}, reversed: true },
     Idea {
-        name: "an encoder at the cart, as fine as what is there",
+        name: "an encoder at the cart, as fine as the one there is, or to 10 µm",
         measured: |problem, noise| vec![(Quantity::CartPosition, cart_noise(problem, noise))],
         change: |_| {},
         reversed: false,

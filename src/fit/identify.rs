@@ -2,7 +2,8 @@
 //!
 //! With J the derivatives of the weighted outputs with respect to relative changes of the parameters, and what else is
 //! fitted along projected out, J = U S Vᵀ: moving the parameters along vᵢ by one changes the outputs by sᵢ standard deviations,
-//! so 1/sᵢ is how far off that combination may be. Where that is more than [`LIMIT`], it is not determined.
+//! so 1/sᵢ is how far off that combination may be. Where that is more than [`LIMIT`], or where the outputs move by less than
+//! [`SHOWS`], it is not determined.
 
 use super::knob::{at_pulley, parameter_of, value_of};
 use super::problem::Problem;
@@ -10,6 +11,15 @@ use nalgebra::{DMatrix, SVD};
 
 /// Relative standard error from which on a combination counts as not determined.
 pub const LIMIT: f64 = 1.0;
+
+/// Root mean square, in standard deviations of the noise, of what a change by 100 % makes of a value: below that a combination
+/// counts as not determined however many values there are. Averages of thousands of values would tell it of a machine that is the
+/// model to a fraction of what one value shows, and no machine is.
+pub const SHOWS: f64 = 0.2;
+
+/// From this share of it in what is not determined a parameter counts as not determined: a change of the combination by 100 %
+/// that takes more than 10 % of the parameter with it.
+const SHARE: f64 = 0.01;
 
 /// Iterations of a singular value decomposition before it is given up.
 const MOST_SWEEPS: usize = 10_000;
@@ -52,10 +62,8 @@ impl Identifiability {
         let mut own = projected(jacobian, globals)?;
         let mut names: Vec<String> = problem.knobs.iter().map(|knob| knob.name.clone()).collect();
         names.extend(problem.shared.iter().map(|extra| extra.what.name().to_string()));
-        // Relative changes: of what is searched on a linear scale, of its value or of a tenth of its unit if that is more.
-        for (j, x) in x.iter().enumerate().take(globals) {
-            let unit = if j < problem.knobs.len() && !problem.is_log(j) { x.abs().max(0.1) } else { 1.0 };
-            own.column_mut(j).scale_mut(unit / deviation.max(f64::MIN_POSITIVE));
+        for (j, &x) in x.iter().enumerate().take(globals) {
+            own.column_mut(j).scale_mut(problem.whole(j, x) / deviation.max(f64::MIN_POSITIVE));
         }
         let rows = problem.counted().max(1) as f64;
         let sensitivity = (0..globals).map(|j| own.column(j).norm() / rows.sqrt()).collect();
@@ -65,13 +73,14 @@ impl Identifiability {
         let most = singular.iter().copied().fold(0.0, f64::max);
         // Differences are good to about 1e-9 of the largest column.
         let floor = 1e-8 * most;
-        let lost: Vec<usize> = (0..globals).filter(|&i| !(singular[i] > floor && 1.0 / singular[i] < LIMIT)).collect();
+        let least = f64::max(1.0 / LIMIT, SHOWS * rows.sqrt());
+        let lost: Vec<usize> = (0..globals).filter(|&i| !(singular[i] > floor && singular[i] > least)).collect();
         let mut error = Vec::new();
         for j in 0..globals {
             let hidden: f64 = lost.iter().map(|&i| v[(j, i)].powi(2)).sum();
-            let squares: f64 =
-                (0..globals).filter(|i| !lost.contains(i)).map(|i| (v[(j, i)] / singular[i]).powi(2)).sum();
-            error.push(if hidden > 1e-3 { f64::INFINITY } else { squares.sqrt() });
+            let told = (0..globals).filter(|&i| singular[i] > floor);
+            let squares: f64 = told.map(|i| (v[(j, i)] / singular[i]).powi(2)).sum();
+            error.push(if hidden > SHARE { f64::INFINITY } else { squares.sqrt() });
         }
         let mut result = Self { names, sensitivity, singular, error, groups: Vec::new() };
         result.groups = result.grouped(problem, &v, &lost, x);
@@ -85,7 +94,7 @@ impl Identifiability {
         let mut groups = Vec::new();
         let mut seen = vec![false; n];
         for start in 0..n {
-            if seen[start] || hidden(start, start) < 1e-3 {
+            if seen[start] || hidden(start, start) <= SHARE {
                 continue;
             }
             let mut members = vec![start];
@@ -94,7 +103,7 @@ impl Identifiability {
             while next < members.len() {
                 let i = members[next];
                 for (j, seen) in seen.iter_mut().enumerate() {
-                    if !*seen && hidden(i, j).abs() > 1e-3 {
+                    if !*seen && hidden(j, j) > SHARE && hidden(i, j).abs() > SHARE {
                         *seen = true;
                         members.push(j);
                     }
@@ -145,8 +154,7 @@ impl Identifiability {
                 .enumerate()
                 .map(|(a, &j)| {
                     let value = problem.value(j, x[j]);
-                    let unit = if problem.is_log(j) { 1.0 } else { x[j].abs().max(0.1) };
-                    left[(a, best)] / (problem.slope(j, value) * unit)
+                    left[(a, best)] / (problem.slope(j, value) * problem.whole(j, x[j]))
                 })
                 .collect();
             let knobs: Vec<&super::Knob> = members.iter().map(|&j| &problem.knobs[j]).collect();

@@ -22,14 +22,23 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 /// Steps of coarse derivatives, in standard errors of a variable by itself, tried one after the other.
 const COARSER: [f64; 2] = [1.0, 10.0];
 
+/// So many standard errors from where it leads, a search takes derivatives over this part of a standard error: where the cost has
+/// kinks, they see past the small ones; where it has none, they are as good as others.
+const NEAR: f64 = 1.0;
+const FINE: f64 = 0.3;
+
 /// Most variables that are searched by evolution, and how often.
 const MOST_EVOLVED: usize = 16;
 const MOST_EVOLUTIONS: usize = 2;
 
+/// Generations without a gain that shows, after which an evolution ends.
+const BARREN: usize = 8;
+
 /// Where the cost has kinks, the standard errors that the last step may promise: no step of any length fulfilled it.
 const KINK: f64 = 0.1;
 
-/// Two steps after each other that gain less than this many standard errors, and little of what they promised, are at a kink.
+/// Two steps after each other that gain less than this many standard errors, and little of what they promised, are at a kink;
+/// and so are steps after which twice that is still promised.
 const SHOWS: f64 = 0.1;
 
 /// Residuals as a function of the variables.
@@ -278,14 +287,17 @@ pub fn minimise(
         best.decrement = model.reach(&newton) / deviation.max(f64::MIN_POSITIVE);
         let tiny = (0..n).all(|j| newton[j].abs() <= 1e-11 * best.x[j].abs().max(1.0));
         if best.decrement <= options.tolerance || tiny {
-            if how != Differences::Forward {
+            if how == Differences::Central || coarser > 0 {
                 best.ending = Ending::Converged;
                 return best;
             }
             how = Differences::Central;
             continue;
         }
-        if best.decrement < 100.0 * options.tolerance && how == Differences::Forward {
+        if best.decrement < NEAR && how == Differences::Forward {
+            let errors = model.errors(&held, deviation);
+            how = Differences::Coarse(errors.iter().map(|error| FINE * error).collect());
+        } else if best.decrement < 100.0 * options.tolerance && coarser == 0 {
             how = Differences::Central;
         }
         if best.iterations >= options.iterations {
@@ -315,9 +327,10 @@ pub fn minimise(
                 // λ shrinks the better the linear model was (Nielsen 1999).
                 damping *= f64::max(1.0 / 5.0, 1.0 - (2.0 * gain - 1.0).powi(3));
                 grow = 2.0;
-                // Far less than was promised, and less than shows: a kink is near.
+                // Less than shows, far less than was promised: a kink is near.
                 let shows = 0.5 * (SHOWS * deviation).powi(2);
-                slow = if best.cost - cost < shows && gain < 0.25 { slow + 1 } else { 0 };
+                let fallen = best.cost - cost;
+                slow = if fallen < shows && (gain < 0.25 || best.decrement > 2.0 * SHOWS) { slow + 1 } else { 0 };
                 best.x = x;
                 best.cost = cost;
                 std::mem::swap(&mut best.residuals, &mut trial);
@@ -336,7 +349,7 @@ pub fn minimise(
             continue;
         }
         slow = 0;
-        if how == Differences::Forward {
+        if coarser == 0 && how != Differences::Central {
             // The cheap derivatives may be to blame.
             (how, lambda) = (Differences::Central, None);
             continue;
@@ -417,10 +430,11 @@ fn evolve(
     let mut random = Pcg64::seed_from_u64(1);
     let mut trial = vec![0.0; best.residuals.len()];
     let generations = (60 * n + 60) / lambda;
+    let (shows, mut fruitful) = (0.5 * (SHOWS * deviation).powi(2), 0);
     for generation in 1..=generations {
         let Some(eigen) = SymmetricEigen::try_new(shape.clone(), 1e-14, 1000) else { break };
         let lengths = eigen.eigenvalues.map(|value| value.max(1e-20).sqrt());
-        if pace * lengths.max() < 0.01 {
+        if pace * lengths.max() < 0.01 || generation > fruitful + BARREN {
             break;
         }
         let mut born: Vec<(f64, DVector<f64>)> = Vec::with_capacity(lambda);
@@ -436,6 +450,9 @@ fn evolve(
             let good = problem.evaluate(&x, &mut trial);
             let cost = if good { cost_of(&trial, huber) } else { f64::INFINITY };
             if cost < best.cost {
+                if best.cost - cost > shows {
+                    fruitful = generation;
+                }
                 best.cost = cost;
                 best.x = x;
                 best.residuals.copy_from_slice(&trial);

@@ -25,6 +25,7 @@ use crate::log::Quantity;
 use crate::solve::Flow;
 use crate::stage::Stage;
 use least_squares::{Minimum, Options, minimise};
+use nalgebra::DVector;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use std::path::Path;
@@ -93,7 +94,8 @@ pub struct Estimate {
     pub value: f64,
     /// Its standard error; infinite where it is not determined, none where it is at a bound.
     pub error: Option<f64>,
-    /// 95 % interval; none where it is at a bound, infinite where it is not determined.
+    /// 95 % interval; infinite where it is not determined. At a bound it reaches from there to where it would without that
+    /// bound; none where even that cannot be said.
     pub interval: Option<[f64; 2]>,
     /// Its bounds.
     pub bounds: [f64; 2],
@@ -214,10 +216,10 @@ pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f
         for &(quantity, deviation) in &fresh {
             problem.weigh(quantity, deviation, true);
         }
-        let alike = fresh.len() == 1 && !plan.huber && uniform(&problem);
+        let alike = fresh.len() == 1 && !plan.huber && !told_beforehand(&problem, &fresh) && uniform(&problem);
         noise = fresh;
         let options = Options { huber: if plan.huber { HUBER } else { f64::INFINITY }, ..whole };
-        if alike && round == 0 && best.ending == Ending::Converged {
+        if alike && round == 0 && matches!(best.ending, Ending::Converged | Ending::Stalled) {
             // One weight for all: only the unit of the residuals changes.
             let factor =
                 problem.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).find(|w| **w > 0.0);
@@ -302,6 +304,10 @@ impl Fit {
                     put("high", high);
                 }
                 _ => {
+                    if let Some([low, high]) = estimate.interval.filter(|ends| ends.iter().all(|end| end.is_finite())) {
+                        put("low", low);
+                        put("high", high);
+                    }
                     let why = if estimate.at_bound { "at its bound" } else { "not determined" };
                     row.insert("known", toml_edit::Value::from(why));
                 }
@@ -351,6 +357,13 @@ fn uniform(problem: &Problem) -> bool {
         problem.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).filter(|w| **w > 0.0);
     let Some(first) = weights.next() else { return true };
     weights.all(|w| (w / first - 1.0).abs() < 1e-3)
+}
+
+/// Whether what is known beforehand of the start could be as wrong as the residuals are: then it depends on their weight.
+fn told_beforehand(problem: &Problem, noise: &[(Quantity, f64)]) -> bool {
+    let most = noise.iter().map(|(_, deviation)| *deviation).fold(0.0, f64::max);
+    let arm = problem.stage.pulley_radius.min(1.0);
+    problem.runs.iter().flat_map(|run| &run.extras).any(|extra| extra.known.is_some_and(|own| own > 0.1 * arm * most))
 }
 
 /// Refuses what the logs do not determine, with the choices there are.
@@ -403,9 +416,9 @@ fn noise_of(problem: &Problem, at: &Minimum, robust: bool) -> Vec<(Quantity, f64
                     let w = seen.weights[k];
                     if w > 0.0 {
                         let r = at.residuals[first + output * n + k] / w;
-                        // Equal values in a row are one.
-                        let share = 1.0 / seen.repeats[k].max(1.0);
-                        let share = if seen.step > 0.0 { share } else { 1.0 };
+                        // Equal values in a row are one, unless they tremble.
+                        let equal = seen.step > 0.0 && seen.alike[k] <= 1.0;
+                        let share = if equal { 1.0 / seen.repeats[k].max(1.0) } else { 1.0 };
                         squares += share * r * r;
                         weight += share;
                         if robust {
@@ -428,28 +441,41 @@ fn noise_of(problem: &Problem, at: &Minimum, robust: bool) -> Vec<(Quantity, f64
 /// Everything that is told of a minimum.
 fn result(problem: &Problem, best: &Minimum, noise: Vec<(Quantity, f64)>, starts: Vec<f64>, work: Work) -> Fit {
     let covariance = Covariance::new(problem, &best.residuals, &best.jacobian, &best.at_bound);
-    let deviation = (2.0 * best.cost / problem.counted().saturating_sub(problem.variables()).max(1) as f64).sqrt();
+    let deviation = (2.0 * best.cost / (problem.independent() - problem.variables() as f64).max(1.0)).sqrt();
     let identifiability = Identifiability::new(problem, &best.jacobian, &best.x, deviation);
     let bounds = problem.bounds();
-    let t = student(covariance.as_ref().map_or(1, |c| c.freedom));
+    let t = covariance.as_ref().map_or(student(1), |c| c.reach);
     let determined = |j: usize| identifiability.as_ref().is_some_and(|found| found.error[j].is_finite());
     let error = |j: usize| match &covariance {
         Some(covariance) if j >= problem.globals() || determined(j) => covariance.error(j),
         _ if best.at_bound[j] => None,
         _ => Some(f64::INFINITY),
     };
+    // All variables without their bounds, where one is at its bound.
+    let beyond = if best.at_bound.contains(&true) {
+        let free = Covariance::new(problem, &best.residuals, &best.jacobian, &vec![false; best.at_bound.len()]);
+        // d = −(JᵀJ)⁻¹ Jᵀ r
+        let step = inverse_of_square(&best.jacobian)
+            .map(|inverse| -inverse * best.jacobian.tr_mul(&DVector::from_column_slice(&best.residuals)));
+        free.zip(step)
+    } else {
+        None
+    };
     let mut estimates = Vec::new();
     for (j, knob) in problem.knobs.iter().enumerate() {
         let (x, value) = (best.x[j], problem.value(j, best.x[j]));
         let error = if best.at_bound[j] { None } else { error(j) };
-        let interval = error.map(|e| {
-            if e.is_finite() {
-                let end = |x: f64, j: usize| problem.value(j, x).clamp(knob.low, knob.high);
-                [end(x - t * e, j), end(x + t * e, j)]
-            } else {
-                [f64::NEG_INFINITY, f64::INFINITY]
-            }
-        });
+        let end = |x: f64| problem.value(j, x).clamp(knob.low, knob.high);
+        let interval = match error {
+            Some(e) if e.is_finite() => Some([end(x - t * e), end(x + t * e)]),
+            Some(_) => Some([f64::NEG_INFINITY, f64::INFINITY]),
+            // Where it would be without its bound, but no further off than a standard error.
+            None => beyond.as_ref().filter(|_| determined(j)).map(|(covariance, step)| {
+                let e = covariance.error(j).unwrap_or(f64::INFINITY);
+                let x = x + step[j].clamp(-e, e);
+                [end(x - t * e), end(x + t * e)]
+            }),
+        };
         estimates.push(Estimate {
             name: knob.name.clone(),
             unit: knob.unit,
@@ -496,7 +522,8 @@ fn result(problem: &Problem, best: &Minimum, noise: Vec<(Quantity, f64)>, starts
         let own = problem.own_variables(index);
         for (extra, &value) in run.extras.iter().zip(&extras) {
             let j = own.iter().find(|(_, other)| other.what == extra.what).map(|(j, _)| *j);
-            if let Some(j) = j {
+            // What is known beforehand is no result.
+            if let (Some(j), None) = (j, extra.known) {
                 told.push((extra.what, value, error(j).map(|e| e * extra.unit)));
                 match sums.iter_mut().find(|(what, ..)| *what == extra.what) {
                     Some((_, sum, count)) => (*sum, *count) = (*sum + value, *count + 1),

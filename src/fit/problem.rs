@@ -2,7 +2,7 @@
 
 use super::knob::{Breakaways, Knob};
 use super::least_squares::{Bounds, Differences, Residuals, Step};
-use super::run::{Extra, Nuisance, Run, Setting, is_position};
+use super::run::{Extra, Nuisance, Run, Setting, is_position, rounding_at_rest};
 use crate::case::{Case, Nuisances, Plan, Scope, matches};
 use crate::error::{Error, Result};
 use crate::log::Quantity;
@@ -24,9 +24,21 @@ pub struct Problem<'a> {
     /// Simulated runs so far.
     pub simulations: u64,
     units: Vec<Scale>,
+    typical: Vec<f64>,
     breakaways: Breakaways,
     /// Whether to end the work.
     stop: Option<Stop<'a>>,
+}
+
+/// Standard deviations by quantity.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Noise(pub Vec<(Quantity, f64)>);
+
+impl Noise {
+    /// That of a quantity; a picometre or its like where there is none.
+    pub fn of(&self, quantity: Quantity) -> f64 {
+        self.0.iter().find(|(own, _)| *own == quantity).map_or(1e-12, |(_, deviation)| *deviation)
+    }
 }
 
 /// What says that it is enough: Ctrl-C, say.
@@ -104,6 +116,7 @@ impl<'a> Problem<'a> {
         let mut problem = Self {
             breakaways: Breakaways::of(&stage, &all),
             units: knobs.iter().map(|knob| scale(&stage, knob, &runs)).collect(),
+            typical: knobs.iter().map(|knob| typical(&stage, knob, &runs)).collect(),
             stage,
             knobs,
             shared: Vec::new(),
@@ -134,12 +147,14 @@ impl<'a> Problem<'a> {
         let interval = self.runs[0].interval();
         let most = self.runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
         let most = if most > 0.0 { most } else { 1.0 };
-        let late = Extra { what: Nuisance::Delay, start: 0.0, unit: interval, low: 0.0, high: 50.0 * interval };
-        let gain = Extra { what: Nuisance::InputGain, start: 1.0, unit: 1.0, low: 0.2, high: 5.0 };
-        let offset = Extra { what: Nuisance::InputOffset, start: 0.0, unit: most, low: -most, high: most };
+        let late =
+            Extra { what: Nuisance::Delay, start: 0.0, unit: interval, low: 0.0, high: 50.0 * interval, known: None };
+        let gain = Extra { what: Nuisance::InputGain, start: 1.0, unit: 1.0, low: 0.2, high: 5.0, known: None };
+        let offset = Extra { what: Nuisance::InputOffset, start: 0.0, unit: most, low: -most, high: most, known: None };
         let scopes = [(delay, late), (input_gain, gain), (input_offset, offset)];
         self.shared = scopes.iter().filter(|(scope, _)| *scope == Scope::Shared).map(|(_, extra)| *extra).collect();
         let r = self.stage.pulley_radius;
+        let noise = self.noise();
         for run in self.runs.iter_mut().chain(&mut self.held_out) {
             let own = scopes.iter().filter(|(scope, _)| *scope == Scope::Each).map(|(_, extra)| *extra);
             run.extras.extend(own);
@@ -163,22 +178,26 @@ impl<'a> Problem<'a> {
             let windowed = plan.windows.is_some() && !run.held_out;
             if let Some(start) = first {
                 let free = initial_state || windowed;
-                let room = if free { 1.0 } else { 0.0 };
-                // Positions count from where the log begins, unless the case says where that is.
+                // Positions count from where the log begins, unless the case says where that is; its first value says that
+                // no better than any other value says where the cart is.
+                let arm = position.map_or(1.0, |seen| if seen.quantity == Quantity::CartPosition { 1.0 } else { r });
+                let noise = arm * position.map_or(0.0, |seen| noise.of(seen.quantity));
+                let (unit, room) = if free { (1e-2 * wide, wide) } else { (noise, 6.0 * noise) };
                 if free || !given {
                     run.extras.push(Extra {
                         what: Nuisance::StartPosition,
                         start,
-                        unit: 1e-2 * wide,
-                        low: start - room * wide,
-                        high: start + room * wide,
+                        unit,
+                        low: start - room,
+                        high: start + room,
+                        known: if free { None } else { Some(noise) },
                     });
                 }
             }
             if initial_state || windowed {
                 let start = if windowed { slope_at_start(run, r) } else { 0.0 };
                 let (low, high) = (start - 20.0 * fast, start + 20.0 * fast);
-                run.extras.push(Extra { what: Nuisance::StartSpeed, start, unit: fast, low, high });
+                run.extras.push(Extra { what: Nuisance::StartSpeed, start, unit: fast, low, high, known: None });
             }
             for (index, seen) in run.seen.iter().enumerate() {
                 let counted =
@@ -191,11 +210,36 @@ impl<'a> Problem<'a> {
                         unit: 1e-2 * wide,
                         low: -wide,
                         high: wide,
+                        known: None,
                     });
                 }
             }
             // What has no room is no variable, but a number: see `extras_of`.
         }
+    }
+
+    /// What the values of each quantity do from one to the next, and what its converter rounds.
+    pub fn noise(&self) -> Noise {
+        let mut noise = Vec::new();
+        for quantity in self.quantities() {
+            let mut sizes = Vec::new();
+            let (mut step, mut wide): (f64, f64) = (0.0, 0.0);
+            for seen in self.runs.iter().flat_map(|run| &run.seen).filter(|seen| seen.quantity == quantity) {
+                step = step.max(seen.step);
+                wide = wide.max(extent(&seen.values));
+                // Third differences of noise have √20 times its deviation, those of smooth motion next to nothing.
+                let third = |w: &[f64]| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs();
+                sizes.extend(seen.values.windows(4).map(third).filter(|d| d.is_finite()));
+            }
+            let middle = sizes.len() / 2;
+            let rough = if sizes.is_empty() {
+                0.0
+            } else {
+                1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 / 20f64.sqrt()
+            };
+            noise.push((quantity, rough.max(step / 12f64.sqrt()).max(1e-6 * wide).max(1e-12)));
+        }
+        Noise(noise)
     }
 
     /// Weights before anything is fitted: one deviation for each quantity, a hundredth of how far it ranges, or what its
@@ -210,16 +254,23 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Weighs a quantity: each value with the variance σ² of the noise and of what rounding makes of equal values in a row,
-    /// which is one error and not one for each: σ² + (m − 1) Δ²/12.
+    /// Weighs a quantity: each value with the variance σ² of the noise and of what rounding makes of m equal values in a row,
+    /// which is one error and not one for each: σ² + (m − 1) Δ²/12; or of m that go to and fro at rest: [`rounding_at_rest`].
     pub fn weigh(&mut self, quantity: Quantity, deviation: f64, rounding: bool) {
         for run in &mut self.runs {
             let fitted = run.fitted_rows;
+            // Of the deviation, rounding has its part.
+            let trembles = |step: f64| (deviation * deviation - step * step / 12.0).max(0.0).sqrt();
             for seen in run.seen.iter_mut().filter(|seen| seen.quantity == quantity) {
                 for k in 0..seen.values.len() {
-                    let extra = if rounding { (seen.repeats[k] - 1.0) * seen.step * seen.step / 12.0 } else { 0.0 };
+                    let (equal, alike) = (seen.repeats[k] - 1.0, seen.alike[k] - 1.0);
+                    let common = match rounding {
+                        false => 0.0,
+                        true if alike > 0.0 => alike * rounding_at_rest(seen.step, trembles(seen.step)),
+                        true => equal * seen.step * seen.step / 12.0,
+                    };
                     let counts = k < fitted && seen.values[k].is_finite();
-                    seen.weights[k] = if counts { 1.0 / (deviation * deviation + extra).sqrt() } else { 0.0 };
+                    seen.weights[k] = if counts { 1.0 / (deviation * deviation + common).sqrt() } else { 0.0 };
                 }
             }
         }
@@ -249,6 +300,11 @@ impl<'a> Problem<'a> {
     /// Number of values that count.
     pub fn counted(&self) -> usize {
         self.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).filter(|w| **w > 0.0).count()
+    }
+
+    /// As how many independent values they count: those that share an error of rounding count for less.
+    pub fn independent(&self) -> f64 {
+        self.runs.iter().flat_map(|run| (0..run.seen.len()).map(|output| run.independent(output))).sum()
     }
 
     /// Where the case starts.
@@ -287,6 +343,14 @@ impl<'a> Problem<'a> {
     /// dp/dx of knob `j`.
     pub fn slope(&self, j: usize, value: f64) -> f64 {
         self.units[j].slope(value)
+    }
+
+    /// What counts as a change by 100 %, in the variable: of what may be zero, by its value or what is much of it.
+    pub fn whole(&self, j: usize, x: f64) -> f64 {
+        match self.units.get(j) {
+            Some(Scale::Linear(unit)) => x.abs().max(self.typical[j] / unit),
+            _ => 1.0,
+        }
     }
 
     /// Whether knob `j` is searched for on a logarithmic scale.
@@ -358,6 +422,11 @@ impl<'a> Problem<'a> {
     }
 }
 
+/// Whether it matters where the cart is, and not only how far it goes.
+fn placed(stage: &Stage) -> bool {
+    stage.cart.along.is_some() || stage.belt.follows_cart || stage.travel.is_some()
+}
+
 /// Extras that have room to vary and belong to the run alone.
 fn variable_extras(run: &Run) -> impl Iterator<Item = &Extra> {
     run.extras.iter().filter(|extra| extra.low < extra.high)
@@ -389,12 +458,16 @@ fn slope_at_start(run: &Run, r: f64) -> f64 {
 /// The scale on which a knob is searched for.
 fn scale(stage: &Stage, knob: &Knob, runs: &[Run]) -> Scale {
     if knob.logarithmic() && knob.start > 0.0 {
-        return Scale::Log(knob.start);
+        Scale::Log(knob.start)
+    } else if knob.start != 0.0 {
+        Scale::Linear(knob.start.abs())
+    } else {
+        Scale::Linear(typical(stage, knob, runs))
     }
-    if knob.start != 0.0 {
-        return Scale::Linear(knob.start.abs());
-    }
-    // From zero: a tenth of what the motor gives at the greatest input.
+}
+
+/// What is much of a quantity that may be zero: of friction a tenth of what the motor gives at the greatest input.
+fn typical(stage: &Stage, knob: &Knob, runs: &[Run]) -> f64 {
     let most = runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
     let motor = &stage.motor;
     let per_unit = match stage.amplifier.mode {
@@ -423,7 +496,7 @@ fn scale(stage: &Stage, knob: &Knob, runs: &[Run]) -> Scale {
         _ if knob.high.is_finite() && knob.high < 1e14 => 0.1 * knob.high.abs().max(knob.low.abs()),
         _ => 1.0,
     };
-    Scale::Linear(if unit > 0.0 && unit.is_finite() { unit } else { 1.0 })
+    if unit > 0.0 && unit.is_finite() { unit } else { 1.0 }
 }
 
 impl Residuals for Problem<'_> {
@@ -472,10 +545,16 @@ impl Residuals for Problem<'_> {
         for index in 0..self.runs.len() {
             let rows = self.runs[index].rows();
             for (j, extra) in self.own_variables(index) {
-                if let Nuisance::Bias(output) = extra.what {
-                    let n = self.runs[index].time.len();
-                    for k in 0..n {
-                        jacobian[(first + output * n + k, j)] = extra.unit * self.runs[index].seen[output].weights[k];
+                let signed = self.runs[index].seen.iter().all(|seen| !seen.absolute);
+                let shifts = match extra.what {
+                    Nuisance::Bias(_) => true,
+                    Nuisance::StartPosition => signed && !placed(&stage),
+                    _ => false,
+                };
+                if shifts {
+                    self.runs[index].shift(&stage, &extra, &mut a[..rows]);
+                    for k in 0..rows {
+                        jacobian[(first + k, j)] = a[k];
                     }
                     continue;
                 }

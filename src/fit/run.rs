@@ -10,6 +10,9 @@ use crate::stage::Stage;
 /// raster's times. What that makes of a value is at most its rate of change times this share of an interval.
 const EVEN: f64 = 1e-3;
 
+/// So often up and so often down, and that in every hundred, go values at rest that tremble.
+const FEWEST: usize = 2;
+
 /// Points of the raster per interval where times are uneven; between them positions follow cubics through positions and
 /// speeds, all else straight lines. With h the raster, that is off by at most h⁴|x⁗|/384, and h²|ÿ|/8.
 const RASTER: f64 = 8.0;
@@ -58,6 +61,8 @@ pub struct Extra {
     pub low: f64,
     /// The greatest.
     pub high: f64,
+    /// What is known of it beforehand: its standard deviation around `start`. A residual like any other.
+    pub known: Option<f64>,
 }
 
 /// One output of a log with its weights.
@@ -75,6 +80,8 @@ pub struct Seen {
     pub step: f64,
     /// How many equal values stand in a row here: what rounds them is the same for all of them.
     pub repeats: Vec<f64>,
+    /// How many values stand in a row here that go to and fro within two steps: at rest, with noise.
+    pub alike: Vec<f64>,
 }
 
 /// A log, or a window of one, and the model's side of it.
@@ -178,6 +185,7 @@ impl Run {
                     absolute: output.absolute,
                     weights: vec![0.0; n],
                     repeats: repeats(&values),
+                    alike: alike(&values, step),
                     values,
                     step,
                 }
@@ -206,9 +214,42 @@ impl Run {
         self.shared = shared.to_vec();
     }
 
-    /// Number of residuals: every output at every time.
+    /// Number of residuals: every output at every time, and what is known of extras beforehand.
     pub fn rows(&self) -> usize {
-        self.seen.len() * self.time.len()
+        self.seen.len() * self.time.len() + self.extras.iter().filter(|extra| extra.known.is_some()).count()
+    }
+
+    /// As how many independent values those of an output count: those that share an error of rounding count for less.
+    pub fn independent(&self, output: usize) -> f64 {
+        let weights = &self.seen[output].weights;
+        let most = weights.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        weights.iter().map(|weight| (weight / most).powi(2)).sum()
+    }
+
+    /// Residuals of the extras of which something is known, in standard deviations.
+    fn beforehand(&self, extras: &[f64]) -> impl Iterator<Item = f64> {
+        let pairs = self.extras.iter().zip(extras);
+        pairs.filter_map(|(extra, value)| extra.known.map(|deviation| (value - extra.start) / deviation))
+    }
+
+    /// ∂r/∂x of an extra that only shifts outputs, x being its variable.
+    pub fn shift(&self, stage: &Stage, extra: &Extra, out: &mut [f64]) {
+        let n = self.time.len();
+        for (i, seen) in self.seen.iter().enumerate() {
+            let per_unit = match extra.what {
+                Nuisance::Bias(index) if index == i => 1.0,
+                Nuisance::StartPosition if seen.quantity.name().ends_with("_position") => 1.0,
+                Nuisance::StartPosition if is_position(seen.quantity) => 1.0 / stage.pulley_radius,
+                _ => 0.0,
+            };
+            for (out, weight) in out[i * n..(i + 1) * n].iter_mut().zip(&seen.weights) {
+                *out = per_unit * extra.unit * weight;
+            }
+        }
+        let known = self.extras.iter().filter(|extra| extra.known.is_some());
+        for (out, own) in out[self.seen.len() * n..].iter_mut().zip(known) {
+            *out = if own.what == extra.what { own.known.map_or(0.0, |deviation| own.unit / deviation) } else { 0.0 };
+        }
     }
 
     /// Mean interval between its samples, s.
@@ -301,6 +342,9 @@ impl Run {
             return false;
         }
         let n = self.time.len();
+        for (out, own) in out[self.seen.len() * n..].iter_mut().zip(self.beforehand(extras)) {
+            *out = own;
+        }
         for (i, (seen, column)) in self.seen.iter().zip(&columns).enumerate() {
             let bias = self.bias(i, extras);
             let out = &mut out[i * n..(i + 1) * n];
@@ -393,6 +437,46 @@ fn repeats(values: &[f64]) -> Vec<f64> {
     values.chunk_by(|a, b| a == b).flat_map(|same| std::iter::repeat_n(same.len() as f64, same.len())).collect()
 }
 
+/// For each value how many stand around it in a row within two steps, often to and fro; 1 where they do not.
+fn alike(values: &[f64], step: f64) -> Vec<f64> {
+    let mut alike = vec![1.0; values.len()];
+    let mut first = 0;
+    while step > 0.0 && first < values.len() {
+        let (mut low, mut high) = (values[first], values[first]);
+        let (mut up, mut down) = (0, 0);
+        let mut last = first + 1;
+        while last < values.len() && values[last].is_finite() {
+            let (least, most) = (low.min(values[last]), high.max(values[last]));
+            if most - least > 2.5 * step {
+                break;
+            }
+            (low, high) = (least, most);
+            up += usize::from(values[last] > values[last - 1]);
+            down += usize::from(values[last] < values[last - 1]);
+            last += 1;
+        }
+        if up.min(down) >= FEWEST.max((last - first) / 100) {
+            alike[first..last].fill((last - first) as f64);
+        }
+        first = last;
+    }
+    alike
+}
+
+/// Variance of what remains of rounding to this step in the mean of many values at rest, over all places of rest, where they
+/// tremble by a normal deviation σ: Δ²/12 without noise, as good as nothing from σ = Δ/2 on.
+///
+/// The mean of a rounded value is off by Σₖ (−1)ᵏ Δ/(πk) e^(−2π²k²σ²/Δ²) sin(2πkx/Δ) (Widrow 1956); over all x that has the
+/// variance Σₖ Δ²/(2π²k²) e^(−4π²k²σ²/Δ²).
+pub fn rounding_at_rest(step: f64, deviation: f64) -> f64 {
+    use std::f64::consts::PI;
+    let term = |k: u32| {
+        let k2 = f64::from(k * k);
+        (-4.0 * PI * PI * k2 * (deviation / step).powi(2)).exp() / k2
+    };
+    if step > 0.0 { step * step / (2.0 * PI * PI) * (1..200).map(term).sum::<f64>() } else { 0.0 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -403,6 +487,15 @@ mod tests {
         assert!((step_of(&counts) - 0.01).abs() < 1e-12);
         let smooth: Vec<f64> = (0..200).map(|k| (f64::from(k) * 0.1).sin()).collect();
         assert_eq!(step_of(&smooth), 0.0);
+    }
+
+    #[test]
+    fn what_trembles_at_rest_is_told_from_what_moves() {
+        let values = [0.0, 1.0, 2.0, 3.0, 3.0, 4.0, 3.0, 3.0, 5.0, 4.0, 3.0, 6.0, 7.0];
+        let found = alike(&values, 1.0);
+        assert_eq!((&found[..3], &found[3..11], &found[11..]), (&[1.0; 3][..], &[8.0; 8][..], &[1.0; 2][..]));
+        assert!((rounding_at_rest(2.0, 0.0) / (4.0 / 12.0) - 1.0).abs() < 5e-3);
+        assert!(rounding_at_rest(2.0, 2.0) < 1e-15);
     }
 
     #[test]

@@ -15,24 +15,27 @@ pub struct Covariance {
     pub matrix: DMatrix<f64>,
     /// Standard deviation of the weighted residuals.
     pub deviation: f64,
-    /// Values minus variables.
+    /// Independent values minus variables.
     pub freedom: usize,
+    /// How many standard errors a 95 % interval reaches to each side.
+    pub reach: f64,
 }
 
 impl Covariance {
     /// At a minimum with these residuals and this Jacobian, its variables at bounds left out.
     pub fn new(problem: &Problem, residuals: &[f64], jacobian: &DMatrix<f64>, at_bound: &[bool]) -> Option<Self> {
         let free: Vec<usize> = (0..at_bound.len()).filter(|&j| !at_bound[j]).collect();
-        let counted = problem.counted();
-        let freedom = counted.saturating_sub(free.len()).max(1);
+        let counted = problem.independent();
+        let freedom = (counted - free.len() as f64).max(1.0);
         let squares: f64 = residuals.iter().map(|r| r * r).sum();
-        let deviation = (squares / freedom as f64).sqrt();
-        let own = jacobian.select_columns(&free);
-        let inverse = inverse_of_square(&own)?;
+        let deviation = (squares / freedom).sqrt();
+        let columns = jacobian.select_columns(&free);
+        let inverse = inverse_of_square(&columns)?;
         let white = &inverse * (deviation * deviation);
 
         let mut sum = DMatrix::zeros(free.len(), free.len());
         let mut coloured = false;
+        let (mut lagged, mut counting) = (0.0, 0.0);
         let mut first = 0;
         for run in &problem.runs {
             let n = run.time.len();
@@ -40,14 +43,17 @@ impl Covariance {
                 let rows: Vec<usize> =
                     (0..n).filter(|&k| run.seen[output].weights[k] > 0.0).map(|k| first + output * n + k).collect();
                 let memory = memory_of(residuals, &rows);
-                let lags = bandwidth(memory, rows.len());
+                let own = run.independent(output);
+                let lags = bandwidth(memory, own as usize);
                 coloured |= lags > 0;
-                add_products(&mut sum, &own, residuals, &rows, lags);
+                lagged += lags as f64;
+                counting += own;
+                add_products(&mut sum, &columns, residuals, &rows, lags);
             }
             first += run.rows();
         }
         let matrix = if coloured {
-            let grown = counted as f64 / freedom as f64;
+            let grown = counted / freedom;
             let robust = &inverse * sum * &inverse * grown;
             // Correlations as with white residuals, variances the greater ones.
             let factor: Vec<f64> = (0..free.len()).map(|j| (robust[(j, j)] / white[(j, j)]).max(1.0).sqrt()).collect();
@@ -55,7 +61,12 @@ impl Covariance {
         } else {
             white
         };
-        Some(Self { free, matrix, deviation, freedom })
+        // How far an interval reaches with a covariance summed over the share b of the lags (Kiefer and Vogelsang 2005, for
+        // Bartlett weights), instead of 1.96.
+        let b: f64 = if counting > 0.0 { lagged / counting } else { 0.0 };
+        let wider = (1.96 + 2.9694 * b + 0.416 * b.powi(2) - 0.5324 * b.powi(3)) / 1.96;
+        let reach = student(freedom.round() as usize) * wider;
+        Some(Self { free, matrix, deviation, freedom: freedom.round() as usize, reach })
     }
 
     /// Standard deviation of variable `j`; none for one at a bound.

@@ -1,5 +1,6 @@
 //! Measured files in: logs of a machine from CSV, Parquet and MATLAB files, and every mistake told with its line.
 
+mod accelerometer;
 mod csv;
 mod lines;
 mod mapping;
@@ -10,6 +11,7 @@ mod sheet;
 mod survey;
 
 pub use crate::stage::Quantity;
+pub use accelerometer::{Accelerometer, read_accelerometer};
 pub use mapping::{Clock, Mapping, Source, Unit};
 pub use sheet::{ColumnId, Dialect, Filter};
 pub use survey::{Channel, Clipped, Gap, Motion, Note, Outlier, Severity, Steady, Survey, Timing};

@@ -25,7 +25,7 @@ pub fn text(case: &Case, fit: &Fit, took: Duration, out: Option<&Path>, written:
     }
     let _ = writeln!(
         text,
-        "\n{} values, {} variables; {} steps, {} simulated logs, {}",
+        "\n{} values, {} variables; {} steps, {} simulated logs\n  took {}",
         fit.values,
         fit.variables,
         fit.work.iterations,
@@ -94,10 +94,11 @@ fn significant(value: f64, digits: usize) -> String {
 pub fn words(estimate: &Estimate) -> [String; 3] {
     let shown = |v: f64, digits| value(v, estimate.unit, digits);
     let own = shown(estimate.value, 5);
-    if estimate.at_bound {
-        return [own, "-".into(), "at its bound: no interval".into()];
-    }
     match (estimate.error, estimate.interval) {
+        (_, Some([low, high])) if estimate.at_bound => {
+            [own, "-".into(), format!("95 %: {} to {}, at its bound", shown(low, 4), shown(high, 4))]
+        }
+        _ if estimate.at_bound => [own, "-".into(), "at its bound: no interval".into()],
         (Some(error), Some([low, high])) if error.is_finite() => {
             [own, shown(error, 2), format!("95 %: {} to {}", shown(low, 4), shown(high, 4))]
         }

@@ -143,10 +143,11 @@ pub fn beyond(f: &Findings) -> Plot {
         laws: &[(&str, &str, Law, Colour, Style)],
         named: bool,
     ) -> Vec<Curve<'a>> {
-        let curve = |((heading, values), law): (&'a (String, Vec<f64>), &(&str, &str, Law, Colour, Style))| {
-            Curve::new(if named { law.0 } else { "" }, heading, values, law.3).style(law.4)
+        let curve = |k: usize| {
+            let ((heading, values), (name, _, _, colour, style)) = (&values[k], &laws[k]);
+            Curve::new(if named { name } else { "" }, heading, values, *colour).style(*style)
         };
-        values.iter().zip(laws).map(curve).collect()
+        (0..values.len().min(laws.len())).map(curve).collect()
     }
     let x = Axis::new("Velocity", "m/s").shown_as("mm/s", 1e3);
     Plot::new("friction-laws", "The friction laws of a case file", x, "velocity_m_s", &v)

@@ -1,0 +1,124 @@
+//! Spectra with and without shapers, what shapers leave at each frequency, and modes along the travel.
+
+use super::{Findings, Found, Source};
+use taut::control::resonance::Resonance;
+use taut::control::shaping::Target;
+use taut::control::spectrum::Spectrum;
+use taut::report::{Axis, Colour, Figure, Panel, Series, Style};
+
+/// All figures, with the names of their files.
+pub fn figures(found: &Findings) -> Vec<(String, Figure)> {
+    let mut figures = Vec::new();
+    for (i, one) in found.each.iter().enumerate() {
+        let name = if i == 0 { "spectrum" } else { "spectrum-2" };
+        match &one.source {
+            Source::Spectrum(spectrum) => {
+                figures.push((name.to_string(), shaped(one, spectrum)));
+                figures.push((name.replace("spectrum", "axes"), axes(one, spectrum)));
+            }
+            Source::Model { modes, .. } => figures.push((name.replace("spectrum", "modes"), model(one, modes))),
+        }
+    }
+    if let [a, b] = found.each.as_slice()
+        && let (Source::Spectrum(first), Source::Spectrum(second)) = (&a.source, &b.source)
+    {
+        figures.push(("compared".into(), compared(found, first, second)));
+    }
+    figures
+}
+
+fn density() -> Axis {
+    Axis::new("Density / frequency", "(mm/s^2)^2/Hz^2")
+}
+
+/// The spectrum, what the recommended shaper leaves of it, and what each shaper leaves at each frequency.
+fn shaped(one: &Found, spectrum: &Spectrum) -> Figure {
+    let f = &spectrum.frequency;
+    let best = one.choice.best();
+    let mut above = Panel::new(density())
+        .series(Series::new("measured", f.clone(), spectrum.density.clone()).colour(Colour::Ink))
+        .weight(1.4);
+    for (i, fitted) in one.choice.fitted.iter().enumerate() {
+        let left = Target::left(spectrum, &fitted.shaper, &one.criterion.tested);
+        let is_best = i == one.choice.recommended;
+        let name = format!("{} {:.1} Hz", fitted.shaper.kind.name(), fitted.shaper.frequency);
+        let style = if is_best { Style::Solid } else { Style::Dashed };
+        above = above.series(Series::new(name, f.clone(), left).colour(colour(i)).style(style));
+    }
+    Figure::new(one.name(), Axis::new("Frequency", "Hz"))
+        .panel(above)
+        .panel(responses(one, f, &one.criterion.tested))
+        .vertical(best.shaper.frequency, "")
+        .caption(format!(
+            "Above the spectrum as measured and behind each shaper, below the part of the vibration that each leaves, both at the \
+             worst of the damping ratios that are looked at. Recommended: {} at {:.1} Hz, the solid line; the vertical line is its \
+             frequency.",
+            best.shaper.kind.name(),
+            best.shaper.frequency
+        ))
+}
+
+fn colour(i: usize) -> Colour {
+    Colour::CYCLE[i % Colour::CYCLE.len()]
+}
+
+fn responses(one: &Found, f: &[f64], dampings: &[f64]) -> Panel {
+    let mut panel = Panel::new(Axis::new("Vibration left", "%").shown_as("%", 100.0));
+    let (low, high) = (f.first().copied().unwrap_or(0.0), f.last().copied().unwrap_or(200.0));
+    let fine: Vec<f64> = (0..=800).map(|k| low + (high - low) * f64::from(k) / 800.0).collect();
+    for (i, fitted) in one.choice.fitted.iter().enumerate() {
+        let left = |f: &f64| dampings.iter().map(|z| fitted.shaper.residual_vibration(*f, *z)).fold(0.0, f64::max);
+        let curve: Vec<f64> = fine.iter().map(left).collect();
+        let style = if i == one.choice.recommended { Style::Solid } else { Style::Dashed };
+        panel = panel.series(Series::new("", fine.clone(), curve).colour(colour(i)).style(style));
+    }
+    panel.horizontal(0.05, "5 %")
+}
+
+/// The axes of the accelerometer.
+fn axes(one: &Found, spectrum: &Spectrum) -> Figure {
+    let mut panel = Panel::new(density());
+    for (name, values) in ["x", "y", "z"].iter().zip(&spectrum.axes) {
+        panel = panel.line(*name, &spectrum.frequency, values);
+    }
+    Figure::new(format!("{}: axes", one.name()), Axis::new("Frequency", "Hz"))
+        .panel(panel)
+        .caption("Each axis of the accelerometer.")
+}
+
+/// Frequencies of a model, and what shapers leave there.
+fn model(one: &Found, modes: &[Resonance]) -> Figure {
+    let high = modes.iter().filter(|mode| mode.share > 0.05).map(|mode| mode.frequency).fold(0.0, f64::max);
+    // A line for each mode, from zero up.
+    let (mut at, mut height) = (Vec::new(), Vec::new());
+    for mode in modes.iter().filter(|mode| mode.frequency <= 1.5 * high) {
+        at.extend([mode.frequency; 3]);
+        height.extend([0.0, mode.share, f64::NAN]);
+    }
+    let lines = Series::new("modes", at, height);
+    let above = Panel::new(Axis::new("Motion of the cart", "")).series(lines.colour(Colour::Ink));
+    let mut legend = responses(one, &[0.0, 1.5 * high], &[super::damping(modes)]);
+    for (series, fitted) in legend.series.iter_mut().zip(&one.choice.fitted) {
+        series.name = format!("{} {:.1} Hz", fitted.shaper.kind.name(), fitted.shaper.frequency);
+    }
+    Figure::new(one.name(), Axis::new("Frequency", "Hz"))
+        .panel(above.weight(0.6))
+        .panel(legend)
+        .vertical(one.choice.best().shaper.frequency, "")
+        .caption(
+            "Above the modes at all places of the travel, by how far each moves the cart, of the strongest; below what each \
+             shaper leaves of a mode with the strongest ones' mean damping ratio. The solid line is the recommended one.",
+        )
+}
+
+/// Both spectra, each of its own height and to one scale.
+fn compared(found: &Findings, first: &Spectrum, second: &Spectrum) -> Figure {
+    let [a, b] = [&found.each[0], &found.each[1]].map(Found::name);
+    Figure::new("Compared", Axis::new("Frequency", "Hz"))
+        .panel(Panel::new(density()).line(a, &first.frequency, &first.density).line(
+            b,
+            &second.frequency,
+            &second.density,
+        ))
+        .caption("Both spectra to one scale.")
+}

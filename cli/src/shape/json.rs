@@ -1,0 +1,85 @@
+//! The result as data: what `--json` prints and `shape.json` holds. Everything is in SI units.
+
+use super::{Findings, Found, Source};
+use serde_json::{Value, json};
+use taut::control::compare::{Comparison, Pair};
+use taut::control::resonance::{Drive, Resonance};
+use taut::control::shaping::Fitted;
+
+/// The text.
+pub fn text(found: &Findings) -> String {
+    let mut value = one(&found.each[0]);
+    value["second"] = found.each.get(1).map_or(Value::Null, one);
+    value["comparison"] = found.comparison.as_ref().map_or(Value::Null, comparison);
+    format!("{}\n", serde_json::to_string_pretty(&value).unwrap_or_default())
+}
+
+fn one(found: &Found) -> Value {
+    let best = found.choice.best();
+    let criterion = &found.criterion;
+    let mut value = json!({
+        "file": found.file.display().to_string(),
+        "told": found.told(),
+        "recommended": {
+            "shaper": best.shaper.kind.name(),
+            "frequency": best.shaper.frequency,
+            "damping": best.shaper.damping,
+            "reason": found.choice.reason,
+        },
+        "shapers": found.choice.fitted.iter().map(fitted).collect::<Vec<_>>(),
+        "criterion": {
+            "design_damping": criterion.damping,
+            "tested_dampings": criterion.tested,
+            "corner_acceleration": criterion.corner.acceleration,
+            "corner_speed": criterion.corner.speed,
+            "max_smoothing": criterion.max_smoothing,
+        },
+    });
+    match &found.source {
+        Source::Spectrum(spectrum) => {
+            value["peaks"] = peaks(&spectrum.peaks());
+            value["spectrum"] =
+                json!({ "axis": spectrum.axis.word(), "frequency": spectrum.frequency, "density": spectrum.density });
+        }
+        Source::Model { title, drive, modes } => {
+            let mode = |mode: &Resonance| json!({ "position": mode.position, "frequency": mode.frequency, "damping": mode.damping, "share": mode.share });
+            let drive = if *drive == Drive::Held { "held" } else { "free" };
+            value["model"] =
+                json!({ "title": title, "motor": drive, "modes": modes.iter().map(mode).collect::<Vec<_>>() });
+        }
+    }
+    value
+}
+
+fn fitted(fitted: &Fitted) -> Value {
+    let impulses: Vec<[f64; 2]> = fitted.shaper.impulses().iter().map(|(t, a)| [*t, *a]).collect();
+    json!({
+        "shaper": fitted.shaper.kind.name(),
+        "frequency": fitted.shaper.frequency,
+        "vibration": fitted.vibration,
+        "smoothing": fitted.smoothing,
+        "max_acceleration": fitted.max_acceleration,
+        "score": fitted.score,
+        "candidate": fitted.is_candidate,
+        "lowest_tried": fitted.is_lowest,
+        "impulses": impulses,
+    })
+}
+
+fn peaks(peaks: &[(f64, f64)]) -> Value {
+    peaks.iter().map(|(f, p)| json!({ "frequency": f, "density": p })).collect()
+}
+
+fn comparison(comparison: &Comparison) -> Value {
+    let pair = |pair: &Pair| json!({ "first": pair.first.0, "second": pair.second.0, "stiffness_per_mass": pair.stiffness_per_mass() });
+    json!({
+        "similarity": comparison.similarity,
+        "level": comparison.level,
+        "resolution": comparison.resolution,
+        "main_peaks": comparison.main.as_ref().map(pair),
+        "common_peaks": comparison.pairs.iter().map(pair).collect::<Vec<_>>(),
+        "only_first": peaks(&comparison.only_first),
+        "only_second": peaks(&comparison.only_second),
+        "suggests": comparison.suggestions(),
+    })
+}

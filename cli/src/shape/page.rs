@@ -1,0 +1,82 @@
+//! The report: one HTML file.
+
+use super::{Findings, Found, table};
+use taut::control::compare::Comparison;
+use taut::report::{Callout, Cell, Figure, Page, Table};
+
+/// The page.
+pub fn page(found: &Findings, figures: &[(String, Figure)]) -> Page {
+    let title = found.each.iter().map(Found::name).collect::<Vec<_>>().join(" and ");
+    let mut page = Page::new(title).subtitle("Input shapers for what vibrates.");
+    for (i, one) in found.each.iter().enumerate() {
+        page.section(&one.name());
+        let best = one.choice.best();
+        let recommended = format!("{} at {:.1} Hz", best.shaper.kind.name(), best.shaper.frequency);
+        page.callout(Callout::Note, recommended, format!("{}.", one.choice.reason));
+        page.prose(format!("{}.", one.told()));
+        shapers(&mut page, one);
+        for (name, figure) in figures.iter().filter(|(name, _)| name != "compared") {
+            if name.ends_with("-2") == (i == 1) {
+                page.figure(figure);
+            }
+        }
+        impulses(&mut page, one);
+    }
+    if let Some(comparison) = &found.comparison {
+        compared(&mut page, comparison);
+    }
+    for (_, figure) in figures.iter().filter(|(name, _)| name == "compared") {
+        page.figure(figure);
+    }
+    page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
+    page
+}
+
+fn shapers(page: &mut Page, one: &Found) {
+    let corner = &one.criterion.corner;
+    let mut rows = Table::new(format!(
+        "Each shaper at its best frequency. Smoothing is at {} mm/s² and {} mm/s at corners; the acceleration is what smooths by \
+         0.12 mm, whether or not the motor can do it.",
+        1e3 * corner.acceleration,
+        taut::quantity::rounded(1e3 * corner.speed)
+    ));
+    rows = rows.column("Shaper", "").column("Frequency", "Hz").column("Vibration left", "%").column("Smoothing", "mm");
+    rows = rows.column("Acceleration up to", "mm/s^2").column("", "");
+    for (i, fitted) in one.choice.fitted.iter().enumerate() {
+        let word = match () {
+            () if i == one.choice.recommended => Cell::Badge(Callout::Holds, "recommended".into()),
+            () => Cell::from(table::remark(fitted)),
+        };
+        let name = Cell::from(fitted.shaper.kind.name());
+        let numbers = table::words(fitted).map(Cell::Number);
+        rows.row(std::iter::once(name).chain(numbers).chain([word]));
+    }
+    page.table(&rows);
+}
+
+fn impulses(page: &mut Page, one: &Found) {
+    let best = one.choice.best();
+    let mut rows = Table::new(format!("The impulses of {}.", best.shaper.kind.name()));
+    rows = rows.column("Time", "ms").column("Amplitude", "");
+    for (time, amplitude) in best.shaper.impulses() {
+        rows.row([Cell::fixed(1e3 * time, 4), Cell::fixed(*amplitude, 6)]);
+    }
+    page.table(&rows);
+}
+
+fn compared(page: &mut Page, comparison: &Comparison) {
+    page.section("Compared");
+    for sentence in comparison.suggestions() {
+        page.prose(sentence);
+    }
+    if comparison.pairs.is_empty() {
+        return;
+    }
+    let mut rows = Table::new("Peaks that both have. Stiffness over mass is the square of the frequencies' ratio.");
+    rows = rows.column("First", "Hz").column("Second", "Hz").column("Stiffness over mass", "%");
+    for pair in &comparison.pairs {
+        let change = 100.0 * (pair.stiffness_per_mass() - 1.0);
+        rows.row([Cell::fixed(pair.first.0, 1), Cell::fixed(pair.second.0, 1), Cell::fixed(change, 0)]);
+    }
+    page.table(&rows);
+}

@@ -1,0 +1,65 @@
+//! The result for people.
+
+use super::{Findings, Found};
+use crate::terminal::bold;
+use std::fmt::Write;
+use std::path::Path;
+use taut::control::shaping::Fitted;
+
+/// The text on the terminal.
+pub fn text(found: &Findings, out: Option<&Path>, written: &[String]) -> String {
+    let mut text = String::new();
+    for one in &found.each {
+        let _ = write!(text, "{}\n{}\n\n", bold(&one.name()), one.told());
+        shapers(&mut text, one);
+        let best = one.choice.best();
+        let recommended = format!("recommended: {} at {:.1} Hz", best.shaper.kind.name(), best.shaper.frequency);
+        let _ = write!(text, "\n{}\n{}\n\n", bold(&recommended), one.choice.reason);
+    }
+    if let Some(comparison) = &found.comparison {
+        let _ = writeln!(text, "{}", bold("Compared"));
+        for sentence in comparison.suggestions() {
+            let _ = writeln!(text, "{sentence}");
+        }
+        text.push('\n');
+    }
+    match out {
+        Some(folder) => {
+            let _ = writeln!(text, "wrote in {}: {}", folder.display(), written.join("  "));
+        }
+        None => text.push_str("nothing was written: add --out DIR for a report, pictures and shape.json\n"),
+    }
+    text
+}
+
+fn shapers(text: &mut String, one: &Found) {
+    text.push_str("  shaper    frequency  vibration  smoothing  acceleration up to\n");
+    for fitted in &one.choice.fitted {
+        let [frequency, vibration, smoothing, acceleration] = words(fitted);
+        let name = fitted.shaper.kind.name();
+        let row = format!(
+            "  {name:<8} {frequency:>7} Hz {vibration:>8} % {smoothing:>7} mm {acceleration:>9} mm/s^2  {}",
+            remark(fitted)
+        );
+        let _ = writeln!(text, "{}", row.trim_end());
+    }
+}
+
+/// What else there is to say.
+pub fn remark(fitted: &Fitted) -> &'static str {
+    match (fitted.is_candidate, fitted.is_lowest) {
+        (false, _) => "not a candidate",
+        (true, true) => "the lowest frequency tried",
+        (true, false) => "",
+    }
+}
+
+/// Frequency in Hz, vibration in %, smoothing in mm, acceleration in mm/s² to hundreds.
+pub fn words(fitted: &Fitted) -> [String; 4] {
+    [
+        format!("{:.1}", fitted.shaper.frequency),
+        format!("{:.1}", 100.0 * fitted.vibration),
+        format!("{:.3}", 1e3 * fitted.smoothing),
+        format!("{:.0}", (10.0 * fitted.max_acceleration).round() * 100.0),
+    ]
+}

@@ -1,0 +1,89 @@
+//! `taut shape` as a user runs it.
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+fn taut() -> Command {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("taut"));
+    command.current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(".."));
+    command
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let output = taut().arg("shape").args(arguments).arg("--json").output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// A spectrum with one resonance at 40 Hz, as Klipper writes it.
+fn spectrum(folder: &Path, name: &str, peak: f64) -> PathBuf {
+    let mut text = String::from("freq,psd_x,psd_y,psd_z,psd_xyz\n");
+    for k in 0..125 {
+        let f = 1.6 * f64::from(k);
+        let p = 1e6 / (1.0 + ((f - peak) / 3.0).powi(2));
+        text += &format!("{f:.1},{p:.3e},0,0,{p:.3e}\n");
+    }
+    let file = folder.join(name);
+    std::fs::write(&file, text).unwrap();
+    file
+}
+
+#[test]
+fn a_spectrum_a_second_one_and_their_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let [a, b] = [("a.csv", 40.0), ("b.csv", 48.0)].map(|(name, peak)| spectrum(folder.path(), name, peak));
+    let out = folder.path().join("out");
+    let [a, b, to] = [&a, &b, &out].map(|path| path.to_str().unwrap());
+    let value = json(&[a, b, "--out", to]);
+    let frequency = value["recommended"]["frequency"].as_f64().unwrap();
+    assert!((frequency - 40.0).abs() < 8.0, "{frequency}");
+    assert_eq!(value["shapers"].as_array().unwrap().len(), 6);
+    let main = &value["comparison"]["main_peaks"];
+    assert_eq!((main["first"].as_f64(), main["second"].as_f64()), (Some(40.0), Some(48.0)));
+    assert!((main["stiffness_per_mass"].as_f64().unwrap() - 1.44).abs() < 1e-12);
+    let wanted = ["shape.json", "report.html", "spectrum.svg", "spectrum.png", "spectrum-2.svg", "compared.png"];
+    assert!(wanted.iter().all(|name| out.join(name).metadata().unwrap().len() > 500));
+    let written: Value = serde_json::from_slice(&std::fs::read(out.join("shape.json")).unwrap()).unwrap();
+    assert_eq!(written, value);
+    // One axis alone, which has everything; the others have nothing.
+    assert_eq!(json(&[a, "--axis", "x"])["recommended"], json(&[a])["recommended"]);
+    taut().args(["shape", a, "--axis", "z"]).assert().code(2);
+}
+
+#[test]
+fn a_model_and_its_options() {
+    let case = "stages/printer-axis/printer-axis.toml";
+    let held = json(&[case]);
+    let frequency = |value: &Value| value["model"]["modes"][0]["frequency"].as_f64().unwrap();
+    let heavier = json(&[case, "--set", "cart.mass=0.8 kg"]);
+    assert!(frequency(&heavier) < frequency(&held) && frequency(&held) < frequency(&json(&[case, "--motor", "free"])));
+    assert_eq!(json(&[case, "--uncertainty", "0"])["recommended"]["shaper"], "zv");
+    let only = json(&[case, "--shapers", "zvd,3hump_ei", "--damping", "0.05"]);
+    let shapers = only["shapers"].as_array().unwrap();
+    assert!(shapers.len() == 2 && shapers.iter().all(|one| one["candidate"] == true));
+    assert_eq!(only["recommended"]["damping"], 0.05);
+}
+
+#[test]
+fn mistakes_end_with_status_2() {
+    let case = "stages/printer-axis/printer-axis.toml";
+    let bad = "tests/bad/shape/density-nan.csv";
+    for arguments in [
+        vec!["no-such-file.csv"],
+        vec![bad],
+        vec!["stages/emps/emps.toml"],
+        vec![case, "--axis", "x"],
+        vec![case, "--damping", "1.5"],
+        vec![case, "--max-smoothing", "0.1"],
+        vec![case, "--max-smoothing", "0.0001 mm"],
+        vec![case, "--corner-speed", "5 mm"],
+        vec![case, "--shapers", "zw"],
+        vec![case, "--uncertainty", "10"],
+        vec![bad, "--motor", "free"],
+    ] {
+        let output = taut().arg("shape").args(&arguments).output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(output.stdout.is_empty() && output.stderr.starts_with(b"error: "), "{arguments:?}");
+    }
+}

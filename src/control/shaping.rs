@@ -1,0 +1,276 @@
+//! Which shaper, and at which frequency: the criterion by which Klipper chooses, on a spectrum or on the modes of a model.
+//!
+//! For every frequency of a grid a shaper leaves some vibration and costs some smoothing. Of each kind the frequency is taken
+//! that leaves the least vibration or hardly more, with the best score; and of all kinds the one with the clearly best score.
+
+use super::resonance::Resonance;
+use super::shaper::{Corner, Kind, Shaper, TOLERANCE, USUAL_DAMPING, check_damping};
+use super::spectrum::Spectrum;
+use crate::error::{Error, Result};
+use crate::quantity::rounded;
+
+/// The highest frequency of a shaper for a spectrum, Hz; it is not reached.
+const HIGHEST: f64 = 150.0;
+/// Steps of a shaper's frequency within one hertz.
+const STEPS: f64 = 5.0;
+/// Smoothing that is not too much, m: what the greatest acceleration is suggested for.
+pub const ALLOWED_SMOOTHING: f64 = 0.12e-3;
+
+/// Where within the uncertainty of its frequency a mode is looked at.
+const PARTS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
+
+/// What vibrates.
+#[derive(Debug, Clone, Copy)]
+pub enum Target<'a> {
+    /// Density over frequency; damping is not known.
+    Spectrum(&'a Spectrum),
+    /// Modes of known damping, each at its own time: the one that keeps the most counts.
+    Modes {
+        /// At all places of the travel.
+        modes: &'a [Resonance],
+        /// By which part their true frequencies may be higher or lower.
+        uncertainty: f64,
+    },
+}
+
+/// By what shapers are chosen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Criterion {
+    /// Damping ratio that shapers are designed for.
+    pub damping: f64,
+    /// Damping ratios of the machine at which a spectrum's vibration is looked at; the worst counts.
+    pub tested: Vec<f64>,
+    /// The corner at which smoothing is compared.
+    pub corner: Corner,
+    /// Most smoothing that is allowed, m.
+    pub max_smoothing: Option<f64>,
+    /// Kinds that are fitted.
+    pub kinds: Vec<Kind>,
+    /// Kinds of them that may be recommended.
+    pub candidates: Vec<Kind>,
+}
+
+impl Default for Criterion {
+    /// As Klipper's: designed for a damping ratio of 0.1, looked at from 0.075 to 0.15. ZVD is fitted, but not a candidate: it
+    /// is as long as EI and covers less.
+    fn default() -> Self {
+        let kinds = Kind::ALL.to_vec();
+        let candidates = kinds.iter().copied().filter(|kind| *kind != Kind::Zvd).collect();
+        let mut criterion = Self {
+            damping: 0.0,
+            tested: Vec::new(),
+            corner: Corner::default(),
+            max_smoothing: None,
+            kinds,
+            candidates,
+        };
+        criterion.assume(USUAL_DAMPING);
+        criterion
+    }
+}
+
+impl Criterion {
+    /// Designs for a damping ratio ζ, and looks at ¾ ζ, ζ and 1½ ζ.
+    pub fn with_damping(mut self, damping: f64) -> Result<Self> {
+        check_damping(damping)?;
+        self.assume(damping);
+        Ok(self)
+    }
+
+    /// Fits these kinds alone; each may be recommended.
+    pub fn with_kinds(mut self, kinds: &[Kind]) -> Self {
+        self.kinds = kinds.to_vec();
+        self.candidates = kinds.to_vec();
+        self
+    }
+
+    fn assume(&mut self, damping: f64) {
+        self.damping = damping;
+        self.tested = vec![0.75 * damping, damping, (1.5 * damping).min(0.999)];
+        self.tested.dedup();
+    }
+}
+
+/// A shaper at its best frequency.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fitted {
+    /// The shaper.
+    pub shaper: Shaper,
+    /// Vibration that remains, of that without a shaper: 0 to 1, see [`Target::remaining`].
+    pub vibration: f64,
+    /// Smoothing at the criterion's corner, m.
+    pub smoothing: f64,
+    /// Greatest acceleration with at most [`ALLOWED_SMOOTHING`], m/s².
+    pub max_acceleration: f64,
+    /// What is compared, smaller is better: smoothing in mm times a measure of the vibration.
+    pub score: f64,
+    /// Whether it may be recommended.
+    pub is_candidate: bool,
+    /// Whether its frequency is the lowest that is tried: a lower one might leave less, and would smooth more.
+    pub is_lowest: bool,
+}
+
+/// All kinds at their best, and the one to take.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    /// In the order of the criterion's kinds, without those that `max_smoothing` excludes.
+    pub fitted: Vec<Fitted>,
+    /// The place of the recommended one among them.
+    pub recommended: usize,
+    /// Why that one.
+    pub reason: String,
+}
+
+impl Choice {
+    /// The recommended one.
+    pub fn best(&self) -> &Fitted {
+        &self.fitted[self.recommended]
+    }
+}
+
+impl Target<'_> {
+    /// Vibration that a shaper leaves, of that without one: 0 to 1; of a spectrum what is above a twentieth of the highest peak.
+    pub fn remaining(&self, shaper: &Shaper, dampings: &[f64]) -> f64 {
+        match self {
+            // Σ max(V P − P_max/20, 0) / Σ max(P − P_max/20, 0), at the worst of the damping ratios
+            Target::Spectrum(spectrum) => {
+                let floor = TOLERANCE * spectrum.greatest();
+                let above = |p: f64| (p - floor).max(0.0);
+                let lines = || spectrum.frequency.iter().zip(&spectrum.density).filter(|(_, p)| **p > floor);
+                let whole: f64 = lines().map(|(_, p)| above(*p)).sum();
+                let left =
+                    |zeta: &f64| -> f64 { lines().map(|(f, p)| above(shaper.residual_vibration(*f, *zeta) * p)).sum() };
+                dampings.iter().map(left).fold(0.0, f64::max) / whole
+            }
+            // max V w / w_max over modes and over f (1 − u) to f (1 + u); nothing is taken off, as a model has no noise
+            Target::Modes { modes, uncertainty } => {
+                let most = modes.iter().map(|mode| mode.share).fold(0.0, f64::max);
+                let at = |mode: &Resonance, part: f64| {
+                    let f = mode.frequency * (1.0 + part * uncertainty);
+                    shaper.residual_vibration(f, mode.damping) * mode.share / most
+                };
+                let worst = |mode: &Resonance| PARTS.iter().map(|part| at(mode, *part)).fold(0.0, f64::max);
+                modes.iter().map(worst).fold(0.0, f64::max)
+            }
+        }
+    }
+
+    /// The spectrum that is left behind a shaper, at the worst of the damping ratios.
+    pub fn left(spectrum: &Spectrum, shaper: &Shaper, dampings: &[f64]) -> Vec<f64> {
+        let worst = |f: f64| dampings.iter().map(|z| shaper.residual_vibration(f, *z)).fold(0.0, f64::max);
+        spectrum.frequency.iter().zip(&spectrum.density).map(|(f, p)| worst(*f) * p).collect()
+    }
+
+    /// Frequencies that are tried for a kind, ascending.
+    fn grid(&self, kind: Kind) -> Vec<f64> {
+        match self {
+            Target::Spectrum(_) => {
+                let first = lowest(kind) * STEPS;
+                let count = (HIGHEST * STEPS - first) as usize;
+                (0..count).map(|k| (first + k as f64) / STEPS).collect()
+            }
+            Target::Modes { modes, .. } => {
+                let low = modes.iter().map(|mode| mode.frequency).fold(f64::INFINITY, f64::min);
+                let high = modes.iter().map(|mode| mode.frequency).fold(0.0, f64::max);
+                let step = low / 200.0;
+                let count = ((3.0 * high - 0.5 * low) / step) as usize;
+                (0..count.min(20_000)).map(|k| 0.5 * low + k as f64 * step).collect()
+            }
+        }
+    }
+}
+
+/// The lowest frequency that is tried on a spectrum, Hz: below, hardly 1500 mm/s² would be left.
+fn lowest(kind: Kind) -> f64 {
+    match kind {
+        Kind::Zv => 21.0,
+        Kind::Mzv => 23.0,
+        Kind::Zvd | Kind::Ei => 29.0,
+        Kind::TwoHumpEi => 39.0,
+        Kind::ThreeHumpEi => 48.0,
+    }
+}
+
+/// Fits every kind, and recommends one.
+pub fn choose(target: Target<'_>, criterion: &Criterion) -> Result<Choice> {
+    if let Target::Modes { modes: [], .. } = target {
+        return Err(Error::new("there is no mode to shape for").next("give a model whose belt stretches"));
+    }
+    let fitted: Vec<Fitted> = criterion.kinds.iter().filter_map(|kind| fit(target, *kind, criterion)).collect();
+    let mut candidates = (0..fitted.len()).filter(|&i| fitted[i].is_candidate);
+    let Some(first) = candidates.next() else {
+        let limit = rounded(criterion.max_smoothing.unwrap_or_default() * 1e3);
+        let error = Error::new(format!("no shaper has so little smoothing as {limit} mm"));
+        return Err(error.next("allow more smoothing, or more kinds of shapers"));
+    };
+    // A longer shaper must be clearly better: by a fifth, or by a twentieth with a tenth less smoothing.
+    let recommended = candidates.fold(first, |best, i| {
+        let (one, best_one) = (&fitted[i], &fitted[best]);
+        let clearly = 1.2 * one.score < best_one.score;
+        let smoother = 1.05 * one.score < best_one.score && 1.1 * one.smoothing < best_one.smoothing;
+        if clearly || smoother { i } else { best }
+    });
+    let reason = reason(&fitted, recommended);
+    Ok(Choice { fitted, recommended, reason })
+}
+
+/// A kind at its best frequency; none if it always smooths too much.
+fn fit(target: Target<'_>, kind: Kind, criterion: &Criterion) -> Option<Fitted> {
+    let grid = target.grid(kind);
+    let tried = grid.iter().copied().filter_map(|frequency| {
+        let shaper = Shaper::of(kind, frequency, criterion.damping);
+        let smoothing = shaper.smoothing(&criterion.corner);
+        if criterion.max_smoothing.is_some_and(|most| smoothing > most) {
+            return None;
+        }
+        let v = target.remaining(&shaper, &criterion.tested);
+        // Smoothing in mm times (v^1.5 + 0.2 v + 0.01): with little vibration left it is smoothing that counts.
+        let score = smoothing * 1e3 * (v.powf(1.5) + 0.2 * v + 0.01);
+        Some((shaper, v, smoothing, score))
+    });
+    let tried: Vec<_> = tried.collect();
+    // The least vibration; of equals the highest frequency, which smooths least.
+    let least = tried.iter().rev().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    // What leaves less than a tenth more is as good, and may have the better score.
+    let (shaper, vibration, smoothing, score) = tried
+        .iter()
+        .filter(|one| one.1 < 1.1 * least.1)
+        .fold(least, |best, one| if one.3 < best.3 { one } else { best });
+    Some(Fitted {
+        shaper: shaper.clone(),
+        vibration: *vibration,
+        smoothing: *smoothing,
+        max_acceleration: shaper.max_acceleration(ALLOWED_SMOOTHING, criterion.corner.speed),
+        score: *score,
+        is_candidate: criterion.candidates.contains(&kind),
+        is_lowest: grid.first() == Some(&shaper.frequency),
+    })
+}
+
+fn reason(fitted: &[Fitted], recommended: usize) -> String {
+    let best = &fitted[recommended];
+    let told = |one: &Fitted| {
+        format!("leaves {:.1} % of the vibration and smooths by {:.3} mm", 100.0 * one.vibration, 1e3 * one.smoothing)
+    };
+    let name = |one: &Fitted| one.shaper.kind.name();
+    let other = |i: &usize| *i != recommended && fitted[*i].is_candidate;
+    let next = (0..fitted.len()).filter(other).min_by(|a, b| fitted[*a].score.total_cmp(&fitted[*b].score));
+    let Some(next) = next.map(|i| &fitted[i]) else {
+        return format!("{} {}; no other is a candidate", name(best), told(best));
+    };
+    let ratio = next.score / best.score;
+    let words = match ratio {
+        r if r >= 1.2 => {
+            format!("the next best, {}, {}, and its score is {r:.2} times as high", name(next), told(next))
+        }
+        r if r >= 1.0 => {
+            format!("{} is nearly as good: it {}, and its score is {r:.2} times as high", name(next), told(next))
+        }
+        r => format!(
+            "{} {}, and its score is {r:.2} of that: too little gained for a longer one",
+            name(next),
+            told(next)
+        ),
+    };
+    format!("{} {}; {words}", name(best), told(best))
+}

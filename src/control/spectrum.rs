@@ -1,0 +1,163 @@
+//! Spectra of an axis' vibration: from a file, or from samples.
+
+use super::welch::power_spectral_density;
+use crate::log::Accelerometer;
+
+/// Frequencies below this are left out, Hz: they are the test's own motion.
+pub const LOWEST: f64 = 5.0;
+/// Frequencies above this are left out, Hz.
+pub const HIGHEST: f64 = 200.0;
+/// A segment of samples lasts at least so long, s: frequencies are 2 Hz apart, or less.
+const SEGMENT: f64 = 0.5;
+/// The least height of a peak over what parts it from a higher one, of the highest peak.
+const PROMINENCE: f64 = 0.1;
+
+/// An axis of the accelerometer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Axis {
+    /// x.
+    X,
+    /// y.
+    Y,
+    /// z.
+    Z,
+    /// The sum of the three.
+    #[default]
+    All,
+}
+
+impl Axis {
+    /// Its word.
+    pub fn word(self) -> &'static str {
+        ["x", "y", "z", "x + y + z"][self as usize]
+    }
+}
+
+/// Power spectral density over frequency, divided by frequency.
+///
+/// A resonance test shakes the harder the higher the frequency; divided by the frequency, the density tells better what a
+/// move excites. This is the scale by which Klipper chooses shapers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spectrum {
+    /// Hz, ascending, at most [`HIGHEST`].
+    pub frequency: Vec<f64>,
+    /// Of the axis that was asked for; 0 below [`LOWEST`].
+    pub density: Vec<f64>,
+    /// Of x, y and z, to be shown.
+    pub axes: [Vec<f64>; 3],
+    /// Which axis `density` is of.
+    pub axis: Axis,
+    /// Where it comes from, in a few words.
+    pub origin: String,
+}
+
+impl Spectrum {
+    /// The spectrum of what was read.
+    pub fn new(data: &Accelerometer, axis: Axis) -> Self {
+        match data {
+            Accelerometer::Spectrum { frequency, density: [x, y, z, all], per_frequency } => {
+                let origin = match per_frequency {
+                    true => "a spectrum with shapers, already divided by frequency",
+                    false => "a spectrum",
+                };
+                let parts = [x, y, z, all].map(|density| scaled(frequency, density, *per_frequency));
+                Self::of(frequency, parts, axis, origin.to_string())
+            }
+            Accelerometer::Samples { time, acceleration } => {
+                let span = time[time.len() - 1] - time[0];
+                let rate = (time.len() - 1) as f64 / span;
+                let length = (rate * SEGMENT).ceil() as usize;
+                let length = length.next_power_of_two();
+                let [x, y, z] = acceleration.each_ref().map(|values| power_spectral_density(values, rate, length));
+                let frequency = x.0;
+                let all: Vec<f64> = x.1.iter().zip(&y.1).zip(&z.1).map(|((x, y), z)| x + y + z).collect();
+                let parts = [x.1, y.1, z.1, all].map(|density| scaled(&frequency, &density, false));
+                let origin = format!("{} samples in {span:.1} s, {rate:.0} a second, segments of {length}", time.len());
+                Self::of(&frequency, parts, axis, origin)
+            }
+        }
+    }
+
+    fn of(frequency: &[f64], [x, y, z, all]: [Vec<f64>; 4], axis: Axis, origin: String) -> Self {
+        let count = frequency.iter().take_while(|f| **f <= HIGHEST).count();
+        let cut = |part: &[f64]| part[..count].to_vec();
+        let density = match axis {
+            Axis::X => cut(&x),
+            Axis::Y => cut(&y),
+            Axis::Z => cut(&z),
+            Axis::All => cut(&all),
+        };
+        Self { frequency: cut(frequency), density, axes: [cut(&x), cut(&y), cut(&z)], axis, origin }
+    }
+
+    /// The greatest density.
+    pub fn greatest(&self) -> f64 {
+        self.density.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Where it has its peaks: frequency (Hz) and density, by frequency. A peak stands out by a tenth of the highest at least.
+    pub fn peaks(&self) -> Vec<(f64, f64)> {
+        let d = &self.density;
+        let wanted = PROMINENCE * self.greatest();
+        let least = |values: &mut dyn Iterator<Item = &f64>, top: f64| {
+            // The lowest value on the way to one that is higher, or to the end.
+            let mut low = top;
+            for value in values {
+                if *value > top {
+                    return low;
+                }
+                low = low.min(*value);
+            }
+            low
+        };
+        let is_peak = |&k: &usize| {
+            let before = k.checked_sub(1).map_or(0.0, |i| d[i]);
+            let behind = d.get(k + 1).copied().unwrap_or(0.0);
+            d[k] > before && d[k] >= behind && {
+                let left = least(&mut d[..k].iter().rev(), d[k]);
+                let right = least(&mut d[k + 1..].iter(), d[k]);
+                d[k] - left.max(right) >= wanted
+            }
+        };
+        (0..d.len()).filter(is_peak).map(|k| (self.frequency[k], d[k])).collect()
+    }
+
+    /// The axis of the accelerometer that vibrates most at one of the spectrum's frequencies, and its part of the three.
+    pub fn main_axis(&self, frequency: f64) -> Option<(Axis, f64)> {
+        let k = self.frequency.iter().position(|f| *f == frequency)?;
+        let all: f64 = self.axes.iter().map(|axis| axis[k]).sum();
+        let named = [Axis::X, Axis::Y, Axis::Z].into_iter().zip(&self.axes);
+        let (axis, most) = named.map(|(axis, values)| (axis, values[k])).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        (all > 0.0).then_some((axis, most / all))
+    }
+
+    /// The density at a frequency, joined linearly; 0 outside.
+    pub fn at(&self, f: f64) -> f64 {
+        let above = self.frequency.partition_point(|x| *x < f);
+        match (above.checked_sub(1), self.frequency.get(above)) {
+            (_, None) => 0.0,
+            (None, Some(first)) => {
+                if *first == f {
+                    self.density[0]
+                } else {
+                    0.0
+                }
+            }
+            (Some(below), Some(high)) => {
+                let low = self.frequency[below];
+                let part = (f - low) / (high - low);
+                self.density[below] * (1.0 - part) + self.density[above] * part
+            }
+        }
+    }
+}
+
+/// P(f) / f, without the lowest frequencies; a tenth of a hertz keeps it from infinity.
+fn scaled(frequency: &[f64], density: &[f64], is_already: bool) -> Vec<f64> {
+    let one = |(f, p): (&f64, &f64)| match *f {
+        f if f < LOWEST => 0.0,
+        _ if is_already => *p,
+        f => p / (f + 0.1),
+    };
+    frequency.iter().zip(density).map(one).collect()
+}

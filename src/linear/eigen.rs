@@ -1,0 +1,226 @@
+//! Eigenvalues of small real matrices whose entries differ by many powers of ten.
+//!
+//! A matrix is first taken apart where it is block triangular by a single row or column, then balanced, then brought to real
+//! Schur form by a bounded iteration; each eigenvalue is at last improved by its own two eigenvectors.
+
+use crate::error::{Error, Result};
+use nalgebra::linalg::Schur;
+use nalgebra::{Complex, DMatrix, DVector};
+
+/// Steps that the iteration to the Schur form may take.
+const MOST_STEPS: usize = 10_000;
+
+/// Copies of a matrix, each turned by another angle, that are tried where the iteration does not settle.
+const MOST_TURNS: u32 = 8;
+
+/// Eigenvalues that are smaller than this share of the matrix' norm are zero: rounding alone makes them that large.
+pub(crate) const NOTHING: f64 = 1e-13;
+
+/// The diagonal D, of powers of two, for which rows and columns of D⁻¹ A D have norms of one size (Osborne 1960, Parlett and Reinsch
+/// 1969); scaling by powers of two rounds nothing.
+pub(crate) fn balance(matrix: &DMatrix<f64>) -> DVector<f64> {
+    let n = matrix.nrows();
+    let mut a = matrix.clone();
+    let mut scale = DVector::from_element(n, 1.0);
+    // It ends by itself; the bound is for entries that are no numbers.
+    for _ in 0..100 {
+        let mut done = true;
+        for i in 0..n {
+            let others = || (0..n).filter(|&j| j != i);
+            let column: f64 = others().map(|j| a[(j, i)].abs()).sum();
+            let row: f64 = others().map(|j| a[(i, j)].abs()).sum();
+            if column == 0.0 || row == 0.0 || !(column + row).is_finite() {
+                continue;
+            }
+            // c f and r/f are as near to each other as a power of two can bring them.
+            let factor = (0.5 * (row / column).log2()).round().clamp(-300.0, 300.0).exp2();
+            if column * factor + row / factor < 0.95 * (column + row) {
+                done = false;
+                scale[i] *= factor;
+                a.column_mut(i).scale_mut(factor);
+                a.row_mut(i).scale_mut(1.0 / factor);
+            }
+        }
+        if done {
+            break;
+        }
+    }
+    scale
+}
+
+/// D⁻¹ A D.
+pub(crate) fn scaled(matrix: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
+    DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * scale[j] / scale[i])
+}
+
+/// The largest sum of absolute values in a row.
+pub(crate) fn norm(matrix: &DMatrix<f64>) -> f64 {
+    matrix.row_iter().map(|row| row.iter().map(|v| v.abs()).sum()).fold(0.0, f64::max)
+}
+
+/// The eigenvalues, conjugates side by side, the one of positive imaginary part first, those of least absolute value first.
+///
+/// Fails only if the matrix holds what is no number, or the iteration does not settle on any of its turned copies.
+pub(crate) fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
+    let (mut values, rest) = taken_apart(matrix);
+    if rest.nrows() > 0 {
+        let balanced = scaled(&rest, &balance(&rest));
+        let size = norm(&balanced);
+        let rough = schur(&balanced)?;
+        for (i, &value) in rough.iter().enumerate() {
+            if value.im < 0.0 {
+                continue;
+            }
+            let mut value = polished(&balanced, balanced.nrows(), value, distance(&rough, i));
+            if value.norm() <= NOTHING * size {
+                value = Complex::new(0.0, 0.0);
+            }
+            values.push(value);
+            if rough[i].im > 0.0 {
+                values.push(value.conj());
+            }
+        }
+    }
+    sort(&mut values);
+    Ok(values)
+}
+
+/// The same as the Schur form gives them: each within a few roundings of the largest.
+pub(crate) fn rough(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
+    let (mut values, rest) = taken_apart(matrix);
+    if rest.nrows() > 0 {
+        values.extend(schur(&scaled(&rest, &balance(&rest)))?);
+    }
+    Ok(values)
+}
+
+/// By absolute value, then conjugates together.
+pub(crate) fn sort(values: &mut [Complex<f64>]) {
+    values.sort_by(|p, q| p.norm().total_cmp(&q.norm()).then(q.im.total_cmp(&p.im)));
+}
+
+/// Distance to the nearest of the others.
+pub(crate) fn distance(values: &[Complex<f64>], of: usize) -> f64 {
+    let others = values.iter().enumerate().filter(|(j, _)| *j != of);
+    others.map(|(_, other)| (other - values[of]).norm()).fold(f64::INFINITY, f64::min)
+}
+
+/// Eigenvalues that stand on the diagonal, because all else in their row or column is zero, and the matrix without these rows and
+/// columns.
+fn taken_apart(matrix: &DMatrix<f64>) -> (Vec<Complex<f64>>, DMatrix<f64>) {
+    let (mut values, mut rest) = (Vec::new(), matrix.clone());
+    loop {
+        let n = rest.nrows();
+        let alone = (0..n).find(|&i| {
+            let others = || (0..n).filter(|&j| j != i);
+            others().all(|j| rest[(i, j)] == 0.0) || others().all(|j| rest[(j, i)] == 0.0)
+        });
+        let Some(i) = alone else { return (values, rest) };
+        values.push(Complex::new(rest[(i, i)], 0.0));
+        rest = rest.remove_row(i).remove_column(i);
+    }
+}
+
+/// The eigenvalues as the real Schur form has them.
+fn schur(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
+    let n = matrix.nrows();
+    let size = norm(matrix);
+    if !size.is_finite() {
+        return Err(Error::new("the linearised equations hold a number that is too large to compute with")
+            .next("look for a stiffness, an inertia or an inductance with a wrong unit"));
+    }
+    for turn in 0..MOST_TURNS {
+        let mut copy = matrix.clone();
+        if turn > 0 && n > 1 {
+            // A turned copy has the same eigenvalues, and where the iteration went in circles it does not.
+            let (s, c) = (0.1 + 0.37 * f64::from(turn)).sin_cos();
+            let mut rotation = DMatrix::identity(n, n);
+            let (i, j) = (turn as usize % n, (turn as usize + 1) % n);
+            (rotation[(i, i)], rotation[(i, j)], rotation[(j, i)], rotation[(j, j)]) = (c, s, -s, c);
+            copy = &rotation * copy * rotation.transpose();
+        }
+        if let Some(form) = Schur::try_new(copy, f64::EPSILON, MOST_STEPS) {
+            return Ok(form.complex_eigenvalues().iter().copied().collect());
+        }
+    }
+    Err(Error::new("the eigenvalues of the linearised equations cannot be found: the iteration does not settle")
+        .next("change a value of the case a little"))
+}
+
+/// An eigenvalue s of M − s E, better than it is known; E is the unit matrix in its first `count` rows and zero in the others.
+///
+/// By its right and left vectors: (M − s E) x ≈ 0, yᴴ (M − s E) ≈ 0, s ← s + yᴴ (M − s E) x / yᴴ E x. `apart` is the distance to the next
+/// one: what would move it by a tenth of that is not believed.
+pub(crate) fn polished(matrix: &DMatrix<f64>, count: usize, s: Complex<f64>, apart: f64) -> Complex<f64> {
+    let whole = matrix.map(|v| Complex::new(v, 0.0));
+    let n = whole.nrows();
+    let shifted = |s: Complex<f64>| {
+        let mut shifted = whole.clone();
+        for i in 0..count {
+            shifted[(i, i)] -= s;
+        }
+        shifted
+    };
+    let kept =
+        |v: &DVector<Complex<f64>>| DVector::from_fn(n, |i, _| if i < count { v[i] } else { Complex::new(0.0, 0.0) });
+    let size = norm(matrix);
+    let start = DVector::from_fn(n, |i, _| Complex::new(1.0 + 0.1 * i as f64, 0.3));
+    let mut best = s;
+    for _ in 0..2 {
+        let at = shifted(best);
+        let (right, left) = (at.clone().lu(), at.adjoint().lu());
+        let (mut x, mut y) = (start.clone(), start.clone());
+        for _ in 0..3 {
+            let (Some(next_x), Some(next_y)) = (right.solve(&kept(&x)), left.solve(&kept(&y))) else { return best };
+            (x, y) = (next_x.unscale(next_x.norm()), next_y.unscale(next_y.norm()));
+        }
+        let change = y.dotc(&(&at * &x)) / y.dotc(&kept(&x));
+        if !(change.norm() <= 0.1 * apart && change.norm() <= 1e-3 * best.norm() + 1e-8 * size) {
+            return best;
+        }
+        best += change;
+        if s.im == 0.0 {
+            best.im = 0.0;
+        }
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn balancing_is_exact_and_evens_out() {
+        let a = DMatrix::from_row_slice(2, 2, &[1.0, 1e8, 1e-6, 2.0]);
+        let b = scaled(&a, &balance(&a));
+        assert_eq!((b[(0, 0)], b[(1, 1)]), (1.0, 2.0));
+        assert_eq!(b[(0, 1)] * b[(1, 0)], 1e8 * 1e-6);
+        assert!(norm(&b) < 20.0, "{b}");
+    }
+
+    /// A companion matrix of (s + 1e-3)(s + 1)(s² + 2 s + 1e10): eleven decades between its eigenvalues.
+    #[test]
+    fn slow_eigenvalues_beside_fast_ones() {
+        let slow = [1e-3, 1.0 + 1e-3, 1.0];
+        let fast = [1e10, 2.0, 1.0];
+        let mut p = [0.0; 5];
+        for (i, a) in slow.iter().enumerate() {
+            for (j, b) in fast.iter().enumerate() {
+                p[i + j] += a * b;
+            }
+        }
+        let a = DMatrix::from_fn(4, 4, |i, j| if i < 3 { f64::from(u8::from(j == i + 1)) } else { -p[j] });
+        let values = eigenvalues(&a).unwrap();
+        assert!((values[0].re + 1e-3).abs() < 1e-12 && (values[1].re + 1.0).abs() < 1e-10, "{values:?}");
+        assert!((values[2].norm() - 1e5).abs() < 1e-7 && values[2].im > 0.0, "{values:?}");
+    }
+
+    /// The swap of four coordinates in a circle, on which unshifted iterations go round for ever.
+    #[test]
+    fn a_circle_of_four() {
+        let a = DMatrix::from_fn(4, 4, |i, j| f64::from(u8::from(j == (i + 1) % 4)));
+        let values = eigenvalues(&a).unwrap();
+        assert!(values.iter().all(|v| (v.norm() - 1.0).abs() < 1e-14), "{values:?}");
+    }
+}

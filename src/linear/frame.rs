@@ -1,0 +1,211 @@
+//! Coordinates: which quantities are the states, and what every stretch, speed and angle is in terms of them.
+
+use super::model::Variable;
+use crate::friction::Law;
+use crate::plant::{Body, Form, Plant, ROTOR, SPEEDS, STRETCHES, arms};
+use crate::stage::BeltModel;
+use nalgebra::{DMatrix, DVector};
+
+/// States, and what is made of them.
+pub(super) struct Frame {
+    pub(super) variables: Vec<Variable>,
+    /// Coefficients of the states in the stretches of [`Form::stretch`].
+    stretch: [DVector<f64>; STRETCHES],
+    /// In φ̇₁, ẋ, φ̇₃, φ̇_r.
+    speed: [DVector<f64>; SPEEDS],
+    /// In φ₁, x, φ₃, φ_r.
+    pub(super) angle: [DVector<f64>; SPEEDS],
+    /// Places of the states that are ways, and their rates.
+    pub(super) ways: Vec<(usize, DVector<f64>)>,
+    /// Where the speeds stand that are states.
+    pub(super) speed_place: [Option<usize>; SPEEDS],
+    pub(super) current_place: Option<usize>,
+    pub(super) bristle_place: [Option<usize>; 3],
+    /// What each state is: the quantity whose coefficients in another frame are its own.
+    kinds: Vec<Kind>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Angle(usize),
+    Stretch(usize),
+    Speed(usize),
+    Current,
+    Bristle(usize),
+}
+
+const ANGLES: [Variable; SPEEDS] = [
+    Variable { name: "drive_angle", unit: "rad" },
+    Variable { name: "cart_position", unit: "m" },
+    Variable { name: "idler_angle", unit: "rad" },
+    Variable { name: "rotor_angle", unit: "rad" },
+];
+
+const RATES: [Variable; SPEEDS] = [
+    Variable { name: "drive_speed", unit: "rad/s" },
+    Variable { name: "cart_speed", unit: "m/s" },
+    Variable { name: "idler_speed", unit: "rad/s" },
+    Variable { name: "rotor_speed", unit: "rad/s" },
+];
+
+const BRISTLES: [Variable; 3] = [
+    Variable { name: "drive_bristle", unit: "rad" },
+    Variable { name: "cart_bristle", unit: "m" },
+    Variable { name: "idler_bristle", unit: "rad" },
+];
+
+impl Frame {
+    /// Angles and speeds as in [`crate::plant::place`], of what moves by itself.
+    pub(super) fn outer(plant: &Plant, held: [bool; 3], speed: f64) -> Self {
+        let moving: Vec<usize> = moving(plant, held);
+        let mut kinds: Vec<Kind> = Vec::new();
+        for &j in moving.iter().filter(|&&j| j != ROTOR) {
+            kinds.extend([Kind::Angle(j), Kind::Speed(j)]);
+        }
+        kinds.extend(plant.has_current_state().then_some(Kind::Current));
+        if moving.contains(&ROTOR) {
+            kinds.extend([Kind::Angle(ROTOR), Kind::Speed(ROTOR)]);
+        }
+        kinds.extend(bristles(plant, held, speed));
+        Self::new(plant, kinds, false)
+    }
+
+    /// The cart's position and stretches, so that what does not depend on where the axis is has coefficients that are exactly zero. The
+    /// outer frame where a body is held: then positions are stretches.
+    pub(super) fn inner(plant: &Plant, held: [bool; 3], speed: f64) -> Self {
+        if held.contains(&true) {
+            return Self::outer(plant, held, speed);
+        }
+        let mut kinds = vec![Kind::Angle(1)];
+        kinds.extend(match plant.stage().belt.model {
+            BeltModel::Elastic => vec![Kind::Stretch(0), Kind::Stretch(1)],
+            BeltModel::TwoMass => vec![Kind::Stretch(0)],
+            BeltModel::Rigid => Vec::new(),
+        });
+        kinds.extend(plant.has_rotor().then_some(Kind::Stretch(3)));
+        kinds.extend(moving(plant, held).into_iter().map(Kind::Speed));
+        kinds.extend(plant.has_current_state().then_some(Kind::Current));
+        kinds.extend(bristles(plant, held, speed));
+        Self::new(plant, kinds, true)
+    }
+
+    fn new(plant: &Plant, kinds: Vec<Kind>, relative: bool) -> Self {
+        let r = plant.stage().pulley_radius;
+        let n = kinds.len();
+        let place = |kind: Kind| kinds.iter().position(|k| *k == kind);
+        let unit = |kind: Kind, factor: f64| {
+            let mut row = DVector::zeros(n);
+            if let Some(place) = place(kind) {
+                row[place] = factor;
+            }
+            row
+        };
+        // What moves with another body goes its way times a ratio; the rotor of a stiff gear goes with the drive pulley.
+        let led = |kind: fn(usize) -> Kind, j: usize| match Body::ALL.get(j) {
+            Some(&body) => unit(kind(plant.leader(body).index()), plant.ratio(body)),
+            None if plant.has_rotor() => unit(kind(ROTOR), 1.0),
+            None => unit(kind(plant.leader(Body::DrivePulley).index()), plant.ratio(Body::DrivePulley)),
+        };
+        let speed: [DVector<f64>; SPEEDS] = std::array::from_fn(|j| led(Kind::Speed, j));
+        let arms = arms(r);
+        let along = |ways: &[DVector<f64>; SPEEDS], arm: &[f64; SPEEDS]| {
+            ways.iter().zip(arm).fold(DVector::zeros(n), |sum, (way, arm)| sum + way * *arm)
+        };
+        let (angle, stretch): ([DVector<f64>; SPEEDS], [DVector<f64>; STRETCHES]);
+        if relative {
+            let x = unit(Kind::Angle(1), 1.0);
+            let (d1, twist) = (unit(Kind::Stretch(0), 1.0), unit(Kind::Stretch(3), 1.0));
+            // x − r φ₃; with both pulleys as one it is x − r φ₁
+            let d2 = match plant.stage().belt.model {
+                BeltModel::Elastic => unit(Kind::Stretch(1), 1.0),
+                _ => -d1.clone(),
+            };
+            // r φ₁ = x + d₁,  r φ₃ = x − d₂,  φ_r = φ₁ + θ
+            let drive = (&x + &d1) / r;
+            let rotor = &drive + &twist;
+            angle = [drive, x.clone(), (&x - &d2) / r, rotor];
+            stretch = [d1.clone(), d2.clone(), -d1 - d2, twist, x];
+        } else {
+            angle = std::array::from_fn(|j| led(Kind::Angle, j));
+            stretch = std::array::from_fn(|j| along(&angle, &arms[j]));
+        }
+        let ways = kinds
+            .iter()
+            .enumerate()
+            .filter_map(|(place, kind)| match *kind {
+                Kind::Angle(j) => Some((place, speed[j].clone())),
+                Kind::Stretch(j) => Some((place, along(&speed, &arms[j]))),
+                _ => None,
+            })
+            .collect();
+        let variables = kinds.iter().map(|kind| match *kind {
+            Kind::Angle(j) => ANGLES[j],
+            Kind::Speed(j) => RATES[j],
+            Kind::Current => Variable { name: "motor_current", unit: "A" },
+            Kind::Bristle(j) => BRISTLES[j],
+            Kind::Stretch(3) => Variable { name: "twist", unit: "rad" },
+            Kind::Stretch(_) => Variable { name: "stretch", unit: "m" },
+        });
+        Self {
+            variables: variables.collect(),
+            speed_place: std::array::from_fn(|j| place(Kind::Speed(j))),
+            current_place: place(Kind::Current),
+            bristle_place: std::array::from_fn(|j| place(Kind::Bristle(j))),
+            stretch,
+            speed,
+            angle,
+            ways,
+            kinds,
+        }
+    }
+
+    /// Coefficients of the states in a form, and that of the input.
+    pub(super) fn row(&self, form: &Form) -> (DVector<f64>, f64) {
+        let mut row = DVector::zeros(self.variables.len());
+        for (part, factor) in self.stretch.iter().zip(form.stretch).chain(self.speed.iter().zip(form.speed)) {
+            if factor != 0.0 {
+                row += part * factor;
+            }
+        }
+        if let Some(place) = self.current_place {
+            row[place] += form.current;
+        }
+        (row, form.input)
+    }
+
+    /// This frame's states from those of another.
+    pub(super) fn from(&self, other: &Frame) -> DMatrix<f64> {
+        let n = self.kinds.len();
+        let mut matrix = DMatrix::zeros(n, n);
+        for (i, kind) in self.kinds.iter().enumerate() {
+            let row = match *kind {
+                Kind::Angle(j) => other.angle[j].clone(),
+                Kind::Stretch(j) => other.stretch[j].clone(),
+                Kind::Speed(j) => other.speed[j].clone(),
+                Kind::Current | Kind::Bristle(_) => {
+                    DVector::from_fn(n, |j, _| f64::from(u8::from(other.kinds[j] == *kind)))
+                }
+            };
+            matrix.row_mut(i).copy_from(&row.transpose());
+        }
+        matrix
+    }
+}
+
+/// Bodies that move by themselves, and the rotor, if it does.
+fn moving(plant: &Plant, held: [bool; 3]) -> Vec<usize> {
+    let leaders = plant.leaders().map(Body::index).filter(|&j| !held[j]);
+    leaders.chain(plant.has_rotor().then_some(ROTOR)).collect()
+}
+
+/// Bristles that are states.
+fn bristles(plant: &Plant, held: [bool; 3], speed: f64) -> Vec<Kind> {
+    let forward = speed >= 0.0;
+    let r = plant.stage().pulley_radius;
+    let has = |body: &Body| {
+        let friction = plant.friction(*body);
+        let v = if *body == Body::Cart { speed.abs() } else { speed.abs() / r };
+        matches!(friction.law, Law::LuGre { .. }) && friction.dry(forward, v) > 0.0 && !held[body.index()]
+    };
+    plant.leaders().filter(has).map(|body| Kind::Bristle(body.index())).collect()
+}

@@ -1,0 +1,99 @@
+//! Linear analysis: what a control engineer's tools say about a stage.
+//!
+//! [`StateSpace::of`] writes the equations of a stage that slides as ẋ = A x + b u, y = C x + d u, from the same forms that
+//! the solvers use. From there: [poles](StateSpace::poles), [zeros](StateSpace::zeros), [`Response`] over frequency, resonance
+//! and anti-resonance [along the travel](travel), and [`Discrete`] models for a sample time.
+//!
+//! Dry friction that does not change with speed drops out while everything slides; while a body sticks it does not move at all, and
+//! [`Operation::held`] says so.
+
+mod discrete;
+mod eigen;
+mod frame;
+mod model;
+mod response;
+mod travel;
+mod words;
+mod zeros;
+
+pub use discrete::{Discrete, Hold};
+pub use model::{Operation, StateSpace, Variable};
+pub use response::{Range, Response, Transfer};
+pub use travel::{Place, places, travel, undamped};
+pub use words::{assumptions, sticks};
+pub use zeros::Zeros;
+
+use crate::error::Result;
+use nalgebra::{Complex, DMatrix};
+use std::f64::consts::PI;
+
+impl StateSpace {
+    /// The poles: eigenvalues of A, 1/s, conjugates side by side, the slowest first. An integrator is exactly zero.
+    pub fn poles(&self) -> Result<Vec<Complex<f64>>> {
+        eigen::eigenvalues(&self.inner.a)
+    }
+
+    /// Invariant zeros of an output, 1/s, and its gain. Where an output does not see the axis' position, one of its zeros is 0 and
+    /// takes the integrator away. None for an output that there is not.
+    pub fn zeros(&self, output: usize) -> Option<Result<Zeros>> {
+        let d = *self.d.get(output)?;
+        let row = |c: &DMatrix<f64>| c.row(output).transpose();
+        let degree = zeros::relative_degree(&self.a, &self.b, &row(&self.c), d);
+        Some(zeros::zeros(&self.inner.a, &self.inner.b, &row(&self.inner.c), d, degree))
+    }
+}
+
+/// What a pole or a zero is to an engineer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Root {
+    /// At zero: an integrator, or as a zero a differentiator.
+    Zero,
+    /// Real: e^{s t} with this s, 1/s.
+    Real(f64),
+    /// A conjugate pair.
+    Pair {
+        /// Undamped natural frequency |s|, rad/s.
+        frequency: f64,
+        /// Damping ratio −Re s/|s|; negative for what grows.
+        damping: f64,
+    },
+}
+
+impl Root {
+    /// Of each real value and each pair, in the order given.
+    pub fn of(values: &[Complex<f64>]) -> Vec<Root> {
+        let one = |value: &Complex<f64>| match *value {
+            v if v.im > 0.0 => Some(Root::Pair { frequency: v.norm(), damping: -v.re / v.norm() }),
+            v if v.im < 0.0 => None,
+            v if v.re == 0.0 => Some(Root::Zero),
+            v => Some(Root::Real(v.re)),
+        };
+        values.iter().filter_map(one).collect()
+    }
+
+    /// Time in which it falls (or grows) by the factor e, s; infinite if it does neither.
+    pub fn time_constant(self) -> f64 {
+        match self {
+            Root::Zero => f64::INFINITY,
+            Root::Real(s) => 1.0 / s.abs(),
+            // 1/|Re s| = 1/(ζ ω)
+            Root::Pair { frequency, damping } => 1.0 / (damping * frequency).abs(),
+        }
+    }
+
+    /// Undamped natural frequency in Hz, of a pair.
+    pub fn hertz(self) -> Option<f64> {
+        match self {
+            Root::Pair { frequency, .. } => Some(frequency / (2.0 * PI)),
+            _ => None,
+        }
+    }
+
+    /// Frequency at which it swings, Hz: |Im s|/2π.
+    pub fn damped_hertz(self) -> Option<f64> {
+        match self {
+            Root::Pair { frequency, damping } => Some(frequency * (1.0 - damping * damping).sqrt() / (2.0 * PI)),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,296 @@
+//! The equations of a stage, linearised about steady sliding, as matrices.
+
+use super::frame::Frame;
+use crate::error::{Error, Result};
+use crate::friction::{Law, Motion};
+use crate::plant::{Body, Contact, Form, Mode, Plant, ROTOR};
+use crate::stage::{AmplifierMode, BeltModel, Stage};
+use nalgebra::{DMatrix, DVector};
+
+/// About what a stage is linearised.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Operation {
+    /// Speed of the cart, m/s, with which everything slides; negative is backward. Friction curves have their slope there, and bristles
+    /// are bent as they are in steady sliding.
+    pub speed: f64,
+    /// Where the cart is, m: spans that follow it are as stiff as there, friction that changes along the travel is as there.
+    pub position: f64,
+    /// Which of drive pulley, cart and idler pulley are held where they are.
+    pub held: [bool; 3],
+}
+
+impl Default for Operation {
+    /// Everything slides forward at 0.1 m/s, the cart at x = 0.
+    fn default() -> Self {
+        Self { speed: 0.1, position: 0.0, held: [false; 3] }
+    }
+}
+
+/// A quantity with its unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Variable {
+    /// As the columns of a run are called.
+    pub name: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+}
+
+/// ẋ = A x + b u, y = C x + d u: small motions on top of steady sliding.
+#[derive(Debug, Clone)]
+pub struct StateSpace {
+    /// What x is, in order.
+    pub states: Vec<Variable>,
+    /// What u is, before the amplifier's gain.
+    pub input: Variable,
+    /// What y is, in order.
+    pub outputs: Vec<Variable>,
+    /// A, 1/s and other units.
+    pub a: DMatrix<f64>,
+    /// b.
+    pub b: DVector<f64>,
+    /// C.
+    pub c: DMatrix<f64>,
+    /// d.
+    pub d: DVector<f64>,
+    /// The same system in stretches instead of positions, which loses nothing to cancellation.
+    pub(super) inner: Inner,
+}
+
+/// The system in coordinates that suit the arithmetic.
+#[derive(Debug, Clone)]
+pub(super) struct Inner {
+    pub(super) a: DMatrix<f64>,
+    pub(super) b: DVector<f64>,
+    pub(super) c: DMatrix<f64>,
+    /// The states of the outer system from these, and these from those.
+    pub(super) outward: DMatrix<f64>,
+    pub(super) inward: DMatrix<f64>,
+}
+
+impl StateSpace {
+    /// The linear equations of `stage` about `operation`.
+    ///
+    /// Parts that work piece by piece are taken as they are in undisturbed motion: amplifier within its limits, spans taut, end stops apart,
+    /// the driving flank of a gear with play in contact. A gear with losses is driven by the motor. How stiffness and friction change
+    /// with the cart's place is not followed: they are what they are at the place. Fails for a place where no span can be.
+    ///
+    /// ```
+    /// use taut::case::{Case, TEMPLATE};
+    /// use taut::linear::{Operation, StateSpace};
+    ///
+    /// let case = Case::from_text("axis.toml", TEMPLATE)?;
+    /// let axis = StateSpace::of(&case.stage, Operation::default())?;
+    /// assert_eq!(axis.states.len(), 6);
+    /// // One integrator, and all else dies away.
+    /// let poles = axis.poles()?;
+    /// assert_eq!(poles.iter().filter(|p| p.norm() == 0.0).count(), 1);
+    /// assert!(poles.iter().all(|p| p.re <= 0.0));
+    /// # Ok::<(), taut::Error>(())
+    /// ```
+    pub fn of(stage: &Stage, operation: Operation) -> Result<Self> {
+        let stage = placed(stage, operation.position)?;
+        let plant = Plant::new(&stage);
+        let held = Body::ALL.map(|body| plant.followers(plant.leader(body)).any(|b| operation.held[b.index()]));
+        let frame = Frame::outer(&plant, held, operation.speed);
+        let inner = Frame::inner(&plant, held, operation.speed);
+        let mode = mode(&plant, held, operation.speed);
+        let equations = Linear { plant: &plant, operation, held, mode };
+        let (a, b) = equations.rates(&frame);
+        let (inner_a, inner_b) = equations.rates(&inner);
+        let (outputs, c, d) = equations.outputs(&frame);
+        let (_, inner_c, _) = equations.outputs(&inner);
+        let input = match stage.amplifier.mode {
+            AmplifierMode::Voltage => Variable { name: "voltage_command", unit: "V" },
+            AmplifierMode::Current => Variable { name: "current_command", unit: "A" },
+        };
+        Ok(Self {
+            states: frame.variables.clone(),
+            input,
+            outputs,
+            a,
+            b,
+            c,
+            d,
+            inner: Inner {
+                a: inner_a,
+                b: inner_b,
+                c: inner_c,
+                outward: frame.from(&inner),
+                inward: inner.from(&frame),
+            },
+        })
+    }
+
+    /// Where an output of this name stands.
+    pub fn output(&self, name: &str) -> Option<usize> {
+        self.outputs.iter().position(|output| output.name == name)
+    }
+}
+
+/// The stage with its spans as stiff as they are with the cart at `x`.
+fn placed(stage: &Stage, x: f64) -> Result<Stage> {
+    let mut stage = stage.clone();
+    if let (true, Some(make)) = (stage.belt.follows_cart, stage.belt.make) {
+        let [l1, l2, _] = make.spans;
+        if !(-l2 < x && x < l1) {
+            return Err(Error::new(format!("the cart cannot be at {x} m: a span would have no length"))
+                .allowed(format!("between {} m and {l1} m", -l2))
+                .next("name a place between the pulleys"));
+        }
+        let [k1, k2] = make.stiffness_at(x);
+        (stage.belt.stiffness[0], stage.belt.stiffness[1]) = (k1, k2);
+    }
+    Ok(stage)
+}
+
+/// The mode of steady sliding.
+fn mode(plant: &Plant, held: [bool; 3], speed: f64) -> Mode {
+    let forward = speed >= 0.0;
+    let motion = Body::ALL.map(|body| match (held[body.index()], plant.has_modes(body), forward) {
+        (true, ..) => Motion::Stuck,
+        (_, false, _) => Motion::Free,
+        (_, _, true) => Motion::Forward,
+        (_, _, false) => Motion::Backward,
+    });
+    let gear = if forward { Contact::High } else { Contact::Low };
+    Mode { gear, gear_torque_positive: forward, ..Mode::of(motion) }
+}
+
+/// The equations to be written out in a frame.
+struct Linear<'a> {
+    plant: &'a Plant,
+    operation: Operation,
+    held: [bool; 3],
+    mode: Mode,
+}
+
+impl Linear<'_> {
+    /// A and b.
+    fn rates(&self, frame: &Frame) -> (DMatrix<f64>, DVector<f64>) {
+        let plant = self.plant;
+        let n = frame.variables.len();
+        let (mut a, mut b) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        let equations = plant.equations(self.mode);
+        for (place, rate) in &frame.ways {
+            a.row_mut(*place).copy_from(&rate.transpose());
+        }
+        if let Some(place) = frame.current_place {
+            let (row, input) = frame.row(&equations.current_rate);
+            a.row_mut(place).copy_from(&row.transpose());
+            b[place] = input;
+        }
+        for body in plant.leaders().filter(|body| !self.held[body.index()]) {
+            let Some(place) = frame.speed_place[body.index()] else { continue };
+            let (mut row, input) = frame.row(&equations.acceleration[body.index()]);
+            let of = |b: Body| plant.ratio(b).powi(2) * equations.inertia[b.index()];
+            let mass: f64 = plant.followers(body).map(of).sum();
+            // M v̇ = what is linear − what friction adds to it
+            let (on_speed, on_bristle) = self.friction(body);
+            row[place] -= on_speed / mass;
+            if let Some(bristle) = frame.bristle_place[body.index()] {
+                row[bristle] -= on_bristle / mass;
+                let [on_speed, on_bristle] = self.bristle(body);
+                (a[(bristle, place)], a[(bristle, bristle)]) = (on_speed, on_bristle);
+            }
+            a.row_mut(place).copy_from(&row.transpose());
+            b[place] = input;
+        }
+        if let Some(place) = frame.speed_place[ROTOR] {
+            let (row, input) = frame.row(&equations.acceleration[ROTOR]);
+            a.row_mut(place).copy_from(&row.transpose());
+            b[place] = input;
+        }
+        (a, b)
+    }
+
+    /// Speed of a body, in its own unit.
+    fn speed(&self, body: Body) -> f64 {
+        let r = self.plant.stage().pulley_radius;
+        if body == Body::Cart { self.operation.speed } else { self.operation.speed / r }
+    }
+
+    /// By what the dry friction of a body is multiplied where the cart is.
+    fn factor(&self, body: Body) -> f64 {
+        match &self.plant.stage().cart.along {
+            Some(along) if body == Body::Cart => along.factor(self.operation.position),
+            _ => 1.0,
+        }
+    }
+
+    /// ∂F_f/∂v beyond the viscous friction that stands in the equations, and ∂F_f/∂z of a bristle.
+    fn friction(&self, body: Body) -> (f64, f64) {
+        let friction = self.plant.friction(body);
+        let v = self.speed(body);
+        let side = friction.side(v >= 0.0);
+        let viscous = match self.mode.motion[body.index()] {
+            Motion::Backward => friction.backward.viscous,
+            _ => friction.forward.viscous,
+        };
+        match friction.law {
+            Law::LuGre { stiffness, damping, .. } if friction.dry(v >= 0.0, v.abs()) > 0.0 => {
+                // F_f = σ₀ z + σ₁ ż + b v
+                let [on_speed, on_bristle] = self.bristle(body);
+                (damping * on_speed + side.viscous - viscous, stiffness + damping * on_bristle)
+            }
+            // F_f = b v ± a(x) dry(|v|)
+            _ => (side.viscous - viscous + self.factor(body) * (friction.slope(v) - side.viscous), 0.0),
+        }
+    }
+
+    /// ∂ż/∂v and ∂ż/∂z of the bristles of a body.
+    fn bristle(&self, body: Body) -> [f64; 2] {
+        let friction = self.plant.friction(body);
+        let Law::LuGre { stiffness, .. } = friction.law else { return [0.0; 2] };
+        let v = self.speed(body);
+        if v == 0.0 {
+            // At rest ż = v.
+            return [1.0, 0.0];
+        }
+        let factor = self.factor(body);
+        let g = factor * friction.dry(v >= 0.0, v.abs());
+        let slope = factor * (friction.slope(v) - friction.side(v >= 0.0).viscous);
+        // ż = v − σ₀ |v| z / g(|v|) about z = ± g/σ₀: ∂ż/∂v = |v| g′/g, ∂ż/∂z = −σ₀ |v|/g
+        [v.abs() * slope / g, -stiffness * v.abs() / g]
+    }
+
+    /// The outputs, C and d.
+    fn outputs(&self, frame: &Frame) -> (Vec<Variable>, DMatrix<f64>, DVector<f64>) {
+        let plant = self.plant;
+        let mut all: Vec<(Variable, DVector<f64>, f64)> = Vec::new();
+        let mut add = |name, unit, (row, input)| all.push((Variable { name, unit }, row, input));
+        const BODIES: [[(&str, &str); 2]; 3] = [
+            [("drive_angle", "rad"), ("drive_speed", "rad/s")],
+            [("cart_position", "m"), ("cart_speed", "m/s")],
+            [("idler_angle", "rad"), ("idler_speed", "rad/s")],
+        ];
+        let moving = |body: &Body| !self.held[body.index()];
+        for body in Body::ALL.into_iter().filter(moving) {
+            let [(angle, unit), _] = BODIES[body.index()];
+            add(angle, unit, (frame.angle[body.index()].clone(), 0.0));
+        }
+        if plant.has_rotor() {
+            add("rotor_angle", "rad", (frame.angle[ROTOR].clone(), 0.0));
+        }
+        for body in Body::ALL.into_iter().filter(moving) {
+            let [_, (speed, unit)] = BODIES[body.index()];
+            add(speed, unit, frame.row(&Form::speed(body.index())));
+        }
+        if plant.has_rotor() {
+            add("rotor_speed", "rad/s", frame.row(&Form::speed(ROTOR)));
+        }
+        if plant.stage().belt.model != BeltModel::Rigid {
+            for (name, force) in
+                ["span1_force", "span2_force", "span3_force"].into_iter().zip(plant.span_forces(&self.mode))
+            {
+                add(name, "N", frame.row(&force));
+            }
+        }
+        if plant.has_rotor() {
+            add("gear_torque", "N m", frame.row(&plant.gear_torque(&self.mode)));
+        }
+        add("motor_current", "A", frame.row(&plant.current(&self.mode)));
+        let c = DMatrix::from_fn(all.len(), frame.variables.len(), |i, j| all[i].1[j]);
+        let d = DVector::from_fn(all.len(), |i, _| all[i].2);
+        (all.into_iter().map(|(variable, ..)| variable).collect(), c, d)
+    }
+}

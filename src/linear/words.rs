@@ -1,0 +1,122 @@
+//! What a linear model leaves out, in words.
+
+use super::Operation;
+use crate::friction::Law;
+use crate::number::engineering_ascii;
+use crate::plant::{Body, Plant};
+use crate::stage::{BeltModel, Stage};
+
+/// What was linearised, and what was taken for granted: a sentence for each part that makes the stage more than a linear system.
+pub fn assumptions(stage: &Stage, operation: Operation) -> Vec<String> {
+    let plant = Plant::new(stage);
+    let held = |body: Body| operation.held[body.index()] || operation.held[plant.leader(body).index()];
+    let moving: Vec<Body> = plant.leaders().filter(|body| !held(*body)).collect();
+    let mut words = Vec::new();
+    let stopped: Vec<&str> = Body::ALL.into_iter().filter(|b| held(*b)).map(Body::name).collect();
+    if !stopped.is_empty() {
+        words.push(format!("held where it is: {}", stopped.join(", ")));
+    }
+    words.extend(sliding(&plant, operation, &moving));
+    words.extend(curves(&plant, operation, &moving));
+    if stage.cart.along.is_some() && moving.contains(&plant.leader(Body::Cart)) {
+        let at = engineering_ascii(operation.position, "m", 4);
+        words.push(format!("friction that changes along the travel is taken as it is at x = {at}, and not followed"));
+    }
+    let amplifier = &stage.amplifier;
+    if amplifier.voltage_limit.is_some() || amplifier.current_limit.is_some() {
+        words.push("the amplifier is taken within its limits".into());
+    }
+    if let Some(play) = stage.motor.gear_play.filter(|play| play.backlash > 0.0) {
+        let width = engineering_ascii(play.backlash, "rad", 3);
+        words.push(format!(
+            "the gear is taken with its driving flank in contact; within its play of {width} the motor moves nothing but its rotor"
+        ));
+    }
+    if plant.gear_loses() {
+        words
+            .push("the gear is taken as driven by the motor: it passes on its efficiency's share of the torque".into());
+    }
+    if stage.belt.pretension.is_some() {
+        words.push("the spans are taken taut; forces are those beyond pretension".into());
+    }
+    match stage.belt.model {
+        BeltModel::Elastic => {}
+        BeltModel::TwoMass => words.push("the belt's model is two-mass: both pulleys are one inertia".into()),
+        BeltModel::Rigid => words.push("the belt's model is rigid: it does not stretch, so it has no resonance".into()),
+    }
+    if stage.travel.is_some_and(|travel| travel.stop.is_some()) {
+        words.push("the cart is taken between its end stops".into());
+    }
+    if stage.cart.constant_force() != 0.0 {
+        words.push("the constant force on the cart changes where the stage is, not how it swings".into());
+    }
+    words
+}
+
+/// Whether dry friction can hold a body that moves in this model at rest.
+pub fn sticks(stage: &Stage, operation: Operation) -> bool {
+    let plant = Plant::new(stage);
+    plant.leaders().any(|body| !operation.held[body.index()] && plant.friction(body).breakaway(true) > 0.0)
+}
+
+fn sliding(plant: &Plant, operation: Operation, moving: &[Body]) -> Option<String> {
+    let breakaway = |body: &Body| {
+        let most = plant.friction(*body).breakaway(operation.speed >= 0.0);
+        let unit = if *body == Body::Cart { "N" } else { "N m" };
+        (most > 0.0).then(|| format!("{} up to {}", body.name(), engineering_ascii(most, unit, 4)))
+    };
+    let way = if operation.speed >= 0.0 { "forward" } else { "backward" };
+    let holds: Vec<String> = moving.iter().filter_map(breakaway).collect();
+    let curve = moving.iter().any(|body| plant.friction(*body).law != Law::Coulomb);
+    let pace = match operation.speed == 0.0 {
+        true => "in the limit of zero speed".to_string(),
+        false => format!("at {}", engineering_ascii(operation.speed.abs(), "m/s", 4)),
+    };
+    Some(match (holds.is_empty(), operation.speed == 0.0) {
+        _ if moving.is_empty() => "nothing is left to move but the current and the rotor".into(),
+        (true, true) => "linearised at rest: nothing sticks".into(),
+        (true, false) if curve => format!("linearised while it moves {way} {pace}"),
+        (true, false) => "linear as it stands: nothing sticks".into(),
+        (false, true) => format!(
+            "at rest this stage sticks: dry friction holds {}, and what is held answers no input; \
+             linearised instead while everything slides {way}, {pace}; --stuck takes who is held out",
+            holds.join(", ")
+        ),
+        (false, false) => {
+            let pace = if curve { format!(" {pace}") } else { String::new() };
+            format!(
+                "linearised while everything slides {way}{pace}, where dry friction does not change and drops out; \
+                 at rest it holds {}",
+                holds.join(", ")
+            )
+        }
+    })
+}
+
+fn curves(plant: &Plant, operation: Operation, moving: &[Body]) -> Vec<String> {
+    let r = plant.stage().pulley_radius;
+    let of = |body: &Body| {
+        let friction = plant.friction(*body);
+        let (speed, unit) = match body {
+            Body::Cart => (operation.speed, "N s/m"),
+            _ => (operation.speed / r, "N m s/rad"),
+        };
+        let name = body.name();
+        match friction.law {
+            Law::Coulomb => None,
+            Law::LuGre { .. } if operation.speed == 0.0 => {
+                Some(format!("the bristles of the {name} hold it like a spring: one more state"))
+            }
+            Law::LuGre { .. } => {
+                Some(format!("the bristles of the {name} are one more state, bent as in steady sliding"))
+            }
+            Law::Stribeck { .. } | Law::Smooth { .. } => {
+                let slope = friction.slope(speed);
+                let told = engineering_ascii(slope, unit, 4);
+                let falls = if slope < 0.0 { ": it falls with speed, which feeds oscillations" } else { "" };
+                Some(format!("friction of the {name} has the slope {told} at this speed{falls}"))
+            }
+        }
+    };
+    moving.iter().filter_map(of).collect()
+}

@@ -1,0 +1,338 @@
+//! Linear analysis: against python-control with SLICOT and 60-digit numbers (`authorities/linear.py`), and by laws that hold for any stage.
+
+mod common;
+
+use common::random::{Dry, cases, equipped, stage};
+use common::{experiment, table1, table2, table4};
+use nalgebra::Complex;
+use proptest::prelude::*;
+use serde_json::Value;
+use std::f64::consts::PI;
+use taut::case::Case;
+use taut::friction::{Friction, Law, Shape};
+use taut::linear::{Hold, Operation, Range, Root, StateSpace, places, travel, undamped};
+use taut::signal::Signal;
+use taut::solve::{Solver, simulate};
+use taut::stage::{Belt, BeltMake, BeltModel, Stage};
+
+fn complex(value: &Value) -> Complex<f64> {
+    Complex::new(value[0].as_f64().unwrap(), value[1].as_f64().unwrap())
+}
+
+fn list(value: &Value) -> Vec<Complex<f64>> {
+    value.as_array().unwrap().iter().map(complex).collect()
+}
+
+/// The largest relative distance between roots that match; zero must be zero.
+fn apart(ours: &[Complex<f64>], theirs: &[Complex<f64>]) -> f64 {
+    if ours.len() != theirs.len() {
+        return f64::INFINITY;
+    }
+    let (mut left, mut worst) = (ours.to_vec(), 0.0_f64);
+    let mut sorted = theirs.to_vec();
+    sorted.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
+    for value in sorted {
+        let nearest = (0..left.len()).min_by(|&i, &j| (left[i] - value).norm().total_cmp(&(left[j] - value).norm()));
+        let found = left.swap_remove(nearest.unwrap());
+        let distance = (found - value).norm();
+        worst = worst.max(if distance == 0.0 { 0.0 } else { distance / value.norm() });
+    }
+    worst
+}
+
+fn told(values: &[f64]) -> String {
+    values.iter().map(|v| format!("{v:.1e}")).collect::<Vec<_>>().join(", ")
+}
+
+#[test]
+fn two_hundred_random_stages() {
+    let file: Value = serde_json::from_str(include_str!("authorities/linear.json")).unwrap();
+    let all = file["cases"].as_array().unwrap();
+    assert_eq!(all.len(), 200);
+    let (mut worst, mut worst_control, mut excused, mut faults) = ([0.0_f64; 5], [0.0_f64; 4], [0; 4], Vec::new());
+    for case in all {
+        let name = case["name"].as_str().unwrap();
+        let number = |key: &str| case[key].as_f64().unwrap();
+        let stage = Case::from_text("case.toml", case["case"].as_str().unwrap()).unwrap().stage;
+        let operation = Operation { speed: number("speed"), ..Operation::default() };
+        let system = StateSpace::of(&stage, operation).unwrap();
+        let sampled = system.discrete(number("sample_time"), Hold::Zero, 0.0).unwrap();
+        // Index, our distance to 60 digits, to python-control, and how far that is from the 60 digits.
+        let mut check = |index: usize, what: &str, exact: f64, control: f64, doubt: &str| {
+            let doubt = case["control_differs_by"][doubt].as_f64().unwrap_or(f64::INFINITY);
+            worst[index] = worst[index].max(exact);
+            if exact > 1e-9 {
+                faults.push(format!("{name}: {what} differ by {exact:.1e}"));
+            }
+            if index < 4 {
+                if doubt < 1e-10 {
+                    worst_control[index] = worst_control[index].max(control);
+                } else {
+                    excused[index] += 1;
+                }
+                if control > 1e-9_f64.max(2.0 * doubt) {
+                    faults.push(format!("{name}: {what} differ from python-control's by {control:.1e}"));
+                }
+            }
+        };
+        let poles = system.poles().unwrap();
+        // Of a double zero python-control makes two small numbers: it is compared without those.
+        let size = poles.iter().map(|v| v.norm()).fold(0.0, f64::max);
+        let nonzero =
+            |values: &[Complex<f64>]| values.iter().copied().filter(|v| v.norm() > 1e-9 * size).collect::<Vec<_>>();
+        let control = list(&case["control_poles"]);
+        check(0, "poles", apart(&poles, &list(&case["poles"])), apart(&nonzero(&poles), &nonzero(&control)), "poles");
+        for output in case["outputs"].as_array().unwrap() {
+            let index = system.output(output["name"].as_str().unwrap()).unwrap();
+            let transfer = &system.transfers().unwrap()[index];
+            let zeros = &transfer.zeros.values;
+            let control = list(&output["control_zeros"]);
+            let from_control = apart(&nonzero(zeros), &nonzero(&control));
+            check(1, "zeros", apart(zeros, &list(&output["zeros"])), from_control, "zeros");
+            let (order, gain) = transfer.low_frequency();
+            let want = output["low_frequency_gain"].as_f64().unwrap();
+            let same = i64::from(order) == output["integrators"].as_i64().unwrap();
+            check(4, "gains", if same { (gain / want - 1.0).abs() } else { f64::INFINITY }, 0.0, "poles");
+            let far = |got: Complex<f64>, want: &Value| (got - complex(want)).norm() / complex(want).norm();
+            for (k, omega) in case["frequencies"].as_array().unwrap().iter().enumerate() {
+                let got = system.at(omega.as_f64().unwrap())[index];
+                let [exact, control] = ["exact_response", "response"].map(|key| far(got, &output[key][k]));
+                check(2, "responses", exact, control, "response");
+            }
+            for (k, angle) in case["angles"].as_array().unwrap().iter().enumerate() {
+                let got = sampled.at(angle.as_f64().unwrap() / sampled.sample_time)[index];
+                let [exact, control] = ["exact_sampled", "sampled"].map(|key| far(got, &output[key][k]));
+                check(3, "sampled responses", exact, control, "sampled");
+            }
+        }
+    }
+    println!("poles, zeros, responses, sampled responses, gains: from 60 digits at most {}", told(&worst));
+    println!(
+        "from python-control, where it is within 1e-10 of those, at most {}; elsewhere {excused:?} values",
+        told(&worst_control)
+    );
+    assert!(faults.is_empty(), "{} faults:\n{}", faults.len(), faults[..faults.len().min(20)].join("\n"));
+}
+
+/// Hertz of every pair, the lowest first.
+fn hertz(system: &StateSpace) -> Vec<f64> {
+    Root::of(&system.poles().unwrap()).into_iter().filter_map(Root::hertz).collect()
+}
+
+proptest! {
+    #![proptest_config(cases(200))]
+
+    /// What has no source of energy does not grow: the motor gives no more than it takes only with K_t = K_e.
+    #[test]
+    fn poles_of_a_passive_stage_do_not_grow(mut stage in equipped(Dry::Any)) {
+        stage.motor.back_emf_constant = stage.motor.torque_constant;
+        for operation in [Operation::default(), Operation { speed: -0.1, ..Operation::default() }] {
+            let poles = StateSpace::of(&stage, operation).unwrap().poles().unwrap();
+            let largest = poles.iter().map(|p| p.norm()).fold(0.0, f64::max);
+            prop_assert!(poles.iter().all(|p| p.re <= 1e-12 * largest), "{poles:?}");
+        }
+    }
+
+    /// An output that is the drive angle stands still where everything else swings with the drive pulley clamped.
+    #[test]
+    fn antiresonance_is_resonance_with_the_drive_pulley_clamped(stage in stage(Dry::Any)) {
+        let free = StateSpace::of(&stage, Operation::default()).unwrap();
+        let held = Operation { held: [true, false, false], ..Operation::default() };
+        let held = StateSpace::of(&stage, held).unwrap().poles().unwrap();
+        let zeros = free.zeros(free.output("drive_angle").unwrap()).unwrap().unwrap().values;
+        // With an inductance the current goes on by itself while the pulley is held: −R/L, no zero.
+        let electrical = Complex::new(-stage.motor.resistance / stage.motor.inductance, 0.0);
+        let of_motion: Vec<_> = held.iter().copied().filter(|p| (p - electrical).norm() > 1e-6 * p.norm()).collect();
+        prop_assert!(apart(&of_motion, &zeros) < 1e-9, "{of_motion:?} {zeros:?}");
+    }
+
+    /// Poles and zeros together are the transfer function.
+    #[test]
+    fn the_response_is_that_of_its_poles_and_zeros(stage in equipped(Dry::Any)) {
+        let system = StateSpace::of(&stage, Operation::default()).unwrap();
+        let transfers = system.transfers().unwrap();
+        for omega in [3.0, 40.0, 700.0, 2e4] {
+            for (got, transfer) in system.at(omega).into_iter().zip(&transfers) {
+                let s = Complex::new(0.0, omega);
+                let mut log = Complex::new(transfer.zeros.gain, 0.0).ln();
+                log += transfer.zeros.values.iter().map(|z| (s - z).ln()).sum::<Complex<f64>>();
+                log -= transfer.poles.iter().map(|p| (s - p).ln()).sum::<Complex<f64>>();
+                let want = if transfer.zeros.gain == 0.0 { Complex::new(0.0, 0.0) } else { log.exp() };
+                prop_assert!((got - want).norm() <= 1e-8 * want.norm(), "{got} {want} {transfer:?}");
+                let turn = (transfer.phase(omega) - got.arg()) / (2.0 * PI);
+                prop_assert!(got.norm() == 0.0 || (turn - turn.round()).abs() < 1e-7, "{transfer:?}");
+            }
+        }
+    }
+
+    /// A model for a sample time does what the exact solver does with an input that stands between samples.
+    #[test]
+    fn sampled_models_step_like_the_exact_solver(mut stage in stage(Dry::Any), late in 0.0..2.5_f64) {
+        for law in [&mut stage.drive_pulley.friction, &mut stage.cart.friction, &mut stage.idler_pulley.friction] {
+            // Without dry friction the linear model is the whole one.
+            (law.backward, law.forward.coulomb, law.forward.breakaway) = (law.forward, 0.0, 0.0);
+            law.backward = law.forward;
+        }
+        stage.motor.gear_efficiency = 1.0;
+        let (period, late) = (1e-3, (late * 4.0).round() / 4.0);
+        let system = StateSpace::of(&stage, Operation::default()).unwrap();
+        let model = system.discrete(period, Hold::Zero, late * period).unwrap();
+        let run = experiment(Signal::Pulse { value: 3.0, duration: 5.0 * period, at: late * period }, 0.02);
+        let trajectory = simulate(&stage, &run, Solver::Exact).unwrap().trajectory;
+        let mut x = nalgebra::DVector::zeros(model.a.nrows());
+        let column = trajectory.get("cart_position").unwrap();
+        let row = system.output("cart_position").unwrap();
+        let largest = column.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        for (k, want) in column.iter().enumerate() {
+            let u = if k < 5 { 3.0 } else { 0.0 };
+            let got = (model.c.row(row) * &x)[0] + model.d[row] * u;
+            prop_assert!((got - want).abs() <= 1e-9 * largest + 1e-15, "row {k}: {got} {want}");
+            x = &model.a * x + &model.b * u;
+        }
+    }
+}
+
+/// A small sine on top of steady sliding, run by the exact solver, swings as the frequency response says.
+#[test]
+fn the_response_is_what_a_run_shows() {
+    for (stage, hertz) in [(table4(), 20.0), (table4(), 130.0), (table2(), 300.0), (table1(), 60.0)] {
+        let system = StateSpace::of(&stage, Operation::default()).unwrap();
+        let mut run = experiment(Signal::Sine { amplitude: 0.2, frequency: hertz, phase: 0.0, offset: 4.0 }, 3.0);
+        run.every = 1.0 / (40.0 * hertz);
+        let trajectory = simulate(&stage, &run, Solver::Exact).unwrap().trajectory;
+        let (time, speed) = (trajectory.get("time").unwrap(), trajectory.get("cart_speed").unwrap());
+        // The last 20 periods, by correlation.
+        let from = time.len() - 1 - 800;
+        let mut sum = Complex::new(0.0, 0.0);
+        for k in from..time.len() - 1 {
+            sum += speed[k] * Complex::new(0.0, -2.0 * PI * hertz * time[k]).exp() / 400.0;
+        }
+        // sin = Im e^{jωt}: the coefficient of e^{jωt} is G/j
+        let got = sum * Complex::new(0.0, 1.0) / 0.2;
+        let want = system.at(2.0 * PI * hertz)[system.output("cart_speed").unwrap()];
+        assert!((got - want).norm() < 1e-6 * want.norm(), "{hertz} Hz: {got} {want}");
+    }
+}
+
+/// Bristles that slide steadily carry what a Stribeck curve says; at rest they hold the cart like a spring.
+#[test]
+fn bristles_slide_like_the_curve_and_hold_like_a_spring() {
+    let with = |law: Law| {
+        let mut stage = undamped(&table2());
+        stage.cart.friction = Friction::with_breakaway(19.0, 0.2, 0.3).following(law);
+        stage
+    };
+    let bristles = with(Law::LuGre { stiffness: 1e5, damping: 30.0, velocity: 0.1 });
+    let curve = with(Law::Stribeck { velocity: 0.1, shape: Shape::Gaussian });
+    let gain = |stage: &Stage, speed: f64| {
+        let system = StateSpace::of(stage, Operation { speed, ..Operation::default() }).unwrap();
+        system.transfers().unwrap()[system.output("cart_speed").unwrap()].low_frequency()
+    };
+    for speed in [0.02, 0.1, -0.3] {
+        let ((zero, a), (none, b)) = (gain(&bristles, speed), gain(&curve, speed));
+        assert!(zero == 0 && none == 0 && (a / b - 1.0).abs() < 1e-9, "{speed}: {a} {b}");
+    }
+    let rest = Operation { speed: 0.0, held: [true, false, true], ..Operation::default() };
+    let [k1, k2, _] = bristles.belt.stiffness;
+    let swing = StateSpace::of(&bristles, rest).unwrap().poles().unwrap().pop().unwrap().norm_sqr();
+    assert!((swing / ((k1 + k2 + 1e5) / bristles.cart.mass) - 1.0).abs() < 1e-12, "{swing}");
+}
+
+/// Two inertias on one spring: ω² = k (1/J + 1/J′), clamped k/J′.
+#[test]
+fn two_masses_by_hand() {
+    let mut stage = undamped(&table2());
+    stage.belt.model = BeltModel::TwoMass;
+    let [k1, k2, k3] = stage.belt.stiffness;
+    let k = k1 + k2 * k3 / (k2 + k3);
+    let r2 = stage.pulley_radius.powi(2);
+    let pulleys = (stage.drive_pulley.inertia + stage.idler_pulley.inertia) / r2;
+    let m = stage.cart.mass;
+    let found = &travel(&stage, Operation::default(), &[0.0]).unwrap()[0];
+    let by_hand = |omega2: f64| omega2.sqrt() / (2.0 * PI);
+    assert!((found.undamped_resonances[0] / by_hand(k * (1.0 / m + 1.0 / pulleys)) - 1.0).abs() < 1e-12);
+    assert!((found.undamped_antiresonances[0] / by_hand(k / m) - 1.0).abs() < 1e-12);
+}
+
+/// k = A E / l with the length that is left of a span.
+#[test]
+fn spans_that_follow_the_cart() {
+    let make = BeltMake { modulus: 4e9, section: 4e-6, spans: [0.4, 0.4, 0.8] };
+    let belt = Belt { make: Some(make), follows_cart: true, ..Belt::given(make.stiffness(), [0.0; 3]) };
+    let stage = Stage { belt, ..table2() };
+    assert_eq!(places(&table2(), 5), None);
+    let positions = places(&stage, 5).unwrap();
+    assert!((positions[0] + 0.38).abs() < 1e-12 && (positions[4] - 0.38).abs() < 1e-12);
+    let along = travel(&stage, Operation::default(), &positions).unwrap();
+    // Near the drive pulley the cart hangs on a short span.
+    assert!(along[4].undamped_antiresonances[1] > 2.0 * along[2].undamped_antiresonances[1], "{along:?}");
+    // Where the axis is built symmetric it is so for the anti-resonance with both pulleys held.
+    let both = Operation { held: [true, false, true], ..Operation::default() };
+    let at = |position| hertz(&StateSpace::of(&stage, Operation { position, ..both }).unwrap());
+    assert!((at(0.2)[0] / at(-0.2)[0] - 1.0).abs() < 1e-12);
+    let [k1, k2] = make.stiffness_at(0.2);
+    let poles = StateSpace::of(&stage, Operation { position: 0.2, ..both }).unwrap().poles().unwrap();
+    assert!((poles[0].norm_sqr() / ((k1 + k2) / stage.cart.mass) - 1.0).abs() < 1e-12);
+    let beyond = StateSpace::of(&stage, Operation { position: 0.41, ..Operation::default() });
+    assert!(beyond.unwrap_err().to_string().contains("between -0.4 m and 0.4 m"));
+}
+
+#[test]
+fn phases_run_on_from_where_they_begin() {
+    let system = StateSpace::of(&table2(), Operation::default()).unwrap();
+    let transfers = system.transfers().unwrap();
+    let zeros: Vec<_> = transfers.iter().map(|t| t.zeros.clone()).collect();
+    let range = Range::of(&transfers[0].poles, &zeros);
+    let frequencies = range.frequencies(&transfers[0].poles);
+    let responses = system.responses(&transfers, &frequencies);
+    let of = |name: &str| &responses[system.output(name).unwrap()];
+    let ends = |name: &str| (of(name).degrees()[0], *of(name).degrees().last().unwrap());
+    // An integrator begins at −90°. Four poles more than zeros, or two, where it ends.
+    let (begin, end) = ends("drive_angle");
+    assert!((begin + 90.0).abs() < 10.0 && (end + 180.0).abs() < 5.0, "{begin} {end}");
+    let (begin, end) = ends("cart_position");
+    assert!((begin + 90.0).abs() < 10.0 && (end + 360.0).abs() < 5.0, "{begin} {end}");
+    for response in &responses {
+        let jump = response.phase.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
+        assert!(jump < 1.0, "{jump}");
+    }
+}
+
+/// Of an undamped stage nothing is left over: the eigenvalues lie on the axis.
+#[test]
+fn stages_without_losses() {
+    let poles = StateSpace::of(&undamped(&table4()), Operation::default()).unwrap().poles().unwrap();
+    assert_eq!(poles.iter().filter(|p| p.norm() == 0.0).count(), 2);
+    assert!(poles.iter().all(|p| p.re.abs() <= 1e-12 * p.norm()), "{poles:?}");
+}
+
+/// With every body held the current alone is left, and without an inductance it is no state: a system without states.
+#[test]
+fn nothing_is_left_to_move() {
+    let held = Operation { held: [true; 3], ..Operation::default() };
+    let system = StateSpace::of(&table4(), held).unwrap();
+    assert_eq!((system.states.len(), system.poles().unwrap().len()), (0, 0));
+    let transfers = system.transfers().unwrap();
+    let current = system.output("motor_current").unwrap();
+    assert!((transfers[current].low_frequency().1 * 0.71 - 1.0).abs() < 1e-15);
+    assert_eq!(system.responses(&transfers, &[1.0])[current].value[0].re, 1.0 / 0.71);
+    assert!(system.discrete(1e-3, Hold::Zero, 0.0).is_err());
+}
+
+#[test]
+fn what_cannot_be_sampled_is_said() {
+    let system = StateSpace::of(&table2(), Operation::default()).unwrap();
+    for (t, hold, delay) in
+        [(0.0, Hold::Zero, 0.0), (f64::NAN, Hold::Zero, 0.0), (1e-3, Hold::Tustin, 1e-4), (1e-3, Hold::Zero, 1.0)]
+    {
+        assert!(system.discrete(t, hold, delay).is_err());
+    }
+    // Between samples a tenth of the fastest period long the three rules agree about the slow end.
+    let at = |hold| system.discrete(1e-5, hold, 0.0).unwrap().at(100.0)[0];
+    let exact = system.at(100.0)[0];
+    assert!((at(Hold::Tustin) - exact).norm() < 1e-6 * exact.norm());
+    assert!((at(Hold::First) - exact).norm() < 1e-6 * exact.norm());
+    // Half a sample late.
+    let late = exact * Complex::new(0.0, -100.0 * 0.5e-5).exp();
+    assert!((at(Hold::Zero) - late).norm() < 1e-6 * exact.norm());
+}

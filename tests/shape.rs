@@ -1,0 +1,431 @@
+//! Input shapers: their laws, the published tables, Klipper's printed results, and other people's numbers.
+
+use std::f64::consts::PI;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use proptest::prelude::*;
+use taut::case::Case;
+use taut::control::compare::compare;
+use taut::control::power_spectral_density;
+use taut::control::resonance::{Drive, resonances};
+use taut::control::shaper::{Corner, Kind, Shaper, TOLERANCE, residual_vibration};
+use taut::control::shaping::{ALLOWED_SMOOTHING, Criterion, Target, choose};
+use taut::control::spectrum::{Axis, Spectrum};
+use taut::log::{Accelerometer, read_accelerometer};
+
+const EXACT: [Kind; 3] = [Kind::Zv, Kind::Mzv, Kind::Zvd];
+
+fn shaper(kind: Kind, frequency: f64, damping: f64) -> Shaper {
+    Shaper::new(kind, frequency, damping).unwrap()
+}
+
+fn any_kind() -> impl Strategy<Value = Kind> {
+    (0..Kind::ALL.len()).prop_map(|i| Kind::ALL[i])
+}
+
+proptest! {
+    #[test]
+    fn amplitudes_sum_to_one_and_times_ascend(kind in any_kind(), f in 0.1..2000.0, zeta in 0.0..0.9) {
+        let shaper = shaper(kind, f, zeta);
+        let sum: f64 = shaper.impulses().iter().map(|impulse| impulse.1).sum();
+        prop_assert!((sum - 1.0).abs() < 1e-14);
+        prop_assert!(shaper.impulses().iter().all(|impulse| impulse.1 > 0.0));
+        prop_assert_eq!(shaper.impulses()[0].0, 0.0);
+        prop_assert!(shaper.impulses().windows(2).all(|pair| pair[0].0 < pair[1].0));
+        let periods = shaper.duration() * f * (1.0 - zeta * zeta).sqrt();
+        let expected = [0.5, 0.75, 1.0, 1.0, 1.5, 2.0][kind as usize];
+        prop_assert!((periods - expected).abs() < 1e-12);
+    }
+
+    /// Zero where zero is promised; the tolerance of EI without damping, and less with it.
+    #[test]
+    fn vibration_at_the_design_point(f in 0.1..2000.0, zeta in 0.0..0.9) {
+        for kind in EXACT.into_iter().chain([Kind::TwoHumpEi]) {
+            let v = shaper(kind, f, zeta).residual_vibration(f, zeta);
+            prop_assert!(v < 1e-12, "{:?}: {v}", kind);
+        }
+        for kind in [Kind::Ei, Kind::ThreeHumpEi] {
+            let v = shaper(kind, f, zeta).residual_vibration(f, zeta);
+            prop_assert!(v <= TOLERANCE + 1e-12, "{:?}: {v}", kind);
+            let v = shaper(kind, f, 0.0).residual_vibration(f, 0.0);
+            prop_assert!((v - TOLERANCE).abs() < 1e-12, "{:?}: {v}", kind);
+        }
+    }
+
+    /// A mode that takes the impulses one after another keeps what the formula says.
+    #[test]
+    fn a_simulated_mode_keeps_that_vibration(
+        kind in any_kind(), f in 1.0..100.0, zeta in 0.0..0.5, at in 0.3..2.0, plant_zeta in 0.0..0.5,
+    ) {
+        let shaper = shaper(kind, f, zeta);
+        let (omega, z): (f64, f64) = (2.0 * PI * f * at, plant_zeta);
+        let omega_d = omega * (1.0 - z * z).sqrt();
+        // x″ + 2ζω x′ + ω² x = 0 between impulses, each of which adds its amplitude to the speed.
+        let (mut x, mut v, mut now): (f64, f64, f64) = (0.0, 0.0, 0.0);
+        for &(t, a) in shaper.impulses() {
+            let h = t - now;
+            let (s, c) = (omega_d * h).sin_cos();
+            let decay = (-z * omega * h).exp();
+            let b = (v + z * omega * x) / omega_d;
+            (x, v) = (decay * (x * c + b * s), decay * (v * c - (omega * omega * x + z * omega * v) / omega_d * s));
+            now = t;
+            v += a;
+        }
+        // Amplitude of the free vibration that is left, of that which one impulse of the same sum makes now.
+        let left = (x * omega_d).hypot(v + z * omega * x);
+        prop_assert!((left - shaper.residual_vibration(f * at, z)).abs() < 1e-12);
+    }
+
+    /// The suggested acceleration is the one at which the smoothing is the one allowed.
+    #[test]
+    fn acceleration_and_smoothing_agree(kind in any_kind(), f in 15.0..200.0, zeta in 0.0..0.3) {
+        let shaper = shaper(kind, f, zeta);
+        let acceleration = shaper.max_acceleration(ALLOWED_SMOOTHING, 5e-3);
+        let smoothing = shaper.smoothing(&Corner { acceleration, speed: 5e-3 });
+        prop_assert!((smoothing - ALLOWED_SMOOTHING).abs() < 1e-12 * smoothing.max(1.0));
+    }
+
+    /// A higher frequency smooths less: what `max_smoothing` relies on.
+    #[test]
+    fn smoothing_falls_with_frequency(kind in any_kind(), f in 15.0..200.0, zeta in 0.0..0.3) {
+        let corner = Corner::default();
+        prop_assert!(shaper(kind, 1.01 * f, zeta).smoothing(&corner) < shaper(kind, f, zeta).smoothing(&corner));
+    }
+}
+
+/// Singhose's EI shapers are those whose humps all reach the tolerance: Chebyshev's polynomials in cos(πx/2).
+#[test]
+fn humps_are_as_high_as_the_tolerance() {
+    for (kind, humps) in [(Kind::Ei, 2), (Kind::TwoHumpEi, 3), (Kind::ThreeHumpEi, 4)] {
+        let shaper = shaper(kind, 1.0, 0.0);
+        let beta = ((1.0 / TOLERANCE).acosh() / f64::from(humps)).cosh();
+        for k in 0..=200 {
+            let x = f64::from(k) / 100.0;
+            // V = V_tol T_n(β cos(π x / 2))
+            let y = beta * (PI * x / 2.0).cos();
+            let chebyshev = match y.abs() {
+                y if y <= 1.0 => (f64::from(humps) * y.acos()).cos(),
+                y => (f64::from(humps) * y.acosh()).cosh(),
+            };
+            let v = shaper.residual_vibration(x, 0.0);
+            assert!((v - TOLERANCE * chebyshev.abs()).abs() < 1e-12, "{kind:?} at {x}: {v}");
+        }
+    }
+}
+
+/// In % below and above.
+type Range = (f64, f64);
+
+/// Klipper's documentation, "Resonance Compensation", Technical details: ranges in % of the shaper's frequency within which
+/// vibration is reduced 20 and 10 times, said to be approximate, for shapers of ζ = 0.1 and machines around that.
+const PUBLISHED: [(Kind, Option<Range>, Range); 6] = [
+    (Kind::Zv, None, (-5.0, 5.0)),
+    (Kind::Mzv, Some((-4.0, 4.0)), (-10.0, 15.0)),
+    (Kind::Zvd, Some((-15.0, 15.0)), (-22.0, 22.0)),
+    (Kind::Ei, Some((-20.0, 20.0)), (-25.0, 25.0)),
+    (Kind::TwoHumpEi, Some((-35.0, 35.0)), (-40.0, 40.0)),
+    (Kind::ThreeHumpEi, Some((-45.0, 50.0)), (-50.0, 55.0)),
+];
+
+/// What is published lies within what is computed, and is at most five points of percent less: it was rounded down to 5 %.
+#[test]
+fn the_published_table_of_robustness() {
+    let mut missing = Vec::new();
+    let documented = fs::read_to_string("docs/shape.md").unwrap();
+    for (kind, twenty, ten) in PUBLISHED {
+        let shaper = shaper(kind, 50.0, 0.1);
+        let range = |level: f64| {
+            let part = shaper.insensitivity(level, &[0.075, 0.1, 0.15])?;
+            Some((100.0 * (part.0 - 1.0), 100.0 * (part.1 - 1.0)))
+        };
+        for (level, published) in [(0.05, twenty), (0.1, Some(ten))] {
+            let computed = range(level);
+            let (Some(computed), Some(published)) = (computed, published) else {
+                assert_eq!(computed.is_some(), published.is_some(), "{kind:?}");
+                continue;
+            };
+            let (low, high) = (published.0 - computed.0, computed.1 - published.1);
+            assert!((0.0..5.01).contains(&low) && (0.0..5.01).contains(&high), "{kind:?}: {computed:?}");
+        }
+        let shown = |range: Option<(f64, f64)>| {
+            range.map_or("none".into(), |(low, high)| format!("−{:.1} … +{high:.1} %", -low))
+        };
+        let row = format!("| {} | {} | {} |", kind.name(), shown(range(0.05)), shown(range(0.1)));
+        if !documented.contains(&row) {
+            missing.push(row);
+        }
+    }
+    assert!(missing.is_empty(), "docs/shape.md does not have:\n{}", missing.join("\n"));
+}
+
+fn data() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/klipper-ender3");
+    let folder = folder.is_dir().then_some(folder);
+    if folder.is_none() {
+        println!("skipped: ../shared/data/klipper-ender3 is not there");
+    }
+    folder
+}
+
+fn spectrum(file: &Path) -> Spectrum {
+    Spectrum::new(&read_accelerometer(file).unwrap(), Axis::All)
+}
+
+/// Frequency (Hz), vibration (%) of zv, mzv, ei, 2hump_ei, 3hump_ei, and the recommendation.
+type Printed = (&'static str, [(f64, f64); 5], &'static str);
+
+/// As ../shared/data/README.md has them.
+const PRINTED: [Printed; 3] = [
+    ("resonances_x_20210821_152037.csv", [(58.2, 15.8), (40.8, 2.0), (51.2, 0.2), (63.0, 0.0), (77.6, 0.0)], "ei"),
+    ("resonances_y_20210630_223910.csv", [(46.0, 9.5), (29.4, 1.0), (39.4, 0.0), (50.2, 0.0), (62.0, 0.0)], "ei"),
+    ("resonances_y_20210630_230110.csv", [(48.2, 2.8), (46.2, 0.0), (56.2, 0.0), (71.6, 0.0), (88.0, 0.0)], "mzv"),
+];
+
+#[test]
+fn what_klipper_printed() {
+    let Some(folder) = data() else { return };
+    for (file, printed, recommended) in PRINTED {
+        let spectrum = spectrum(&folder.join(file));
+        let choice = choose(Target::Spectrum(&spectrum), &Criterion::default()).unwrap();
+        assert_eq!(choice.best().shaper.kind.name(), recommended, "{file}");
+        let fitted: Vec<_> = choice.fitted.iter().filter(|one| one.shaper.kind != Kind::Zvd).collect();
+        for (one, (frequency, vibration)) in fitted.iter().zip(printed) {
+            assert!((one.shaper.frequency - frequency).abs() < 0.2, "{file}: {one:?}");
+            assert!((100.0 * one.vibration - vibration).abs() < 0.051, "{file}: {one:?}");
+        }
+        if file == PRINTED[0].0 {
+            let smoothing = [0.052, 0.122, 0.123, 0.136, 0.136];
+            let acceleration = [13200.0, 4900.0, 4900.0, 4400.0, 4400.0];
+            for (one, (smoothing, acceleration)) in fitted.iter().zip(smoothing.into_iter().zip(acceleration)) {
+                assert!((1e3 * one.smoothing - smoothing).abs() < 5.1e-4, "{one:?}");
+                assert!((1e3 * one.max_acceleration - acceleration).abs() < 51.0, "{one:?}");
+            }
+        }
+    }
+}
+
+fn temporary(name: &str, text: &str) -> PathBuf {
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    fs::write(&file, text).unwrap();
+    file
+}
+
+/// A file that names shapers holds densities that are divided by frequency already, with a column that marks them or without.
+#[test]
+fn spectra_with_shapers_are_divided_already() {
+    let plain: Vec<(f64, f64)> =
+        (0..140).map(|k| 1.5 * f64::from(k)).map(|f| (f, 1e5 / (1.0 + ((f - 44.0) / 4.0).powi(2)))).collect();
+    let mut text = String::from("freq,psd_x,psd_y,psd_z,psd_xyz\n");
+    let mut divided = [
+        "freq,psd_x,psd_y,psd_z,psd_xyz,zv(44.0),mzv(44.0)\n",
+        "# accelerometer x\nfreq,psd_x,psd_y,psd_z,psd_xyz,shapers:,mzv(44.0)\n",
+    ]
+    .map(String::from);
+    for (f, p) in plain {
+        text += &format!("{f},{p},0,0,{p}\n");
+        let (q, kept) = (p / (f + 0.1), if f < 5.0 { 0.0 } else { 1.0 });
+        divided[0] += &format!("{f},{0},0,0,{0},0.5,0.4\n", q * kept);
+        divided[1] += &format!("{f},{0},0,0,{0},,0.4\n", q * kept);
+    }
+    let expected = spectrum(&temporary("resonances_x.csv", &text));
+    for (name, text) in ["calibration_data_x.csv", "calibration_data_y.csv"].iter().zip(&divided) {
+        let read = spectrum(&temporary(name, text));
+        let far = read.density.iter().zip(&expected.density).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(far < 1e-12 * expected.greatest(), "{name}: {far}");
+    }
+}
+
+/// Samples from a file, as Klipper writes them: the names stand in a remark.
+#[test]
+fn samples_from_a_file() {
+    let mut text = String::from("#time,accel_x,accel_y,accel_z\n");
+    for k in 0..3200 {
+        let t = f64::from(k) / 1600.0;
+        text += &format!("{:.6},{:.6},0.5,9806.65\n", 100.0 + t, 700.0 * (2.0 * PI * 50.0 * t).sin());
+    }
+    let spectrum = spectrum(&temporary("raw_data_x.csv", &text));
+    let peaks = spectrum.peaks();
+    assert!(peaks.len() == 1 && (peaks[0].0 - 50.0).abs() < 0.1, "{peaks:?}");
+    assert_eq!(spectrum.main_axis(peaks[0].0).unwrap().0, Axis::X);
+    // Half the squared amplitude, spread over a few frequencies.
+    let width = spectrum.frequency[1] - spectrum.frequency[0];
+    let power: f64 = spectrum.frequency.iter().zip(&spectrum.density).map(|(f, p)| p * (f + 0.1) * width).sum();
+    assert!((power / (0.5 * 700.0 * 700.0) - 1.0).abs() < 1e-3, "{power}");
+}
+
+/// The lighter motor: the first peak goes from 40.0 to 45.0 Hz (../shared/data/README.md).
+#[test]
+fn two_motors_compared() {
+    let Some(folder) = data() else { return };
+    let heavy = spectrum(&folder.join("resonances_x_20210701_223821.csv"));
+    let light = spectrum(&folder.join("resonances_x_20210821_152037.csv"));
+    let first = |spectrum: &Spectrum| spectrum.peaks()[0].0;
+    assert!(
+        (first(&heavy) - 40.0).abs() < 1.6 && (first(&light) - 45.0).abs() < 1.6,
+        "{} {}",
+        first(&heavy),
+        first(&light)
+    );
+    let compared = compare(&heavy, &light);
+    assert!(compared.similarity < 0.95);
+    let same = compare(&light, &light);
+    assert!((same.similarity - 1.0).abs() < 1e-12 && (same.level - 1.0).abs() < 1e-12);
+    assert!(same.only_first.is_empty() && same.only_second.is_empty() && same.pairs.len() == light.peaks().len());
+}
+
+/// `max_smoothing` is kept, and costs vibration.
+#[test]
+fn smoothing_can_be_limited() {
+    let Some(folder) = data() else { return };
+    let spectrum = spectrum(&folder.join(PRINTED[1].0));
+    let free = choose(Target::Spectrum(&spectrum), &Criterion::default()).unwrap();
+    let limit = 0.1e-3;
+    let criterion = Criterion { max_smoothing: Some(limit), ..Criterion::default() };
+    let limited = choose(Target::Spectrum(&spectrum), &criterion).unwrap();
+    assert!(limited.fitted.iter().all(|one| one.smoothing <= limit));
+    for (one, other) in free.fitted.iter().zip(&limited.fitted) {
+        assert!(other.vibration >= one.vibration, "{one:?} {other:?}");
+    }
+    let criterion = Criterion { max_smoothing: Some(1e-9), ..Criterion::default() };
+    assert!(choose(Target::Spectrum(&spectrum), &criterion).is_err());
+}
+
+/// Acceleration samples of one mode shaken by noise: the spectrum peaks there, and the shaper that is chosen covers it.
+#[test]
+fn samples_of_a_known_mode() {
+    let (rate, f, zeta) = (3200.0, 47.0, 0.05);
+    let omega: f64 = 2.0 * PI * f;
+    let (mut x, mut v, mut seed) = (0.0, 0.0, 1u64);
+    let (mut time, mut acceleration) = (Vec::new(), Vec::new());
+    for k in 0..(60.0 * rate) as usize {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        let noise = (seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
+        let a = noise - 2.0 * zeta * omega * v - omega * omega * x;
+        v += a / rate;
+        x += v / rate;
+        time.push(k as f64 / rate);
+        acceleration.push(1e6 * omega * omega * x);
+    }
+    let still = vec![0.0; time.len()];
+    let samples = Accelerometer::Samples { time, acceleration: [acceleration, still.clone(), still] };
+    let spectrum = Spectrum::new(&samples, Axis::X);
+    let peak = spectrum.peaks().into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+    assert!((peak.0 - f).abs() < 3.2, "{peak:?}");
+    let criterion = Criterion::default().with_damping(zeta).unwrap();
+    let choice = choose(Target::Spectrum(&spectrum), &criterion).unwrap();
+    assert!(choice.best().shaper.residual_vibration(f, zeta) < 0.06, "{choice:?}");
+}
+
+/// The density's sum is the variance, and a sine's power stands at its frequency.
+#[test]
+fn densities_sum_to_the_variance() {
+    let rate = 1000.0;
+    let values: Vec<f64> = (0..20_000).map(|k| 3.0 * (2.0 * PI * 62.5 * f64::from(k) / rate).sin()).collect();
+    let (frequency, density) = power_spectral_density(&values, rate, 512);
+    let total: f64 = density.iter().sum::<f64>() * (frequency[1] - frequency[0]);
+    assert!((total - 4.5).abs() < 1e-3, "{total}");
+    let top = (0..density.len()).max_by(|a, b| density[*a].total_cmp(&density[*b])).unwrap();
+    assert_eq!(frequency[top], 62.5);
+    assert!(power_spectral_density(&values[..100], rate, 512).1.is_empty());
+}
+
+/// What authorities/shapers.py says, which integrates the oscillator and shares nothing with taut.
+#[test]
+fn an_authority_agrees() {
+    let text = fs::read_to_string("tests/authorities/shapers.json").unwrap();
+    let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+    let vibrations = value["vibration"].as_array().unwrap();
+    assert!(vibrations.len() >= 60);
+    for one in vibrations {
+        let kind = Kind::from_name(one["shaper"].as_str().unwrap()).unwrap();
+        let shaper = shaper(kind, number(&one["frequency"]), number(&one["damping"]));
+        let v = shaper.residual_vibration(number(&one["mode_frequency"]), number(&one["mode_damping"]));
+        assert!((v - number(&one["vibration"])).abs() < 1e-8, "{one}: {v}");
+    }
+    let samples: Vec<f64> = value["samples"].as_array().unwrap().iter().map(number).collect();
+    let (_, density) = power_spectral_density(&samples, number(&value["rate"]), 64);
+    let expected: Vec<f64> = value["density"].as_array().unwrap().iter().map(number).collect();
+    assert_eq!(density.len(), expected.len());
+    let most = expected.iter().copied().fold(0.0, f64::max);
+    for (mine, theirs) in density.iter().zip(&expected) {
+        assert!((mine - theirs).abs() < 1e-12 * most, "{mine} {theirs}");
+    }
+    for one in value["resonances"].as_array().unwrap() {
+        let case = Case::from_text("authority.toml", one["toml"].as_str().unwrap()).unwrap();
+        let drive = if one["drive"] == "held" { Drive::Held } else { Drive::Free };
+        let found = resonances(&case.stage, drive).unwrap();
+        let expected = one["modes"].as_array().unwrap();
+        assert!(!expected.is_empty());
+        for mode in expected {
+            let (f, z) = (number(&mode["frequency"]), number(&mode["damping"]));
+            let near = found.iter().min_by(|a, b| (a.frequency - f).abs().total_cmp(&(b.frequency - f).abs())).unwrap();
+            assert!((near.frequency / f - 1.0).abs() < 1e-9, "{mode} {near:?}");
+            assert!((near.damping - z).abs() < 1e-9, "{mode} {near:?}");
+        }
+    }
+}
+
+/// The shaper that is chosen for a stage leaves little of each of its modes, along all of its travel.
+#[test]
+fn a_stage_without_a_measurement() {
+    for case in [
+        "stages/printer-axis/printer-axis.toml",
+        "stages/sollmann-jouaneh/table4.toml",
+        "stages/two-mass/two-mass.toml",
+    ] {
+        for drive in [Drive::Held, Drive::Free] {
+            let stage = Case::read(case).unwrap().stage;
+            let modes = resonances(&stage, drive).unwrap();
+            assert!(modes.iter().all(|mode| mode.frequency > 1.0 && mode.damping >= 0.0 && mode.share <= 1.0));
+            let main = modes.iter().find(|mode| mode.share == 1.0).unwrap();
+            let criterion = Criterion::default().with_damping(main.damping).unwrap();
+            // Where nothing is uncertain the shortest one does, at the mode's own frequency.
+            let sure = choose(Target::Modes { modes: &modes[..1], uncertainty: 0.0 }, &criterion).unwrap();
+            assert_eq!(sure.best().shaper.kind, Kind::Zv);
+            assert!((sure.best().shaper.frequency / modes[0].frequency - 1.0).abs() < 0.03, "{sure:?}");
+            let choice = choose(Target::Modes { modes: &modes, uncertainty: 0.1 }, &criterion).unwrap();
+            let best = &choice.best().shaper;
+            for mode in &modes {
+                let left = mode.share * residual_vibration(best.impulses(), mode.frequency, mode.damping);
+                assert!(left < 0.15, "{case} {drive:?}: {left} of {mode:?} behind {best:?}");
+            }
+        }
+    }
+    let rigid = Case::read("stages/emps/emps.toml").unwrap().stage;
+    assert!(resonances(&rigid, Drive::Held).unwrap_err().what.contains("rigid"));
+}
+
+#[test]
+fn wrong_files_are_told_what_is_wrong_with_them() {
+    let update = std::env::var_os("UPDATE_EXPECT").is_some();
+    let folder = Path::new("tests/bad/shape");
+    let mut files: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.retain(|file| file.extension().is_some_and(|e| e == "csv"));
+    files.sort();
+    assert!(files.len() >= 12);
+    let mut wrong = Vec::new();
+    for file in files {
+        let message = match read_accelerometer(&file) {
+            Ok(_) => panic!("{} was read without a complaint", file.display()),
+            Err(error) => format!("{error}\n"),
+        };
+        let expected = file.with_extension("txt");
+        if update {
+            fs::write(&expected, &message).unwrap();
+        }
+        if fs::read_to_string(&expected).unwrap_or_default() != message {
+            wrong.push(message);
+        }
+    }
+    assert!(wrong.is_empty(), "{} messages differ from what is expected:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+#[test]
+fn wrong_numbers_are_refused() {
+    for (frequency, damping) in [(0.0, 0.1), (-5.0, 0.1), (f64::NAN, 0.1), (50.0, 1.0), (50.0, -0.1), (50.0, f64::NAN)]
+    {
+        assert!(Shaper::new(Kind::Zv, frequency, damping).is_err(), "{frequency} {damping}");
+    }
+}
