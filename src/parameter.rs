@@ -555,6 +555,17 @@ const CONTROLLER: &[Parameter] = &[
 ];
 
 #[rustfmt::skip]
+const TUNE: &[Parameter] = &[
+    row("tune.bandwidth", "", "Hz", Words("one that suits the axis"), FREQUENCY, "8 Hz", "Bandwidth that the gains are placed for, and from which a search begins."),
+    row("tune.damping", "ζ", "", Value(0.8), Range { above: true, ..Range::new(0.0, 10.0) }, "0.8", "Damping ratio that they are placed for."),
+    row("tune.sensitivity", "M_s", "", Value(1.8), Range { above: true, ..Range::new(1.0, 100.0) }, "1.6", "Largest magnitude that the sensitivity 1/(1 + L) may have; 1.6 is careful, 2 is bold."),
+    row("tune.complementary", "M_t", "", Value(1.8), Range { above: true, ..Range::new(1.0, 100.0) }, "1.5", "The same of L/(1 + L)."),
+    row("tune.spread", "", "", Words("what a fit says, or 0.2"), Range { below: true, ..Range::new(0.0, 1.0) }, "20 %", "Share by which each parameter of the axis can be off."),
+    row("tune.load", "", "kg", Value(0.0), Range::new(0.0, 1e6), "0.5 kg", "Each value of `load`: a mass that is added to the cart."),
+    row("tune.places", "", "", Value(7.0), Range::whole(1.0, 1000.0), "7", "Places along the travel that are looked at."),
+];
+
+#[rustfmt::skip]
 const MOVE: &[Parameter] = &[
     row("move.from", "", "m", Value(0.0), ANY, "0 mm", "Where the cart stands at time zero."),
     row("move.to", "", "m", Words("`points` or `gcode` instead"), ANY, "50 mm", "Where it goes."),
@@ -666,6 +677,7 @@ const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     ("input", &[INPUTS]),
     ("controller", &[CONTROLLER]),
     ("move", &[MOVE]),
+    ("tune", &[TUNE]),
     ("fit", &[FIT]),
 ];
 

@@ -12,10 +12,12 @@ mod set;
 mod stage;
 mod template;
 mod tree;
+mod tune;
 
 pub use fit::{Nuisances, Plan, Scope, matches};
 pub use motion::Move;
 pub use template::TEMPLATE;
+pub use tune::{Cost, Known, Tuning};
 
 use crate::design::Design;
 use crate::error::{Error, Result};
@@ -57,6 +59,10 @@ pub struct Case {
     pub moves: Vec<Move>,
     /// What is to be found from their logs, where the file says so.
     pub fit: Option<Plan>,
+    /// What the controller's gains are to be good for, where the file says so.
+    pub tune: Option<Tuning>,
+    /// What a fit said of its estimates.
+    pub known: Vec<Known>,
     /// The text it was read from, with `--set` applied: read again, it gives the same case.
     pub text: String,
     /// The files that its inputs and logs name, in the text's order.
@@ -201,7 +207,8 @@ impl Case {
             "controller",
             "move",
             "fit",
-            // What a fit says of its own result; nothing is computed from it.
+            "tune",
+            // What a fit says of its own result.
             "uncertainty",
         ];
         root.check_keys(&tables, PLANNED)?;
@@ -221,9 +228,12 @@ impl Case {
         };
         let measurement = measurement::measurement(&root, &stage, &experiments)?;
         let fit = fit::plan(&root, &experiments)?;
+        let tune = tune::tuning(&root, controller.as_ref(), &moves)?;
+        let known = tune::known(&root)?;
         let mut files = folder.read.into_inner();
         files.sort_by_key(|file| file.place.start);
-        Ok(Self { title, stage, measurement, experiments, controller, moves, fit, text: source.text.clone(), files })
+        let text = source.text.clone();
+        Ok(Self { title, stage, measurement, experiments, controller, moves, fit, tune, known, text, files })
     }
 
     /// The text with other names for the files of its inputs; it is to lie where these names lead to them.

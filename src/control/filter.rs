@@ -1,6 +1,7 @@
 //! Filters on the command.
 
 use crate::design::Filter;
+use nalgebra::Complex;
 use std::f64::consts::PI;
 
 /// A filter of second order, stepped once a sample.
@@ -36,6 +37,20 @@ impl Biquad {
         self.state[0] = self.b[1] * input - self.a[0] * output + self.state[1];
         self.state[1] = self.b[2] * input - self.a[1] * output;
         output
+    }
+
+    /// Its gain at z.
+    pub fn at(&self, z: Complex<f64>) -> Complex<f64> {
+        let q = z.inv();
+        let [b0, b1, b2] = self.b;
+        let [a1, a2] = self.a;
+        (q * (q * b2 + b1) + b0) / (q * (q * a2 + a1) + 1.0)
+    }
+
+    /// Where its poles turn, rad/s, sampled every `every` s.
+    pub fn frequency(&self, every: f64) -> f64 {
+        // z² + a₁ z + a₂ with |z|² = a₂ and Re z = −a₁/2
+        (-0.5 * self.a[0] / self.a[1].abs().sqrt().max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0).acos() / every
     }
 
     /// Forgets.

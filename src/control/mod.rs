@@ -7,6 +7,7 @@
 
 pub mod compare;
 pub mod compensation;
+pub mod feedback;
 pub mod filter;
 pub mod fuzzy;
 pub mod model;
@@ -27,6 +28,6 @@ mod welch;
 
 pub use outcome::{Deviation, Figures, MoveRun, Rows, Setup, close, closed_loop, stream};
 pub use sampled::{Controller, Loop, Sample, Seen, measures_cart};
-pub use spread::spread;
+pub use spread::{Change, PARAMETERS, spread};
 pub use standard::Standard;
 pub use welch::power_spectral_density;

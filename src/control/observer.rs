@@ -1,7 +1,7 @@
 //! An observer of the disturbance at the command.
 
 use super::compensation::Rigid;
-use nalgebra::{Matrix3, RowVector3, Vector3};
+use nalgebra::{Complex, Matrix3, RowVector3, Vector3};
 
 /// Estimates position, speed and a constant disturbance of an axis of one mass from its measured position.
 #[derive(Debug, Clone)]
@@ -45,6 +45,21 @@ impl DisturbanceState {
     pub fn step(&mut self, position: f64, command: f64) {
         let state = self.state.unwrap_or(Vector3::new(position, 0.0, 0.0));
         self.state = Some(self.a * state + self.b * command + self.gain * (position - state[0]));
+    }
+
+    /// What it makes at z of a command and of a position: w = W_u u + W_y y.
+    pub(super) fn at(&self, z: Complex<f64>) -> [Complex<f64>; 2] {
+        // s⁺ = (A − L c) s + b u + L y,  w = s₃
+        let c = RowVector3::new(1.0, 0.0, 0.0);
+        let mut shifted = (self.a - self.gain * c).map(|v| Complex::new(-v, 0.0));
+        for i in 0..3 {
+            shifted[(i, i)] += z;
+        }
+        let lu = shifted.lu();
+        [self.b, self.gain].map(|from| {
+            let solved = lu.solve(&from.map(|v| Complex::new(v, 0.0)));
+            solved.map_or(Complex::new(f64::NAN, f64::NAN), |s| s[2])
+        })
     }
 
     /// Forgets.

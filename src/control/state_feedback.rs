@@ -42,7 +42,44 @@ pub struct StateFeedbackState {
     pub residuals: [f64; 2],
 }
 
+/// What a linear view of it needs; names as in [`StateFeedbackState`].
+#[derive(Debug, Clone)]
+pub(super) struct Parts {
+    pub every: f64,
+    pub phi: DMatrix<f64>,
+    pub now: DVector<f64>,
+    pub before: DVector<f64>,
+    pub measured: DVector<f64>,
+    pub kalman: DVector<f64>,
+    pub gain: DVector<f64>,
+    pub pending: usize,
+    /// Samples from a command to the one that takes over within a sample.
+    pub lag: usize,
+    /// Gain of the integral, if there is one.
+    pub integral: Option<f64>,
+}
+
 impl StateFeedbackState {
+    /// Its matrices.
+    pub(super) fn parts(&self) -> Parts {
+        Parts {
+            every: self.every,
+            phi: self.phi.clone(),
+            now: self.now.clone(),
+            before: self.before.clone(),
+            measured: self.measured.clone(),
+            kalman: self.kalman.clone(),
+            gain: self.gain.clone(),
+            pending: self.pending,
+            lag: self.lag(),
+            integral: self.has_integral.then(|| self.gain[self.phi.nrows() + self.pending]),
+        }
+    }
+
+    fn lag(&self) -> usize {
+        if self.before.iter().any(|v| *v != 0.0) { self.pending - 1 } else { self.pending }
+    }
+
     /// For a model of the axis.
     pub fn new(weights: &StateFeedback, stage: &Stage, design: &Design) -> Result<Self> {
         let linear = Linear::of(stage);
@@ -202,7 +239,7 @@ impl StateFeedbackState {
         self.own.truncate(self.pending);
         self.given.insert(0, effective);
         self.given.truncate(self.pending + 1);
-        let lag = if self.before.iter().any(|v| *v != 0.0) { self.pending - 1 } else { self.pending };
+        let lag = self.lag();
         self.scratch.gemv(1.0, &self.phi, &self.estimate, 0.0);
         self.scratch.axpy(self.given[lag], &self.now, 1.0);
         if let Some(&previous) = self.given.get(lag + 1) {

@@ -1,0 +1,171 @@
+//! The table of the tuning: what the gains are to be good for, and what they have to stand. And what a fit said of its estimates.
+
+use super::Move;
+use super::reader::{Field, Table};
+use super::tree::Kind;
+use crate::design::{Design, Structure};
+use crate::error::Result;
+
+/// What `taut tune` looks for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tuning {
+    /// What is made small; nothing, where bandwidth and damping alone say the gains.
+    pub cost: Option<Cost>,
+    /// Bandwidth that the gains are placed for, Hz; one that suits the axis where it is not said.
+    pub bandwidth: Option<f64>,
+    /// Damping ratio that they are placed for.
+    pub damping: f64,
+    /// Largest |S| allowed.
+    pub sensitivity: f64,
+    /// Largest |T| allowed.
+    pub complementary: f64,
+    /// By what share each parameter can be off; where it is not said, what a fit says, or 20 %.
+    pub spread: Option<f64>,
+    /// Masses that are added to the cart, kg.
+    pub loads: Vec<f64>,
+    /// Places along the travel that are looked at.
+    pub places: usize,
+}
+
+impl Default for Tuning {
+    /// What holds where the file says nothing: the cart's squared error made small with Ms ≤ 1.8.
+    fn default() -> Self {
+        Self {
+            cost: Some(Cost::Squares),
+            bandwidth: None,
+            damping: 0.8,
+            sensitivity: 1.8,
+            complementary: 1.8,
+            spread: None,
+            loads: vec![0.0],
+            places: 7,
+        }
+    }
+}
+
+/// What is made small.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cost {
+    /// Root of the mean square of the cart's error over all moves.
+    Squares,
+    /// Its largest magnitude.
+    Peak,
+    /// The bandwidth, made large.
+    Bandwidth,
+}
+
+impl Cost {
+    /// As in the case file.
+    pub fn word(self) -> &'static str {
+        match self {
+            Cost::Squares => "squares",
+            Cost::Peak => "peak",
+            Cost::Bandwidth => "bandwidth",
+        }
+    }
+}
+
+/// What a fit knows of a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Known {
+    /// Its key, or the name of a group, as in `[fit]`.
+    pub name: String,
+    /// Its 95 % interval, SI; none where the fit knows nothing.
+    pub interval: Option<[f64; 2]>,
+}
+
+pub(super) fn tuning(root: &Table, design: Option<&Design>, moves: &[Move]) -> Result<Option<Tuning>> {
+    let Some(field) = root.optional("tune") else { return Ok(None) };
+    let table = field.table()?;
+    table.check_keys(&["cost"], &[])?;
+    let Some(design) = design else {
+        return Err(field
+            .fail("there is no controller to tune")
+            .next("add [controller] with for example every = \"1 ms\" and pid = { proportional = \"2 V/mm\" }"));
+    };
+    let placed = matches!(design.structure, Structure::Pid(_) | Structure::Cascade(_));
+    if !placed && !matches!(design.structure, Structure::StateFeedback(_)) {
+        return Err(field
+            .fail(format!("the gains of {} cannot be tuned", design.structure.name()))
+            .allowed("a controller with pid, cascade or state_feedback"));
+    }
+    let default = Tuning::default();
+    let words = [
+        ("squares", Some(Cost::Squares)),
+        ("peak", Some(Cost::Peak)),
+        ("bandwidth", Some(Cost::Bandwidth)),
+        ("none", None),
+    ];
+    let cost = match table.optional("cost") {
+        None if moves.is_empty() => Some(Cost::Bandwidth),
+        None => default.cost,
+        Some(field) => {
+            let cost = field.choice(&words)?;
+            if moves.is_empty() && matches!(cost, Some(Cost::Squares | Cost::Peak)) {
+                return Err(field
+                    .fail("there is no move whose error could be made small")
+                    .next("add [[move]], or write cost = \"bandwidth\""));
+            }
+            cost
+        }
+    };
+    let bandwidth = table.number_if_given("bandwidth")?;
+    if let (Some(field), false) = (table.optional("bandwidth").or(table.optional("damping")), placed) {
+        return Err(field
+            .fail(format!("{} follows from weights, not from a bandwidth", design.structure.name()))
+            .next("leave it out: the search begins at the weights of the file"));
+    }
+    if cost.is_none() && bandwidth.is_none() {
+        let next = if placed { "add for example bandwidth = \"8 Hz\"" } else { "write for example cost = \"bandwidth\"" };
+        return Err(field.fail("without a cost the gains follow from a bandwidth, which is not said").next(next));
+    }
+    Ok(Some(Tuning {
+        cost,
+        bandwidth,
+        damping: table.number("damping")?,
+        sensitivity: table.number("sensitivity")?,
+        complementary: table.number("complementary")?,
+        spread: table.number_if_given("spread")?,
+        loads: match table.optional("load") {
+            None => default.loads,
+            Some(field) => {
+                let load = |field: &Field| field.clone().named("tune.load").number();
+                field.filled_list()?.iter().map(load).collect::<Result<_>>()?
+            }
+        },
+        places: table.number("places")? as usize,
+    }))
+}
+
+/// The table that a fit leaves behind.
+pub(super) fn known(root: &Table) -> Result<Vec<Known>> {
+    let Some(field) = root.optional("uncertainty") else { return Ok(Vec::new()) };
+    let table = field.table()?;
+    let mut all = Vec::new();
+    for key in table.keys() {
+        let Some(field) = table.optional(key) else { continue };
+        let row = field.table()?;
+        let number = |key: &str| match row.optional(key) {
+            None => Ok(None),
+            Some(field) => match field.node.kind {
+                Kind::Float(value) if value.is_finite() => Ok(Some(value)),
+                Kind::Integer(value) => Ok(Some(value as f64)),
+                _ => Err(field
+                    .fail("this is no finite number in SI units")
+                    .next("leave the table as `taut fit` wrote it, or take it out")),
+            },
+        };
+        let interval = match (number("low")?, number("high")?) {
+            (Some(low), Some(high)) if low > high => {
+                return Err(field.fail(format!("the interval from {low} to {high} is none")).allowed("low up to high"));
+            }
+            (Some(low), Some(high)) => Some([low, high]),
+            (Some(_), None) | (None, Some(_)) => {
+                return Err(field.fail("an interval has two ends").next("give low and high, or neither"));
+            }
+            (None, None) => None,
+        };
+        all.push(Known { name: key.to_string(), interval });
+    }
+    Ok(all)
+}

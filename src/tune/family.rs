@@ -1,0 +1,282 @@
+//! All the axes that a controller may meet: parameters that are off, loads, places along the travel; and the worst of them.
+
+use super::margins::{Margins, Plant};
+use crate::case::{Case, Tuning};
+use crate::control::feedback::Feedback;
+use crate::control::{Change, PARAMETERS};
+use crate::design::Design;
+use crate::error::Result;
+use crate::fit::Knob;
+use crate::linear::places;
+use crate::number::engineering;
+use crate::stage::Stage;
+
+/// Share by which parameters are off where nothing else is said.
+pub const SPREAD: f64 = 0.2;
+
+/// Rounds of the search for the worst axis.
+const ROUNDS: usize = 6;
+
+/// A parameter that is not known exactly.
+#[derive(Debug, Clone)]
+pub struct Unknown {
+    /// Its name.
+    pub name: String,
+    /// The least and the most: factors, or values in SI units.
+    pub low: f64,
+    /// The most.
+    pub high: f64,
+    what: What,
+}
+
+#[derive(Debug, Clone)]
+enum What {
+    Factor(Change),
+    Value(Box<Knob>),
+}
+
+impl Unknown {
+    /// Puts it into `stage`: −1 for its least, 1 for its most, 0 for what it is taken for.
+    pub fn set(&self, stage: &mut Stage, off: f64) {
+        if off == 0.0 {
+            return;
+        }
+        let end = if off < 0.0 { self.low } else { self.high };
+        match &self.what {
+            What::Factor(change) => change(stage, 1.0 + off.abs() * (end - 1.0)),
+            What::Value(knob) => knob.set(stage, knob.start + off.abs() * (end - knob.start)),
+        }
+    }
+
+    fn words(&self, off: f64) -> String {
+        let end = if off < 0.0 { self.low } else { self.high };
+        match &self.what {
+            What::Factor(_) => format!("{} {:+.0} %", self.name, 100.0 * off.abs() * (end - 1.0)),
+            What::Value(knob) => {
+                let value = knob.start + off.abs() * (end - knob.start);
+                format!("{} {}", self.name, engineering(value, knob.unit, 4))
+            }
+        }
+    }
+}
+
+/// One of the axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Corner {
+    /// Where the cart is, m.
+    pub place: f64,
+    /// Mass added to it, kg.
+    pub load: f64,
+    /// How far each unknown is off, from −1 to 1.
+    pub off: Vec<f64>,
+}
+
+/// All of them.
+#[derive(Debug, Clone)]
+pub struct Family {
+    /// The axis as it is taken for.
+    pub stage: Stage,
+    /// What can be off.
+    pub unknowns: Vec<Unknown>,
+    /// Where that is from.
+    pub source: Source,
+    /// Places along the travel, m; a single one where nothing changes along it.
+    pub places: Vec<f64>,
+    /// Loads, kg.
+    pub loads: Vec<f64>,
+}
+
+/// Where the uncertainty is from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Source {
+    /// The intervals of a fit.
+    Fit,
+    /// A share of each parameter.
+    Spread(f64),
+}
+
+impl Family {
+    /// That of a case.
+    pub fn of(case: &Case, tuning: &Tuning) -> Result<Self> {
+        let stage = case.stage.clone();
+        let keys: Vec<&str> = case.known.iter().flat_map(|known| known.name.split(" = ")).collect();
+        let (unknowns, source) = match tuning.spread {
+            None if !case.known.is_empty() => {
+                let mut unknowns = Vec::new();
+                // What is fitted along with a log has no key.
+                for known in case.known.iter().filter(|known| known.name.contains('.')) {
+                    let tied: Vec<&str> = known.name.split(" = ").collect();
+                    let knob = match known.name.starts_with("total.") {
+                        true => Knob::lumped(&stage, &known.name, &Vec::new())?,
+                        false => Knob::tied(&stage, &tied, &keys, &Vec::new())?,
+                    };
+                    // What the fit knows nothing of is off by a share.
+                    let [low, high] = known
+                        .interval
+                        .unwrap_or([knob.start * (1.0 - SPREAD), knob.start * (1.0 + SPREAD)])
+                        .map(|end| if knob.start > 0.0 { end.max(1e-3 * knob.start) } else { end });
+                    unknowns.push(Unknown { name: known.name.clone(), low, high, what: What::Value(Box::new(knob)) });
+                }
+                (unknowns, Source::Fit)
+            }
+            given => {
+                let share = given.unwrap_or(SPREAD);
+                let matters = |change: &Change| {
+                    let mut other = stage.clone();
+                    change(&mut other, 1.0 + share);
+                    other != stage
+                };
+                let unknown = |(name, change): (&str, Change)| Unknown {
+                    name: name.to_string(),
+                    low: 1.0 - share,
+                    high: 1.0 + share,
+                    what: What::Factor(change),
+                };
+                let unknowns = PARAMETERS.into_iter().filter(|(_, change)| matters(change)).map(unknown).collect();
+                (unknowns, Source::Spread(share))
+            }
+        };
+        Ok(Self { places: along(case, tuning.places), loads: tuning.loads.clone(), stage, unknowns, source })
+    }
+
+    /// The axis as it is taken for, in the middle of its places, with the least load.
+    pub fn nominal(&self) -> Corner {
+        let middle = self.places.get(self.places.len() / 2).copied().unwrap_or_default();
+        let least = self.loads.iter().copied().fold(f64::INFINITY, f64::min);
+        Corner { place: middle, load: if least.is_finite() { least } else { 0.0 }, off: vec![0.0; self.unknowns.len()] }
+    }
+
+    /// Corners with one unknown off at a time, and with each load.
+    pub fn singles(&self) -> Vec<Corner> {
+        let nominal = self.nominal();
+        let mut all: Vec<Corner> = self.loads.iter().map(|&load| Corner { load, ..nominal.clone() }).collect();
+        for unknown in 0..self.unknowns.len() {
+            for end in [-1.0, 1.0] {
+                let mut corner = nominal.clone();
+                corner.off[unknown] = end;
+                all.push(corner);
+            }
+        }
+        all
+    }
+
+    /// The machine at a corner.
+    pub fn stage_at(&self, corner: &Corner) -> Stage {
+        let mut stage = self.stage.clone();
+        for (unknown, &off) in self.unknowns.iter().zip(&corner.off) {
+            unknown.set(&mut stage, off);
+        }
+        stage.cart.mass += corner.load;
+        stage
+    }
+
+    /// Its response, as the controller of `design` sees it.
+    pub fn plant(&self, corner: &Corner, design: &Design, corners: &[f64]) -> Result<Plant> {
+        let mut stage = self.stage_at(corner);
+        // Along the travel spans are as long as they are, whatever the runs assume.
+        stage.belt.follows_cart |= stage.belt.make.is_some();
+        Plant::of(&stage, corner.place, design, corners)
+    }
+
+    /// The corner in words: what is off, the load, the place.
+    pub fn words(&self, corner: &Corner) -> String {
+        let off = |(unknown, &off): (&Unknown, &f64)| (off != 0.0).then(|| unknown.words(off));
+        let mut words: Vec<String> = self.unknowns.iter().zip(&corner.off).filter_map(off).collect();
+        if self.loads.len() > 1 {
+            words.push(format!("load {}", engineering(corner.load, "kg", 4)));
+        }
+        if self.places.len() > 1 {
+            words.push(format!("cart at {:.0} mm", 1e3 * corner.place));
+        }
+        if words.is_empty() { "as the file has it".into() } else { words.join(", ") }
+    }
+
+    /// The corner at which `badness` is largest, and its margins: from the axis as it is taken for and from what each unknown does by
+    /// itself, one coordinate after another as long as it gets worse.
+    pub fn worst(
+        &self,
+        design: &Design,
+        feedback: &Feedback,
+        badness: &dyn Fn(&Margins) -> f64,
+    ) -> Result<(Corner, Margins)> {
+        let corners = feedback.corners();
+        let look = |corner: &Corner| -> Result<(f64, Margins)> {
+            let margins = Margins::of(&self.plant(corner, design, &corners)?, feedback);
+            let value = badness(&margins);
+            Ok((if value.is_nan() { f64::INFINITY } else { value }, margins))
+        };
+        let nominal = self.nominal();
+        let mut best = (nominal.clone(), look(&nominal)?);
+        let start = best.1.0;
+        // What each unknown does by itself.
+        let mut signs = nominal;
+        for unknown in 0..self.unknowns.len() {
+            let mut most = start;
+            for end in [-1.0, 1.0] {
+                let mut corner = best.0.clone();
+                corner.off = vec![0.0; self.unknowns.len()];
+                corner.off[unknown] = end;
+                let (value, _) = look(&corner)?;
+                if value > most * (1.0 + 1e-9) {
+                    (most, signs.off[unknown]) = (value, end);
+                }
+            }
+        }
+        let found = look(&signs)?;
+        if found.0 > best.1.0 {
+            best = (signs, found);
+        }
+        for _ in 0..ROUNDS {
+            let before = best.1.0;
+            if before == f64::INFINITY {
+                break;
+            }
+            let mut others: Vec<Box<dyn Fn(&Corner) -> Corner>> = Vec::new();
+            others.extend(self.places.iter().map(|&place| moved(move |corner| corner.place = place)));
+            others.extend(self.loads.iter().map(|&load| moved(move |corner| corner.load = load)));
+            for unknown in 0..self.unknowns.len() {
+                others.extend([-1.0, 0.0, 1.0].map(|end| moved(move |corner| corner.off[unknown] = end)));
+            }
+            for other in &others {
+                let corner = other(&best.0);
+                if corner == best.0 {
+                    continue;
+                }
+                let found = look(&corner)?;
+                if found.0 > best.1.0 * (1.0 + 1e-9) {
+                    best = (corner, found);
+                }
+            }
+            if best.1.0 <= before * (1.0 + 1e-6) {
+                break;
+            }
+        }
+        Ok((best.0, best.1.1))
+    }
+}
+
+/// A corner with one thing changed.
+fn moved(change: impl Fn(&mut Corner) + 'static) -> Box<dyn Fn(&Corner) -> Corner> {
+    Box::new(move |corner| {
+        let mut other = corner.clone();
+        change(&mut other);
+        other
+    })
+}
+
+/// Places along the travel: of `[travel]`, or where the moves lead.
+fn along(case: &Case, count: usize) -> Vec<f64> {
+    let mut stage = case.stage.clone();
+    stage.belt.follows_cart |= stage.belt.make.is_some();
+    let Some(whole) = places(&stage, count) else { return vec![0.0] };
+    let (low, high) = case
+        .moves
+        .iter()
+        .flat_map(|motion| motion.profile.strokes().flat_map(|(_, from, distance, _)| [from, from + distance]))
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    if stage.travel.is_some() || low > high {
+        return whole;
+    }
+    let steps = count.max(2) - 1;
+    (0..=steps).map(|i| low + (high - low) * i as f64 / steps as f64).collect()
+}

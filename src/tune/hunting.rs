@@ -1,0 +1,150 @@
+//! Limit cycles at rest: an integral against sticking friction and counts, found by simulation.
+
+use crate::control::compensation::Rigid;
+use crate::control::{Loop, Rows, Standard, stream};
+use crate::design::{Design, Structure};
+use crate::error::Result;
+use crate::friction::Side;
+use crate::signal::profile::{Leg, Limits, Profile};
+use crate::solve::{Flow, Solver};
+use crate::stage::{Encoder, Stage};
+
+/// Way of the slow reversal after which the axis is left alone, m.
+const WAY: f64 = 1e-3;
+
+/// Its speed, m/s.
+const SPEED: f64 = 5e-3;
+
+/// Longest watch, s.
+const LONGEST: f64 = 60.0;
+
+/// An axis that does not come to rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hunt {
+    /// Half of what the cart goes to and fro, m.
+    pub amplitude: f64,
+    /// s.
+    pub period: f64,
+    /// Without each of these it comes to rest.
+    pub needs: Vec<&'static str>,
+    /// How long it was watched at rest, s.
+    pub watched: f64,
+}
+
+/// Watches the closed loop after a slow reversal; none if the cart comes to rest. A loop that is not stable hunts as well, and needs
+/// nothing of what is listed.
+pub fn hunting(stage: &Stage, design: &Design) -> Result<Option<Hunt>> {
+    let watched = watch(stage, design);
+    let Some((amplitude, period)) = swing(stage, design, stage, watched)? else { return Ok(None) };
+    let mut needs = Vec::new();
+    let mut without = |word: &'static str, stage_without: &Stage, design: &Design| -> Result<()> {
+        if swing(stage_without, design, stage, watched)?.is_none() {
+            needs.push(word);
+        }
+        Ok(())
+    };
+    if let Some(other) = without_integral(design) {
+        without("integral action", stage, &other)?;
+    }
+    let other = friction(stage, |side| (side.coulomb, side.breakaway) = (0.0, 0.0));
+    if other != *stage {
+        without("dry friction", &other, design)?;
+    }
+    let other = friction(stage, |side| side.breakaway = side.coulomb);
+    if other != *stage {
+        without("breakaway above Coulomb friction", &other, design)?;
+    }
+    if let Some(encoder) = stage.encoder {
+        let finer = Stage { encoder: Some(Encoder { lines: 1e6 * encoder.lines, ..encoder }), ..stage.clone() };
+        without("encoder counts", &finer, design)?;
+    }
+    Ok(Some(Hunt { amplitude, period, needs, watched }))
+}
+
+fn friction(stage: &Stage, change: fn(&mut Side)) -> Stage {
+    let mut other = stage.clone();
+    for law in [&mut other.drive_pulley.friction, &mut other.cart.friction, &mut other.idler_pulley.friction] {
+        change(&mut law.forward);
+        change(&mut law.backward);
+    }
+    other
+}
+
+fn without_integral(design: &Design) -> Option<Design> {
+    let mut other = design.clone();
+    match &mut other.structure {
+        Structure::Pid(pid) if pid.integral != 0.0 => pid.integral = 0.0,
+        Structure::Cascade(cascade) if cascade.speed_integral != 0.0 => cascade.speed_integral = 0.0,
+        Structure::StateFeedback(weights) if weights.integral.is_some() => weights.integral = None,
+        _ => return None,
+    }
+    Some(other)
+}
+
+/// How long to watch, s: some of the times in which the integral takes the command from one breakaway to the other.
+fn watch(stage: &Stage, design: &Design) -> f64 {
+    let rigid = Rigid::of(stage);
+    let dry: f64 = rigid.coulomb.iter().sum();
+    let count = stage.encoder.map_or(1e-6, |encoder| {
+        let length = if crate::control::measures_cart(stage) { 1.0 } else { stage.pulley_radius };
+        length / encoder.counts_per_unit(stage.motor.gear_ratio)
+    });
+    // Command per second and metre of error that stays.
+    let rate = match &design.structure {
+        Structure::Pid(pid) => pid.integral * rigid.force_per_command(),
+        Structure::Cascade(cascade) => match cascade.current {
+            Some(_) => cascade.speed_integral * cascade.position * rigid.force_per_ampere,
+            None => cascade.speed_integral * cascade.position * rigid.force_per_command(),
+        },
+        _ => 0.0,
+    };
+    let ramp = dry / (rate.abs() * count);
+    if ramp.is_finite() { (20.0 * ramp).clamp(4.0, LONGEST) } else { 10.0 }
+}
+
+/// Half of what the cart goes to and fro at rest (m) and how long that takes (s); none if it rests or dies out.
+fn swing(stage: &Stage, design: &Design, model: &Stage, watched: f64) -> Result<Option<(f64, f64)>> {
+    let limits = Limits { speed: SPEED, acceleration: 0.1, jerk: None, snap: None };
+    let profile = Profile::new(0.0, &[Leg::To(WAY, limits), Leg::To(0.0, limits)])?;
+    let from = profile.end();
+    let until = from + watched;
+    let mut controller = Standard::new(design, model)?;
+    let rows = Rows { until, every: design.every.min(until), window: 1e-4 };
+    let mut cart: Vec<(f64, f64)> = Vec::new();
+    let solver = Solver::of(stage);
+    stream(stage, &mut controller, &Loop::of(design), &profile, &rows, solver, false, &mut |block| {
+        let (time, x) = (block.get("time").unwrap_or(&[]), block.get("cart_position").unwrap_or(&[]));
+        let late = time.iter().zip(x).filter(|(t, _)| **t > from + 0.25 * watched);
+        cart.extend(late.map(|(t, x)| (*t, *x)));
+        Flow::Continue
+    })?;
+    let middle = cart.len() / 2;
+    let (early, late) = cart.split_at(middle);
+    let ends = |part: &[(f64, f64)]| {
+        part.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, x)| (low.min(*x), high.max(*x)))
+    };
+    let ((low, high), (early_low, early_high)) = (ends(late), ends(early));
+    let (size, before) = (high - low, early_high - early_low);
+    // What trembles in the last digits rests, and what halves dies out.
+    if !(size > 1e-9 && size > 0.5 * before) {
+        return Ok(None);
+    }
+    // Crossings of the middle upward, with a band of a quarter each way.
+    let (mean, band) = (0.5 * (low + high), 0.25 * size);
+    let mut below = false;
+    let mut upward = Vec::new();
+    for (time, x) in &cart {
+        if *x < mean - band {
+            below = true;
+        } else if *x > mean + band && below {
+            below = false;
+            upward.push(*time);
+        }
+    }
+    match (upward.first(), upward.last()) {
+        (Some(first), Some(last)) if upward.len() > 2 => {
+            Ok(Some((0.5 * size, (last - first) / (upward.len() - 1) as f64)))
+        }
+        _ => Ok(None),
+    }
+}
