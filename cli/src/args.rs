@@ -28,6 +28,7 @@ pub enum Command {
     Init(Init),
     Simulate(Simulate),
     Move(Move),
+    Tune(Tune),
     Check(Check),
     Fit(Fit),
     Shape(Shape),
@@ -163,6 +164,48 @@ Examples:
   taut move stages/sollmann-jouaneh/controllers/pid.toml --out results
   taut move axis.toml --set controller.delay=1ms --json | jq .moves[0].cart_error
   taut move stages/sollmann-jouaneh/controllers/*.toml --spread 20%";
+
+/// Find the gains of the controller in a case, good for the worst axis it may meet.
+///
+/// Places the gains by bandwidth and damping, then makes the cost in [tune] small while the sampled loop keeps its limits of
+/// sensitivity with every parameter off, every load and all along the travel. Prints gains, margins, the worst axis, cart
+/// errors and limit cycles before and after.
+#[derive(Debug, clap::Args)]
+#[command(after_help = TUNE)]
+pub struct Tune {
+    /// The case file
+    pub case: PathBuf,
+    /// The case file to write (ends in .toml), or the folder for it, a summary, a report and plots
+    #[arg(long, value_name = "FILE or DIR")]
+    pub out: Option<PathBuf>,
+    /// Write the gains into the case file itself
+    #[arg(long, conflicts_with = "out")]
+    pub in_place: bool,
+    /// Change one value of the case for this run, as often as needed; it is written with the gains
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub changes: Vec<String>,
+    /// Let each parameter of the axis be off by this share, whatever the file says: 20%
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub spread: Option<f64>,
+    /// Leave out the report and the plots
+    #[arg(long)]
+    pub no_report: bool,
+    /// Print the summary as JSON, the same as in tune.json
+    #[arg(long)]
+    pub json: bool,
+    /// Print nothing but errors
+    #[arg(long, short, conflicts_with = "json")]
+    pub quiet: bool,
+}
+
+const TUNE: &str = "\
+Examples:
+  taut tune stages/sollmann-jouaneh/controllers/pid.toml --out tuned
+  taut tune axis.toml --set tune.sensitivity=1.6 --set 'tune.load=[0, \"1 kg\"]' --out axis-tuned.toml
+  taut tune axis.toml --set tune.cost=none --set tune.bandwidth=8Hz
+
+Exit status 1: no search could keep the limits on the worst axis. Ctrl-C ends a search early with the
+best gains so far, with exit status 130.";
 
 /// Say what the logs of a case can tell of the parameters in its [fit], before any fit.
 ///

@@ -12,6 +12,7 @@ mod paper;
 mod shape;
 mod simulate;
 mod terminal;
+mod tune;
 
 use args::{Args, Command};
 use clap::Parser;
@@ -31,6 +32,7 @@ fn main() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::Fit(args) => fit::run(&args),
         Command::Shape(args) => shape::run(&args),
+        Command::Tune(args) => tune::run(&args),
         Command::Modes(args) => modes::run(&args),
     };
     match done {

@@ -83,7 +83,7 @@ fn write(args: &Args, folder: &Path, case: &Case, found: &Fit, json: &str) -> Re
 }
 
 /// The way from a folder to a file, with `/` between the parts.
-fn between(folder: &Path, file: &Path) -> String {
+pub fn between(folder: &Path, file: &Path) -> String {
     let whole = |path: &Path| -> PathBuf { std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf()) };
     let (from, to) = (whole(folder), whole(file));
     let (from, to): (Vec<Component>, Vec<Component>) = (from.components().collect(), to.components().collect());

@@ -1,0 +1,355 @@
+//! Gains: placement, margins of the sampled loop, the worst axis, limit cycles.
+
+use nalgebra::Complex;
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+use std::f64::consts::PI;
+use std::path::Path;
+use taut::case::{Case, Cost, Tuning};
+use taut::control::compensation::Rigid;
+use taut::control::feedback::Feedback;
+use taut::control::{Controller, Seen, Setup, Standard, closed_loop};
+use taut::design::{Design, Structure};
+use taut::signal::profile::Reference;
+use taut::solve::{Ending, Solver};
+use taut::tune::{Corner, Family, Margins, Plant, hunting, minimise, place, tune};
+
+fn case(name: &str, changes: &[&str]) -> Case {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
+    Case::read_with(folder.join(name), changes).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn share(random: &mut Pcg64) -> f64 {
+    (random.next_u64() >> 11) as f64 * 2f64.powi(-53)
+}
+
+/// The linear view of a controller answers any motion as the controller itself does: by the response to sines, after the transient.
+#[test]
+fn the_linear_controller_is_what_the_controller_does() {
+    let notch = "controller.filters=[{ notch = \"190 Hz\", depth = 0.1, damping = 0.7 }, { low_pass = \"300 Hz\" }]";
+    let observer = "controller.disturbance_observer={ bandwidth = \"8 Hz\" }";
+    let late = "controller.delay=1.7 ms";
+    for (name, changes) in [
+        ("pid.toml", vec!["controller.pid.integral=0"]),
+        ("pid.toml", vec!["controller.pid.integral=0", notch]),
+        ("cascade.toml", vec!["controller.cascade.speed_integral=0", notch]),
+        ("lqg.toml", vec![]),
+        ("lqg.toml", vec![late, notch]),
+        ("lqg.toml", vec!["controller.delay=0"]),
+        ("pid-observer.toml", vec![observer]),
+    ] {
+        let mut changes = changes;
+        changes.push("controller.feed_forward={ model = \"none\" }");
+        let case = case(name, &changes);
+        let design = case.controller.clone().unwrap();
+        let feedback = Feedback::new(&design, &case.stage).unwrap();
+        for hertz in [3.0, 40.0, 170.0, 430.0] {
+            let (t, omega) = (design.every, 2.0 * PI * hertz);
+            let mut controller = Standard::new(&Design { limit: None, ..design.clone() }, &case.stage).unwrap();
+            // Whole periods: 1000 samples at 1 kHz and whole Hz.
+            let (n, from) = (1000, 4000);
+            let (mut sum, mut seen_sum) = (Complex::new(0.0, 0.0), Complex::new(0.0, 0.0));
+            // The loop around an observer's integrator: what it drifts by is taken out as a straight line.
+            let mut samples = Vec::new();
+            for k in 0..from + n {
+                let phase = omega * t * k as f64;
+                let position = 1e-5 * phase.cos();
+                let at = Reference::default();
+                let seen = Seen { time: t * k as f64, reference: at, ahead: at, position, current: 0.0 };
+                let command = controller.step(&seen);
+                controller.limited(command);
+                if k >= from {
+                    samples.push((phase, position, command));
+                }
+            }
+            let slope = (controller_drift(&samples)) / n as f64;
+            for (i, (phase, position, command)) in samples.iter().enumerate() {
+                let turn = Complex::new(0.0, -phase).exp();
+                sum += turn * (command - slope * i as f64);
+                seen_sum += turn * position;
+            }
+            let ratio = sum / seen_sum;
+            let terms = feedback.at(omega);
+            let told = -terms.position / terms.own;
+            let apart = (ratio - told).norm() / told.norm();
+            let bound = if design.disturbance_observer.is_some() { 2e-2 } else { 1e-6 };
+            assert!(apart < bound, "{name} {changes:?} at {hertz} Hz: {ratio} and {told}, {apart:.1e}");
+        }
+    }
+}
+
+/// Difference of the means of the last and the first half, twice: how far a straight line goes.
+fn controller_drift(samples: &[(f64, f64, f64)]) -> f64 {
+    let half = samples.len() / 2;
+    let mean = |part: &[(f64, f64, f64)]| part.iter().map(|s| s.2).sum::<f64>() / part.len() as f64;
+    2.0 * (mean(&samples[half..]) - mean(&samples[..half]))
+}
+
+/// Without delay, sampled quickly, on a belt that does not stretch, the poles are where they were asked for.
+#[test]
+fn placement_gives_the_asked_bandwidth_and_damping() {
+    for (name, rigid_poles) in [("pid.toml", true), ("cascade.toml", false), ("cascade-current.toml", false)] {
+        for (hertz, damping) in [(5.0, 1.0), (9.0, 0.6), (14.0, 0.8)] {
+            let case = case(name, &[]);
+            let design = place(case.controller.as_ref().unwrap(), &case.stage, hertz, damping).unwrap();
+            let rigid = Rigid::of(&case.stage);
+            let w = 2.0 * PI * hertz;
+            match &design.structure {
+                Structure::Pid(gains) if rigid_poles => {
+                    // M s³ + (d + g K_d) s² + g K_p s + g K_i has the root −ζω ± jω√(1 − ζ²)
+                    let g = rigid.force_per_command();
+                    let s = Complex::new(-damping * w, w * (1.0 - damping * damping).max(0.0).sqrt());
+                    let value = s * s * s * rigid.mass
+                        + s * s * (rigid.drag() + g * gains.derivative)
+                        + s * g * gains.proportional
+                        + g * gains.integral;
+                    assert!(value.norm() < 1e-9 * rigid.mass * w.powi(3), "{name} {hertz} {damping}: {value}");
+                }
+                Structure::Cascade(gains) => {
+                    let current = gains.current.is_some();
+                    let (g, d) = match current {
+                        true => (rigid.force_per_ampere, rigid.viscous[0]),
+                        false => (rigid.force_per_command(), rigid.drag()),
+                    };
+                    let v = 4.0 * w;
+                    let s = Complex::new(-damping * v, v * (1.0 - damping * damping).max(0.0).sqrt());
+                    let value = s * s * rigid.mass + s * (d + g * gains.speed) + g * gains.speed_integral;
+                    assert!(value.norm() < 1e-9 * rigid.mass * v.powi(2), "{name}: {value}");
+                    assert!((gains.position - w).abs() < 1e-9 * w);
+                }
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+}
+
+/// The same seen in a run: a rigid axis without friction, sampled quickly, swings after a jump as its poles say.
+#[test]
+fn a_placed_loop_swings_as_asked() {
+    let (hertz, damping) = (6.0, 0.3);
+    let changes = [
+        "belt.model=rigid",
+        "controller.every=0.05 ms",
+        "controller.delay=0",
+        "controller.pid.integral=0",
+        "controller.pid.filter=20 kHz",
+        "controller.limit=1e9",
+        "encoder.lines=1e9",
+        "cart.friction={ viscous = 0, coulomb = 0 }",
+        "drive_pulley.friction={ viscous = 0, coulomb = 0 }",
+        "idler_pulley.friction={ viscous = 0, coulomb = 0 }",
+    ];
+    let case = case("pid.toml", &changes);
+    let design = place(case.controller.as_ref().unwrap(), &case.stage, hertz, damping).unwrap();
+    let feedback = Feedback::new(&design, &case.stage).unwrap();
+    let plant = Plant::of(&case.stage, 0.0, &design, &[]).unwrap();
+    // |T| of a PD loop on M s² + d s: (2ζ′ω s + ω²)/(s² + 2ζω s + ω²), ζ′ what K_d gives of ζ
+    let rigid = Rigid::of(&case.stage);
+    let Structure::Pid(gains) = &design.structure else { panic!() };
+    let (g, w) = (rigid.force_per_command(), 2.0 * PI * hertz);
+    let most = (0..20_000)
+        .map(|k| {
+            let s = Complex::new(0.0, w * (0.01 + 2.0 * f64::from(k) / 20_000.0));
+            let own = s * gains.derivative * g + g * gains.proportional;
+            (own / (s * s * rigid.mass + s * rigid.drag() + own)).norm()
+        })
+        .fold(0.0, f64::max);
+    let margins = Margins::of(&plant, &feedback);
+    assert!(margins.stable);
+    assert!((margins.complementary / most - 1.0).abs() < 1e-2, "{} {most}", margins.complementary);
+}
+
+/// Nyquist's criterion on the grid agrees with the loop run in time, close to the limit on either side.
+#[test]
+fn stability_is_that_of_a_run() {
+    for name in ["pid.toml", "cascade.toml", "cascade-current.toml", "lqi.toml", "pid-observer.toml", "pid-shaped.toml"] {
+        let friction = |body: &str, viscous: &str| format!("{body}.friction={{ viscous = \"{viscous}\", coulomb = 0 }}");
+        let (a, b, c) =
+            (friction("cart", "19 N s/m"), friction("drive_pulley", "1.6e-3 N m s"), friction("idler_pulley", "1.6e-3 N m s"));
+        let case = case(name, &[&a, &b, &c, "encoder.lines=1e9", "controller.limit=1e12"]);
+        let design = case.controller.clone().unwrap();
+        let mut both = [0, 0];
+        for step in 0..40 {
+            let mut louder = design.clone();
+            let factor = 1.15f64.powi(step);
+            match &mut louder.structure {
+                Structure::Pid(gains) => {
+                    gains.proportional *= factor;
+                    gains.derivative *= factor;
+                    gains.integral *= factor;
+                }
+                Structure::Cascade(gains) => {
+                    gains.speed *= factor;
+                    gains.speed_integral *= factor;
+                    if let Some(current) = &mut gains.current {
+                        current.limit = None;
+                    }
+                }
+                Structure::StateFeedback(weights) => {
+                    weights.position /= factor;
+                    weights.disturbance *= factor;
+                }
+                _ => unreachable!(),
+            }
+            let Ok(feedback) = Feedback::new(&louder, &case.stage) else { continue };
+            let margins = Margins::of(&Plant::of(&case.stage, 0.0, &louder, &feedback.corners()).unwrap(), &feedback);
+            if margins.stable && margins.sensitivity > 8.0 {
+                continue;
+            }
+            // What is unstable grows out of all bounds, what is stable settles.
+            let motion = &case.moves[0];
+            let until = 4.0;
+            let setup = Setup {
+                stage: &case.stage,
+                model: &case.stage,
+                design: &louder,
+                profile: &motion.profile,
+                until,
+                window: 1e-6,
+                solver: Solver::Exact,
+            };
+            let run = closed_loop(&setup).unwrap();
+            let calm = run.outcome.ending == Ending::Complete && run.figures.final_cart_error.abs() < 1e-4;
+            assert_eq!(margins.stable, calm, "{name} times {factor}: {margins:?} {:?}", run.figures.final_cart_error);
+            both[usize::from(margins.stable)] += 1;
+        }
+        assert!(both[0] > 0 && both[1] > 0, "{name}: {both:?}");
+    }
+}
+
+/// M_s by a sweep of its own: 20 000 frequencies, the plant by its matrices, the controller by its difference equations.
+#[test]
+fn the_constraint_is_met_by_a_dense_sweep() {
+    let case = case("pid.toml", &[]);
+    let tuning = Tuning { cost: Some(Cost::Bandwidth), sensitivity: 1.7, loads: vec![0.0, 0.2], ..Tuning::default() };
+    let tuned = tune(&case, &tuning, &|| false).unwrap();
+    assert!(tuned.holds, "{:?}", tuned.after.worst);
+    let design = &tuned.after.design;
+    let Structure::Pid(gains) = &design.structure else { panic!() };
+    for corner in [&tuned.after.corner, &tuned.family.nominal()] {
+        let mut stage = tuned.family.stage_at(corner);
+        stage.belt.follows_cart = true;
+        use taut::linear::{Hold, Operation, StateSpace};
+        let about = Operation { position: corner.place, ..Operation::default() };
+        let system = StateSpace::of(&stage, about).unwrap();
+        let model = system.discrete(design.every, Hold::Zero, design.delay).unwrap();
+        let drive = system.output("drive_angle").unwrap();
+        let n = model.a.nrows();
+        let mut most = 0.0_f64;
+        for k in 1..20_000 {
+            let theta = PI * f64::from(k) / 20_000.0;
+            let z = Complex::new(0.0, theta).exp();
+            let shifted = nalgebra::DMatrix::from_fn(n, n, |i, j| if i == j { z } else { Complex::new(0.0, 0.0) })
+                - model.a.map(|v| Complex::new(v, 0.0));
+            let x = shifted.lu().solve(&model.b.map(|v| Complex::new(v, 0.0))).unwrap();
+            let y: Complex<f64> = (0..n).map(|j| x[j] * model.c[(drive, j)]).sum::<Complex<f64>>() * stage.pulley_radius;
+            let t = design.every;
+            let time = 1.0 / (2.0 * PI * gains.filter);
+            let one = Complex::new(1.0, 0.0);
+            let c = one * gains.proportional
+                + one * gains.integral * t / (one - one / z)
+                + (one - one / z) * gains.derivative / ((one - one / z) * time + t);
+            most = most.max((one + c * y).norm().recip());
+        }
+        assert!(most <= 1.7 * (1.0 + 1e-3), "{most}");
+        if *corner == tuned.after.corner {
+            assert!((most / tuned.after.worst.sensitivity - 1.0).abs() < 2e-3, "{most} {:?}", tuned.after.worst);
+        }
+    }
+}
+
+/// No axis drawn at random is worse than the worst that was found, by more than 1 %, and each settles in a run.
+#[test]
+fn the_worst_axis_is_worse_than_random_ones() {
+    for name in ["pid.toml", "cascade.toml", "lqi.toml"] {
+        let case = case(name, &[]);
+        let tuning = Tuning { cost: Some(Cost::Bandwidth), loads: vec![0.0, 0.3], ..Tuning::default() };
+        let tuned = tune(&case, &tuning, &|| false).unwrap();
+        assert!(tuned.holds, "{name}: {:?}", tuned.after.worst);
+        let family: &Family = &tuned.family;
+        let design = &tuned.after.design;
+        let feedback = Feedback::new(design, &case.stage).unwrap();
+        let mut random = Pcg64::seed_from_u64(1);
+        let mut most = 0.0_f64;
+        for draw in 0..200 {
+            let (low, high) = (family.places[0], *family.places.last().unwrap());
+            let corner = Corner {
+                place: low + share(&mut random) * (high - low),
+                load: 0.3 * share(&mut random),
+                off: family.unknowns.iter().map(|_| 2.0 * share(&mut random) - 1.0).collect(),
+            };
+            let margins = Margins::of(&family.plant(&corner, design, &feedback.corners()).unwrap(), &feedback);
+            assert!(margins.stable);
+            most = most.max(margins.excess(tuning.sensitivity, tuning.complementary));
+            if draw < 12 {
+                let stage = family.stage_at(&corner);
+                let motion = &case.moves[0];
+                let setup = Setup {
+                    stage: &stage,
+                    model: &case.stage,
+                    design,
+                    profile: &motion.profile,
+                    until: 3.0,
+                    window: 1e-3,
+                    solver: Solver::Exact,
+                };
+                let run = closed_loop(&setup).unwrap();
+                assert_eq!(run.outcome.ending, Ending::Complete);
+                assert!(run.figures.final_cart_error.abs() < 2e-3, "{name}: {}", run.figures.final_cart_error);
+            }
+        }
+        let worst = tuned.after.worst.excess(tuning.sensitivity, tuning.complementary);
+        println!("{name}: at worst {worst:.4} of the limits, of 200 random axes {most:.4}");
+        assert!(most <= 1.01 * worst, "{name}: {most} {worst}");
+    }
+}
+
+/// An integral with breakaway above Coulomb friction hunts; without the breakaway, or without friction, it does not.
+#[test]
+fn hunting_is_found_where_there_is_stiction() {
+    let sticky = "cart.friction={ viscous = \"19.0424 N s/m\", coulomb = \"0.2 N\", static = \"3 N\" }";
+    let fine = "encoder.lines=1e7";
+    let stiff = "controller.pid.integral=600 V/(mm s)";
+    let found = case("pid.toml", &[sticky, fine, stiff]);
+    let hunt = hunting(&found.stage, found.controller.as_ref().unwrap()).unwrap();
+    let hunt = hunt.expect("a limit cycle");
+    println!("{hunt:?}");
+    assert!(hunt.amplitude > 1e-7 && hunt.period > 1e-2, "{hunt:?}");
+    assert!(hunt.needs.contains(&"integral action") && hunt.needs.contains(&"dry friction"), "{hunt:?}");
+    let none = |body: &str| format!("{body}.friction={{ viscous = \"1.6e-3 N m s\", coulomb = 0 }}");
+    let (a, b) = (none("drive_pulley"), none("idler_pulley"));
+    let smooth = case("pid.toml", &["cart.friction={ viscous = \"19 N s/m\", coulomb = 0 }", &a, &b, fine]);
+    assert_eq!(hunting(&smooth.stage, smooth.controller.as_ref().unwrap()).unwrap(), None);
+}
+
+/// The search makes the cost smaller, the text reads back to the same gains, and remarks are still there.
+#[test]
+fn a_tuned_case_is_better_and_reads_back() {
+    let case = case("pid-elastic.toml", &[]);
+    let tuning = Tuning { cost: Some(Cost::Squares), ..Tuning::default() };
+    let tuned = tune(&case, &tuning, &|| false).unwrap();
+    assert!(tuned.holds);
+    let text = tuned.case_text(&case, Path::new("tuned.toml")).unwrap();
+    let again = Case::from_text("tuned.toml", &text).unwrap();
+    assert_eq!(again.controller.as_ref(), Some(&tuned.after.design));
+    assert!(text.contains("# Table 2; weighed (2.3.2)"));
+}
+
+#[test]
+fn what_is_asked_to_stop_says_what_it_has() {
+    let case = case("pid.toml", &[]);
+    let tuning = Tuning { cost: Some(Cost::Peak), ..Tuning::default() };
+    let asked = std::cell::Cell::new(0);
+    let stop = || {
+        asked.set(asked.get() + 1);
+        asked.get() > 40
+    };
+    let tuned = tune(&case, &tuning, &stop);
+    assert!(tuned.is_ok_and(|tuned| tuned.holds));
+}
+
+#[test]
+fn a_search_is_as_good_as_its_simplex() {
+    let found = minimise(&[3.0, -2.0], 0.5, 1e-9, 1000, &mut |x| (x[0] - 1.0).powi(2) + 4.0 * (x[1] + 1.0).powi(4));
+    assert!((found.x[0] - 1.0).abs() < 1e-4, "{found:?}");
+}
