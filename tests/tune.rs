@@ -43,7 +43,7 @@ fn the_linear_controller_is_what_the_controller_does() {
         let case = case(name, &changes);
         let design = case.controller.clone().unwrap();
         let feedback = Feedback::new(&design, &case.stage).unwrap();
-        for hertz in [3.0, 40.0, 170.0, 430.0] {
+        for hertz in [4.0, 40.0, 170.0, 430.0] {
             let (t, omega) = (design.every, 2.0 * PI * hertz);
             let mut controller = Standard::new(&Design { limit: None, ..design.clone() }, &case.stage).unwrap();
             // Whole periods: 1000 samples at 1 kHz and whole Hz.
@@ -62,7 +62,8 @@ fn the_linear_controller_is_what_the_controller_does() {
                     samples.push((phase, position, command));
                 }
             }
-            let slope = (controller_drift(&samples)) / n as f64;
+            // Even frequencies: both halves of the second hold whole periods.
+            let slope = controller_drift(&samples) / n as f64;
             for (i, (phase, position, command)) in samples.iter().enumerate() {
                 let turn = Complex::new(0.0, -phase).exp();
                 sum += turn * (command - slope * i as f64);
@@ -162,58 +163,52 @@ fn a_placed_loop_swings_as_asked() {
 /// Nyquist's criterion on the grid agrees with the loop run in time, close to the limit on either side.
 #[test]
 fn stability_is_that_of_a_run() {
-    for name in ["pid.toml", "cascade.toml", "cascade-current.toml", "lqi.toml", "pid-observer.toml", "pid-shaped.toml"] {
-        let friction = |body: &str, viscous: &str| format!("{body}.friction={{ viscous = \"{viscous}\", coulomb = 0 }}");
-        let (a, b, c) =
-            (friction("cart", "19 N s/m"), friction("drive_pulley", "1.6e-3 N m s"), friction("idler_pulley", "1.6e-3 N m s"));
+    for name in ["pid.toml", "cascade.toml", "cascade-current.toml", "lqi.toml", "pid-observer.toml", "pid-shaped.toml"]
+    {
+        let friction =
+            |body: &str, viscous: &str| format!("{body}.friction={{ viscous = \"{viscous}\", coulomb = 0 }}");
+        let (a, b, c) = (
+            friction("cart", "19 N s/m"),
+            friction("drive_pulley", "1.6e-3 N m s"),
+            friction("idler_pulley", "1.6e-3 N m s"),
+        );
         let case = case(name, &[&a, &b, &c, "encoder.lines=1e9", "controller.limit=1e12"]);
         let design = case.controller.clone().unwrap();
+        // The axis takes the command for more and more; the controller knows nothing of it.
+        let louder = |step: i32| {
+            let mut stage = case.stage.clone();
+            stage.amplifier.gain *= 1.2f64.powi(step - 12);
+            stage
+        };
+        let feedback = Feedback::new(&design, &case.stage).unwrap();
+        let told = |step: i32| {
+            let plant = Plant::of(&louder(step), 0.0, &design, &feedback.corners()).unwrap();
+            Margins::of(&plant, &feedback).stable
+        };
+        let told: Vec<bool> = (0..30).map(told).collect();
         let mut both = [0, 0];
-        for step in 0..40 {
-            let mut louder = design.clone();
-            let factor = 1.15f64.powi(step);
-            match &mut louder.structure {
-                Structure::Pid(gains) => {
-                    gains.proportional *= factor;
-                    gains.derivative *= factor;
-                    gains.integral *= factor;
-                }
-                Structure::Cascade(gains) => {
-                    gains.speed *= factor;
-                    gains.speed_integral *= factor;
-                    if let Some(current) = &mut gains.current {
-                        current.limit = None;
-                    }
-                }
-                Structure::StateFeedback(weights) => {
-                    weights.position /= factor;
-                    weights.disturbance *= factor;
-                }
-                _ => unreachable!(),
-            }
-            let Ok(feedback) = Feedback::new(&louder, &case.stage) else { continue };
-            let margins = Margins::of(&Plant::of(&case.stage, 0.0, &louder, &feedback.corners()).unwrap(), &feedback);
-            if margins.stable && margins.sensitivity > 8.0 {
+        for step in (1..29).step_by(2) {
+            // At the limit itself it grows and dies out too slowly to be seen.
+            if told[step - 1] != told[step + 1] {
                 continue;
             }
-            // What is unstable grows out of all bounds, what is stable settles.
             let motion = &case.moves[0];
-            let until = 4.0;
             let setup = Setup {
-                stage: &case.stage,
+                stage: &louder(step as i32),
                 model: &case.stage,
-                design: &louder,
+                design: &design,
                 profile: &motion.profile,
-                until,
+                until: 12.0,
                 window: 1e-6,
                 solver: Solver::Exact,
             };
             let run = closed_loop(&setup).unwrap();
-            let calm = run.outcome.ending == Ending::Complete && run.figures.final_cart_error.abs() < 1e-4;
-            assert_eq!(margins.stable, calm, "{name} times {factor}: {margins:?} {:?}", run.figures.final_cart_error);
-            both[usize::from(margins.stable)] += 1;
+            let calm = run.outcome.ending == Ending::Complete && run.figures.cart.last.abs() < 1e-3;
+            assert_eq!(told[step], calm, "{name} at step {step}: {:?} {told:?}", run.figures.cart);
+            both[usize::from(calm)] += 1;
         }
-        assert!(both[0] > 0 && both[1] > 0, "{name}: {both:?}");
+        println!("{name}: {} unstable, {} stable", both[0], both[1]);
+        assert!(both[1] > 0 && both[0] > 0, "{name}: {both:?}");
     }
 }
 
@@ -242,7 +237,8 @@ fn the_constraint_is_met_by_a_dense_sweep() {
             let shifted = nalgebra::DMatrix::from_fn(n, n, |i, j| if i == j { z } else { Complex::new(0.0, 0.0) })
                 - model.a.map(|v| Complex::new(v, 0.0));
             let x = shifted.lu().solve(&model.b.map(|v| Complex::new(v, 0.0))).unwrap();
-            let y: Complex<f64> = (0..n).map(|j| x[j] * model.c[(drive, j)]).sum::<Complex<f64>>() * stage.pulley_radius;
+            let y: Complex<f64> =
+                (0..n).map(|j| x[j] * model.c[(drive, j)]).sum::<Complex<f64>>() * stage.pulley_radius;
             let t = design.every;
             let time = 1.0 / (2.0 * PI * gains.filter);
             let one = Complex::new(1.0, 0.0);
@@ -279,17 +275,25 @@ fn the_worst_axis_is_worse_than_random_ones() {
                 off: family.unknowns.iter().map(|_| 2.0 * share(&mut random) - 1.0).collect(),
             };
             let margins = Margins::of(&family.plant(&corner, design, &feedback.corners()).unwrap(), &feedback);
-            assert!(margins.stable);
+            assert!(margins.stable, "{name} draw {draw}: {corner:?} {margins:?}\n{:?} {design:?}", tuned.after.worst);
             most = most.max(margins.excess(tuning.sensitivity, tuning.complementary));
             if draw < 12 {
-                let stage = family.stage_at(&corner);
+                // Without dry friction, which a soft integral needs long for.
+                let mut stage = family.stage_at(&corner);
+                for law in
+                    [&mut stage.cart.friction, &mut stage.drive_pulley.friction, &mut stage.idler_pulley.friction]
+                {
+                    for side in [&mut law.forward, &mut law.backward] {
+                        (side.coulomb, side.breakaway) = (0.0, 0.0);
+                    }
+                }
                 let motion = &case.moves[0];
                 let setup = Setup {
                     stage: &stage,
                     model: &case.stage,
                     design,
                     profile: &motion.profile,
-                    until: 3.0,
+                    until: 8.0,
                     window: 1e-3,
                     solver: Solver::Exact,
                 };
@@ -309,8 +313,8 @@ fn the_worst_axis_is_worse_than_random_ones() {
 fn hunting_is_found_where_there_is_stiction() {
     let sticky = "cart.friction={ viscous = \"19.0424 N s/m\", coulomb = \"0.2 N\", static = \"3 N\" }";
     let fine = "encoder.lines=1e7";
-    let stiff = "controller.pid.integral=600 V/(mm s)";
-    let found = case("pid.toml", &[sticky, fine, stiff]);
+    let gains = "controller.pid={ proportional = \"800 V/m\", integral = \"8 V/(mm s)\", derivative = \"4 V s/m\" }";
+    let found = case("pid.toml", &[sticky, fine, gains]);
     let hunt = hunting(&found.stage, found.controller.as_ref().unwrap()).unwrap();
     let hunt = hunt.expect("a limit cycle");
     println!("{hunt:?}");
@@ -318,7 +322,7 @@ fn hunting_is_found_where_there_is_stiction() {
     assert!(hunt.needs.contains(&"integral action") && hunt.needs.contains(&"dry friction"), "{hunt:?}");
     let none = |body: &str| format!("{body}.friction={{ viscous = \"1.6e-3 N m s\", coulomb = 0 }}");
     let (a, b) = (none("drive_pulley"), none("idler_pulley"));
-    let smooth = case("pid.toml", &["cart.friction={ viscous = \"19 N s/m\", coulomb = 0 }", &a, &b, fine]);
+    let smooth = case("pid.toml", &["cart.friction={ viscous = \"19 N s/m\", coulomb = 0 }", &a, &b, fine, gains]);
     assert_eq!(hunting(&smooth.stage, smooth.controller.as_ref().unwrap()).unwrap(), None);
 }
 

@@ -94,6 +94,11 @@ fn the_page_on_control_shows_what_the_program_prints() {
 }
 
 #[test]
+fn the_page_on_tuning_shows_what_the_program_prints() {
+    check("docs/tune.md");
+}
+
+#[test]
 fn the_page_on_modes_shows_what_the_program_prints() {
     check("docs/modes.md");
 }
@@ -139,6 +144,7 @@ fn what_the_documents_name_is_there() {
         "docs/logs.md",
         "docs/paper.md",
         "docs/shape.md",
+        "docs/tune.md",
         "docs/solver.md",
         "docs/general-solver.md",
         "docs/modes.md",

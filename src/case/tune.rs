@@ -116,7 +116,8 @@ pub(super) fn tuning(root: &Table, design: Option<&Design>, moves: &[Move]) -> R
             .next("leave it out: the search begins at the weights of the file"));
     }
     if cost.is_none() && bandwidth.is_none() {
-        let next = if placed { "add for example bandwidth = \"8 Hz\"" } else { "write for example cost = \"bandwidth\"" };
+        let next =
+            if placed { "add for example bandwidth = \"8 Hz\"" } else { "write for example cost = \"bandwidth\"" };
         return Err(field.fail("without a cost the gains follow from a bandwidth, which is not said").next(next));
     }
     Ok(Some(Tuning {

@@ -9,11 +9,11 @@ use crate::signal::profile::{Leg, Limits, Profile};
 use crate::solve::{Flow, Solver};
 use crate::stage::{Encoder, Stage};
 
-/// Way of the slow reversal after which the axis is left alone, m.
-const WAY: f64 = 1e-3;
+/// Way out before the slow reversal, m, half of which it goes back; enough to break away. Less on a short travel.
+const WAY: f64 = 10e-3;
 
 /// Its speed, m/s.
-const SPEED: f64 = 5e-3;
+const SPEED: f64 = 20e-3;
 
 /// Longest watch, s.
 const LONGEST: f64 = 60.0;
@@ -104,8 +104,13 @@ fn watch(stage: &Stage, design: &Design) -> f64 {
 
 /// Half of what the cart goes to and fro at rest (m) and how long that takes (s); none if it rests or dies out.
 fn swing(stage: &Stage, design: &Design, model: &Stage, watched: f64) -> Result<Option<(f64, f64)>> {
-    let limits = Limits { speed: SPEED, acceleration: 0.1, jerk: None, snap: None };
-    let profile = Profile::new(0.0, &[Leg::To(WAY, limits), Leg::To(0.0, limits)])?;
+    let limits = Limits { speed: SPEED, acceleration: 0.2, jerk: None, snap: None };
+    // From 0, to the side that has more room.
+    let way = stage.travel.map_or(WAY, |travel| match travel.max >= -travel.min {
+        true => travel.max.clamp(0.0, 2.0 * WAY) * 0.5,
+        false => travel.min.clamp(-2.0 * WAY, 0.0) * 0.5,
+    });
+    let profile = Profile::new(0.0, &[Leg::To(way, limits), Leg::To(0.5 * way, limits)])?;
     let from = profile.end();
     let until = from + watched;
     let mut controller = Standard::new(design, model)?;

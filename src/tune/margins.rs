@@ -15,6 +15,10 @@ use std::f64::consts::PI;
 /// Points of the grid on each of its decades, those about resonances apart.
 const POINTS: f64 = 90.0;
 
+/// Lowest frequency, as a share of half the sampling rate, and points on each decade of where nothing turns.
+const LOWEST: f64 = 1e-8;
+const SPARSE: f64 = 12.0;
+
 /// A sampled axis over frequency: what the controller measures per command.
 #[derive(Debug, Clone)]
 pub struct Plant {
@@ -41,9 +45,14 @@ impl Plant {
             model.poles().iter().filter(|z| z.norm() > 0.0).map(|z| z.ln() / t).collect();
         roots.extend(corners.iter().map(|omega| Complex::new(-0.3 * omega, *omega)));
         let slowest = roots.iter().map(|s| s.norm()).filter(|w| *w > 1e-9 * most).fold(most, f64::min);
-        let from = (1e-3 * slowest).clamp(1e-7 * most, 1e-3 * most);
+        let from = (0.01 * slowest).clamp(10.0 * LOWEST * most, 1e-3 * most);
         let points = (POINTS * (most / from).log10()) as usize;
-        let frequency = Range { from, to: most, points }.frequencies(&roots);
+        // Far below a slow integral, so that what it does to the phase is seen whole.
+        let below = (LOWEST * most / from).log10().abs();
+        let count = (SPARSE * below).ceil();
+        let mut frequency: Vec<f64> =
+            (0..count as usize).map(|k| LOWEST * most * 10f64.powf(below * k as f64 / count)).collect();
+        frequency.extend(Range { from, to: most, points }.frequencies(&roots));
         let output = match stage.encoder.map(|encoder| encoder.at) {
             _ if measures_cart(stage) => "cart_position",
             Some(EncoderPlace::DrivePulley) => "drive_angle",

@@ -237,6 +237,9 @@ impl Work<'_> {
         };
         while rounds < ROUNDS && !(self.stop)() {
             rounds += 1;
+            if rounds == 1 {
+                x = self.scan(&start, dimension, cost);
+            }
             // Again from where it ended, with a smaller simplex: it may have collapsed at a limit.
             for (step, most) in [(0.3, VALUES), (0.1, VALUES / 2)] {
                 let mut value = |x: &[f64]| self.value(&gains::scaled(&start, x), cost);
@@ -265,6 +268,16 @@ impl Work<'_> {
             }
         }
         Ok((gains::rounded(&gains::scaled(&start, &safe)), rounds))
+    }
+
+    /// The best of a coarse grid about `start`: a simplex that runs into a limit goes no further along it.
+    fn scan(&mut self, start: &Design, dimension: usize, cost: Cost) -> Vec<f64> {
+        let steps = [-0.6, 0.0, 0.6];
+        let point = |number: usize| (0..dimension).map(|j| steps[number / 3usize.pow(j as u32) % 3]).collect();
+        let points = (0..3usize.pow(dimension as u32)).map(point);
+        let valued = points.map(|x: Vec<f64>| (self.value(&gains::scaled(start, &x), cost), x)).collect::<Vec<_>>();
+        let best = valued.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+        best.map_or(vec![0.0; dimension], |(_, x)| x)
     }
 
     /// What the search makes small: the logarithm of the cost, and what goes beyond the limits.

@@ -13,7 +13,8 @@ pub const CASCADE: f64 = 4.0;
 ///
 /// PID: with an integral all three poles, (s + ζω₀)(s² + 2ζω₀ s + ω₀²), ω₀ = 2π f; without one s² + 2ζω₀ s + ω₀². Cascade: K_v = ω₀, the
 /// speed loop s² + 2ζω_v s + ω_v² with ω_v = 4 ω₀ (without its integral the pole −ω_v), and the current loop −4 ω_v, or
-/// −1/(2 (T/2 + delay)) where sampling allows no more. A damping that the drag of the axis exceeds by itself takes no gain.
+/// −1/(2 (T/2 + delay)) where sampling allows no more. A damping that the drag of the axis exceeds by itself takes a twentieth of the
+/// gain, for a search to turn.
 pub fn place(design: &Design, stage: &Stage, bandwidth: f64, damping: f64) -> Option<Design> {
     let rigid = Rigid::of(stage);
     let (mass, w) = (rigid.mass, 2.0 * PI * bandwidth);
@@ -29,7 +30,7 @@ pub fn place(design: &Design, stage: &Stage, bandwidth: f64, damping: f64) -> Op
                 integral: gain(real * w * w),
                 derivative: match old.derivative {
                     0.0 => 0.0,
-                    _ => sign * (mass * (2.0 * damping * w + real) - drag).max(0.0) / push,
+                    _ => sign * least(mass * (2.0 * damping * w + real), drag) / push,
                 },
                 ..*old
             })
@@ -55,7 +56,7 @@ pub fn place(design: &Design, stage: &Stage, bandwidth: f64, damping: f64) -> Op
             let middle = if old.speed_integral == 0.0 { speed } else { 2.0 * damping * speed };
             Structure::Cascade(Cascade {
                 position: w,
-                speed: sign * (mass * middle - drag).max(0.01 * mass * middle) / push,
+                speed: sign * least(mass * middle, drag) / push,
                 speed_integral: if old.speed_integral == 0.0 { 0.0 } else { sign * mass * speed * speed / push },
                 current,
                 ..*old
@@ -64,6 +65,11 @@ pub fn place(design: &Design, stage: &Stage, bandwidth: f64, damping: f64) -> Op
         _ => return None,
     };
     Some(Design { structure, ..design.clone() })
+}
+
+/// What a loop adds to the drag of the axis to make `wanted`.
+fn least(wanted: f64, drag: f64) -> f64 {
+    (wanted - drag).max(0.05 * wanted)
 }
 
 /// A bandwidth to begin with, Hz: well below the first anti-resonance `swing` (Hz) and what delay and sampling allow.

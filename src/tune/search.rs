@@ -39,11 +39,9 @@ pub fn minimise(
         let size = |x: &[f64]| x.iter().zip(&simplex[0].0).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         let width = simplex.iter().map(|(x, _)| size(x)).fold(0.0, f64::max);
         let last = simplex[n].clone();
-        let centre: Vec<f64> =
-            (0..n).map(|j| simplex[..n].iter().map(|(x, _)| x[j]).sum::<f64>() / n as f64).collect();
-        let along = |factor: f64| -> Vec<f64> {
-            centre.iter().zip(&last.0).map(|(c, w)| c + factor * (c - w)).collect()
-        };
+        let centre: Vec<f64> = (0..n).map(|j| simplex[..n].iter().map(|(x, _)| x[j]).sum::<f64>() / n as f64).collect();
+        let along =
+            |factor: f64| -> Vec<f64> { centre.iter().zip(&last.0).map(|(c, w)| c + factor * (c - w)).collect() };
         let reflected = along(1.0);
         let (at_reflected, count) = value(&reflected);
         if width < accuracy || count >= most {
@@ -56,8 +54,7 @@ pub fn minimise(
         if at_reflected < simplex[0].1 {
             let expanded = along(2.0);
             let at_expanded = value(&expanded).0;
-            simplex[n] =
-                if at_expanded < at_reflected { (expanded, at_expanded) } else { (reflected, at_reflected) };
+            simplex[n] = if at_expanded < at_reflected { (expanded, at_expanded) } else { (reflected, at_reflected) };
             continue;
         }
         if at_reflected < simplex[n - 1].1 {

@@ -38,8 +38,7 @@ pub fn run(args: &Args) -> Outcome {
     let tuning = tuning(args, &case);
     let target = target(args)?;
     let interrupt = Interrupt::listen();
-    let tuned =
-        tune(&case, &tuning, &|| interrupt.signal().is_some()).map_err(|error| error.in_file(&args.case))?;
+    let tuned = tune(&case, &tuning, &|| interrupt.signal().is_some()).map_err(|error| error.in_file(&args.case))?;
     let work = Work { case: &case, tuning: &tuning, tuned: &tuned };
     let text = tuned.case_text(&case, &args.case)?;
     let json = json::text(&work);
@@ -89,7 +88,9 @@ fn target(args: &Args) -> Result<Target> {
         _ => false,
     };
     if same {
-        return Err(Error::new("this is the case file itself").in_file("--out").next("name another, or say --in-place"));
+        return Err(Error::new("this is the case file itself")
+            .in_file("--out")
+            .next("name another, or say --in-place"));
     }
     if is_file && path.exists() {
         return Err(Error::new(format!("{} is there already", path.display()))

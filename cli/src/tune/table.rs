@@ -45,7 +45,10 @@ pub fn margins(before: &Margins, after: &Margins) -> Vec<Row> {
         ("Ms", Box::new(move |m| peak(m.sensitivity))),
         ("Mt", Box::new(move |m| peak(m.complementary))),
         ("gain margin", Box::new(factor)),
-        ("phase margin", Box::new(|m| if m.phase.is_finite() { format!("{:.1}°", m.phase.to_degrees()) } else { "any".into() })),
+        (
+            "phase margin",
+            Box::new(|m| if m.phase.is_finite() { format!("{:.1}°", m.phase.to_degrees()) } else { "any".into() }),
+        ),
         ("crossover", Box::new(move |m| hertz(m.crossover))),
         ("bandwidth", Box::new(move |m| hertz(m.bandwidth))),
     ];
@@ -142,7 +145,8 @@ pub fn text(work: &Work, written: &[String]) -> String {
     }
     let _ = writeln!(text, "\n{}", bold("Limit cycles at rest"));
     let _ = writeln!(text, "  before: {}\n  after: {}", hunt(&before.hunt), hunt(&after.hunt));
-    let verdict = if tuned.holds { "the limits hold on the worst axis" } else { "the limits do NOT hold on the worst axis" };
+    let verdict =
+        if tuned.holds { "the limits hold on the worst axis" } else { "the limits do NOT hold on the worst axis" };
     let _ = writeln!(text, "\n{verdict}; {} designs tried in {} rounds", tuned.work.1, tuned.work.0);
     match written {
         [] => text.push_str("nothing was written: add --out FILE.toml, --out DIR or --in-place\n"),
