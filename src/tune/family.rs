@@ -10,12 +10,20 @@ use crate::fit::Knob;
 use crate::linear::places;
 use crate::number::engineering;
 use crate::stage::Stage;
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng, SeedableRng};
 
 /// Share by which parameters are off where nothing else is said.
 pub const SPREAD: f64 = 0.2;
 
 /// Rounds of the search for the worst axis.
 const ROUNDS: usize = 6;
+
+/// Corners that are drawn to begin another search from.
+const DRAWS: usize = 16;
+
+/// A change of a corner.
+type Step = Box<dyn Fn(&Corner) -> Corner>;
 
 /// A parameter that is not known exactly.
 #[derive(Debug, Clone)]
@@ -178,6 +186,17 @@ impl Family {
         Plant::of(&stage, corner.place, design, corners)
     }
 
+    /// Steps to these ends of each unknown, to these places and loads.
+    fn steps(&self, ends: &[f64], places: &[f64], loads: &[f64]) -> Vec<Step> {
+        let mut steps: Vec<Step> = Vec::new();
+        steps.extend(places.iter().map(|&place| moved(move |corner| corner.place = place)));
+        steps.extend(loads.iter().map(|&load| moved(move |corner| corner.load = load)));
+        for unknown in 0..self.unknowns.len() {
+            steps.extend(ends.iter().map(|&end| moved(move |corner| corner.off[unknown] = end)));
+        }
+        steps
+    }
+
     /// The corner in words: what is off, the load, the place.
     pub fn words(&self, corner: &Corner) -> String {
         let off = |(unknown, &off): (&Unknown, &f64)| (off != 0.0).then(|| unknown.words(off));
@@ -192,7 +211,7 @@ impl Family {
     }
 
     /// The corner at which `badness` is largest, and its margins: from the axis as it is taken for and from what each unknown does by
-    /// itself, one coordinate after another as long as it gets worse.
+    /// itself, and from the worst of some draws, one coordinate after another as long as it gets worse.
     pub fn worst(
         &self,
         design: &Design,
@@ -226,37 +245,75 @@ impl Family {
         if found.0 > best.1.0 {
             best = (signs, found);
         }
-        for _ in 0..ROUNDS {
-            let before = best.1.0;
-            if before == f64::INFINITY {
-                break;
-            }
-            let mut others: Vec<Box<dyn Fn(&Corner) -> Corner>> = Vec::new();
-            others.extend(self.places.iter().map(|&place| moved(move |corner| corner.place = place)));
-            others.extend(self.loads.iter().map(|&load| moved(move |corner| corner.load = load)));
-            for unknown in 0..self.unknowns.len() {
-                others.extend([-1.0, 0.0, 1.0].map(|end| moved(move |corner| corner.off[unknown] = end)));
-            }
-            for other in &others {
-                let corner = other(&best.0);
-                if corner == best.0 {
-                    continue;
-                }
-                let found = look(&corner)?;
-                if found.0 > best.1.0 * (1.0 + 1e-9) {
-                    best = (corner, found);
-                }
-            }
-            if best.1.0 <= before * (1.0 + 1e-6) {
-                break;
+        // And what is found by chance, for what no single unknown says.
+        let mut random = Pcg64::seed_from_u64(1);
+        let mut share = || (random.next_u64() >> 11) as f64 * 2f64.powi(-53);
+        let mut other: Option<(Corner, (f64, Margins))> = None;
+        for _ in 0..DRAWS {
+            let pick = |values: &[f64], share: f64| values.get((share * values.len() as f64) as usize).copied();
+            let corner = Corner {
+                place: pick(&self.places, share()).unwrap_or_default(),
+                load: pick(&self.loads, share()).unwrap_or_default(),
+                off: self.unknowns.iter().map(|_| if share() < 0.5 { -1.0 } else { 1.0 }).collect(),
+            };
+            let found = look(&corner)?;
+            if other.as_ref().is_none_or(|(_, most)| found.0 > most.0) {
+                other = Some((corner, found));
             }
         }
+        let ends = self.steps(&[-1.0, 0.0, 1.0], &self.places, &self.loads);
+        best = climb(best, &ends, ROUNDS, &look)?;
+        if let Some(other) = other {
+            let other = climb(other, &ends, ROUNDS, &look)?;
+            if other.1.0 > best.1.0 {
+                best = other;
+            }
+        }
+        // Seldom the worst lies between the ends.
+        let between = self.steps(&[-0.75, -0.5, -0.25, 0.25, 0.5, 0.75], &halves(&self.places), &halves(&self.loads));
+        best = climb(best, &between, 2, &look)?;
         Ok((best.0, best.1.1))
     }
 }
 
+type Look<'a> = &'a dyn Fn(&Corner) -> Result<(f64, Margins)>;
+
+/// From a corner to worse ones, one step after another, as long as it gets worse or for so many rounds.
+fn climb(
+    mut best: (Corner, (f64, Margins)),
+    steps: &[Step],
+    rounds: usize,
+    look: Look,
+) -> Result<(Corner, (f64, Margins))> {
+    for _ in 0..rounds {
+        let before = best.1.0;
+        if before == f64::INFINITY {
+            break;
+        }
+        for step in steps {
+            let corner = step(&best.0);
+            if corner == best.0 {
+                continue;
+            }
+            let found = look(&corner)?;
+            if found.0 > best.1.0 * (1.0 + 1e-9) {
+                best = (corner, found);
+            }
+        }
+        if best.1.0 <= before * (1.0 + 1e-6) {
+            break;
+        }
+    }
+    Ok(best)
+}
+
+/// The middles between neighbours.
+fn halves(values: &[f64]) -> Vec<f64> {
+    values.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect()
+}
+
 /// A corner with one thing changed.
-fn moved(change: impl Fn(&mut Corner) + 'static) -> Box<dyn Fn(&Corner) -> Corner> {
+fn moved(change: impl Fn(&mut Corner) + 'static) -> Step {
     Box::new(move |corner| {
         let mut other = corner.clone();
         change(&mut other);

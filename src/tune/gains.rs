@@ -46,6 +46,16 @@ pub fn scaled(design: &Design, powers: &[f64]) -> Design {
     other
 }
 
+/// State feedback with weights that make its bandwidth about √`soft` of what it is: of the integral, which has a time in it, more so.
+pub fn softer(design: &Design, stage: &Stage, soft: f64) -> Design {
+    let power = |gain: Gain| match gain.key {
+        key if key.ends_with(".integral") => -2.0 * soft.ln(),
+        key if key.ends_with(".disturbance") => 0.0,
+        _ => -soft.ln(),
+    };
+    scaled(design, &gains(design, stage).into_iter().map(power).collect::<Vec<_>>())
+}
+
 /// The design with gains of four digits, as they are written.
 pub fn rounded(design: &Design) -> Design {
     let mut other = design.clone();

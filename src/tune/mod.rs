@@ -192,7 +192,7 @@ impl Work<'_> {
         loop {
             // Weights that count less make a softer loop.
             let soft = bandwidth / asked;
-            let weights = || gains::scaled(design, &vec![-soft.ln(); 4]);
+            let weights = || gains::softer(design, &self.case.stage, soft);
             let trial = placed(bandwidth).unwrap_or_else(weights);
             self.tried += 1;
             let fits = match self.feedback(&trial) {
