@@ -8,6 +8,7 @@ mod identify;
 mod knob;
 pub mod least_squares;
 mod problem;
+mod regression;
 mod run;
 mod uncertainty;
 
@@ -16,6 +17,7 @@ pub use identify::{Group, Identifiability, LIMIT};
 pub use knob::{GROUPS, Knob};
 pub use least_squares::Ending;
 pub use problem::{Problem, Stop};
+pub use regression::{Balance, regression};
 pub use run::{Extra, Nuisance, Run, Seen};
 pub use uncertainty::{Covariance, inverse_of_square, student};
 
@@ -24,7 +26,7 @@ use crate::error::{Error, Result};
 use crate::log::Quantity;
 use crate::solve::Flow;
 use crate::stage::Stage;
-use least_squares::{Minimum, Options, minimise};
+use least_squares::{Minimum, Options, Residuals, minimise};
 use nalgebra::DVector;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
@@ -60,7 +62,8 @@ pub struct Fit {
     pub decrement: f64,
     /// ½ Σ r² of the weighted residuals.
     pub cost: f64,
-    /// The cost that each start led to, in the first weights; the first start is that of the case.
+    /// The cost that each start led to, in the first weights; the first start is that of the case, or what a regression makes
+    /// of it if that is nearer.
     pub starts: Vec<f64>,
     /// Values that count.
     pub values: usize,
@@ -179,7 +182,7 @@ pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f
         minimum
     };
     let whole = Options::default();
-    let start = problem.start();
+    let start = first_guess(&mut problem);
     let mut best = search(&mut problem, &start, &whole);
     if best.ending == Ending::Failed {
         return Err(Error::new("the model does not get through these logs with the values of the case file")
@@ -364,6 +367,23 @@ fn told_beforehand(problem: &Problem, noise: &[(Quantity, f64)]) -> bool {
     let most = noise.iter().map(|(_, deviation)| *deviation).fold(0.0, f64::max);
     let arm = problem.stage.pulley_radius.min(1.0);
     problem.runs.iter().flat_map(|run| &run.extras).any(|extra| extra.known.is_some_and(|own| own > 0.1 * arm * most))
+}
+
+/// Where the case starts, or with the totals that a regression finds, whichever is nearer to the logs.
+fn first_guess(problem: &mut Problem) -> Vec<f64> {
+    let start = problem.start();
+    let Some(balance) = regression(problem) else { return start };
+    let bounds = problem.bounds();
+    let mut guess = start.clone();
+    for (j, value) in balance.guess(problem).into_iter().enumerate() {
+        let x = problem.variable(j, value);
+        guess[j] = if x.is_finite() { x.clamp(bounds.low[j], bounds.high[j]) } else { start[j] };
+    }
+    let mut residuals = vec![0.0; problem.rows()];
+    let mut cost = |x: &[f64]| {
+        if problem.evaluate(x, &mut residuals) { residuals.iter().map(|r| r * r).sum() } else { f64::INFINITY }
+    };
+    if cost(&guess) < cost(&start) { guess } else { start }
 }
 
 /// Refuses what the logs do not determine, with the choices there are.
