@@ -109,13 +109,13 @@ fn the_logs_of_the_procedure_are_made_by_table_4() {
     let case = Case::read_with(stages().join("sollmann-jouaneh/table4.toml"), &encoder).unwrap();
     for experiment in &case.experiments {
         let log = measure(&case.stage, &case.measurement.clone().unwrap_or_default(), experiment, Solver::Exact);
-        let file = std::env::temp_dir().join(format!("taut-{}-{}.csv", std::process::id(), experiment.slug()));
+        let file = std::env::temp_dir().join(format!("taut-{}-{}.csv", std::process::id(), experiment.file_name()));
         let mut writer = CsvWriter::create(&file).unwrap();
         writer.write(&log.unwrap().trajectory).unwrap();
         writer.finish().unwrap();
         let made = fs::read(&file).unwrap();
         fs::remove_file(&file).unwrap();
-        let committed = stages().join(PROCEDURE).join(format!("logs/{}.measured.csv", experiment.slug()));
+        let committed = stages().join(PROCEDURE).join(format!("logs/{}.measured.csv", experiment.file_name()));
         assert!(made == fs::read(&committed).unwrap(), "{} is out of date", committed.display());
     }
 }

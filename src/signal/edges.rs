@@ -106,6 +106,18 @@ enum Source<'a> {
     Samples(&'a [f64], &'a [f64]),
 }
 
+/// The place of the time that comes next, looked for where it is if times are even.
+fn near(now: Now, times: &[f64]) -> Option<usize> {
+    let (first, last) = (*times.first()?, *times.last()?);
+    let guess = ((now.t - first) / (last - first) * (times.len() - 1) as f64) as usize;
+    let next = |&i: &usize| {
+        let after = i.checked_sub(1).is_none_or(|i| times.get(i).is_some_and(|&t| now.reached(t)));
+        after && times.get(i).is_none_or(|&t| !now.reached(t))
+    };
+    // A guess is off by one where rounding has it so.
+    (guess..=guess.saturating_add(2)).find(next)
+}
+
 impl<'a> Points<'a> {
     /// A table; two points of the same time are a jump.
     pub fn of_table(points: &'a [[f64; 2]]) -> Self {
@@ -129,7 +141,7 @@ impl<'a> Points<'a> {
     fn next(&self, now: Now) -> usize {
         match self.from {
             Source::Table(points) => points.partition_point(|p| now.reached(p[0])),
-            Source::Samples(times, _) => times.partition_point(|&t| now.reached(t)),
+            Source::Samples(times, _) => near(now, times).unwrap_or_else(|| times.partition_point(|&t| now.reached(t))),
         }
     }
 
