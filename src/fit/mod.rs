@@ -28,6 +28,7 @@ use crate::solve::Flow;
 use crate::stage::Stage;
 use least_squares::{Minimum, Options, Residuals, minimise};
 use nalgebra::DVector;
+use problem::{ROUNDING, extent};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use std::path::Path;
@@ -176,7 +177,8 @@ pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f
     let mut watch = |_: &[f64], cost: f64| watch(cost);
     let mut work = Work::default();
     let mut search = |problem: &mut Problem, x: &[f64], options: &Options| {
-        let minimum = minimise(problem, x, &bounds, options, &mut watch);
+        let options = Options { rounding: problem.rounding(), ..*options };
+        let minimum = minimise(problem, x, &bounds, &options, &mut watch);
         work.iterations += minimum.iterations;
         work.evaluations += minimum.evaluations;
         minimum
@@ -426,12 +428,13 @@ fn noise_of(problem: &Problem, at: &Minimum, robust: bool) -> Vec<(Quantity, f64
     let mut noise = Vec::new();
     for quantity in quantities {
         let (mut sizes, mut squares, mut weight) = (Vec::new(), 0.0, 0.0);
-        let mut step: f64 = 0.0;
+        let (mut step, mut wide): (f64, f64) = (0.0, 0.0);
         for (index, run) in problem.runs.iter().enumerate() {
             let first = problem.first_row(index);
             let n = run.time.len();
             for (output, seen) in run.seen.iter().enumerate().filter(|(_, seen)| seen.quantity == quantity) {
                 step = step.max(seen.step);
+                wide = wide.max(extent(&seen.values));
                 for k in 0..n {
                     let w = seen.weights[k];
                     if w > 0.0 {
@@ -453,7 +456,7 @@ fn noise_of(problem: &Problem, at: &Minimum, robust: bool) -> Vec<(Quantity, f64
             let middle = sizes.len() / 2;
             deviation = 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
         }
-        noise.push((quantity, deviation.max(step / 12f64.sqrt()).max(f64::MIN_POSITIVE * 1e10)));
+        noise.push((quantity, deviation.max(step / 12f64.sqrt()).max(ROUNDING * wide).max(f64::MIN_POSITIVE * 1e10)));
     }
     noise
 }

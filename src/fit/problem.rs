@@ -2,12 +2,15 @@
 
 use super::knob::{Breakaways, Knob};
 use super::least_squares::{Bounds, Differences, Residuals, Step};
-use super::run::{Extra, Nuisance, Run, Setting, is_position, rounding_at_rest};
+use super::run::{Extra, Nuisance, Run, Seen, Setting, is_position, rounding_at_rest};
 use crate::case::{Case, Nuisances, Plan, Scope, matches};
 use crate::error::{Error, Result};
 use crate::log::Quantity;
 use crate::stage::{AmplifierMode, Stage};
 use nalgebra::DMatrix;
+
+/// Share of how far a quantity ranges that numbers in files and solvers may be off by.
+pub(super) const ROUNDING: f64 = 1e-10;
 
 /// What is searched for, in which logs.
 pub struct Problem<'a> {
@@ -274,6 +277,13 @@ impl<'a> Problem<'a> {
                 }
             }
         }
+    }
+
+    /// Residuals that are rounding, with the present weights: of each quantity [`ROUNDING`] of how far it ranges.
+    pub fn rounding(&self) -> f64 {
+        let seen = self.runs.iter().flat_map(|run| &run.seen);
+        let of = |seen: &Seen| ROUNDING * extent(&seen.values) * seen.weights.iter().copied().fold(0.0, f64::max);
+        seen.map(of).fold(0.0, f64::max)
     }
 
     /// The quantities that the fitted logs hold.
