@@ -4,17 +4,25 @@
 //! all logs at once. The recipe is [`fit`]; before it, [`check`] says what the logs can determine.
 
 mod check;
+#[cfg(feature = "posterior")]
+mod density;
+mod drawn;
 mod identify;
 mod knob;
 pub mod least_squares;
+#[cfg(feature = "posterior")]
+mod posterior;
 mod problem;
 mod run;
 mod uncertainty;
 
 pub use check::{Check, LogFacts, Proposal, check};
+pub use drawn::machines;
 pub use identify::{Group, Identifiability, LIMIT};
 pub use knob::{GROUPS, Knob};
 pub use least_squares::Ending;
+#[cfg(feature = "posterior")]
+pub use posterior::{Credible, EFFECTIVE, Posterior, R_HAT, posterior};
 pub use problem::{Problem, Stop};
 pub use run::{Extra, Nuisance, Run, Seen};
 pub use uncertainty::{Covariance, inverse_of_square, student};
@@ -54,6 +62,8 @@ pub struct Fit {
     pub logs: Vec<LogFit>,
     /// What the logs determine at the estimates.
     pub identifiability: Option<Identifiability>,
+    /// The variables of the search where it ended.
+    pub point: Vec<f64>,
     /// How the search ended.
     pub ending: Ending,
     /// What the last step promised, in standard errors.
@@ -555,6 +565,7 @@ fn result(problem: &Problem, best: &Minimum, noise: Vec<(Quantity, f64)>, starts
         noise,
         logs,
         identifiability,
+        point: best.x.clone(),
         ending: best.ending,
         decrement: best.decrement,
         cost: best.cost,
