@@ -120,6 +120,7 @@ fn what_the_documents_name_is_there() {
         "docs/case-file.md",
         "docs/commands.md",
         "docs/paper.md",
+        "docs/posterior.md",
         "docs/solver.md",
         "docs/general-solver.md",
         "stages/sollmann-jouaneh/README.md",
