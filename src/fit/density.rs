@@ -9,7 +9,8 @@
 //! x = l + eᵘ above a bound, h − eᵘ below one, l + (h − l)/(1 + e⁻ᵘ) between two, and u without any; S Sᵀ is the covariance at the
 //! fit, so that z is nearly standard normal. A path is a leapfrog along a slope; any slope that depends on the place alone leaves
 //! the draws right (Neal 2011, "MCMC using Hamiltonian dynamics", section 5.5), since they are taken by the density itself. So slopes
-//! are Jᵀψ with the Jacobian at the fit, one simulation each, where that is near enough, and measured anew at each place otherwise.
+//! are Jᵀψ with J = J₀ + Σ zₖ ∂J/∂zₖ about the fit, one simulation each, where that is near enough, and measured anew at each place
+//! otherwise.
 
 use super::least_squares::{Bounds, Differences, Residuals};
 use crate::posterior::{Draws, Effort, LogDensity, Watch, sample};
@@ -22,7 +23,10 @@ use std::sync::Mutex;
 const FELT: f64 = 1e3;
 
 /// How far the slopes at the fit may be off, where one is a standard error's, before slopes are measured at each place.
-const OFF: f64 = 0.5;
+const OFF: f64 = 0.3;
+
+/// Most variables for which the Jacobian's own derivatives are measured.
+const MOST_BENT: usize = 16;
 
 /// Places at which they are compared.
 const PLACES: usize = 6;
@@ -114,8 +118,8 @@ struct Density<'a, R> {
     spread: DMatrix<f64>,
     /// Standard errors.
     errors: Vec<f64>,
-    /// The Jacobian about the fit; none where slopes are measured at each place.
-    fixed: Option<DMatrix<f64>>,
+    /// The Jacobian about the fit, and its derivatives by z; none where slopes are measured at each place.
+    fixed: Option<Vec<DMatrix<f64>>>,
 }
 
 /// Draws from the density; none where the model does not get through.
@@ -170,7 +174,38 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
             let slope = changes[j].at(centre[j])[1].abs();
             spread.row_mut(j).scale_mut(f64::min(errors[j] / slope, 2.0));
         }
-        Self { pool: Mutex::new(vec![problem]), ingredients, changes, centre, spread, errors, fixed: Some(jacobian) }
+        let pool = Mutex::new(vec![problem]);
+        let mut density = Self { pool, ingredients, changes, centre, spread, errors, fixed: None };
+        density.fixed = Some(density.bent(jacobian));
+        density
+    }
+
+    /// The Jacobian about the fit and, if they can be had, its derivatives along each z, over a standard error to each side.
+    fn bent(&self, jacobian: DMatrix<f64>) -> Vec<DMatrix<f64>> {
+        let n = self.errors.len();
+        let mut problem = self.ingredients.problem.clone();
+        let mut at = |k: usize, side: f64| {
+            let mut z = vec![0.0; n];
+            z[k] = side;
+            let x: Vec<f64> = self.place(&z).iter().map(|place| place[0]).collect();
+            self.measured(&mut problem, &x).map(|(_, jacobian)| jacobian)
+        };
+        let all: Option<Vec<DMatrix<f64>>> = match n <= MOST_BENT {
+            true => (0..n).map(|k| Some((at(k, 1.0)? - at(k, -1.0)?) * 0.5)).collect(),
+            false => None,
+        };
+        std::iter::once(jacobian).chain(all.unwrap_or_default()).collect()
+    }
+
+    /// Residuals and their Jacobian, over steps of a part of a standard error.
+    fn measured(&self, problem: &mut R, x: &[f64]) -> Option<(Vec<f64>, DMatrix<f64>)> {
+        let mut residuals = vec![0.0; problem.rows()];
+        if !problem.evaluate(x, &mut residuals) {
+            return None;
+        }
+        let steps = self.errors.iter().map(|error| STEP * error).collect();
+        let jacobian = problem.jacobian(x, &residuals, &self.ingredients.bounds, &Differences::Coarse(steps))?;
+        Some((residuals, jacobian))
     }
 
     /// Each variable's x, dx/du, ln |dx/du| and its slope.
@@ -180,10 +215,10 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
     }
 
     fn log(&self, z: &[f64], gradient: &mut [f64]) -> Option<f64> {
-        self.log_with(self.fixed.as_ref(), z, gradient)
+        self.log_with(self.fixed.as_deref(), z, gradient)
     }
 
-    fn log_with(&self, fixed: Option<&DMatrix<f64>>, z: &[f64], gradient: &mut [f64]) -> Option<f64> {
+    fn log_with(&self, fixed: Option<&[DMatrix<f64>]>, z: &[f64], gradient: &mut [f64]) -> Option<f64> {
         let own = self.pool.lock().ok()?.pop();
         let mut problem = own.unwrap_or_else(|| self.ingredients.problem.clone());
         let result = self.log_of(&mut problem, fixed, z, gradient);
@@ -191,7 +226,7 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         result
     }
 
-    fn log_of(&self, problem: &mut R, fixed: Option<&DMatrix<f64>>, z: &[f64], gradient: &mut [f64]) -> Option<f64> {
+    fn log_of(&self, problem: &mut R, fixed: Option<&[DMatrix<f64>]>, z: &[f64], gradient: &mut [f64]) -> Option<f64> {
         let Ingredients { bounds, priors, inflation, huber, .. } = self.ingredients;
         let places = self.place(z);
         let x: Vec<f64> = places.iter().map(|place| place[0]).collect();
@@ -199,18 +234,17 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         if x.iter().zip(bounds.low.iter().zip(&bounds.high)).any(|(x, (low, high))| !(low <= x && x <= high)) {
             return None;
         }
-        let mut residuals = vec![0.0; problem.rows()];
-        if !problem.evaluate(&x, &mut residuals) {
-            return None;
-        }
-        let measured = match fixed {
-            Some(_) => None,
-            None => {
-                let steps = self.errors.iter().map(|error| STEP * error).collect();
-                Some(problem.jacobian(&x, &residuals, bounds, &Differences::Coarse(steps))?)
+        let (mut residuals, measured) = match fixed {
+            Some(_) => {
+                let mut residuals = vec![0.0; problem.rows()];
+                if !problem.evaluate(&x, &mut residuals) {
+                    return None;
+                }
+                (residuals, None)
             }
+            None => self.measured(problem, &x).map(|(residuals, jacobian)| (residuals, Some([jacobian])))?,
         };
-        let jacobian = fixed.or(measured.as_ref())?;
+        let jacobians = fixed.or(measured.as_ref().map(|own| &own[..]))?;
         // ρ = ½ r², from k on k |r| − ½ k²; ψ = ρ′
         let mut cost = 0.0;
         for r in &mut residuals {
@@ -219,7 +253,12 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
             *r = r.clamp(-huber, *huber);
         }
         let mut log = -cost / inflation;
-        let mut slopes = -jacobian.tr_mul(&DVector::from_column_slice(&residuals)) / *inflation;
+        // −(J₀ + Σ zₖ ∂J/∂zₖ)ᵀ ψ / T
+        let psi = DVector::from_column_slice(&residuals);
+        let mut slopes = DVector::zeros(x.len());
+        for (jacobian, factor) in jacobians.iter().zip(std::iter::once(&1.0).chain(z)) {
+            slopes.gemv_tr(-factor / inflation, jacobian, &psi, 1.0);
+        }
         for (j, [x, dx, log_dx, slope_of_log]) in places.into_iter().enumerate() {
             let (own, slope) = priors[j].as_ref().map_or((0.0, 0.0), |prior| prior(x));
             log += own + log_dx;
