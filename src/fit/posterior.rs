@@ -125,10 +125,13 @@ impl Posterior {
                 .map(|c| (number(c), &c.name))
                 .reduce(|a, b| if a.0.is_nan() || (!b.0.is_nan() && !bad(b.0, a.0)) { a } else { b })
         };
-        if let Some((r_hat, name)) = worst(|c| c.r_hat, |new, old| new > old).filter(|(r, _)| !(*r <= R_HAT)) {
+        if let Some((r_hat, name)) = worst(|c| c.r_hat, |new, old| new > old).filter(|(r, _)| r.is_nan() || *r > R_HAT)
+        {
             doubts.push(format!("R\u{302} of {name} is {r_hat:.3}, above {R_HAT}"));
         }
-        if let Some((count, name)) = worst(|c| c.effective, |new, old| new < old).filter(|(n, _)| !(*n >= EFFECTIVE)) {
+        if let Some((count, name)) =
+            worst(|c| c.effective, |new, old| new < old).filter(|(n, _)| n.is_nan() || *n < EFFECTIVE)
+        {
             doubts.push(format!("{name} has {count:.0} effective draws, fewer than {EFFECTIVE}"));
         }
         let all = self.count() as f64;
@@ -265,7 +268,7 @@ fn priors<'a>(scales: &'a [Scale<'a>], plan: &Plan, bounds: &mut Bounds) -> Resu
         // ln 0 and what is below have no place on a logarithmic scale: no bound there.
         bounds.low[j] = bounds.low[j].max(if low.is_nan() { f64::NEG_INFINITY } else { low });
         bounds.high[j] = bounds.high[j].min(high);
-        if !(bounds.low[j] < bounds.high[j]) {
+        if bounds.low[j] >= bounds.high[j] {
             return Err(Error::new(format!("the prior of {name} leaves nothing of its bounds"))
                 .next("widen the prior, or [fit.bounds]"));
         }
