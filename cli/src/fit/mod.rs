@@ -42,9 +42,12 @@ pub fn run(args: &Args) -> Outcome {
     })?;
     progress.clear();
     let drawn = match args.posterior && interrupt.signal().is_none() {
-        true => Some(posterior::draw(args, &case, &plan, &found, &interrupt)?),
+        true => Some(posterior::draw(args, &case, &plan, &found, &interrupt)?).filter(|drawn| drawn.count() > 0),
         false => None,
     };
+    if args.posterior && drawn.is_none() {
+        terminal::show_error(&"interrupted before the first draw: there is no posterior");
+    }
     let drawn = drawn.as_ref();
     let took = begin.elapsed();
     let json = json::text(&case, &found, drawn);
