@@ -137,6 +137,7 @@ fn what_the_documents_name_is_there() {
         "docs/fit.md",
         "docs/logs.md",
         "docs/paper.md",
+        "docs/posterior.md",
         "docs/shape.md",
         "docs/solver.md",
         "docs/general-solver.md",

@@ -11,7 +11,7 @@ mod stage;
 mod template;
 mod tree;
 
-pub use fit::{Nuisances, Plan, Scope, matches};
+pub use fit::{Nuisances, Plan, Prior, Scope, matches};
 pub use template::TEMPLATE;
 
 use crate::error::{Error, Result};

@@ -4,18 +4,26 @@
 //! all logs at once. The recipe is [`fit`]; before it, [`check`] says what the logs can determine.
 
 mod check;
+#[cfg(feature = "posterior")]
+mod density;
+mod drawn;
 mod identify;
 mod knob;
 pub mod least_squares;
+#[cfg(feature = "posterior")]
+mod posterior;
 mod problem;
 mod regression;
 mod run;
 mod uncertainty;
 
 pub use check::{Check, LogFacts, Proposal, check};
+pub use drawn::machines;
 pub use identify::{Group, Identifiability, LIMIT};
 pub use knob::{GROUPS, Knob};
 pub use least_squares::Ending;
+#[cfg(feature = "posterior")]
+pub use posterior::{Credible, EFFECTIVE, Posterior, R_HAT, posterior};
 pub use problem::{Problem, Stop};
 pub use regression::{Balance, regression};
 pub use run::{Extra, Nuisance, Run, Seen};
@@ -57,6 +65,8 @@ pub struct Fit {
     pub logs: Vec<LogFit>,
     /// What the logs determine at the estimates.
     pub identifiability: Option<Identifiability>,
+    /// The variables of the search where it ended.
+    pub point: Vec<f64>,
     /// How the search ended.
     pub ending: Ending,
     /// What the last step promised, in standard errors.
@@ -578,6 +588,7 @@ fn result(problem: &Problem, best: &Minimum, noise: Vec<(Quantity, f64)>, starts
         noise,
         logs,
         identifiability,
+        point: best.x.clone(),
         ending: best.ending,
         decrement: best.decrement,
         cost: best.cost,

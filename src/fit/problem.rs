@@ -13,6 +13,7 @@ use nalgebra::DMatrix;
 pub(super) const ROUNDING: f64 = 1e-10;
 
 /// What is searched for, in which logs.
+#[derive(Clone)]
 pub struct Problem<'a> {
     /// The machine as the case has it.
     pub stage: Stage,
@@ -45,7 +46,7 @@ impl Noise {
 }
 
 /// What says that it is enough: Ctrl-C, say.
-pub type Stop<'a> = &'a dyn Fn() -> bool;
+pub type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
 
 /// How a variable of the search becomes the value of a knob.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,21 +85,7 @@ impl<'a> Problem<'a> {
     /// What `plan` asks of the logs of `case`.
     pub fn new(case: &Case, plan: &Plan) -> Result<Self> {
         let stage = case.stage.clone();
-        let all: Vec<&str> = plan.free.iter().chain(plan.tied.iter().flatten()).map(String::as_str).collect();
-        let mut knobs = Vec::new();
-        for key in &plan.free {
-            knobs.push(Knob::free(&stage, key, &all, &plan.bounds)?);
-        }
-        for keys in &plan.tied {
-            let keys: Vec<&str> = keys.iter().map(String::as_str).collect();
-            knobs.push(Knob::tied(&stage, &keys, &all, &plan.bounds)?);
-        }
-        for name in &plan.lumped {
-            knobs.push(Knob::lumped(&stage, name, &plan.bounds)?);
-        }
-        if knobs.is_empty() {
-            return Err(Error::new("nothing is searched for").next("add free = [\"cart.mass\"] to [fit]"));
-        }
+        let (knobs, breakaways) = knobs(&stage, plan)?;
         let mut runs = Vec::new();
         let mut held_out = Vec::new();
         for experiment in &case.experiments {
@@ -117,7 +104,7 @@ impl<'a> Problem<'a> {
             ));
         }
         let mut problem = Self {
-            breakaways: Breakaways::of(&stage, &all),
+            breakaways,
             units: knobs.iter().map(|knob| scale(&stage, knob, &runs)).collect(),
             typical: knobs.iter().map(|knob| typical(&stage, knob, &runs)).collect(),
             stage,
@@ -430,6 +417,26 @@ impl<'a> Problem<'a> {
         let extras = self.extras_of(index, x);
         self.runs[index].residuals(stage, &extras, out)
     }
+}
+
+/// What `plan` turns of a machine, and which breakaways follow.
+pub fn knobs(stage: &Stage, plan: &Plan) -> Result<(Vec<Knob>, Breakaways)> {
+    let all: Vec<&str> = plan.free.iter().chain(plan.tied.iter().flatten()).map(String::as_str).collect();
+    let mut knobs = Vec::new();
+    for key in &plan.free {
+        knobs.push(Knob::free(stage, key, &all, &plan.bounds)?);
+    }
+    for keys in &plan.tied {
+        let keys: Vec<&str> = keys.iter().map(String::as_str).collect();
+        knobs.push(Knob::tied(stage, &keys, &all, &plan.bounds)?);
+    }
+    for name in &plan.lumped {
+        knobs.push(Knob::lumped(stage, name, &plan.bounds)?);
+    }
+    if knobs.is_empty() {
+        return Err(Error::new("nothing is searched for").next("add free = [\"cart.mass\"] to [fit]"));
+    }
+    Ok((knobs, Breakaways::of(stage, &all)))
 }
 
 /// Whether it matters where the cart is, and not only how far it goes.
