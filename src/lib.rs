@@ -43,13 +43,13 @@
 //! - [`parameter`]: the one table of everything a case file can say.
 //! - [`trajectory`]: columns with units, and their files.
 //! - [`friction`], [`stage`]: what the machine is.
-//! - [`signal`]: what is fed into it.
+//! - [`signal`]: what is fed into it, and the references of its moves. [`design`]: what a controller is, in data.
 //! - [`plant`]: its equations of motion, mode by mode.
 //! - [`log`]: measured columns in. [`case`]: the case file in.
 //! - [`solve`]: the motion. [`measure`]: what a recorder makes of it. [`metrics`]: what it shows. [`reduction`]: how far a reduced model
 //!   is from the elastic one.
-//! - [`control`]: input shapers, from spectra and from the model.
 //! - [`linear`]: state space, poles, zeros, frequency response, resonance along the travel.
+//! - [`control`]: controllers stepped in time around the exact plant; input shapers, from spectra and from the model.
 //! - [`fit`]: parameters from logs, and what the logs cannot tell.
 //! - `report`: figures, drawings and an HTML page of them (feature `report`, on by default).
 //!
@@ -60,6 +60,7 @@
 
 pub mod case;
 pub mod control;
+pub mod design;
 pub mod error;
 pub mod files;
 pub mod fit;

@@ -27,6 +27,20 @@ pub struct Parameter {
 /// The unit of what is fed into the amplifier: V in voltage mode, A in current mode.
 pub const INPUT: &str = "V or A";
 
+/// The unit that a parameter has where the amplifier takes `input` (V or A): its own, or the one of two that fits, the first in volts.
+pub fn unit_for(unit: &'static str, input: &str) -> &'static str {
+    match unit.split_once(" or ") {
+        Some((volts, amperes)) => {
+            if input == "A" {
+                amperes
+            } else {
+                volts
+            }
+        }
+        None => unit,
+    }
+}
+
 /// What holds for a parameter that is not given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Fallback {
@@ -493,6 +507,69 @@ const INPUTS: &[Parameter] = &[
     row("input.element.lasts", "", "s", Words("as long as a `pulse`, `ramp`, `chirp`, `table` or `file` takes"), DURATION, "1 s", "How long an element of a `sequence` has its turn."),
 ];
 
+#[rustfmt::skip]
+const CONTROLLER: &[Parameter] = &[
+    row("controller.every", "T", "s", Required, DURATION, "1 ms", "Sample time."),
+    row("controller.delay", "", "s", Value(0.0), TIME, "0.5 ms", "Time from a sample to the command that follows from it; up to 1000 sample times."),
+    row("controller.limit", "", INPUT, Words("none"), POSITIVE, "24 V", "Largest command, either way."),
+    row("controller.pid.proportional", "K_p", "V/m or A/m", Required, ANY, "2 V/mm", "Command per error of position."),
+    row("controller.pid.integral", "K_i", "V/(m s) or A/(m s)", Value(0.0), ANY, "30 V/(mm s)", "Command per integral of the error."),
+    row("controller.pid.derivative", "K_d", "V s/m or A s/m", Value(0.0), ANY, "25 V s/m", "Command per rate of the error."),
+    row("controller.pid.filter", "", "Hz", Value(200.0), FREQUENCY, "200 Hz", "Corner of the derivative's filter, of first order."),
+    row("controller.pid.tracking", "", "s", Value(0.05), DURATION, "50 ms", "Time in which the integral follows a command that is limited (anti-windup)."),
+    row("controller.cascade.position", "K_v", "rad/s", Required, NOT_NEGATIVE, "60 rad/s", "Speed asked for per error of position."),
+    row("controller.cascade.speed", "", "V s/m or A s/m", Required, ANY, "30 V s/m", "Command per error of speed; with a current loop the current."),
+    row("controller.cascade.speed_integral", "", "V/m or A/m", Value(0.0), ANY, "1 V/mm", "Command per integral of that; with a current loop the current."),
+    row("controller.cascade.filter", "", "Hz", Value(200.0), FREQUENCY, "200 Hz", "Corner of the filter of the measured speed, of first order."),
+    row("controller.cascade.tracking", "", "s", Value(0.02), DURATION, "20 ms", "Time in which the integrals follow what is limited."),
+    row("controller.cascade.current.proportional", "", "V/A", Required, ANY, "0.3 V/A", "Voltage per error of current."),
+    row("controller.cascade.current.integral", "", "V/(A s)", Value(0.0), ANY, "200 V/(A s)", "Voltage per integral of that."),
+    row("controller.cascade.current.limit", "", "A", Words("none"), POSITIVE, "10 A", "Largest current asked for."),
+    row("controller.state_feedback.position", "", "m", Required, POSITIVE, "0.1 mm", "Error of the cart's position that weighs as much as `command`."),
+    row("controller.state_feedback.speed", "", "m/s", Words("no weight"), POSITIVE, "0.1 m/s", "The same of its speed."),
+    row("controller.state_feedback.integral", "", "m s", Words("no integral"), POSITIVE, "5e-6 m s", "The same of the integral of the measured error: makes it LQI."),
+    row("controller.state_feedback.command", "", INPUT, Required, POSITIVE, "5 V", "Command that weighs as much as each of these."),
+    row("controller.state_feedback.disturbance", "", INPUT, Required, POSITIVE, "1 V", "Standard deviation of an unknown command, and of a force on the cart as large, that the Kalman filter expects at each sample."),
+    row("controller.state_feedback.noise", "", "m", Value(0.0), NOT_NEGATIVE, "5 um", "Standard deviation of a measured position; at least 0.3 counts are taken."),
+    row("controller.sliding_mode.bandwidth", "λ", "rad/s", Required, POSITIVE, "60 rad/s", "How fast the error dies out on the sliding surface ė + λ e = 0."),
+    row("controller.sliding_mode.reaching", "K", "m/s^2", Required, POSITIVE, "4 m/s^2", "Acceleration that drives to the surface."),
+    row("controller.sliding_mode.boundary", "Φ", "m/s", Required, POSITIVE, "0.05 m/s", "Boundary layer: distance from the surface below which only a share of it does."),
+    row("controller.sliding_mode.integral", "", "s^-2", Value(0.0), NOT_NEGATIVE, "900 s^-2", "Weight of the error's integral in the surface."),
+    row("controller.sliding_mode.filter", "", "Hz", Value(200.0), FREQUENCY, "200 Hz", "Corner of the filter of the measured speed, of first order."),
+    row("controller.fuzzy.error", "", "m", Required, POSITIVE, "2 mm", "Error at the outermost sets."),
+    row("controller.fuzzy.rate", "", "m/s", Required, POSITIVE, "0.1 m/s", "Its rate at the outermost sets."),
+    row("controller.fuzzy.command", "", INPUT, Words("none with `slope`"), POSITIVE, "5 V", "Command of a rule of 1: makes it PD."),
+    row("controller.fuzzy.slope", "", "V/s or A/s", Words("none with `command`"), POSITIVE, "100 V/s", "Change of the command of a rule of 1: makes it PI."),
+    row("controller.fuzzy.rule", "", "", Required, Range::new(-1.0, 1.0), "0.5", "Each value in `rules`."),
+    row("controller.fuzzy.filter", "", "Hz", Value(200.0), FREQUENCY, "200 Hz", "Corner of the filter of the rate, of first order."),
+    row("controller.feed_forward.inertia", "", "", Value(1.0), Range::new(0.0, 2.0), "1", "Share of the inertia's part that is fed forward."),
+    row("controller.feed_forward.friction", "", "", Value(1.0), Range::new(0.0, 2.0), "0.8", "Share of the friction's."),
+    row("controller.feed_forward.lead", "", "s", Words("the delay and half a sample"), TIME, "1 ms", "How far ahead of a sample it looks."),
+    row("controller.disturbance_observer.bandwidth", "", "Hz", Required, FREQUENCY, "10 Hz", "Its three poles."),
+    row("controller.filters.notch", "", "Hz", Words("one of these two"), FREQUENCY, "180 Hz", "Frequency that a notch takes out of the command."),
+    row("controller.filters.low_pass", "", "Hz", Words("one of these two"), FREQUENCY, "300 Hz", "Frequency above which a low-pass of second order takes out everything."),
+    row("controller.filters.damping", "ζ_p", "", Value(0.7), Range { above: true, ..Range::new(0.0, 10.0) }, "0.7", "Damping of the filter's poles: the more, the wider a notch."),
+    row("controller.filters.depth", "ζ_z", "", Value(0.05), Range::new(0.0, 10.0), "0.05", "Damping of a notch's zeros: its gain there is depth over damping."),
+    row("controller.shaper.time", "", "s", Required, TIME, "2.8 ms", "First number of each impulse of `shaper`, growing from impulse to impulse."),
+    row("controller.shaper.amplitude", "", "", Required, Range::new(-10.0, 10.0), "0.5", "Second number; together they are 1."),
+];
+
+#[rustfmt::skip]
+const MOVE: &[Parameter] = &[
+    row("move.from", "", "m", Value(0.0), ANY, "0 mm", "Where the cart stands at time zero."),
+    row("move.to", "", "m", Words("`points` or `gcode` instead"), ANY, "50 mm", "Where it goes."),
+    row("move.speed", "", "m/s", Required, POSITIVE, "0.4 m/s", "Largest speed."),
+    row("move.acceleration", "", "m/s^2", Required, POSITIVE, "5 m/s^2", "Largest acceleration."),
+    row("move.jerk", "", "m/s^3", Words("none: a trapezoid"), POSITIVE, "200 m/s^3", "Largest jerk."),
+    row("move.snap", "", "m/s^4", Words("none: third order"), POSITIVE, "20000 m/s^4", "Largest snap; only with `jerk`."),
+    row("move.until", "", "s", Required, DURATION, "1 s", "End of the run."),
+    row("move.every", "", "s", Words("the controller's `every`"), DURATION, "1 ms", "Interval between the rows of the result; it does not affect the accuracy."),
+    row("move.window", "", "m", Value(1e-4), POSITIVE, "50 um", "How near its target the cart counts as settled."),
+    row("move.points.to", "", "m", Required, ANY, "50 mm", "Each point of a list, or its `to`."),
+    row("move.points.speed", "", "m/s", Words("the move's"), POSITIVE, "0.1 m/s", "Largest speed on the way there."),
+    row("move.points.wait", "", "s", Value(0.0), TIME, "0.2 s", "How long it stands there."),
+];
+
 /// Titles of the sections, in the order of the case file, with the key prefix of their rows.
 const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     ("motor", &[MOTOR]),
@@ -587,6 +664,8 @@ const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     ("experiment.initial", &[INITIAL]),
     ("experiment.log", &[LOG]),
     ("input", &[INPUTS]),
+    ("controller", &[CONTROLLER]),
+    ("move", &[MOVE]),
     ("fit", &[FIT]),
 ];
 
@@ -654,7 +733,7 @@ mod tests {
     #[test]
     fn examples_and_defaults_lie_in_their_ranges() {
         for p in all() {
-            let unit = if p.unit == INPUT { "V" } else { p.unit };
+            let unit = unit_for(p.unit, "V");
             let example = quantity::read(p.example, unit).unwrap_or_else(|e| panic!("{}: {e}", p.key));
             assert!(p.range.contains(example), "{}", p.key);
             if let Fallback::Value(value) = p.default {

@@ -66,10 +66,17 @@ fn every_remark_of_the_template_that_shows_a_line_is_a_line() {
         shown = shown.replace(&format!("\n# {key} "), &format!("\n{key} "));
     }
     assert!(Case::from_text("axis.toml", &shown).is_ok_and(|case| case.stage == with(&[]).stage));
-    let recorded = ["[measurement]", "delay ", "motor_current "]
+    let recorded = ["[measurement]", "delay = \"0 s\"", "motor_current "]
         .iter()
         .fold(TEMPLATE.to_string(), |t, k| t.replace(&format!("\n# {k}"), &format!("\n{k}")));
     assert!(Case::from_text("axis.toml", &recorded).unwrap().measurement.is_some_and(|m| m.channels.len() == 1));
+
+    // The closed loop stands at the end, all of it remarks.
+    let (before, after) = TEMPLATE.split_once("\n# [controller]\n").unwrap();
+    let looped: String = after.lines().map(|line| format!("{}\n", line.trim_start_matches("# "))).collect();
+    let looped =
+        Case::from_text("axis.toml", &format!("{before}\n[controller]\n{}", looped.replace("#\n", "\n"))).unwrap();
+    assert!(looped.controller.is_some() && looped.moves.len() == 1);
 
     let made = TEMPLATE.replace("\nstiffness", "\n# stiffness");
     let made =

@@ -27,6 +27,7 @@ pub enum Command {
     Paper(Paper),
     Init(Init),
     Simulate(Simulate),
+    Move(Move),
     Check(Check),
     Fit(Fit),
     Shape(Shape),
@@ -127,6 +128,47 @@ Examples:
   taut simulate axis.toml --solver table3 --step 1ms --out as-printed
 
 Ctrl-C ends a run early: what was computed until then is written and reported, with exit status 130.";
+
+/// Run the moves of a case in closed loop: the controller sampled, the axis exact.
+///
+/// Prints for each move how far the drive pulley and the cart are from where the cart should be, when the cart settles, by how much it
+/// overshoots, and what belt and motor take. With --out it also writes, for each move, every quantity over time and the
+/// controller's samples as CSV, the events and the plots, and for all of them a report and a summary as JSON. With
+/// several cases it prints one table for each move, to compare controllers.
+#[derive(Debug, clap::Args)]
+#[command(after_help = MOVE)]
+pub struct Move {
+    /// The case file; several to compare them
+    #[arg(required = true)]
+    pub case: Vec<PathBuf>,
+    /// The folder to write results into; it is made if it is not there
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Change one value of the case for this run, as often as needed
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub changes: Vec<String>,
+    /// Run only the move of this name, as often as needed
+    #[arg(long = "move", value_name = "NAME")]
+    pub moves: Vec<String>,
+    /// Also run with each parameter of the axis wrong by this share, the controller knowing nothing of it: 20%
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub spread: Option<f64>,
+    /// Leave out the report and the plots
+    #[arg(long)]
+    pub no_report: bool,
+    /// Print the summary as JSON, the same as in summary.json
+    #[arg(long)]
+    pub json: bool,
+    /// Print nothing but errors
+    #[arg(long, short, conflicts_with = "json")]
+    pub quiet: bool,
+}
+
+const MOVE: &str = "\
+Examples:
+  taut move stages/sollmann-jouaneh/controllers/pid.toml --out results
+  taut move axis.toml --set controller.delay=1ms --json | jq .moves[0].cart_error
+  taut move stages/sollmann-jouaneh/controllers/*.toml --spread 20%";
 
 /// Say what the logs of a case can tell of the parameters in its [fit], before any fit.
 ///
@@ -425,6 +467,14 @@ fn count(text: &str) -> Result<usize, String> {
         Ok(number @ 1..=1_000_000) => Ok(number),
         _ => Err("a whole number from 1 to 1000000 is needed".into()),
     }
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    let share = match text.parse() {
+        Ok(number) => number,
+        Err(_) => quantity::read(text, "").map_err(|e| e.to_string())?,
+    };
+    if share > 0.0 && share < 1.0 { Ok(share) } else { Err("a share between 0 and 1 is needed, such as 20%".into()) }
 }
 
 /// A number in the SI unit, or with a unit of its own.

@@ -7,6 +7,7 @@ mod fit;
 mod init;
 mod interrupt;
 mod modes;
+mod motion;
 mod paper;
 mod shape;
 mod simulate;
@@ -26,6 +27,7 @@ fn main() -> ExitCode {
         Command::Paper(args) => paper::run(&args),
         Command::Init(args) => init::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Move(args) => motion::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Fit(args) => fit::run(&args),
         Command::Shape(args) => shape::run(&args),

@@ -301,6 +301,52 @@ fn a_run_that_diverges_says_how_far_it_came() {
     assert!(names(&folder.path().join("out")).contains(&"5-v-pulse.csv".to_string()));
 }
 
+fn controllers() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/sollmann-jouaneh/controllers")
+}
+
+#[test]
+fn moves_in_closed_loop() {
+    let folder = TempDir::new().unwrap();
+    let case = controllers().join("pid-elastic.toml");
+    let output = taut(folder.path())
+        .args(["move", "--move", "short fast", "--out", "moved", "--json"])
+        .arg(&case)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let error = told["moves"][0]["cart_error"]["peak_m"].as_f64().unwrap().abs();
+    assert!(error > 1e-6 && error < 50e-6, "{error}");
+    let moved = folder.path().join("moved");
+    assert_eq!(json(&moved.join("summary.json")), told);
+    let rows = fs::read_to_string(moved.join("short-fast.csv")).unwrap();
+    assert!(rows.lines().next().unwrap().ends_with("encoder_count,reference_m,cart_error_m"));
+    assert_eq!(rows.lines().count(), 602);
+    let samples = fs::read_to_string(moved.join("short-fast.samples.csv")).unwrap();
+    assert_eq!(samples.lines().next().unwrap(), "time_s,reference_m,measured_m,asked_V,given_V");
+    assert!(moved.join("report.html").exists() && moved.join("plots/short-fast-motion.png").exists());
+    // The case that was written repeats the move.
+    let again =
+        taut(folder.path()).args(["move", "moved/case.toml", "--move", "short fast", "--json"]).output().unwrap();
+    let again: Value = serde_json::from_slice(&again.stdout).unwrap();
+    assert_eq!(again["moves"][0]["cart_error"], told["moves"][0]["cart_error"]);
+}
+
+#[test]
+fn moves_that_cannot_be() {
+    let folder = TempDir::new().unwrap();
+    let case = controllers().join("pid.toml");
+    let output = taut(folder.path()).arg("simulate").arg(&case).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("run its moves with `taut move`"), "{}", text(&output.stderr));
+    let output = taut(folder.path()).arg("move").arg(table4()).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("no move and no controller"), "{}", text(&output.stderr));
+    let output = taut(folder.path()).arg("move").arg(&case).args(["--spread", "150%"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+}
+
 /// Poles, matrices and files of `taut modes`; wrong places and ranges are told.
 #[test]
 fn modes_of_the_papers_machine() {

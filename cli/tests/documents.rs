@@ -94,6 +94,11 @@ fn the_reference_of_the_commands_shows_their_help() {
 }
 
 #[test]
+fn the_page_on_control_shows_what_the_program_prints() {
+    check("docs/control.md");
+}
+
+#[test]
 fn the_page_on_modes_shows_what_the_program_prints() {
     check("docs/modes.md");
 }
@@ -134,6 +139,7 @@ fn what_the_documents_name_is_there() {
         "CHANGELOG.md",
         "docs/case-file.md",
         "docs/commands.md",
+        "docs/control.md",
         "docs/fit.md",
         "docs/logs.md",
         "docs/paper.md",

@@ -1,10 +1,12 @@
 //! The case file: TOML in, a [`Case`] out, and every mistake told with its line.
 
+mod controller;
 mod fit;
 mod friction;
 mod input;
 mod log;
 mod measurement;
+mod motion;
 mod reader;
 mod set;
 mod stage;
@@ -12,8 +14,10 @@ mod template;
 mod tree;
 
 pub use fit::{Nuisances, Plan, Prior, Scope, matches};
+pub use motion::Move;
 pub use template::TEMPLATE;
 
+use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::log::Log;
 use crate::plant::{Plant, State};
@@ -34,7 +38,7 @@ const MOST_SAMPLES: f64 = 1e9;
 const LONGEST_NAME: usize = 100;
 
 /// Keys that stand in the plan and not yet in the program.
-const PLANNED: &[&str] = &["controller", "sweep"];
+const PLANNED: &[&str] = &["sweep"];
 
 /// Everything needed to repeat a run.
 #[derive(Debug, Clone)]
@@ -47,6 +51,10 @@ pub struct Case {
     pub measurement: Option<Measurement>,
     /// What is done with it, in the file's order.
     pub experiments: Vec<Experiment>,
+    /// What holds the cart where it should be, where the file says so.
+    pub controller: Option<Design>,
+    /// Where it should be, in the file's order.
+    pub moves: Vec<Move>,
     /// What is to be found from their logs, where the file says so.
     pub fit: Option<Plan>,
     /// The text it was read from, with `--set` applied: read again, it gives the same case.
@@ -190,6 +198,8 @@ impl Case {
             "encoder",
             "measurement",
             "experiment",
+            "controller",
+            "move",
             "fit",
             // What a fit says of its own result; nothing is computed from it.
             "uncertainty",
@@ -202,12 +212,18 @@ impl Case {
         };
         let stage = stage::stage(&root)?;
         let folder = Folder { path: name.parent().unwrap_or(Path::new("")), read: RefCell::default() };
-        let experiments = experiments(&root, &stage, &folder)?;
+        let controller = controller::controller(&root, &stage)?;
+        let moves = motion::moves(&root, &stage, controller.as_ref())?;
+        // A case of moves needs no experiments.
+        let experiments = match root.optional("experiment") {
+            None if !moves.is_empty() => Vec::new(),
+            _ => experiments(&root, &stage, &folder)?,
+        };
         let measurement = measurement::measurement(&root, &stage, &experiments)?;
         let fit = fit::plan(&root, &experiments)?;
         let mut files = folder.read.into_inner();
         files.sort_by_key(|file| file.place.start);
-        Ok(Self { title, stage, measurement, experiments, fit, text: source.text.clone(), files })
+        Ok(Self { title, stage, measurement, experiments, controller, moves, fit, text: source.text.clone(), files })
     }
 
     /// The text with other names for the files of its inputs; it is to lie where these names lead to them.

@@ -2,7 +2,7 @@
 
 use super::tree::{Entry, Kind, Node, Source};
 use crate::error::{Error, Place, Result};
-use crate::parameter::{self, Fallback, INPUT, Parameter};
+use crate::parameter::{self, Fallback, Parameter};
 use crate::quantity::{self, rounded};
 
 /// A value on the way to its meaning.
@@ -48,11 +48,10 @@ impl<'a> Field<'a> {
     }
 
     pub fn number_of(&self, row: &Parameter) -> Result<f64> {
-        let unit = if row.unit == INPUT { self.input_unit } else { row.unit };
-        let example = match (row.unit == INPUT && self.input_unit == "A", row.unit) {
-            (true, _) => format!("\"{}\"", row.example.replace(" V", " A")),
-            (_, "") => row.example.to_string(),
-            _ => format!("\"{}\"", row.example),
+        let unit = parameter::unit_for(row.unit, self.input_unit);
+        let example = match row.unit {
+            "" => row.example.to_string(),
+            _ => format!("\"{}\"", example_for(row, self.input_unit)),
         };
         let such_as = match self.key() {
             key if key.starts_with(|c: char| c.is_ascii_digit()) => format!("write for example {example}"),
@@ -309,13 +308,18 @@ impl<'a> Table<'a> {
     }
 
     fn missing_number(&self, key: &str, row: &Parameter) -> Error {
-        let example = match (row.unit, row.unit == INPUT && self.field.input_unit == "A") {
-            ("", _) => format!("{key} = {}", row.example),
-            (_, true) => format!("{key} = \"{}\"", row.example.replace(" V", " A")),
-            _ => format!("{key} = \"{}\"", row.example),
+        let example = match row.unit {
+            "" => format!("{key} = {}", row.example),
+            _ => format!("{key} = \"{}\"", example_for(row, self.field.input_unit)),
         };
         self.missing(key, &format!("for example {example}  # {}", row.sentence))
     }
+}
+
+/// The example of a row, in amperes where the amplifier takes those.
+fn example_for(row: &Parameter, input_unit: &str) -> String {
+    let amperes = row.unit != parameter::unit_for(row.unit, "A") && input_unit == "A";
+    if amperes { row.example.replace(" V", " A") } else { row.example.to_string() }
 }
 
 /// The table that a misplaced key belongs to.

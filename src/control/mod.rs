@@ -1,10 +1,32 @@
-//! Control of an axis: input shapers, the spectra that they are chosen from, and how one is chosen.
+//! Control of an axis: controllers stepped in time around the exact plant, input shapers, and the spectra that these are chosen from.
+//!
+//! [`closed_loop`] runs a [`Design`] on a stage along a [`Profile`]; [`close`] does so with any [`Controller`], a user's own too.
+//!
+//! [`Design`]: crate::design::Design
+//! [`Profile`]: crate::signal::profile::Profile
 
 pub mod compare;
+pub mod compensation;
+pub mod filter;
+pub mod fuzzy;
+pub mod model;
+pub mod observer;
+mod outcome;
+pub mod pid;
 pub mod resonance;
+pub mod riccati;
+mod sampled;
 pub mod shaper;
 pub mod shaping;
+pub mod sliding;
 pub mod spectrum;
+mod spread;
+mod standard;
+pub mod state_feedback;
 mod welch;
 
+pub use outcome::{Deviation, Figures, MoveRun, Rows, Setup, close, closed_loop, stream};
+pub use sampled::{Controller, Loop, Sample, Seen, measures_cart};
+pub use spread::spread;
+pub use standard::Standard;
 pub use welch::power_spectral_density;

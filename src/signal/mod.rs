@@ -11,7 +11,9 @@
 
 mod clock;
 mod edges;
+pub mod gcode;
 mod prbs;
+pub mod profile;
 mod smooth;
 #[cfg(test)]
 mod tests;

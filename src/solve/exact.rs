@@ -14,7 +14,7 @@ use super::law::{Law, Size, Watch, chain, highest, states};
 use super::propagator::SERIES_ORDER;
 use super::record::Recorder;
 use super::roots;
-use super::{Cost, Ending, Event, Flow, Grid, Outcome};
+use super::{Cost, Ending, Event, Flow, Grid, Outcome, Source, held};
 use crate::case::Experiment;
 use crate::plant::{Cause, Form, Mode, Plant, State, place};
 use crate::signal::Piece;
@@ -25,14 +25,19 @@ use std::rc::Rc;
 const SOON: f64 = 1e-6;
 
 /// Runs the experiment.
-pub(crate) fn run(plant: &Plant, experiment: &Experiment, sink: &mut dyn FnMut(&Trajectory) -> Flow) -> Outcome {
+pub(super) fn run(
+    plant: &Plant,
+    experiment: &Experiment,
+    source: Source,
+    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+) -> Outcome {
     // Eight moving quantities (three positions, three speeds, current, input) serve straight inputs; smooth ones carry
     // their derivatives along.
     // A rotor that turns by itself adds two.
-    match (experiment.input.degree() <= 1, plant.has_rotor()) {
-        (true, false) => Run::<8, 10>::new(plant, experiment, sink).finish(experiment),
-        (true, true) => Run::<12, 14>::new(plant, experiment, sink).finish(experiment),
-        (false, _) => Run::<16, 18>::new(plant, experiment, sink).finish(experiment),
+    match (source.degree() <= 1, plant.has_rotor()) {
+        (true, false) => Run::<8, 10>::new(plant, experiment, sink).finish(source),
+        (true, true) => Run::<12, 14>::new(plant, experiment, sink).finish(source),
+        (false, _) => Run::<16, 18>::new(plant, experiment, sink).finish(source),
     }
 }
 
@@ -111,11 +116,18 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     }
 
     /// The recipe: piece by piece of the input, to the end.
-    fn finish(mut self, experiment: &Experiment) -> Outcome {
+    fn finish(mut self, mut source: Source) -> Outcome {
         let end = self.grid.end();
         let mut time = 0.0;
         while self.trouble.is_none() {
-            let piece = experiment.input.piece(time);
+            let piece = match &mut source {
+                Source::Signal(signal) => signal.piece(time),
+                Source::Decided(decide) => {
+                    let current = self.value(&self.plant.current(&self.mode));
+                    let (value, until) = decide.decide(time, &self.state(), current);
+                    held(value, time, until)
+                }
+            };
             self.set_input(&piece);
             self.resolve();
             if time >= end {
@@ -165,6 +177,13 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
 
     fn set_input(&mut self, piece: &Piece) {
         self.cost.pieces += 1;
+        self.fresh = [0; Cause::KINDS];
+        if piece.coefficients[1..].iter().all(|&c| c == 0.0) {
+            (0..=highest::<R>()).for_each(|k| self.z[chain::<R>(k)] = 0.0);
+            self.z[chain::<R>(0)] = piece.coefficients[0];
+            (self.input_rate, self.input_curvature) = (0.0, 0.0);
+            return;
+        }
         let length = if piece.end.is_finite() { piece.end - piece.start } else { 0.0 };
         let (mut factorial, mut rate, mut curvature) = (1.0, 0.0, 0.0);
         let (mut power1, mut power2) = (1.0, 1.0);
@@ -186,7 +205,6 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         }
         self.input_rate = rate;
         self.input_curvature = curvature;
-        self.fresh = [0; Cause::KINDS];
     }
 
     /// Advances to `offset` behind row `row`, event by event.

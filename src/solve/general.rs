@@ -10,7 +10,7 @@ mod model;
 mod stretch;
 
 use super::record::Recorder;
-use super::{Cost, Ending, Event, Flow, Grid, Outcome, check};
+use super::{Cost, Ending, Event, Flow, Grid, Outcome, Source, check, held};
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
@@ -38,9 +38,10 @@ const TURNS_AT_ONCE: usize = 20;
 const MOST_STEPS: f64 = 1e10;
 
 /// Runs the experiment; `tolerance` is the error allowed in each step, relative and, of small quantities, absolute.
-pub(crate) fn run(
+pub(super) fn run(
     plant: &Plant,
     experiment: &Experiment,
+    source: Source,
     tolerance: f64,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<Outcome> {
@@ -60,7 +61,7 @@ pub(crate) fn run(
         .next("leave out the inductance, the damping or the friction that is as fast as that, or shorten the run"));
     }
     let model = Model::new(plant);
-    Ok(Run::new(&model, experiment, tolerance, FIRST / fastest, sink).finish(experiment))
+    Ok(Run::new(&model, experiment, tolerance, FIRST / fastest, sink).finish(source))
 }
 
 /// h·|λ| up to which the formula is stable.
@@ -167,10 +168,10 @@ impl<'a> Run<'a> {
     }
 
     /// The recipe: from edge to edge of the input, event by event, to the end.
-    fn finish(mut self, experiment: &Experiment) -> Outcome {
+    fn finish(mut self, mut source: Source) -> Outcome {
         let end = self.grid.end();
         let mut time = 0.0;
-        let mut stretch = Stretch::new(&experiment.input, time, end);
+        let mut stretch = self.stretch(&mut source, time, 0.0);
         loop {
             self.cost.pieces += stretch.pieces() as u64;
             self.tau = 0.0;
@@ -189,7 +190,7 @@ impl<'a> Run<'a> {
                 break;
             }
             time = stretch.end;
-            let next = Stretch::new(&experiment.input, time, end);
+            let next = self.stretch(&mut source, time, stretch.input(stretch.length()));
             if !next.continues(&stretch) {
                 self.solver.first_step = Some(self.first_step);
             }
@@ -204,6 +205,20 @@ impl<'a> Run<'a> {
             (None, Flow::Continue) => Ending::Complete,
         };
         Outcome { events: self.events, ending, cost: self.cost }
+    }
+
+    /// What the input does from `time` on, having been `before`.
+    fn stretch(&self, source: &mut Source, time: f64, before: f64) -> Stretch {
+        let end = self.grid.end();
+        match source {
+            Source::Signal(signal) => Stretch::new(signal, time, end),
+            Source::Decided(decide) => {
+                let (plant, state) = (self.model.plant, self.model.state(&self.y));
+                let current = plant.current(&self.mode).value(plant, &state, before);
+                let (value, until) = decide.decide(time, &state, current);
+                Stretch::of(held(value, time, until), end)
+            }
+        }
     }
 
     /// Advances to the end of the stretch, event by event.

@@ -10,8 +10,9 @@ mod roots;
 mod table3;
 
 use crate::case::Experiment;
-use crate::error::Result;
-use crate::plant::{Body, Part, Plant, Status};
+use crate::error::{Error, Result};
+use crate::plant::{Body, Part, Plant, State, Status};
+use crate::signal::{DEGREE, Piece, Signal};
 use crate::stage::Stage;
 use crate::trajectory::Trajectory;
 
@@ -170,6 +171,36 @@ pub enum Flow {
     Stop,
 }
 
+/// Decides the input while a run goes on: a sampled controller, or anything else that answers the motion.
+pub trait Decide {
+    /// The input from `time` (s) on, and until when it is held (s, after `time`), told the state and the motor current (A) just
+    /// before. It is asked first at time zero, then whenever what it said has ended.
+    fn decide(&mut self, time: f64, state: &State, current: f64) -> (f64, f64);
+}
+
+/// Where the input comes from.
+enum Source<'a> {
+    Signal(&'a Signal),
+    Decided(&'a mut dyn Decide),
+}
+
+impl Source<'_> {
+    /// The highest power of time in any piece.
+    fn degree(&self) -> usize {
+        match self {
+            Source::Signal(signal) => signal.degree(),
+            Source::Decided(_) => 0,
+        }
+    }
+}
+
+/// A piece on which the input is held; one that would not end after it begins has no end.
+fn held(value: f64, start: f64, end: f64) -> Piece {
+    let mut coefficients = [0.0; DEGREE + 1];
+    coefficients[0] = value;
+    Piece { start, end: if end > start { end } else { f64::INFINITY }, coefficients }
+}
+
 /// The times at which rows are put out: 0, `every`, 2 `every`, … up to `until`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
@@ -262,15 +293,69 @@ pub fn stream(
     solver: Solver,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<Outcome> {
+    let plant = checked(stage, experiment, solver)?;
+    run(&plant, experiment, Source::Signal(&experiment.input), solver, sink)
+}
+
+/// The same with an input that is decided as the run goes on; that of `experiment` counts for nothing.
+///
+/// ```
+/// use taut::case::{Case, TEMPLATE};
+/// use taut::plant::{State, place};
+/// use taut::solve::{Decide, Ending, Flow, Solver, stream_decided};
+///
+/// /// Full voltage until the cart has gone far enough, looked at every millisecond.
+/// struct Switch;
+/// impl Decide for Switch {
+///     fn decide(&mut self, time: f64, state: &State, _: f64) -> (f64, f64) {
+///         (if state[place::CART_POSITION] < 0.05 { 10.0 } else { 0.0 }, time + 1e-3)
+///     }
+/// }
+/// let case = Case::from_text("axis.toml", TEMPLATE)?;
+/// let mut last = 0.0;
+/// let outcome = stream_decided(&case.stage, &case.experiments[0], &mut Switch, Solver::Exact, &mut |rows| {
+///     last = rows.get("cart_position").unwrap().last().copied().unwrap();
+///     Flow::Continue
+/// })?;
+/// assert!(outcome.ending == Ending::Complete && last > 0.05 && last < 0.08);
+/// # Ok::<(), taut::Error>(())
+/// ```
+pub fn stream_decided(
+    stage: &Stage,
+    experiment: &Experiment,
+    decide: &mut dyn Decide,
+    solver: Solver,
+    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+) -> Result<Outcome> {
+    let plant = checked(stage, experiment, solver)?;
+    run(&plant, experiment, Source::Decided(decide), solver, sink)
+}
+
+/// The equations of what makes sense as a run.
+fn checked(stage: &Stage, experiment: &Experiment, solver: Solver) -> Result<Plant> {
     check::stage(stage)?;
     let plant = Plant::new(stage);
     check::experiment(&plant, experiment)?;
     if !matches!(solver, Solver::General { .. }) {
         check::piecewise_linear(stage)?;
     }
-    match solver {
-        Solver::General { tolerance } => general::run(&plant, experiment, tolerance, sink),
-        Solver::Exact => Ok(exact::run(&plant, experiment, sink)),
-        Solver::Table3 { step, method } => table3::run(&plant, experiment, step, method, sink),
+    Ok(plant)
+}
+
+fn run(
+    plant: &Plant,
+    experiment: &Experiment,
+    source: Source,
+    solver: Solver,
+    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+) -> Result<Outcome> {
+    match (solver, source) {
+        (Solver::General { tolerance }, source) => general::run(plant, experiment, source, tolerance, sink),
+        (Solver::Exact, source) => Ok(exact::run(plant, experiment, source, sink)),
+        (Solver::Table3 { step, method }, Source::Signal(_)) => table3::run(plant, experiment, step, method, sink),
+        (Solver::Table3 { .. }, Source::Decided(_)) => {
+            Err(Error::new("the paper's Table 3 has a fixed step and no sampled input")
+                .next("take the exact solver, or the general one"))
+        }
     }
 }

@@ -6,7 +6,7 @@ use super::{page, plots};
 use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use taut::case::{Case, Experiment};
+use taut::case::Case;
 use taut::files::write_atomically;
 use taut::solve::Event;
 use taut::{Error, Result};
@@ -37,19 +37,19 @@ impl Folder {
     }
 
     /// The events as CSV; returns the file's name.
-    pub fn write_events(&self, experiment: &Experiment, events: &[Event]) -> Result<String> {
+    pub fn write_events(&self, name: &str, events: &[Event]) -> Result<String> {
         let mut text = String::from("time_s,part,from,to,load\n");
         for e in events {
             // Rust's own form of a number reads back to the same bits.
             let _ = writeln!(text, "{},{},{},{},{}", e.time, e.part.key(), e.from.word(), e.to.word(), e.load);
         }
-        let name = format!("{}.events.csv", experiment.file_name());
+        let name = format!("{name}.events.csv");
         write_atomically(self.path(&name), text)?;
         Ok(name)
     }
 
     /// Copies the files that the case's inputs are read from into `inputs/`; returns the text that names them there.
-    fn bring_inputs(&self, case: &Case) -> Result<String> {
+    pub fn bring_inputs(&self, case: &Case) -> Result<String> {
         let mut names: HashMap<PathBuf, String> = HashMap::new();
         for file in &case.files {
             if names.contains_key(&file.path) {
@@ -68,7 +68,8 @@ impl Folder {
         Ok(case.text_with(|file| names.get(&file.path).cloned().unwrap_or_default()))
     }
 
-    fn make(&self, name: &str) -> Result<()> {
+    /// Makes a folder in it.
+    pub fn make(&self, name: &str) -> Result<()> {
         let path = self.path(name);
         std::fs::create_dir_all(&path).map_err(|e| Error::new(told(&e)).in_file(&path).next("remove what has its name"))
     }

@@ -2,12 +2,12 @@
 
 mod band;
 mod curves;
-mod folder;
+pub mod folder;
 mod page;
-mod plots;
+pub mod plots;
 mod run;
 mod summary;
-mod table;
+pub mod table;
 
 use crate::args::Simulate;
 use crate::failure::{Failure, Outcome, Status};
@@ -86,6 +86,10 @@ fn measurable(case: &Case, solver: Solver, args: &Simulate) -> Result<()> {
 
 /// The experiments named on the command line, in the file's order; all if none is named.
 fn chosen<'a>(case: &'a Case, names: &[String]) -> Result<Vec<&'a Experiment>> {
+    if case.experiments.is_empty() {
+        return Err(Error::new(format!("\"{}\" has moves, and no experiments", case.title))
+            .next("run its moves with `taut move`, or add an [[experiment]]"));
+    }
     if let Some(name) = names.iter().find(|name| case.experiments.iter().all(|e| e.name != **name)) {
         let known: Vec<String> = case.experiments.iter().map(|e| format!("\"{}\"", e.name)).collect();
         return Err(Error::new(format!("there is no experiment \"{name}\""))

@@ -112,12 +112,18 @@ impl Plot<'_> {
     }
 }
 
-/// Writes every figure as SVG and PNG, on all processors.
+/// Writes every figure as SVG and PNG.
 pub fn write(folder: &Path, runs: &[Run], figures: &[Vec<Named>]) -> Result<()> {
+    let names: Vec<String> = runs.iter().map(|run| run.experiment.file_name()).collect();
+    write_all(folder, &names, figures)
+}
+
+/// The same for figures of runs of these names, on all processors.
+pub fn write_all(folder: &Path, runs: &[String], figures: &[Vec<Named>]) -> Result<()> {
     let mut jobs = Vec::new();
     for (run, figures) in runs.iter().zip(figures) {
         for (name, figure) in figures {
-            jobs.push((folder.join(format!("{}-{name}", run.experiment.file_name())), figure));
+            jobs.push((folder.join(format!("{run}-{name}")), figure));
         }
     }
     let next = AtomicUsize::new(0);

@@ -87,7 +87,7 @@ impl<'a> Setting<'a> {
             writer.finish().map_err(Failure::work)?;
         }
         if let Some(folder) = self.folder {
-            files.push(folder.write_events(experiment, &outcome.events).map_err(Failure::work)?);
+            files.push(folder.write_events(&experiment.file_name(), &outcome.events).map_err(Failure::work)?);
         }
         let mut samples = None;
         if let Some(folder) = self.folder.filter(|_| self.args.as_measured && self.interrupt.signal().is_none()) {

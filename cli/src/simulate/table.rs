@@ -45,7 +45,7 @@ pub fn value(value: f64, unit: &str) -> String {
 }
 
 /// A length of travel in mm, far ones in m.
-fn travel(metres: f64) -> String {
+pub fn travel(metres: f64) -> String {
     match metres.abs() {
         m if m < 1e-4 && m > 0.0 => value(metres, "m"),
         m if m < 10.0 => format!("{:.4} mm", metres * 1e3),
@@ -54,7 +54,7 @@ fn travel(metres: f64) -> String {
 }
 
 /// A speed in mm/s, fast ones in m/s.
-fn speed(metres_per_second: f64) -> String {
+pub fn speed(metres_per_second: f64) -> String {
     match metres_per_second.abs() {
         v if v < 1e-3 && v > 0.0 => value(metres_per_second, "m/s"),
         v if v < 10.0 => format!("{:.2} mm/s", metres_per_second * 1e3),
@@ -63,7 +63,7 @@ fn speed(metres_per_second: f64) -> String {
 }
 
 /// A time in ms, long ones in s.
-fn time(seconds: f64) -> String {
+pub fn time(seconds: f64) -> String {
     match seconds.abs() {
         s if s < 1e-3 && s > 0.0 => value(seconds, "s"),
         s if s < 1.0 => format!("{} ms", number::fixed(seconds * 1e3, 3).trim_end_matches('0').trim_end_matches('.')),

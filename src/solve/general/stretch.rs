@@ -32,6 +32,11 @@ impl Stretch {
         Self { begin, end: stop.min(end), parts }
     }
 
+    /// One piece, up to `end` at most.
+    pub(super) fn of(piece: Piece, end: f64) -> Self {
+        Self { begin: piece.start, end: piece.end.min(end), parts: vec![(0.0, piece)] }
+    }
+
     pub(super) fn pieces(&self) -> usize {
         self.parts.len()
     }

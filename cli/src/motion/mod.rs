@@ -1,0 +1,217 @@
+//! `taut move`: runs the moves of a case in closed loop, and says where the cart really is.
+
+mod figures;
+mod json;
+mod page;
+mod table;
+
+use crate::args::Move as Args;
+use crate::failure::{Failure, Outcome, Status};
+use crate::interrupt::Interrupt;
+use crate::simulate::folder::Folder;
+use crate::simulate::plots;
+use crate::simulate::table::early_end;
+use crate::terminal;
+use figures::Curves;
+use std::fmt::Write;
+use std::path::Path;
+use taut::case::{Case, Move};
+use taut::control::{Loop, MoveRun, Rows, Setup, Standard, closed_loop, spread, stream};
+use taut::design::Design;
+use taut::files::write_atomically;
+use taut::solve::{Ending, Flow, Solver};
+use taut::trajectory::{CsvWriter, Trajectory};
+use taut::{Error, Result};
+
+/// What is known of a move after it ran.
+pub struct Done<'a> {
+    pub motion: &'a Move,
+    pub run: MoveRun,
+    pub curves: Option<Curves>,
+    /// With parameters wrong by a share: the largest cart error (m), and how many of how many settle.
+    pub worst: Option<Worst>,
+    pub files: Vec<String>,
+}
+
+/// The worst of axes whose parameters are off.
+pub struct Worst {
+    /// Largest |x − y|, m, and of which axis.
+    pub error: f64,
+    pub axis: String,
+    /// Largest |x − y| at the end, m.
+    pub last: f64,
+    /// Axes on which the cart settles, and all of them.
+    pub settled: usize,
+    pub axes: usize,
+}
+
+/// A case with what came of its moves.
+pub struct Tried<'a> {
+    pub case: &'a Case,
+    pub design: &'a Design,
+    pub done: Vec<Done<'a>>,
+}
+
+/// Reads the cases, runs their moves, reports.
+pub fn run(args: &Args) -> Outcome {
+    let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
+    let cases: Vec<Case> = args.case.iter().map(|path| Case::read_with(path, &changes)).collect::<Result<_>>()?;
+    if cases.len() > 1 && args.out.is_some() {
+        return Err(Error::new("--out takes the results of one case")
+            .in_file("--out")
+            .next("name one case, or leave --out out")
+            .into());
+    }
+    let folder = args.out.as_deref().map(Folder::create).transpose()?;
+    let interrupt = Interrupt::listen();
+    let mut tried = Vec::new();
+    for (case, path) in cases.iter().zip(&args.case) {
+        let (design, moves) = chosen(case, path, &args.moves)?;
+        let mut done = Vec::new();
+        for motion in moves {
+            if interrupt.signal().is_some() {
+                break;
+            }
+            done.push(one(case, design, motion, args, folder.as_ref(), &interrupt)?);
+        }
+        tried.push(Tried { case, design, done });
+    }
+    let json = json::text(&tried);
+    if let (Some(folder), [tried]) = (&folder, &tried[..]) {
+        write(folder, tried, args, &json).map_err(Failure::work)?;
+    }
+    if args.json {
+        terminal::show(&json);
+    } else if !args.quiet {
+        match &tried[..] {
+            [one] => terminal::show(&table::text(one, folder.as_ref())),
+            several => terminal::show(&table::comparison(several)),
+        }
+    }
+    Ok(status(&tried, &interrupt))
+}
+
+/// The controller and the moves named on the command line; all if none is named.
+fn chosen<'a>(case: &'a Case, path: &Path, names: &[String]) -> Result<(&'a Design, Vec<&'a Move>)> {
+    let Some(design) = case.controller.as_ref().filter(|_| !case.moves.is_empty()) else {
+        return Err(Error::new("this case has no move and no controller to run it").in_file(path).next(
+            "add [controller] with every and for example pid = { proportional = \"2 V/mm\" }, \
+             and [[move]] with name, to, speed, acceleration and until",
+        ));
+    };
+    if let Some(name) = names.iter().find(|name| case.moves.iter().all(|m| m.name != **name)) {
+        let known: Vec<String> = case.moves.iter().map(|m| format!("\"{}\"", m.name)).collect();
+        return Err(Error::new(format!("there is no move \"{name}\"")).in_file("--move").allowed(known.join(", ")));
+    }
+    Ok((design, case.moves.iter().filter(|m| names.is_empty() || names.contains(&m.name)).collect()))
+}
+
+/// Runs one move.
+fn one<'a>(
+    case: &'a Case,
+    design: &'a Design,
+    motion: &'a Move,
+    args: &Args,
+    folder: Option<&Folder>,
+    interrupt: &Interrupt,
+) -> std::result::Result<Done<'a>, Failure> {
+    let stage = &case.stage;
+    let mut controller = Standard::new(design, stage)?;
+    let profile = motion.profile.clone().shaped(&design.shaper);
+    let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
+    let name = motion.file_name();
+    let writer = folder.map(|folder| CsvWriter::create(folder.path(&format!("{name}.csv")))).transpose();
+    let mut writer = writer.map_err(Failure::work)?;
+    let mut curves = folder.is_some().then(|| Curves::new(stage)).filter(|_| !args.no_report);
+    let mut trouble = None;
+    let solver = Solver::of(stage);
+    let mut take = |block: &Trajectory| {
+        if let Some(curves) = &mut curves {
+            curves.take(block);
+        }
+        trouble = writer.as_mut().and_then(|writer| writer.write(block).err());
+        if trouble.is_some() || interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue }
+    };
+    let keep = folder.is_some();
+    let run = stream(stage, &mut controller, &Loop::of(design), &profile, &rows, solver, keep, &mut take)?;
+    if let Some(trouble) = trouble {
+        return Err(Failure::work(trouble));
+    }
+    let mut files = Vec::new();
+    if let (Some(writer), Some(folder)) = (writer, folder) {
+        writer.finish().map_err(Failure::work)?;
+        files.push(format!("{name}.csv"));
+        files.push(folder.write_events(&name, &run.outcome.events).map_err(Failure::work)?);
+        files.push(write_samples(folder, &name, case, &run).map_err(Failure::work)?);
+    }
+    let worst = match args.spread.filter(|_| interrupt.signal().is_none()) {
+        Some(share) => Some(worst(case, design, motion, share, solver)?),
+        None => None,
+    };
+    Ok(Done { motion, run, curves, worst, files })
+}
+
+/// The controller's samples as CSV.
+fn write_samples(folder: &Folder, name: &str, case: &Case, run: &MoveRun) -> Result<String> {
+    let unit = if case.stage.amplifier.mode == taut::stage::AmplifierMode::Current { "A" } else { "V" };
+    let mut text = format!("time_s,reference_m,measured_m,asked_{unit},given_{unit}\n");
+    for s in &run.kept {
+        let _ = writeln!(text, "{},{},{},{},{}", s.time, s.reference, s.measured, s.asked, s.given);
+    }
+    let name = format!("{name}.samples.csv");
+    write_atomically(folder.path(&name), text)?;
+    Ok(name)
+}
+
+/// The same controller on axes that are not what it takes them for.
+fn worst(case: &Case, design: &Design, motion: &Move, share: f64, solver: Solver) -> Result<Worst> {
+    let mut worst = Worst { error: 0.0, axis: String::new(), last: 0.0, settled: 0, axes: 0 };
+    for (axis, stage) in spread(&case.stage, share) {
+        let (until, window) = (motion.until, motion.window);
+        let setup =
+            Setup { stage: &stage, model: &case.stage, design, profile: &motion.profile, until, window, solver };
+        let run = closed_loop(&setup)?;
+        worst.axes += 1;
+        worst.settled += usize::from(run.figures.settling.is_some() && run.outcome.ending == Ending::Complete);
+        let error = match run.outcome.ending {
+            Ending::Complete => run.figures.cart.peak.value.abs(),
+            _ => f64::INFINITY,
+        };
+        if error > worst.error {
+            (worst.error, worst.axis) = (error, axis);
+        }
+        worst.last = worst.last.max(run.figures.final_cart_error.abs());
+    }
+    Ok(worst)
+}
+
+/// What belongs to all moves: summary, case, report and plots.
+fn write(folder: &Folder, tried: &Tried, args: &Args, json: &str) -> Result<()> {
+    write_atomically(folder.path("summary.json"), json)?;
+    let text = folder.bring_inputs(tried.case)?;
+    write_atomically(folder.path("case.toml"), &text)?;
+    if args.no_report {
+        return Ok(());
+    }
+    let figures: Vec<_> = tried.done.iter().map(figures::figures).collect();
+    page::page(tried, &text, &figures).write(folder.path("report.html"))?;
+    folder.make("plots")?;
+    let names: Vec<String> = tried.done.iter().map(|done| done.motion.file_name()).collect();
+    plots::write_all(&folder.path("plots"), &names, &figures)
+}
+
+/// How it ended, and a word about every move that did not reach its end.
+fn status(tried: &[Tried], interrupt: &Interrupt) -> Status {
+    let mut complete = true;
+    for done in tried.iter().flat_map(|tried| &tried.done) {
+        if let Some(told) = early_end(&done.run.outcome.ending) {
+            terminal::show_error(&format!("the move \"{}\" {told}", done.motion.name));
+            complete = false;
+        }
+    }
+    match interrupt.signal() {
+        Some(signal) => Status::Interrupted(signal),
+        None if complete => Status::Done,
+        None => Status::Incomplete,
+    }
+}

@@ -1,0 +1,33 @@
+//! The report: one HTML file.
+
+use super::{Tried, table};
+use crate::simulate::plots::Named;
+use crate::simulate::table::early_end;
+use taut::report::{Callout, Cell, Page, Table, stage_drawing};
+
+/// The page; `text` is the case that repeats the moves.
+pub fn page(tried: &Tried, text: &str, figures: &[Vec<Named>]) -> Page {
+    let words = table::controller(tried.design, &tried.case.stage);
+    let mut page = Page::new(tried.case.title.clone()).subtitle(format!("Moves in closed loop: {words}."));
+    page.section("The stage");
+    page.drawing(&stage_drawing(&tried.case.stage), "Symbols, values and positive directions.");
+    for (done, figures) in tried.done.iter().zip(figures) {
+        page.section(&done.motion.name);
+        if let Some(told) = early_end(&done.run.outcome.ending) {
+            page.callout(Callout::Fails, "The whole move", format!("This move {told}."));
+        }
+        let mut rows = Table::new("").column("Quantity", "").column("Value", "");
+        for (name, value) in table::lines(tried, done) {
+            rows.row([Cell::from(name), Cell::from(value.replace('-', "−"))]);
+        }
+        page.table(&rows);
+        for (_, figure) in figures {
+            page.figure(figure);
+        }
+    }
+    page.section("The case");
+    page.prose("This text repeats the moves.");
+    page.embed("case.toml", text);
+    page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
+    page
+}

@@ -1,0 +1,59 @@
+//! A controller of one's own in closed loop, beside a PID: `cargo run --release --example controller`.
+
+use std::time::Instant;
+use taut::case::{Case, TEMPLATE};
+use taut::control::{Controller, Loop, Seen, Setup, close, closed_loop};
+use taut::design::{Design, FeedForward, Pid, Structure};
+use taut::signal::profile::{Leg, Limits, Profile};
+use taut::solve::Solver;
+
+/// As much voltage as there is, towards the target; less within a millimetre.
+struct Relay {
+    volts: f64,
+}
+
+impl Controller for Relay {
+    fn step(&mut self, seen: &Seen) -> f64 {
+        self.volts * ((seen.reference.position - seen.position) / 1e-3).clamp(-1.0, 1.0)
+    }
+
+    fn reset(&mut self) {}
+}
+
+fn main() -> taut::Result<()> {
+    let case = Case::from_text_with("axis.toml", TEMPLATE, &["encoder.lines=3000"])?;
+    let stage = &case.stage;
+    let limits = Limits { speed: 0.3, acceleration: 4.0, jerk: Some(200.0), snap: None };
+    let profile = Profile::new(0.0, &[Leg::To(0.1, limits)])?;
+    let timing = Loop { every: 1e-3, delay: 0.0, limit: Some(24.0), lead: 0.0 };
+    let run = close(stage, &mut Relay { volts: 10.0 }, &timing, &profile, 1.0, 50e-6, Solver::Exact)?;
+    println!("relay: cart error at most {:.1} µm", 1e6 * run.figures.cart.peak.value.abs());
+
+    let pid = Pid { proportional: 3000.0, integral: 60e3, derivative: 10.0, filter: 200.0, tracking: 0.05 };
+    let design = Design {
+        every: 1e-3,
+        delay: 0.0,
+        limit: Some(24.0),
+        structure: Structure::Pid(pid),
+        feed_forward: FeedForward::NONE,
+        disturbance_observer: None,
+        filters: Vec::new(),
+        shaper: Vec::new(),
+    };
+    let solver = Solver::Exact;
+    let setup = Setup { stage, model: stage, design: &design, profile: &profile, until: 1.0, window: 50e-6, solver };
+    let mut best = f64::INFINITY;
+    for _ in 0..200 {
+        let begin = Instant::now();
+        closed_loop(&setup)?;
+        best = best.min(begin.elapsed().as_secs_f64());
+    }
+    let run = closed_loop(&setup)?;
+    println!(
+        "PID: cart error at most {:.1} µm; one second at 1 kHz in {:.0} µs",
+        1e6 * run.figures.cart.peak.value.abs(),
+        1e6 * best
+    );
+    println!("{:?} {:?} events {}", run.figures, run.outcome.cost, run.outcome.events.len());
+    Ok(())
+}

@@ -1,0 +1,163 @@
+//! The moves: to a place, through points, or as a list in the manner of G-code.
+
+use super::reader::{Field, Table};
+use super::{MOST_SAMPLES, check_name, file_name};
+use crate::design::Design;
+use crate::error::Result;
+use crate::quantity::{rounded, show};
+use crate::signal::gcode;
+use crate::signal::profile::{Leg, Limits, Profile};
+use crate::stage::Stage;
+
+/// A move in closed loop: where the cart should be, and what is looked at.
+#[derive(Debug, Clone)]
+pub struct Move {
+    /// Its name, unique among the moves.
+    pub name: String,
+    /// The cart's reference.
+    pub profile: Profile,
+    /// End of the run, s.
+    pub until: f64,
+    /// Interval between rows, s.
+    pub every: f64,
+    /// How near its target the cart counts as settled, m.
+    pub window: f64,
+}
+
+impl Move {
+    /// Its name as that of a file, without ending.
+    pub fn file_name(&self) -> String {
+        file_name(&self.name)
+    }
+}
+
+pub(super) fn moves(root: &Table, stage: &Stage, design: Option<&Design>) -> Result<Vec<Move>> {
+    let Some(field) = root.optional("move") else { return Ok(Vec::new()) };
+    if field.is_table() {
+        return Err(field
+            .fail("a list of tables is wanted")
+            .next("write [[move]] with double brackets: there can be several"));
+    }
+    let Some(design) = design else {
+        return Err(field
+            .fail("there is no controller that could follow it")
+            .next("add [controller] with for example every = \"1 ms\" and pid = { proportional = \"2 V/mm\" }"));
+    };
+    let mut moves: Vec<Move> = Vec::new();
+    for field in field.filled_list()? {
+        let table = field.clone().named("move").table()?;
+        let one = one(&table, stage, design)?;
+        if let Some(other) = moves.iter().find(|other| other.file_name() == one.file_name()) {
+            let name = table.required("name", "a name")?;
+            return Err(name
+                .fail(format!(
+                    "\"{}\" and \"{}\" would both be written to {}.csv",
+                    other.name,
+                    one.name,
+                    one.file_name()
+                ))
+                .next("give each move a name of its own"));
+        }
+        moves.push(one);
+    }
+    Ok(moves)
+}
+
+fn one(table: &Table, stage: &Stage, design: &Design) -> Result<Move> {
+    table.check_keys(&["name", "gcode"], &[])?;
+    let name = table.required("name", "for example name = \"short fast\"")?;
+    check_name(&name)?;
+    let limits = limits(table)?;
+    let from = table.number("from")?;
+    let legs = legs(table, from, &limits)?;
+    let until = table.number("until")?;
+    let every = table.number_if_given("every")?.unwrap_or(design.every.min(until));
+    let at = |key: &str| table.optional(key).unwrap_or_else(|| table.field.clone());
+    if every > until {
+        return Err(at("every")
+            .fail(format!("an interval of {every} s is longer than the run of {until} s"))
+            .allowed(format!("up to {until} s")));
+    }
+    if until / every > MOST_SAMPLES || until / design.every > MOST_SAMPLES {
+        return Err(at("until")
+            .fail("this makes too many rows or samples")
+            .allowed(format!("up to {}", rounded(MOST_SAMPLES)))
+            .next("take a shorter run, or a longer interval"));
+    }
+    let profile = Profile::new(from, &legs).map_err(|error| table.field.fail(error.what))?;
+    if profile.end() > until {
+        return Err(at("until")
+            .fail(format!("the run ends before the move, which takes {}", show(profile.end(), "s")))
+            .allowed(format!("from {} on", show(profile.end(), "s"))));
+    }
+    if let Some(travel) = stage.travel {
+        let places = std::iter::once(from).chain(profile.strokes().map(|(_, from, distance, _)| from + distance));
+        if let Some(out) = places.into_iter().find(|x| !(travel.min..=travel.max).contains(x)) {
+            return Err(table.field.fail(format!("it leads to {}, off the travel", show(out, "mm"))).allowed(format!(
+                "from {} to {}",
+                show(travel.min, "mm"),
+                show(travel.max, "mm")
+            )));
+        }
+    }
+    Ok(Move { name: name.text()?.to_string(), profile, until, every, window: table.number("window")? })
+}
+
+fn limits(table: &Table) -> Result<Limits> {
+    let limits = Limits {
+        speed: table.number("speed")?,
+        acceleration: table.number("acceleration")?,
+        jerk: table.number_if_given("jerk")?,
+        snap: table.number_if_given("snap")?,
+    };
+    match table.optional("snap") {
+        Some(field) if limits.jerk.is_none() => {
+            Err(field.fail("a limit of snap needs one of jerk").next("add for example jerk = \"200 m/s^3\""))
+        }
+        _ => Ok(limits),
+    }
+}
+
+/// The legs: `to`, `points` or `gcode`.
+fn legs(table: &Table, from: f64, limits: &Limits) -> Result<Vec<Leg>> {
+    let kinds = ["to", "points", "gcode"];
+    let given: Vec<Field> = kinds.iter().filter_map(|key| table.optional(key)).collect();
+    let field = match &given[..] {
+        [field] => field,
+        [] => return Err(table.missing("to", "to = \"50 mm\", or points, or gcode")),
+        [first, second, ..] => {
+            return Err(second
+                .fail(format!("the move is given by {} already", first.key()))
+                .next("keep one of to, points and gcode"));
+        }
+    };
+    match field.key() {
+        "to" => Ok(vec![Leg::To(field.number()?, *limits)]),
+        "points" => {
+            let mut legs = Vec::new();
+            for point in field.filled_list()? {
+                if !point.is_table() {
+                    legs.push(Leg::To(point.named("move.points.to").number()?, *limits));
+                    continue;
+                }
+                let table = point.named("move.points").table()?;
+                table.check_keys(&[], &[])?;
+                let speed = table.number_if_given("speed")?.unwrap_or(limits.speed);
+                legs.push(Leg::To(table.number("to")?, Limits { speed, ..*limits }));
+                let wait = table.number("wait")?;
+                if wait > 0.0 {
+                    legs.push(Leg::Wait(wait));
+                }
+            }
+            Ok(legs)
+        }
+        _ => gcode::legs(field.text()?, from, limits).map_err(|error| {
+            let mut told = field.fail(error.what);
+            told.allowed = error.allowed;
+            match error.next {
+                Some(next) => told.next(next),
+                None => told,
+            }
+        }),
+    }
+}

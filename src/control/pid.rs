@@ -1,0 +1,109 @@
+//! PID, and cascades of P and PI.
+
+use super::sampled::Speed;
+use crate::design::{Cascade, Pid};
+use crate::signal::profile::Reference;
+
+/// A PID controller: u = K_p e + K_i ∫e dt + K_d ė.
+#[derive(Debug, Clone)]
+pub struct PidState {
+    gains: Pid,
+    every: f64,
+    integral: f64,
+    slope: f64,
+    last: Option<f64>,
+}
+
+impl PidState {
+    /// Stepped every `every` s.
+    pub fn new(gains: &Pid, every: f64) -> Self {
+        Self { gains: *gains, every, integral: 0.0, slope: 0.0, last: None }
+    }
+
+    /// The next command.
+    pub fn step(&mut self, target: &Reference, position: f64) -> f64 {
+        let Pid { proportional, integral, derivative, filter, .. } = self.gains;
+        let error = target.position - position;
+        // T_f ḋ + d = ė by backward differences
+        let time = 1.0 / (2.0 * std::f64::consts::PI * filter);
+        let change = error - self.last.unwrap_or(error);
+        self.slope = (time * self.slope + change) / (time + self.every);
+        self.last = Some(error);
+        self.integral += integral * self.every * error;
+        proportional * error + self.integral + derivative * self.slope
+    }
+
+    /// Back-calculation: the integral follows what the limit leaves.
+    pub fn limited(&mut self, excess: f64) {
+        self.integral += (self.every / self.gains.tracking).min(1.0) * excess;
+    }
+
+    /// Forgets.
+    pub fn reset(&mut self) {
+        *self = Self::new(&self.gains, self.every);
+    }
+}
+
+/// A position loop around a speed loop, around a current loop if there is one.
+#[derive(Debug, Clone)]
+pub struct CascadeState {
+    gains: Cascade,
+    every: f64,
+    speed: Speed,
+    speed_integral: f64,
+    current_integral: f64,
+}
+
+impl CascadeState {
+    /// Stepped every `every` s.
+    pub fn new(gains: &Cascade, every: f64) -> Self {
+        let speed = Speed::new(every, gains.filter);
+        Self { gains: *gains, every, speed, speed_integral: 0.0, current_integral: 0.0 }
+    }
+
+    /// The next command. `forward` is what feed-forward adds to the speed loop's output where that is a current.
+    pub fn step(&mut self, target: &Reference, position: f64, current: f64, forward: f64) -> f64 {
+        let gains = &self.gains;
+        let speed = self.speed.step(position);
+        // v* = K_v (y* − y) + ẏ*
+        let wanted = gains.position * (target.position - position) + target.speed;
+        let error = wanted - speed;
+        self.speed_integral += gains.speed_integral * self.every * error;
+        let output = gains.speed * error + self.speed_integral;
+        let Some(inner) = gains.current else { return output };
+        let asked = output + forward;
+        let held = inner.limit.map_or(asked, |limit| asked.clamp(-limit, limit));
+        self.speed_integral += self.share() * (held - asked);
+        let error = held - current;
+        self.current_integral += inner.integral * self.every * error;
+        inner.proportional * error + self.current_integral
+    }
+
+    /// Whether its speed loop asks for a current.
+    pub fn commands_current(&self) -> bool {
+        self.gains.current.is_some()
+    }
+
+    fn share(&self) -> f64 {
+        (self.every / self.gains.tracking).min(1.0)
+    }
+
+    /// Back-calculation in the innermost loop.
+    pub fn limited(&mut self, excess: f64) {
+        let share = self.share() * excess;
+        match self.gains.current {
+            None => self.speed_integral += share,
+            Some(inner) => {
+                self.current_integral += share;
+                if inner.proportional > 0.0 {
+                    self.speed_integral += share / inner.proportional;
+                }
+            }
+        }
+    }
+
+    /// Forgets.
+    pub fn reset(&mut self) {
+        *self = Self::new(&self.gains, self.every);
+    }
+}

@@ -1,0 +1,249 @@
+//! The loop closed: samples, counts, delay and limit between a controller and the axis.
+
+use crate::plant::{State, place};
+use crate::signal::profile::{Profile, Reference};
+use crate::solve::Decide;
+use crate::stage::{Encoder, EncoderPlace, Stage};
+use std::collections::VecDeque;
+
+/// What a controller knows at a sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Seen {
+    /// Time of the sample, s.
+    pub time: f64,
+    /// Where the cart should be now.
+    pub reference: Reference,
+    /// Where it should be when the command acts, or as far ahead as the controller asked to look.
+    pub ahead: Reference,
+    /// Measured position, m along the belt: whole counts.
+    pub position: f64,
+    /// Measured motor current, A.
+    pub current: f64,
+}
+
+/// A controller, stepped once a sample. A user's own implements this.
+///
+/// ```
+/// use taut::case::{Case, TEMPLATE};
+/// use taut::control::{Controller, Loop, Seen, close};
+/// use taut::signal::profile::{Leg, Limits, Profile};
+/// use taut::solve::Solver;
+///
+/// /// So many volts per metre.
+/// struct Proportional(f64);
+/// impl Controller for Proportional {
+///     fn step(&mut self, seen: &Seen) -> f64 {
+///         self.0 * (seen.reference.position - seen.position)
+///     }
+///     fn reset(&mut self) {}
+/// }
+/// let case = Case::from_text("axis.toml", TEMPLATE)?;
+/// let limits = Limits { speed: 0.2, acceleration: 2.0, jerk: None, snap: None };
+/// let profile = Profile::new(0.0, &[Leg::To(0.05, limits)])?;
+/// let timing = Loop { every: 1e-3, delay: 0.0, limit: Some(12.0), lead: 0.0 };
+/// let run = close(&case.stage, &mut Proportional(3000.0), &timing, &profile, 1.0, 50e-6, Solver::Exact)?;
+/// assert!(run.figures.final_cart_error.abs() < 1e-3);
+/// # Ok::<(), taut::Error>(())
+/// ```
+pub trait Controller {
+    /// The command that follows from what is seen, V or A.
+    fn step(&mut self, seen: &Seen) -> f64;
+
+    /// Is told what the limit left of the command just asked for.
+    fn limited(&mut self, _given: f64) {}
+
+    /// Forgets all it has seen.
+    fn reset(&mut self);
+}
+
+/// The timing of a loop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Loop {
+    /// Sample time T, s.
+    pub every: f64,
+    /// Time from a sample to its command, s.
+    pub delay: f64,
+    /// Largest command either way, V or A.
+    pub limit: Option<f64>,
+    /// How far ahead of a sample [`Seen::ahead`] is, s.
+    pub lead: f64,
+}
+
+/// A controller's sample, kept.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// s.
+    pub time: f64,
+    /// Reference of the cart, m.
+    pub reference: f64,
+    /// Measured position, m.
+    pub measured: f64,
+    /// Command before the limit, V or A.
+    pub asked: f64,
+    /// Command after it.
+    pub given: f64,
+}
+
+/// Decides the input: samples, asks the controller, limits, and hands on when the delay is over.
+pub(super) struct Sampled<'a> {
+    controller: &'a mut dyn Controller,
+    profile: &'a Profile,
+    timing: Loop,
+    sensor: Sensor,
+    /// Next sample, and the place in it: at the sample, or where a delayed command takes over.
+    k: u64,
+    halfway: bool,
+    /// Whole samples of delay, and what is left of it, s.
+    rest: f64,
+    waiting: VecDeque<f64>,
+    acting: f64,
+    /// Samples at the limit.
+    pub(super) limited: u64,
+    pub(super) samples: u64,
+    pub(super) kept: Option<Vec<Sample>>,
+}
+
+impl<'a> Sampled<'a> {
+    pub(super) fn new(
+        stage: &Stage,
+        controller: &'a mut dyn Controller,
+        timing: Loop,
+        profile: &'a Profile,
+        keep: bool,
+    ) -> Self {
+        let ratio = timing.delay / timing.every;
+        // A delay of whole samples is one, whatever rounding says.
+        let near = ratio.round();
+        let whole = if (ratio - near).abs() < 1e-9 * near.max(1.0) { near } else { ratio.floor() };
+        let rest = if whole == near && (ratio - near).abs() < 1e-9 * near.max(1.0) {
+            0.0
+        } else {
+            timing.delay - whole * timing.every
+        };
+        Self {
+            controller,
+            profile,
+            timing,
+            sensor: Sensor::new(stage),
+            k: 0,
+            halfway: false,
+            rest,
+            waiting: std::iter::repeat_n(0.0, whole as usize).collect(),
+            acting: 0.0,
+            limited: 0,
+            samples: 0,
+            kept: keep.then(Vec::new),
+        }
+    }
+}
+
+impl Decide for Sampled<'_> {
+    fn decide(&mut self, _: f64, state: &State, current: f64) -> (f64, f64) {
+        let Loop { every, lead, limit, .. } = self.timing;
+        let time = self.k as f64 * every;
+        if self.halfway {
+            self.halfway = false;
+            self.k += 1;
+            self.acting = self.waiting.pop_front().unwrap_or(0.0);
+            return (self.acting, time + every);
+        }
+        let seen = Seen {
+            time,
+            reference: self.profile.at(time),
+            ahead: self.profile.at(time + lead),
+            position: self.sensor.read(state),
+            current,
+        };
+        let asked = self.controller.step(&seen);
+        // What is no number asks for nothing.
+        let asked = if asked.is_finite() { asked } else { 0.0 };
+        let given = limit.map_or(asked, |limit| asked.clamp(-limit, limit));
+        self.controller.limited(given);
+        self.samples += 1;
+        self.limited += u64::from(given != asked);
+        if let Some(kept) = &mut self.kept {
+            kept.push(Sample { time, reference: seen.reference.position, measured: seen.position, asked, given });
+        }
+        self.waiting.push_back(given);
+        if self.rest > 0.0 {
+            self.halfway = true;
+            return (self.acting, time + self.rest);
+        }
+        self.k += 1;
+        self.acting = self.waiting.pop_front().unwrap_or(0.0);
+        (self.acting, self.k as f64 * every)
+    }
+}
+
+/// The encoder as a controller reads it, m along the belt; exact where the stage has none.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sensor {
+    place: usize,
+    /// m per unit of what it watches.
+    length: f64,
+    /// Counts per unit of that.
+    counts: Option<f64>,
+}
+
+impl Sensor {
+    pub(super) fn new(stage: &Stage) -> Self {
+        let counts = stage.encoder.map(|encoder: Encoder| encoder.counts_per_unit(stage.motor.gear_ratio));
+        let r = stage.pulley_radius;
+        let (place, length) = match stage.encoder.map(|encoder| encoder.at) {
+            Some(EncoderPlace::Cart) => (place::CART_POSITION, 1.0),
+            Some(EncoderPlace::DrivePulley) => (place::DRIVE_ANGLE, r),
+            Some(EncoderPlace::Motor) | None => (place::ROTOR_ANGLE, r),
+        };
+        Self { place, length, counts }
+    }
+
+    pub(super) fn read(&self, state: &State) -> f64 {
+        let value = state[self.place];
+        self.length * self.counts.map_or(value, |counts| (value * counts).round() / counts)
+    }
+
+    /// One count, m; 0 where it reads exactly.
+    pub(super) fn step(&self) -> f64 {
+        self.counts.map_or(0.0, |counts| self.length / counts)
+    }
+}
+
+/// Whether the encoder of this stage sits at the cart.
+pub fn measures_cart(stage: &Stage) -> bool {
+    stage.encoder.is_some_and(|encoder| encoder.at == EncoderPlace::Cart)
+}
+
+impl Loop {
+    /// That of a design.
+    pub fn of(design: &crate::design::Design) -> Self {
+        let lead = design.feed_forward.lead.unwrap_or(design.delay + 0.5 * design.every);
+        Self { every: design.every, delay: design.delay, limit: design.limit, lead }
+    }
+}
+
+/// Speed from a measured position: differences through a filter of first order.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Speed {
+    every: f64,
+    keep: f64,
+    last: Option<f64>,
+    value: f64,
+}
+
+impl Speed {
+    /// With a corner at `filter`, Hz.
+    pub(super) fn new(every: f64, filter: f64) -> Self {
+        Self { every, keep: (-2.0 * std::f64::consts::PI * filter * every).exp(), last: None, value: 0.0 }
+    }
+
+    pub(super) fn step(&mut self, position: f64) -> f64 {
+        let difference = (position - self.last.unwrap_or(position)) / self.every;
+        self.last = Some(position);
+        self.value = self.keep * self.value + (1.0 - self.keep) * difference;
+        self.value
+    }
+
+    pub(super) fn reset(&mut self) {
+        (self.last, self.value) = (None, 0.0);
+    }
+}

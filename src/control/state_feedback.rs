@@ -1,0 +1,221 @@
+//! State feedback with a Kalman filter: LQG, and with an integral LQI.
+
+use super::compensation::{Compensation, Rigid};
+use super::model::Linear;
+use super::riccati;
+use super::sampled::Sensor;
+use crate::design::{Design, StateFeedback};
+use crate::error::Result;
+use crate::plant::place;
+use crate::signal::profile::Reference;
+use crate::stage::Stage;
+use nalgebra::{DMatrix, DVector};
+
+/// A linear-quadratic regulator on the states that a Kalman filter estimates, both for the sampled axis with its delay.
+#[derive(Debug, Clone)]
+pub struct StateFeedbackState {
+    every: f64,
+    radius: f64,
+    states: Vec<usize>,
+    phi: DMatrix<f64>,
+    /// Effect over a sample of the command that takes over within it, and of the one before.
+    now: DVector<f64>,
+    before: DVector<f64>,
+    measured: DVector<f64>,
+    kalman: DVector<f64>,
+    /// u = −K (x − x*), then of commands under way, then of the integral.
+    gain: DVector<f64>,
+    pending: usize,
+    has_integral: bool,
+    /// Weight of the disturbance as a command: what dry friction amounts to.
+    estimate: DVector<f64>,
+    scratch: DVector<f64>,
+    wanted: DVector<f64>,
+    started: bool,
+    /// The last commands beside feed-forward, latest first, and as the axis got them.
+    own: Vec<f64>,
+    given: Vec<f64>,
+    integral: f64,
+    integrated: f64,
+    last_own: f64,
+    /// Residuals of the two Riccati equations.
+    pub residuals: [f64; 2],
+}
+
+impl StateFeedbackState {
+    /// For a model of the axis.
+    pub fn new(weights: &StateFeedback, stage: &Stage, design: &Design) -> Result<Self> {
+        let linear = Linear::of(stage);
+        let n = linear.a.nrows();
+        let every = design.every;
+        let ratio = design.delay / every;
+        let near = (ratio - ratio.round()).abs() < 1e-9 * ratio.max(1.0);
+        let whole = if near { ratio.round() } else { ratio.floor() };
+        let rest = if near { 0.0 } else { design.delay - whole * every };
+        let whole = whole as usize;
+        let (phi, both) = linear.sampled(every);
+        let (late, after) = linear.sampled(every - rest);
+        let (_, early) = linear.sampled(rest.max(0.0));
+        // x⁺ = Φ x + Γ₀ u_{k−d} + e^{A(T−ρ)} Γ(ρ) u_{k−d−1}
+        let now = after.column(0).into_owned();
+        let before = if rest > 0.0 { &late * early.column(0) } else { DVector::zeros(n) };
+        let pending = whole + usize::from(rest > 0.0);
+
+        // States of the regulator: those of the axis, commands under way, the integral.
+        let integral = weights.integral.is_some();
+        let size = n + pending + usize::from(integral);
+        let (mut a, mut b) = (DMatrix::zeros(size, size), DMatrix::zeros(size, 1));
+        a.view_mut((0, 0), (n, n)).copy_from(&phi);
+        for (lag, effect) in [(whole, &now), (whole + 1, &before)] {
+            match lag {
+                0 => b.view_mut((0, 0), (n, 1)).copy_from(effect),
+                lag if lag <= pending => a.view_mut((0, n + lag - 1), (n, 1)).copy_from(effect),
+                _ => {}
+            }
+        }
+        if pending > 0 {
+            b[(n, 0)] = 1.0;
+            for lag in 1..pending {
+                a[(n + lag, n + lag - 1)] = 1.0;
+            }
+        }
+        let mut q = DMatrix::zeros(size, size);
+        let mut weigh = |row: &nalgebra::RowDVector<f64>, scale: f64| {
+            for i in 0..n {
+                for j in 0..n {
+                    q[(i, j)] += row[i] * row[j] / (scale * scale);
+                }
+            }
+        };
+        weigh(&linear.cart, weights.position);
+        if let Some(speed) = weights.speed {
+            weigh(&linear.cart_speed, speed);
+        }
+        if let Some(scale) = weights.integral {
+            let last = size - 1;
+            a[(last, last)] = 1.0;
+            for j in 0..n {
+                a[(last, j)] = every * linear.measured[j];
+            }
+            q[(last, last)] = 1.0 / (scale * scale);
+        }
+        let r = DMatrix::from_element(1, 1, 1.0 / (weights.command * weights.command));
+        let regulator = riccati::discrete(&a, &b, &q, &r)?;
+
+        // The filter is the same problem transposed; what is unknown acts at the command, and as the same force at the cart.
+        let force = Rigid::of(stage).force_per_command();
+        let mut noise = DMatrix::zeros(n, n);
+        for (column, scale) in [(0, weights.disturbance), (1, weights.disturbance * force)] {
+            let effect = both.column(column) * scale;
+            noise += &effect * effect.transpose();
+        }
+        let spread = weights.noise.max(0.3 * Sensor::new(stage).step());
+        let measured = linear.measured.transpose();
+        let filter = riccati::discrete(
+            &phi.transpose(),
+            &DMatrix::from_column_slice(n, 1, measured.as_slice()),
+            &noise,
+            &DMatrix::from_element(1, 1, spread * spread),
+        )?;
+        // L = P cᵀ/(c P cᵀ + V), before the prediction
+        let p = &filter.x * &measured;
+        let kalman = &p / (measured.dot(&p) + spread * spread);
+        Ok(Self {
+            every,
+            radius: stage.pulley_radius,
+            states: linear.states,
+            phi,
+            now,
+            before,
+            measured,
+            kalman,
+            gain: regulator.gain.row(0).transpose(),
+            pending,
+            has_integral: integral,
+            estimate: DVector::zeros(n),
+            scratch: DVector::zeros(n),
+            wanted: DVector::zeros(n),
+            started: false,
+            own: vec![0.0; pending],
+            given: vec![0.0; pending + 1],
+            integral: 0.0,
+            integrated: 0.0,
+            last_own: 0.0,
+            residuals: [regulator.residual, filter.residual],
+        })
+    }
+
+    /// The next command beside feed-forward.
+    pub fn step(&mut self, reference: &Reference, compensation: &Compensation, position: f64) -> f64 {
+        // What the states should be, were the cart where it should be.
+        let needed = compensation.needed(reference);
+        let r = self.radius;
+        let current = needed.force[0] / compensation.rigid.force_per_ampere;
+        for (wanted, &state) in self.wanted.iter_mut().zip(&self.states) {
+            *wanted = match state {
+                place::DRIVE_ANGLE | place::ROTOR_ANGLE => needed.drive.position / r,
+                place::DRIVE_SPEED | place::ROTOR_SPEED => needed.drive.speed / r,
+                place::CART_POSITION => reference.position,
+                place::CART_SPEED => reference.speed,
+                place::IDLER_ANGLE => needed.idler[0] / r,
+                place::IDLER_SPEED => needed.idler[1] / r,
+                _ => current,
+            };
+        }
+        if !self.started {
+            self.started = true;
+            // At rest where it is measured.
+            for (x, &state) in self.estimate.iter_mut().zip(&self.states) {
+                *x = match state {
+                    place::CART_POSITION => position,
+                    place::DRIVE_ANGLE | place::IDLER_ANGLE | place::ROTOR_ANGLE => position / r,
+                    _ => 0.0,
+                };
+            }
+        }
+        let surprise = position - self.measured.dot(&self.estimate);
+        self.estimate.axpy(surprise, &self.kalman, 1.0);
+        let mut command = 0.0;
+        let n = self.estimate.len();
+        for i in 0..n {
+            command -= self.gain[i] * (self.estimate[i] - self.wanted[i]);
+        }
+        for (i, own) in self.own.iter().enumerate() {
+            command -= self.gain[n + i] * own;
+        }
+        if self.has_integral {
+            command -= self.gain[n + self.pending] * self.integral;
+            self.integrated = self.every * (position - self.measured.dot(&self.wanted));
+            self.integral += self.integrated;
+        }
+        self.last_own = command;
+        command
+    }
+
+    /// Is told what the limit took (`excess`), and what the axis gets beside what dry friction takes of it.
+    pub fn limited(&mut self, excess: f64, effective: f64) {
+        if excess != 0.0 && self.has_integral {
+            // What has no effect is not gathered.
+            self.integral -= self.integrated;
+        }
+        self.own.insert(0, self.last_own + excess);
+        self.own.truncate(self.pending);
+        self.given.insert(0, effective);
+        self.given.truncate(self.pending + 1);
+        let lag = if self.before.iter().any(|v| *v != 0.0) { self.pending - 1 } else { self.pending };
+        self.scratch.gemv(1.0, &self.phi, &self.estimate, 0.0);
+        self.scratch.axpy(self.given[lag], &self.now, 1.0);
+        if let Some(&previous) = self.given.get(lag + 1) {
+            self.scratch.axpy(previous, &self.before, 1.0);
+        }
+        std::mem::swap(&mut self.scratch, &mut self.estimate);
+    }
+
+    /// Forgets.
+    pub fn reset(&mut self) {
+        self.started = false;
+        self.own.fill(0.0);
+        self.given.fill(0.0);
+        (self.integral, self.integrated, self.last_own) = (0.0, 0.0, 0.0);
+    }
+}

@@ -1,0 +1,208 @@
+//! What a controller is, in data: its timing, its structure with its gains, and what stands around it.
+//!
+//! A command is in units of the amplifier's input (V in voltage mode, A in current mode), a position in m along the belt: of an
+//! encoder at motor or pulley r φ, of one at the cart x. [`crate::control`] steps it in time.
+
+/// A sampled controller.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Design {
+    /// Sample time T, s.
+    pub every: f64,
+    /// Time from a sample to the command that follows from it, s; it may be longer than T.
+    pub delay: f64,
+    /// Largest command, either way, V or A; none without a limit of its own.
+    pub limit: Option<f64>,
+    /// What it makes of the error.
+    pub structure: Structure,
+    /// What it adds from the reference alone.
+    pub feed_forward: FeedForward,
+    /// What it estimates and takes away.
+    pub disturbance_observer: Option<DisturbanceObserver>,
+    /// Filters on what the structure gives, in this order.
+    pub filters: Vec<Filter>,
+    /// Impulses (time, s; amplitude) that the reference is convolved with; amplitudes add up to 1. Empty for none.
+    pub shaper: Vec<[f64; 2]>,
+}
+
+/// The structure and its gains.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Structure {
+    /// u = K_p e + K_i ∫e dt + K_d ė, the derivative filtered.
+    Pid(Pid),
+    /// Position loop around speed loop, around a current loop if there is one.
+    Cascade(Cascade),
+    /// Feedback of the states that a Kalman filter estimates.
+    StateFeedback(StateFeedback),
+    /// Sliding mode with a boundary layer.
+    SlidingMode(SlidingMode),
+    /// A table of rules.
+    Fuzzy(Fuzzy),
+}
+
+impl Structure {
+    /// Its name for people.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Structure::Pid(_) => "PID",
+            Structure::Cascade(Cascade { current: None, .. }) => "cascade P-PI",
+            Structure::Cascade(_) => "cascade P-PI-PI",
+            Structure::StateFeedback(StateFeedback { integral: None, .. }) => "state feedback (LQG)",
+            Structure::StateFeedback(_) => "state feedback (LQI)",
+            Structure::SlidingMode(_) => "sliding mode",
+            Structure::Fuzzy(Fuzzy { incremental: false, .. }) => "fuzzy PD",
+            Structure::Fuzzy(_) => "fuzzy PI",
+        }
+    }
+}
+
+/// Gains of a PID controller.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pid {
+    /// K_p, V/m or A/m.
+    pub proportional: f64,
+    /// K_i, V/(m s) or A/(m s).
+    pub integral: f64,
+    /// K_d, V s/m or A s/m.
+    pub derivative: f64,
+    /// Corner of the derivative's filter, Hz.
+    pub filter: f64,
+    /// Time in which the integral follows a command that is limited, s.
+    pub tracking: f64,
+}
+
+/// Gains of a cascade.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cascade {
+    /// K_v, 1/s: speed asked for per error of position.
+    pub position: f64,
+    /// V s/m or A s/m; with a current loop A s/m.
+    pub speed: f64,
+    /// V/m or A/m; with a current loop A/m.
+    pub speed_integral: f64,
+    /// Corner of the filter of the measured speed, Hz.
+    pub filter: f64,
+    /// Time in which the integrals follow what is limited, s.
+    pub tracking: f64,
+    /// The current loop; needs an amplifier in voltage mode.
+    pub current: Option<CurrentLoop>,
+}
+
+/// A sampled current loop inside a cascade.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CurrentLoop {
+    /// V/A.
+    pub proportional: f64,
+    /// V/(A s).
+    pub integral: f64,
+    /// Largest current asked for, A.
+    pub limit: Option<f64>,
+}
+
+/// Weights of a linear-quadratic regulator and spreads for its Kalman filter: each an amount that counts as much as the others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StateFeedback {
+    /// Error of the cart's position, m.
+    pub position: f64,
+    /// Error of its speed, m/s, if that counts.
+    pub speed: Option<f64>,
+    /// Integral of the measured error, m s, if there is one.
+    pub integral: Option<f64>,
+    /// Command, V or A.
+    pub command: f64,
+    /// Standard deviation of an unknown command that acts along, V or A, new at each sample.
+    pub disturbance: f64,
+    /// Standard deviation of a measured position, m.
+    pub noise: f64,
+}
+
+/// Parameters of a sliding-mode controller, σ = ė + λ e.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SlidingMode {
+    /// λ, 1/s: how fast the error goes on the sliding surface.
+    pub bandwidth: f64,
+    /// K, m/s²: acceleration that drives to the surface.
+    pub reaching: f64,
+    /// Φ, m/s: |σ| below which it is only a part of that.
+    pub boundary: f64,
+    /// 1/s²: of an integral of the error in σ; 0 for none.
+    pub integral: f64,
+    /// Corner of the filter of the measured speed, Hz.
+    pub filter: f64,
+}
+
+/// A fuzzy controller: triangular sets, the same on both axes, and a singleton for each pair of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fuzzy {
+    /// Error at the outermost sets, m.
+    pub error: f64,
+    /// Its rate at the outermost sets, m/s.
+    pub rate: f64,
+    /// Command of a rule of 1, V or A; of an incremental one, V/s or A/s.
+    pub command: f64,
+    /// Whether rules change the command (PI) instead of giving it (PD).
+    pub incremental: bool,
+    /// rules[i][j] from −1 to 1 for set i of the error and set j of its rate, both from negative to positive; a square of odd size.
+    pub rules: Vec<Vec<f64>>,
+    /// Corner of the filter of the rate, Hz.
+    pub filter: f64,
+}
+
+/// What the reference alone tells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FeedForward {
+    /// Which model tells it.
+    pub model: FeedForwardModel,
+    /// Share of the inertia's part.
+    pub inertia: f64,
+    /// Share of the friction's.
+    pub friction: f64,
+    /// Whether an encoder at the motor is given the cart's reference with the belt's stretch added.
+    pub compensate_stretch: bool,
+    /// How far ahead of the sample the reference is looked at, s; delay + T/2 where it is not said.
+    pub lead: Option<f64>,
+}
+
+impl FeedForward {
+    /// None at all.
+    pub const NONE: Self =
+        Self { model: FeedForwardModel::None, inertia: 1.0, friction: 1.0, compensate_stretch: false, lead: None };
+}
+
+/// How much of the axis feed-forward knows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FeedForwardModel {
+    /// Nothing.
+    None,
+    /// One mass with its friction (Li & Rehani 1996).
+    Rigid,
+    /// The belt's stretch, too: needs a reference of fourth order for all of it.
+    Elastic,
+}
+
+/// An observer of a disturbance at the command: one mass, its friction, and a third pole for the disturbance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DisturbanceObserver {
+    /// All three poles, Hz.
+    pub bandwidth: f64,
+}
+
+/// A filter of second order, sampled by Tustin's rule with its frequency kept.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Filter {
+    /// (s² + 2 ζ_z ω s + ω²)/(s² + 2 ζ_p ω s + ω²)
+    Notch {
+        /// Hz.
+        frequency: f64,
+        /// ζ_z: the less, the deeper; the gain at the frequency is ζ_z/ζ_p.
+        depth: f64,
+        /// ζ_p: the more, the wider.
+        damping: f64,
+    },
+    /// ω²/(s² + 2 ζ ω s + ω²)
+    LowPass {
+        /// Hz.
+        frequency: f64,
+        /// ζ.
+        damping: f64,
+    },
+}
