@@ -3,6 +3,9 @@
  * each Coulomb friction, v_s = 0.05 m/s at the belt; adams-fixed: fixed-point iteration instead of Newton's with the Jacobian).
  * Prints the best run's seconds, the number of events, and the 1001 samples of phi1, x, phi3.
  *
+ * For a fit: cvode fit METHOD RTOL. Each line of the standard input is a run: the pulse's volts, three viscous and three Coulomb
+ * frictions. The answer is 1001 doubles of phi1, then 1001 of x, in binary; NaN where the run failed.
+ *
  *   J phi1'' = -r f1 + r f3 - tau_f1 + K_t i     f1 = k1 (r phi1 - x)      i = (u - K_e w1) / R
  *   M x''    =  f1 - f2 - F_f                    f2 = k2 (x - r phi3)
  *   J phi3'' =  r f2 - r f3 - tau_f2             f3 = k3 (r phi3 - r phi1)
@@ -30,7 +33,7 @@
 
 static const double r = 0.0194, k1 = 1.3276e5, k2 = 1.3276e5, k3 = 5.8885e4, M = 0.362, J = 6.3e-5;
 static const double Kt = 23e-3, Ke = 23e-3, R = 0.71;
-static const double viscous[3] = {0.0016, 19.0424, 0.0016}, coulomb[3] = {0.015, 0.2, 0.015};
+static double viscous[3] = {0.0016, 19.0424, 0.0016}, coulomb[3] = {0.015, 0.2, 0.015}, pulse = 5.0;
 static const double above[3] = {0.3 * 0.015, 0.3 * 0.2, 0.3 * 0.015}, vs[3] = {0.05 / 0.0194, 0.05, 0.05 / 0.0194};
 
 typedef struct {
@@ -125,7 +128,7 @@ static void check(int status, const char *what) {
 /* One run from rest; samples y[k] at k ms. Returns the number of events. */
 static int simulate(void *cvode, N_Vector y, Machine *m, double (*samples)[STATES]) {
     static const double edges[] = {0.25, 1.0};
-    static const double volts[] = {5.0, 0.0};
+    const double volts[] = {pulse, 0.0};
     double *state = NV_DATA_S(y), t = 0.0, load[3];
     int events = 0, sample = 1;
     memset(state, 0, STATES * sizeof(double));
@@ -164,10 +167,7 @@ static int simulate(void *cvode, N_Vector y, Machine *m, double (*samples)[STATE
                         events++;
                     }
                 }
-                if (events > MOST_EVENTS) {
-                    fprintf(stderr, "chatter: the tolerance is too loose\n");
-                    exit(1);
-                }
+                if (events > MOST_EVENTS) return events;
                 check(CVodeReInit(cvode, t, y), "CVodeReInit");
                 check(CVodeSetStopTime(cvode, edges[piece]), "CVodeSetStopTime");
             }
@@ -177,9 +177,23 @@ static int simulate(void *cvode, N_Vector y, Machine *m, double (*samples)[STATE
     return events;
 }
 
+/* Runs as the standard input asks for them. */
+static int serve(void *cvode, N_Vector y, Machine *m, double (*samples)[STATES]) {
+    static double out[2][SAMPLES + 1];
+    while (scanf("%lf %lf %lf %lf %lf %lf %lf", &pulse, viscous, viscous + 1, viscous + 2, coulomb, coulomb + 1, coulomb + 2) == 7) {
+        memcpy(m->breakaway, coulomb, sizeof coulomb);
+        int failed = simulate(cvode, y, m, samples) > MOST_EVENTS;
+        for (int k = 0; k <= SAMPLES; k++) out[0][k] = failed ? NAN : samples[k][0], out[1][k] = failed ? NAN : samples[k][2];
+        fwrite(out, sizeof out, 1, stdout);
+        fflush(stdout);
+    }
+    return 0;
+}
+
 int main(int argc, char **argv) {
-    if (argc != 5) return fprintf(stderr, "usage: cvode coulomb|stribeck bdf|adams|adams-fixed RTOL RUNS\n"), 2;
-    int adams = !strncmp(argv[2], "adams", 5), fixed = !strcmp(argv[2], "adams-fixed"), runs = atoi(argv[4]), events = 0;
+    int fit = argc == 4 && !strcmp(argv[1], "fit");
+    if (argc != 5 && !fit) return fprintf(stderr, "usage: cvode coulomb|stribeck bdf|adams|adams-fixed RTOL RUNS\n"), 2;
+    int adams = !strncmp(argv[2], "adams", 5), fixed = !strcmp(argv[2], "adams-fixed"), runs = fit ? 0 : atoi(argv[4]), events = 0;
     double rtol = atof(argv[3]);
     static double samples[SAMPLES + 1][STATES];
     Machine m = {{0, 0, 0}, -1, 0.0, 0.0, !strcmp(argv[1], "stribeck"), {0.0, 0.0, 0.0}};
@@ -209,6 +223,8 @@ int main(int argc, char **argv) {
     check(CVodeSetNoInactiveRootWarn(cvode), "CVodeSetNoInactiveRootWarn");
     check(CVodeSetMaxNumSteps(cvode, 1000000), "CVodeSetMaxNumSteps");
 
+    if (fit) return serve(cvode, y, &m, samples);
+
     /* The best of the runs: what the method costs, not what else the computer did. */
     double best = INFINITY;
     for (int run = 0; run < runs; run++) {
@@ -218,6 +234,7 @@ int main(int argc, char **argv) {
         clock_gettime(CLOCK_MONOTONIC, &to);
         best = fmin(best, (to.tv_sec - from.tv_sec) + 1e-9 * (to.tv_nsec - from.tv_nsec));
     }
+    if (events > MOST_EVENTS) return fprintf(stderr, "chatter: the tolerance is too loose\n"), 1;
     printf("%.9e %d\n", best, events);
     for (int k = 0; k <= SAMPLES; k++)
         printf("%.17g %.17g %.17g\n", samples[k][0], samples[k][2], samples[k][4]);

@@ -60,6 +60,8 @@ VELOCITY = [0.05 / R, 0.05, 0.05 / R]  # v_s
 class Problem:
     """With a Stribeck curve or without, and the positions at the samples by authority B."""
 
+    viscous, coulomb, edges = VISCOUS, COULOMB, EDGES
+
     def __init__(self, name, share):
         self.name, self.curved = name, share > 0
         self.above = [share * c for c in COULOMB]
@@ -84,8 +86,8 @@ class Problem:
             a[2 * k, 2 * k + 1] = 1
             if mode:
                 a[2 * k + 1] = LOADS[k] / INERTIA[k]
-                a[2 * k + 1, 2 * k + 1] -= VISCOUS[k] / INERTIA[k]
-                b[2 * k + 1] = (PER_VOLT[k] * volts - mode * COULOMB[k]) / INERTIA[k]
+                a[2 * k + 1, 2 * k + 1] -= self.viscous[k] / INERTIA[k]
+                b[2 * k + 1] = (PER_VOLT[k] * volts - mode * self.coulomb[k]) / INERTIA[k]
                 sliding.append((2 * k + 1, mode * self.above[k] / INERTIA[k], 1 / VELOCITY[k]))
         if not self.curved:
             return lambda t, y: a @ y + b, a
@@ -131,7 +133,7 @@ def scipy_run(problem, method, rtol):
     y, t, modes, events = np.zeros(6), 0.0, [0, 0, 0], 0
     out = np.zeros((len(SAMPLES), 6))
     options = dict(method=method, rtol=rtol, atol=rtol * SIZE)
-    for (start, volts), end in zip(EDGES, (EDGES[1][0], SAMPLES[-1])):
+    for (_, volts), end in zip(problem.edges, (problem.edges[1][0], SAMPLES[-1])):
         left = None
         for k in range(3):
             if not modes[k] and (mode := problem.at_rest(k, LOADS[k] @ y + PER_VOLT[k] * volts)):

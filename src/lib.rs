@@ -56,7 +56,8 @@
 //!
 //! # Features
 //!
-//! `report` (default) adds figures and reports; `parquet` adds Parquet files. Without both the library is the physics alone.
+//! `report` (default) adds figures and reports; `parquet` adds Parquet files; `posterior` draws from the posterior of a fit.
+//! Without them the library is the physics alone.
 
 pub mod case;
 pub mod control;

@@ -9,7 +9,7 @@ use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 use std::collections::HashMap;
 use std::fmt;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 /// How many draws, from how many chains.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,6 +71,9 @@ struct Density<'a> {
 /// The logarithm of the density at a point, and its gradient into the second argument; none where the density is zero.
 pub type LogDensity<'a> = dyn Fn(&[f64], &mut [f64]) -> Option<f64> + Sync + 'a;
 
+/// Told how many draws all chains have made so far, those for tuning included; says whether to go on.
+pub type Watch<'a> = dyn Fn(usize) -> bool + Sync + 'a;
+
 impl fmt::Debug for Density<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "a density in {} dimensions", self.dimension)
@@ -106,13 +109,15 @@ impl CpuLogpFunc for Density<'_> {
     }
 }
 
-/// Draws from `log`, each chain beginning at one of `starts` in turn; each on a thread of its own. `stop` ends it early.
-pub fn sample(log: &LogDensity, starts: &[Vec<f64>], effort: Effort, stop: &AtomicBool) -> Result<Draws> {
+/// Draws from `log`, each chain beginning at one of `starts` in turn; each on a thread of its own. `watch` sees how far it is, and
+/// may end it early: then each chain keeps as many draws as the shortest has.
+pub fn sample(log: &LogDensity, starts: &[Vec<f64>], effort: Effort, watch: &Watch) -> Result<Draws> {
     let dimension = starts.first().map_or(0, Vec::len);
     if dimension == 0 || starts.iter().any(|start| start.len() != dimension) {
         return Err(Error::new("a sampler needs points of one or more dimensions to start from"));
     }
     let evaluations = AtomicU64::new(0);
+    let (made, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
     let run = |chain: usize| -> Result<(Vec<Vec<f64>>, u64)> {
         let settings = DiagNutsSettings { num_tune: effort.tune as u64, ..DiagNutsSettings::default() };
         // Each chain has a stream of its own.
@@ -126,13 +131,16 @@ pub fn sample(log: &LogDensity, starts: &[Vec<f64>], effort: Effort, stop: &Atom
         sampler.set_position(&starts[chain % starts.len()]).map_err(|error| fail(&error))?;
         let (mut draws, mut divergences) = (Vec::with_capacity(effort.draws), 0);
         for k in 0..effort.tune + effort.draws {
-            if stop.load(Ordering::Relaxed) {
+            if stopped.load(Ordering::Relaxed) {
                 break;
             }
             let (draw, progress) = sampler.draw().map_err(|error| fail(&error))?;
             if k >= effort.tune {
                 divergences += u64::from(progress.diverging);
                 draws.push(draw.to_vec());
+            }
+            if !watch(made.fetch_add(1, Ordering::Relaxed) + 1) {
+                stopped.store(true, Ordering::Relaxed);
             }
         }
         Ok((draws, divergences))
@@ -152,6 +160,8 @@ pub fn sample(log: &LogDensity, starts: &[Vec<f64>], effort: Effort, stop: &Atom
         draws.chains.push(chain);
         draws.divergences += divergences;
     }
+    let shortest = draws.chains.iter().map(Vec::len).min().unwrap_or(0);
+    draws.chains.iter_mut().for_each(|chain| chain.truncate(shortest));
     draws.evaluations = evaluations.into_inner();
     Ok(draws)
 }
@@ -309,7 +319,7 @@ mod tests {
 
     fn draw(log: &LogDensity, dimension: usize, effort: Effort) -> Draws {
         let starts: Vec<Vec<f64>> = (0..4).map(|k| vec![0.5 * f64::from(k) - 0.7; dimension]).collect();
-        sample(log, &starts, effort, &AtomicBool::new(false)).unwrap()
+        sample(log, &starts, effort, &|_| true).unwrap()
     }
 
     /// Two correlated normal variables with known moments.

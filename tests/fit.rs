@@ -1,7 +1,9 @@
 //! Fits: certified least-squares problems, machines whose truth is known, and what logs cannot tell.
 
-use rand_pcg::Pcg64;
-use rand_pcg::rand_core::{Rng, SeedableRng};
+#[path = "common/chance.rs"]
+mod chance;
+
+use chance::Chance;
 use std::sync::Arc;
 use taut::case::{Case, Plan, TEMPLATE};
 use taut::fit::least_squares::{Bounds, Ending, Options, Residuals, minimise};
@@ -99,24 +101,6 @@ fn certified_problems_of_nist_are_met() {
                 assert!((own / error - 1.0).abs() < 1e-5, "{name} error of b{}: {own} {error}", j + 1);
             }
         }
-    }
-}
-
-/// Uniform numbers from 0 to 1, and normal ones.
-struct Chance(Pcg64);
-
-impl Chance {
-    fn new(seed: u64) -> Self {
-        Self(Pcg64::seed_from_u64(seed))
-    }
-
-    fn uniform(&mut self) -> f64 {
-        (self.0.next_u64() >> 11) as f64 * 2f64.powi(-53)
-    }
-
-    /// By Box and Muller.
-    fn normal(&mut self) -> f64 {
-        (-2.0 * (1.0 - self.uniform()).ln()).sqrt() * (std::f64::consts::TAU * self.uniform()).cos()
     }
 }
 

@@ -8,9 +8,15 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 use taut::case::{Case, Experiment};
+use taut::fit::{Fit, fit};
 use taut::log::read_columns;
+use taut::measure::measure;
 use taut::signal::Signal;
-use taut::solve::{Ending, Solver, simulate};
+use taut::solve::{Ending, Flow, Solver, simulate};
+use taut::trajectory::CsvWriter;
+
+/// The paper's procedure, within its machine's folder.
+const PROCEDURE: &str = "sollmann-jouaneh/identification";
 
 /// Intervals between the rows that are kept of each experiment.
 const KEPT: usize = 5;
@@ -86,7 +92,7 @@ fn every_machine_gives_its_curves() {
 
 #[test]
 fn every_machine_says_what_it_is_and_where_its_numbers_are_from() {
-    for machine in entries(&stages()) {
+    for machine in entries(&stages()).into_iter().chain([stages().join(PROCEDURE)]) {
         let readme = fs::read_to_string(machine.join("README.md")).unwrap_or_default();
         assert!(readme.starts_with("# ") && readme.contains("ource"), "{}", machine.display());
         assert!(!cases(&machine).is_empty(), "{}", machine.display());
@@ -94,6 +100,55 @@ fn every_machine_says_what_it_is_and_where_its_numbers_are_from() {
             assert!(readme.contains(path.file_name().unwrap().to_str().unwrap()), "{name} is not in its README");
         }
     }
+}
+
+/// The synthetic logs of the paper's procedure are what Table 4 gives behind the rig's encoder.
+#[test]
+fn the_logs_of_the_procedure_are_made_by_table_4() {
+    let encoder = ["encoder.at=drive_pulley", "encoder.lines=3020.8"];
+    let case = Case::read_with(stages().join("sollmann-jouaneh/table4.toml"), &encoder).unwrap();
+    for experiment in &case.experiments {
+        let log = measure(&case.stage, &case.measurement.clone().unwrap_or_default(), experiment, Solver::Exact);
+        let file = std::env::temp_dir().join(format!("taut-{}-{}.csv", std::process::id(), experiment.file_name()));
+        let mut writer = CsvWriter::create(&file).unwrap();
+        writer.write(&log.unwrap().trajectory).unwrap();
+        writer.finish().unwrap();
+        let made = fs::read(&file).unwrap();
+        fs::remove_file(&file).unwrap();
+        let committed = stages().join(PROCEDURE).join(format!("logs/{}.measured.csv", experiment.file_name()));
+        assert!(made == fs::read(&committed).unwrap(), "{} is out of date", committed.display());
+    }
+}
+
+/// The paper's procedure: friction of one kind meets one voltage, of two kinds both, and the logs tell two sums of it.
+#[test]
+fn the_procedure_of_the_paper_comes_out() {
+    let fitted = |name: &str| {
+        let case = Case::read(stages().join(PROCEDURE).join(name)).unwrap();
+        let plan = case.fit.clone().unwrap();
+        (fit(&case, &plan, None, &mut |_| Flow::Continue), case.stage.pulley_radius)
+    };
+    let way = |fit: &Fit, r: f64| {
+        fit.logs
+            .iter()
+            .map(|log| {
+                let output = &log.outputs[0];
+                r * output.fitted.or(output.held_out).unwrap().rmse
+            })
+            .collect::<Vec<f64>>()
+    };
+    let (linear, r) = fitted("linear-5v.toml");
+    let linear = way(&linear.unwrap(), r);
+    assert!(linear[0] < 0.3e-3 && linear[1] > 40.0 * linear[0], "{linear:?} m");
+    let (both, r) = fitted("nonlinear.toml");
+    let both = both.unwrap();
+    assert!(way(&both, r).iter().all(|rmse| *rmse < 10.1e-6), "{:?} m", way(&both, r));
+    // 2 B + r² b and 2 τ_c + r F_c of Table 4
+    for (estimate, truth) in both.estimates.iter().zip([2.0 * 0.0016 + r * r * 19.0424, 2.0 * 0.015 + r * 0.2]) {
+        assert!((estimate.value / truth - 1.0).abs() < 1e-3, "{} {}", estimate.name, estimate.value);
+    }
+    let told = fitted("separate.toml").0.unwrap_err().to_string();
+    assert!(told.contains("do not determine"), "{told}");
 }
 
 /// The rig is Table 4 seen from before the gear: motion differs by what 19.404 mm instead of 19.4 mm of radius makes.

@@ -102,6 +102,12 @@ pub struct Simulate {
     /// Also write each run as a recorder logs it: [encoder] and [measurement] of the case
     #[arg(long, requires = "out")]
     pub as_measured: bool,
+    /// Also run machines drawn by `taut fit --posterior`, and write the band that 95 % of them stay in
+    #[arg(long, value_name = "FILE")]
+    pub draws: Option<PathBuf>,
+    /// How many of them to run
+    #[arg(long, value_name = "N", default_value_t = 200, requires = "draws", value_parser = count)]
+    pub bands: usize,
     /// Leave out the report and the plots
     #[arg(long)]
     pub no_report: bool,
@@ -227,7 +233,8 @@ pub struct Check {
 /// Find the parameters in [fit] of a case from its logs.
 ///
 /// Prints the estimates with 95 % intervals and how each log is met. With --out it also writes fitted.toml, a case that
-/// simulates with the estimates, fit.json, and a report with model and log side by side.
+/// simulates with the estimates, fit.json, and a report with model and log side by side; with --posterior also the draws,
+/// posterior.csv.
 #[derive(Debug, clap::Args)]
 #[command(after_help = FIT)]
 pub struct Fit {
@@ -239,6 +246,15 @@ pub struct Fit {
     /// Change one value of the case for this run, as often as needed
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub changes: Vec<String>,
+    /// Also draw from the posterior, with the priors in [fit.priors]: intervals where those of the fit are too simple
+    #[arg(long)]
+    pub posterior: bool,
+    /// Draws of each chain that are kept
+    #[arg(long, value_name = "N", default_value_t = 1000, requires = "posterior", value_parser = count)]
+    pub draws: usize,
+    /// Chains, each from a start of its own
+    #[arg(long, value_name = "N", default_value_t = 4, requires = "posterior", value_parser = count)]
+    pub chains: usize,
     /// Leave out the report
     #[arg(long)]
     pub no_report: bool,
@@ -254,6 +270,8 @@ const FIT: &str = "\
 Examples:
   taut fit axis.toml --out fitted
   taut fit axis.toml --set fit.starts=8 --json | jq .parameters
+  taut fit axis.toml --posterior --draws 2000 --out fitted
+  taut simulate fitted/fitted.toml --draws fitted/posterior.csv --out band
 
 Ctrl-C ends a fit early: the best so far is written and said not to be converged, with exit status 130.";
 
@@ -483,6 +501,14 @@ impl Simulate {
             }
             _ => Ok(solver),
         }
+    }
+}
+
+/// A number of draws or chains.
+fn count(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(number @ 1..=1_000_000) => Ok(number),
+        _ => Err("a whole number from 1 to 1000000 is needed".into()),
     }
 }
 

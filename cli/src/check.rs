@@ -2,7 +2,7 @@
 
 use crate::args::Check as Args;
 use crate::failure::{Outcome, Status};
-use crate::fit::plan;
+use crate::fit::{plan, table};
 use crate::terminal::{self, bold};
 use serde_json::json;
 use std::fmt::Write;
@@ -24,6 +24,20 @@ fn text(case: &Case, found: &Check) -> String {
     let _ = write!(text, "\n{}\n", bold("What the logs show"));
     for log in &found.logs {
         let _ = writeln!(text, "  {}: {}", log.name, log.told.join("; "));
+    }
+    if let Some(found) = &found.balance {
+        let _ = write!(text, "\n{}\n", bold("A rigid axis by regression, all at the drive pulley"));
+        let values = [found.inertia, found.viscous, found.coulomb, found.load];
+        let names = [("inertia", "kg m^2"), ("viscous", "N m s/rad"), ("Coulomb", "N m"), ("load", "N m")];
+        for ((name, unit), (value, error)) in names.iter().zip(values.iter().zip(found.errors)) {
+            let _ = writeln!(text, "  {name:<9}{} ± {}", table::value(*value, unit, 5), table::value(error, unit, 2));
+        }
+        let left = 100.0 * found.unexplained;
+        let _ = writeln!(
+            text,
+            "  {} equations, of whose torque {left:.1} % is left; a first guess, not a fit",
+            found.equations
+        );
     }
     let _ = write!(text, "\n{}\n", bold("How well each parameter would be known, all others free"));
     let known = &found.identifiability;
@@ -71,6 +85,15 @@ fn data(case: &Case, found: &Check) -> String {
             "determined": known.error[j].is_finite(),
             "sensitivity": number(known.sensitivity[j]),
         })).collect::<Vec<_>>(),
+        "regression": found.balance.map(|b| json!({
+            "inertia_kg_m2": b.inertia,
+            "viscous_N_m_s_rad": b.viscous,
+            "coulomb_N_m": b.coulomb,
+            "load_N_m": b.load,
+            "errors": b.errors,
+            "unexplained": b.unexplained,
+            "equations": b.equations,
+        })),
         "singular_values": known.singular.iter().map(|s| number(*s)).collect::<Vec<_>>(),
         "not_determined": known.groups.iter().zip(&found.choices).map(|(group, choices)| json!({
             "parameters": group.members.iter().map(|&j| &known.names[j]).collect::<Vec<_>>(),

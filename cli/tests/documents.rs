@@ -84,6 +84,11 @@ fn the_documentation_of_the_fit_shows_what_it_prints() {
 }
 
 #[test]
+fn the_papers_procedure_shows_what_the_program_prints() {
+    check("stages/sollmann-jouaneh/identification/README.md");
+}
+
+#[test]
 fn the_reference_of_the_commands_shows_their_help() {
     check("docs/commands.md");
 }
@@ -143,12 +148,14 @@ fn what_the_documents_name_is_there() {
         "docs/fit.md",
         "docs/logs.md",
         "docs/paper.md",
+        "docs/posterior.md",
         "docs/shape.md",
         "docs/tune.md",
         "docs/solver.md",
         "docs/general-solver.md",
         "docs/modes.md",
         "stages/sollmann-jouaneh/README.md",
+        "stages/sollmann-jouaneh/identification/README.md",
         "stages/printer-axis/README.md",
         "stages/laser-gantry/README.md",
         "stages/pendulepi/README.md",

@@ -4,7 +4,7 @@ use super::Experiment;
 use super::reader::{Field, Table, nearest};
 use super::tree::Kind;
 use crate::error::Result;
-use crate::parameter;
+use crate::parameter::{self, INPUT, Parameter, Range};
 
 /// What a fit may turn, and how it is done.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +17,8 @@ pub struct Plan {
     pub lumped: Vec<String>,
     /// Bounds that are given, SI, by name.
     pub bounds: Vec<(String, [f64; 2])>,
+    /// What is known beforehand, by name; counts for draws from the posterior alone.
+    pub priors: Vec<(String, Prior)>,
     /// What is fitted along with each log.
     pub nuisance: Nuisances,
     /// Whether residuals beyond 1.345 standard deviations count linearly.
@@ -41,6 +43,7 @@ impl Default for Plan {
             tied: Vec::new(),
             lumped: Vec::new(),
             bounds: Vec::new(),
+            priors: Vec::new(),
             nuisance: Nuisances::default(),
             huber: false,
             starts: 1,
@@ -48,6 +51,51 @@ impl Default for Plan {
             held_out: Vec::new(),
             until: None,
             windows: None,
+        }
+    }
+}
+
+/// What is known of a number before its logs are seen; SI.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Prior {
+    /// Normally distributed.
+    Normal {
+        /// Its mean.
+        mean: f64,
+        /// Its standard deviation.
+        deviation: f64,
+    },
+    /// Its logarithm is normally distributed.
+    LogNormal {
+        /// Its median.
+        median: f64,
+        /// Standard deviation of its logarithm.
+        deviation: f64,
+    },
+    /// Equally likely everywhere between two values, and nowhere else.
+    Uniform {
+        /// The least.
+        low: f64,
+        /// The greatest.
+        high: f64,
+    },
+}
+
+impl Prior {
+    /// The logarithm of its density at `p`, but for a constant, and the derivative of that.
+    pub fn log(self, p: f64) -> (f64, f64) {
+        match self {
+            // −½ ((p − m)/s)²
+            Prior::Normal { mean, deviation } => {
+                let off = (p - mean) / deviation;
+                (-0.5 * off * off, -off / deviation)
+            }
+            // −½ (ln(p/m)/s)² − ln p
+            Prior::LogNormal { median, deviation } => {
+                let off = (p / median).ln() / deviation;
+                (-0.5 * off * off - p.ln(), -(off / deviation + 1.0) / p)
+            }
+            Prior::Uniform { .. } => (0.0, 0.0),
         }
     }
 }
@@ -82,7 +130,7 @@ pub enum Scope {
 pub(super) fn plan(root: &Table, experiments: &[Experiment]) -> Result<Option<Plan>> {
     let Some(field) = root.optional("fit") else { return Ok(None) };
     let table = field.table()?;
-    let known = ["free", "tied", "lumped", "bounds", "nuisance", "loss", "held_out"];
+    let known = ["free", "tied", "lumped", "bounds", "priors", "nuisance", "loss", "held_out"];
     table.check_keys(&known, &[])?;
     let free = table.optional("free").map_or(Ok(Vec::new()), |field| words(&field))?;
     let tied = match table.optional("tied") {
@@ -119,9 +167,11 @@ pub(super) fn plan(root: &Table, experiments: &[Experiment]) -> Result<Option<Pl
     }
     let huber =
         table.optional("loss").map_or(Ok(false), |field| field.choice(&[("squares", false), ("huber", true)]))?;
+    let nuisance = nuisances(&table)?;
     Ok(Some(Plan {
         bounds: bounds(&table, &seen)?,
-        nuisance: nuisances(&table)?,
+        priors: priors(&table, &seen, nuisance)?,
+        nuisance,
         huber,
         starts: table.number("starts")? as usize,
         seed: table.number("seed")? as u64,
@@ -150,35 +200,131 @@ fn bounds(table: &Table, names: &[&str]) -> Result<Vec<(String, [f64; 2])>> {
     let given = field.table()?;
     for key in given.keys() {
         let Some(field) = given.optional(key) else { continue };
-        if !names.contains(&key) {
-            let error = field.fail(format!("`{key}` is not searched for")).allowed(names.join(", "));
-            return Err(match nearest(key, names) {
-                Some(near) => error.next(format!("did you mean `{near}`?")),
-                None => error,
-            });
-        }
-        let row = parameter::find(key).or_else(|| parameter::find(key.rsplit_once('.')?.0));
-        let ends = field.list()?;
-        let [low, high] = &ends[..] else {
-            return Err(field
-                .fail(format!("the list has {} values", ends.len()))
-                .allowed("two: the least and the most"));
-        };
-        let value = |end: &Field| match row {
-            Some(row) => end.number_of(row),
-            None => match &end.node.kind {
-                Kind::Float(value) => Ok(*value),
-                Kind::Integer(value) => Ok(*value as f64),
-                other => Err(end.fail(format!("{} stands where a number in SI units is wanted", other.word()))),
-            },
-        };
-        let (low, high) = (value(low)?, value(high)?);
-        if low >= high {
-            return Err(field.fail(format!("{low} is not below {high}")).allowed("the least value, then the most"));
-        }
-        bounds.push((key.to_string(), [low, high]));
+        searched(&field, key, names)?;
+        bounds.push((key.to_string(), ends(&field, key)?));
     }
     Ok(bounds)
+}
+
+/// Refuses a name that is not searched for.
+fn searched(field: &Field, key: &str, names: &[&str]) -> Result<()> {
+    if names.contains(&key) {
+        return Ok(());
+    }
+    let error = field.fail(format!("`{key}` is not searched for")).allowed(names.join(", "));
+    Err(match nearest(key, names) {
+        Some(near) => error.next(format!("did you mean `{near}`?")),
+        None => error,
+    })
+}
+
+/// The least and the greatest value of the parameter `key`.
+fn ends(field: &Field, key: &str) -> Result<[f64; 2]> {
+    let [low, high] = two(field, "two: the least and the most")?;
+    let (low, high) = (value(&low, key)?, value(&high, key)?);
+    if low >= high {
+        return Err(field.fail(format!("{low} is not below {high}")).allowed("the least value, then the most"));
+    }
+    Ok([low, high])
+}
+
+/// The two values of a list.
+fn two<'a>(field: &Field<'a>, wanted: &str) -> Result<[Field<'a>; 2]> {
+    let list = field.list()?;
+    let count = list.len();
+    list.try_into().map_err(|_| field.fail(format!("the list has {count} values")).allowed(wanted))
+}
+
+/// A number of the parameter `key`: in its range; in SI units, where it is a group's.
+fn value(field: &Field, key: &str) -> Result<f64> {
+    match row_of(key) {
+        Some(row) => field.number_of(&row),
+        None => plain(field, "a number in SI units"),
+    }
+}
+
+/// A number without a unit.
+fn plain(field: &Field, wanted: &str) -> Result<f64> {
+    match &field.node.kind {
+        Kind::Float(value) if value.is_finite() => Ok(*value),
+        Kind::Integer(value) => Ok(*value as f64),
+        Kind::Float(value) => Err(field.fail(format!("{value} stands where {wanted} is wanted"))),
+        other => Err(field.fail(format!("{} stands where {wanted} is wanted", other.word()))),
+    }
+}
+
+/// The row of the table of parameters, of the table of the fit's nuisances too.
+fn row_of(key: &str) -> Option<Parameter> {
+    let unit = match key {
+        "delay" => "s",
+        "input_offset" => INPUT,
+        "input_gain" => "",
+        _ => return parameter::find(key).or_else(|| parameter::find(key.rsplit_once('.')?.0)).copied(),
+    };
+    let example = match key {
+        "delay" => "2 ms",
+        "input_offset" => "0.1 V",
+        _ => "1",
+    };
+    let default = parameter::Fallback::Required;
+    Some(Parameter { key: "", symbol: "", unit, default, range: Range::ANY, sentence: "", example })
+}
+
+fn priors(table: &Table, names: &[&str], nuisance: Nuisances) -> Result<Vec<(String, Prior)>> {
+    let Some(field) = table.optional("priors") else { return Ok(Vec::new()) };
+    let own = [("delay", nuisance.delay), ("input_gain", nuisance.input_gain), ("input_offset", nuisance.input_offset)];
+    let mut names = names.to_vec();
+    names.extend(own.iter().filter(|(_, scope)| *scope != Scope::Off).map(|(name, _)| *name));
+    let given = field.table()?;
+    let mut priors = Vec::new();
+    for key in given.keys() {
+        let Some(field) = given.optional(key) else { continue };
+        searched(&field, key, &names)?;
+        priors.push((key.to_string(), prior(&field, key)?));
+    }
+    Ok(priors)
+}
+
+const PRIORS: &str =
+    "normal = [mean, deviation], log_normal = [median, deviation of the logarithm], uniform = [least, most]";
+
+fn prior(field: &Field, key: &str) -> Result<Prior> {
+    let table = field.table()?;
+    table.check_keys(&["normal", "log_normal", "uniform"], &[])?;
+    let mut kinds = table.keys();
+    let (Some(kind), None) = (kinds.next(), kinds.next()) else {
+        let count = table.keys().count();
+        return Err(field.fail(format!("{count} priors stand here")).allowed(format!("one of {PRIORS}")));
+    };
+    let Some(field) = table.optional(kind) else { return Err(field.fail("this prior is empty")) };
+    let positive = |deviation: &Field, value: f64| match value > 0.0 {
+        true => Ok(value),
+        false => Err(deviation
+            .fail(format!("a deviation of {value} leaves nothing to draw"))
+            .allowed("above zero")
+            .next("leave a parameter that is known exactly out of [fit]")),
+    };
+    match kind {
+        "normal" => {
+            let [mean, deviation] = two(&field, "two: the mean and the standard deviation")?;
+            // A deviation has the parameter's unit and not its range.
+            let wide = match row_of(key) {
+                Some(row) => deviation.number_of(&Parameter { range: Range::ANY, ..row })?,
+                None => plain(&deviation, "a number in SI units")?,
+            };
+            Ok(Prior::Normal { mean: value(&mean, key)?, deviation: positive(&deviation, wide)? })
+        }
+        "log_normal" => {
+            let [median, deviation] = two(&field, "two: the median and the standard deviation of the logarithm")?;
+            let wide = plain(&deviation, "a number without a unit, 0.05 for about 5 %,")?;
+            let middle = value(&median, key)?;
+            if middle <= 0.0 {
+                return Err(median.fail(format!("{middle} has no logarithm")).allowed("above zero"));
+            }
+            Ok(Prior::LogNormal { median: middle, deviation: positive(&deviation, wide)? })
+        }
+        _ => ends(&field, key).map(|[low, high]| Prior::Uniform { low, high }),
+    }
 }
 
 fn nuisances(table: &Table) -> Result<Nuisances> {

@@ -14,7 +14,7 @@ mod template;
 mod tree;
 mod tune;
 
-pub use fit::{Nuisances, Plan, Scope, matches};
+pub use fit::{Nuisances, Plan, Prior, Scope, matches};
 pub use motion::Move;
 pub use template::TEMPLATE;
 pub use tune::{Cost, Known, Tuning};

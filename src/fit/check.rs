@@ -3,6 +3,7 @@
 use super::identify::Identifiability;
 use super::least_squares::{Differences, Residuals, Step};
 use super::problem::{Problem, extent};
+use super::regression::{Balance, regression};
 use super::run::{Run, is_position};
 use crate::case::{Case, Plan};
 use crate::error::{Error, Result};
@@ -15,6 +16,8 @@ use nalgebra::DMatrix;
 pub struct Check {
     /// What each log shows.
     pub logs: Vec<LogFacts>,
+    /// The balance of torques of a rigid axis, by regression; none where the logs do not allow one.
+    pub balance: Option<Balance>,
     /// What they determine together.
     pub identifiability: Identifiability,
     /// What to do about each group that is not determined.
@@ -67,6 +70,7 @@ pub fn check(case: &Case, plan: &Plan) -> Result<Check> {
         })
         .collect();
     Ok(Check {
+        balance: regression(&problem),
         logs: problem.runs.iter().map(facts).collect(),
         identifiability,
         choices,

@@ -158,11 +158,13 @@ pub struct Options {
     pub huber: f64,
     /// One-sided differences until the last few steps.
     pub frugal: bool,
+    /// Residuals as small as this are taken for rounding, and not for what tells how good a step has to be.
+    pub rounding: f64,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { tolerance: 1e-3, iterations: 100, huber: f64::INFINITY, frugal: true }
+        Self { tolerance: 1e-3, iterations: 100, huber: f64::INFINITY, frugal: true, rounding: 0.0 }
     }
 }
 
@@ -283,7 +285,10 @@ pub fn minimise(
         best.at_bound.clone_from(&held);
         let newton = model.step(&held, &scale, 0.0);
         let freedom = (rows.saturating_sub(n)).max(1) as f64;
-        let deviation = (2.0 * best.cost / freedom).sqrt() * inflation(&best.residuals, n);
+        let spread = (2.0 * best.cost / freedom).sqrt();
+        // What is left of logs that a model made is what rounding made of them.
+        let exact = spread <= options.rounding;
+        let deviation = if exact { options.rounding } else { spread * inflation(&best.residuals, n) };
         best.decrement = model.reach(&newton) / deviation.max(f64::MIN_POSITIVE);
         let tiny = (0..n).all(|j| newton[j].abs() <= 1e-11 * best.x[j].abs().max(1.0));
         if best.decrement <= options.tolerance || tiny {

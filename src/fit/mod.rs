@@ -4,18 +4,28 @@
 //! all logs at once. The recipe is [`fit`]; before it, [`check`] says what the logs can determine.
 
 mod check;
+#[cfg(feature = "posterior")]
+mod density;
+mod drawn;
 mod identify;
 mod knob;
 pub mod least_squares;
+#[cfg(feature = "posterior")]
+mod posterior;
 mod problem;
+mod regression;
 mod run;
 mod uncertainty;
 
 pub use check::{Check, LogFacts, Proposal, check};
+pub use drawn::machines;
 pub use identify::{Group, Identifiability, LIMIT};
 pub use knob::{GROUPS, Knob};
 pub use least_squares::Ending;
+#[cfg(feature = "posterior")]
+pub use posterior::{Credible, EFFECTIVE, Posterior, R_HAT, posterior};
 pub use problem::{Problem, Stop};
+pub use regression::{Balance, regression};
 pub use run::{Extra, Nuisance, Run, Seen};
 pub use uncertainty::{Covariance, inverse_of_square, student};
 
@@ -24,8 +34,9 @@ use crate::error::{Error, Result};
 use crate::log::Quantity;
 use crate::solve::Flow;
 use crate::stage::Stage;
-use least_squares::{Minimum, Options, minimise};
+use least_squares::{Minimum, Options, Residuals, minimise};
 use nalgebra::DVector;
+use problem::{ROUNDING, extent};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use std::path::Path;
@@ -54,13 +65,16 @@ pub struct Fit {
     pub logs: Vec<LogFit>,
     /// What the logs determine at the estimates.
     pub identifiability: Option<Identifiability>,
+    /// The variables of the search where it ended.
+    pub point: Vec<f64>,
     /// How the search ended.
     pub ending: Ending,
     /// What the last step promised, in standard errors.
     pub decrement: f64,
     /// ½ Σ r² of the weighted residuals.
     pub cost: f64,
-    /// The cost that each start led to, in the first weights; the first start is that of the case.
+    /// The cost that each start led to, in the first weights; the first start is that of the case, or what a regression makes
+    /// of it if that is nearer.
     pub starts: Vec<f64>,
     /// Values that count.
     pub values: usize,
@@ -173,13 +187,14 @@ pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f
     let mut watch = |_: &[f64], cost: f64| watch(cost);
     let mut work = Work::default();
     let mut search = |problem: &mut Problem, x: &[f64], options: &Options| {
-        let minimum = minimise(problem, x, &bounds, options, &mut watch);
+        let options = Options { rounding: problem.rounding(), ..*options };
+        let minimum = minimise(problem, x, &bounds, &options, &mut watch);
         work.iterations += minimum.iterations;
         work.evaluations += minimum.evaluations;
         minimum
     };
     let whole = Options::default();
-    let start = problem.start();
+    let start = first_guess(&mut problem);
     let mut best = search(&mut problem, &start, &whole);
     if best.ending == Ending::Failed {
         return Err(Error::new("the model does not get through these logs with the values of the case file")
@@ -366,6 +381,23 @@ fn told_beforehand(problem: &Problem, noise: &[(Quantity, f64)]) -> bool {
     problem.runs.iter().flat_map(|run| &run.extras).any(|extra| extra.known.is_some_and(|own| own > 0.1 * arm * most))
 }
 
+/// Where the case starts, or with the totals that a regression finds, whichever is nearer to the logs.
+fn first_guess(problem: &mut Problem) -> Vec<f64> {
+    let start = problem.start();
+    let Some(balance) = regression(problem) else { return start };
+    let bounds = problem.bounds();
+    let mut guess = start.clone();
+    for (j, value) in balance.guess(problem).into_iter().enumerate() {
+        let x = problem.variable(j, value);
+        guess[j] = if x.is_finite() { x.clamp(bounds.low[j], bounds.high[j]) } else { start[j] };
+    }
+    let mut residuals = vec![0.0; problem.rows()];
+    let mut cost = |x: &[f64]| {
+        if problem.evaluate(x, &mut residuals) { residuals.iter().map(|r| r * r).sum() } else { f64::INFINITY }
+    };
+    if cost(&guess) < cost(&start) { guess } else { start }
+}
+
 /// Refuses what the logs do not determine, with the choices there are.
 fn refuse(problem: &Problem, found: &Identifiability) -> Result<()> {
     let Some(group) = found.groups.first() else { return Ok(()) };
@@ -406,12 +438,13 @@ fn noise_of(problem: &Problem, at: &Minimum, robust: bool) -> Vec<(Quantity, f64
     let mut noise = Vec::new();
     for quantity in quantities {
         let (mut sizes, mut squares, mut weight) = (Vec::new(), 0.0, 0.0);
-        let mut step: f64 = 0.0;
+        let (mut step, mut wide): (f64, f64) = (0.0, 0.0);
         for (index, run) in problem.runs.iter().enumerate() {
             let first = problem.first_row(index);
             let n = run.time.len();
             for (output, seen) in run.seen.iter().enumerate().filter(|(_, seen)| seen.quantity == quantity) {
                 step = step.max(seen.step);
+                wide = wide.max(extent(&seen.values));
                 for k in 0..n {
                     let w = seen.weights[k];
                     if w > 0.0 {
@@ -433,7 +466,7 @@ fn noise_of(problem: &Problem, at: &Minimum, robust: bool) -> Vec<(Quantity, f64
             let middle = sizes.len() / 2;
             deviation = 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
         }
-        noise.push((quantity, deviation.max(step / 12f64.sqrt()).max(f64::MIN_POSITIVE * 1e10)));
+        noise.push((quantity, deviation.max(step / 12f64.sqrt()).max(ROUNDING * wide).max(f64::MIN_POSITIVE * 1e10)));
     }
     noise
 }
@@ -555,6 +588,7 @@ fn result(problem: &Problem, best: &Minimum, noise: Vec<(Quantity, f64)>, starts
         noise,
         logs,
         identifiability,
+        point: best.x.clone(),
         ending: best.ending,
         decrement: best.decrement,
         cost: best.cost,

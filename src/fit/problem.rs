@@ -2,14 +2,18 @@
 
 use super::knob::{Breakaways, Knob};
 use super::least_squares::{Bounds, Differences, Residuals, Step};
-use super::run::{Extra, Nuisance, Run, Setting, is_position, rounding_at_rest};
+use super::run::{Extra, Nuisance, Run, Seen, Setting, is_position, rounding_at_rest};
 use crate::case::{Case, Nuisances, Plan, Scope, matches};
 use crate::error::{Error, Result};
 use crate::log::Quantity;
 use crate::stage::{AmplifierMode, Stage};
 use nalgebra::DMatrix;
 
+/// Share of how far a quantity ranges that numbers in files and solvers may be off by.
+pub(super) const ROUNDING: f64 = 1e-10;
+
 /// What is searched for, in which logs.
+#[derive(Clone)]
 pub struct Problem<'a> {
     /// The machine as the case has it.
     pub stage: Stage,
@@ -42,7 +46,7 @@ impl Noise {
 }
 
 /// What says that it is enough: Ctrl-C, say.
-pub type Stop<'a> = &'a dyn Fn() -> bool;
+pub type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
 
 /// How a variable of the search becomes the value of a knob.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,21 +85,7 @@ impl<'a> Problem<'a> {
     /// What `plan` asks of the logs of `case`.
     pub fn new(case: &Case, plan: &Plan) -> Result<Self> {
         let stage = case.stage.clone();
-        let all: Vec<&str> = plan.free.iter().chain(plan.tied.iter().flatten()).map(String::as_str).collect();
-        let mut knobs = Vec::new();
-        for key in &plan.free {
-            knobs.push(Knob::free(&stage, key, &all, &plan.bounds)?);
-        }
-        for keys in &plan.tied {
-            let keys: Vec<&str> = keys.iter().map(String::as_str).collect();
-            knobs.push(Knob::tied(&stage, &keys, &all, &plan.bounds)?);
-        }
-        for name in &plan.lumped {
-            knobs.push(Knob::lumped(&stage, name, &plan.bounds)?);
-        }
-        if knobs.is_empty() {
-            return Err(Error::new("nothing is searched for").next("add free = [\"cart.mass\"] to [fit]"));
-        }
+        let (knobs, breakaways) = knobs(&stage, plan)?;
         let mut runs = Vec::new();
         let mut held_out = Vec::new();
         for experiment in &case.experiments {
@@ -114,7 +104,7 @@ impl<'a> Problem<'a> {
             ));
         }
         let mut problem = Self {
-            breakaways: Breakaways::of(&stage, &all),
+            breakaways,
             units: knobs.iter().map(|knob| scale(&stage, knob, &runs)).collect(),
             typical: knobs.iter().map(|knob| typical(&stage, knob, &runs)).collect(),
             stage,
@@ -276,6 +266,13 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// Residuals that are rounding, with the present weights: of each quantity [`ROUNDING`] of how far it ranges.
+    pub fn rounding(&self) -> f64 {
+        let seen = self.runs.iter().flat_map(|run| &run.seen);
+        let of = |seen: &Seen| ROUNDING * extent(&seen.values) * seen.weights.iter().copied().fold(0.0, f64::max);
+        seen.map(of).fold(0.0, f64::max)
+    }
+
     /// The quantities that the fitted logs hold.
     pub fn quantities(&self) -> Vec<Quantity> {
         let mut all = Vec::new();
@@ -420,6 +417,26 @@ impl<'a> Problem<'a> {
         let extras = self.extras_of(index, x);
         self.runs[index].residuals(stage, &extras, out)
     }
+}
+
+/// What `plan` turns of a machine, and which breakaways follow.
+pub fn knobs(stage: &Stage, plan: &Plan) -> Result<(Vec<Knob>, Breakaways)> {
+    let all: Vec<&str> = plan.free.iter().chain(plan.tied.iter().flatten()).map(String::as_str).collect();
+    let mut knobs = Vec::new();
+    for key in &plan.free {
+        knobs.push(Knob::free(stage, key, &all, &plan.bounds)?);
+    }
+    for keys in &plan.tied {
+        let keys: Vec<&str> = keys.iter().map(String::as_str).collect();
+        knobs.push(Knob::tied(stage, &keys, &all, &plan.bounds)?);
+    }
+    for name in &plan.lumped {
+        knobs.push(Knob::lumped(stage, name, &plan.bounds)?);
+    }
+    if knobs.is_empty() {
+        return Err(Error::new("nothing is searched for").next("add free = [\"cart.mass\"] to [fit]"));
+    }
+    Ok((knobs, Breakaways::of(stage, &all)))
 }
 
 /// Whether it matters where the cart is, and not only how far it goes.

@@ -22,7 +22,7 @@ pub enum Hold {
 /// Most samples by which an input can be late.
 const MOST_DELAY: f64 = 100.0;
 
-/// x[k+1] = A x[k] + b u[k], y[k] = C x[k] + d u[k].
+/// `x[k+1] = A x[k] + b u[k]`, `y[k] = C x[k] + d u[k]`.
 ///
 /// With a first-order hold and with Tustin's rule x is not the state of the stage at the sample (it has a part of the input in it, or another
 /// scale); y is its output.

@@ -92,6 +92,9 @@ pub(super) fn square(now: Now, amplitude: f64, frequency: f64, duty: f64) -> Par
     if now.reached(down) { Part::held(-amplitude, up(k + 1.0)) } else { Part::held(amplitude, down) }
 }
 
+/// Most points that one piece goes past.
+const MOST_ALIKE: usize = 1000;
+
 /// Points in time, joined or held: tables and samples.
 pub(super) struct Points<'a> {
     from: Source<'a>,
@@ -101,6 +104,18 @@ pub(super) struct Points<'a> {
 enum Source<'a> {
     Table(&'a [[f64; 2]]),
     Samples(&'a [f64], &'a [f64]),
+}
+
+/// The place of the time that comes next, looked for where it is if times are even.
+fn near(now: Now, times: &[f64]) -> Option<usize> {
+    let (first, last) = (*times.first()?, *times.last()?);
+    let guess = ((now.t - first) / (last - first) * (times.len() - 1) as f64) as usize;
+    let next = |&i: &usize| {
+        let after = i.checked_sub(1).is_none_or(|i| times.get(i).is_some_and(|&t| now.reached(t)));
+        after && times.get(i).is_none_or(|&t| !now.reached(t))
+    };
+    // A guess is off by one where rounding has it so.
+    (guess..=guess.saturating_add(2)).find(next)
 }
 
 impl<'a> Points<'a> {
@@ -122,23 +137,44 @@ impl<'a> Points<'a> {
         }
     }
 
-    /// The point that came last and the one that comes next, if any.
-    fn around(&self, now: Now) -> (Option<[f64; 2]>, Option<[f64; 2]>) {
-        let next = match self.from {
+    /// The place of the point that comes next.
+    fn next(&self, now: Now) -> usize {
+        match self.from {
             Source::Table(points) => points.partition_point(|p| now.reached(p[0])),
-            Source::Samples(times, _) => times.partition_point(|&t| now.reached(t)),
-        };
+            Source::Samples(times, _) => near(now, times).unwrap_or_else(|| times.partition_point(|&t| now.reached(t))),
+        }
+    }
+
+    /// The point that came last and the one that comes next, if any.
+    fn around(&self, next: usize) -> (Option<[f64; 2]>, Option<[f64; 2]>) {
         (next.checked_sub(1).and_then(|i| self.get(i)), self.get(next))
     }
 
+    /// When a value that is held from before point `next` may change: equal values after each other are one piece.
+    fn held_until(&self, value: f64, mut next: usize, mut end: f64) -> f64 {
+        for _ in 0..MOST_ALIKE {
+            let (Some([_, here]), Some([time, after])) = (self.get(next), self.get(next + 1)) else { break };
+            // A straight line ends at the last of them, a held value lasts until the first other one.
+            let alike = here == value && (self.hold == Hold::Zero || after == value);
+            if !alike || time <= end {
+                break;
+            }
+            (next, end) = (next + 1, time);
+        }
+        end
+    }
+
     pub fn part(&self, now: Now) -> Part {
-        match self.around(now) {
+        let next = self.next(now);
+        match self.around(next) {
             (None, None) => Part::held(0.0, f64::INFINITY),
             (None, Some([next, _])) => Part::held(0.0, next),
             (Some([_, v]), None) => Part::held(v, f64::INFINITY),
             (Some([t0, v0]), Some([t1, v1])) => {
                 let slope = (v1 - v0) / (t1 - t0);
-                if self.hold == Hold::Zero || !slope.is_finite() {
+                if self.hold == Hold::Zero || slope == 0.0 {
+                    Part::held(v0, self.held_until(v0, next, t1))
+                } else if !slope.is_finite() {
                     Part::held(v0, t1)
                 } else {
                     Part::line(v0 + slope * (now.t - t0), slope, t1)
@@ -148,7 +184,7 @@ impl<'a> Points<'a> {
     }
 
     pub fn value(&self, now: Now) -> f64 {
-        match self.around(now) {
+        match self.around(self.next(now)) {
             (None, _) => 0.0,
             (Some([_, v]), None) => v,
             (Some([t0, v0]), Some([t1, v1])) => {

@@ -364,3 +364,12 @@ fn cost_of_a_call() {
         println!("{name}: {:.0} ns", begin.elapsed().as_secs_f64() / f64::from(calls) * 1e9);
     }
 }
+
+#[test]
+fn equal_samples_are_one_piece() {
+    let sampled =
+        |hold| Signal::Sampled { times: vec![0.0, 1.0, 2.0, 3.0, 4.0], values: vec![5.0, 5.0, 5.0, 0.0, 0.0], hold };
+    let ends = |signal: Signal| [0.0, 0.5, 2.0, 3.0, 4.0].map(|t| signal.piece(t).end);
+    assert_eq!(ends(sampled(Hold::Zero)), [3.0, 3.0, 3.0, 4.0, f64::INFINITY]);
+    assert_eq!(ends(sampled(Hold::Linear)), [2.0, 2.0, 3.0, 4.0, f64::INFINITY]);
+}

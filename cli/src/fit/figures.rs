@@ -1,7 +1,7 @@
 //! Model and log side by side.
 
-use taut::fit::{LogFit, OutputFit};
-use taut::report::{Axis, Figure, Panel, Series, Style};
+use taut::fit::{Estimate, LogFit, OutputFit, Posterior};
+use taut::report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// Logs drawn; the numbers of the rest are in the tables.
 pub const MOST_LOGS: usize = 12;
@@ -60,4 +60,43 @@ pub fn memory(log: &LogFit, output: &OutputFit) -> Option<Figure> {
             )
             .caption("White noise stays between the two lines; what does not is left over by the model."),
     )
+}
+
+/// Bars of a histogram.
+const BARS: usize = 40;
+
+/// How the draws of a variable are spread, and how the fit alone would have it.
+pub fn histogram(drawn: &Posterior, j: usize, estimate: Option<&Estimate>) -> Option<Figure> {
+    let variable = &drawn.variables[j];
+    let sorted = drawn.draws.sorted(j);
+    let (low, high) = (*sorted.first()?, *sorted.last()?);
+    let wide = (high - low) / BARS as f64;
+    if sorted.len() < 2 * BARS || wide <= 0.0 || !wide.is_finite() {
+        return None;
+    }
+    // Densities, in steps.
+    let (mut x, mut y) = (vec![low], vec![0.0]);
+    for bar in 0..BARS {
+        let (from, to) = (low + bar as f64 * wide, low + (bar + 1) as f64 * wide);
+        let count = sorted.partition_point(|v| *v < to) - sorted.partition_point(|v| *v < from);
+        let density = count as f64 / (sorted.len() as f64 * wide);
+        x.extend([from, to]);
+        y.extend([density, density]);
+    }
+    x.push(high);
+    y.push(0.0);
+    let mut panel = Panel::new(Axis::new("Density", "")).series(Series::new("draws", x, y));
+    if let Some((value, error)) = estimate.and_then(|e| Some((e.value, e.error.filter(|error| *error > 0.0)?))) {
+        let x: Vec<f64> = (0..=200).map(|k| low + (high - low) * f64::from(k) / 200.0).collect();
+        let normal = |x: &f64| (-0.5 * ((x - value) / error).powi(2)).exp() / (error * std::f64::consts::TAU.sqrt());
+        let y: Vec<f64> = x.iter().map(normal).collect();
+        panel = panel.series(Series::new("the fit alone", x, y).style(Style::Dashed).colour(Colour::Vermillion));
+    }
+    let [from, to] = variable.interval;
+    let figure = Figure::new(format!("{}: posterior", variable.name), Axis::new(&variable.name, variable.unit))
+        .panel(panel)
+        .vertical(from, "2.5 %")
+        .vertical(to, "97.5 %")
+        .caption("How the draws are spread, and the normal distribution that the fit stands for.");
+    Some(figure)
 }

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 use taut::case::Case;
-use taut::fit::{Fit, Score};
+use taut::fit::{Fit, Posterior, Score};
 
 /// Numbers that JSON has no word for are null.
 fn number(value: f64) -> Value {
@@ -21,8 +21,33 @@ fn score(score: Option<Score>) -> Value {
     })
 }
 
+/// What was drawn.
+fn drawn(posterior: &Posterior) -> Value {
+    json!({
+        "converged": posterior.doubts().is_empty(),
+        "doubts": posterior.doubts(),
+        "chains": posterior.draws.chains.len(),
+        "draws": posterior.count(),
+        "divergences": posterior.draws.divergences,
+        "evaluations": posterior.draws.evaluations,
+        "interrupted": posterior.draws.interrupted,
+        "inflation": number(posterior.inflation),
+        "fixed_slopes": posterior.fixed_slopes,
+        "parameters": posterior.variables.iter().map(|variable| json!({
+            "name": variable.name,
+            "unit": variable.unit,
+            "mean": number(variable.mean),
+            "standard_deviation": number(variable.deviation),
+            "median": number(variable.median),
+            "interval_95": variable.interval.map(number),
+            "r_hat": number(variable.r_hat),
+            "effective_draws": number(variable.effective),
+        })).collect::<Vec<_>>(),
+    })
+}
+
 /// The text.
-pub fn text(case: &Case, fit: &Fit) -> String {
+pub fn text(case: &Case, fit: &Fit, posterior: Option<&Posterior>) -> String {
     let parameters: Vec<Value> = fit
         .estimates
         .iter()
@@ -82,6 +107,7 @@ pub fn text(case: &Case, fit: &Fit) -> String {
             "quantity": quantity.name(), "unit": quantity.unit(), "value": number(*deviation),
         })).collect::<Vec<_>>(),
         "logs": logs,
+        "posterior": posterior.map_or(Value::Null, drawn),
         "work": {
             "iterations": fit.work.iterations,
             "evaluations": fit.work.evaluations,

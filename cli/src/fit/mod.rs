@@ -3,6 +3,7 @@
 mod figures;
 mod json;
 mod page;
+mod posterior;
 pub mod table;
 
 use crate::args::Fit as Args;
@@ -15,8 +16,9 @@ use std::path::{Component, Path, PathBuf};
 use std::time::{Duration, Instant};
 use taut::case::Case;
 use taut::files::write_atomically;
-use taut::fit::{Ending, Fit, fit};
+use taut::fit::{Ending, Fit, Posterior, fit};
 use taut::solve::Flow;
+use taut::trajectory::CsvWriter;
 use taut::{Error, Result};
 
 /// How long a fit may take before its progress is shown.
@@ -39,19 +41,28 @@ pub fn run(args: &Args) -> Outcome {
         if interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue }
     })?;
     progress.clear();
+    let drawn = match args.posterior && interrupt.signal().is_none() {
+        true => Some(posterior::draw(args, &case, &plan, &found, &interrupt)?).filter(|drawn| drawn.count() > 0),
+        false => None,
+    };
+    if args.posterior && drawn.is_none() {
+        terminal::show_error(&"interrupted before the first draw: there is no posterior");
+    }
+    let drawn = drawn.as_ref();
     let took = begin.elapsed();
-    let json = json::text(&case, &found);
+    let json = json::text(&case, &found, drawn);
     let mut written = Vec::new();
     if let Some(folder) = &args.out {
-        written = write(args, folder, &case, &found, &json).map_err(Failure::work)?;
+        written = write(args, folder, &case, &found, drawn, &json).map_err(Failure::work)?;
     }
     if args.json {
         terminal::show(&json);
     } else if !args.quiet {
-        terminal::show(&table::text(&case, &found, took, args.out.as_deref(), &written));
+        terminal::show(&table::text(&case, &found, drawn, took, args.out.as_deref(), &written));
     }
     Ok(match (interrupt.signal(), found.ending) {
         (Some(signal), _) => Status::Interrupted(signal),
+        (None, _) if drawn.is_some_and(|drawn| !drawn.doubts().is_empty()) => Status::Incomplete,
         (None, Ending::Converged | Ending::Stalled) => Status::Done,
         (None, _) => Status::Incomplete,
     })
@@ -67,7 +78,14 @@ pub fn plan(case: &Case, path: &Path) -> Result<taut::case::Plan> {
 }
 
 /// Writes the files; returns their names.
-fn write(args: &Args, folder: &Path, case: &Case, found: &Fit, json: &str) -> Result<Vec<&'static str>> {
+fn write(
+    args: &Args,
+    folder: &Path,
+    case: &Case,
+    found: &Fit,
+    drawn: Option<&Posterior>,
+    json: &str,
+) -> Result<Vec<&'static str>> {
     let text = found.case_text(case, &args.case)?;
     // Paths in it lead from its own folder to the same files.
     let fitted = Case::from_text(&args.case, &text)?;
@@ -75,8 +93,14 @@ fn write(args: &Args, folder: &Path, case: &Case, found: &Fit, json: &str) -> Re
     write_atomically(folder.join("fitted.toml"), &text)?;
     write_atomically(folder.join("fit.json"), json)?;
     let mut names = vec!["fitted.toml", "fit.json"];
+    if let Some(drawn) = drawn {
+        let mut writer = CsvWriter::create(folder.join("posterior.csv"))?;
+        writer.write(&drawn.table())?;
+        writer.finish()?;
+        names.push("posterior.csv");
+    }
     if !args.no_report {
-        page::page(case, found, &text).write(folder.join("report.html"))?;
+        page::page(case, found, drawn, &text).write(folder.join("report.html"))?;
         names.push("report.html");
     }
     Ok(names)

@@ -1,12 +1,12 @@
 //! The report: one HTML file.
 
-use super::{figures, table};
+use super::{figures, posterior, table};
 use taut::case::Case;
-use taut::fit::{Ending, Fit};
+use taut::fit::{Ending, Fit, Posterior};
 use taut::report::{Callout, Cell, Page, Table};
 
 /// The page; `text` is the case with the estimates.
-pub fn page(case: &Case, fit: &Fit, text: &str) -> Page {
+pub fn page(case: &Case, fit: &Fit, drawn: Option<&Posterior>, text: &str) -> Page {
     let mut page = Page::new(case.title.clone()).subtitle("Parameters from logs.");
     page.section("How it ended");
     let kind = if fit.ending == Ending::Converged { Callout::Holds } else { Callout::Fails };
@@ -17,6 +17,9 @@ pub fn page(case: &Case, fit: &Fit, text: &str) -> Page {
     ));
     parameters(&mut page, fit);
     correlations(&mut page, fit);
+    if let Some(drawn) = drawn {
+        posterior::section(&mut page, fit, drawn);
+    }
     logs(&mut page, fit);
     for log in fit.logs.iter().take(figures::MOST_LOGS) {
         for output in &log.outputs {

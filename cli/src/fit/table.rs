@@ -1,15 +1,23 @@
 //! The result for people.
 
+use super::posterior;
 use crate::terminal::bold;
 use std::fmt::Write;
 use std::path::Path;
 use std::time::Duration;
 use taut::case::Case;
-use taut::fit::{Ending, Estimate, Fit, Score};
+use taut::fit::{Ending, Estimate, Fit, Posterior, Score};
 use taut::number;
 
 /// The text on the terminal.
-pub fn text(case: &Case, fit: &Fit, took: Duration, out: Option<&Path>, written: &[&str]) -> String {
+pub fn text(
+    case: &Case,
+    fit: &Fit,
+    drawn: Option<&Posterior>,
+    took: Duration,
+    out: Option<&Path>,
+    written: &[&str],
+) -> String {
     let mut text = format!("{}\n", bold(&case.title));
     let _ = writeln!(text, "{}", ending(fit));
     let _ = write!(text, "\n{}\n", bold("Parameters"));
@@ -17,6 +25,9 @@ pub fn text(case: &Case, fit: &Fit, took: Duration, out: Option<&Path>, written:
     for estimate in &fit.estimates {
         let [value, error, interval] = words(estimate);
         let _ = writeln!(text, "  {:<wide$}  {value:>14} ± {error:<10} {interval}", estimate.name);
+    }
+    if let Some(drawn) = drawn {
+        text.push_str(&posterior::text(drawn, wide));
     }
     let _ = write!(text, "\n{}\n", bold("Logs"));
     let wide = fit.logs.iter().map(|log| name(log).chars().count()).max().unwrap_or(0).min(40);

@@ -1,5 +1,6 @@
 //! `taut simulate`: runs the experiments of a case, and says what they show.
 
+mod band;
 mod curves;
 pub mod folder;
 mod page;
@@ -17,6 +18,7 @@ use run::{Run, Setting};
 use summary::Summary;
 use taut::case::{Case, Experiment};
 use taut::solve::{Ending, Solver};
+use taut::stage::Stage;
 use taut::{Error, Result};
 
 /// Reads the case, simulates, measures, reports.
@@ -28,9 +30,11 @@ pub fn run(args: &Simulate) -> Outcome {
     if args.as_measured {
         measurable(&case, solver, args)?;
     }
+    let machines = machines(&case, args)?;
     let folder = args.out.as_deref().map(Folder::create).transpose()?;
     let interrupt = Interrupt::listen();
-    let setting = Setting { args, case: &case, solver, folder: folder.as_ref(), interrupt: &interrupt };
+    let setting =
+        Setting { args, case: &case, solver, folder: folder.as_ref(), interrupt: &interrupt, machines: &machines };
 
     let mut runs = Vec::new();
     for experiment in experiments {
@@ -49,6 +53,17 @@ pub fn run(args: &Simulate) -> Outcome {
         terminal::show(&table::text(&case, solver, &runs, folder.as_ref()));
     }
     Ok(status(&runs, &interrupt))
+}
+
+/// The machines of --draws.
+fn machines(case: &Case, args: &Simulate) -> Result<Vec<Stage>> {
+    let Some(file) = &args.draws else { return Ok(Vec::new()) };
+    let plan = case.fit.as_ref().ok_or_else(|| {
+        Error::new("this case does not say which parameters were drawn")
+            .in_file(&args.case)
+            .next("use --draws with the fitted.toml of the same folder, or with the case that was fitted")
+    })?;
+    Ok(band::chosen(taut::fit::machines(case, plan, file)?, args.bands))
 }
 
 /// Refuses to log what nobody measures, and what would not be the run.

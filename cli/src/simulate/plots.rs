@@ -60,14 +60,18 @@ pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
         .caption(
             "What friction takes or holds, and the states: 1 forward, 0 stuck, −1 backward, 2 without dry friction.",
         );
-    vec![
+    let mut all = vec![
         ("input", input),
         ("positions", positions),
         ("speeds", speeds),
         ("stretch", stretch),
         ("forces", forces),
         ("friction", friction),
-    ]
+    ];
+    if let Some(band) = &run.band {
+        all.insert(2, ("band", band.figure(run.experiment)));
+    }
+    all
 }
 
 struct Plot<'a> {

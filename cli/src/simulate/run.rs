@@ -1,5 +1,6 @@
 //! One experiment: its rows go to files, meter and plots as they come, and none is kept.
 
+use super::band::Band;
 use super::curves::{Curves, Samples};
 use super::folder::Folder;
 use crate::args::{Format, Simulate};
@@ -13,7 +14,7 @@ use taut::measure;
 use taut::metrics::{Meter, Metrics};
 use taut::reduction::Reduction;
 use taut::solve::{self, Flow, Solver};
-use taut::stage::BeltModel;
+use taut::stage::{BeltModel, Stage};
 #[cfg(feature = "parquet")]
 use taut::trajectory::ParquetWriter;
 use taut::trajectory::{CsvWriter, Trajectory};
@@ -29,6 +30,8 @@ pub struct Setting<'a> {
     pub solver: Solver,
     pub folder: Option<&'a Folder>,
     pub interrupt: &'a Interrupt,
+    /// Machines drawn from a posterior.
+    pub machines: &'a [Stage],
 }
 
 /// What is known of an experiment after it ran.
@@ -40,6 +43,8 @@ pub struct Run<'a> {
     pub curves: Option<Curves>,
     /// Its samples, where they and plots are wanted.
     pub samples: Option<Samples>,
+    /// What the machines of --draws do.
+    pub band: Option<Band>,
     /// Its model of the belt.
     pub model: BeltModel,
     /// How far its model is from the elastic one, where it is a reduced one.
@@ -89,10 +94,17 @@ impl<'a> Setting<'a> {
             samples = Some(self.record(experiment, folder)?).filter(|_| curves.is_some());
             files.push(log_name(experiment));
         }
+        let mut band = None;
+        if !self.machines.is_empty() && self.interrupt.signal().is_none() {
+            band = Band::of(self, self.machines, experiment)?;
+            if let Some(band) = &band {
+                files.extend(band.write(self, experiment).map_err(Failure::work)?);
+            }
+        }
         let metrics = meter.finish(&outcome.events);
         let took = begin.elapsed();
         let reduction = Reduction::of(stage, experiment, self.solver)?;
-        Ok(Run { experiment, outcome, metrics, curves, samples, model: stage.belt.model, reduction, files, took })
+        Ok(Run { experiment, outcome, metrics, curves, samples, band, model: stage.belt.model, reduction, files, took })
     }
 
     /// Runs it once more, as its recorder sees it, and writes the log.

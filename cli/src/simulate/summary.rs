@@ -54,9 +54,22 @@ struct ExperimentFigures {
     /// None for the elastic model.
     #[serde(skip_serializing_if = "Option::is_none")]
     reduction: Option<ReductionTold>,
+    /// With --draws.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    band: Option<BandTold>,
     events: Vec<EventTold>,
     events_not_listed: usize,
     cost: CostTold,
+}
+
+/// Where machines drawn from a posterior end: 2.5 %, 50 % and 97.5 % of them below.
+#[derive(Serialize)]
+struct BandTold {
+    machines: usize,
+    machines_left_out: usize,
+    final_drive_angle_rad: [f64; 3],
+    final_cart_position_m: [f64; 3],
+    final_drive_travel_minus_cart_m: [f64; 3],
 }
 
 #[derive(Serialize)]
@@ -231,6 +244,13 @@ impl ExperimentFigures {
                 final_cart_difference_m: reduction.final_cart,
                 encoder_error: reduction.encoder_error.into(),
                 stretch: reduction.stretch.into(),
+            }),
+            band: run.band.as_ref().map(|band| BandTold {
+                machines: band.machines,
+                machines_left_out: band.failed,
+                final_drive_angle_rad: band.end(0),
+                final_cart_position_m: band.end(1),
+                final_drive_travel_minus_cart_m: band.end(2),
             }),
             events: outcome.events.iter().take(MOST_EVENTS).map(EventTold::of).collect(),
             events_not_listed: outcome.events.len().saturating_sub(MOST_EVENTS),

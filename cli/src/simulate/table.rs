@@ -1,5 +1,6 @@
 //! The summary for people: a small table for each experiment.
 
+use super::band::Band;
 use super::folder::Folder;
 use super::run::Run;
 use crate::terminal::bold;
@@ -120,10 +121,30 @@ pub fn lines(run: &Run, solver: Solver) -> Vec<(&'static str, String)> {
         // Nothing stretches in it.
         lines.retain(|(name, _)| !["peak stretch", "peak force", "r φ₁ - x"].contains(name));
     }
+    if let Some(band) = &run.band {
+        lines.insert(lines.len() - 1, ("band", band_words(band)));
+    }
     if let Some(reduction) = run.reduction {
         lines.insert(lines.len() - 1, ("reduced model", reduced(&reduction)));
     }
     lines
+}
+
+/// Where the machines of --draws end.
+fn band_words(band: &Band) -> String {
+    let ([low, _, high], [left_low, _, left_high]) = (band.end(1), band.end(2));
+    let failed = match band.failed {
+        0 => String::new(),
+        n => format!("; {n} more do not reach the end"),
+    };
+    format!(
+        "95 % of {} machines end with the cart from {} to {}, r φ₁ - x from {} to {}{failed}",
+        band.machines,
+        travel(low),
+        travel(high),
+        value(left_low, "m"),
+        value(left_high, "m"),
+    )
 }
 
 /// How far a reduced model is from the elastic one.

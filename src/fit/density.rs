@@ -1,0 +1,433 @@
+//! The posterior density of a least-squares problem, on variables without bounds that are all about as wide as one.
+//!
+//! With ψ the residuals after the loss, T the inflation that the covariance has, π the priors and x(u) the change of variables:
+//!
+//! ```text
+//! ln p(u) = −Σ ρ(rᵢ(x)) / T + Σⱼ ln πⱼ(xⱼ) + Σⱼ ln |dxⱼ/duⱼ|        u = u₀ + S z
+//! ```
+//!
+//! x = l + eᵘ above a bound, h − eᵘ below one, l + (h − l)/(1 + e⁻ᵘ) between two, and u without any; S Sᵀ is the covariance at the
+//! fit, so that z is nearly standard normal. A path is a leapfrog along a slope; any slope that depends on the place alone leaves
+//! the draws right (Neal 2011, "MCMC using Hamiltonian dynamics", section 5.5), since they are taken by the density itself. So slopes
+//! are Jᵀψ with J = J₀ + Σ zₖ ∂J/∂zₖ about the fit, one simulation each, where that is near enough, and measured anew at each place
+//! otherwise.
+
+use super::least_squares::{Bounds, Differences, Residuals};
+use crate::posterior::{Draws, Effort, LogDensity, Watch, sample};
+use nalgebra::{DMatrix, DVector};
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+use std::sync::Mutex;
+
+/// A bound further away than so many standard errors is not felt.
+const FELT: f64 = 1e3;
+
+/// How far the slopes at the fit may be off, where one is a standard error's, before slopes are measured at each place.
+const OFF: f64 = 0.3;
+
+/// Most variables for which the Jacobian's own derivatives are measured.
+const MOST_BENT: usize = 16;
+
+/// Places at which they are compared.
+const PLACES: usize = 6;
+
+/// Steps of measured slopes, in standard errors: past the kinks that sticks and slips make.
+const STEP: f64 = 0.3;
+
+/// The logarithm of a variable's prior density, and its slope.
+pub type Prior<'a> = Box<dyn Fn(f64) -> (f64, f64) + Sync + 'a>;
+
+/// What the density is made of.
+pub struct Ingredients<'a, R> {
+    /// The residuals.
+    pub problem: R,
+    /// The fit.
+    pub at: Vec<f64>,
+    /// The Jacobian there.
+    pub jacobian: DMatrix<f64>,
+    /// Where the variables may be.
+    pub bounds: Bounds,
+    /// What is known beforehand; flat without.
+    pub priors: Vec<Option<Prior<'a>>>,
+    /// What the sum of squares is divided by.
+    pub inflation: f64,
+    /// Residuals beyond this count linearly.
+    pub huber: f64,
+}
+
+/// What was drawn.
+pub struct Sampled {
+    /// Values of the variables.
+    pub draws: Draws,
+    /// Whether slopes were those of the fit.
+    pub fixed: bool,
+}
+
+/// How a variable without bounds becomes one with them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Change {
+    None,
+    Above(f64),
+    Below(f64),
+    Between(f64, f64),
+}
+
+impl Change {
+    /// For a variable that is at `x`, give or take `deviation`.
+    fn of(x: f64, deviation: f64, low: f64, high: f64) -> Self {
+        match (x - low < FELT * deviation, high - x < FELT * deviation) {
+            (false, false) => Change::None,
+            (true, false) => Change::Above(low),
+            (false, true) => Change::Below(high),
+            (true, true) => Change::Between(low, high),
+        }
+    }
+
+    /// x(u), dx/du, ln |dx/du| and its slope.
+    fn at(self, u: f64) -> [f64; 4] {
+        match self {
+            Change::None => [u, 1.0, 0.0, 0.0],
+            Change::Above(low) => [low + u.exp(), u.exp(), u, 1.0],
+            Change::Below(high) => [high - u.exp(), -u.exp(), u, 1.0],
+            Change::Between(low, high) => {
+                let (share, rest) = (1.0 / (1.0 + (-u).exp()), 1.0 / (1.0 + u.exp()));
+                let slope = (high - low) * share * rest;
+                [low + (high - low) * share, slope, slope.ln(), rest - share]
+            }
+        }
+    }
+
+    /// u(x)
+    fn variable(self, x: f64) -> f64 {
+        match self {
+            Change::None => x,
+            Change::Above(low) => (x - low).ln(),
+            Change::Below(high) => (high - x).ln(),
+            Change::Between(low, high) => ((x - low) / (high - x)).ln(),
+        }
+    }
+}
+
+/// The density, shared by the chains.
+struct Density<'a, R> {
+    /// A problem for each chain that is at work.
+    pool: Mutex<Vec<R>>,
+    ingredients: &'a Ingredients<'a, R>,
+    changes: Vec<Change>,
+    centre: DVector<f64>,
+    spread: DMatrix<f64>,
+    /// Standard errors.
+    errors: Vec<f64>,
+    /// The Jacobian about the fit, and its derivatives by z; none where slopes are measured at each place.
+    fixed: Option<Vec<DMatrix<f64>>>,
+}
+
+/// Draws from the density; none where the model does not get through.
+pub fn draw<R: Residuals + Clone + Send + Sync>(
+    ingredients: &Ingredients<R>,
+    effort: Effort,
+    watch: &Watch,
+) -> crate::error::Result<Sampled> {
+    let mut density = Density::new(ingredients);
+    let mut random = Pcg64::seed_from_u64(effort.seed ^ 0x5eed);
+    if !density.is_straight(&mut random) {
+        density.fixed = None;
+    }
+    let starts: Vec<Vec<f64>> = (0..effort.chains.max(1)).map(|_| density.start(&mut random)).collect();
+    let log: &LogDensity = &|z, gradient| density.log(z, gradient);
+    let mut draws = sample(log, &starts, effort, watch)?;
+    for draw in draws.chains.iter_mut().flatten() {
+        *draw = density.place(draw).iter().map(|place| place[0]).collect();
+    }
+    Ok(Sampled { draws, fixed: density.fixed.is_some() })
+}
+
+impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
+    fn new(ingredients: &'a Ingredients<'a, R>) -> Self {
+        let Ingredients { bounds, at, .. } = ingredients;
+        let n = at.len();
+        // Standard errors, then the Jacobian over about as much, then all again with that one.
+        let errors = deviations(&covariance(ingredients, &ingredients.jacobian));
+        let inside: Vec<f64> = (0..n)
+            .map(|j| {
+                let (low, high) = (bounds.low[j], bounds.high[j]);
+                let room = f64::min(0.5 * errors[j], 0.25 * (high - low));
+                at[j].clamp(low + room, high - room)
+            })
+            .collect();
+        let mut problem = ingredients.problem.clone();
+        let mut residuals = vec![0.0; problem.rows()];
+        let mut jacobian = ingredients.jacobian.clone();
+        if problem.evaluate(&inside, &mut residuals) {
+            let how = Differences::Coarse(errors.clone());
+            jacobian = problem.jacobian(&inside, &residuals, bounds, &how).unwrap_or(jacobian);
+        }
+        let covariance = covariance(ingredients, &jacobian);
+        let errors = deviations(&covariance);
+        let changes: Vec<Change> =
+            (0..n).map(|j| Change::of(inside[j], errors[j], bounds.low[j], bounds.high[j])).collect();
+        let centre = DVector::from_fn(n, |j, _| changes[j].variable(inside[j]));
+        let correlation = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / (errors[i] * errors[j]));
+        let mut spread = correlation.cholesky().map_or_else(|| DMatrix::identity(n, n), |found| found.l());
+        for j in 0..n {
+            // Near a bound a standard error reaches beyond it.
+            let slope = changes[j].at(centre[j])[1].abs();
+            spread.row_mut(j).scale_mut(f64::min(errors[j] / slope, 2.0));
+        }
+        let pool = Mutex::new(vec![problem]);
+        let mut density = Self { pool, ingredients, changes, centre, spread, errors, fixed: None };
+        density.fixed = Some(density.bent(jacobian));
+        density
+    }
+
+    /// The Jacobian about the fit and, if they can be had, its derivatives along each z, over a standard error to each side.
+    fn bent(&self, jacobian: DMatrix<f64>) -> Vec<DMatrix<f64>> {
+        let n = self.errors.len();
+        let mut problem = self.ingredients.problem.clone();
+        let mut at = |k: usize, side: f64| {
+            let mut z = vec![0.0; n];
+            z[k] = side;
+            let x: Vec<f64> = self.place(&z).iter().map(|place| place[0]).collect();
+            self.measured(&mut problem, &x).map(|(_, jacobian)| jacobian)
+        };
+        let all: Option<Vec<DMatrix<f64>>> = match n <= MOST_BENT {
+            true => (0..n).map(|k| Some((at(k, 1.0)? - at(k, -1.0)?) * 0.5)).collect(),
+            false => None,
+        };
+        std::iter::once(jacobian).chain(all.unwrap_or_default()).collect()
+    }
+
+    /// Residuals and their Jacobian, over steps of a part of a standard error.
+    fn measured(&self, problem: &mut R, x: &[f64]) -> Option<(Vec<f64>, DMatrix<f64>)> {
+        let mut residuals = vec![0.0; problem.rows()];
+        if !problem.evaluate(x, &mut residuals) {
+            return None;
+        }
+        let steps = self.errors.iter().map(|error| STEP * error).collect();
+        let jacobian = problem.jacobian(x, &residuals, &self.ingredients.bounds, &Differences::Coarse(steps))?;
+        Some((residuals, jacobian))
+    }
+
+    /// Each variable's x, dx/du, ln |dx/du| and its slope.
+    fn place(&self, z: &[f64]) -> Vec<[f64; 4]> {
+        let u = &self.centre + &self.spread * DVector::from_column_slice(z);
+        self.changes.iter().zip(u.iter()).map(|(change, u)| change.at(*u)).collect()
+    }
+
+    fn log(&self, z: &[f64], gradient: &mut [f64]) -> Option<f64> {
+        self.log_with(self.fixed.as_deref(), z, gradient)
+    }
+
+    fn log_with(&self, fixed: Option<&[DMatrix<f64>]>, z: &[f64], gradient: &mut [f64]) -> Option<f64> {
+        let own = self.pool.lock().ok()?.pop();
+        let mut problem = own.unwrap_or_else(|| self.ingredients.problem.clone());
+        let result = self.log_of(&mut problem, fixed, z, gradient);
+        self.pool.lock().ok()?.push(problem);
+        result
+    }
+
+    fn log_of(&self, problem: &mut R, fixed: Option<&[DMatrix<f64>]>, z: &[f64], gradient: &mut [f64]) -> Option<f64> {
+        let Ingredients { bounds, priors, inflation, huber, .. } = self.ingredients;
+        let places = self.place(z);
+        let x: Vec<f64> = places.iter().map(|place| place[0]).collect();
+        // Rounding may put it onto a bound, and bounds that were not felt are still there.
+        if x.iter().zip(bounds.low.iter().zip(&bounds.high)).any(|(x, (low, high))| !(low <= x && x <= high)) {
+            return None;
+        }
+        let (mut residuals, measured) = match fixed {
+            Some(_) => {
+                let mut residuals = vec![0.0; problem.rows()];
+                if !problem.evaluate(&x, &mut residuals) {
+                    return None;
+                }
+                (residuals, None)
+            }
+            None => self.measured(problem, &x).map(|(residuals, jacobian)| (residuals, Some([jacobian])))?,
+        };
+        let jacobians = fixed.or(measured.as_ref().map(|own| &own[..]))?;
+        // ρ = ½ r², from k on k |r| − ½ k²; ψ = ρ′
+        let mut cost = 0.0;
+        for r in &mut residuals {
+            let size = r.abs();
+            cost += if size > *huber { huber * (size - 0.5 * huber) } else { 0.5 * size * size };
+            *r = r.clamp(-huber, *huber);
+        }
+        let mut log = -cost / inflation;
+        // −(J₀ + Σ zₖ ∂J/∂zₖ)ᵀ ψ / T
+        let psi = DVector::from_column_slice(&residuals);
+        let mut slopes = DVector::zeros(x.len());
+        for (jacobian, factor) in jacobians.iter().zip(std::iter::once(&1.0).chain(z)) {
+            slopes.gemv_tr(-factor / inflation, jacobian, &psi, 1.0);
+        }
+        for (j, [x, dx, log_dx, slope_of_log]) in places.into_iter().enumerate() {
+            let (own, slope) = priors[j].as_ref().map_or((0.0, 0.0), |prior| prior(x));
+            log += own + log_dx;
+            slopes[j] = (slopes[j] + slope) * dx + slope_of_log;
+        }
+        gradient.copy_from_slice(self.spread.tr_mul(&slopes).as_slice());
+        Some(log).filter(|log| log.is_finite() && gradient.iter().all(|slope| slope.is_finite()))
+    }
+
+    /// Whether slopes with the Jacobian at the fit are near those that are measured, where draws will be.
+    fn is_straight(&self, random: &mut Pcg64) -> bool {
+        let n = self.errors.len();
+        let (mut squares, mut count) = (0.0, 0);
+        for _ in 0..PLACES {
+            let z = normal(random, n);
+            let (mut a, mut b) = (vec![0.0; n], vec![0.0; n]);
+            if self.log(&z, &mut a).is_some() && self.log_with(None, &z, &mut b).is_some() {
+                squares += a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+                count += n;
+            }
+        }
+        count > 0 && squares <= OFF * OFF * count as f64
+    }
+
+    /// Somewhere to begin, drawn from the covariance at the fit.
+    fn start(&self, random: &mut Pcg64) -> Vec<f64> {
+        let n = self.errors.len();
+        let mut gradient = vec![0.0; n];
+        for attempt in 0..20 {
+            let size = 0.9f64.powi(attempt);
+            let z: Vec<f64> = normal(random, n).into_iter().map(|z| size * z).collect();
+            if self.log(&z, &mut gradient).is_some() {
+                return z;
+            }
+        }
+        vec![0.0; n]
+    }
+}
+
+/// (JᵀJ/T + curvature of the priors + 12/(h − l)²)⁻¹: what a flat prior between bounds tells is in it too.
+fn covariance<R>(ingredients: &Ingredients<R>, jacobian: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut precision = jacobian.tr_mul(jacobian) / ingredients.inflation;
+    for (j, prior) in ingredients.priors.iter().enumerate() {
+        let (x, wide) = (ingredients.at[j], ingredients.bounds.high[j] - ingredients.bounds.low[j]);
+        let h = 1e-4 * x.abs().max(1.0);
+        let curvature = prior.as_ref().map_or(0.0, |prior| (prior(x - h).1 - prior(x + h).1) / (2.0 * h));
+        let curvature = if curvature.is_finite() { curvature.max(0.0) } else { 0.0 };
+        precision[(j, j)] += curvature + (12.0 / (wide * wide)).max(1e-20);
+    }
+    let n = precision.nrows();
+    // On variables of equal size, for the sake of rounding.
+    let sizes: Vec<f64> = (0..n).map(|j| precision[(j, j)].sqrt()).collect();
+    let scaled = DMatrix::from_fn(n, n, |i, j| precision[(i, j)] / (sizes[i] * sizes[j]));
+    let inverse = scaled.cholesky().map_or_else(|| DMatrix::identity(n, n), |found| found.inverse());
+    DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (sizes[i] * sizes[j]))
+}
+
+fn deviations(covariance: &DMatrix<f64>) -> Vec<f64> {
+    covariance.diagonal().iter().map(|variance| variance.sqrt()).collect()
+}
+
+/// Standard normal numbers, by Box and Muller.
+fn normal(random: &mut Pcg64, n: usize) -> Vec<f64> {
+    let mut uniform = || (random.next_u64() >> 11) as f64 * 2f64.powi(-53);
+    (0..n).map(|_| (-2.0 * (1.0 - uniform()).ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Clone)]
+    struct Straight {
+        matrix: DMatrix<f64>,
+        values: DVector<f64>,
+    }
+
+    impl Residuals for Straight {
+        fn rows(&self) -> usize {
+            self.values.len()
+        }
+
+        fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool {
+            r.copy_from_slice((&self.matrix * DVector::from_column_slice(x) - &self.values).as_slice());
+            true
+        }
+    }
+
+    fn straight() -> Straight {
+        // y = a + b t with unit noise at t = 0 … 19.
+        let matrix = DMatrix::from_fn(20, 2, |i, j| if j == 0 { 1.0 } else { i as f64 });
+        let values = DVector::from_fn(20, |i, _| 2.0 + 0.5 * i as f64 + (i as f64 * 2.1).sin());
+        Straight { matrix, values }
+    }
+
+    fn ingredients<'a>(low: f64, priors: Vec<Option<Prior<'a>>>, inflation: f64) -> Ingredients<'a, Straight> {
+        let problem = straight();
+        let bounds = Bounds { low: vec![low, f64::NEG_INFINITY], high: vec![f64::INFINITY; 2] };
+        let jacobian = problem.matrix.clone();
+        let at = (jacobian.tr_mul(&jacobian)).try_inverse().unwrap() * jacobian.tr_mul(&problem.values);
+        Ingredients {
+            problem,
+            at: vec![at[0].max(low), at[1]],
+            jacobian,
+            bounds,
+            priors,
+            inflation,
+            huber: f64::INFINITY,
+        }
+    }
+
+    fn drawn(ingredients: &Ingredients<Straight>) -> Sampled {
+        let effort = Effort { draws: 1500, tune: 300, ..Effort::default() };
+        draw(ingredients, effort, &|_| true).unwrap()
+    }
+
+    /// A linear model with normal noise and a normal prior has a normal posterior, whose mean and covariance are known.
+    #[test]
+    fn a_linear_model_has_the_posterior_of_the_textbook() {
+        for (prior, inflation) in [(None, 1.0), (Some([3.0, 0.2]), 1.0), (Some([3.0, 0.2]), 4.0)] {
+            let of = |[mean, deviation]: [f64; 2]| -> Prior {
+                Box::new(move |x| (-0.5 * ((x - mean) / deviation).powi(2), -(x - mean) / deviation.powi(2)))
+            };
+            let all = ingredients(f64::NEG_INFINITY, vec![prior.map(of), None], inflation);
+            // (JᵀJ/T + 1/s²)⁻¹ and that times (Jᵀy/T + m/s²)
+            let mut precision = all.jacobian.tr_mul(&all.jacobian) / inflation;
+            let mut right = all.jacobian.tr_mul(&all.problem.values) / inflation;
+            if let Some([mean, deviation]) = prior {
+                precision[(0, 0)] += 1.0 / (deviation * deviation);
+                right[0] += mean / (deviation * deviation);
+            }
+            let covariance = precision.try_inverse().unwrap();
+            let mean = &covariance * right;
+            let Sampled { draws, fixed } = drawn(&all);
+            assert!(fixed);
+            for j in 0..2 {
+                let error = covariance[(j, j)].sqrt();
+                assert!((draws.mean(j) - mean[j]).abs() < 0.06 * error, "{} {}", draws.mean(j), mean[j]);
+                assert!((draws.deviation(j) / error - 1.0).abs() < 0.06, "{} {error}", draws.deviation(j));
+                assert!(draws.r_hat(j) < 1.01 && draws.effective(j) > 400.0);
+            }
+        }
+    }
+
+    /// A bound through the middle of it leaves half of it: the quantiles are those of the truncated normal distribution.
+    #[test]
+    fn a_bound_cuts_the_posterior_off() {
+        let free = ingredients(f64::NEG_INFINITY, vec![None, None], 1.0);
+        let (middle, error) =
+            (free.at[0], (free.jacobian.tr_mul(&free.jacobian)).try_inverse().unwrap()[(0, 0)].sqrt());
+        let Sampled { draws, .. } = drawn(&ingredients(middle, vec![None, None], 1.0));
+        // Half-normal: median 0.6745, 97.5 % at 2.2414 standard errors.
+        for (share, want) in [(0.025, 0.0313), (0.5, 0.6745), (0.975, 2.2414)] {
+            let found = (draws.quantile(0, share) - middle) / error;
+            assert!((found - want).abs() < 0.1, "{share}: {found} instead of {want}");
+        }
+        assert!(draws.divergences < 30, "{}", draws.divergences);
+    }
+
+    #[test]
+    fn the_changes_of_variables_have_their_slopes() {
+        for change in [Change::None, Change::Above(1.0), Change::Below(2.0), Change::Between(-1.0, 3.0)] {
+            for u in [-2.0, 0.1, 1.5] {
+                let [x, dx, log, slope] = change.at(u);
+                let (h, near) = (1e-6, |u: f64| change.at(u));
+                assert!(((near(u + h)[0] - near(u - h)[0]) / (2.0 * h) - dx).abs() < 1e-8);
+                assert!(((near(u + h)[2] - near(u - h)[2]) / (2.0 * h) - slope).abs() < 1e-8);
+                assert!((log - dx.abs().ln()).abs() < 1e-12 && (change.variable(x) - u).abs() < 1e-9);
+            }
+        }
+    }
+}
