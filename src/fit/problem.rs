@@ -245,7 +245,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Weighs a quantity: each value with the variance σ² of the noise and of what rounding makes of m equal values in a row,
-    /// which is one error and not one for each: σ² + (m − 1) Δ²/12; or of m that go to and fro at rest: [`rounding_at_rest`].
+    /// which is one error and not one for each: σ² + (m − 1) Δ²/12; or of m that go to and fro at rest: `rounding_at_rest`.
     pub fn weigh(&mut self, quantity: Quantity, deviation: f64, rounding: bool) {
         for run in &mut self.runs {
             let fitted = run.fitted_rows;
@@ -266,7 +266,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Residuals that are rounding, with the present weights: of each quantity [`ROUNDING`] of how far it ranges.
+    /// Residuals that are rounding, with the present weights: of each quantity `ROUNDING` of how far it ranges.
     pub fn rounding(&self) -> f64 {
         let seen = self.runs.iter().flat_map(|run| &run.seen);
         let of = |seen: &Seen| ROUNDING * extent(&seen.values) * seen.weights.iter().copied().fold(0.0, f64::max);
