@@ -7,7 +7,7 @@ use chance::Chance;
 use std::sync::Arc;
 use taut::case::{Case, Plan, TEMPLATE};
 use taut::fit::least_squares::{Bounds, Ending, Options, Residuals, minimise};
-use taut::fit::{Fit, check, fit, inverse_of_square};
+use taut::fit::{Fit, check, fit, inverse_of_square, profiles};
 use taut::log::{Log, Output, Quantity};
 use taut::signal::Hold;
 use taut::solve::{Flow, Solver, simulate};
@@ -160,6 +160,25 @@ fn a_machine_is_found_again() {
 }
 
 /// P7: an encoder at the motor does not tell the friction of the cart from that of the pulleys.
+#[test]
+fn the_profile_of_what_is_well_known_is_that_of_a_linear_model() {
+    let case = recorded(&[], 1, 1e-3);
+    let plan = plan(&["cart.friction.viscous", "cart.friction.coulomb"]);
+    let found = fit(&case, &plan, None, &mut |_| Flow::Continue).unwrap();
+    let profiles = profiles(&case, &plan, &found, None).unwrap();
+    assert_eq!(profiles.len(), 2);
+    for profile in &profiles {
+        assert!(profile.values.is_sorted() && profile.values.len() == 7, "{profile:?}");
+        assert!(profile.bends().into_iter().all(|bend| bend.is_some()), "{profile:?}");
+        // Residuals of which more than noise is left widen the interval, and the growth falls behind by as much.
+        for (grown, linear) in profile.growth.iter().zip(&profile.linear) {
+            assert!((grown - linear).abs() <= 0.2 * linear, "{profile:?}");
+        }
+    }
+    // What is asked to stop leaves out what it has not.
+    assert!(taut::fit::profiles(&case, &plan, &found, Some(&|| true)).unwrap().is_empty());
+}
+
 #[test]
 fn what_an_encoder_cannot_tell_is_refused_in_words() {
     let case = with_logs_of(recorded(&[], 1, 0.0));

@@ -13,11 +13,12 @@ pub mod least_squares;
 #[cfg(feature = "posterior")]
 mod posterior;
 mod problem;
+mod profile;
 mod regression;
 mod run;
 mod uncertainty;
 
-pub use check::{Check, LogFacts, Proposal, check};
+pub use check::{Check, Proposal, check};
 pub use drawn::machines;
 pub use identify::{Group, Identifiability, LIMIT};
 pub use knob::{GROUPS, Knob};
@@ -25,6 +26,7 @@ pub use least_squares::Ending;
 #[cfg(feature = "posterior")]
 pub use posterior::{Credible, EFFECTIVE, Posterior, R_HAT, posterior};
 pub use problem::{Problem, Stop};
+pub use profile::{Profile, profiles};
 pub use regression::{Balance, regression};
 pub use run::{Extra, Nuisance, Run, Seen};
 pub use uncertainty::{Covariance, inverse_of_square, student};

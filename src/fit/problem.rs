@@ -539,7 +539,7 @@ impl Residuals for Problem<'_> {
         let mut jacobian = DMatrix::zeros(rows, n);
         let mut moved = x.to_vec();
         let (mut a, mut b) = (vec![0.0; rows], vec![0.0; rows]);
-        for j in 0..globals {
+        for j in (0..globals).filter(|&j| !bounds.hold(j)) {
             let step = Step::new(x, bounds, j, how);
             moved[j] = step.first;
             let mut good = self.evaluate(&moved, &mut a);
