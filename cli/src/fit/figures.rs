@@ -24,7 +24,11 @@ pub fn overlay(log: &LogFit, output: &OutputFit) -> Figure {
         .panel(
             Panel::new(axis(output, "Value"))
                 .series(Series::new("log", log.time.clone(), output.seen.clone()).style(Style::Solid))
-                .series(Series::new("model", log.time.clone(), output.model.clone()).style(Style::Dashed))
+                .series(
+                    Series::new("model", log.time.clone(), output.model.clone())
+                        .style(Style::Dashed)
+                        .colour(Colour::Vermillion),
+                )
                 .weight(2.0),
         )
         .panel(Panel::new(axis(output, "Model − log")).line("model − log", &log.time, &residual).horizontal(0.0, ""))
@@ -75,7 +79,7 @@ pub fn profile(profile: &Profile) -> Figure {
                 )
                 .horizontal(1.96, "95 %"),
         )
-        .caption("With this parameter held and all others fitted anew; where both lines agree, so do interval and truth of the model.")
+        .caption("With this parameter held and all others fitted anew; where both lines agree, the interval is as long as it should be.")
 }
 
 /// Bars of a histogram.

@@ -111,14 +111,20 @@ fn significant(value: f64, digits: usize) -> String {
 /// Value, standard error and interval of an estimate.
 pub fn words(estimate: &Estimate) -> [String; 3] {
     let shown = |v: f64, digits| value(v, estimate.unit, digits);
-    let own = shown(estimate.value, 5);
+    // Two digits of what separates the ends of the interval.
+    let wide = estimate.interval.map_or(f64::INFINITY, |[low, high]| high - low);
+    let digits = match (estimate.value / wide).abs().log10().ceil() {
+        digits if digits.is_finite() => (digits.clamp(2.0, 12.0) as usize + 2).max(4),
+        _ => 4,
+    };
+    let own = shown(estimate.value, digits.max(5));
     match (estimate.error, estimate.interval) {
         (_, Some([low, high])) if estimate.at_bound => {
-            [own, "-".into(), format!("95 %: {} to {}, at its bound", shown(low, 4), shown(high, 4))]
+            [own, "-".into(), format!("95 %: {} to {}, at its bound", shown(low, digits), shown(high, digits))]
         }
         _ if estimate.at_bound => [own, "-".into(), "at its bound: no interval".into()],
         (Some(error), Some([low, high])) if error.is_finite() => {
-            [own, shown(error, 2), format!("95 %: {} to {}", shown(low, 4), shown(high, 4))]
+            [own, shown(error, 2), format!("95 %: {} to {}", shown(low, digits), shown(high, digits))]
         }
         _ => [own, "∞".into(), "not determined by these logs".into()],
     }
