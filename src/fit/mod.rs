@@ -357,7 +357,9 @@ fn first_weight(problem: &Problem, at: &Minimum) -> Option<f64> {
     if !run.residuals(&stage, &problem.extras_of(0, &at.x), &mut fresh) {
         return None;
     }
-    let k = (0..fresh.len()).max_by(|&a, &b| fresh[a].abs().total_cmp(&fresh[b].abs()))?;
+    // Of outputs; what is known beforehand stands behind them.
+    let outputs = 0..run.seen.len() * run.time.len();
+    let k = outputs.max_by(|&a, &b| fresh[a].abs().total_cmp(&fresh[b].abs()))?;
     let now = run.seen[k / run.time.len()].weights[k % run.time.len()];
     if fresh[k] == 0.0 { None } else { Some(now * at.residuals[k] / fresh[k]) }
 }

@@ -94,7 +94,10 @@ impl<'a> Problem<'a> {
             // What is only compared is compared whole.
             let window = if held { None } else { plan.windows };
             let setting = Setting { window, fitted_until: plan.until, held_out: held };
-            for run in Run::all(experiment, log, &setting) {
+            for mut run in Run::all(experiment, log, &setting) {
+                if plan.closed_loop {
+                    run.close(case, log);
+                }
                 if held { held_out.push(run) } else { runs.push(run) }
             }
         }
