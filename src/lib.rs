@@ -42,7 +42,7 @@
 //! - [`quantity`]: `"19.4 mm"` becomes 0.0194, with the dimension checked. Everywhere else numbers are in SI units.
 //! - [`parameter`]: the one table of everything a case file can say.
 //! - [`trajectory`]: columns with units, and their files.
-//! - [`friction`], [`stage`]: what the machine is.
+//! - [`friction`], [`stage`]: what the machine is. [`knob`]: its numbers by their keys.
 //! - [`signal`]: what is fed into it, and the references of its moves. [`design`]: what a controller is, in data.
 //! - [`plant`]: its equations of motion, mode by mode.
 //! - [`log`]: measured columns in. [`case`]: the case file in.
@@ -66,6 +66,7 @@ pub mod error;
 pub mod files;
 pub mod fit;
 pub mod friction;
+pub mod knob;
 pub mod linear;
 pub mod log;
 pub mod measure;

@@ -1,4 +1,4 @@
-//! What a fit can turn: numbers of a stage by their keys, and groups of them that move together.
+//! What can be turned: numbers of a stage by their keys, and groups of them that move together. A fit turns them, and a sweep.
 
 use crate::error::{Error, Result};
 use crate::friction::{Friction, Side};
@@ -30,6 +30,7 @@ enum Place {
     Inclination,
     Stiffness(usize),
     Damping(usize),
+    Modulus,
     Pretension,
     Friction(usize, bool, Term),
 }
@@ -114,6 +115,7 @@ impl Place {
             Place::Inclination => &mut stage.cart.inclination,
             Place::Stiffness(span) => &mut stage.belt.stiffness[span],
             Place::Damping(span) => &mut stage.belt.damping[span],
+            Place::Modulus => &mut stage.belt.make.as_mut()?.modulus,
             Place::Pretension => stage.belt.pretension.as_mut()?,
             Place::Friction(body, forward, term) => {
                 let side = side(stage, body, forward);
@@ -134,7 +136,9 @@ fn places(stage: &Stage, key: &str, keys: &[&str]) -> Option<Vec<Place>> {
         return Some(vec![*place]);
     }
     match key {
-        "belt.stiffness" | "belt.modulus" => return Some((0..3).map(Place::Stiffness).collect()),
+        "belt.stiffness" => return Some((0..3).map(Place::Stiffness).collect()),
+        // Spans that follow the cart are as stiff as the modulus says, those that do not as their stiffness.
+        "belt.modulus" => return Some((0..3).map(Place::Stiffness).chain([Place::Modulus]).collect()),
         "belt.damping" => return Some((0..3).map(Place::Damping).collect()),
         _ => {}
     }
@@ -159,7 +163,7 @@ fn get(stage: &Stage, place: Place) -> Option<f64> {
     place.slot(&mut stage.clone()).copied()
 }
 
-/// A number that a fit turns, and all that turns with it.
+/// A number that is turned, and all that turns with it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Knob {
     /// Its key, those of what is tied joined by ` = `, or the name of a group.
@@ -337,7 +341,7 @@ fn limits(
 
 fn unknown(key: &str) -> Error {
     let known: Vec<&str> = PLACES.iter().map(|(name, _)| *name).collect();
-    let error = Error::new(format!("`{key}` is no parameter that a fit can turn"));
+    let error = Error::new(format!("`{key}` is no parameter that can be turned"));
     let friction: Vec<String> = BODIES
         .iter()
         .flat_map(|body| ["viscous", "coulomb", "static"].map(|term| format!("{body}.friction.{term}")))
