@@ -264,6 +264,11 @@ impl Knob {
         }
     }
 
+    /// Whether both turn a number of the machine.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        self.members.iter().any(|(place, _)| other.members.iter().any(|(its, _)| its == place))
+    }
+
     /// Whether it is searched for on a logarithmic scale: what is above zero by nature, over more than a factor of two.
     pub fn logarithmic(&self) -> bool {
         self.low > 0.0 && self.high > 2.0 * self.low
@@ -309,6 +314,48 @@ pub fn value_of(stage: &Stage, key: &str) -> Option<f64> {
         "belt.stiffness" => Some(stage.belt.stiffness[0]),
         _ => get(stage, *places(stage, key, &[])?.first()?),
     }
+}
+
+/// The keys of everything of a machine that is known by measurement and is not zero: all numbers of motor, pulleys, cart and belt but
+/// the gear's ratio and efficiency, and the inclination. Directions and breakaways that have the same value count once.
+pub fn all_keys(stage: &Stage) -> Vec<String> {
+    let exact = |place: Place| {
+        matches!(
+            place,
+            Place::GearRatio
+                | Place::GearEfficiency
+                | Place::Gain
+                | Place::VoltageLimit
+                | Place::CurrentLimit
+                | Place::Inclination
+        )
+    };
+    let made = stage.belt.make.is_some();
+    let of_belt = |place: Place| matches!(place, Place::Stiffness(_));
+    let there = |place: Place| get(stage, place).is_some_and(|value| value != 0.0 && value.is_finite());
+    let mut keys: Vec<String> = PLACES
+        .iter()
+        .filter(|(_, place)| there(*place) && !exact(*place) && !(made && of_belt(*place)))
+        .map(|(key, _)| key.to_string())
+        .collect();
+    if made {
+        keys.push("belt.modulus".to_string());
+    }
+    for (index, body) in BODIES.iter().enumerate() {
+        for (term, word) in [(Term::Viscous, "viscous"), (Term::Coulomb, "coulomb"), (Term::Breakaway, "static")] {
+            let value = |forward: bool, term: Term| get(stage, Place::Friction(index, forward, term));
+            let (forward, backward) = (value(true, term), value(false, term));
+            let follows =
+                |forward: bool| term == Term::Breakaway && value(forward, term) == value(forward, Term::Coulomb);
+            if forward.is_some_and(|value| value != 0.0) && !follows(true) {
+                keys.push(format!("{body}.friction.{word}"));
+            }
+            if backward != forward && backward.is_some_and(|value| value != 0.0) && !follows(false) {
+                keys.push(format!("{body}.friction.{word}_backward"));
+            }
+        }
+    }
+    keys
 }
 
 /// The row of the table of parameters; of a list, that of the list.

@@ -51,6 +51,7 @@
 //! - [`linear`]: state space, poles, zeros, frequency response, resonance along the travel.
 //! - [`control`]: controllers stepped in time around the exact plant; input shapers, from spectra and from the model.
 //! - [`fit`]: parameters from logs, and what the logs cannot tell.
+//! - [`sweep`]: many runs with parameters varied.
 //! - [`tune`]: gains of a controller, good for the worst axis that parameters, loads and places can make.
 //! - `report`: figures, drawings and an HTML page of them (feature `report`, on by default).
 //!
@@ -83,6 +84,7 @@ pub mod report;
 pub mod signal;
 pub mod solve;
 pub mod stage;
+pub mod sweep;
 pub mod trajectory;
 pub mod tune;
 

@@ -18,7 +18,7 @@ mod uncertainty;
 
 pub use crate::knob::{GROUPS, Knob};
 pub use check::{Check, LogFacts, Proposal, check};
-pub use drawn::machines;
+pub use drawn::{drawn, machines};
 pub use identify::{Group, Identifiability, LIMIT};
 pub use least_squares::Ending;
 #[cfg(feature = "posterior")]
