@@ -163,11 +163,6 @@ pub(super) fn sweeping(root: &Table, context: &Context) -> Result<Option<Sweepin
         }
         _ => {}
     }
-    if context.experiments.is_empty() {
-        return Err(field
-            .fail("this case has no [[experiment]], and moves in closed loop are not swept")
-            .next("add [[experiment]] with name, input, until and every"));
-    }
     let interval = table.number_if_given("interval")?;
     for experiment in context.experiments {
         if let (Some(interval), Some(field)) = (interval, table.optional("interval"))

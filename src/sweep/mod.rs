@@ -1,7 +1,7 @@
 //! Many runs with parameters varied.
 //!
 //! A [`Sweep`] is made of a case that says what is varied ([`crate::case::Sweeping`]). Each of its runs is one machine, with every
-//! experiment of the case: row `i` follows from the case and `i` alone, bit for bit, so that rows can be computed in any order, in pieces,
+//! experiment and move of the case: row `i` follows from the case and `i` alone, bit for bit, so that rows can be computed in any order, in pieces,
 //! by any number of threads and machines. The kernel does no I/O and starts no thread.
 //!
 //! ```
@@ -20,20 +20,26 @@
 
 mod chance;
 mod distribution;
-mod figures;
+mod indices;
+mod measures;
 mod plan;
 mod points;
 mod sobol;
+mod statistics;
 
 pub use distribution::{Distribution, normal_quantile};
-pub use figures::{FIGURES, Figure};
+pub use indices::{Estimate, Index, indices};
+pub use measures::{Measure, OF_EXPERIMENT, OF_MOVE};
 pub use sobol::{DIMENSIONS, Sobol};
+pub use statistics::{SHARES, Spread, rank_correlation};
 
-use crate::case::{Experiment, Sampling};
-use crate::error::Result;
+use crate::case::{Experiment, Move, Sampling};
+use crate::control::{self, MoveRun, Setup};
+use crate::design::Design;
+use crate::error::{Error, Result};
 use crate::knob::{Breakaways, Knob};
 use crate::metrics::Meter;
-use crate::solve::{self, Ending, Flow, Solver};
+use crate::solve::{self, Bench, Detail, Ending, Flow, Solver};
 use crate::stage::Stage;
 use crate::trajectory::{Column, Trajectory};
 use points::Points;
@@ -99,6 +105,8 @@ struct Draws {
 pub struct Sweep {
     stage: Stage,
     experiments: Vec<Experiment>,
+    moves: Vec<Move>,
+    controller: Option<Design>,
     parameters: Vec<Parameter>,
     breakaways: Breakaways,
     draws: Option<Arc<Draws>>,
@@ -134,6 +142,11 @@ impl Sweep {
     /// The experiments that each machine does.
     pub fn experiments(&self) -> &[Experiment] {
         &self.experiments
+    }
+
+    /// The moves in closed loop that each machine does; the controller takes every machine for the one of the case.
+    pub fn moves(&self) -> &[Move] {
+        &self.moves
     }
 
     /// The machine as the case has it.
@@ -178,6 +191,7 @@ impl Sweep {
         let mut table = Trajectory::with_capacity(&self.headings, count);
         let mut values = Vec::with_capacity(self.headings.len());
         let mut stage = self.stage.clone();
+        let mut bench = Bench::default();
         for run in self.range(first, count) {
             if stop() {
                 return None;
@@ -185,29 +199,41 @@ impl Sweep {
             self.put_values(run, &mut values);
             stage.clone_from(&self.stage);
             self.turn(&mut stage, run, &values);
-            let solver = Solver::of(&stage);
+            let machine = bench.mount(&stage);
             for experiment in &self.experiments {
                 let mut meter = Meter::new(&stage);
-                let outcome = solve::stream(&stage, experiment, solver, &mut |block| {
-                    meter.take(block);
-                    Flow::Continue
+                let outcome = machine.clone().and_then(|()| {
+                    bench.run(experiment, Detail::Metrics, &mut |block| {
+                        meter.take(block);
+                        Flow::Continue
+                    })
                 });
-                let status = match &outcome {
-                    Ok(outcome) => status(outcome.ending),
-                    Err(_) => Status::Refused,
-                };
-                values.push(status.code());
-                match outcome {
-                    Ok(outcome) if status == Status::Complete => {
-                        let metrics = meter.finish(&outcome.events);
-                        values.extend(FIGURES.iter().map(|figure| (figure.of)(&metrics)));
-                    }
-                    _ => values.extend(FIGURES.iter().map(|_| f64::NAN)),
-                }
+                let told = outcome.map(|outcome| (outcome.ending, meter.finish(&outcome.events)));
+                put_measures(told, OF_EXPERIMENT, &mut values);
+            }
+            for motion in &self.moves {
+                let told =
+                    machine.clone().and_then(|()| self.close(&stage, motion)).map(|run| (run.outcome.ending, run));
+                put_measures(told, OF_MOVE, &mut values);
             }
             push(&mut table, &values);
         }
         Some(table)
+    }
+
+    /// A move in closed loop.
+    fn close(&self, stage: &Stage, motion: &Move) -> Result<MoveRun> {
+        let Some(design) = &self.controller else { return Err(Error::new("there is no controller")) };
+        let setup = Setup {
+            stage,
+            model: &self.stage,
+            design,
+            profile: &motion.profile,
+            until: motion.until,
+            window: motion.window,
+            solver: Solver::of(stage),
+        };
+        control::closed_loop(&setup)
     }
 
     fn range(&self, first: u64, count: usize) -> std::ops::Range<u64> {
@@ -249,7 +275,20 @@ impl Sweep {
         for experiment in &self.experiments {
             solve::stream(&self.stage, experiment, Solver::of(&self.stage), &mut |_| Flow::Stop)?;
         }
+        for motion in &self.moves {
+            self.close(&self.stage, motion)?;
+        }
         Ok(())
+    }
+}
+
+/// How a run ended, and its figures; NaN where it has not reached its end.
+fn put_measures<T>(told: Result<(Ending, T)>, measures: &[Measure<T>], values: &mut Vec<f64>) {
+    let status = told.as_ref().map_or(Status::Refused, |(ending, _)| status(*ending));
+    values.push(status.code());
+    match told {
+        Ok((_, run)) if status == Status::Complete => values.extend(measures.iter().map(|measure| (measure.of)(&run))),
+        _ => values.extend(measures.iter().map(|_| f64::NAN)),
     }
 }
 
@@ -269,14 +308,25 @@ fn status(ending: Ending) -> Status {
 }
 
 /// The columns that a sweep of these has.
-fn headings(draws: Option<&Draws>, parameters: &[Parameter], experiments: &[Experiment]) -> Vec<Column> {
+fn headings(
+    draws: Option<&Draws>,
+    parameters: &[Parameter],
+    experiments: &[Experiment],
+    moves: &[Move],
+) -> Vec<Column> {
     let knobs = draws.iter().flat_map(|draws| &draws.knobs).chain(parameters.iter().map(|parameter| &parameter.knob));
     let mut columns = vec![Column::new("run", "")];
     columns.extend(knobs.map(|knob| Column::new(knob.name.clone(), knob.unit)));
     for experiment in experiments {
-        let name = experiment.file_name();
-        columns.push(Column::new(format!("{name}.status"), ""));
-        columns.extend(FIGURES.iter().map(|figure| Column::new(format!("{name}.{}", figure.name), figure.unit)));
+        put_headings(&experiment.file_name(), OF_EXPERIMENT, &mut columns);
+    }
+    for motion in moves {
+        put_headings(&motion.file_name(), OF_MOVE, &mut columns);
     }
     columns
+}
+
+fn put_headings<T>(name: &str, measures: &[Measure<T>], columns: &mut Vec<Column>) {
+    columns.push(Column::new(format!("{name}.status"), ""));
+    columns.extend(measures.iter().map(|measure| Column::new(format!("{name}.{}", measure.name), measure.unit)));
 }

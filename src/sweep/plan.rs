@@ -69,10 +69,12 @@ impl Sweep {
             experiment.log = None;
             experiment.every = plan.interval.unwrap_or(experiment.every);
         }
-        let headings = headings(draws.as_deref(), &parameters, &experiments);
+        let headings = headings(draws.as_deref(), &parameters, &experiments, &case.moves);
         let sweep = Self {
             stage,
             experiments,
+            moves: case.moves.clone(),
+            controller: case.controller.clone(),
             parameters,
             breakaways,
             draws,
