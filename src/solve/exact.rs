@@ -310,6 +310,12 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             return false;
         }
         let resting = y.iter().all(|&rate| rate == 0.0);
+        if resting && self.input() == 0.0 && self.recorder.detail == Detail::Metrics {
+            // Rows that say nothing new.
+            self.recorder.skip(safe - 1);
+            self.row += safe;
+            return true;
+        }
         let step = law.step(0);
         for j in 0..safe {
             if j > 0 {

@@ -184,7 +184,8 @@ pub enum Detail {
     /// All of them.
     #[default]
     Full,
-    /// Those that [`crate::metrics::Meter`] looks at; friction, encoder and what the stage adds are left out.
+    /// Those that [`crate::metrics::Meter`] looks at, without friction, encoder and what the stage adds; and of a stage that rests without
+    /// input, for which nothing changes, the first row and the last.
     Metrics,
 }
 

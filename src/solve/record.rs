@@ -24,7 +24,7 @@ pub(crate) struct Extra {
 pub(crate) struct Recorder<'a> {
     plant: &'a Plant,
     grid: Grid,
-    detail: Detail,
+    pub(crate) detail: Detail,
     /// States, with the input.
     raw: Vec<(State, f64)>,
     modes: Vec<Mode>,
@@ -81,6 +81,14 @@ impl<'a> Recorder<'a> {
     pub(crate) fn push_with(&mut self, state: State, input: f64, mode: Mode, extra: Extra) {
         self.extra.push(extra);
         self.push(state, input, mode);
+    }
+
+    /// Leaves out so many rows.
+    pub(crate) fn skip(&mut self, rows: u64) {
+        if rows > 0 {
+            self.finish();
+            self.rows += rows;
+        }
     }
 
     /// Hands on what is left.
