@@ -122,7 +122,7 @@ fn a_killed_sweep_goes_on() {
     assert!(output.status.success());
     let text = String::from_utf8(output.stdout).unwrap();
     let line = text.lines().find(|line| line.contains("simulations a second")).unwrap();
-    let again: usize = line.split(' ').next().unwrap().parse().unwrap();
+    let again: usize = line.split(": ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     assert!(again < 6000 && kept >= 6, "{line}");
     assert!(run("whole.parquet").output().unwrap().status.success());
     let [killed, whole] = ["killed.parquet", "whole.parquet"].map(|name| fs::read(folder.path().join(name)).unwrap());

@@ -321,16 +321,7 @@ impl<const R: usize, const C: usize> Law<R, C> {
 
     /// Terms of the Taylor series of z over `distance`: z(s · distance) = Σ term_k sᵏ.
     pub(super) fn series(&self, z: &[f64; C], distance: f64) -> [[f64; C]; SERIES_ORDER + 1] {
-        let mut terms = [[0.0; C]; SERIES_ORDER + 1];
-        terms[0] = *z;
-        for k in 1..=SERIES_ORDER {
-            let factor = distance / k as f64;
-            let next = self.rate.times(&terms[k - 1]);
-            for (term, next) in terms[k].iter_mut().zip(next) {
-                *term = next * factor;
-            }
-        }
-        terms
+        self.rate.series(z, distance)
     }
 
     /// How much √V may grow by itself within `length`.
