@@ -146,13 +146,13 @@ fn a_folder_has_rows_summary_case_report_and_plots() {
     ];
     let case = stage("table4.toml");
     let text = done(folder.path(), &[&[&case as &str, "--out", "out"], &arguments[..]].concat());
-    assert!(text.contains("128 runs of 2 simulations each: 2 parameters, sobol, for Sobol' indices"), "{text}");
+    assert!(text.contains("512 runs of 2 simulations each: 2 parameters, sobol, for Sobol' indices"), "{text}");
     let out = folder.path().join("out");
     let summary: Value = serde_json::from_str(&fs::read_to_string(out.join("sweep.json")).unwrap()).unwrap();
     let figures = summary["experiments"][0]["figures"].as_array().unwrap();
     let current = figures.iter().find(|figure| figure["name"] == "peak_motor_current").unwrap();
     // The peak of the current is that of the first moment, V/R: nothing else matters.
-    assert!((current["indices"]["motor.resistance"]["total"]["value"].as_f64().unwrap() - 1.0).abs() < 0.1);
+    assert!((current["indices"]["motor.resistance"]["total"]["value"].as_f64().unwrap() - 1.0).abs() < 0.2);
     assert!(current["indices"]["cart.mass"]["total"]["value"].as_f64().unwrap().abs() < 1e-9);
     let report = fs::read_to_string(out.join("report.html")).unwrap();
     assert!(report.contains("first order") && report.contains("motor.resistance") && !report.contains("http://"));
@@ -249,12 +249,12 @@ fn the_papers_study_is_a_sweep() {
     ] {
         assert!((swept - claimed).abs() < 1e-10, "{swept} and {claimed}");
     }
-    // The print of Table 4's friction in the remark: "From Table 4 it is −38.6 % and +67.2 % at 5 V."
+    // In the remark, to three digits: "From Table 4 it is −61.6 % and +111 % at 5 V."
     let remark =
         claims.iter().find(|claim| claim["id"] == "p10-friction").unwrap()["remark"].as_str().unwrap().to_string();
     let friction = summary["parameters"][3]["name"].as_str().unwrap();
     for which in [0, 1] {
-        let percent = format!("{:.1}", 100.0 * relative(0, friction, which).abs());
+        let percent = taut::number::significant(100.0 * relative(0, friction, which).abs(), 3);
         assert!(remark.contains(&percent), "{percent}: {remark}");
     }
 }

@@ -250,12 +250,12 @@ impl<const R: usize, const C: usize> Law<R, C> {
 
     /// ż.
     pub(super) fn rate(&self, z: &[f64; C]) -> [f64; R] {
-        self.rate.times(z)
+        self.rate.rate(z)
     }
 
     /// z̈ from ż.
     pub(super) fn rate_of_rate(&self, y: &[f64; R]) -> [f64; R] {
-        self.rate.times(&widened(y))
+        self.rate.rate(&widened(y))
     }
 
     /// √(2V) of ż.
@@ -290,7 +290,9 @@ impl<const R: usize, const C: usize> Law<R, C> {
 
     /// Length of the intervals of a level: h/2^level.
     pub(super) fn length(&self, level: usize) -> f64 {
-        self.h * 0.5_f64.powi(level as i32)
+        // 2^−level by its exponent.
+        let power = if level < 1000 { f64::from_bits((1023 - level as u64) << 52) } else { 0.5_f64.powi(level as i32) };
+        self.h * power
     }
 
     /// How far the Taylor series reaches.

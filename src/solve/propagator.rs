@@ -87,8 +87,24 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
     }
 
     /// The product with a vector.
+    #[inline]
+    pub(crate) fn rate(&self, z: &[f64; C]) -> [f64; R] {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.times_by_avx2(z) };
+        }
+        self.times(z)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn times_by_avx2(&self, z: &[f64; C]) -> [f64; R] {
+        self.times(z)
+    }
+
     #[inline(always)]
-    pub(crate) fn times(&self, z: &[f64; C]) -> [f64; R] {
+    fn times(&self, z: &[f64; C]) -> [f64; R] {
         let mut sum = [0.0; R];
         for (column, &factor) in self.column.iter().zip(z) {
             for (s, c) in sum.iter_mut().zip(column) {
