@@ -135,7 +135,7 @@ fn a_folder_has_rows_summary_case_report_and_plots() {
     let folder = TempDir::new().unwrap();
     let arguments = [
         "--runs",
-        "32",
+        "128",
         "--design",
         "sobol",
         "--indices",
