@@ -62,13 +62,13 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         let mut terms = [[0.0; C]; SERIES_ORDER + 1];
         terms[0] = *z;
         let mut next = self.times(z);
-        for k in 1..=SERIES_ORDER {
+        for (k, term) in terms.iter_mut().enumerate().skip(1) {
             let factor = distance / k as f64;
-            for (term, next) in terms[k].iter_mut().zip(next) {
+            for (term, next) in term.iter_mut().zip(next) {
                 *term = next * factor;
             }
             if k < SERIES_ORDER {
-                next = self.times_moving(&terms[k]);
+                next = self.times_moving(term);
             }
         }
         terms

@@ -19,14 +19,14 @@ const STEPS: [Step; 6] = [
         "the library without its features",
         &["clippy", "--package", "taut", "--lib", "--no-default-features", "--", "-D", "warnings"],
     ),
-    // Unit tests, integration tests and the examples in the documentation.
-    step("tests", &["test", "--workspace", "--no-fail-fast"]),
-    step("examples", &["build", "--workspace", "--examples"]),
     Step {
         what: "documentation",
         command: &["doc", "--workspace", "--no-deps"],
         variables: &[("RUSTDOCFLAGS", "-D warnings")],
     },
+    // Unit tests, integration tests and the examples in the documentation.
+    step("tests", &["test", "--workspace", "--no-fail-fast"]),
+    step("examples", &["build", "--workspace", "--examples"]),
 ];
 
 const fn step(what: &'static str, command: &'static [&'static str]) -> Step {

@@ -1,8 +1,9 @@
 //! The result as data: what `--json` prints and `fit.json` holds. Everything is in SI units.
 
+use super::Found;
 use serde_json::{Value, json};
 use taut::case::Case;
-use taut::fit::{Fit, Posterior, Score};
+use taut::fit::{Posterior, Profile, Score};
 
 /// Numbers that JSON has no word for are null.
 fn number(value: f64) -> Value {
@@ -46,8 +47,20 @@ fn drawn(posterior: &Posterior) -> Value {
     })
 }
 
+/// A profile: where the parameter was held, and how much worse the logs were met.
+fn profile(profile: &Profile) -> Value {
+    json!({
+        "name": profile.name,
+        "unit": profile.unit,
+        "values": profile.values,
+        "growth": profile.growth,
+        "linear": profile.linear,
+    })
+}
+
 /// The text.
-pub fn text(case: &Case, fit: &Fit, posterior: Option<&Posterior>) -> String {
+pub fn text(case: &Case, found: &Found) -> String {
+    let fit = &found.fit;
     let parameters: Vec<Value> = fit
         .estimates
         .iter()
@@ -107,7 +120,8 @@ pub fn text(case: &Case, fit: &Fit, posterior: Option<&Posterior>) -> String {
             "quantity": quantity.name(), "unit": quantity.unit(), "value": number(*deviation),
         })).collect::<Vec<_>>(),
         "logs": logs,
-        "posterior": posterior.map_or(Value::Null, drawn),
+        "profiles": found.profiles.iter().map(profile).collect::<Vec<_>>(),
+        "posterior": found.drawn.as_ref().map_or(Value::Null, drawn),
         "work": {
             "iterations": fit.work.iterations,
             "evaluations": fit.work.evaluations,
