@@ -104,6 +104,11 @@ fn the_page_on_tuning_shows_what_the_program_prints() {
 }
 
 #[test]
+fn the_page_on_sweeps_shows_what_the_program_prints() {
+    check("docs/sweep.md");
+}
+
+#[test]
 fn the_page_on_modes_shows_what_the_program_prints() {
     check("docs/modes.md");
 }
@@ -150,6 +155,7 @@ fn what_the_documents_name_is_there() {
         "docs/paper.md",
         "docs/posterior.md",
         "docs/shape.md",
+        "docs/sweep.md",
         "docs/tune.md",
         "docs/solver.md",
         "docs/general-solver.md",

@@ -5,6 +5,7 @@ use crate::friction::Motion;
 use crate::plant::{Body, Cause, Form, Mode, Plant, ROTOR, ROUNDING, SPEEDS, STRETCHES, arms, place};
 use crate::signal::DEGREE;
 use std::cell::OnceCell;
+use std::rc::Rc;
 
 /// Number of states: without the rotor's two with eight rows, else all.
 pub(super) const fn states<const R: usize>() -> usize {
@@ -42,7 +43,11 @@ impl Size {
 
 /// A condition of the mode on the vector z.
 pub(super) struct Watch<const C: usize> {
-    row: [f64; C],
+    /// What counts in it: places in z in ascending order, and their weights. Most others are zero.
+    places: [usize; C],
+    weights: [f64; C],
+    /// How many count; and how many of those move.
+    count: [usize; 2],
     /// The norm dual to the energy: how much its value can change per unit of √(2V), mechanical and magnetic.
     dual: Size,
     /// Its coefficient of the input.
@@ -51,8 +56,24 @@ pub(super) struct Watch<const C: usize> {
 }
 
 impl<const C: usize> Watch<C> {
+    fn new<const R: usize>(row: &[f64; C], dual: Size, input: f64, cause: Cause) -> Self {
+        let (mut places, mut weights, mut count) = ([0; C], [0.0; C], [0; 2]);
+        for (place, weight) in row.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
+            (places[count[0]], weights[count[0]]) = (place, *weight);
+            count[0] += 1;
+            count[1] += usize::from(place < R);
+        }
+        Self { places, weights, count, dual, input, cause }
+    }
+
+    /// Σ w_j z_j, in the order of the places.
+    #[inline(always)]
+    fn sum(&self, count: usize, term: impl Fn(f64, usize) -> f64) -> f64 {
+        self.weights.iter().zip(&self.places).take(count).fold(0.0, |sum, (weight, place)| sum + term(*weight, *place))
+    }
+
     pub(super) fn value(&self, z: &[f64; C]) -> f64 {
-        self.row.iter().zip(z).fold(0.0, |sum, (w, z)| sum + w * z)
+        self.sum(self.count[0], |weight, place| weight * z[place])
     }
 
     /// Its value, with what rounding alone may have made negative taken for zero.
@@ -68,12 +89,12 @@ impl<const C: usize> Watch<C> {
 
     /// What rounding may do to its value.
     pub(super) fn noise(&self, z: &[f64; C]) -> f64 {
-        ROUNDING * self.row.iter().zip(z).fold(0.0, |sum, (w, z)| sum + (w * z).abs())
+        ROUNDING * self.sum(self.count[0], |weight, place| (weight * z[place]).abs())
     }
 
     /// Its rate of change, `y` being ż.
     pub(super) fn slope<const R: usize>(&self, y: &[f64; R]) -> f64 {
-        self.row.iter().zip(y).fold(0.0, |sum, (w, y)| sum + w * y)
+        self.sum(self.count[1], |weight, place| weight * y[place])
     }
 }
 
@@ -100,7 +121,17 @@ pub(super) struct Law<const R: usize, const C: usize> {
 }
 
 impl<const R: usize, const C: usize> Law<R, C> {
-    pub(super) fn new(plant: &Plant, mode: Mode, h: f64) -> Self {
+    /// That of a mode and an interval, among those that are known, or a new one, which is added; and whether it is new.
+    pub(super) fn of(known: &mut Vec<Rc<Self>>, plant: &Plant, mode: Mode, h: f64) -> (Rc<Self>, bool) {
+        if let Some(law) = known.iter().find(|law| law.mode == mode && law.h == h) {
+            return (Rc::clone(law), false);
+        }
+        let law = Rc::new(Self::new(plant, mode, h));
+        known.push(Rc::clone(&law));
+        (law, true)
+    }
+
+    fn new(plant: &Plant, mode: Mode, h: f64) -> Self {
         let stage = plant.stage();
         let r = stage.pulley_radius;
         let mut equations = plant.equations(mode);
@@ -196,12 +227,7 @@ impl<const R: usize, const C: usize> Law<R, C> {
         let guards = equations
             .guards
             .iter()
-            .map(|guard| Watch {
-                row: row_of(&guard.form),
-                dual: dual(&guard.form),
-                input: guard.form.input,
-                cause: guard.cause,
-            })
+            .map(|guard| Watch::new::<R>(&row_of(&guard.form), dual(&guard.form), guard.form.input, guard.cause))
             .collect();
         let push: f64 = (0..SPEEDS).map(|j| inertia[j] * equations.acceleration[j].input.powi(2)).sum();
         let forcing = (push + magnetic * equations.current_rate.input.powi(2)).sqrt();
@@ -239,12 +265,12 @@ impl<const R: usize, const C: usize> Law<R, C> {
 
     /// ż.
     pub(super) fn rate(&self, z: &[f64; C]) -> [f64; R] {
-        self.rate.times(z)
+        self.rate.rate(z)
     }
 
     /// z̈ from ż.
     pub(super) fn rate_of_rate(&self, y: &[f64; R]) -> [f64; R] {
-        self.rate.times(&widened(y))
+        self.rate.rate(&widened(y))
     }
 
     /// √(2V) of ż.
@@ -279,7 +305,9 @@ impl<const R: usize, const C: usize> Law<R, C> {
 
     /// Length of the intervals of a level: h/2^level.
     pub(super) fn length(&self, level: usize) -> f64 {
-        self.h * 0.5_f64.powi(level as i32)
+        // 2^−level by its exponent.
+        let power = if level < 1000 { f64::from_bits((1023 - level as u64) << 52) } else { 0.5_f64.powi(level as i32) };
+        self.h * power
     }
 
     /// How far the Taylor series reaches.
@@ -310,16 +338,7 @@ impl<const R: usize, const C: usize> Law<R, C> {
 
     /// Terms of the Taylor series of z over `distance`: z(s · distance) = Σ term_k sᵏ.
     pub(super) fn series(&self, z: &[f64; C], distance: f64) -> [[f64; C]; SERIES_ORDER + 1] {
-        let mut terms = [[0.0; C]; SERIES_ORDER + 1];
-        terms[0] = *z;
-        for k in 1..=SERIES_ORDER {
-            let factor = distance / k as f64;
-            let next = self.rate.times(&terms[k - 1]);
-            for (term, next) in terms[k].iter_mut().zip(next) {
-                *term = next * factor;
-            }
-        }
-        terms
+        self.rate.series(z, distance)
     }
 
     /// How much √V may grow by itself within `length`.
