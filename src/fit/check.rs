@@ -8,6 +8,7 @@ use super::run::is_position;
 use crate::case::{Case, Plan};
 use crate::error::{Error, Result};
 use crate::log::{Quantity, Survey};
+use crate::solve::Bench;
 use crate::stage::Stage;
 use nalgebra::DMatrix;
 
@@ -246,13 +247,14 @@ fn rows_of(problem: &Problem, idea: &Idea, x: &[f64], noise: &[(Quantity, f64)])
         let mut stage = problem.stage_at(x);
         (idea.change)(&mut stage);
         let mut values = Vec::new();
+        let mut bench = Bench::default();
         for (index, run) in problem.runs.iter().enumerate() {
             let mut stage = stage.clone();
             if idea.reversed {
                 stage.amplifier.gain = -stage.amplifier.gain;
             }
             let mut columns = vec![Vec::new(); quantities.len()];
-            if !run.predict(&stage, &problem.extras_of(index, x), &quantities, &mut columns) {
+            if !run.predict(&mut bench, &stage, &problem.extras_of(index, x), &quantities, &mut columns) {
                 return None;
             }
             for (column, (_, sigma)) in columns.iter().zip(&measured) {

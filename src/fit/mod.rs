@@ -33,7 +33,7 @@ pub use uncertainty::{Covariance, inverse_of_square, student};
 use crate::case::{Case, Plan};
 use crate::error::{Error, Result};
 use crate::log::Quantity;
-use crate::solve::Flow;
+use crate::solve::{Bench, Flow};
 use crate::stage::Stage;
 use least_squares::{Minimum, Options, Residuals, minimise};
 use nalgebra::DVector;
@@ -353,7 +353,7 @@ fn first_weight(problem: &Problem, at: &Minimum) -> Option<f64> {
     let stage = problem.stage_at(&at.x);
     let run = &problem.runs[0];
     let mut fresh = vec![0.0; run.rows()];
-    if !run.residuals(&stage, &problem.extras_of(0, &at.x), &mut fresh) {
+    if !run.residuals(&mut Bench::default(), &stage, &problem.extras_of(0, &at.x), &mut fresh) {
         return None;
     }
     // Of outputs; what is known beforehand stands behind them.
@@ -606,7 +606,7 @@ fn result(problem: &Problem, best: &Minimum, noise: Vec<(Quantity, f64)>, starts
 fn compared(run: &Run, stage: &Stage, extras: &[f64], told: Vec<(Nuisance, f64, Option<f64>)>) -> LogFit {
     let quantities: Vec<Quantity> = run.seen.iter().map(|seen| seen.quantity).collect();
     let mut columns = vec![Vec::new(); quantities.len()];
-    let complete = run.predict(stage, extras, &quantities, &mut columns);
+    let complete = run.predict(&mut Bench::default(), stage, extras, &quantities, &mut columns);
     let n = run.time.len();
     let outputs = run
         .seen

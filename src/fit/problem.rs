@@ -6,6 +6,7 @@ use crate::case::{Case, Nuisances, Plan, Scope, matches};
 use crate::error::{Error, Result};
 use crate::knob::{Breakaways, Knob};
 use crate::log::Quantity;
+use crate::solve::Bench;
 use crate::stage::{AmplifierMode, Stage};
 use nalgebra::DMatrix;
 
@@ -412,13 +413,13 @@ impl<'a> Problem<'a> {
         self.runs[..index].iter().map(Run::rows).sum()
     }
 
-    fn one(&mut self, index: usize, stage: &Stage, x: &[f64], out: &mut [f64]) -> bool {
+    fn one(&mut self, bench: &mut Bench, index: usize, stage: &Stage, x: &[f64], out: &mut [f64]) -> bool {
         if self.is_stopped() {
             return false;
         }
         self.simulations += 1;
         let extras = self.extras_of(index, x);
-        self.runs[index].residuals(stage, &extras, out)
+        self.runs[index].residuals(bench, stage, &extras, out)
     }
 }
 
@@ -526,10 +527,11 @@ impl Residuals for Problem<'_> {
 
     fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool {
         let stage = self.stage_at(x);
+        let mut bench = Bench::default();
         let mut first = 0;
         for index in 0..self.runs.len() {
             let rows = self.runs[index].rows();
-            if !self.one(index, &stage, x, &mut r[first..first + rows]) {
+            if !self.one(&mut bench, index, &stage, x, &mut r[first..first + rows]) {
                 return false;
             }
             first += rows;
@@ -561,6 +563,7 @@ impl Residuals for Problem<'_> {
         }
         // What belongs to one run moves its residuals alone.
         let stage = self.stage_at(x);
+        let mut bench = Bench::default();
         let mut first = 0;
         for index in 0..self.runs.len() {
             let rows = self.runs[index].rows();
@@ -580,10 +583,10 @@ impl Residuals for Problem<'_> {
                 }
                 let step = Step::new(x, bounds, j, how);
                 moved[j] = step.first;
-                let mut good = self.one(index, &stage, &moved, &mut a[..rows]);
+                let mut good = self.one(&mut bench, index, &stage, &moved, &mut a[..rows]);
                 if let Some(second) = step.second {
                     moved[j] = second;
-                    good &= self.one(index, &stage, &moved, &mut b[..rows]);
+                    good &= self.one(&mut bench, index, &stage, &moved, &mut b[..rows]);
                 }
                 moved[j] = x[j];
                 if !good {

@@ -6,7 +6,7 @@ use crate::design::Design;
 use crate::log::{Log, Quantity};
 use crate::signal::Signal;
 use crate::signal::profile::Profile;
-use crate::solve::{self, Ending, Flow, Solver};
+use crate::solve::{Bench, Detail, Ending, Flow, Solver};
 use crate::stage::Stage;
 use crate::trajectory::Trajectory;
 use std::sync::Arc;
@@ -331,7 +331,14 @@ impl Run {
 
     /// What the model says at the log's times, one column for each output, biases not yet added; false where it does not
     /// reach the end.
-    pub fn predict(&self, stage: &Stage, extras: &[f64], quantities: &[Quantity], out: &mut [Vec<f64>]) -> bool {
+    pub fn predict(
+        &self,
+        bench: &mut Bench,
+        stage: &Stage,
+        extras: &[f64],
+        quantities: &[Quantity],
+        out: &mut [Vec<f64>],
+    ) -> bool {
         let mut stage = stage.clone();
         let experiment = self.experiment(&mut stage, extras);
         let mut slopes: Vec<Vec<f64>> = vec![Vec::new(); quantities.len()];
@@ -355,7 +362,10 @@ impl Run {
             }
             None => {
                 stage.encoder = None;
-                solve::stream(&stage, &experiment, solver, &mut take)
+                // A rotor of its own has columns that only the whole table has.
+                let of_rotor = |quantity: &Quantity| quantity.name().starts_with("rotor");
+                let detail = if quantities.iter().any(of_rotor) { Detail::Full } else { Detail::Lean };
+                bench.mount(&stage).and_then(|()| bench.run(&experiment, detail, &mut take))
             }
         };
         if !outcome.is_ok_and(|outcome| outcome.ending == Ending::Complete) {
@@ -370,10 +380,10 @@ impl Run {
     }
 
     /// Weighted residuals, model minus log, with this model and these extras.
-    pub fn residuals(&self, stage: &Stage, extras: &[f64], out: &mut [f64]) -> bool {
+    pub fn residuals(&self, bench: &mut Bench, stage: &Stage, extras: &[f64], out: &mut [f64]) -> bool {
         let quantities: Vec<Quantity> = self.seen.iter().map(|seen| seen.quantity).collect();
         let mut columns = vec![Vec::with_capacity(self.time.len()); self.seen.len()];
-        if !self.predict(stage, extras, &quantities, &mut columns) {
+        if !self.predict(bench, stage, extras, &quantities, &mut columns) {
             return false;
         }
         let n = self.time.len();

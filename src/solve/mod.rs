@@ -184,8 +184,9 @@ pub enum Detail {
     /// All of them.
     #[default]
     Full,
-    /// Those that [`crate::metrics::Meter`] looks at, without friction, encoder and what the stage adds; and of a stage that rests without
-    /// input, for which nothing changes, the first row and the last.
+    /// Those that [`crate::metrics::Meter`] looks at, without friction, encoder and what the stage adds.
+    Lean,
+    /// The same; and of a stage that rests without input, for which nothing changes, only the first row and the last.
     Metrics,
 }
 
@@ -198,8 +199,11 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Takes up a stage. Errors: what makes no sense as a machine.
+    /// Takes up a stage, unless it is there already. Errors: what makes no sense as a machine.
     pub fn mount(&mut self, stage: &Stage) -> Result<()> {
+        if self.plant.as_ref().is_some_and(|plant| plant.stage() == stage) {
+            return Ok(());
+        }
         self.laws.clear();
         self.plant = None;
         check::stage(stage)?;

@@ -179,7 +179,7 @@ impl<'a> Recorder<'a> {
                 column.iter_mut().for_each(|value| *value = value.clamp(-limit, limit));
             }
         }
-        if self.detail == Detail::Metrics {
+        if self.detail != Detail::Full {
             for body in 0..3 {
                 put(next(), |j| f64::from(modes[j].motion[body].code()));
             }
