@@ -1,7 +1,6 @@
 //! `taut fit`: finds parameters from the logs of a case, and says how well they are known.
 
 mod figures;
-mod json;
 mod page;
 mod posterior;
 pub mod table;
@@ -17,6 +16,7 @@ use std::time::{Duration, Instant};
 use taut::case::Case;
 use taut::files::write_atomically;
 use taut::fit::{Ending, Fit, Posterior, fit};
+use taut::json;
 use taut::solve::Flow;
 use taut::trajectory::CsvWriter;
 use taut::{Error, Result};
@@ -50,7 +50,7 @@ pub fn run(args: &Args) -> Outcome {
     }
     let drawn = drawn.as_ref();
     let took = begin.elapsed();
-    let json = json::text(&case, &found, drawn);
+    let json = json::text(&json::fit(&case, &found, drawn.map(json::posterior)));
     let mut written = Vec::new();
     if let Some(folder) = &args.out {
         written = write(args, folder, &case, &found, drawn, &json).map_err(Failure::work)?;

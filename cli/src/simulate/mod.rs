@@ -6,7 +6,6 @@ pub mod folder;
 mod page;
 pub mod plots;
 mod run;
-mod summary;
 pub mod table;
 
 use crate::args::Simulate;
@@ -15,8 +14,8 @@ use crate::interrupt::Interrupt;
 use crate::terminal;
 use folder::Folder;
 use run::{Run, Setting};
-use summary::Summary;
 use taut::case::{Case, Experiment};
+use taut::json::{self, Simulation};
 use taut::solve::{Ending, Solver};
 use taut::stage::Stage;
 use taut::{Error, Result};
@@ -43,12 +42,13 @@ pub fn run(args: &Simulate) -> Outcome {
             break;
         }
     }
-    let summary = Summary::new(&case, solver, &runs);
+    let told: Vec<_> = runs.iter().map(Run::told).collect();
+    let summary = json::text(&Simulation::new(&case, solver, &told));
     if let Some(folder) = &folder {
         folder.write_common(&setting, &summary, &runs).map_err(Failure::work)?;
     }
     if args.json {
-        terminal::show(&summary.json());
+        terminal::show(&summary);
     } else if !args.quiet {
         terminal::show(&table::text(&case, solver, &runs, folder.as_ref()));
     }
