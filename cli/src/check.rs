@@ -2,7 +2,7 @@
 
 use crate::args::Check as Args;
 use crate::failure::{Outcome, Status};
-use crate::fit::{plan, table};
+use crate::fit::table;
 use crate::terminal::{self, bold};
 use std::fmt::Write;
 use taut::case::Case;
@@ -13,7 +13,7 @@ use taut::json;
 pub fn run(args: &Args) -> Outcome {
     let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
     let case = Case::read_with(&args.case, &changes)?;
-    let plan = plan(&case, &args.case)?;
+    let plan = case.fit_plan(&args.case)?;
     let found = check(&case, &plan)?;
     terminal::show(&if args.json { json::text(&json::check(&case, &found)) } else { text(&case, &found) });
     Ok(Status::Done)

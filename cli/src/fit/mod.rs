@@ -28,7 +28,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 pub fn run(args: &Args) -> Outcome {
     let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
     let case = Case::read_with(&args.case, &changes)?;
-    let plan = plan(&case, &args.case)?;
+    let plan = case.fit_plan(&args.case)?;
     if let Some(folder) = &args.out {
         std::fs::create_dir_all(folder)
             .map_err(|e| Error::new(format!("this folder cannot be made: {e}")).in_file(folder))?;
@@ -65,15 +65,6 @@ pub fn run(args: &Args) -> Outcome {
         (None, _) if drawn.is_some_and(|drawn| !drawn.doubts().is_empty()) => Status::Incomplete,
         (None, Ending::Converged | Ending::Stalled) => Status::Done,
         (None, _) => Status::Incomplete,
-    })
-}
-
-/// What the case asks for.
-pub fn plan(case: &Case, path: &Path) -> Result<taut::case::Plan> {
-    case.fit.clone().ok_or_else(|| {
-        Error::new("this case does not say what is searched for")
-            .in_file(path)
-            .next("add a table [fit] with for example free = [\"cart.friction.viscous\", \"cart.friction.coulomb\"]")
     })
 }
 

@@ -13,7 +13,6 @@ use crate::simulate::table::early_end;
 use crate::terminal;
 use figures::Curves;
 use std::fmt::Write;
-use std::path::Path;
 use taut::case::{Case, Move};
 use taut::control::{Loop, MoveRun, Rows, Standard, Worst, stream, worst};
 use taut::design::Design;
@@ -61,7 +60,7 @@ pub fn run(args: &Args) -> Outcome {
     let interrupt = Interrupt::listen();
     let mut tried = Vec::new();
     for (case, path) in cases.iter().zip(&args.case) {
-        let (design, moves) = chosen(case, path, &args.moves)?;
+        let (design, moves) = case.moves_named(path, &args.moves)?;
         let mut done = Vec::new();
         for motion in moves {
             if interrupt.signal().is_some() {
@@ -93,21 +92,6 @@ pub fn run(args: &Args) -> Outcome {
 fn told(tried: &Tried) -> impl serde::Serialize + use<> {
     let moved: Vec<Moved> = tried.done.iter().map(Done::told).collect();
     json::moves(&tried.case.title, tried.design.structure.name(), &Loop::of(tried.design), &moved)
-}
-
-/// The controller and the moves named on the command line; all if none is named.
-fn chosen<'a>(case: &'a Case, path: &Path, names: &[String]) -> Result<(&'a Design, Vec<&'a Move>)> {
-    let Some(design) = case.controller.as_ref().filter(|_| !case.moves.is_empty()) else {
-        return Err(Error::new("this case has no move and no controller to run it").in_file(path).next(
-            "add [controller] with every and for example pid = { proportional = \"2 V/mm\" }, \
-             and [[move]] with name, to, speed, acceleration and until",
-        ));
-    };
-    if let Some(name) = names.iter().find(|name| case.moves.iter().all(|m| m.name != **name)) {
-        let known: Vec<String> = case.moves.iter().map(|m| format!("\"{}\"", m.name)).collect();
-        return Err(Error::new(format!("there is no move \"{name}\"")).in_file("--move").allowed(known.join(", ")));
-    }
-    Ok((design, case.moves.iter().filter(|m| names.is_empty() || names.contains(&m.name)).collect()))
 }
 
 /// Runs one move.
