@@ -1,0 +1,33 @@
+"""Belt-driven axes: described in a file, simulated exactly, identified from logs.
+
+    >>> import taut
+    >>> case = taut.Case(taut.template())
+    >>> run = case.simulate("5 V pulse")
+    >>> run["cart_position"][-1]  # m
+
+Numbers are in SI units everywhere; names of columns and keys of dictionaries say which where they hold bare numbers.
+Mistakes are :class:`taut.Error`, a ``ValueError`` with the text that the command line shows.
+"""
+
+from ._native import Error, Seen, __version__
+from .case import Case, read, template
+from .results import Check, Estimate, Fit, LinearModel, Modes
+from .runs import Run, Runs
+from .table import Table
+
+__all__ = [
+    "Case",
+    "Check",
+    "Error",
+    "Estimate",
+    "Fit",
+    "LinearModel",
+    "Modes",
+    "Run",
+    "Runs",
+    "Seen",
+    "Table",
+    "__version__",
+    "read",
+    "template",
+]
