@@ -158,7 +158,7 @@ def test_what_a_controller_raises_comes_out(pid):
     with pytest.raises(ZeroDivisionError):
         pid.move(controller=broken)
     assert len(calls) == 7
-    with pytest.raises(ValueError, match="the controller's command is nan"):
+    with pytest.raises(ValueError, match="the controller's command is NaN"):
         pid.move(controller=lambda position, reference: float("nan"))
     with pytest.raises(TypeError):
         pid.move(controller=lambda position, reference: "5 V")
