@@ -42,7 +42,7 @@
 //! - [`quantity`]: `"19.4 mm"` becomes 0.0194, with the dimension checked. Everywhere else numbers are in SI units.
 //! - [`parameter`]: the one table of everything a case file can say.
 //! - [`trajectory`]: columns with units, and their files.
-//! - [`friction`], [`stage`]: what the machine is.
+//! - [`friction`], [`stage`]: what the machine is. [`knob`]: its numbers by their keys.
 //! - [`signal`]: what is fed into it, and the references of its moves. [`design`]: what a controller is, in data.
 //! - [`plant`]: its equations of motion, mode by mode.
 //! - [`log`]: measured columns in. [`case`]: the case file in.
@@ -51,6 +51,7 @@
 //! - [`linear`]: state space, poles, zeros, frequency response, resonance along the travel.
 //! - [`control`]: controllers stepped in time around the exact plant; input shapers, from spectra and from the model.
 //! - [`fit`]: parameters from logs, and what the logs cannot tell.
+//! - [`sweep`]: many runs with parameters varied.
 //! - [`tune`]: gains of a controller, good for the worst axis that parameters, loads and places can make.
 //! - `json`: results as data (feature `json`).
 //! - `report`: figures, drawings and an HTML page of them (feature `report`, on by default).
@@ -69,6 +70,7 @@ pub mod fit;
 pub mod friction;
 #[cfg(feature = "json")]
 pub mod json;
+pub mod knob;
 pub mod linear;
 pub mod log;
 pub mod measure;
@@ -85,6 +87,7 @@ pub mod report;
 pub mod signal;
 pub mod solve;
 pub mod stage;
+pub mod sweep;
 pub mod trajectory;
 pub mod tune;
 

@@ -103,11 +103,14 @@ impl EventCount {
 
 impl Peak {
     /// Looks at the next values.
-    fn see(&mut self, times: &[f64], values: impl Iterator<Item = f64>) {
-        for (&time, value) in times.iter().zip(values) {
-            if value.abs() > self.value.abs() {
-                *self = Peak { value, time };
-            }
+    fn see(&mut self, times: &[f64], values: impl Iterator<Item = f64> + Clone) {
+        // First how large any gets, which is quick; only if that is news, which one it was.
+        let larger = |most: f64, value: f64| if value.abs() > most { value.abs() } else { most };
+        let most = values.clone().fold(0.0, larger);
+        if most > self.value.abs()
+            && let Some((&time, value)) = times.iter().zip(values).find(|(_, value)| value.abs() == most)
+        {
+            *self = Peak { value, time };
         }
     }
 }
@@ -170,11 +173,19 @@ impl Meter {
         seen.final_cart_speed = at(cart_speed);
         seen.settled = stuck(last) && [drive_speed, cart_speed, idler_speed].iter().all(|speed| at(speed) == 0.0);
 
-        for ((&time, &input), &speed) in time.iter().zip(input).zip(cart_speed) {
-            if input.to_bits() != self.plateau.input.to_bits() {
-                self.close_plateau(input);
+        let mut row = 0;
+        for alike in input.chunk_by(|a, b| a.to_bits() == b.to_bits()) {
+            if alike[0].to_bits() != self.plateau.input.to_bits() {
+                self.close_plateau(alike[0]);
             }
-            self.plateau.add(time, speed);
+            let rows = row..row + alike.len();
+            // Of a stretch without input nothing is asked.
+            if alike[0] != 0.0 {
+                for (&time, &speed) in time.iter().zip(cart_speed).take(rows.end).skip(rows.start) {
+                    self.plateau.add(time, speed);
+                }
+            }
+            row = rows.end;
         }
     }
 
@@ -219,6 +230,8 @@ struct Plateau {
     last: f64,
     /// Rows in each part; doubles whenever there are too many parts.
     width: u64,
+    /// Rows that the last part still takes.
+    room: u64,
     parts: Vec<Part>,
 }
 
@@ -234,14 +247,14 @@ impl Plateau {
     const PARTS: usize = 1024;
 
     fn new(input: f64) -> Self {
-        Self { input, rows: 0, begin: 0.0, end: 0.0, last: 0.0, width: 1, parts: Vec::new() }
+        Self { input, rows: 0, begin: 0.0, end: 0.0, last: 0.0, width: 1, room: 0, parts: Vec::new() }
     }
 
     fn add(&mut self, time: f64, speed: f64) {
         if self.rows == 0 {
             self.begin = time;
         }
-        if self.rows.is_multiple_of(self.width) {
+        if self.room == 0 {
             if self.parts.len() == Self::PARTS {
                 let join = |pair: &[Part]| Part {
                     end: pair[1].end,
@@ -252,9 +265,11 @@ impl Plateau {
                 self.width *= 2;
             }
             self.parts.push(Part { end: time, least: speed, greatest: speed });
+            self.room = self.width;
         } else if let Some(part) = self.parts.last_mut() {
             *part = Part { end: time, least: part.least.min(speed), greatest: part.greatest.max(speed) };
         }
+        self.room -= 1;
         self.rows += 1;
         (self.end, self.last) = (time, speed);
     }

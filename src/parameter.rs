@@ -68,7 +68,7 @@ pub struct Range {
 }
 
 impl Range {
-    const fn new(low: f64, high: f64) -> Self {
+    pub(crate) const fn new(low: f64, high: f64) -> Self {
         Self { low, high, above: false, below: false, whole: false }
     }
 
@@ -79,7 +79,7 @@ impl Range {
     /// Of either sign.
     pub(crate) const ANY: Self = Self::new(-1e15, 1e15);
 
-    const fn whole(low: f64, high: f64) -> Self {
+    pub(crate) const fn whole(low: f64, high: f64) -> Self {
         Self { whole: true, ..Self::new(low, high) }
     }
 
@@ -566,6 +566,13 @@ const TUNE: &[Parameter] = &[
 ];
 
 #[rustfmt::skip]
+const SWEEP: &[Parameter] = &[
+    row("sweep.runs", "N", "", Words("required where machines are drawn"), Range::whole(1.0, 1e12), "100000", "How many machines are run; `grid` and `one-at-a-time` say it themselves."),
+    row("sweep.seed", "", "", Value(1.0), SEED, "1", "Which draws; the same seed gives the same ones."),
+    row("sweep.interval", "", "s", Words("the experiment's `every`"), DURATION, "1 ms", "Interval between the rows that metrics are taken from; it does not affect the accuracy of the motion."),
+];
+
+#[rustfmt::skip]
 const MOVE: &[Parameter] = &[
     row("move.from", "", "m", Value(0.0), ANY, "0 mm", "Where the cart stands at time zero."),
     row("move.to", "", "m", Words("`points` or `gcode` instead"), ANY, "50 mm", "Where it goes."),
@@ -679,6 +686,7 @@ const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     ("move", &[MOVE]),
     ("tune", &[TUNE]),
     ("fit", &[FIT]),
+    ("sweep", &[SWEEP]),
 ];
 
 /// All parameters, in the order of the case file.

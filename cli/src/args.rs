@@ -29,6 +29,7 @@ pub enum Command {
     Simulate(Simulate),
     Move(Move),
     Tune(Tune),
+    Sweep(Sweep),
     Check(Check),
     Fit(Fit),
     Shape(Shape),
@@ -212,6 +213,71 @@ Examples:
 
 Exit status 1: no search could keep the limits on the worst axis. Ctrl-C ends a search early with the
 best gains so far, with exit status 130.";
+
+/// Run a case many times with its parameters varied.
+///
+/// Prints how each key figure is spread and which parameters it depends on. With --out FILE it writes a row for each run, as Parquet
+/// (units in its metadata) or CSV; with --out DIR also a summary, a report and plots. The same command goes on where an
+/// interrupted or killed one was. Rows are the same, bit for bit, on any number of threads.
+#[derive(Debug, clap::Args)]
+#[command(after_help = SWEEP)]
+pub struct Sweep {
+    /// The case file
+    pub case: PathBuf,
+    /// How many machines to run
+    #[arg(long, value_name = "N")]
+    pub runs: Option<String>,
+    /// How a parameter varies, as often as needed; `all` is every number of the machine that is not zero
+    #[arg(long, value_name = "KEY=HOW")]
+    pub vary: Vec<String>,
+    /// How machines are chosen: random, latin-hypercube, sobol, grid or one-at-a-time [default: random]
+    #[arg(long, value_name = "DESIGN")]
+    pub design: Option<String>,
+    /// Which draws [default: 1]
+    #[arg(long, value_name = "NUMBER")]
+    pub seed: Option<u64>,
+    /// Also compute Sobol' indices: N (k + 2) runs for k parameters
+    #[arg(long)]
+    pub indices: bool,
+    /// Interval between the rows that key figures are taken from [default: the experiment's]
+    #[arg(long, value_name = "TIME")]
+    pub interval: Option<String>,
+    /// The file of the rows (ends in .parquet or .csv), or the folder for it, a summary, a report and plots
+    #[arg(long, value_name = "FILE or DIR")]
+    pub out: Option<PathBuf>,
+    /// Also write every quantity over time of every run
+    #[arg(long, requires = "out")]
+    pub trajectories: bool,
+    /// How many threads [default: as many as there are processors]
+    #[arg(long, value_name = "T", value_parser = count)]
+    pub threads: Option<usize>,
+    /// Change one value of the case for this sweep, as often as needed
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub changes: Vec<String>,
+    /// Leave out the report and the plots
+    #[arg(long)]
+    pub no_report: bool,
+    /// Print the summary as JSON, the same as in sweep.json
+    #[arg(long)]
+    pub json: bool,
+    /// Print nothing but errors
+    #[arg(long, short, conflicts_with = "json")]
+    pub quiet: bool,
+}
+
+const SWEEP: &str = "\
+Examples:
+  taut sweep axis.toml --runs 10000 --vary all=20% --out runs.parquet
+  taut sweep axis.toml --runs 10000 --vary 'cart.mass=uniform(0.3 kg, 0.6 kg)' \\
+      --vary 'cart.friction.coulomb=normal(0.2 N, 0.02 N)' --design sobol --out results
+  taut sweep axis.toml --runs 1024 --vary all=10% --design sobol --indices --out results
+  taut sweep axis.toml --design one-at-a-time --vary 'all=factors(2, 0.5)' --out tornado
+  taut sweep fit/fitted.toml --runs 1000 --set sweep.from=uncertainty
+
+HOW is a share such as 20%, uniform(LEAST, MOST), normal(MEAN, DEVIATION), log-normal(MEDIAN, DEVIATION), values(A, B, ...),
+grid(FROM, TO, COUNT) or factors(A, B, ...). What is varied can stand in the case instead, as [sweep].
+
+Ctrl-C keeps what is done, with exit status 130; the same command then goes on.";
 
 /// Say what the logs of a case can tell of the parameters in its [fit], before any fit.
 ///

@@ -11,6 +11,7 @@ mod motion;
 mod paper;
 mod shape;
 mod simulate;
+mod sweep;
 mod terminal;
 mod tune;
 
@@ -33,6 +34,7 @@ fn main() -> ExitCode {
         Command::Fit(args) => fit::run(&args),
         Command::Shape(args) => shape::run(&args),
         Command::Tune(args) => tune::run(&args),
+        Command::Sweep(args) => sweep::run(&args),
         Command::Modes(args) => modes::run(&args),
     };
     match done {

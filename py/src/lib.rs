@@ -10,6 +10,7 @@ mod error;
 mod interrupt;
 mod modes;
 mod runs;
+mod sweep;
 mod value;
 
 use pyo3::prelude::*;
@@ -24,6 +25,8 @@ mod _native {
     use crate::error::Error;
     #[pymodule_export]
     use crate::runs::{Run, moves, simulation};
+    #[pymodule_export]
+    use crate::sweep::Sweep;
 
     use super::*;
 

@@ -220,7 +220,7 @@ fn searched(field: &Field, key: &str, names: &[&str]) -> Result<()> {
 
 /// The least and the greatest value of the parameter `key`.
 fn ends(field: &Field, key: &str) -> Result<[f64; 2]> {
-    let [low, high] = two(field, "two: the least and the most")?;
+    let [low, high] = pair(field, "two: the least and the most")?;
     let (low, high) = (value(&low, key)?, value(&high, key)?);
     if low >= high {
         return Err(field.fail(format!("{low} is not below {high}")).allowed("the least value, then the most"));
@@ -229,7 +229,7 @@ fn ends(field: &Field, key: &str) -> Result<[f64; 2]> {
 }
 
 /// The two values of a list.
-fn two<'a>(field: &Field<'a>, wanted: &str) -> Result<[Field<'a>; 2]> {
+pub(super) fn pair<'a>(field: &Field<'a>, wanted: &str) -> Result<[Field<'a>; 2]> {
     let list = field.list()?;
     let count = list.len();
     list.try_into().map_err(|_| field.fail(format!("the list has {count} values")).allowed(wanted))
@@ -244,7 +244,7 @@ fn value(field: &Field, key: &str) -> Result<f64> {
 }
 
 /// A number without a unit.
-fn plain(field: &Field, wanted: &str) -> Result<f64> {
+pub(super) fn plain(field: &Field, wanted: &str) -> Result<f64> {
     match &field.node.kind {
         Kind::Float(value) if value.is_finite() => Ok(*value),
         Kind::Integer(value) => Ok(*value as f64),
@@ -297,16 +297,21 @@ fn prior(field: &Field, key: &str) -> Result<Prior> {
         return Err(field.fail(format!("{count} priors stand here")).allowed(format!("one of {PRIORS}")));
     };
     let Some(field) = table.optional(kind) else { return Err(field.fail("this prior is empty")) };
+    prior_of(kind, &field, key)
+}
+
+/// The prior of a kind (`normal`, `log_normal`, else uniform) for the parameter `key`.
+pub(super) fn prior_of(kind: &str, field: &Field, key: &str) -> Result<Prior> {
     let positive = |deviation: &Field, value: f64| match value > 0.0 {
         true => Ok(value),
         false => Err(deviation
             .fail(format!("a deviation of {value} leaves nothing to draw"))
             .allowed("above zero")
-            .next("leave a parameter that is known exactly out of [fit]")),
+            .next("leave out a parameter that is known exactly")),
     };
     match kind {
         "normal" => {
-            let [mean, deviation] = two(&field, "two: the mean and the standard deviation")?;
+            let [mean, deviation] = pair(field, "two: the mean and the standard deviation")?;
             // A deviation has the parameter's unit and not its range.
             let wide = match row_of(key) {
                 Some(row) => deviation.number_of(&Parameter { range: Range::ANY, ..row })?,
@@ -315,7 +320,7 @@ fn prior(field: &Field, key: &str) -> Result<Prior> {
             Ok(Prior::Normal { mean: value(&mean, key)?, deviation: positive(&deviation, wide)? })
         }
         "log_normal" => {
-            let [median, deviation] = two(&field, "two: the median and the standard deviation of the logarithm")?;
+            let [median, deviation] = pair(field, "two: the median and the standard deviation of the logarithm")?;
             let wide = plain(&deviation, "a number without a unit, 0.05 for about 5 %,")?;
             let middle = value(&median, key)?;
             if middle <= 0.0 {
@@ -323,7 +328,7 @@ fn prior(field: &Field, key: &str) -> Result<Prior> {
             }
             Ok(Prior::LogNormal { median: middle, deviation: positive(&deviation, wide)? })
         }
-        _ => ends(&field, key).map(|[low, high]| Prior::Uniform { low, high }),
+        _ => ends(field, key).map(|[low, high]| Prior::Uniform { low, high }),
     }
 }
 

@@ -12,6 +12,7 @@ mod motion;
 mod reader;
 mod set;
 mod stage;
+mod sweep;
 mod template;
 mod tree;
 mod tune;
@@ -19,6 +20,7 @@ mod tune;
 pub use fit::{Nuisances, Plan, Prior, Scope, matches};
 pub use get::Given;
 pub use motion::Move;
+pub use sweep::{Kinds, Origin, Sampling, Sweeping, Variation};
 pub use template::TEMPLATE;
 pub use tune::{Cost, Known, Tuning};
 
@@ -42,9 +44,6 @@ const MOST_SAMPLES: f64 = 1e9;
 /// Longest name of an experiment, in characters.
 const LONGEST_NAME: usize = 100;
 
-/// Keys that stand in the plan and not yet in the program.
-const PLANNED: &[&str] = &["sweep"];
-
 /// Everything needed to repeat a run.
 #[derive(Debug, Clone)]
 pub struct Case {
@@ -66,6 +65,8 @@ pub struct Case {
     pub tune: Option<Tuning>,
     /// What a fit said of its estimates.
     pub known: Vec<Known>,
+    /// What is varied in many runs, where the file says so.
+    pub sweep: Option<Sweeping>,
     /// The text it was read from, with `--set` applied: read again, it gives the same case.
     pub text: String,
     /// The files that its inputs and logs name, in the text's order.
@@ -213,8 +214,9 @@ impl Case {
             "tune",
             // What a fit says of its own result.
             "uncertainty",
+            "sweep",
         ];
-        root.check_keys(&tables, PLANNED)?;
+        root.check_keys(&tables, &[])?;
 
         let title = match root.optional("title") {
             Some(field) => field.text()?.to_string(),
@@ -233,10 +235,18 @@ impl Case {
         let fit = fit::plan(&root, &experiments)?;
         let tune = tune::tuning(&root, controller.as_ref(), &moves)?;
         let known = tune::known(&root)?;
+        let context = sweep::Context {
+            stage: &stage,
+            experiments: &experiments,
+            fit: fit.as_ref(),
+            known: &known,
+            folder: folder.path,
+        };
+        let sweep = sweep::sweeping(&root, &context)?;
         let mut files = folder.read.into_inner();
         files.sort_by_key(|file| file.place.start);
         let text = source.text.clone();
-        Ok(Self { title, stage, measurement, experiments, controller, moves, fit, tune, known, text, files })
+        Ok(Self { title, stage, measurement, experiments, controller, moves, fit, tune, known, sweep, text, files })
     }
 
     /// The text with other names for the files of its inputs; it is to lie where these names lead to them.

@@ -1,6 +1,6 @@
 //! `--set KEY=VALUE`: changes the text of a case and leaves its comments alone.
 
-use super::tree::{Entry, Kind, Node, Override, Source};
+use super::tree::{Entry, Kind, Node, Override, Source, equals};
 use crate::error::{Error, Place, Result};
 use std::path::Path;
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Key, Table, Value};
@@ -38,9 +38,10 @@ impl<'a> Change<'a> {
     fn new(argument: &'a str) -> Result<Self> {
         let usage = "write KEY=VALUE, such as --set cart.mass=\"0.5 kg\" or --set experiment.0.until=2s";
         let whole = || Place::in_text("--set", argument, 0..argument.len());
-        let Some((key, value)) = argument.split_once('=') else {
+        let Some(place) = equals(argument) else {
             return Err(Error::new("there is no `=`").at(whole()).next(usage));
         };
+        let (key, value) = (&argument[..place], &argument[place + 1..]);
         let keys = Key::parse(key).ok().filter(|keys| !keys.is_empty());
         let Some(keys) = keys else {
             return Err(Error::new(format!("\"{key}\" is no key")).at(whole()).next(usage));
@@ -61,7 +62,7 @@ impl<'a> Change<'a> {
     }
 
     fn fail(&self, what: impl Into<String>) -> Error {
-        let key = self.argument.find('=').unwrap_or(self.argument.len());
+        let key = equals(self.argument).unwrap_or(self.argument.len());
         Error::new(what).at(Place::in_text("--set", self.argument, 0..key))
     }
 

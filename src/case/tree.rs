@@ -57,7 +57,7 @@ impl Source {
     pub fn place(&self, range: Range<usize>) -> Place {
         let set = self.overrides.iter().find(|o| o.range.start <= range.start && range.end <= o.range.end);
         if let Some(set) = set {
-            let value = set.argument.find('=').map_or(0, |i| i + 1);
+            let value = equals(&set.argument).map_or(0, |i| i + 1);
             return Place::in_text("--set", &set.argument, value..set.argument.len());
         }
         Place::in_text(&self.name, &self.text, range)
@@ -80,6 +80,20 @@ impl Source {
         let document = Document::parse(text).map_err(|e| syntax(self, &e))?;
         Ok(Node { span: 0..0, kind: Kind::Table(entries(document.as_table(), 0..0)) })
     }
+}
+
+/// Where `=` stands between key and value: the first that is not within quotes.
+pub(super) fn equals(argument: &str) -> Option<usize> {
+    let mut quote = None;
+    argument.char_indices().find_map(|(place, c)| {
+        match (quote, c) {
+            (None, '"' | '\'') => quote = Some(c),
+            (Some(open), _) if open == c => quote = None,
+            (None, '=') => return Some(place),
+            _ => {}
+        }
+        None
+    })
 }
 
 /// A TOML mistake in our words where we have better ones.

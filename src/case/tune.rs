@@ -72,6 +72,8 @@ pub struct Known {
     pub name: String,
     /// Its 95 % interval, SI; none where the fit knows nothing.
     pub interval: Option<[f64; 2]>,
+    /// Its standard error, SI; none where the fit knows nothing.
+    pub error: Option<f64>,
 }
 
 pub(super) fn tuning(root: &Table, design: Option<&Design>, moves: &[Move]) -> Result<Option<Tuning>> {
@@ -166,7 +168,8 @@ pub(super) fn known(root: &Table) -> Result<Vec<Known>> {
             }
             (None, None) => None,
         };
-        all.push(Known { name: key.to_string(), interval });
+        let error = number("error")?.filter(|error| *error > 0.0);
+        all.push(Known { name: key.to_string(), interval, error });
     }
     Ok(all)
 }

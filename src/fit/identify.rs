@@ -5,8 +5,8 @@
 //! so 1/sᵢ is how far off that combination may be. Where that is more than [`LIMIT`], or where the outputs move by less than
 //! [`SHOWS`], it is not determined.
 
-use super::knob::{at_pulley, parameter_of, value_of};
 use super::problem::Problem;
+use crate::knob::{at_pulley, parameter_of, value_of};
 use nalgebra::{DMatrix, SVD};
 
 /// Relative standard error from which on a combination counts as not determined.

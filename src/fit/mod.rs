@@ -8,7 +8,6 @@ mod check;
 mod density;
 mod drawn;
 mod identify;
-mod knob;
 pub mod least_squares;
 #[cfg(feature = "posterior")]
 mod posterior;
@@ -17,10 +16,10 @@ mod regression;
 mod run;
 mod uncertainty;
 
+pub use crate::knob::{GROUPS, Knob};
 pub use check::{Check, LogFacts, Proposal, check};
-pub use drawn::machines;
+pub use drawn::{drawn, machines};
 pub use identify::{Group, Identifiability, LIMIT};
-pub use knob::{GROUPS, Knob};
 pub use least_squares::Ending;
 #[cfg(feature = "posterior")]
 pub use posterior::{Credible, EFFECTIVE, Posterior, R_HAT, posterior};

@@ -1,10 +1,10 @@
 //! All logs of a case as one least-squares problem.
 
-use super::knob::{Breakaways, Knob};
 use super::least_squares::{Bounds, Differences, Residuals, Step};
 use super::run::{Extra, Nuisance, Run, Seen, Setting, is_position, rounding_at_rest};
 use crate::case::{Case, Nuisances, Plan, Scope, matches};
 use crate::error::{Error, Result};
+use crate::knob::{Breakaways, Knob};
 use crate::log::Quantity;
 use crate::stage::{AmplifierMode, Stage};
 use nalgebra::DMatrix;

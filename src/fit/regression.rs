@@ -8,9 +8,9 @@
 //! method of the inverse dynamic model (M. Gautier, W. Khalil 1990); noise in positions biases it, so it only says where a search
 //! may begin.
 
-use super::knob::{Knob, at_pulley, value_of};
 use super::problem::Problem;
 use super::run::{Run, is_position};
+use crate::knob::{Knob, at_pulley, value_of};
 use crate::log::Quantity;
 use crate::stage::{AmplifierMode, Stage};
 use nalgebra::{DMatrix, DVector};

@@ -14,7 +14,7 @@ use super::law::{Law, Size, Watch, chain, highest, states};
 use super::propagator::SERIES_ORDER;
 use super::record::Recorder;
 use super::roots;
-use super::{Cost, Ending, Event, Flow, Grid, Outcome, Source, held};
+use super::{Cost, Detail, Ending, Event, Flow, Grid, Outcome, Source, held};
 use crate::case::Experiment;
 use crate::plant::{Cause, Form, Mode, Plant, State, place};
 use crate::signal::Piece;
@@ -24,20 +24,39 @@ use std::rc::Rc;
 /// For so small a part of the series' reach a speed that has left zero is still told by its series alone.
 const SOON: f64 = 1e-6;
 
-/// Runs the experiment.
+/// What runs of one plant can share: the modes that were made ready.
+#[derive(Default)]
+pub(super) struct Laws {
+    straight: Vec<Rc<Law<8, 10>>>,
+    rotor: Vec<Rc<Law<12, 14>>>,
+    smooth: Vec<Rc<Law<16, 18>>>,
+}
+
+impl Laws {
+    /// Forgets all of them: another plant.
+    pub(super) fn clear(&mut self) {
+        self.straight.clear();
+        self.rotor.clear();
+        self.smooth.clear();
+    }
+}
+
+/// Runs the experiment with the laws of this plant that are known so far.
 pub(super) fn run(
     plant: &Plant,
     experiment: &Experiment,
     source: Source,
+    laws: &mut Laws,
+    detail: Detail,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Outcome {
     // Eight moving quantities (three positions, three speeds, current, input) serve straight inputs; smooth ones carry
     // their derivatives along.
     // A rotor that turns by itself adds two.
     match (source.degree() <= 1, plant.has_rotor()) {
-        (true, false) => Run::<8, 10>::new(plant, experiment, sink).finish(source),
-        (true, true) => Run::<12, 14>::new(plant, experiment, sink).finish(source),
-        (false, _) => Run::<16, 18>::new(plant, experiment, sink).finish(source),
+        (true, false) => Run::new(plant, experiment, &mut laws.straight, detail, sink).finish(source),
+        (true, true) => Run::new(plant, experiment, &mut laws.rotor, detail, sink).finish(source),
+        (false, _) => Run::new(plant, experiment, &mut laws.smooth, detail, sink).finish(source),
     }
 }
 
@@ -51,7 +70,9 @@ struct Run<'a, const R: usize, const C: usize> {
     z: [f64; C],
     mode: Mode,
     law: Rc<Law<R, C>>,
-    laws: Vec<Rc<Law<R, C>>>,
+    laws: &'a mut Vec<Rc<Law<R, C>>>,
+    /// Matrices that were there before.
+    shared: u64,
     /// How many leading Taylor coefficients of a sliding body's speed are zero by definition, because it starts from rest:
     /// 1 where it is accelerated, 2 where the load has only just reached its friction. The same for all else that is watched.
     fresh: [usize; Cause::KINDS],
@@ -83,7 +104,13 @@ enum Look<const C: usize> {
 }
 
 impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
-    fn new(plant: &'a Plant, experiment: &Experiment, sink: &'a mut dyn FnMut(&Trajectory) -> Flow) -> Self {
+    fn new(
+        plant: &'a Plant,
+        experiment: &Experiment,
+        laws: &'a mut Vec<Rc<Law<R, C>>>,
+        detail: Detail,
+        sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
+    ) -> Self {
         let grid = Grid::new(experiment.every, experiment.until);
         let h = grid.interval();
         let start = experiment.initial.state(plant);
@@ -91,14 +118,16 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         z[..states::<R>()].copy_from_slice(&start[..states::<R>()]);
         z[C - 1] = 1.0;
         let mode = plant.first_mode(&start);
-        let law = Rc::new(Law::new(plant, mode, h));
+        let shared = propagators(laws);
+        let (law, is_new) = Law::of(laws, plant, mode, h);
         Self {
             plant,
             grid,
             h,
             z,
             mode,
-            laws: vec![Rc::clone(&law)],
+            laws,
+            shared,
             law,
             fresh: [0; Cause::KINDS],
             slack: [0.0; Cause::KINDS],
@@ -106,11 +135,11 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             input_curvature: 0.0,
             row: 0,
             offset: 0.0,
-            recorder: Recorder::new(plant, grid, sink),
+            recorder: Recorder::new(plant, grid, detail, sink),
             events: Vec::new(),
             changed_at: (0, 0.0),
             changes: 0,
-            cost: Cost { modes: 1, ..Cost::default() },
+            cost: Cost { modes: u64::from(is_new), ..Cost::default() },
             trouble: None,
         }
     }
@@ -145,7 +174,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             (None, Flow::Stop) => Ending::Interrupted { time: self.time() },
             (None, Flow::Continue) => Ending::Complete,
         };
-        self.cost.propagators = self.laws.iter().map(|law| law.propagators()).sum();
+        self.cost.propagators = propagators(self.laws) - self.shared;
         Outcome { events: self.events, ending, cost: self.cost }
     }
 
@@ -281,6 +310,12 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             return false;
         }
         let resting = y.iter().all(|&rate| rate == 0.0);
+        if resting && self.input() == 0.0 && self.recorder.detail == Detail::Metrics {
+            // Rows that say nothing new.
+            self.recorder.skip(safe - 1);
+            self.row += safe;
+            return true;
+        }
         let step = law.step(0);
         for j in 0..safe {
             if j > 0 {
@@ -450,4 +485,9 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     fn value(&self, form: &Form) -> f64 {
         form.value(self.plant, &self.state(), self.input())
     }
+}
+
+/// Matrices computed so far.
+fn propagators<const R: usize, const C: usize>(laws: &[Rc<Law<R, C>>]) -> u64 {
+    laws.iter().map(|law| law.propagators()).sum()
 }

@@ -10,7 +10,7 @@ mod model;
 mod stretch;
 
 use super::record::Recorder;
-use super::{Cost, Ending, Event, Flow, Grid, Outcome, Source, check, held};
+use super::{Cost, Detail, Ending, Event, Flow, Grid, Outcome, Source, check, held};
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
@@ -43,6 +43,7 @@ pub(super) fn run(
     experiment: &Experiment,
     source: Source,
     tolerance: f64,
+    detail: Detail,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<Outcome> {
     if !(1e-14..=1e-2).contains(&tolerance) {
@@ -61,7 +62,7 @@ pub(super) fn run(
         .next("leave out the inductance, the damping or the friction that is as fast as that, or shorten the run"));
     }
     let model = Model::new(plant);
-    Ok(Run::new(&model, experiment, tolerance, FIRST / fastest, sink).finish(source))
+    Ok(Run::new(&model, experiment, tolerance, FIRST / fastest, detail, sink).finish(source))
 }
 
 /// h·|λ| up to which the formula is stable.
@@ -112,6 +113,7 @@ impl<'a> Run<'a> {
         experiment: &Experiment,
         tolerance: f64,
         first_step: f64,
+        detail: Detail,
         sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
     ) -> Self {
         let plant = model.plant;
@@ -141,7 +143,7 @@ impl<'a> Run<'a> {
         Self {
             model,
             grid,
-            recorder: Recorder::new(plant, grid, sink),
+            recorder: Recorder::new(plant, grid, detail, sink),
             // It is stopped from outside: by its observer.
             solver: DOP853 {
                 max_steps: usize::MAX - 1,

@@ -5,6 +5,7 @@ use crate::friction::Motion;
 use crate::plant::{Body, Cause, Form, Mode, Plant, ROTOR, ROUNDING, SPEEDS, STRETCHES, arms, place};
 use crate::signal::DEGREE;
 use std::cell::OnceCell;
+use std::rc::Rc;
 
 /// Number of states: without the rotor's two with eight rows, else all.
 pub(super) const fn states<const R: usize>() -> usize {
@@ -100,7 +101,17 @@ pub(super) struct Law<const R: usize, const C: usize> {
 }
 
 impl<const R: usize, const C: usize> Law<R, C> {
-    pub(super) fn new(plant: &Plant, mode: Mode, h: f64) -> Self {
+    /// That of a mode and an interval, among those that are known, or a new one, which is added; and whether it is new.
+    pub(super) fn of(known: &mut Vec<Rc<Self>>, plant: &Plant, mode: Mode, h: f64) -> (Rc<Self>, bool) {
+        if let Some(law) = known.iter().find(|law| law.mode == mode && law.h == h) {
+            return (Rc::clone(law), false);
+        }
+        let law = Rc::new(Self::new(plant, mode, h));
+        known.push(Rc::clone(&law));
+        (law, true)
+    }
+
+    fn new(plant: &Plant, mode: Mode, h: f64) -> Self {
         let stage = plant.stage();
         let r = stage.pulley_radius;
         let mut equations = plant.equations(mode);

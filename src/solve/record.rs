@@ -1,6 +1,6 @@
 //! From states to the columns that a user sees, block by block.
 
-use super::{Flow, Grid};
+use super::{Detail, Flow, Grid};
 use crate::friction::{Law, Motion};
 use crate::plant::{Body, Form, Mode, Part, Plant, SPEEDS, STRETCHES, State, place};
 use crate::stage::{AmplifierMode, BeltModel, EncoderPlace};
@@ -24,6 +24,7 @@ pub(crate) struct Extra {
 pub(crate) struct Recorder<'a> {
     plant: &'a Plant,
     grid: Grid,
+    pub(crate) detail: Detail,
     /// States, with the input.
     raw: Vec<(State, f64)>,
     modes: Vec<Mode>,
@@ -40,15 +41,21 @@ pub(crate) struct Recorder<'a> {
 }
 
 impl<'a> Recorder<'a> {
-    pub(crate) fn new(plant: &'a Plant, grid: Grid, sink: &'a mut dyn FnMut(&Trajectory) -> Flow) -> Self {
+    pub(crate) fn new(
+        plant: &'a Plant,
+        grid: Grid,
+        detail: Detail,
+        sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
+    ) -> Self {
         Self {
             plant,
             grid,
+            detail,
             raw: Vec::with_capacity(BLOCK),
             modes: Vec::with_capacity(BLOCK),
             extra: Vec::new(),
             scratch: Default::default(),
-            block: Trajectory { columns: headings(plant) },
+            block: Trajectory { columns: headings(plant, detail) },
             sink,
             rows: 0,
             flow: Flow::Continue,
@@ -74,6 +81,14 @@ impl<'a> Recorder<'a> {
     pub(crate) fn push_with(&mut self, state: State, input: f64, mode: Mode, extra: Extra) {
         self.extra.push(extra);
         self.push(state, input, mode);
+    }
+
+    /// Leaves out so many rows.
+    pub(crate) fn skip(&mut self, rows: u64) {
+        if rows > 0 {
+            self.finish();
+            self.rows += rows;
+        }
     }
 
     /// Hands on what is left.
@@ -163,6 +178,15 @@ impl<'a> Recorder<'a> {
             if let Some(limit) = limit {
                 column.iter_mut().for_each(|value| *value = value.clamp(-limit, limit));
             }
+        }
+        if self.detail == Detail::Metrics {
+            for body in 0..3 {
+                put(next(), |j| f64::from(modes[j].motion[body].code()));
+            }
+            if shows_input(plant) {
+                next().copy_from_slice(input);
+            }
+            return;
         }
         let (current, f1, f2, f3) = (&*current, &*f1, &*f2, &*f3);
         for (column, there, form) in [
@@ -317,7 +341,8 @@ fn bristles(plant: &Plant) -> impl Iterator<Item = Body> {
 }
 
 /// The columns of a run on this stage, without rows.
-pub(crate) fn headings(plant: &Plant) -> Vec<Column> {
+fn headings(plant: &Plant, detail: Detail) -> Vec<Column> {
+    let full = detail == Detail::Full;
     let mut columns: Vec<Column> = [
         ("time", "s"),
         ("voltage", "V"),
@@ -338,11 +363,16 @@ pub(crate) fn headings(plant: &Plant) -> Vec<Column> {
         ("cart_state", ""),
         ("idler_state", ""),
     ]
+    .into_iter()
+    .filter(|(name, _)| full || !name.ends_with("_friction"))
     .map(|(name, unit)| Column { values: Vec::with_capacity(BLOCK), ..Column::new(name, unit) })
-    .into();
+    .collect();
     if shows_input(plant) {
         let unit = if plant.stage().amplifier.mode == AmplifierMode::Current { "A" } else { "V" };
         columns.push(Column::new("input", unit));
+    }
+    if !full {
+        return columns;
     }
     if plant.has_rotor() {
         for (name, unit) in

@@ -19,11 +19,9 @@ pub(crate) fn first_fall(c: &[f64]) -> Option<f64> {
     // Bernstein coefficients, b_i = Σ_{k ≤ i} C(i,k)/C(n,k) c_k: the polynomial lies within their hull.
     let mut b = [0.0; MOST];
     let n = c.len() - 1;
-    for (i, b) in b.iter_mut().enumerate().take(n + 1) {
-        let mut ratio = 1.0;
-        for (k, c) in c.iter().enumerate().take(i + 1) {
+    for (i, (b, ratios)) in b.iter_mut().zip(&RATIOS[n]).enumerate().take(n + 1) {
+        for (c, ratio) in c.iter().zip(ratios).take(i + 1) {
             *b += ratio * c;
-            ratio *= (i - k) as f64 / (n - k).max(1) as f64;
         }
     }
     search(c, &b[..=n], 0.0, 1.0)
@@ -31,6 +29,26 @@ pub(crate) fn first_fall(c: &[f64]) -> Option<f64> {
 
 /// Room for the coefficients of a Taylor series.
 const MOST: usize = SERIES_ORDER + 1;
+
+/// C(i,k)/C(n,k), by n, i and k; zero for k above i.
+static RATIOS: [[[f64; MOST]; MOST]; MOST] = {
+    let mut table = [[[0.0; MOST]; MOST]; MOST];
+    let mut n = 0;
+    while n < MOST {
+        let mut i = 0;
+        while i <= n {
+            let (mut ratio, mut k) = (1.0, 0);
+            while k <= i {
+                table[n][i][k] = ratio;
+                ratio *= (i - k) as f64 / if n > k { (n - k) as f64 } else { 1.0 };
+                k += 1;
+            }
+            i += 1;
+        }
+        n += 1;
+    }
+    table
+};
 
 /// Halvings after which a touch is as good as a point: 2⁻⁴⁰ of an interval that is itself a fraction of a swing.
 const NARROWEST: f64 = 1e-12;

@@ -4,7 +4,7 @@
 //! to rest, so the stage creeps after it has stopped, by an amount that depends on the step.
 
 use super::record::Recorder;
-use super::{Cost, Ending, Flow, Grid, Method, Outcome};
+use super::{Cost, Detail, Ending, Flow, Grid, Method, Outcome};
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::Motion;
@@ -36,7 +36,7 @@ pub(crate) fn run(
     }
     let h = grid.interval() / substeps;
     let mut state = experiment.initial.state(plant);
-    let mut recorder = Recorder::new(plant, grid, sink);
+    let mut recorder = Recorder::new(plant, grid, Detail::Full, sink);
     let mut cost = Cost { modes: 1, ..Cost::default() };
     let mut ending = Ending::Complete;
     for row in 0..=grid.intervals() {

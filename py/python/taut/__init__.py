@@ -13,6 +13,7 @@ from ._native import Error, Seen, __version__
 from .case import Case, read, template
 from .results import Check, Estimate, Fit, LinearModel, Modes
 from .runs import Run, Runs
+from .sweep import sweep, sweep_tables
 from .table import Table
 
 __all__ = [
@@ -29,5 +30,7 @@ __all__ = [
     "Table",
     "__version__",
     "read",
+    "sweep",
+    "sweep_tables",
     "template",
 ]

@@ -11,6 +11,7 @@ from . import _html, _native
 from ._toml import change
 from .results import Check, Fit, LinearModel, Modes
 from .runs import Run, Runs
+from .sweep import sweep
 from .table import Table
 
 
@@ -237,6 +238,10 @@ class Case:
         names = [move] if isinstance(move, str) else list(move or ())
         runs = [Run(run) for run in self._native.run_moves(names, controller, (every, delay, limit), spread)]
         return runs[0] if isinstance(move, str) else Runs(runs, moved=True)
+
+    def sweep(self, n: int | None = None, **options: Any) -> Table:
+        """Runs ``n`` machines with parameters varied: :func:`taut.sweep` of this case, with its options."""
+        return sweep(self, n, **options)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Case) and (self.text, self.path) == (other.text, other.path)

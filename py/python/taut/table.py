@@ -72,15 +72,7 @@ class Table(Mapping[str, NDArray[np.float64]]):
         Columns have headings with units; the schema's metadata holds ``unit.cart_position_m`` = ``m`` and so on, and each
         field's ``unit`` besides.
         """
-        arrow = needed("pyarrow", "pyarrow", "to_arrow()")
-        fields = [
-            arrow.field(heading, arrow.float64(), nullable=False, metadata={"unit": unit})
-            for _, unit, heading in self._names
-        ]
-        units = {f"unit.{heading}": unit for _, unit, heading in self._names}
-        return arrow.Table.from_arrays(
-            [arrow.array(array) for array in self._by_heading().values()], schema=arrow.schema(fields, metadata=units)
-        )
+        return arrow_table(self._arrays, self._names)
 
     def to_pandas(self) -> pandas.DataFrame:
         """A pandas.DataFrame with headings as columns; ``attrs["units"]`` holds the units."""
@@ -99,3 +91,14 @@ class Table(Mapping[str, NDArray[np.float64]]):
     def _repr_html_(self) -> str:
         rows = [(name, unit, float(self[name].min()), float(self[name].max())) for name, unit, _ in self._names if self.rows]
         return _html.table(f"{self.rows} rows", ("column", "unit", "least", "greatest"), rows)
+
+
+def arrow_table(arrays: Mapping[str, NDArray[np.float64]], names: Sequence[tuple[str, str, str]]) -> pyarrow.Table:
+    """Columns by name, each with its unit and heading, as Arrow; a column that is not there has no rows."""
+    arrow = needed("pyarrow", "pyarrow", "to_arrow()")
+    fields = [
+        arrow.field(heading, arrow.float64(), nullable=False, metadata={"unit": unit}) for _, unit, heading in names
+    ]
+    schema = arrow.schema(fields, metadata={f"unit.{heading}": unit for _, unit, heading in names})
+    columns = [arrow.array(arrays.get(name, ()), arrow.float64()) for name, _, _ in names]
+    return arrow.Table.from_arrays(columns, schema=schema)

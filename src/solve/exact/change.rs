@@ -146,16 +146,9 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
 
     /// Takes up the equations of the present mode.
     fn enter(&mut self) {
-        let known = self.laws.iter().find(|law| law.mode == self.mode);
-        self.law = match known {
-            Some(law) => Rc::clone(law),
-            None => {
-                let law = Rc::new(Law::new(self.plant, self.mode, self.h));
-                self.cost.modes += 1;
-                self.laws.push(Rc::clone(&law));
-                law
-            }
-        };
+        let (law, is_new) = Law::of(self.laws, self.plant, self.mode, self.h);
+        self.law = law;
+        self.cost.modes += u64::from(is_new);
     }
 
     /// Changes modes, without time passing, until every guard holds.

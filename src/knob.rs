@@ -1,4 +1,4 @@
-//! What a fit can turn: numbers of a stage by their keys, and groups of them that move together.
+//! What can be turned: numbers of a stage by their keys, and groups of them that move together. A fit turns them, and a sweep.
 
 use crate::error::{Error, Result};
 use crate::friction::{Friction, Side};
@@ -30,6 +30,7 @@ enum Place {
     Inclination,
     Stiffness(usize),
     Damping(usize),
+    Modulus,
     Pretension,
     Friction(usize, bool, Term),
 }
@@ -114,6 +115,7 @@ impl Place {
             Place::Inclination => &mut stage.cart.inclination,
             Place::Stiffness(span) => &mut stage.belt.stiffness[span],
             Place::Damping(span) => &mut stage.belt.damping[span],
+            Place::Modulus => &mut stage.belt.make.as_mut()?.modulus,
             Place::Pretension => stage.belt.pretension.as_mut()?,
             Place::Friction(body, forward, term) => {
                 let side = side(stage, body, forward);
@@ -134,7 +136,9 @@ fn places(stage: &Stage, key: &str, keys: &[&str]) -> Option<Vec<Place>> {
         return Some(vec![*place]);
     }
     match key {
-        "belt.stiffness" | "belt.modulus" => return Some((0..3).map(Place::Stiffness).collect()),
+        "belt.stiffness" => return Some((0..3).map(Place::Stiffness).collect()),
+        // Spans that follow the cart are as stiff as the modulus says, those that do not as their stiffness.
+        "belt.modulus" => return Some((0..3).map(Place::Stiffness).chain([Place::Modulus]).collect()),
         "belt.damping" => return Some((0..3).map(Place::Damping).collect()),
         _ => {}
     }
@@ -159,7 +163,7 @@ fn get(stage: &Stage, place: Place) -> Option<f64> {
     place.slot(&mut stage.clone()).copied()
 }
 
-/// A number that a fit turns, and all that turns with it.
+/// A number that is turned, and all that turns with it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Knob {
     /// Its key, those of what is tied joined by ` = `, or the name of a group.
@@ -260,6 +264,11 @@ impl Knob {
         }
     }
 
+    /// Whether both turn a number of the machine.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        self.members.iter().any(|(place, _)| other.members.iter().any(|(its, _)| its == place))
+    }
+
     /// Whether it is searched for on a logarithmic scale: what is above zero by nature, over more than a factor of two.
     pub fn logarithmic(&self) -> bool {
         self.low > 0.0 && self.high > 2.0 * self.low
@@ -307,6 +316,48 @@ pub fn value_of(stage: &Stage, key: &str) -> Option<f64> {
     }
 }
 
+/// The keys of everything of a machine that is known by measurement and is not zero: all numbers of motor, pulleys, cart and belt but
+/// the gear's ratio and efficiency, and the inclination. Directions and breakaways that have the same value count once.
+pub fn all_keys(stage: &Stage) -> Vec<String> {
+    let exact = |place: Place| {
+        matches!(
+            place,
+            Place::GearRatio
+                | Place::GearEfficiency
+                | Place::Gain
+                | Place::VoltageLimit
+                | Place::CurrentLimit
+                | Place::Inclination
+        )
+    };
+    let made = stage.belt.make.is_some();
+    let of_belt = |place: Place| matches!(place, Place::Stiffness(_));
+    let there = |place: Place| get(stage, place).is_some_and(|value| value != 0.0 && value.is_finite());
+    let mut keys: Vec<String> = PLACES
+        .iter()
+        .filter(|(_, place)| there(*place) && !exact(*place) && !(made && of_belt(*place)))
+        .map(|(key, _)| key.to_string())
+        .collect();
+    if made {
+        keys.push("belt.modulus".to_string());
+    }
+    for (index, body) in BODIES.iter().enumerate() {
+        for (term, word) in [(Term::Viscous, "viscous"), (Term::Coulomb, "coulomb"), (Term::Breakaway, "static")] {
+            let value = |forward: bool, term: Term| get(stage, Place::Friction(index, forward, term));
+            let (forward, backward) = (value(true, term), value(false, term));
+            let follows =
+                |forward: bool| term == Term::Breakaway && value(forward, term) == value(forward, Term::Coulomb);
+            if forward.is_some_and(|value| value != 0.0) && !follows(true) {
+                keys.push(format!("{body}.friction.{word}"));
+            }
+            if backward != forward && backward.is_some_and(|value| value != 0.0) && !follows(false) {
+                keys.push(format!("{body}.friction.{word}_backward"));
+            }
+        }
+    }
+    keys
+}
+
 /// The row of the table of parameters; of a list, that of the list.
 pub fn parameter_of(key: &str) -> Option<&'static parameter::Parameter> {
     parameter::find(key).or_else(|| parameter::find(key.rsplit_once('.')?.0))
@@ -337,7 +388,7 @@ fn limits(
 
 fn unknown(key: &str) -> Error {
     let known: Vec<&str> = PLACES.iter().map(|(name, _)| *name).collect();
-    let error = Error::new(format!("`{key}` is no parameter that a fit can turn"));
+    let error = Error::new(format!("`{key}` is no parameter that can be turned"));
     let friction: Vec<String> = BODIES
         .iter()
         .flat_map(|body| ["viscous", "coulomb", "static"].map(|term| format!("{body}.friction.{term}")))

@@ -1,0 +1,77 @@
+//! The summary for machines.
+
+use super::Work;
+use super::summary::{Drawn, Group, Measured, Summary};
+use serde_json::{Value, json};
+use taut::sweep::{Estimate, Spread};
+
+/// As JSON; SI units, numbers to the last bit, null for what is no number.
+pub fn text(work: &Work, summary: &Summary) -> String {
+    let sweep = work.sweep;
+    let value = json!({
+        "title": work.case.title,
+        "version": env!("CARGO_PKG_VERSION"),
+        "runs": sweep.runs(),
+        "design": sweep.sampling().word(),
+        "seed": work.case.sweep.as_ref().map(|sweep| sweep.seed),
+        "indices": sweep.indices(),
+        "shares_of_every": summary.every,
+        "columns": sweep.columns().iter().map(|column| column.heading()).collect::<Vec<_>>(),
+        "parameters": summary.parameters.iter().map(parameter).collect::<Vec<_>>(),
+        "experiments": summary.groups.iter().map(|group| of_group(summary, group)).collect::<Vec<_>>(),
+    });
+    let mut text = serde_json::to_string_pretty(&value).unwrap_or_default();
+    text.push('\n');
+    text
+}
+
+fn spread(spread: &Option<Spread>) -> Value {
+    spread.as_ref().map_or(Value::Null, |spread| {
+        let [least, low, middle, high, greatest] = spread.quantiles;
+        json!({
+            "count": spread.count, "missing": spread.missing, "mean": spread.mean, "standard_deviation": spread.deviation,
+            "least": least, "5%": low, "50%": middle, "95%": high, "greatest": greatest,
+        })
+    })
+}
+
+fn parameter(drawn: &Drawn) -> Value {
+    json!({ "name": drawn.name, "unit": drawn.unit, "spread": spread(&drawn.spread) })
+}
+
+fn of_group(summary: &Summary, group: &Group) -> Value {
+    let endings: serde_json::Map<String, Value> =
+        group.endings.iter().map(|(status, count)| (status.words().to_string(), json!(count))).collect();
+    json!({
+        "name": group.name,
+        "endings": endings,
+        "figures": group.measures.iter().map(|measured| figure(summary, measured)).collect::<Vec<_>>(),
+    })
+}
+
+fn figure(summary: &Summary, measured: &Measured) -> Value {
+    let mut value = json!({
+        "name": measured.name, "unit": measured.unit, "meaning": measured.words, "spread": spread(&measured.spread),
+    });
+    let named = |values: Vec<Value>| -> Value {
+        let names = summary.parameters.iter().map(|parameter| parameter.name.clone());
+        Value::Object(names.zip(values).collect())
+    };
+    if !measured.ranks.is_empty() {
+        value["rank_correlation"] = named(measured.ranks.iter().map(|rank| json!(rank)).collect());
+    }
+    if let Some(indices) = &measured.indices {
+        let told = |estimate: Estimate| json!({ "value": estimate.value, "interval": estimate.interval });
+        value["indices"] = named(
+            indices.iter().map(|index| json!({ "first": told(index.first), "total": told(index.total) })).collect(),
+        );
+    }
+    if !measured.tornado.is_empty() {
+        value["nominal"] = json!(measured.nominal);
+        let bars = |bars: &Vec<(f64, f64)>| {
+            Value::Array(bars.iter().map(|(at, value)| json!({ "at": at, "figure": value })).collect())
+        };
+        value["one_at_a_time"] = named(measured.tornado.iter().map(bars).collect());
+    }
+    value
+}

@@ -1,0 +1,124 @@
+//! `taut sweep`: many runs with parameters varied, which go on where they were left.
+
+mod figures;
+mod json;
+mod options;
+mod output;
+mod page;
+mod progress;
+mod store;
+mod summary;
+mod table;
+mod trajectories;
+
+use crate::args::Sweep as Args;
+use crate::failure::{Failure, Outcome, Status};
+use crate::interrupt::Interrupt;
+use crate::terminal;
+use options::Target;
+use progress::Progress;
+use rayon::prelude::*;
+use std::time::{Duration, Instant};
+use store::Store;
+use summary::Summary;
+use taut::case::Case;
+use taut::sweep::Sweep;
+use taut::{Error, Result};
+
+/// Most runs that are kept in memory, where nothing is written.
+const MOST_KEPT: u64 = 100_000;
+
+/// What was asked for.
+pub struct Work<'a> {
+    pub args: &'a Args,
+    pub case: &'a Case,
+    pub sweep: &'a Sweep,
+    pub interrupt: &'a Interrupt,
+}
+
+/// Reads the case, runs what is not there yet, sums up, writes, tells.
+pub fn run(args: &Args) -> Outcome {
+    let changes = options::changes(args)?;
+    let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
+    let case = Case::read_with(&args.case, &changes)?;
+    let sweep = Sweep::new(&case).map_err(|error| error.in_file(&args.case))?;
+    let target = Target::of(args)?;
+    if args.trajectories {
+        trajectories::check(&sweep)?;
+    }
+    if matches!(target, Target::Nowhere) && sweep.runs() > MOST_KEPT {
+        return Err(Failure::from(
+            Error::new(format!("{} runs are too many to keep in memory", sweep.runs()))
+                .allowed(format!("up to {MOST_KEPT} without --out"))
+                .next("write them: --out runs.parquet"),
+        ));
+    }
+    let interrupt = Interrupt::listen();
+    let work = Work { args, case: &case, sweep: &sweep, interrupt: &interrupt };
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(args.threads.unwrap_or(0))
+        .build()
+        .map_err(|e| Failure::work(Error::new(format!("the threads cannot be started: {e}"))))?;
+    let store = Store::open(&work, &target, pool.current_num_threads())?;
+    let begin = Instant::now();
+    let before = store.done();
+    pool.install(|| rows(&work, &store)).map_err(Failure::work)?;
+    let took = begin.elapsed();
+    if let Some(signal) = interrupt.signal() {
+        told_interrupted(&work, &store);
+        return Ok(Status::Interrupted(signal));
+    }
+    let summary = pool.install(|| Summary::of(&work, &store)).map_err(Failure::work)?;
+    let json = json::text(&work, &summary);
+    let written = output::write(&work, &target, &store, &summary, &json).map_err(Failure::work)?;
+    let Some(written) = written else {
+        told_interrupted(&work, &store);
+        return Ok(Status::Interrupted(interrupt.signal().unwrap_or(2)));
+    };
+    store.remove().map_err(Failure::work)?;
+    if args.json {
+        terminal::show(&json);
+    } else if !args.quiet {
+        terminal::show(&table::text(&work, &summary, took, sweep.runs() - before, &written));
+    }
+    Ok(Status::Done)
+}
+
+/// Runs the chunks that are not there yet, each written when it is whole.
+fn rows(work: &Work, store: &Store) -> Result<()> {
+    let pending = store.pending();
+    let progress = Progress::new(work, store.done());
+    let stop = || work.interrupt.signal().is_some();
+    pending.into_par_iter().try_for_each(|chunk| {
+        let (first, count) = store.range(chunk);
+        // None where it was interrupted.
+        let Some(table) = work.sweep.rows(first, count, &stop) else { return Ok(()) };
+        store.put(chunk, table)?;
+        progress.add(count as u64);
+        Ok(())
+    })?;
+    progress.clear();
+    Ok(())
+}
+
+fn told_interrupted(work: &Work, store: &Store) {
+    let done = store.done();
+    let what = match store.folder() {
+        Some(folder) => format!(
+            "interrupted: {done} of {} runs are done and kept in {}; the same command goes on from there",
+            work.sweep.runs(),
+            folder.display()
+        ),
+        None => format!("interrupted after {done} of {} runs; with --out they would be kept", work.sweep.runs()),
+    };
+    terminal::show_error(&what);
+}
+
+/// A time for people.
+pub fn shown(time: Duration) -> String {
+    match time.as_secs_f64() {
+        seconds if seconds < 100.0 => format!("{seconds:.1} s"),
+        seconds if seconds < 6000.0 => format!("{:.0} min", seconds / 60.0),
+        seconds => format!("{:.1} h", seconds / 3600.0),
+    }
+}

@@ -1,0 +1,104 @@
+//! The summary for people.
+
+use super::summary::{Group, MOST_VALUES, Measured, Summary};
+use super::{Work, shown};
+use crate::terminal::bold;
+use std::fmt::Write;
+use std::time::Duration;
+use taut::number::engineering;
+use taut::sweep::Status;
+
+/// A value with four digits in its unit, spaces as on a keyboard; a dash for none.
+pub fn number(value: f64, unit: &str) -> String {
+    match value.is_finite() {
+        true => engineering(value, unit, 4).replace('\u{a0}', " "),
+        false => "–".into(),
+    }
+}
+
+/// How many runs of what.
+pub fn plan(work: &Work) -> String {
+    let sweep = work.sweep;
+    let count = sweep.inputs() - 1;
+    let parameters = if count == 1 { "1 parameter".to_string() } else { format!("{count} parameters") };
+    let jobs = sweep.experiments().len() + sweep.moves().len();
+    let each = if jobs == 1 { String::new() } else { format!(" of {jobs} simulations each") };
+    let indices = if sweep.indices() { ", for Sobol' indices" } else { "" };
+    format!("{} runs{each}: {parameters}, {}{indices}", sweep.runs(), sweep.sampling().word())
+}
+
+/// What the influence of a figure is told by.
+pub fn influence_heading(work: &Work) -> &'static str {
+    match (work.sweep.indices(), work.sweep.sampling()) {
+        (true, _) => "depends most on (S_T)",
+        (_, taut::case::Sampling::OneAtATime) => "changes most with",
+        _ => "depends most on (rank correlation)",
+    }
+}
+
+/// The parameters that matter most, in words.
+pub fn influence(summary: &Summary, measured: &Measured, most: usize) -> String {
+    let told = |(place, much): (usize, f64)| {
+        let name = &summary.parameters[place].name;
+        match measured.tornado.is_empty() {
+            true => format!("{name} {}", taut::number::fixed(much, 2)),
+            false => format!("{name} {}{}", if much > 0.0 { "+" } else { "" }, number(much, measured.unit)),
+        }
+    };
+    let telling = |(_, much): &(usize, f64)| much.abs() > if measured.tornado.is_empty() { 0.05 } else { 0.0 };
+    measured.influence().into_iter().filter(telling).take(most).map(told).collect::<Vec<_>>().join(", ")
+}
+
+/// How runs ended, if not all to the end.
+pub fn endings(group: &Group) -> Option<String> {
+    let all: usize = group.endings.iter().map(|(_, count)| count).sum();
+    let told = group.endings.iter().filter(|(status, _)| *status != Status::Complete);
+    let told: Vec<String> = told.map(|(status, count)| format!("{count} of {all} runs: {}", status.words())).collect();
+    (!told.is_empty()).then(|| told.join("; "))
+}
+
+/// Text on the terminal.
+pub fn text(work: &Work, summary: &Summary, took: Duration, run: u64, written: &[String]) -> String {
+    let mut text = format!("{}\n{}\n", bold(&work.case.title), plan(work));
+    for group in &summary.groups {
+        let _ = writeln!(text, "\n{}", bold(&group.name));
+        if let Some(endings) = endings(group) {
+            let _ = writeln!(text, "  {endings}");
+        }
+        let mut rows =
+            vec![["".to_string(), "5 %".into(), "50 %".into(), "95 %".into(), influence_heading(work).into()]];
+        let constant = group.measures.iter().filter(|measured| !measured.varies()).count();
+        for measured in group.measures.iter().filter(|measured| measured.varies()) {
+            let Some(spread) = &measured.spread else { continue };
+            let [_, low, middle, high, _] = spread.quantiles.map(|value| number(value, measured.unit));
+            rows.push([measured.words.to_string(), low, middle, high, influence(summary, measured, 3)]);
+        }
+        let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+        let widths = [0, 1, 2, 3].map(width);
+        for [name, low, middle, high, most] in &rows {
+            let [a, b, c, d] = widths;
+            let line = format!("  {name:<a$}  {low:>b$}  {middle:>c$}  {high:>d$}  {most}");
+            let _ = writeln!(text, "{}", line.trim_end());
+        }
+        if constant > 0 {
+            let _ = writeln!(text, "  {constant} more figures are the same in all runs, or in none");
+        }
+    }
+    if summary.every > 1 {
+        let _ = writeln!(text, "\nShares are those of every {}th run: {MOST_VALUES} values at most", summary.every);
+    }
+    let rate =
+        run as f64 * (work.sweep.experiments().len() + work.sweep.moves().len()) as f64 / took.as_secs_f64().max(1e-9);
+    let simulations = match run {
+        0 => "all runs were done already".to_string(),
+        _ => format!("{run} runs in {}: {:.0} simulations a second", shown(took), rate),
+    };
+    let _ = writeln!(text, "\n{simulations}");
+    match written {
+        [] => text.push_str("nothing was written: add --out FILE.parquet or --out DIR\n"),
+        names => {
+            let _ = writeln!(text, "wrote {}", names.join("  "));
+        }
+    }
+    text.replace('\u{a0}', " ")
+}

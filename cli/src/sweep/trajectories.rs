@@ -1,0 +1,80 @@
+//! Every quantity over time of every run, in one file.
+
+use super::Work;
+use super::output::Writer;
+use std::path::Path;
+use taut::solve::{self, Flow, Solver};
+use taut::sweep::Sweep;
+use taut::trajectory::{Column, Trajectory};
+use taut::{Error, Result};
+
+/// Most runs whose trajectories are kept.
+const MOST: u64 = 10_000;
+
+/// Refuses what would fill the disk.
+pub fn check(sweep: &Sweep) -> Result<()> {
+    if sweep.runs() > MOST {
+        return Err(Error::new(format!(
+            "the trajectories of {} runs would fill the disk: each takes about 150 kB for 1000 rows",
+            sweep.runs()
+        ))
+        .in_file("--trajectories")
+        .allowed(format!("up to {MOST} runs"))
+        .next("sweep for the metrics, then run again those machines that are worth a look"));
+    }
+    match sweep.experiments() {
+        [] => Err(Error::new("moves in closed loop have no trajectories here")
+            .in_file("--trajectories")
+            .next("run `taut move` with the machine in question")),
+        _ => Ok(()),
+    }
+}
+
+/// Writes them with the number of the run and of the experiment in front; false where it was interrupted.
+pub fn write(work: &Work, parts: &Path, path: &Path) -> Result<bool> {
+    let mut writer = Writer::create(parts, path)?;
+    let mut wide = Trajectory::default();
+    for run in 0..work.sweep.runs() {
+        let stage = work.sweep.machine(run);
+        for (number, experiment) in work.sweep.experiments().iter().enumerate() {
+            let mut failed = None;
+            let outcome = solve::stream(&stage, experiment, Solver::of(&stage), &mut |block| {
+                widen(&mut wide, run as f64, number as f64, block);
+                match writer.write(&wide) {
+                    Ok(()) if work.interrupt.signal().is_none() => Flow::Continue,
+                    Ok(()) => Flow::Stop,
+                    Err(error) => {
+                        failed = Some(error);
+                        Flow::Stop
+                    }
+                }
+            });
+            match failed {
+                Some(error) => return Err(error),
+                // A machine that cannot be run has a row of its own that says so, and no trajectory.
+                None if outcome.is_err() => {}
+                None if work.interrupt.signal().is_some() => return Ok(false),
+                None => {}
+            }
+        }
+    }
+    writer.finish()?;
+    Ok(true)
+}
+
+/// The block with two numbers in front, in the columns of the first block.
+fn widen(wide: &mut Trajectory, run: f64, experiment: f64, block: &Trajectory) {
+    if wide.columns.is_empty() {
+        let bare = block.columns.iter().map(|column| Column::new(column.name.clone(), column.unit.clone()));
+        wide.columns = [Column::new("run", ""), Column::new("experiment", "")].into_iter().chain(bare).collect();
+    }
+    for column in &mut wide.columns {
+        column.values.clear();
+        match (column.name.as_str(), block.get(&column.name)) {
+            ("run", _) => column.values.resize(block.len(), run),
+            ("experiment", _) => column.values.resize(block.len(), experiment),
+            (_, Some(values)) => column.values.extend_from_slice(values),
+            (_, None) => column.values.resize(block.len(), f64::NAN),
+        }
+    }
+}

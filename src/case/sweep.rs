@@ -1,0 +1,336 @@
+//! The table of the sweep: what is varied, how, and in how many runs.
+
+use super::fit::{pair, plain, prior_of};
+use super::reader::{Field, Table};
+use super::tree::{Entry, Kind, Node};
+use super::{Experiment, Known, Plan, Prior};
+use crate::error::{Error, Result};
+use crate::knob::{GROUPS, Knob, parameter_of};
+use crate::parameter::{self, Parameter, Range};
+use crate::stage::Stage;
+use std::path::PathBuf;
+
+/// Most values of a grid, of one parameter.
+const MOST_VALUES: usize = 100_000;
+
+/// What `taut sweep` does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sweeping {
+    /// How many machines are run; none where the design says it.
+    pub runs: Option<u64>,
+    /// Which ones.
+    pub design: Sampling,
+    /// Seed of what is drawn.
+    pub seed: u64,
+    /// Interval between the rows that metrics are taken from, s; the experiment's where there is none.
+    pub interval: Option<f64>,
+    /// What is varied by itself, by name: parameters, several tied by ` = `, groups, or `all`.
+    pub vary: Vec<(String, Variation)>,
+    /// What a fit says of its parameters.
+    pub from: Option<Origin>,
+    /// Whether the runs are those that Sobol' indices need.
+    pub indices: bool,
+}
+
+impl Default for Sweeping {
+    /// Random draws of nothing.
+    fn default() -> Self {
+        Self {
+            runs: None,
+            design: Sampling::Random,
+            seed: 1,
+            interval: None,
+            vary: Vec::new(),
+            from: None,
+            indices: false,
+        }
+    }
+}
+
+/// How the machines are chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sampling {
+    /// Each by itself.
+    Random,
+    /// Each parameter's distribution is cut into as many equal parts as there are runs, and every part is met once.
+    LatinHypercube,
+    /// Points of a Sobol' sequence, scrambled.
+    Sobol,
+    /// Every value of one with every value of the others.
+    Grid,
+    /// The machine as it is, then one parameter off at a time.
+    OneAtATime,
+}
+
+impl Sampling {
+    /// All of them, with their words.
+    pub const ALL: [(&str, Sampling); 5] = [
+        ("random", Sampling::Random),
+        ("latin-hypercube", Sampling::LatinHypercube),
+        ("sobol", Sampling::Sobol),
+        ("grid", Sampling::Grid),
+        ("one-at-a-time", Sampling::OneAtATime),
+    ];
+
+    /// As in the case file.
+    pub fn word(self) -> &'static str {
+        Self::ALL.iter().find(|(_, sampling)| *sampling == self).map_or("", |(word, _)| word)
+    }
+
+    /// Whether the runs are drawn, as many as one wants.
+    pub fn is_drawn(self) -> bool {
+        !matches!(self, Sampling::Grid | Sampling::OneAtATime)
+    }
+}
+
+/// How a parameter varies; SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Variation {
+    /// What values it takes.
+    pub kind: Kinds,
+    /// Where it is cut off, beside what the parameter may be at all.
+    pub within: Option<[f64; 2]>,
+}
+
+/// What values a parameter takes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Kinds {
+    /// Equally likely within this share of its value on either side.
+    Share(f64),
+    /// By a density.
+    Drawn(Prior),
+    /// These.
+    Values(Vec<f64>),
+    /// Its value times these.
+    Factors(Vec<f64>),
+}
+
+/// What a fit left behind.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Origin {
+    /// Draws from its posterior, in this file.
+    Posterior(PathBuf),
+    /// The standard errors in the table `[uncertainty]`.
+    Uncertainty,
+}
+
+/// What else of the case counts.
+pub(super) struct Context<'a> {
+    pub stage: &'a Stage,
+    pub experiments: &'a [Experiment],
+    pub fit: Option<&'a Plan>,
+    pub known: &'a [Known],
+    pub folder: &'a std::path::Path,
+}
+
+pub(super) fn sweeping(root: &Table, context: &Context) -> Result<Option<Sweeping>> {
+    let Some(field) = root.optional("sweep") else { return Ok(None) };
+    let table = field.table()?;
+    table.check_keys(&["design", "vary", "from", "indices"], &[])?;
+    let design = table.optional("design").map_or(Ok(Sampling::Random), |field| field.choice(&Sampling::ALL))?;
+    let indices = table.optional("indices").map_or(Ok(false), |field| field.truth())?;
+    let runs = table.number_if_given("runs")?.map(|runs| runs as u64);
+    let mut vary = Vec::new();
+    if let Some(field) = table.optional("vary") {
+        let given = field.table()?;
+        for key in given.keys() {
+            let Some(field) = given.optional(key) else { continue };
+            vary.push((key.to_string(), variation(&field, key, design, context.stage)?));
+        }
+    }
+    let from = table.optional("from").map(|field| origin(&field, context)).transpose()?;
+    if vary.is_empty() && from.is_none() {
+        return Err(field.fail("nothing is varied").next("add [sweep.vary] with for example \"cart.mass\" = \"20 %\""));
+    }
+    if let (Some(field), true) = (table.optional("from"), !design.is_drawn() || indices) {
+        let what =
+            if indices { "sensitivity indices need parameters that vary by themselves" } else { "a fit is drawn from" };
+        return Err(field.fail(what).allowed("design = \"random\", \"latin-hypercube\" or \"sobol\", without indices"));
+    }
+    if let (Some(field), true) = (table.optional("indices"), indices && !design.is_drawn()) {
+        return Err(field
+            .fail(format!("sensitivity indices cannot be had from design = \"{}\"", design.word()))
+            .allowed("design = \"random\", \"latin-hypercube\" or \"sobol\""));
+    }
+    match (table.optional("runs"), design.is_drawn()) {
+        (None, true) => {
+            return Err(table.missing("runs", "runs = 10000, or give --runs"));
+        }
+        (Some(field), false) => {
+            return Err(field
+                .fail(format!("how many runs there are follows from design = \"{}\"", design.word()))
+                .next("leave runs out, or take design = \"random\""));
+        }
+        _ => {}
+    }
+    let interval = table.number_if_given("interval")?;
+    for experiment in context.experiments {
+        if let (Some(interval), Some(field)) = (interval, table.optional("interval"))
+            && (interval > experiment.until || experiment.until / interval > super::MOST_SAMPLES)
+        {
+            return Err(field
+                .fail(format!("an interval of {interval} s does not suit \"{}\"", experiment.name))
+                .allowed(format!("up to {} s, and no more than 1e9 rows", experiment.until)));
+        }
+    }
+    Ok(Some(Sweeping { runs, design, seed: table.number("seed")? as u64, interval, vary, from, indices }))
+}
+
+fn origin(field: &Field, context: &Context) -> Result<Origin> {
+    let text = field.text()?;
+    if text != "uncertainty" {
+        if context.fit.is_none() {
+            return Err(field
+                .fail("draws of a posterior belong to the parameters of a table [fit], which is missing")
+                .next("sweep the fitted.toml that lies beside the draws"));
+        }
+        let path = context.folder.join(text);
+        if !path.is_file() {
+            return Err(field
+                .fail(format!("there is no file {}", path.display()))
+                .allowed("\"uncertainty\", or the file posterior.csv that `taut fit --posterior --out DIR` writes"));
+        }
+        return Ok(Origin::Posterior(path));
+    }
+    match context.known {
+        [] => Err(field
+            .fail("this case has no table [uncertainty]")
+            .next("sweep the fitted.toml that `taut fit --out DIR` writes")),
+        _ => Ok(Origin::Uncertainty),
+    }
+}
+
+const KINDS: &str = "\"20 %\", uniform = [least, most], normal = [mean, deviation], log_normal = [median, deviation of the logarithm], \
+                     values = [...], grid = [from, to, count], factors = [...]";
+
+/// What stands at a key of `[sweep.vary]`.
+fn variation(field: &Field, key: &str, design: Sampling, stage: &Stage) -> Result<Variation> {
+    let first = key.split(" = ").next().unwrap_or(key);
+    check_key(field, key, stage)?;
+    let node = match &field.node.kind {
+        Kind::Text(text) => short(field, text)?,
+        Kind::List(_) => table_of(field.node, "values", field.node.kind.clone()),
+        _ => field.node.clone(),
+    };
+    let field = &Field { node: &node, ..field.clone() };
+    let table = field.table()?;
+    table.check_keys(&["share", "uniform", "normal", "log_normal", "values", "grid", "factors", "within"], &[])?;
+    let mut kinds = table.keys().filter(|kind| *kind != "within");
+    let (Some(kind), None) = (kinds.next(), kinds.next()) else {
+        let count = table.keys().filter(|kind| *kind != "within").count();
+        return Err(field.fail(format!("{count} ways to vary it stand here")).allowed(format!("one of {KINDS}")));
+    };
+    let Some(at) = table.optional(kind) else { return Err(field.fail("this is empty")) };
+    if key == "all" && !matches!(kind, "share" | "factors") {
+        return Err(at
+            .fail("parameters of different kinds have no values in common")
+            .allowed("a share such as \"20 %\", or factors = [2, 0.5]"));
+    }
+    if !design.is_drawn() && design == Sampling::Grid && !matches!(kind, "values" | "grid" | "factors") {
+        return Err(at
+            .fail(format!("{} is drawn from, and has no values of a grid", kind.replace('_', "-")))
+            .allowed("values = [...], grid = [from, to, count] or factors = [...]")
+            .next("or take design = \"sobol\""));
+    }
+    let number = |field: &Field| match parameter_of(first) {
+        Some(row) => field.number_of(row),
+        None => plain(field, "a number in SI units"),
+    };
+    let within = match table.optional("within") {
+        None => None,
+        Some(field) => {
+            let [low, high] = pair(&field, "two: the least and the most")?;
+            let ends = [number(&low)?, number(&high)?];
+            if ends[0] >= ends[1] {
+                return Err(field
+                    .fail(format!("{} is not below {}", ends[0], ends[1]))
+                    .allowed("the least, then the most"));
+            }
+            Some(ends)
+        }
+    };
+    let kind = match kind {
+        "share" => Kinds::Share(at.number_of(&SHARE)?),
+        "values" => Kinds::Values(at.filled_list()?.iter().map(number).collect::<Result<_>>()?),
+        "factors" => Kinds::Factors(at.filled_list()?.iter().map(|f| f.number_of(&FACTOR)).collect::<Result<_>>()?),
+        "grid" => {
+            let list = at.list()?;
+            let [from, to, count] = &list[..] else {
+                return Err(at
+                    .fail(format!("the list has {} values", list.len()))
+                    .allowed("three: from, to and how many"));
+            };
+            let count = count.number_of(&COUNT)? as usize;
+            let (from, to) = (number(from)?, number(to)?);
+            Kinds::Values((0..count).map(|k| from + (to - from) * k as f64 / (count - 1) as f64).collect())
+        }
+        kind => Kinds::Drawn(prior_of(kind, &at, first)?),
+    };
+    if let (Kinds::Values(_) | Kinds::Factors(_), Some(field)) = (&kind, table.optional("within")) {
+        return Err(field.fail("values that are given are not cut off").next("leave `within` out"));
+    }
+    Ok(Variation { kind, within })
+}
+
+const fn unwritten(range: Range, example: &'static str) -> Parameter {
+    Parameter { key: "", symbol: "", unit: "", default: parameter::Fallback::Required, range, sentence: "", example }
+}
+
+const SHARE: Parameter = unwritten(Range { above: true, below: true, ..Range::new(0.0, 1.0) }, "20 %");
+const FACTOR: Parameter = unwritten(Range::new(1e-6, 1e6), "2");
+const COUNT: Parameter = unwritten(Range::whole(2.0, MOST_VALUES as f64), "11");
+
+/// Refuses names that are no parameter of this machine.
+fn check_key(field: &Field, key: &str, stage: &Stage) -> Result<()> {
+    let told = |error: Error| {
+        let mut told = field.fail(error.what);
+        (told.allowed, told.next) = (error.allowed, error.next);
+        told
+    };
+    match key {
+        "all" => Ok(()),
+        _ if key.starts_with("total.") => match GROUPS.contains(&key) {
+            true => Knob::lumped(stage, key, &Vec::new()).map(|_| ()).map_err(told),
+            false => Err(field.fail(format!("there is no group `{key}`")).allowed(GROUPS.join(", "))),
+        },
+        _ => {
+            let keys: Vec<&str> = key.split(" = ").collect();
+            Knob::tied(stage, &keys, &keys, &Vec::new()).map(|_| ()).map_err(told)
+        }
+    }
+}
+
+/// A short form as the table that it stands for: `20 %`, `uniform(1 kg, 2 kg)`.
+fn short(field: &Field, text: &str) -> Result<Node> {
+    let plain = text.trim().trim_start_matches(['±', '+', '-']).trim_start_matches(['/', '-']);
+    if plain.ends_with('%') && plain.starts_with(|c: char| c.is_ascii_digit() || c == '.') {
+        return Ok(table_of(field.node, "share", Kind::Text(plain.to_string())));
+    }
+    let wrong = || {
+        field.fail(format!("\"{}\" is no way to vary a parameter", text.trim())).allowed(
+            "a share such as 20 %, uniform(least, most), normal(mean, deviation), log-normal(median, deviation), values(a, b, …), \
+             grid(from, to, count) or factors(a, b, …)",
+        )
+    };
+    let (name, rest) = text.split_once('(').ok_or_else(wrong)?;
+    let inside = rest.trim_end().strip_suffix(')').ok_or_else(wrong)?;
+    let name = name.trim().replace('-', "_");
+    let known = ["uniform", "normal", "log_normal", "values", "grid", "factors"];
+    if !known.contains(&name.as_str()) {
+        return Err(wrong());
+    }
+    let of = |part: &str| {
+        let part = part.trim();
+        let kind = part.parse::<f64>().map_or_else(|_| Kind::Text(part.to_string()), Kind::Float);
+        Node { span: field.node.span.clone(), kind }
+    };
+    let values = inside.split(',').filter(|part| !part.trim().is_empty()).map(of).collect();
+    Ok(table_of(field.node, &name, Kind::List(values)))
+}
+
+/// A table of one entry where `node` stands.
+fn table_of(node: &Node, key: &str, kind: Kind) -> Node {
+    let span = node.span.clone();
+    let entry = Entry { key: key.to_string(), key_span: span.clone(), node: Node { span: span.clone(), kind } };
+    Node { span, kind: Kind::Table(vec![entry]) }
+}
