@@ -149,6 +149,8 @@ fn what_the_documents_name_is_there() {
         "docs/logs.md",
         "docs/paper.md",
         "docs/posterior.md",
+        "docs/python.md",
+        "docs/scale.md",
         "docs/shape.md",
         "docs/tune.md",
         "docs/solver.md",
@@ -163,7 +165,7 @@ fn what_the_documents_name_is_there() {
         "stages/emps/README.md",
         "stages/two-mass/README.md",
     ];
-    let folders = ["src", "cli", "stages", "tests", "examples", "docs", "authorities", "xtask", ".ci"];
+    let folders = ["src", "cli", "stages", "tests", "examples", "docs", "authorities", "py", "xtask", ".ci"];
     let mut missing = Vec::new();
     for document in documents {
         let text = read(document);
