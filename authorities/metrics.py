@@ -21,8 +21,8 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 SWEEPS = [
     ("stages/sollmann-jouaneh/table4.toml", 6, "sobol", ["all=20 %"]),
-    ("stages/laser-gantry/laser-gantry.toml", 4, "latin-hypercube", ["all=20 %"]),
-    ("stages/printer-axis/printer-axis.toml", 4, "random", ["all=15 %"]),
+    ("stages/laser-gantry/laser-gantry.toml", 4, "latin-hypercube", ["cart.mass=20 %", "motor.resistance=20 %", "cart.friction.coulomb=20 %"]),
+    ("stages/printer-axis/printer-axis.toml", 4, "random", ["cart.mass=15 %", "cart.friction.viscous=15 %", "motor.torque_constant=15 %"]),
 ]
 
 

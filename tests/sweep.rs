@@ -306,7 +306,8 @@ fn figures_are_those_of_the_authority() {
         let mut changes =
             vec![format!("sweep.runs={}", authority["runs"]), format!("sweep.design={}", authority["design"])];
         for vary in authority["vary"].as_array().unwrap() {
-            changes.push(format!("sweep.vary.{}", vary.as_str().unwrap()));
+            let (key, how) = vary.as_str().unwrap().split_once('=').unwrap();
+            changes.push(format!("sweep.vary.\"{key}\"={how}"));
         }
         let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
         let file = format!("{}/{}", env!("CARGO_MANIFEST_DIR"), authority["case"].as_str().unwrap());

@@ -2,6 +2,7 @@
 
 use super::Work;
 use super::summary::{Group, Measured, Summary};
+use super::table::short;
 use taut::case::file_name;
 use taut::number::engineering;
 use taut::report::{Axis, Colour, Figure, Panel, Series, Style};
@@ -116,7 +117,7 @@ fn indices(summary: &Summary, group: &Group, measured: &Measured) -> Option<Figu
         bar(&mut first, 0.0, index.first.value, y, 0.18);
         whiskers.0.extend([index.total.interval[0], index.total.interval[1], f64::NAN]);
         whiskers.1.extend([y, y, f64::NAN]);
-        panel = panel.horizontal(y, summary.parameters[*place].name.clone());
+        panel = panel.horizontal(y, short(&summary.parameters[*place].name));
     }
     let panel = panel
         .series(Series::new("total order", total.0, total.1).colour(Colour::Blue))
@@ -138,7 +139,7 @@ fn tornado(summary: &Summary, group: &Group, measured: &Measured) -> Figure {
             let more = summary.parameters[*place].points.first().is_none_or(|nominal| value > nominal);
             bar(if more { &mut up } else { &mut down }, measured.nominal, *figure, y, 0.3);
         }
-        panel = panel.horizontal(y, summary.parameters[*place].name.clone());
+        panel = panel.horizontal(y, short(&summary.parameters[*place].name));
     }
     let panel = panel
         .series(Series::new("more of it", up.0, up.1).colour(Colour::Vermillion))

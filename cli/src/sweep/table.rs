@@ -16,6 +16,14 @@ pub fn number(value: f64, unit: &str) -> String {
     }
 }
 
+/// The name of a parameter, what is tied to it only counted.
+pub fn short(name: &str) -> String {
+    match name.split(" = ").collect::<Vec<_>>()[..] {
+        [first, _, ..] => format!("{first} and {} tied to it", name.matches(" = ").count()),
+        _ => name.to_string(),
+    }
+}
+
 /// How many runs of what.
 pub fn plan(work: &Work) -> String {
     let sweep = work.sweep;
@@ -39,7 +47,7 @@ pub fn influence_heading(work: &Work) -> &'static str {
 /// The parameters that matter most, in words.
 pub fn influence(summary: &Summary, measured: &Measured, most: usize) -> String {
     let told = |(place, much): (usize, f64)| {
-        let name = &summary.parameters[place].name;
+        let name = short(&summary.parameters[place].name);
         match measured.tornado.is_empty() {
             true => format!("{name} {}", taut::number::fixed(much, 2)),
             false => format!("{name} {}{}", if much > 0.0 { "+" } else { "" }, number(much, measured.unit)),
@@ -67,8 +75,10 @@ pub fn text(work: &Work, summary: &Summary, took: Duration, run: u64, written: &
         }
         let mut rows =
             vec![["".to_string(), "5 %".into(), "50 %".into(), "95 %".into(), influence_heading(work).into()]];
-        let constant = group.measures.iter().filter(|measured| !measured.varies()).count();
-        for measured in group.measures.iter().filter(|measured| measured.varies()) {
+        // Counts of events are for the report.
+        let shown = |measured: &&Measured| measured.varies() && !measured.unit.is_empty();
+        let left_out = group.measures.len() - group.measures.iter().filter(shown).count();
+        for measured in group.measures.iter().filter(shown) {
             let Some(spread) = &measured.spread else { continue };
             let [_, low, middle, high, _] = spread.quantiles.map(|value| number(value, measured.unit));
             rows.push([measured.words.to_string(), low, middle, high, influence(summary, measured, 3)]);
@@ -80,8 +90,8 @@ pub fn text(work: &Work, summary: &Summary, took: Duration, run: u64, written: &
             let line = format!("  {name:<a$}  {low:>b$}  {middle:>c$}  {high:>d$}  {most}");
             let _ = writeln!(text, "{}", line.trim_end());
         }
-        if constant > 0 {
-            let _ = writeln!(text, "  {constant} more figures are the same in all runs, or in none");
+        if left_out > 0 {
+            let _ = writeln!(text, "  and {left_out} figures that count events, or are the same in all runs: --json");
         }
     }
     if summary.every > 1 {
