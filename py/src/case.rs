@@ -167,7 +167,8 @@ impl Case {
         let drawn = match effort.filter(|_| !interrupt.stop()) {
             Some((draws, chains)) => {
                 let effort = Effort { chains, draws, tune: TUNE, seed: plan.seed };
-                Some(posterior(&self.inner, plan, &found, effort, &|_| !interrupt.stop())?)
+                let watch = |_| !interrupt.stop();
+                Some(interrupt.beside(|| posterior(&self.inner, plan, &found, effort, &watch))?)
             }
             None => None,
         };

@@ -3,7 +3,8 @@
 use pyo3::prelude::*;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::Instant;
+use std::sync::mpsc::RecvTimeoutError;
+use std::time::{Duration, Instant};
 
 /// How long Ctrl-C may wait, ms.
 const PATIENCE: u64 = 50;
@@ -41,6 +42,27 @@ impl Interrupt {
             self.raise(signal);
         }
         self.stopped.load(Ordering::Relaxed)
+    }
+
+    /// Does `work`, which has threads of its own, on one more thread: Python tells signals to the calling one alone, which
+    /// listens meanwhile.
+    pub fn beside<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        let (done, wait) = std::sync::mpsc::channel();
+        std::thread::scope(|scope| {
+            scope.spawn(move || {
+                // The receiver waits until it has come.
+                let _ = done.send(work());
+            });
+            loop {
+                match wait.recv_timeout(Duration::from_millis(PATIENCE)) {
+                    Ok(result) => return result,
+                    Err(RecvTimeoutError::Timeout) => {
+                        self.stop();
+                    }
+                    Err(RecvTimeoutError::Disconnected) => panic!("the work has panicked"),
+                }
+            }
+        })
     }
 
     /// Stops with this exception.

@@ -60,8 +60,8 @@ impl Sweep {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|e| format!("the threads cannot be started: {e}"))?;
         let begins: Vec<u64> = (first..end).step_by(CHUNK as usize).collect();
-        let parts: Vec<Trajectory> =
-            pool.install(|| begins.into_par_iter().map(|from| rows(from, (from + CHUNK).min(end))).collect());
+        let part = |from: u64| rows(from, (from + CHUNK).min(end));
+        let parts: Vec<Trajectory> = interrupt.beside(|| pool.install(|| begins.into_par_iter().map(part).collect()));
         let mut table = Trajectory::with_capacity(self.inner.columns(), end.saturating_sub(first) as usize);
         parts.iter().for_each(|part| table.append(part));
         Ok(table)

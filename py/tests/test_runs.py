@@ -84,6 +84,8 @@ def test_arrow_has_the_schema_of_our_parquet(case, tmp_path):
 
 
 def test_tables_for_pandas_and_polars(case, tmp_path):
+    pytest.importorskip("pandas")
+    pytest.importorskip("polars")
     run = case.simulate("5 V pulse")
     frame = run.to_pandas()
     assert frame.attrs["units"]["cart_position_m"] == "m"
@@ -108,6 +110,7 @@ def test_a_missing_package_is_named():
 
 
 def test_plots_and_notebooks(case, tmp_path):
+    pytest.importorskip("matplotlib")
     run = case.simulate("5 V pulse")
     run.plot().savefig(tmp_path / "run.png")
     figure = run.plot("cart_speed", "idler_angle_rad", "drive_angle")
@@ -134,6 +137,15 @@ def test_ctrl_c_ends_a_long_run(case):
     with pytest.raises(KeyboardInterrupt):
         case.simulate("5 V pulse")
     assert time.perf_counter() - begin < 2.0
+
+
+def test_ctrl_c_ends_a_sweep_on_threads(case):
+    timer = threading.Timer(0.3, _thread.interrupt_main)
+    timer.start()
+    begin = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt):
+        case.sweep(10_000_000, vary={"all": "20 %"}, threads=2)
+    assert time.perf_counter() - begin < 3.0
 
 
 def test_the_lock_of_the_interpreter_is_free_meanwhile(case):
