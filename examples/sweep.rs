@@ -1,32 +1,45 @@
-//! Times the kernel of a sweep on one thread: the Table 4 machine, all of its parameters by ±20 %, 5 V and 10 V for 0.25 s, one
-//! simulated second at 1 kHz; prints JSON.
+//! Times the kernel of a sweep: the Table 4 machine, all of its parameters by ±20 %, 5 V and 10 V for 0.25 s, one simulated second at
+//! 1 kHz; prints JSON.
 //!
-//! `cargo run --release --package taut --example sweep [-- RUNS]`
+//! `cargo run --release --package taut --example sweep [-- RUNS [THREADS]]`
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 use taut::Result;
 use taut::case::Case;
 use taut::sweep::Sweep;
 
+/// Runs of a piece of work.
+const CHUNK: u64 = 256;
+
 fn main() -> Result<()> {
-    let runs: usize = std::env::args().nth(1).and_then(|runs| runs.parse().ok()).unwrap_or(2000);
+    let number = |place: usize, default: u64| {
+        std::env::args().nth(place).and_then(|number| number.parse().ok()).unwrap_or(default)
+    };
+    let (runs, threads) = (number(1, 2000), number(2, 1));
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/stages/sollmann-jouaneh/table4.toml");
     let count = format!("sweep.runs={runs}");
     let case = Case::read_with(file, &[&count, "sweep.design=sobol", "sweep.vary.all=20 %"])?;
     let sweep = Sweep::new(&case)?;
+    let (next, bits) = (AtomicU64::new(0), AtomicU64::new(0));
+    let work = || loop {
+        let first = next.fetch_add(CHUNK, Ordering::Relaxed);
+        let Some(table) = sweep.rows(first, CHUNK as usize, &|| false).filter(|table| !table.is_empty()) else {
+            return;
+        };
+        // Depends on every bit, and not on the order of the chunks.
+        let values = table.columns.iter().flat_map(|column| &column.values);
+        bits.fetch_add(values.fold(first, |sum, value| sum.rotate_left(1) ^ value.to_bits()), Ordering::Relaxed);
+    };
     let begin = Instant::now();
-    let table = sweep.rows(0, runs, &|| false).unwrap_or_default();
+    std::thread::scope(|scope| (0..threads).for_each(|_| drop(scope.spawn(work))));
     let seconds = begin.elapsed().as_secs_f64();
-    let simulations = runs * sweep.experiments().len();
-    // Anything that depends on every bit.
-    let bits = table
-        .columns
-        .iter()
-        .flat_map(|column| &column.values)
-        .fold(0u64, |sum, value| sum.rotate_left(1) ^ value.to_bits());
+    let simulations = runs * sweep.experiments().len() as u64;
     println!(
-        "{{\"runs\": {runs}, \"simulations\": {simulations}, \"seconds\": {seconds:.4}, \"simulations_per_second\": {:.0}, \"bits\": \"{bits:016x}\"}}",
-        simulations as f64 / seconds
+        "{{\"runs\": {runs}, \"threads\": {threads}, \"simulations\": {simulations}, \"seconds\": {seconds:.4}, \
+         \"simulations_per_second\": {:.0}, \"bits\": \"{:016x}\"}}",
+        simulations as f64 / seconds,
+        bits.into_inner()
     );
     Ok(())
 }

@@ -141,7 +141,7 @@ pub struct Fuzzy {
     pub command: f64,
     /// Whether rules change the command (PI) instead of giving it (PD).
     pub incremental: bool,
-    /// rules[i][j] from −1 to 1 for set i of the error and set j of its rate, both from negative to positive; a square of odd size.
+    /// `rules[i][j]` from −1 to 1 for set i of the error and set j of its rate, both from negative to positive; a square of odd size.
     pub rules: Vec<Vec<f64>>,
     /// Corner of the filter of the rate, Hz.
     pub filter: f64,

@@ -6,10 +6,13 @@ mod chance;
 use chance::Chance;
 use std::sync::Arc;
 use taut::case::{Case, Plan, TEMPLATE};
+use taut::control::{Loop, Rows, Standard, stream};
+use taut::design;
 use taut::fit::least_squares::{Bounds, Ending, Options, Residuals, minimise};
-use taut::fit::{Fit, check, fit, inverse_of_square};
+use taut::fit::{Fit, check, fit, inverse_of_square, profiles};
 use taut::log::{Log, Output, Quantity};
 use taut::signal::Hold;
+use taut::signal::profile::{Leg, Limits, Profile};
 use taut::solve::{Flow, Solver, simulate};
 
 /// A problem of NIST's Statistical Reference Datasets (nonlinear regression), with its certified answer.
@@ -120,6 +123,7 @@ fn recorded(changes: &[&str], seed: u64, noise: f64) -> Case {
             time: run.get("time").unwrap().to_vec(),
             input: run.get("voltage").unwrap().to_vec(),
             hold: Hold::Zero,
+            reference: None,
             outputs: vec![Output { quantity: Quantity::DriveAngle, absolute: false, values }],
         }));
     }
@@ -157,6 +161,90 @@ fn a_machine_is_found_again() {
     let text = found.case_text(&case, "axis.toml".as_ref()).unwrap();
     let again = Case::from_text("fitted.toml", &text).unwrap();
     assert!((again.stage.cart.mass - found.estimates[2].value).abs() < 1e-12, "{text}");
+}
+
+#[test]
+fn the_profile_of_what_is_well_known_is_that_of_a_linear_model() {
+    let case = recorded(&[], 1, 1e-3);
+    let plan = plan(&["cart.friction.viscous", "cart.friction.coulomb"]);
+    let found = fit(&case, &plan, None, &mut |_| Flow::Continue).unwrap();
+    let profiles = profiles(&case, &plan, &found, None).unwrap();
+    assert_eq!(profiles.len(), 2);
+    for profile in &profiles {
+        assert!(profile.values.is_sorted() && profile.values.len() == 7, "{profile:?}");
+        assert!(profile.bends().into_iter().all(|bend| bend.is_some()), "{profile:?}");
+        // Residuals of which more than noise is left widen the interval, and the growth falls behind by as much.
+        for (grown, linear) in profile.growth.iter().zip(&profile.linear) {
+            assert!((grown - linear).abs() <= 0.2 * linear, "{profile:?}");
+        }
+    }
+    // What is asked to stop leaves out what it has not.
+    assert!(taut::fit::profiles(&case, &plan, &found, Some(&|| true)).unwrap().is_empty());
+}
+
+/// A log that a controller made is met with the input as logged, and with the controller following its reference again.
+#[test]
+fn a_loop_is_closed_again() {
+    let text = format!(
+        "{TEMPLATE}\n[controller]\nevery = \"1 ms\"\ndelay = \"0.5 ms\"\nlimit = \"12 V\"\npid = {{ proportional = \"600 V/m\", integral = \"3000 V/(m s)\", derivative = \"5 V s/m\" }}\n"
+    );
+    let truth = [("cart.friction.viscous", 24.0), ("cart.friction.coulomb", 0.6), ("cart.mass", 0.5)];
+    let keys: Vec<&str> = truth.iter().map(|(key, _)| *key).collect();
+    let changes: Vec<String> = truth.iter().map(|(key, value)| format!("{key}={value}")).collect();
+    let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
+    let real = Case::from_text_with("axis.toml", &text, &changes).unwrap();
+    let mut case = Case::from_text("axis.toml", &text).unwrap();
+    let design = case.controller.clone().unwrap();
+
+    let limits = Limits { speed: 0.25, acceleration: 3.0, jerk: Some(100.0), snap: None };
+    let profile =
+        Profile::new(0.0, &[Leg::To(0.08, limits), Leg::Wait(0.1), Leg::To(0.02, limits), Leg::Wait(0.2)]).unwrap();
+    let rows = Rows { until: profile.end(), every: 1e-3, window: 1e-4 };
+    let mut controller = Standard::new(&design, &case.stage).unwrap();
+    let mut columns: [Vec<f64>; 4] = Default::default();
+    let timing = Loop::of(&design);
+    stream(&real.stage, &mut controller, &timing, &profile, &rows, Solver::Exact, false, &mut |block| {
+        for (column, name) in columns.iter_mut().zip(["time", "voltage", "reference", "drive_angle"]) {
+            column.extend_from_slice(block.get(name).unwrap());
+        }
+        Flow::Continue
+    })
+    .unwrap();
+    let step = std::f64::consts::TAU / 2048.0;
+    let mut chance = Chance::new(5);
+    let [time, input, reference, angle] = columns;
+    let values = angle.iter().map(|v| step * ((v + 1e-3 * chance.normal()) / step).round()).collect();
+    let output = Output { quantity: Quantity::DriveAngle, absolute: false, values };
+    case.experiments.truncate(1);
+    case.experiments[0].log = Some(Arc::new(Log {
+        name: "move".into(),
+        file: Default::default(),
+        time,
+        input,
+        hold: Hold::Zero,
+        reference: Some(reference),
+        outputs: vec![output],
+    }));
+    let closed = Plan { closed_loop: true, ..plan(&keys) };
+    let found = fit(&case, &closed, None, &mut |_| Flow::Continue).unwrap();
+    for (estimate, (key, value)) in found.estimates.iter().zip(truth) {
+        let error = estimate.error.unwrap();
+        // The loop that made the log saw counts, the one that is closed again does not.
+        assert!(
+            (estimate.value - value).abs() < 4.0 * error + 0.02 * value,
+            "{key}: {} ± {error}, is {value}",
+            estimate.value
+        );
+        assert!(error < 0.2 * value, "{key}: ± {error}");
+    }
+    let rmse = found.logs[0].outputs[0].fitted.unwrap().rmse;
+    assert!(rmse < 2.0 * step, "{rmse} rad");
+    // A controller that is told something else does something else.
+    let mut other = case.clone();
+    let design::Structure::Pid(gains) = &mut other.controller.as_mut().unwrap().structure else { panic!() };
+    gains.proportional *= 0.5;
+    let wrong = fit(&other, &closed, None, &mut |_| Flow::Continue).unwrap();
+    assert!(wrong.logs[0].outputs[0].fitted.unwrap().rmse > 3.0 * rmse);
 }
 
 /// P7: an encoder at the motor does not tell the friction of the cart from that of the pulleys.

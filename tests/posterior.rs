@@ -36,6 +36,7 @@ fn logged(viscous: f64, coulomb: f64, seed: u64) -> Case {
         time: run.get("time").unwrap().to_vec(),
         input: run.get("voltage").unwrap().to_vec(),
         hold: Hold::Zero,
+        reference: None,
         outputs: vec![Output { quantity: Quantity::DriveAngle, absolute: false, values }],
     }));
     case

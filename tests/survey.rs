@@ -25,6 +25,7 @@ fn clean() -> (Stage, Log) {
         input: time.iter().map(|&t| input.value(t)).collect(),
         time,
         hold: Hold::Zero,
+        reference: None,
         outputs: quantities.into_iter().map(output).collect(),
     };
     (stage, log)

@@ -108,7 +108,7 @@ pub struct Simulate {
     pub draws: Option<PathBuf>,
     /// How many of them to run
     #[arg(long, value_name = "N", default_value_t = 200, requires = "draws", value_parser = count)]
-    pub bands: usize,
+    pub machines: usize,
     /// Leave out the report and the plots
     #[arg(long)]
     pub no_report: bool,

@@ -8,6 +8,10 @@ use std::fmt::Write;
 use taut::case::Case;
 use taut::fit::{Check, check};
 use taut::json;
+use taut::log::{Severity, Survey};
+
+/// So many logs are shown with all that is known of them; of more, what matters.
+const MOST_WHOLE: usize = 4;
 
 /// Reads the case, looks, tells.
 pub fn run(args: &Args) -> Outcome {
@@ -23,7 +27,7 @@ fn text(case: &Case, found: &Check) -> String {
     let mut text = format!("{}\n", bold(&case.title));
     let _ = write!(text, "\n{}\n", bold("What the logs show"));
     for log in &found.logs {
-        let _ = writeln!(text, "  {}: {}", log.name, log.told.join("; "));
+        text.push_str(&shown(log, found.logs.len() <= MOST_WHOLE));
     }
     if let Some(found) = &found.balance {
         let _ = write!(text, "\n{}\n", bold("A rigid axis by regression, all at the drive pulley"));
@@ -71,4 +75,14 @@ fn text(case: &Case, found: &Check) -> String {
         }
     }
     text
+}
+
+/// What a log shows, indented; not `whole`: in its first line and its warnings.
+fn shown(log: &Survey, whole: bool) -> String {
+    let mut log = log.clone();
+    if !whole {
+        log.channels.clear();
+        log.notes.retain(|note| note.severity > Severity::Fact);
+    }
+    log.to_string().lines().fold(String::new(), |text, line| format!("{text}  {line}\n"))
 }

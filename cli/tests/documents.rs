@@ -104,6 +104,11 @@ fn the_page_on_tuning_shows_what_the_program_prints() {
 }
 
 #[test]
+fn the_page_on_sweeps_shows_what_the_program_prints() {
+    check("docs/sweep.md");
+}
+
+#[test]
 fn the_page_on_modes_shows_what_the_program_prints() {
     check("docs/modes.md");
 }
@@ -152,6 +157,7 @@ fn what_the_documents_name_is_there() {
         "docs/python.md",
         "docs/scale.md",
         "docs/shape.md",
+        "docs/sweep.md",
         "docs/tune.md",
         "docs/solver.md",
         "docs/general-solver.md",

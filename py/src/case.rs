@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use taut::case::{Plan, TEMPLATE};
 use taut::files::write_atomically;
-use taut::fit::{Posterior, check, fit, posterior};
+use taut::fit::{Posterior, Profile, check, fit, posterior, profiles};
 use taut::json;
 use taut::linear::Analysis;
 use taut::posterior::Effort;
@@ -122,15 +122,15 @@ impl Case {
     }
 
     /// Fits, and draws from the posterior if so many draws and chains are asked for.
-    fn fit(&self, py: Python<'_>, effort: Option<(usize, usize)>) -> PyResult<Fit> {
+    fn fit(&self, py: Python<'_>, effort: Option<(usize, usize)>, profiled: bool) -> PyResult<Fit> {
         let plan = self.inner.fit_plan(&self.path).told(py)?;
         let interrupt = Interrupt::listen();
-        let found = py.detach(|| self.fitted(&plan, effort, &interrupt));
+        let found = py.detach(|| self.fitted(&plan, effort, profiled, &interrupt));
         interrupt.finish()?;
-        let (fit, drawn) = found.told(py)?;
+        let (fit, profiles, drawn) = found.told(py)?;
         let text = fit.case_text(&self.inner, &self.path).told(py)?;
         let case = Self::from_text(py, self.path.clone(), &text, Vec::new())?;
-        let told = json::fit(&self.inner, &fit, drawn.as_ref().map(json::posterior));
+        let told = json::fit(&self.inner, &fit, &profiles, drawn.as_ref().map(json::posterior));
         let draws = drawn.map(|drawn| Columns::of(py, drawn.table())).transpose()?;
         Ok(Fit { data: value::json(py, &told)?.unbind(), case: Py::new(py, case)?, draws })
     }
@@ -159,11 +159,13 @@ impl Case {
         &self,
         plan: &Plan,
         effort: Option<(usize, usize)>,
+        profiled: bool,
         interrupt: &Interrupt,
-    ) -> taut::Result<(taut::fit::Fit, Option<Posterior>)> {
+    ) -> taut::Result<(taut::fit::Fit, Vec<Profile>, Option<Posterior>)> {
         let stop = || interrupt.stop();
         let flow = |stop: bool| if stop { Flow::Stop } else { Flow::Continue };
         let found = fit(&self.inner, plan, Some(&stop), &mut |_| flow(interrupt.stop()))?;
+        let profiles = if profiled { profiles(&self.inner, plan, &found, Some(&stop))? } else { Vec::new() };
         let drawn = match effort.filter(|_| !interrupt.stop()) {
             Some((draws, chains)) => {
                 let effort = Effort { chains, draws, tune: TUNE, seed: plan.seed };
@@ -172,7 +174,7 @@ impl Case {
             }
             None => None,
         };
-        Ok((found, drawn))
+        Ok((found, profiles, drawn))
     }
 }
 

@@ -58,7 +58,8 @@ def test_a_case_without_a_fit_says_what_to_add(case):
 
 
 def test_draws_come_as_columns(root):
-    fit = taut.read(root / STAGE / "identification" / "linear-5v.toml").fit(posterior=True, draws=50, chains=2)
+    fit = taut.read(root / STAGE / "identification" / "linear-5v.toml").fit(profiles=True, posterior=True, draws=50, chains=2)
+    assert [profile["name"] for profile in fit.data["profiles"]] == list(fit.estimates)
     draws = fit.draws
     assert draws.rows == 100 and set(draws["chain"]) == {0.0, 1.0}
     for parameter in fit.data["posterior"]["parameters"]:

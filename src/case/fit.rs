@@ -33,6 +33,8 @@ pub struct Plan {
     pub until: Option<f64>,
     /// Length of the windows into which logs are cut, s.
     pub windows: Option<f64>,
+    /// Whether the case's controller follows the logged reference again; otherwise the input is what was logged.
+    pub closed_loop: bool,
 }
 
 impl Default for Plan {
@@ -51,6 +53,7 @@ impl Default for Plan {
             held_out: Vec::new(),
             until: None,
             windows: None,
+            closed_loop: false,
         }
     }
 }
@@ -130,7 +133,7 @@ pub enum Scope {
 pub(super) fn plan(root: &Table, experiments: &[Experiment]) -> Result<Option<Plan>> {
     let Some(field) = root.optional("fit") else { return Ok(None) };
     let table = field.table()?;
-    let known = ["free", "tied", "lumped", "bounds", "priors", "nuisance", "loss", "held_out"];
+    let known = ["free", "tied", "lumped", "bounds", "priors", "nuisance", "loss", "held_out", "loop"];
     table.check_keys(&known, &[])?;
     let free = table.optional("free").map_or(Ok(Vec::new()), |field| words(&field))?;
     let tied = match table.optional("tied") {
@@ -168,6 +171,11 @@ pub(super) fn plan(root: &Table, experiments: &[Experiment]) -> Result<Option<Pl
     let huber =
         table.optional("loss").map_or(Ok(false), |field| field.choice(&[("squares", false), ("huber", true)]))?;
     let nuisance = nuisances(&table)?;
+    let closed_loop =
+        table.optional("loop").map_or(Ok(false), |field| field.choice(&[("logged", false), ("closed", true)]))?;
+    if let (true, Some(field)) = (closed_loop, table.optional("loop")) {
+        closed(&field, &table, root, experiments, nuisance)?;
+    }
     Ok(Some(Plan {
         bounds: bounds(&table, &seen)?,
         priors: priors(&table, &seen, nuisance)?,
@@ -178,10 +186,35 @@ pub(super) fn plan(root: &Table, experiments: &[Experiment]) -> Result<Option<Pl
         held_out,
         until: table.number_if_given("until")?,
         windows: table.number_if_given("windows")?,
+        closed_loop,
         free: free.clone(),
         tied: tied.clone(),
         lumped: lumped.clone(),
     }))
+}
+
+/// Refuses what a loop that is closed again cannot have.
+fn closed(field: &Field, table: &Table, root: &Table, experiments: &[Experiment], nuisance: Nuisances) -> Result<()> {
+    if root.optional("controller").is_none() {
+        return Err(field.fail("there is no controller that could close the loop").next("add [controller]"));
+    }
+    let without = experiments.iter().find(|e| e.log.as_ref().is_some_and(|log| log.reference.is_none()));
+    if let Some(experiment) = without {
+        return Err(field
+            .fail(format!("the log of \"{}\" does not say where the cart should have been", experiment.name))
+            .next("add reference = \"...\" with the name of that column to the log, or leave out `loop`"));
+    }
+    if table.optional("windows").is_some() {
+        return Err(field
+            .fail("a controller begins with the log, not in the middle of it")
+            .next("leave out `windows` or `loop`"));
+    }
+    if nuisance.delay != Scope::Off || nuisance.input_offset != Scope::Off {
+        return Err(field
+            .fail("a delay or an offset of the input is the controller's own here")
+            .next("leave `delay` and `input_offset` out of `nuisance`; controller.delay is the delay of the loop"));
+    }
+    Ok(())
 }
 
 /// Whether a name is meant by a pattern: the name itself, or its beginning and a `*`.

@@ -14,6 +14,7 @@ use crate::stage::{EncoderPlace, Stage};
 const KEYS: &[&str] = &[
     "file",
     "input",
+    "reference",
     "units",
     "scale",
     "offset",
@@ -84,6 +85,7 @@ pub(super) fn logs(field: &Field, stage: &Stage, folder: &Folder, driven: bool) 
         hold_missing: word("missing_input", &[("refuse", false), ("hold", true)])?,
         absolute: absolute(&table, &outputs)?,
         outputs,
+        reference: sources.source("reference", "m")?,
         hold: if linear { Hold::Linear } else { Hold::Zero },
         from,
         to,
@@ -110,7 +112,7 @@ impl<'a> Sources<'a> {
         let part = |key: &str| table.optional(key).map(|field| field.table()).transpose();
         let sources = Self { units: part("units")?, scale: part("scale")?, offset: part("offset")?, table, stage };
         for part in [&sources.units, &sources.scale, &sources.offset].into_iter().flatten() {
-            let columns = ["time", "input"].into_iter().chain(Quantity::ALL.map(Quantity::name));
+            let columns = ["time", "input", "reference"].into_iter().chain(Quantity::ALL.map(Quantity::name));
             let named: Vec<&'static str> = columns.clone().filter(|key| table.optional(key).is_some()).collect();
             // A quantity without a column, rather than a word that is none.
             let other = part.keys().find(|key| !named.contains(key) && columns.clone().any(|column| column == *key));

@@ -240,7 +240,7 @@ impl Case {
             experiments: &experiments,
             fit: fit.as_ref(),
             known: &known,
-            folder: folder.path,
+            folder: &folder,
         };
         let sweep = sweep::sweeping(&root, &context)?;
         let mut files = folder.read.into_inner();

@@ -3,7 +3,7 @@
 use super::fit::{pair, plain, prior_of};
 use super::reader::{Field, Table};
 use super::tree::{Entry, Kind, Node};
-use super::{Experiment, Known, Plan, Prior};
+use super::{Experiment, Folder, InputFile, Known, Plan, Prior};
 use crate::error::{Error, Result};
 use crate::knob::{GROUPS, Knob, parameter_of};
 use crate::parameter::{self, Parameter, Range};
@@ -120,7 +120,7 @@ pub(super) struct Context<'a> {
     pub experiments: &'a [Experiment],
     pub fit: Option<&'a Plan>,
     pub known: &'a [Known],
-    pub folder: &'a std::path::Path,
+    pub folder: &'a Folder<'a>,
 }
 
 pub(super) fn sweeping(root: &Table, context: &Context) -> Result<Option<Sweeping>> {
@@ -184,12 +184,13 @@ fn origin(field: &Field, context: &Context) -> Result<Origin> {
                 .fail("draws of a posterior belong to the parameters of a table [fit], which is missing")
                 .next("sweep the fitted.toml that lies beside the draws"));
         }
-        let path = context.folder.join(text);
+        let path = context.folder.path.join(text);
         if !path.is_file() {
             return Err(field
                 .fail(format!("there is no file {}", path.display()))
                 .allowed("\"uncertainty\", or the file posterior.csv that `taut fit --posterior --out DIR` writes"));
         }
+        context.folder.read.borrow_mut().push(InputFile { path: path.clone(), place: field.node.span.clone() });
         return Ok(Origin::Posterior(path));
     }
     match context.known {

@@ -137,6 +137,14 @@ impl<'a> Sampled<'a> {
     }
 }
 
+impl Sampled<'_> {
+    /// With positions read exactly and not in counts.
+    pub(super) fn exactly(mut self) -> Self {
+        self.sensor.counts = None;
+        self
+    }
+}
+
 impl Decide for Sampled<'_> {
     fn decide(&mut self, _: f64, state: &State, current: f64) -> (f64, f64) {
         let Loop { every, lead, limit, .. } = self.timing;

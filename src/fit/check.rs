@@ -2,12 +2,12 @@
 
 use super::identify::Identifiability;
 use super::least_squares::{Differences, Residuals, Step};
-use super::problem::{Problem, extent};
+use super::problem::Problem;
 use super::regression::{Balance, regression};
-use super::run::{Run, is_position};
+use super::run::is_position;
 use crate::case::{Case, Plan};
 use crate::error::{Error, Result};
-use crate::log::Quantity;
+use crate::log::{Quantity, Survey};
 use crate::stage::Stage;
 use nalgebra::DMatrix;
 
@@ -15,7 +15,7 @@ use nalgebra::DMatrix;
 #[derive(Debug, Clone)]
 pub struct Check {
     /// What each log shows.
-    pub logs: Vec<LogFacts>,
+    pub logs: Vec<Survey>,
     /// The balance of torques of a rigid axis, by regression; none where the logs do not allow one.
     pub balance: Option<Balance>,
     /// What they determine together.
@@ -26,15 +26,6 @@ pub struct Check {
     pub noise_words: String,
     /// What one more experiment would tell, the best first.
     pub experiments: Vec<Proposal>,
-}
-
-/// What a log shows.
-#[derive(Debug, Clone)]
-pub struct LogFacts {
-    /// Its name.
-    pub name: String,
-    /// In words.
-    pub told: Vec<String>,
 }
 
 /// One more experiment.
@@ -71,7 +62,7 @@ pub fn check(case: &Case, plan: &Plan) -> Result<Check> {
         .collect();
     Ok(Check {
         balance: regression(&problem),
-        logs: problem.runs.iter().map(facts).collect(),
+        logs: case.experiments.iter().filter_map(|e| Some(Survey::new(e.log.as_ref()?, &case.stage))).collect(),
         identifiability,
         choices,
         noise_words: format!(
@@ -106,59 +97,6 @@ pub(super) fn sensitivities(problem: &mut Problem) -> Result<(DMatrix<f64>, Vec<
     Ok((jacobian, x))
 }
 
-/// What can be seen in a log without a model.
-fn facts(run: &Run) -> LogFacts {
-    let mut told = Vec::new();
-    let (n, interval) = (run.time.len(), run.interval());
-    let engineering = |v: f64, unit: &str| crate::number::engineering(v, unit, 3).replace('\u{a0}', " ");
-    told.push(format!("{n} rows over {}", engineering(run.time[n - 1] - run.time[0], "s")));
-    if !run.is_even() {
-        let worst = run.time.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
-        told.push(format!(
-            "times are uneven: {} on average, {} at most",
-            engineering(interval, "s"),
-            engineering(worst, "s")
-        ));
-    }
-    for seen in &run.seen {
-        let (name, unit) = (seen.quantity.name().replace('_', " "), seen.quantity.unit());
-        let missing = seen.values.iter().filter(|v| !v.is_finite()).count();
-        if missing > 0 {
-            told.push(format!("{missing} values of {name} are missing"));
-        }
-        let wide = extent(&seen.values);
-        if wide == 0.0 {
-            told.push(format!("{name} does not change"));
-            continue;
-        }
-        if seen.step > 0.0 {
-            told.push(format!("{name} in steps of {}", engineering(seen.step, unit)));
-        }
-        let top = seen.values.iter().copied().filter(|v| v.is_finite()).fold(f64::NEG_INFINITY, f64::max);
-        let bottom = seen.values.iter().copied().filter(|v| v.is_finite()).fold(f64::INFINITY, f64::min);
-        let at = |end: f64| seen.values.iter().filter(|v| **v == end).count();
-        if !is_position(seen.quantity) && (at(top) > n / 20 + 5 || at(bottom) > n / 20 + 5) {
-            told.push(format!("{name} often stands at its greatest or least value: is it clipped?"));
-        }
-        if is_position(seen.quantity) {
-            let (mut forward, mut backward) = (0.0, 0.0);
-            for pair in seen.values.windows(2).filter(|pair| pair[0].is_finite() && pair[1].is_finite()) {
-                let way = pair[1] - pair[0];
-                if way > 0.0 { forward += way } else { backward -= way }
-            }
-            if f64::min(forward, backward) < 0.02 * f64::max(forward, backward) {
-                told.push("it moves one way only".into());
-            }
-            let still = seen.repeats.iter().filter(|m| **m > 20.0).count();
-            if still > n / 10 {
-                told.push(format!("it rests for {:.0} % of the time", 100.0 * still as f64 / n as f64));
-            }
-        }
-    }
-    let name = if run.window == 0 { run.name.clone() } else { format!("{} [{}]", run.name, run.window + 1) };
-    LogFacts { name, told }
-}
-
 /// What is measured of a problem whose logs have these deviations, and with which deviations.
 type Measured = fn(&Problem, &[(Quantity, f64)]) -> Vec<(Quantity, f64)>;
 
@@ -188,7 +126,7 @@ fn cart_noise(problem: &Problem, noise: &[(Quantity, f64)]) -> f64 {
 const IDEAS: &[Idea] = &[
     Idea { name: "the same inputs again, the other way round", measured: same, change: |_| {}, reversed: true },
     Idea {
-        name: "an encoder at the cart, as fine as the one there is, or to 10 µm",
+        name: "an encoder at the cart, as fine as the one there is (to 10 µm where there is none)",
         measured: |problem, noise| vec![(Quantity::CartPosition, cart_noise(problem, noise))],
         change: |_| {},
         reversed: false,

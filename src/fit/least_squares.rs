@@ -49,12 +49,12 @@ pub trait Residuals {
     /// r(x); false where it cannot be computed.
     fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool;
 
-    /// ∂r/∂x by differences within the bounds; `r` = r(x).
+    /// ∂r/∂x by differences within the bounds; `r` = r(x). Zero for a variable whose bounds hold it.
     fn jacobian(&mut self, x: &[f64], r: &[f64], bounds: &Bounds, how: &Differences) -> Option<DMatrix<f64>> {
         let mut jacobian = DMatrix::zeros(self.rows(), x.len());
         let mut moved = x.to_vec();
         let (mut a, mut b) = (vec![0.0; r.len()], vec![0.0; r.len()]);
-        for j in 0..x.len() {
+        for j in (0..x.len()).filter(|&j| !bounds.hold(j)) {
             let step = Step::new(x, bounds, j, how);
             moved[j] = step.first;
             let mut good = self.evaluate(&moved, &mut a);
@@ -144,6 +144,11 @@ impl Bounds {
     /// No bounds on `n` variables.
     pub fn none(n: usize) -> Self {
         Self { low: vec![f64::NEG_INFINITY; n], high: vec![f64::INFINITY; n] }
+    }
+
+    /// Whether variable `j` can only have one value.
+    pub fn hold(&self, j: usize) -> bool {
+        self.low[j] >= self.high[j]
     }
 }
 

@@ -12,18 +12,20 @@ pub mod least_squares;
 #[cfg(feature = "posterior")]
 mod posterior;
 mod problem;
+mod profile;
 mod regression;
 mod run;
 mod uncertainty;
 
 pub use crate::knob::{GROUPS, Knob};
-pub use check::{Check, LogFacts, Proposal, check};
+pub use check::{Check, Proposal, check};
 pub use drawn::{drawn, machines};
 pub use identify::{Group, Identifiability, LIMIT};
 pub use least_squares::Ending;
 #[cfg(feature = "posterior")]
 pub use posterior::{Credible, EFFECTIVE, Posterior, R_HAT, posterior};
 pub use problem::{Problem, Stop};
+pub use profile::{Profile, profiles};
 pub use regression::{Balance, regression};
 pub use run::{Extra, Nuisance, Run, Seen};
 pub use uncertainty::{Covariance, inverse_of_square, student};
@@ -354,7 +356,9 @@ fn first_weight(problem: &Problem, at: &Minimum) -> Option<f64> {
     if !run.residuals(&stage, &problem.extras_of(0, &at.x), &mut fresh) {
         return None;
     }
-    let k = (0..fresh.len()).max_by(|&a, &b| fresh[a].abs().total_cmp(&fresh[b].abs()))?;
+    // Of outputs; what is known beforehand stands behind them.
+    let outputs = 0..run.seen.len() * run.time.len();
+    let k = outputs.max_by(|&a, &b| fresh[a].abs().total_cmp(&fresh[b].abs()))?;
     let now = run.seen[k / run.time.len()].weights[k % run.time.len()];
     if fresh[k] == 0.0 { None } else { Some(now * at.residuals[k] / fresh[k]) }
 }

@@ -94,7 +94,10 @@ impl<'a> Problem<'a> {
             // What is only compared is compared whole.
             let window = if held { None } else { plan.windows };
             let setting = Setting { window, fitted_until: plan.until, held_out: held };
-            for run in Run::all(experiment, log, &setting) {
+            for mut run in Run::all(experiment, log, &setting) {
+                if plan.closed_loop {
+                    run.close(case, log);
+                }
                 if held { held_out.push(run) } else { runs.push(run) }
             }
         }
@@ -245,7 +248,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Weighs a quantity: each value with the variance σ² of the noise and of what rounding makes of m equal values in a row,
-    /// which is one error and not one for each: σ² + (m − 1) Δ²/12; or of m that go to and fro at rest: [`rounding_at_rest`].
+    /// which is one error and not one for each: σ² + (m − 1) Δ²/12; or of m that go to and fro at rest: `rounding_at_rest`.
     pub fn weigh(&mut self, quantity: Quantity, deviation: f64, rounding: bool) {
         for run in &mut self.runs {
             let fitted = run.fitted_rows;
@@ -266,7 +269,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Residuals that are rounding, with the present weights: of each quantity [`ROUNDING`] of how far it ranges.
+    /// Residuals that are rounding, with the present weights: of each quantity `ROUNDING` of how far it ranges.
     pub fn rounding(&self) -> f64 {
         let seen = self.runs.iter().flat_map(|run| &run.seen);
         let of = |seen: &Seen| ROUNDING * extent(&seen.values) * seen.weights.iter().copied().fold(0.0, f64::max);
@@ -539,7 +542,7 @@ impl Residuals for Problem<'_> {
         let mut jacobian = DMatrix::zeros(rows, n);
         let mut moved = x.to_vec();
         let (mut a, mut b) = (vec![0.0; rows], vec![0.0; rows]);
-        for j in 0..globals {
+        for j in (0..globals).filter(|&j| !bounds.hold(j)) {
             let step = Step::new(x, bounds, j, how);
             moved[j] = step.first;
             let mut good = self.evaluate(&moved, &mut a);

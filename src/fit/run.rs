@@ -1,10 +1,15 @@
 //! A log made ready to be compared: when the model is asked, what it is told, and what its answer is weighed with.
 
-use crate::case::{Experiment, Initial};
+use crate::case::{Case, Experiment, Initial};
+use crate::control::follow;
+use crate::design::Design;
 use crate::log::{Log, Quantity};
 use crate::signal::Signal;
+use crate::signal::profile::Profile;
 use crate::solve::{self, Ending, Flow, Solver};
 use crate::stage::Stage;
+use crate::trajectory::Trajectory;
+use std::sync::Arc;
 
 /// Share of an interval by which times may be off an even raster and still count as on it: the solver then answers at the
 /// raster's times. What that makes of a value is at most its rate of change times this share of an interval.
@@ -105,11 +110,22 @@ pub struct Run {
     pub extras: Vec<Extra>,
     /// What is fitted along for all logs at once; its values stand behind those of `extras`.
     shared: Vec<Extra>,
+    /// What closes the loop, where the input is not as logged.
+    closed: Option<Arc<Closed>>,
     input: Signal,
     initial: Initial,
     every: f64,
     until: f64,
     even: bool,
+}
+
+/// A controller that follows a logged reference again.
+#[derive(Debug, Clone)]
+struct Closed {
+    design: Design,
+    /// What the controller takes the axis for: that of the case, whatever is fitted.
+    model: Stage,
+    profile: Profile,
 }
 
 /// How a run is made of a log.
@@ -201,11 +217,20 @@ impl Run {
             fitted_rows,
             extras: Vec::new(),
             shared: Vec::new(),
+            closed: None,
             input,
             initial: experiment.initial,
             every,
             until,
             even,
+        }
+    }
+
+    /// Has the controller of a case follow the reference of the log, instead of taking the input as logged.
+    pub fn close(&mut self, case: &Case, log: &Log) {
+        if let (Some(design), Some(reference)) = (&case.controller, &log.reference) {
+            let profile = Profile::sampled(&log.time, reference);
+            self.closed = Some(Arc::new(Closed { design: design.clone(), model: case.stage.clone(), profile }));
         }
     }
 
@@ -308,11 +333,11 @@ impl Run {
     /// reach the end.
     pub fn predict(&self, stage: &Stage, extras: &[f64], quantities: &[Quantity], out: &mut [Vec<f64>]) -> bool {
         let mut stage = stage.clone();
-        stage.encoder = None;
         let experiment = self.experiment(&mut stage, extras);
         let mut slopes: Vec<Vec<f64>> = vec![Vec::new(); quantities.len()];
         out.iter_mut().for_each(Vec::clear);
-        let outcome = solve::stream(&stage, &experiment, Solver::of(&stage), &mut |block| {
+        let solver = Solver::of(&stage);
+        let mut take = |block: &Trajectory| {
             for (i, quantity) in quantities.iter().enumerate() {
                 out[i].extend_from_slice(column(block, *quantity));
                 if !self.even
@@ -322,7 +347,17 @@ impl Run {
                 }
             }
             Flow::Continue
-        });
+        };
+        let outcome = match &self.closed {
+            Some(closed) => {
+                let Closed { design, model, profile } = closed.as_ref();
+                follow(&stage, model, design, profile, &experiment, solver, &mut take)
+            }
+            None => {
+                stage.encoder = None;
+                solve::stream(&stage, &experiment, solver, &mut take)
+            }
+        };
         if !outcome.is_ok_and(|outcome| outcome.ending == Ending::Complete) {
             return false;
         }
@@ -380,7 +415,7 @@ fn solve_slot(signal: Signal, lasts: f64) -> crate::signal::Slot {
 }
 
 /// The column of a run that an output is compared with.
-fn column(block: &crate::trajectory::Trajectory, quantity: Quantity) -> &[f64] {
+fn column(block: &Trajectory, quantity: Quantity) -> &[f64] {
     let name = quantity.name();
     let other = match name {
         "motor_voltage" => "voltage",

@@ -33,7 +33,18 @@ pub fn check(case: &Case, found: &Check) -> Value {
             "words": group.words,
             "choices": choices,
         })).collect::<Vec<_>>(),
-        "logs": found.logs.iter().map(|log| json!({ "name": log.name, "told": log.told })).collect::<Vec<_>>(),
+        "logs": found.logs.iter().map(|log| json!({
+            "name": log.log,
+            "samples": log.timing.samples,
+            "duration_s": log.timing.duration,
+            "interval_s": log.timing.interval,
+            "notes": log.notes.iter().map(|note| json!({
+                "code": note.code,
+                "severity": note.severity.word(),
+                "column": note.column,
+                "text": note.text,
+            })).collect::<Vec<_>>(),
+        })).collect::<Vec<_>>(),
         "experiments": found.experiments.iter().map(|experiment| json!({
             "name": experiment.name,
             "told": experiment.told,

@@ -2,7 +2,7 @@
 
 use super::number;
 use crate::case::Case;
-use crate::fit::{Ending, Fit, Score};
+use crate::fit::{Ending, Fit, Profile, Score};
 use serde_json::{Value, json};
 
 fn score(score: Option<Score>) -> Value {
@@ -17,8 +17,19 @@ fn score(score: Option<Score>) -> Value {
     })
 }
 
-/// Estimates and how the logs are met; `posterior` is what was drawn, if anything was.
-pub fn fit(case: &Case, fit: &Fit, posterior: Option<Value>) -> Value {
+/// A profile: where the parameter was held, and how much worse the logs were met.
+fn profile(profile: &Profile) -> Value {
+    json!({
+        "name": profile.name,
+        "unit": profile.unit,
+        "values": profile.values,
+        "growth": profile.growth,
+        "linear": profile.linear,
+    })
+}
+
+/// Estimates and how the logs are met; `profiles` are those that were made and `posterior` is what was drawn, if anything was.
+pub fn fit(case: &Case, fit: &Fit, profiles: &[Profile], posterior: Option<Value>) -> Value {
     let parameters: Vec<Value> = fit
         .estimates
         .iter()
@@ -78,6 +89,7 @@ pub fn fit(case: &Case, fit: &Fit, posterior: Option<Value>) -> Value {
             "quantity": quantity.name(), "unit": quantity.unit(), "value": number(*deviation),
         })).collect::<Vec<_>>(),
         "logs": logs,
+        "profiles": profiles.iter().map(profile).collect::<Vec<_>>(),
         "posterior": posterior,
         "work": {
             "iterations": fit.work.iterations,

@@ -35,6 +35,8 @@ pub struct Mapping {
     pub input_unit: &'static str,
     /// Whether an input that is missing is the one before it; otherwise it is an error.
     pub hold_missing: bool,
+    /// The column of where the cart should have been.
+    pub reference: Option<Source>,
     /// The columns of what was seen.
     pub outputs: Vec<(Quantity, Source)>,
     /// Quantities whose sign was lost.
@@ -101,6 +103,7 @@ impl Source {
 enum Role {
     Time,
     Input(&'static str),
+    Reference,
     Output(Quantity),
 }
 
@@ -109,6 +112,7 @@ impl Role {
         match self {
             Role::Time => "time",
             Role::Input(_) => "input",
+            Role::Reference => "reference",
             Role::Output(quantity) => quantity.name(),
         }
     }
@@ -117,6 +121,7 @@ impl Role {
         match self {
             Role::Time => "s",
             Role::Input(unit) => unit,
+            Role::Reference => "m",
             Role::Output(quantity) => quantity.unit(),
         }
     }
@@ -139,6 +144,7 @@ impl Mapping {
             input: None,
             input_unit: "V",
             hold_missing: false,
+            reference: None,
             outputs: Vec::new(),
             absolute: Vec::new(),
             hold: Hold::Zero,
@@ -158,6 +164,7 @@ impl Mapping {
         }
         let complete = sources.len();
         sources.extend(self.input.iter().map(|source| (Role::Input(self.input_unit), source)));
+        sources.extend(self.reference.iter().map(|source| (Role::Reference, source)));
         sources.extend(self.outputs.iter().map(|(quantity, source)| (Role::Output(*quantity), source)));
         let ids: Vec<ColumnId> = sources.iter().map(|(_, source)| source.column.clone()).collect();
         let request = Request {
@@ -287,8 +294,12 @@ impl Columns<'_> {
             time: time[window.clone()].iter().map(|t| t - start).collect(),
             input: vec![0.0; within.len()],
             hold: mapping.hold,
+            reference: None,
             outputs,
         };
+        if let Some(i) = self.roles.iter().position(|role| matches!(role, Role::Reference)) {
+            log.reference = Some(self.inputs(i, &rows, &within)?);
+        }
         if let Some(i) = self.roles.iter().position(|role| matches!(role, Role::Input(_))) {
             log.input = self.inputs(i, &rows, &within)?;
             // A window that begins between two rows begins with the input of that moment, when nothing was seen.
@@ -300,6 +311,7 @@ impl Columns<'_> {
                 };
                 log.input.insert(0, held + share * (log.input[0] - held));
                 log.time.insert(0, 0.0);
+                log.reference.iter_mut().for_each(|reference| reference.insert(0, reference[0]));
                 log.outputs.iter_mut().for_each(|output| output.values.insert(0, f64::NAN));
             }
         }

@@ -34,6 +34,8 @@ pub struct Log {
     pub input: Vec<f64>,
     /// What the input did between them.
     pub hold: Hold,
+    /// Where the cart should have been at those times, m, if the log was made in closed loop and says so.
+    pub reference: Option<Vec<f64>>,
     /// What was seen; at least one.
     pub outputs: Vec<Output>,
 }

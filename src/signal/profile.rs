@@ -249,6 +249,8 @@ pub struct Profile {
     end: f64,
     /// Impulses (time, s; amplitude) that it is convolved with; empty for none.
     shaper: Vec<[f64; 2]>,
+    /// Times and references that a log has instead of strokes.
+    samples: Vec<(f64, Reference)>,
 }
 
 impl Profile {
@@ -272,7 +274,29 @@ impl Profile {
                 }
             }
         }
-        Ok(Self { strokes, start, end: time, shaper: Vec::new() })
+        Ok(Self { strokes, start, end: time, shaper: Vec::new(), samples: Vec::new() })
+    }
+
+    /// A reference of which `positions` (m) at increasing `times` (s) are known: straight lines between them. Speed and acceleration
+    /// are those of the parabola through a sample and its neighbours; jerk and snap are not known, and zero.
+    pub fn sampled(times: &[f64], positions: &[f64]) -> Self {
+        let n = times.len().min(positions.len());
+        let samples = (0..n)
+            .map(|k| {
+                let mut reference = Reference::at(positions[k]);
+                if k > 0 && k + 1 < n {
+                    let (before, after) = (times[k] - times[k - 1], times[k + 1] - times[k]);
+                    let slopes =
+                        [(positions[k] - positions[k - 1]) / before, (positions[k + 1] - positions[k]) / after];
+                    reference.speed = (after * slopes[0] + before * slopes[1]) / (before + after);
+                    reference.acceleration = 2.0 * (slopes[1] - slopes[0]) / (before + after);
+                }
+                (times[k], reference)
+            })
+            .collect();
+        let start = positions.first().copied().unwrap_or(0.0);
+        let end = times.last().copied().unwrap_or(0.0);
+        Self { strokes: Vec::new(), start, end, shaper: Vec::new(), samples }
     }
 
     /// The same through a shaper: impulses (time, s; amplitude) whose amplitudes add up to 1.
@@ -290,6 +314,15 @@ impl Profile {
     }
 
     fn plain(&self, t: f64) -> Reference {
+        if let Some((_, last)) = self.samples.last() {
+            let k = self.samples.partition_point(|(time, _)| *time <= t);
+            let Some((after, next)) = self.samples.get(k) else { return *last };
+            let Some((before, this)) = k.checked_sub(1).map(|k| &self.samples[k]) else {
+                return Reference::at(self.start);
+            };
+            let share = (t - before) / (after - before);
+            return Reference::default().plus(1.0 - share, *this).plus(share, *next);
+        }
         let index = self.strokes.partition_point(|(begin, ..)| *begin <= t);
         let Some((begin, [from, to], stroke)) = index.checked_sub(1).and_then(|index| self.strokes.get(index)) else {
             return Reference::at(self.start);
@@ -314,7 +347,8 @@ impl Profile {
 
     /// Where it ends, m.
     pub fn target(&self) -> f64 {
-        self.strokes.last().map_or(self.start, |(_, [_, to], _)| *to)
+        let sampled = self.samples.last().map(|(_, reference)| reference.position);
+        sampled.unwrap_or_else(|| self.strokes.last().map_or(self.start, |(_, [_, to], _)| *to))
     }
 
     /// Begin (s), start (m), distance (m) and duration (s) of each stroke.

@@ -250,12 +250,12 @@ impl<const R: usize, const C: usize> Law<R, C> {
 
     /// ż.
     pub(super) fn rate(&self, z: &[f64; C]) -> [f64; R] {
-        self.rate.times(z)
+        self.rate.rate(z)
     }
 
     /// z̈ from ż.
     pub(super) fn rate_of_rate(&self, y: &[f64; R]) -> [f64; R] {
-        self.rate.times(&widened(y))
+        self.rate.rate(&widened(y))
     }
 
     /// √(2V) of ż.
@@ -290,7 +290,9 @@ impl<const R: usize, const C: usize> Law<R, C> {
 
     /// Length of the intervals of a level: h/2^level.
     pub(super) fn length(&self, level: usize) -> f64 {
-        self.h * 0.5_f64.powi(level as i32)
+        // 2^−level by its exponent.
+        let power = if level < 1000 { f64::from_bits((1023 - level as u64) << 52) } else { 0.5_f64.powi(level as i32) };
+        self.h * power
     }
 
     /// How far the Taylor series reaches.
@@ -321,16 +323,7 @@ impl<const R: usize, const C: usize> Law<R, C> {
 
     /// Terms of the Taylor series of z over `distance`: z(s · distance) = Σ term_k sᵏ.
     pub(super) fn series(&self, z: &[f64; C], distance: f64) -> [[f64; C]; SERIES_ORDER + 1] {
-        let mut terms = [[0.0; C]; SERIES_ORDER + 1];
-        terms[0] = *z;
-        for k in 1..=SERIES_ORDER {
-            let factor = distance / k as f64;
-            let next = self.rate.times(&terms[k - 1]);
-            for (term, next) in terms[k].iter_mut().zip(next) {
-                *term = next * factor;
-            }
-        }
-        terms
+        self.rate.series(z, distance)
     }
 
     /// How much √V may grow by itself within `length`.

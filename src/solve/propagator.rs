@@ -3,6 +3,9 @@
 //! A vector holds `R` quantities that move and, behind them, constants, `C` in all. A matrix has `R` rows and `C` columns and
 //! is kept by columns, so that its product with a vector is a chain of scaled vector additions that the compiler turns
 //! into vector instructions. Products are never fused (no FMA): the same bits on every machine.
+//!
+//! The long loops are compiled twice, for any processor and for those with AVX2, and the right one is chosen at run time: wider vectors do
+//! the same operations in the same order.
 
 /// An `R` × `C` matrix: the rate of change ż = A z, or a change over some time, z(t + h) − z(t) = P z(t).
 #[derive(Debug, Clone)]
@@ -38,9 +41,70 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         self.column[column][row] = value;
     }
 
-    /// The product with a vector.
+    /// Terms of the Taylor series over `distance` of what moves by this rate: z(s · distance) = Σ term_k sᵏ.
+    pub(crate) fn series(&self, z: &[f64; C], distance: f64) -> [[f64; C]; SERIES_ORDER + 1] {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.series_by_avx2(z, distance) };
+        }
+        self.series_by_any(z, distance)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn series_by_avx2(&self, z: &[f64; C], distance: f64) -> [[f64; C]; SERIES_ORDER + 1] {
+        self.series_by_any(z, distance)
+    }
+
     #[inline(always)]
-    pub(crate) fn times(&self, z: &[f64; C]) -> [f64; R] {
+    fn series_by_any(&self, z: &[f64; C], distance: f64) -> [[f64; C]; SERIES_ORDER + 1] {
+        let mut terms = [[0.0; C]; SERIES_ORDER + 1];
+        terms[0] = *z;
+        let mut next = self.times(z);
+        for (k, term) in terms.iter_mut().enumerate().skip(1) {
+            let factor = distance / k as f64;
+            for (term, next) in term.iter_mut().zip(next) {
+                *term = next * factor;
+            }
+            if k < SERIES_ORDER {
+                next = self.times_moving(term);
+            }
+        }
+        terms
+    }
+
+    /// The product with a vector whose constants are zero.
+    #[inline(always)]
+    fn times_moving(&self, z: &[f64; C]) -> [f64; R] {
+        let mut sum = [0.0; R];
+        for (column, &factor) in self.column.iter().zip(z).take(R) {
+            for (s, c) in sum.iter_mut().zip(column) {
+                *s += c * factor;
+            }
+        }
+        sum
+    }
+
+    /// The product with a vector.
+    #[inline]
+    pub(crate) fn rate(&self, z: &[f64; C]) -> [f64; R] {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.times_by_avx2(z) };
+        }
+        self.times(z)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn times_by_avx2(&self, z: &[f64; C]) -> [f64; R] {
+        self.times(z)
+    }
+
+    #[inline(always)]
+    fn times(&self, z: &[f64; C]) -> [f64; R] {
         let mut sum = [0.0; R];
         for (column, &factor) in self.column.iter().zip(z) {
             for (s, c) in sum.iter_mut().zip(column) {
@@ -53,6 +117,22 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
     /// z ← z + P z.
     #[inline(always)]
     pub(crate) fn advance(&self, z: &mut [f64; C]) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.advance_by_avx2(z) };
+        }
+        self.advance_by_any(z);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn advance_by_avx2(&self, z: &mut [f64; C]) {
+        self.advance_by_any(z);
+    }
+
+    #[inline(always)]
+    fn advance_by_any(&self, z: &mut [f64; C]) {
         let change = self.times(z);
         for (z, change) in z.iter_mut().zip(change) {
             *z += change;
@@ -60,6 +140,7 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
     }
 
     /// The product of the square part of `self` with `other`.
+    #[inline(always)]
     fn product(&self, other: &Self) -> Self {
         let mut out = Self::zero();
         for (to, from) in out.column.iter_mut().zip(&other.column) {
@@ -77,6 +158,7 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         out
     }
 
+    #[inline(always)]
     fn scaled(&self, factor: f64) -> Self {
         let mut out = self.clone();
         out.column.iter_mut().flatten().for_each(|entry| *entry *= factor);
@@ -85,32 +167,68 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
 
     /// e^{A h} − I for ‖A‖ h ≤ [`SERIES_REACH`], A being `self`.
     pub(crate) fn exponential(&self, h: f64) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.exponential_by_avx2(h) };
+        }
+        self.exponential_by_any(h)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn exponential_by_avx2(&self, h: f64) -> Self {
+        self.exponential_by_any(h)
+    }
+
+    #[inline(always)]
+    fn exponential_by_any(&self, h: f64) -> Self {
         // Σ Xᵏ/k!, k = 1…12, gathered by powers of X³: five products (Paterson & Stockmeyer 1973)
         let x = self.scaled(h);
         let x2 = x.product(&x);
         let x3 = x.product(&x2);
-        let group = |k: usize, rest: Option<&Self>| {
-            let mut out = match rest {
-                Some(rest) => x3.product(rest),
-                None => Self::zero(),
-            };
-            let [a, b, c] = [RECIPROCAL_FACTORIAL[k], RECIPROCAL_FACTORIAL[k + 1], RECIPROCAL_FACTORIAL[k + 2]];
-            for column in 0..C {
-                for row in 0..R {
-                    let [x, x2, x3] = [&x, &x2, &x3].map(|power| power.column[column][row]);
-                    out.column[column][row] = out.column[column][row] + x3 * c + x2 * b + x * a;
-                }
-            }
-            out
+        let powers = [&x, &x2, &x3];
+        let fourth = Self::gathered(powers, 10, None);
+        let third = Self::gathered(powers, 7, Some(&fourth));
+        let second = Self::gathered(powers, 4, Some(&third));
+        Self::gathered(powers, 1, Some(&second))
+    }
+
+    /// X/k! + X²/(k + 1)! + X³/(k + 2)! + X³ · rest, of the powers X, X² and X³.
+    #[inline(always)]
+    fn gathered([x, x2, x3]: [&Self; 3], k: usize, rest: Option<&Self>) -> Self {
+        let mut out = match rest {
+            Some(rest) => x3.product(rest),
+            None => Self::zero(),
         };
-        let fourth = group(10, None);
-        let third = group(7, Some(&fourth));
-        let second = group(4, Some(&third));
-        group(1, Some(&second))
+        let [a, b, c] = [RECIPROCAL_FACTORIAL[k], RECIPROCAL_FACTORIAL[k + 1], RECIPROCAL_FACTORIAL[k + 2]];
+        for column in 0..C {
+            for row in 0..R {
+                let [x, x2, x3] = [x, x2, x3].map(|power| power.column[column][row]);
+                out.column[column][row] = out.column[column][row] + x3 * c + x2 * b + x * a;
+            }
+        }
+        out
     }
 
     /// e^{2 A h} − I from e^{A h} − I, keeping the relative accuracy of small changes.
     pub(crate) fn doubled(&self) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.doubled_by_avx2() };
+        }
+        self.doubled_by_any()
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn doubled_by_avx2(&self) -> Self {
+        self.doubled_by_any()
+    }
+
+    #[inline(always)]
+    fn doubled_by_any(&self) -> Self {
         // P(2h) = 2 P + P²
         let mut out = self.product(self);
         for (o, p) in out.column.iter_mut().flatten().zip(self.column.iter().flatten()) {

@@ -28,13 +28,13 @@ const STEPS: [Step; 7] = [
         "the library without its features",
         &["clippy", "--package", "taut", "--lib", "--no-default-features", "--", "-D", "warnings"],
     ),
-    // Unit tests, integration tests and the examples in the documentation.
-    step("tests", &["test", "--workspace", "--no-fail-fast"]),
-    step("examples", &["build", "--workspace", "--examples"]),
     Step {
         what: "documentation",
         work: Work::Cargo(&["doc", "--workspace", "--no-deps"], &[("RUSTDOCFLAGS", "-D warnings")]),
     },
+    // Unit tests, integration tests and the examples in the documentation.
+    step("tests", &["test", "--workspace", "--no-fail-fast"]),
+    step("examples", &["build", "--workspace", "--examples"]),
     PYTHON,
 ];
 

@@ -1,6 +1,6 @@
 //! Model and log side by side.
 
-use taut::fit::{Estimate, LogFit, OutputFit, Posterior};
+use taut::fit::{Estimate, LogFit, OutputFit, Posterior, Profile};
 use taut::report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// Logs drawn; the numbers of the rest are in the tables.
@@ -24,7 +24,11 @@ pub fn overlay(log: &LogFit, output: &OutputFit) -> Figure {
         .panel(
             Panel::new(axis(output, "Value"))
                 .series(Series::new("log", log.time.clone(), output.seen.clone()).style(Style::Solid))
-                .series(Series::new("model", log.time.clone(), output.model.clone()).style(Style::Dashed))
+                .series(
+                    Series::new("model", log.time.clone(), output.model.clone())
+                        .style(Style::Dashed)
+                        .colour(Colour::Vermillion),
+                )
                 .weight(2.0),
         )
         .panel(Panel::new(axis(output, "Model − log")).line("model − log", &log.time, &residual).horizontal(0.0, ""))
@@ -60,6 +64,22 @@ pub fn memory(log: &LogFit, output: &OutputFit) -> Option<Figure> {
             )
             .caption("White noise stays between the two lines; what does not is left over by the model."),
     )
+}
+
+/// How much worse the logs are met with a parameter held off its estimate.
+pub fn profile(profile: &Profile) -> Figure {
+    Figure::new(format!("{}: profile", profile.name), Axis::new(&profile.name, profile.unit))
+        .panel(
+            Panel::new(Axis::new("√ growth", "standard errors"))
+                .series(Series::new("fitted anew", profile.values.clone(), profile.growth.clone()))
+                .series(
+                    Series::new("a linear model", profile.values.clone(), profile.linear.clone())
+                        .style(Style::Dashed)
+                        .colour(Colour::Vermillion),
+                )
+                .horizontal(1.96, "95 %"),
+        )
+        .caption("With this parameter held and all others fitted anew; where both lines agree, the interval is as long as it should be.")
 }
 
 /// Bars of a histogram.

@@ -15,7 +15,7 @@ use std::path::{Component, Path, PathBuf};
 use std::time::{Duration, Instant};
 use taut::case::Case;
 use taut::files::write_atomically;
-use taut::fit::{Ending, Fit, Posterior, fit};
+use taut::fit::{Ending, Fit, Posterior, Profile, fit, profiles};
 use taut::json;
 use taut::solve::Flow;
 use taut::trajectory::CsvWriter;
@@ -23,6 +23,15 @@ use taut::{Error, Result};
 
 /// How long a fit may take before its progress is shown.
 const PATIENCE: Duration = Duration::from_secs(1);
+
+/// What was found, and what is told of it.
+pub struct Found {
+    pub fit: Fit,
+    /// Profiles, where a report is written.
+    pub profiles: Vec<Profile>,
+    /// The posterior, where one is asked for.
+    pub drawn: Option<Posterior>,
+}
 
 /// Reads the case, fits, writes, tells.
 pub fn run(args: &Args) -> Outcome {
@@ -36,62 +45,59 @@ pub fn run(args: &Args) -> Outcome {
     let interrupt = Interrupt::listen();
     let begin = Instant::now();
     let mut progress = Progress::new(!args.quiet);
-    let found = fit(&case, &plan, Some(&|| interrupt.signal().is_some()), &mut |cost| {
+    let is_stopped = || interrupt.signal().is_some();
+    let fit = fit(&case, &plan, Some(&is_stopped), &mut |cost| {
         progress.show(cost, begin);
-        if interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue }
+        if is_stopped() { Flow::Stop } else { Flow::Continue }
     })?;
+    let shown = args.out.is_some() && !args.no_report && !is_stopped();
+    progress.say("profiles of the parameters; Ctrl-C leaves out the rest", begin);
+    let profiles = if shown { profiles(&case, &plan, &fit, Some(&is_stopped))? } else { Vec::new() };
     progress.clear();
-    let drawn = match args.posterior && interrupt.signal().is_none() {
-        true => Some(posterior::draw(args, &case, &plan, &found, &interrupt)?).filter(|drawn| drawn.count() > 0),
+    let drawn = match args.posterior && !is_stopped() {
+        true => Some(posterior::draw(args, &case, &plan, &fit, &interrupt)?).filter(|drawn| drawn.count() > 0),
         false => None,
     };
     if args.posterior && drawn.is_none() {
         terminal::show_error(&"interrupted before the first draw: there is no posterior");
     }
-    let drawn = drawn.as_ref();
+    let found = Found { fit, profiles, drawn };
     let took = begin.elapsed();
-    let json = json::text(&json::fit(&case, &found, drawn.map(json::posterior)));
+    let json = json::text(&json::fit(&case, &found.fit, &found.profiles, found.drawn.as_ref().map(json::posterior)));
     let mut written = Vec::new();
     if let Some(folder) = &args.out {
-        written = write(args, folder, &case, &found, drawn, &json).map_err(Failure::work)?;
+        written = write(args, folder, &case, &found, &json).map_err(Failure::work)?;
     }
     if args.json {
         terminal::show(&json);
     } else if !args.quiet {
-        terminal::show(&table::text(&case, &found, drawn, took, args.out.as_deref(), &written));
+        terminal::show(&table::text(&case, &found, took, args.out.as_deref(), &written));
     }
-    Ok(match (interrupt.signal(), found.ending) {
+    Ok(match (interrupt.signal(), found.fit.ending) {
         (Some(signal), _) => Status::Interrupted(signal),
-        (None, _) if drawn.is_some_and(|drawn| !drawn.doubts().is_empty()) => Status::Incomplete,
+        (None, _) if found.drawn.is_some_and(|drawn| !drawn.doubts().is_empty()) => Status::Incomplete,
         (None, Ending::Converged | Ending::Stalled) => Status::Done,
         (None, _) => Status::Incomplete,
     })
 }
 
 /// Writes the files; returns their names.
-fn write(
-    args: &Args,
-    folder: &Path,
-    case: &Case,
-    found: &Fit,
-    drawn: Option<&Posterior>,
-    json: &str,
-) -> Result<Vec<&'static str>> {
-    let text = found.case_text(case, &args.case)?;
+fn write(args: &Args, folder: &Path, case: &Case, found: &Found, json: &str) -> Result<Vec<&'static str>> {
+    let text = found.fit.case_text(case, &args.case)?;
     // Paths in it lead from its own folder to the same files.
     let fitted = Case::from_text(&args.case, &text)?;
     let text = fitted.text_with(|file| between(folder, &file.path));
     write_atomically(folder.join("fitted.toml"), &text)?;
     write_atomically(folder.join("fit.json"), json)?;
     let mut names = vec!["fitted.toml", "fit.json"];
-    if let Some(drawn) = drawn {
+    if let Some(drawn) = &found.drawn {
         let mut writer = CsvWriter::create(folder.join("posterior.csv"))?;
         writer.write(&drawn.table())?;
         writer.finish()?;
         names.push("posterior.csv");
     }
     if !args.no_report {
-        page::page(case, found, drawn, &text).write(folder.join("report.html"))?;
+        page::page(case, found, &text).write(folder.join("report.html"))?;
         names.push("report.html");
     }
     Ok(names)
@@ -125,11 +131,15 @@ impl Progress {
 
     fn show(&mut self, cost: f64, begin: Instant) {
         self.steps += 1;
+        self.say(&format!("step {}, cost {cost:.6e}; Ctrl-C keeps the best so far", self.steps), begin);
+    }
+
+    fn say(&mut self, what: &str, begin: Instant) {
         if self.bar.is_none() && self.wanted && begin.elapsed() > PATIENCE {
             self.bar = Some(ProgressBar::new_spinner());
         }
         if let Some(bar) = &self.bar {
-            bar.set_message(format!("step {}, cost {cost:.6e}; Ctrl-C keeps the best so far", self.steps));
+            bar.set_message(what.to_string());
             bar.tick();
         }
     }

@@ -1,12 +1,13 @@
 //! The report: one HTML file.
 
-use super::{figures, posterior, table};
+use super::{Found, figures, posterior, table};
 use taut::case::Case;
-use taut::fit::{Ending, Fit, Posterior};
+use taut::fit::{Ending, Fit, Profile};
 use taut::report::{Callout, Cell, Page, Table};
 
 /// The page; `text` is the case with the estimates.
-pub fn page(case: &Case, fit: &Fit, drawn: Option<&Posterior>, text: &str) -> Page {
+pub fn page(case: &Case, found: &Found, text: &str) -> Page {
+    let fit = &found.fit;
     let mut page = Page::new(case.title.clone()).subtitle("Parameters from logs.");
     page.section("How it ended");
     let kind = if fit.ending == Ending::Converged { Callout::Holds } else { Callout::Fails };
@@ -17,7 +18,8 @@ pub fn page(case: &Case, fit: &Fit, drawn: Option<&Posterior>, text: &str) -> Pa
     ));
     parameters(&mut page, fit);
     correlations(&mut page, fit);
-    if let Some(drawn) = drawn {
+    profiles(&mut page, &found.profiles);
+    if let Some(drawn) = &found.drawn {
         posterior::section(&mut page, fit, drawn);
     }
     logs(&mut page, fit);
@@ -50,6 +52,23 @@ fn parameters(page: &mut Page, fit: &Fit) {
         rows.row([estimate.name.clone(), value, error, interval, start].map(Cell::from));
     }
     page.table(&rows);
+}
+
+fn profiles(page: &mut Page, profiles: &[Profile]) {
+    if profiles.is_empty() {
+        return;
+    }
+    page.subsection("Profiles");
+    page.prose(match table::crooked(profiles) {
+        names if names.is_empty() => "Each parameter held off its estimate and all others fitted anew: the logs get worse as an interval to both sides says.".to_string(),
+        names => format!(
+            "Each parameter held off its estimate and all others fitted anew. Not as a linear model has it: {}; `--posterior` makes intervals that do not need that.",
+            names.join(", ")
+        ),
+    });
+    for profile in profiles {
+        page.figure(&figures::profile(profile));
+    }
 }
 
 fn correlations(page: &mut Page, fit: &Fit) {

@@ -1,23 +1,17 @@
 //! The result for people.
 
-use super::posterior;
+use super::{Found, posterior};
 use crate::terminal::bold;
 use std::fmt::Write;
 use std::path::Path;
 use std::time::Duration;
 use taut::case::Case;
-use taut::fit::{Ending, Estimate, Fit, Posterior, Score};
+use taut::fit::{Ending, Estimate, Fit, Profile, Score};
 use taut::number;
 
 /// The text on the terminal.
-pub fn text(
-    case: &Case,
-    fit: &Fit,
-    drawn: Option<&Posterior>,
-    took: Duration,
-    out: Option<&Path>,
-    written: &[&str],
-) -> String {
+pub fn text(case: &Case, found: &Found, took: Duration, out: Option<&Path>, written: &[&str]) -> String {
+    let fit = &found.fit;
     let mut text = format!("{}\n", bold(&case.title));
     let _ = writeln!(text, "{}", ending(fit));
     let _ = write!(text, "\n{}\n", bold("Parameters"));
@@ -26,7 +20,15 @@ pub fn text(
         let [value, error, interval] = words(estimate);
         let _ = writeln!(text, "  {:<wide$}  {value:>14} ± {error:<10} {interval}", estimate.name);
     }
-    if let Some(drawn) = drawn {
+    let names = crooked(&found.profiles);
+    if !names.is_empty() {
+        let _ = writeln!(
+            text,
+            "  not to be taken as linear: {}; see their profiles in the report, or `--posterior` for other intervals",
+            names.join(", ")
+        );
+    }
+    if let Some(drawn) = &found.drawn {
         text.push_str(&posterior::text(drawn, wide));
     }
     let _ = write!(text, "\n{}\n", bold("Logs"));
@@ -50,6 +52,11 @@ pub fn text(
         None => text.push_str("nothing was written: add --out DIR for fitted.toml, fit.json and a report\n"),
     }
     text
+}
+
+/// Parameters whose interval is not to be believed on one side.
+pub fn crooked(profiles: &[Profile]) -> Vec<&str> {
+    profiles.iter().filter(|profile| profile.is_crooked()).map(|profile| profile.name.as_str()).collect()
 }
 
 /// How the search ended, in a sentence.
@@ -104,14 +111,20 @@ fn significant(value: f64, digits: usize) -> String {
 /// Value, standard error and interval of an estimate.
 pub fn words(estimate: &Estimate) -> [String; 3] {
     let shown = |v: f64, digits| value(v, estimate.unit, digits);
-    let own = shown(estimate.value, 5);
+    // Two digits of what separates the ends of the interval.
+    let wide = estimate.interval.map_or(f64::INFINITY, |[low, high]| high - low);
+    let digits = match (estimate.value / wide).abs().log10().ceil() {
+        digits if digits.is_finite() => (digits.clamp(2.0, 12.0) as usize + 2).max(4),
+        _ => 4,
+    };
+    let own = shown(estimate.value, digits.max(5));
     match (estimate.error, estimate.interval) {
         (_, Some([low, high])) if estimate.at_bound => {
-            [own, "-".into(), format!("95 %: {} to {}, at its bound", shown(low, 4), shown(high, 4))]
+            [own, "-".into(), format!("95 %: {} to {}, at its bound", shown(low, digits), shown(high, digits))]
         }
         _ if estimate.at_bound => [own, "-".into(), "at its bound: no interval".into()],
         (Some(error), Some([low, high])) if error.is_finite() => {
-            [own, shown(error, 2), format!("95 %: {} to {}", shown(low, 4), shown(high, 4))]
+            [own, shown(error, 2), format!("95 %: {} to {}", shown(low, digits), shown(high, digits))]
         }
         _ => [own, "∞".into(), "not determined by these logs".into()],
     }

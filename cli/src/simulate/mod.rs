@@ -63,7 +63,7 @@ fn machines(case: &Case, args: &Simulate) -> Result<Vec<Stage>> {
             .in_file(&args.case)
             .next("use --draws with the fitted.toml of the same folder, or with the case that was fitted")
     })?;
-    Ok(band::chosen(taut::fit::machines(case, plan, file)?, args.bands))
+    Ok(band::chosen(taut::fit::machines(case, plan, file)?, args.machines))
 }
 
 /// Refuses to log what nobody measures, and what would not be the run.

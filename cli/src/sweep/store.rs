@@ -227,11 +227,7 @@ fn fingerprint(work: &Work) -> Result<String> {
         }
     };
     take(work.case.text.as_bytes());
-    let draws = work.case.sweep.iter().filter_map(|sweep| match &sweep.from {
-        Some(taut::case::Origin::Posterior(path)) => Some(path),
-        _ => None,
-    });
-    for path in work.case.files.iter().map(|file| &file.path).chain(draws) {
+    for path in work.case.files.iter().map(|file| &file.path) {
         take(&fs::read(path).map_err(|e| Error::new(e.to_string()).in_file(path))?);
     }
     work.sweep.columns().iter().for_each(|column| take(column.heading().as_bytes()));

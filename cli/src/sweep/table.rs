@@ -99,11 +99,10 @@ pub fn text(work: &Work, summary: &Summary, took: Duration, run: u64, written: &
     }
     let rate =
         run as f64 * (work.sweep.experiments().len() + work.sweep.moves().len()) as f64 / took.as_secs_f64().max(1e-9);
-    let simulations = match run {
-        0 => "all runs were done already".to_string(),
-        _ => format!("{run} runs in {}: {:.0} simulations a second", shown(took), rate),
+    let _ = match run {
+        0 => writeln!(text, "\n  took nothing: all runs were done already"),
+        _ => writeln!(text, "\n  took {}: {run} runs, {rate:.0} simulations a second", shown(took)),
     };
-    let _ = writeln!(text, "\n{simulations}");
     match written {
         [] => text.push_str("nothing was written: add --out FILE.parquet or --out DIR\n"),
         names => {

@@ -150,12 +150,15 @@ class Case:
         """What the logs can tell of the parameters in [fit], before any fit."""
         return Check(self._native.check())
 
-    def fit(self, *, posterior: bool = False, draws: int = 1000, chains: int = 4) -> Fit:
+    def fit(
+        self, *, profiles: bool = False, posterior: bool = False, draws: int = 1000, chains: int = 4
+    ) -> Fit:
         """Finds the parameters in [fit] from the logs.
 
+        With ``profiles`` it also holds each parameter beside its estimate and fits the others: ``data["profiles"]``.
         With ``posterior`` it also draws from the posterior: ``draws`` of each of ``chains`` chains. Ctrl-C ends it.
         """
-        native = self._native.fit((draws, chains) if posterior else None)
+        native = self._native.fit((draws, chains) if posterior else None, profiles)
         drawn = None if native.draws is None else Table(*native.draws)
         return Fit(native.data, self._of(native.case), drawn)
 

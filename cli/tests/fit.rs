@@ -1,0 +1,86 @@
+//! `taut check`, `taut fit` and the band of `taut simulate` as a user runs them, on a log that was simulated.
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::path::Path;
+use tempfile::TempDir;
+
+fn taut(folder: &Path) -> Command {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("taut"));
+    command.current_dir(folder);
+    command
+}
+
+/// A folder with `mine.toml`: the template, and the log that its encoder makes of the pulse.
+fn with_a_log() -> TempDir {
+    let folder = TempDir::new().unwrap();
+    taut(folder.path()).args(["init", "axis.toml"]).assert().success();
+    let arguments = ["simulate", "axis.toml", "--experiment", "5 V pulse", "--as-measured", "--out", "made", "--quiet"];
+    taut(folder.path()).args(arguments).assert().success();
+    let mut text = std::fs::read_to_string(folder.path().join("axis.toml")).unwrap();
+    text += "\n[[experiment]]\nname = \"log\"\nlog = { file = \"made/5-v-pulse.measured.csv\", time = \"time_s\", input = \"voltage_V\", drive_angle = \"drive_angle_rad\" }\n";
+    text += "\n[fit]\nfree = [\"cart.friction.viscous\", \"cart.friction.coulomb\"]\n";
+    std::fs::write(folder.path().join("mine.toml"), text).unwrap();
+    folder
+}
+
+fn json(folder: &Path, file: &str) -> Value {
+    serde_json::from_slice(&std::fs::read(folder.join(file)).unwrap()).unwrap()
+}
+
+#[test]
+fn a_fit_its_posterior_and_the_band_of_its_machines() {
+    let folder = with_a_log();
+    let at = folder.path();
+    let output = taut(at)
+        .args(["fit", "mine.toml", "--posterior", "--draws", "100", "--chains", "2", "--out", "found", "--json"])
+        .args(["--set", "cart.friction.viscous=10"])
+        .output()
+        .unwrap();
+    // So few draws may be doubted, which the exit status says.
+    assert!(matches!(output.status.code(), Some(0 | 1)), "{}", String::from_utf8_lossy(&output.stderr));
+    let value: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(value, json(at, "found/fit.json"));
+    let viscous = &value["parameters"][0];
+    assert_eq!(viscous["name"], "cart.friction.viscous");
+    let (value_of, error) = (viscous["value"].as_f64().unwrap(), viscous["standard_error"].as_f64().unwrap());
+    // The template's friction made the log.
+    assert!((value_of - 19.0424).abs() < 4.0 * error && error < 0.2, "{value_of} ± {error}");
+    assert_eq!(value["profiles"].as_array().unwrap().len(), 2);
+    assert_eq!(value["posterior"]["draws"], 200);
+    let median = value["posterior"]["parameters"][0]["median"].as_f64().unwrap();
+    assert!((median - value_of).abs() < 2.0 * error, "{median}");
+    let page = std::fs::read_to_string(at.join("found/report.html")).unwrap();
+    assert!(page.contains("Profiles") && page.contains("Posterior") && page.contains("fitted.toml"));
+
+    // What was written is a case that simulates, with its own draws as a band.
+    taut(at).args(["simulate", "found/fitted.toml", "--experiment", "5 V pulse", "--quiet"]).assert().success();
+    let arguments = ["simulate", "found/fitted.toml", "--experiment", "5 V pulse", "--draws", "found/posterior.csv"];
+    taut(at).args(arguments).args(["--bands", "20", "--out", "band", "--quiet"]).assert().code(2);
+    taut(at).args(arguments).args(["--machines", "20", "--out", "band", "--quiet"]).assert().success();
+    let names: Vec<String> = std::fs::read_dir(at.join("band"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    assert!(names.iter().any(|name| name.contains("band")), "{names:?}");
+}
+
+#[test]
+fn what_is_not_determined_ends_with_status_2_and_what_to_do() {
+    let folder = with_a_log();
+    let free = "fit.free=[\"drive_pulley.friction.viscous\", \"cart.friction.viscous\"]";
+    let output = taut(folder.path()).args(["fit", "mine.toml", "--out", "found", "--set", free]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert!(told.contains("B₁ + r² b + B₂ + K_t K_e/R") && told.contains("next: fix one"), "{told}");
+    assert!(!folder.path().join("found/fitted.toml").exists());
+    let output = taut(folder.path()).args(["check", "mine.toml", "--json", "--set", free]).output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    let value: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(value["complete"], false);
+    assert_eq!(value["not_determined"][0]["combinations_determined"], 1);
+    assert!(value["experiments"].as_array().unwrap().iter().any(|one| one["determined"] == 2), "{value}");
+    assert_eq!(value["logs"][0]["samples"], 1001);
+    let notes = value["logs"][0]["notes"].as_array().unwrap();
+    assert!(notes.iter().any(|note| note["severity"] == "warning"), "{notes:?}");
+}
