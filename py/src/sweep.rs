@@ -53,7 +53,10 @@ impl Sweep {
     fn table(&self, first: u64, count: u64, threads: usize, interrupt: &Interrupt) -> Result<Trajectory, String> {
         let stop = || interrupt.stop();
         let end = first.saturating_add(count).min(self.inner.runs());
-        let rows = |from: u64, to: u64| self.inner.rows(from, (to - from) as usize, &stop).unwrap_or_default();
+        let rows = |from: u64, to: u64| match stop() {
+            true => Trajectory::default(),
+            false => self.inner.rows(from, (to - from) as usize, &stop).unwrap_or_default(),
+        };
         if threads == 1 {
             return Ok(rows(first.min(end), end));
         }

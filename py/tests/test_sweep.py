@@ -106,12 +106,16 @@ def cluster(tmp_path):
 
 
 def test_a_killed_worker_costs_no_row(case, cluster):
-    runs, chunk = 1200, 40
+    # Runs that are long enough to be killed in.
+    case["experiment.0.input"] = {"sine": "5 V", "frequency": "3 Hz"}
+    case["experiment.0.until"] = 5
+    runs, chunk = 600, 20
     local = case.sweep(runs, vary=VARY, seed=5)
     tables = taut.sweep_tables(case, runs, vary=VARY, seed=5, client=cluster, chunk=chunk)
     found = [next(tables), next(tables)]
     # One that has work to do or results that nobody has fetched.
-    victim = next(address for address, keys in cluster.processing().items() if keys)
+    busy, full = cluster.processing(), cluster.has_what()
+    victim = next(address for address in busy if busy[address] or full[address])
     os.kill(cluster.run(os.getpid, workers=[victim])[victim], signal.SIGKILL)
     found.extend(tables)
     assert victim not in cluster.scheduler_info()["workers"]
