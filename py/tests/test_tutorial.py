@@ -28,6 +28,12 @@ def test_every_block_gives_what_it_shows(root, tmp_path, monkeypatch, document):
     assert runner.summarize(verbose=False).failed == 0, "".join(told)
 
 
+@pytest.mark.parametrize("document, output", [("python.md", "python_cost.txt"), ("scale.md", "scale.txt")])
+def test_what_is_measured_is_the_output_of_its_script(root, document, output):
+    measured = (root / "authorities" / "output" / output).read_text(encoding="utf-8")
+    assert measured in (root / "docs" / document).read_text(encoding="utf-8")
+
+
 def test_docstrings_of_the_package():
     assert doctest.testmod(taut, optionflags=doctest.ELLIPSIS).failed == 0
 
