@@ -43,7 +43,11 @@ impl Size {
 
 /// A condition of the mode on the vector z.
 pub(super) struct Watch<const C: usize> {
-    row: [f64; C],
+    /// What counts in it: places in z in ascending order, and their weights. Most others are zero.
+    places: [usize; C],
+    weights: [f64; C],
+    /// How many count; and how many of those move.
+    count: [usize; 2],
     /// The norm dual to the energy: how much its value can change per unit of √(2V), mechanical and magnetic.
     dual: Size,
     /// Its coefficient of the input.
@@ -52,8 +56,24 @@ pub(super) struct Watch<const C: usize> {
 }
 
 impl<const C: usize> Watch<C> {
+    fn new<const R: usize>(row: &[f64; C], dual: Size, input: f64, cause: Cause) -> Self {
+        let (mut places, mut weights, mut count) = ([0; C], [0.0; C], [0; 2]);
+        for (place, weight) in row.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
+            (places[count[0]], weights[count[0]]) = (place, *weight);
+            count[0] += 1;
+            count[1] += usize::from(place < R);
+        }
+        Self { places, weights, count, dual, input, cause }
+    }
+
+    /// Σ w_j z_j, in the order of the places.
+    #[inline(always)]
+    fn sum(&self, count: usize, term: impl Fn(f64, usize) -> f64) -> f64 {
+        self.weights.iter().zip(&self.places).take(count).fold(0.0, |sum, (weight, place)| sum + term(*weight, *place))
+    }
+
     pub(super) fn value(&self, z: &[f64; C]) -> f64 {
-        self.row.iter().zip(z).fold(0.0, |sum, (w, z)| sum + w * z)
+        self.sum(self.count[0], |weight, place| weight * z[place])
     }
 
     /// Its value, with what rounding alone may have made negative taken for zero.
@@ -69,12 +89,12 @@ impl<const C: usize> Watch<C> {
 
     /// What rounding may do to its value.
     pub(super) fn noise(&self, z: &[f64; C]) -> f64 {
-        ROUNDING * self.row.iter().zip(z).fold(0.0, |sum, (w, z)| sum + (w * z).abs())
+        ROUNDING * self.sum(self.count[0], |weight, place| (weight * z[place]).abs())
     }
 
     /// Its rate of change, `y` being ż.
     pub(super) fn slope<const R: usize>(&self, y: &[f64; R]) -> f64 {
-        self.row.iter().zip(y).fold(0.0, |sum, (w, y)| sum + w * y)
+        self.sum(self.count[1], |weight, place| weight * y[place])
     }
 }
 
@@ -207,12 +227,7 @@ impl<const R: usize, const C: usize> Law<R, C> {
         let guards = equations
             .guards
             .iter()
-            .map(|guard| Watch {
-                row: row_of(&guard.form),
-                dual: dual(&guard.form),
-                input: guard.form.input,
-                cause: guard.cause,
-            })
+            .map(|guard| Watch::new::<R>(&row_of(&guard.form), dual(&guard.form), guard.form.input, guard.cause))
             .collect();
         let push: f64 = (0..SPEEDS).map(|j| inertia[j] * equations.acceleration[j].input.powi(2)).sum();
         let forcing = (push + magnetic * equations.current_rate.input.powi(2)).sqrt();

@@ -186,7 +186,9 @@ impl Store {
         for chunk in 0..self.chunks() {
             let first = self.range(chunk).0;
             let values = self.values(chunk, place)?;
-            column.extend((first..).zip(values).filter(|(run, _)| run / block % every == 0).map(|(_, value)| value));
+            column.extend(
+                (first..).zip(values).filter(|(run, _)| (run / block).is_multiple_of(every)).map(|(_, value)| value),
+            );
         }
         Ok(column)
     }

@@ -22,6 +22,9 @@ pub const REPLICATES: usize = 200;
 /// Points of a scatter plot.
 const POINTS: usize = 1500;
 
+/// Name, unit and words of a figure.
+type Named = (&'static str, &'static str, &'static str);
+
 /// The whole summary.
 pub struct Summary {
     /// Parameters as they were drawn: name, unit, spread.
@@ -131,7 +134,7 @@ impl Summary {
             experiments.map(|name| (name, OF_EXPERIMENT.iter().map(|m| (m.name, m.unit, m.words)).collect()));
         let moves = sweep.moves().iter().map(|motion| motion.name.clone());
         let moves = moves.map(|name| (name, OF_MOVE.iter().map(|m| (m.name, m.unit, m.words)).collect()));
-        let all: Vec<(String, Vec<(&str, &str, &str)>)> = experiments.chain(moves).collect();
+        let all: Vec<(String, Vec<Named>)> = experiments.chain(moves).collect();
         let mut groups = Vec::new();
         let mut place = inputs;
         for (name, measures) in all {
