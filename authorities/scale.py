@@ -20,7 +20,7 @@ import pyarrow.parquet
 from distributed import Client, LocalCluster
 
 import taut
-from taut.sweep import SECONDS_OF_A_TASK, kernel
+from taut.sweeps import SECONDS_OF_A_TASK, kernel
 
 STAGE = Path(__file__).resolve().parents[1] / "stages" / "sollmann-jouaneh" / "table4.toml"
 EXPERIMENTS = ("5 V pulse", "10 V pulse")

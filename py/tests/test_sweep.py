@@ -57,7 +57,7 @@ def test_a_row_is_the_run_of_its_machine(case):
 
 def test_the_kernel_takes_any_runs_in_any_order(case):
     arrow = pytest.importorskip("pyarrow")
-    from taut.sweep import _planned, kernel
+    from taut.sweeps import _planned, kernel
 
     planned = _planned(case, 50, VARY, None, None, False, None)
     whole = taut.sweep(planned).to_arrow()

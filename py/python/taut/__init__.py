@@ -14,7 +14,7 @@ from ._native import Error, Seen, __version__
 from .case import Case, read, template
 from .results import Check, Estimate, Fit, LinearModel, Modes
 from .runs import Run, Runs
-from .sweep import sweep, sweep_tables
+from .sweeps import sweep, sweep_tables
 from .table import Table
 
 __all__ = [

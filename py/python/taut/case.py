@@ -11,7 +11,7 @@ from . import _html, _native
 from ._toml import change
 from .results import Check, Fit, LinearModel, Modes
 from .runs import Run, Runs
-from .sweep import sweep
+from .sweeps import sweep
 from .table import Table
 
 
