@@ -14,6 +14,8 @@ pub struct Interrupt {
     begin: Instant,
     asked: AtomicU64,
     stopped: AtomicBool,
+    /// Whether a thread asks by itself, and nobody else need.
+    watched: AtomicBool,
     raised: Mutex<Option<PyErr>>,
 }
 
@@ -24,45 +26,52 @@ impl Interrupt {
             begin: Instant::now(),
             asked: AtomicU64::new(0),
             stopped: AtomicBool::new(false),
+            watched: AtomicBool::new(false),
             raised: Mutex::new(None),
         }
     }
 
     /// Whether to stop.
     pub fn stop(&self) -> bool {
-        if self.stopped.load(Ordering::Relaxed) {
-            return true;
+        if self.stopped.load(Ordering::Relaxed) || self.watched.load(Ordering::Relaxed) {
+            return self.stopped.load(Ordering::Relaxed);
         }
         let now = self.begin.elapsed().as_millis() as u64;
         if now < self.asked.load(Ordering::Relaxed) + PATIENCE {
             return false;
         }
         self.asked.store(now, Ordering::Relaxed);
+        self.ask();
+        self.stopped.load(Ordering::Relaxed)
+    }
+
+    fn ask(&self) {
         if let Err(signal) = Python::attach(|py| py.check_signals()) {
             self.raise(signal);
         }
-        self.stopped.load(Ordering::Relaxed)
     }
 
     /// Does `work`, which has threads of its own, on one more thread: Python tells signals to the calling one alone, which
     /// listens meanwhile.
     pub fn beside<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         let (done, wait) = std::sync::mpsc::channel();
-        std::thread::scope(|scope| {
+        // Another thread that asked would be told of no signal, and keep this one from asking.
+        self.watched.store(true, Ordering::Relaxed);
+        let result = std::thread::scope(|scope| {
             scope.spawn(move || {
                 // The receiver waits until it has come.
                 let _ = done.send(work());
             });
             loop {
                 match wait.recv_timeout(Duration::from_millis(PATIENCE)) {
-                    Ok(result) => return result,
-                    Err(RecvTimeoutError::Timeout) => {
-                        self.stop();
-                    }
+                    Ok(result) => break result,
+                    Err(RecvTimeoutError::Timeout) => self.ask(),
                     Err(RecvTimeoutError::Disconnected) => panic!("the work has panicked"),
                 }
             }
-        })
+        });
+        self.watched.store(false, Ordering::Relaxed);
+        result
     }
 
     /// Stops with this exception.
