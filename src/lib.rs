@@ -53,11 +53,12 @@
 //! - [`fit`]: parameters from logs, and what the logs cannot tell.
 //! - [`sweep`]: many runs with parameters varied.
 //! - [`tune`]: gains of a controller, good for the worst axis that parameters, loads and places can make.
+//! - `json`: results as data (feature `json`).
 //! - `report`: figures, drawings and an HTML page of them (feature `report`, on by default).
 //!
 //! # Features
 //!
-//! `report` (default) adds figures and reports; `parquet` adds Parquet files; `posterior` draws from the posterior of a fit.
+//! `report` (default) adds figures and reports; `parquet` adds Parquet files; `json` adds results as data; `posterior` draws from the posterior of a fit.
 //! Without them the library is the physics alone.
 
 pub mod case;
@@ -67,6 +68,8 @@ pub mod error;
 pub mod files;
 pub mod fit;
 pub mod friction;
+#[cfg(feature = "json")]
+pub mod json;
 pub mod knob;
 pub mod linear;
 pub mod log;

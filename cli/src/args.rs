@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use taut::control::shaper::Kind;
 use taut::quantity;
-use taut::solve::{Method, Solver};
+use taut::solve::{Choice, Kind as SolverKind, Method, Solver};
 use taut::stage::Stage;
 
 /// Belt-driven axes: described in a file, simulated exactly.
@@ -534,39 +534,17 @@ pub enum Format {
 impl Simulate {
     /// The solver that is asked for, or else the one for this stage.
     pub fn solver(&self, stage: &Stage) -> taut::Result<Solver> {
-        let solver = match (self.solver, Solver::of(stage)) {
-            (Some(SolverName::Table3), _) => Solver::Table3 {
-                step: self.step.unwrap_or(1e-4),
-                method: match self.method.unwrap_or_default() {
-                    MethodName::Rk4 => Method::RungeKutta4,
-                    MethodName::Dp5 => Method::DormandPrince5,
-                },
-            },
-            (Some(SolverName::Exact), _) => Solver::Exact,
-            (Some(SolverName::General), _) => Solver::GENERAL,
-            (None, solver) => solver,
+        let kind = |name: SolverName| match name {
+            SolverName::Exact => SolverKind::Exact,
+            SolverName::General => SolverKind::General,
+            SolverName::Table3 => SolverKind::Table3,
         };
-        let misplaced = |option: &str, what: &str, other: &str| {
-            Err(taut::Error::new(what).in_file(option).next(format!("leave {option} out, or add --solver {other}")))
+        let method = |name: MethodName| match name {
+            MethodName::Rk4 => Method::RungeKutta4,
+            MethodName::Dp5 => Method::DormandPrince5,
         };
-        let fixed = match (self.step, self.method) {
-            (Some(_), _) => Some("--step"),
-            (None, Some(_)) => Some("--method"),
-            (None, None) => None,
-        };
-        match (solver, fixed, self.tolerance) {
-            (Solver::Exact, Some(option), _) => {
-                misplaced(option, "the exact solver has no step and no formula to choose", "table3")
-            }
-            (Solver::General { .. }, Some(option), _) => {
-                misplaced(option, "the general solver chooses its own steps, by one formula", "table3")
-            }
-            (Solver::General { .. }, None, Some(tolerance)) => Ok(Solver::General { tolerance }),
-            (Solver::Exact | Solver::Table3 { .. }, _, Some(_)) => {
-                misplaced("--tolerance", "only the general solver has a tolerance", "general")
-            }
-            _ => Ok(solver),
-        }
+        let (tolerance, step) = (self.tolerance, self.step);
+        Choice { solver: self.solver.map(kind), tolerance, step, method: self.method.map(method) }.solver(stage)
     }
 }
 

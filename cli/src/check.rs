@@ -2,12 +2,12 @@
 
 use crate::args::Check as Args;
 use crate::failure::{Outcome, Status};
-use crate::fit::{plan, table};
+use crate::fit::table;
 use crate::terminal::{self, bold};
-use serde_json::json;
 use std::fmt::Write;
 use taut::case::Case;
 use taut::fit::{Check, check};
+use taut::json;
 use taut::log::{Severity, Survey};
 
 /// So many logs are shown with all that is known of them; of more, what matters.
@@ -17,9 +17,9 @@ const MOST_WHOLE: usize = 4;
 pub fn run(args: &Args) -> Outcome {
     let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
     let case = Case::read_with(&args.case, &changes)?;
-    let plan = plan(&case, &args.case)?;
+    let plan = case.fit_plan(&args.case)?;
     let found = check(&case, &plan)?;
-    terminal::show(&if args.json { data(&case, &found) } else { text(&case, &found) });
+    terminal::show(&if args.json { json::text(&json::check(&case, &found)) } else { text(&case, &found) });
     Ok(Status::Done)
 }
 
@@ -85,53 +85,4 @@ fn shown(log: &Survey, whole: bool) -> String {
         log.notes.retain(|note| note.severity > Severity::Fact);
     }
     log.to_string().lines().fold(String::new(), |text, line| format!("{text}  {line}\n"))
-}
-
-fn data(case: &Case, found: &Check) -> String {
-    let number = |v: f64| if v.is_finite() { json!(v) } else { json!(null) };
-    let known = &found.identifiability;
-    let value = json!({
-        "title": case.title,
-        "complete": known.complete(),
-        "parameters": known.names.iter().enumerate().map(|(j, name)| json!({
-            "name": name,
-            "relative_error": number(known.error[j]),
-            "determined": known.error[j].is_finite(),
-            "sensitivity": number(known.sensitivity[j]),
-        })).collect::<Vec<_>>(),
-        "regression": found.balance.map(|b| json!({
-            "inertia_kg_m2": b.inertia,
-            "viscous_N_m_s_rad": b.viscous,
-            "coulomb_N_m": b.coulomb,
-            "load_N_m": b.load,
-            "errors": b.errors,
-            "unexplained": b.unexplained,
-            "equations": b.equations,
-        })),
-        "singular_values": known.singular.iter().map(|s| number(*s)).collect::<Vec<_>>(),
-        "not_determined": known.groups.iter().zip(&found.choices).map(|(group, choices)| json!({
-            "parameters": group.members.iter().map(|&j| &known.names[j]).collect::<Vec<_>>(),
-            "combinations_determined": group.determined,
-            "words": group.words,
-            "choices": choices,
-        })).collect::<Vec<_>>(),
-        "logs": found.logs.iter().map(|log| json!({
-            "name": log.log,
-            "samples": log.timing.samples,
-            "duration_s": log.timing.duration,
-            "interval_s": log.timing.interval,
-            "notes": log.notes.iter().map(|note| json!({
-                "code": note.code,
-                "severity": note.severity.word(),
-                "column": note.column,
-                "text": note.text,
-            })).collect::<Vec<_>>(),
-        })).collect::<Vec<_>>(),
-        "experiments": found.experiments.iter().map(|experiment| json!({
-            "name": experiment.name,
-            "told": experiment.told,
-            "determined": experiment.determined,
-        })).collect::<Vec<_>>(),
-    });
-    format!("{}\n", serde_json::to_string_pretty(&value).unwrap_or_default())
 }

@@ -154,6 +154,8 @@ fn what_the_documents_name_is_there() {
         "docs/logs.md",
         "docs/paper.md",
         "docs/posterior.md",
+        "docs/python.md",
+        "docs/scale.md",
         "docs/shape.md",
         "docs/sweep.md",
         "docs/tune.md",
@@ -169,7 +171,7 @@ fn what_the_documents_name_is_there() {
         "stages/emps/README.md",
         "stages/two-mass/README.md",
     ];
-    let folders = ["src", "cli", "stages", "tests", "examples", "docs", "authorities", "xtask", ".ci"];
+    let folders = ["src", "cli", "stages", "tests", "examples", "docs", "authorities", "py", "xtask", ".ci"];
     let mut missing = Vec::new();
     for document in documents {
         let text = read(document);

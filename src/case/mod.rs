@@ -1,8 +1,10 @@
 //! The case file: TOML in, a [`Case`] out, and every mistake told with its line.
 
+mod chosen;
 mod controller;
 mod fit;
 mod friction;
+mod get;
 mod input;
 mod log;
 mod measurement;
@@ -16,6 +18,7 @@ mod tree;
 mod tune;
 
 pub use fit::{Nuisances, Plan, Prior, Scope, matches};
+pub use get::Given;
 pub use motion::Move;
 pub use sweep::{Kinds, Origin, Sampling, Sweeping, Variation};
 pub use template::TEMPLATE;

@@ -1,6 +1,6 @@
 //! `--set KEY=VALUE`: changes the text of a case and leaves its comments alone.
 
-use super::tree::{Kind, Node, Override, Source, equals};
+use super::tree::{Entry, Kind, Node, Override, Source, equals};
 use crate::error::{Error, Place, Result};
 use std::path::Path;
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Key, Table, Value};
@@ -149,27 +149,50 @@ fn find(tree: &Node, key: &[String]) -> Option<std::ops::Range<usize>> {
     let mut node = tree;
     let mut range = node.span.clone();
     for step in key {
-        match &node.kind {
-            Kind::Table(entries) => {
-                let entry = entries.iter().find(|e| e.key == *step)?;
-                node = &entry.node;
-                range = entry.key_span.start..node.span.end.max(entry.key_span.end);
-            }
-            Kind::List(nodes) | Kind::Tables(nodes) => {
-                let by_name = |n: &&Node| match &n.kind {
-                    Kind::Table(entries) => entries
-                        .iter()
-                        .any(|e| e.key == "name" && matches!(&e.node.kind, Kind::Text(text) if text == step)),
-                    _ => false,
-                };
-                node = match step.parse::<usize>() {
-                    Ok(index) => nodes.get(index)?,
-                    Err(_) => nodes.iter().find(by_name)?,
-                };
-                range = node.span.clone();
-            }
-            _ => return None,
-        }
+        let (next, entry) = child(node, step)?;
+        node = next;
+        range = match entry {
+            Some(entry) => entry.key_span.start..node.span.end.max(entry.key_span.end),
+            None => node.span.clone(),
+        };
     }
     Some(range)
+}
+
+/// The value of `key`, and the key without places in lists.
+pub(super) fn node<'n>(tree: &'n Node, key: &[String]) -> Option<(&'n Node, String)> {
+    let (mut node, mut section) = (tree, String::new());
+    for step in key {
+        let (next, entry) = child(node, step)?;
+        node = next;
+        if let Some(entry) = entry {
+            let dot = if section.is_empty() { "" } else { "." };
+            section = format!("{section}{dot}{}", entry.key);
+        }
+    }
+    Some((node, section))
+}
+
+/// The entry of a table, or the element of a list by its number or its name.
+fn child<'n>(node: &'n Node, step: &str) -> Option<(&'n Node, Option<&'n Entry>)> {
+    match &node.kind {
+        Kind::Table(entries) => {
+            let entry = entries.iter().find(|e| e.key == step)?;
+            Some((&entry.node, Some(entry)))
+        }
+        Kind::List(nodes) | Kind::Tables(nodes) => {
+            let by_name = |n: &&Node| match &n.kind {
+                Kind::Table(entries) => {
+                    entries.iter().any(|e| e.key == "name" && matches!(&e.node.kind, Kind::Text(text) if text == step))
+                }
+                _ => false,
+            };
+            let node = match step.parse::<usize>() {
+                Ok(index) => nodes.get(index)?,
+                Err(_) => nodes.iter().find(by_name)?,
+            };
+            Some((node, None))
+        }
+        _ => None,
+    }
 }

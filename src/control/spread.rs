@@ -1,5 +1,10 @@
 //! The axis with each of its parameters wrong by some share.
 
+use super::{Setup, closed_loop};
+use crate::case::Move;
+use crate::design::Design;
+use crate::error::Result;
+use crate::solve::{Ending, Solver};
 use crate::stage::Stage;
 
 /// Multiplies a parameter of a stage by a factor.
@@ -47,6 +52,42 @@ pub fn spread(stage: &Stage, share: f64) -> Vec<(String, Stage)> {
         }
     }
     axes
+}
+
+/// The worst of axes whose parameters are off.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Worst {
+    /// Largest |x − y|, m; infinite where a run does not reach its end.
+    pub error: f64,
+    /// What is wrong with that axis.
+    pub axis: String,
+    /// Largest |x − y| at the end, m.
+    pub last: f64,
+    /// Axes on which the cart settles.
+    pub settled: usize,
+    /// All of them.
+    pub axes: usize,
+}
+
+/// The same controller, made for `stage`, on axes of which each parameter is off by a `share`.
+pub fn worst(stage: &Stage, design: &Design, motion: &Move, share: f64, solver: Solver) -> Result<Worst> {
+    let mut worst = Worst::default();
+    for (axis, other) in spread(stage, share) {
+        let (until, window) = (motion.until, motion.window);
+        let setup = Setup { stage: &other, model: stage, design, profile: &motion.profile, until, window, solver };
+        let run = closed_loop(&setup)?;
+        worst.axes += 1;
+        worst.settled += usize::from(run.figures.settling.is_some() && run.outcome.ending == Ending::Complete);
+        let error = match run.outcome.ending {
+            Ending::Complete => run.figures.cart.peak.value.abs(),
+            _ => f64::INFINITY,
+        };
+        if error > worst.error {
+            (worst.error, worst.axis) = (error, axis);
+        }
+        worst.last = worst.last.max(run.figures.final_cart_error.abs());
+    }
+    Ok(worst)
 }
 
 fn viscous(friction: &mut crate::friction::Friction, factor: f64) {

@@ -19,6 +19,17 @@ pub enum Hold {
     Tustin,
 }
 
+impl Hold {
+    /// Its name, and whether it is exact.
+    pub fn words(self) -> &'static str {
+        match self {
+            Hold::Zero => "zero-order hold, exact",
+            Hold::First => "first-order hold, exact for such inputs",
+            Hold::Tustin => "Tustin's rule, an approximation",
+        }
+    }
+}
+
 /// Most samples by which an input can be late.
 const MOST_DELAY: f64 = 100.0;
 

@@ -7,6 +7,7 @@
 //! Dry friction that does not change with speed drops out while everything slides; while a body sticks it does not move at all, and
 //! [`Operation::held`] says so.
 
+mod analysis;
 mod discrete;
 mod eigen;
 mod frame;
@@ -16,6 +17,7 @@ mod travel;
 mod words;
 mod zeros;
 
+pub use analysis::{Analysis, Question};
 pub use discrete::{Discrete, Hold};
 pub use model::{Operation, StateSpace, Variable};
 pub use response::{Range, Response, Transfer};

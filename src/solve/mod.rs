@@ -1,6 +1,7 @@
 //! Runs an experiment on a stage: the choice of solver, the events, how it ended and what it cost.
 
 mod check;
+mod choice;
 mod exact;
 mod general;
 mod law;
@@ -8,6 +9,8 @@ mod propagator;
 mod record;
 mod roots;
 mod table3;
+
+pub use choice::{Choice, Kind};
 
 use crate::case::Experiment;
 use crate::error::{Error, Result};

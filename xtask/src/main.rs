@@ -1,18 +1,27 @@
-//! The project's own chores: `cargo xtask test` checks all that can be checked.
+//! The project's own chores: `cargo xtask test` checks all that can be checked, `cargo xtask python` the Python package alone.
+
+mod python;
 
 use std::io::{BufRead, BufReader};
 use std::process::{Command, ExitCode, Stdio};
 use std::time::Instant;
 
-/// A check: what it is, and the cargo command that does it.
+/// A check: what it is, and what does it.
 struct Step {
     what: &'static str,
-    command: &'static [&'static str],
-    variables: &'static [(&'static str, &'static str)],
+    work: Work,
+}
+
+/// What does a check.
+enum Work {
+    /// A cargo command, with variables of its environment.
+    Cargo(&'static [&'static str], &'static [(&'static str, &'static str)]),
+    /// The Python package's own chain of commands.
+    Python,
 }
 
 /// In this order, the quickest to fail first.
-const STEPS: [Step; 6] = [
+const STEPS: [Step; 7] = [
     step("formatting", &["fmt", "--all", "--check"]),
     step("lints", &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]),
     step(
@@ -21,25 +30,31 @@ const STEPS: [Step; 6] = [
     ),
     Step {
         what: "documentation",
-        command: &["doc", "--workspace", "--no-deps"],
-        variables: &[("RUSTDOCFLAGS", "-D warnings")],
+        work: Work::Cargo(&["doc", "--workspace", "--no-deps"], &[("RUSTDOCFLAGS", "-D warnings")]),
     },
     // Unit tests, integration tests and the examples in the documentation.
     step("tests", &["test", "--workspace", "--no-fail-fast"]),
     step("examples", &["build", "--workspace", "--examples"]),
+    PYTHON,
 ];
 
+const PYTHON: Step = Step { what: "the Python package", work: Work::Python };
+
 const fn step(what: &'static str, command: &'static [&'static str]) -> Step {
-    Step { what, command, variables: &[] }
+    Step { what, work: Work::Cargo(command, &[]) }
 }
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
-    if words != ["test"] {
-        eprintln!("usage: cargo xtask test");
-        return ExitCode::from(2);
-    }
-    match test() {
+    let steps = match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["test"] => &STEPS[..],
+        ["python"] => &[PYTHON],
+        _ => {
+            eprintln!("usage: cargo xtask test | cargo xtask python");
+            return ExitCode::from(2);
+        }
+    };
+    match test(steps) {
         Ok(()) => ExitCode::SUCCESS,
         Err(told) => {
             eprintln!("\nxtask: {told}");
@@ -48,8 +63,8 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs every step, up to the first that fails.
-fn test() -> Result<(), String> {
+/// Runs these steps, up to the first that fails.
+fn test(steps: &[Step]) -> Result<(), String> {
     for (tool, component) in [("fmt", "rustfmt"), ("clippy", "clippy")] {
         let answers = cargo(&[tool, "--version"]).stdout(Stdio::null()).stderr(Stdio::null()).status();
         if !answers.is_ok_and(|status| status.success()) {
@@ -58,14 +73,15 @@ fn test() -> Result<(), String> {
     }
     let begin = Instant::now();
     let mut counts = Counts::default();
-    for step in &STEPS {
-        println!("== {}: cargo {}", step.what, step.command.join(" "));
+    for step in steps {
+        let command = step.command();
+        println!("== {}: cargo {command}", step.what);
         let begin = Instant::now();
         let succeeded = step.run(&mut counts)?;
         println!("== {}: {:.1} s", step.what, begin.elapsed().as_secs_f64());
         if !succeeded {
             counts.show();
-            return Err(format!("failed: {}; to repeat it alone: cargo {}", step.what, step.command.join(" ")));
+            return Err(format!("failed: {}; to repeat it alone: cargo {command}", step.what));
         }
     }
     println!("\nall steps succeeded in {:.1} s", begin.elapsed().as_secs_f64());
@@ -74,23 +90,40 @@ fn test() -> Result<(), String> {
 }
 
 impl Step {
-    /// Whether it succeeds; its output is shown as it comes, and the tests in it are counted.
-    fn run(&self, counts: &mut Counts) -> Result<bool, String> {
-        let mut command = cargo(self.command);
-        let mut child = command
-            .envs(self.variables.iter().copied())
-            .stdout(Stdio::piped())
-            .spawn()
-            .map_err(|e| format!("cargo cannot be started: {e}"))?;
-        if let Some(output) = child.stdout.take() {
-            for line in BufReader::new(output).lines() {
-                let line = line.map_err(|e| format!("the output of cargo cannot be read: {e}"))?;
-                println!("{line}");
-                counts.take(&line);
-            }
+    /// What to give to cargo to run it alone.
+    fn command(&self) -> String {
+        match self.work {
+            Work::Cargo(words, _) => words.join(" "),
+            Work::Python => "xtask python".into(),
         }
-        Ok(child.wait().map_err(|e| format!("cargo was lost: {e}"))?.success())
     }
+
+    /// Whether it succeeds; the tests in it are counted.
+    fn run(&self, counts: &mut Counts) -> Result<bool, String> {
+        match self.work {
+            Work::Cargo(words, variables) => {
+                let mut command = cargo(words);
+                command.envs(variables.iter().copied());
+                run(command, counts)
+            }
+            Work::Python => python::test(counts),
+        }
+    }
+}
+
+/// Whether a command succeeds; its output is shown as it comes, and the tests in it are counted.
+fn run(mut command: Command, counts: &mut Counts) -> Result<bool, String> {
+    let name = command.get_program().to_string_lossy().into_owned();
+    let child = command.stdout(Stdio::piped()).spawn();
+    let mut child = child.map_err(|e| format!("{name} cannot be started: {e}"))?;
+    if let Some(output) = child.stdout.take() {
+        for line in BufReader::new(output).lines() {
+            let line = line.map_err(|e| format!("the output of {name} cannot be read: {e}"))?;
+            println!("{line}");
+            counts.take(&line);
+        }
+    }
+    Ok(child.wait().map_err(|e| format!("{name} was lost: {e}"))?.success())
 }
 
 /// The cargo that runs this program.
@@ -108,17 +141,18 @@ struct Counts {
 }
 
 impl Counts {
-    /// Adds what a line such as `test result: ok. 5 passed; 0 failed; …` reports.
+    /// Adds what a line such as `test result: ok. 5 passed; 0 failed; …`, or pytest's `5 passed, 1 skipped in 0.1s`, reports.
     fn take(&mut self, line: &str) {
-        if !line.starts_with("test result: ") {
+        let pytest = line.ends_with('s') && line.contains(" in ") && line.starts_with(|c: char| c.is_ascii_digit());
+        if !line.starts_with("test result: ") && !pytest {
             return;
         }
         let count = |word: &str| -> u64 {
             let before = line.split(word).next().filter(|before| before.len() < line.len());
             before.and_then(|before| before.split_whitespace().last()?.parse().ok()).unwrap_or(0)
         };
-        self.passed += count(" passed;");
-        self.failed += count(" failed;");
+        self.passed += count(" passed");
+        self.failed += count(" failed");
     }
 
     fn show(&self) {
@@ -136,6 +170,7 @@ mod tests {
         counts.take("test result: ok. 12 passed; 0 failed; 1 ignored; 0 measured; 0 filtered out; finished in 0.01s");
         counts.take("test result: FAILED. 3 passed; 2 failed; 0 ignored; 0 measured; 0 filtered out");
         counts.take("test the_word_passed; ... ok");
-        assert_eq!(counts, Counts { passed: 15, failed: 2 });
+        counts.take("1 failed, 38 passed, 1 skipped in 4.56s");
+        assert_eq!(counts, Counts { passed: 53, failed: 3 });
     }
 }

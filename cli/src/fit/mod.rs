@@ -1,7 +1,6 @@
 //! `taut fit`: finds parameters from the logs of a case, and says how well they are known.
 
 mod figures;
-mod json;
 mod page;
 mod posterior;
 pub mod table;
@@ -17,6 +16,7 @@ use std::time::{Duration, Instant};
 use taut::case::Case;
 use taut::files::write_atomically;
 use taut::fit::{Ending, Fit, Posterior, Profile, fit, profiles};
+use taut::json;
 use taut::solve::Flow;
 use taut::trajectory::CsvWriter;
 use taut::{Error, Result};
@@ -37,7 +37,7 @@ pub struct Found {
 pub fn run(args: &Args) -> Outcome {
     let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
     let case = Case::read_with(&args.case, &changes)?;
-    let plan = plan(&case, &args.case)?;
+    let plan = case.fit_plan(&args.case)?;
     if let Some(folder) = &args.out {
         std::fs::create_dir_all(folder)
             .map_err(|e| Error::new(format!("this folder cannot be made: {e}")).in_file(folder))?;
@@ -63,7 +63,7 @@ pub fn run(args: &Args) -> Outcome {
     }
     let found = Found { fit, profiles, drawn };
     let took = begin.elapsed();
-    let json = json::text(&case, &found);
+    let json = json::text(&json::fit(&case, &found.fit, &found.profiles, found.drawn.as_ref().map(json::posterior)));
     let mut written = Vec::new();
     if let Some(folder) = &args.out {
         written = write(args, folder, &case, &found, &json).map_err(Failure::work)?;
@@ -78,15 +78,6 @@ pub fn run(args: &Args) -> Outcome {
         (None, _) if found.drawn.is_some_and(|drawn| !drawn.doubts().is_empty()) => Status::Incomplete,
         (None, Ending::Converged | Ending::Stalled) => Status::Done,
         (None, _) => Status::Incomplete,
-    })
-}
-
-/// What the case asks for.
-pub fn plan(case: &Case, path: &Path) -> Result<taut::case::Plan> {
-    case.fit.clone().ok_or_else(|| {
-        Error::new("this case does not say what is searched for")
-            .in_file(path)
-            .next("add a table [fit] with for example free = [\"cart.friction.viscous\", \"cart.friction.coulomb\"]")
     })
 }
 

@@ -1,9 +1,9 @@
 //! Bode diagram, map of the travel, map of poles and zeros.
 
-use super::Analysis;
 use super::table::words;
 use nalgebra::Complex;
 use std::f64::consts::PI;
+use taut::linear::Analysis;
 use taut::linear::{Place, Root};
 use taut::report::{Axis, Colour, Figure, Panel, Series, Style};
 

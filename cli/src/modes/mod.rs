@@ -1,7 +1,6 @@
 //! `taut modes`: linearises the stage of a case, and says how it swings.
 
 mod figures;
-mod json;
 mod page;
 mod table;
 
@@ -13,39 +12,17 @@ use std::fmt::Write;
 use std::path::Path;
 use taut::case::Case;
 use taut::files::write_atomically;
-use taut::linear::{
-    Discrete, Hold, Operation, Place, Range, Response, StateSpace, Transfer, assumptions, places, sticks, travel,
-};
+use taut::json;
+use taut::linear::{Analysis, Hold, Question};
 use taut::stage::BeltModel;
 use taut::{Error, Result};
-
-/// Places along the travel.
-const PLACES: usize = 61;
-
-/// Everything the command tells.
-pub struct Analysis<'a> {
-    case: &'a Case,
-    operation: Operation,
-    system: StateSpace,
-    transfers: Vec<Transfer>,
-    /// What was taken for granted.
-    words: Vec<String>,
-    /// Whether the stage sticks at rest.
-    sticks: bool,
-    /// At the place that was asked for.
-    here: Place,
-    /// Along the travel, where the place makes a difference.
-    travel: Option<Vec<Place>>,
-    responses: Vec<Response>,
-    discrete: Option<Discrete>,
-}
 
 /// Reads the case, linearises, writes, tells.
 pub fn run(args: &Args) -> Outcome {
     let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
     let case = Case::read_with(&args.case, &changes)?;
-    let analysis = Analysis::new(&case, args)?;
-    let json = json::text(&analysis);
+    let analysis = Analysis::of(&case, &question(args))?;
+    let json = json::text(&json::modes(&analysis));
     let mut written = Vec::new();
     if let Some(folder) = &args.out {
         std::fs::create_dir_all(folder)
@@ -60,82 +37,39 @@ pub fn run(args: &Args) -> Outcome {
     Ok(Status::Done)
 }
 
-impl<'a> Analysis<'a> {
-    fn new(case: &'a Case, args: &Args) -> Result<Self> {
-        let held = [BodyName::Drive, BodyName::Cart, BodyName::Idler].map(|body| args.stuck.contains(&body));
-        let usual = Operation::default();
-        let operation =
-            Operation { speed: args.speed.unwrap_or(usual.speed), position: args.at.unwrap_or(usual.position), held };
-        let stage = &case.stage;
-        within(case, args)?;
-        let system = StateSpace::of(stage, operation).map_err(|error| error.in_file("--at"))?;
-        let transfers = system.transfers()?;
-        let frequencies = frequencies(&transfers, args)?;
-        let responses = system.responses(&transfers, &frequencies);
-        let along = places(stage, PLACES).map(|places| travel(stage, operation, &places)).transpose()?;
-        let here = travel(stage, operation, &[operation.position])?.swap_remove(0);
-        let hold = match args.hold.unwrap_or_default() {
+/// What the command line asks.
+fn question(args: &Args) -> Question {
+    Question {
+        speed: args.speed,
+        at: args.at,
+        held: [BodyName::Drive, BodyName::Cart, BodyName::Idler].map(|body| args.stuck.contains(&body)),
+        sample_time: args.sample_time,
+        hold: match args.hold.unwrap_or_default() {
             HoldName::Zero => Hold::Zero,
             HoldName::First => Hold::First,
             HoldName::Tustin => Hold::Tustin,
-        };
-        let discrete = args.sample_time.map(|time| system.discrete(time, hold, args.delay.unwrap_or(0.0)));
-        let discrete = discrete.transpose().map_err(|error| error.in_file("--sample-time"))?;
-        let (words, sticks) = (assumptions(stage, operation), sticks(stage, operation));
-        Ok(Self { case, operation, system, transfers, words, sticks, here, travel: along, responses, discrete })
+        },
+        delay: args.delay.unwrap_or(0.0),
+        from: args.from,
+        to: args.to,
     }
+}
 
-    /// Whether the stiffness or the friction of the stage depends on where the cart is, in words.
-    fn along(&self) -> &'static str {
-        let stage = &self.case.stage;
-        match (&self.travel, stage.belt.make) {
-            _ if stage.belt.model == BeltModel::Rigid => {
-                "a rigid belt has no spans that could change with the position"
-            }
-            (Some(_), _) => "spans 1 and 2 follow the cart: k = A E / l with the length that is left",
-            (None, Some(_)) => {
-                "the same along the travel: this file's stiffness does not depend on the position \
+/// Whether the stiffness or the friction of the stage depends on where the cart is, in words.
+pub fn along(analysis: &Analysis) -> &'static str {
+    let stage = &analysis.case.stage;
+    match (&analysis.travel, stage.belt.make) {
+        _ if stage.belt.model == BeltModel::Rigid => "a rigid belt has no spans that could change with the position",
+        (Some(_), _) => "spans 1 and 2 follow the cart: k = A E / l with the length that is left",
+        (None, Some(_)) => {
+            "the same along the travel: this file's stiffness does not depend on the position \
                  (belt.follows_cart = true makes spans 1 and 2 follow the cart)"
-            }
-            (None, None) => {
-                "the same along the travel: this file gives the spans' stiffness as such \
+        }
+        (None, None) => {
+            "the same along the travel: this file gives the spans' stiffness as such \
                  (belt.modulus, section, spans and follows_cart = true make them follow the cart)"
-            }
         }
     }
-}
-
-/// Refuses a place outside the travel.
-fn within(case: &Case, args: &Args) -> Result<()> {
-    match (args.at, case.stage.travel) {
-        (Some(at), Some(travel)) if !(travel.min..=travel.max).contains(&at) => {
-            Err(Error::new(format!("{at} m is outside the travel"))
-                .in_file("--at")
-                .allowed(format!("{} m to {} m", travel.min, travel.max))
-                .next("name a place on the travel, or change [travel]"))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// The frequencies of the response, rad/s.
-fn frequencies(transfers: &[Transfer], args: &Args) -> Result<Vec<f64>> {
-    let poles = transfers.first().map_or(&[][..], |transfer| &transfer.poles);
-    let zeros: Vec<_> = transfers.iter().map(|transfer| transfer.zeros.clone()).collect();
-    let usual = Range::of(poles, &zeros);
-    let range = Range {
-        from: args.from.map_or(usual.from, |hertz| 2.0 * PI * hertz),
-        to: args.to.map_or(usual.to, |hertz| 2.0 * PI * hertz),
-        ..usual
-    };
-    if range.from >= range.to {
-        let [from, to] = [range.from, range.to].map(|omega| omega / (2.0 * PI));
-        return Err(Error::new(format!("the response would end at {to} Hz, before it begins at {from} Hz"))
-            .in_file("--from, --to")
-            .next("give --from and --to, the lower one first"));
-    }
-    let roots: Vec<_> = poles.iter().chain(zeros.iter().flat_map(|zeros| &zeros.values)).copied().collect();
-    Ok(range.frequencies(&roots))
 }
 
 /// Writes the files; returns their names.

@@ -1,8 +1,9 @@
 //! The report: one HTML file.
 
-use super::Analysis;
+use super::along;
 use super::figures::Named;
-use super::table::{gain, hold, pole, poles, words, z, zeros};
+use super::table::{gain, pole, poles, words, z, zeros};
+use taut::linear::Analysis;
 use taut::number::{engineering, engineering_ascii};
 use taut::report::{Callout, Cell, Page, Table, stage_drawing};
 
@@ -33,7 +34,7 @@ pub fn page(analysis: &Analysis, figures: &[Named]) -> Page {
         page.figure(figure);
     }
     page.section("Along the travel");
-    page.prose(analysis.along());
+    page.prose(along(analysis));
     for (_, figure) in figures.iter().filter(|(name, _)| *name == "travel") {
         page.figure(figure);
     }
@@ -44,7 +45,10 @@ pub fn page(analysis: &Analysis, figures: &[Named]) -> Page {
     if let Some(model) = &analysis.discrete {
         page.section("Discrete-time model");
         let [time, delay] = [model.sample_time, model.delay].map(|value| engineering(value, "s", 5));
-        page.prose(format!("Sample time {time}, {}, input late by {delay}. Matrices are in modes.json.", hold(model)));
+        page.prose(format!(
+            "Sample time {time}, {}, input late by {delay}. Matrices are in modes.json.",
+            model.hold.words()
+        ));
         let mut rows = Table::new("").column("Pole z", "").column("|z|", "");
         for value in model.poles().iter().filter(|value| value.im >= 0.0) {
             rows.row([

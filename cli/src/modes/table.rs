@@ -1,12 +1,13 @@
 //! The result for people on a terminal.
 
-use super::Analysis;
+use super::along;
 use crate::terminal::bold;
 use nalgebra::Complex;
 use std::f64::consts::PI;
 use std::fmt::Write;
 use std::path::Path;
-use taut::linear::{Discrete, Hold, Place, Root, Transfer};
+use taut::linear::Analysis;
+use taut::linear::{Discrete, Place, Root, Transfer};
 use taut::number::{ascii, engineering_ascii};
 
 /// Rows of the table of the travel.
@@ -35,7 +36,7 @@ pub fn text(analysis: &Analysis, folder: Option<&Path>, written: &[&str]) -> Str
         }
     }
     let _ = write!(text, "\n{}\n", bold("Resonance and anti-resonance of the drive angle"));
-    let _ = writeln!(text, "  {}", analysis.along());
+    let _ = writeln!(text, "  {}", along(analysis));
     travel(&mut text, analysis);
     if let Some(model) = &analysis.discrete {
         discrete(&mut text, model);
@@ -157,15 +158,6 @@ fn travel(text: &mut String, analysis: &Analysis) {
     }
 }
 
-/// The rule by which the input goes from sample to sample, in words.
-pub fn hold(model: &Discrete) -> &'static str {
-    match model.hold {
-        Hold::Zero => "zero-order hold, exact",
-        Hold::First => "first-order hold, exact for such inputs",
-        Hold::Tustin => "Tustin's rule, an approximation",
-    }
-}
-
 fn discrete(text: &mut String, model: &Discrete) {
     let _ = write!(text, "\n{}\n", bold("Discrete-time model"));
     let late = match model.delay {
@@ -173,7 +165,7 @@ fn discrete(text: &mut String, model: &Discrete) {
         delay => format!(", input late by {}", engineering_ascii(delay, "s", 5)),
     };
     let (time, states) = (engineering_ascii(model.sample_time, "s", 5), model.states.len());
-    let _ = writeln!(text, "  sample time {time}, {}{late}; {states} states", hold(model));
+    let _ = writeln!(text, "  sample time {time}, {}{late}; {states} states", model.hold.words());
     let poles: Vec<String> = model.poles().iter().filter(|z| z.im >= 0.0).map(z).collect();
     let _ = writeln!(text, "  poles z = {}", poles.join(", "));
 }

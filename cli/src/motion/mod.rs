@@ -1,7 +1,6 @@
 //! `taut move`: runs the moves of a case in closed loop, and says where the cart really is.
 
 mod figures;
-mod json;
 mod page;
 mod table;
 
@@ -14,12 +13,12 @@ use crate::simulate::table::early_end;
 use crate::terminal;
 use figures::Curves;
 use std::fmt::Write;
-use std::path::Path;
 use taut::case::{Case, Move};
-use taut::control::{Loop, MoveRun, Rows, Setup, Standard, closed_loop, spread, stream};
+use taut::control::{Loop, MoveRun, Rows, Standard, Worst, stream, worst};
 use taut::design::Design;
 use taut::files::write_atomically;
-use taut::solve::{Ending, Flow, Solver};
+use taut::json::{self, Moved};
+use taut::solve::{Flow, Solver};
 use taut::trajectory::{CsvWriter, Trajectory};
 use taut::{Error, Result};
 
@@ -33,16 +32,11 @@ pub struct Done<'a> {
     pub files: Vec<String>,
 }
 
-/// The worst of axes whose parameters are off.
-pub struct Worst {
-    /// Largest |x − y|, m, and of which axis.
-    pub error: f64,
-    pub axis: String,
-    /// Largest |x − y| at the end, m.
-    pub last: f64,
-    /// Axes on which the cart settles, and all of them.
-    pub settled: usize,
-    pub axes: usize,
+impl Done<'_> {
+    /// What the summary says of it.
+    fn told(&self) -> Moved<'_> {
+        Moved { motion: self.motion, run: &self.run, worst: self.worst.as_ref(), files: &self.files }
+    }
 }
 
 /// A case with what came of its moves.
@@ -66,7 +60,7 @@ pub fn run(args: &Args) -> Outcome {
     let interrupt = Interrupt::listen();
     let mut tried = Vec::new();
     for (case, path) in cases.iter().zip(&args.case) {
-        let (design, moves) = chosen(case, path, &args.moves)?;
+        let (design, moves) = case.moves_named(path, &args.moves)?;
         let mut done = Vec::new();
         for motion in moves {
             if interrupt.signal().is_some() {
@@ -76,7 +70,10 @@ pub fn run(args: &Args) -> Outcome {
         }
         tried.push(Tried { case, design, done });
     }
-    let json = json::text(&tried);
+    let json = match &tried[..] {
+        [one] => json::text(&told(one)),
+        several => json::text(&several.iter().map(told).collect::<Vec<_>>()),
+    };
     if let (Some(folder), [tried]) = (&folder, &tried[..]) {
         write(folder, tried, args, &json).map_err(Failure::work)?;
     }
@@ -91,19 +88,10 @@ pub fn run(args: &Args) -> Outcome {
     Ok(status(&tried, &interrupt))
 }
 
-/// The controller and the moves named on the command line; all if none is named.
-fn chosen<'a>(case: &'a Case, path: &Path, names: &[String]) -> Result<(&'a Design, Vec<&'a Move>)> {
-    let Some(design) = case.controller.as_ref().filter(|_| !case.moves.is_empty()) else {
-        return Err(Error::new("this case has no move and no controller to run it").in_file(path).next(
-            "add [controller] with every and for example pid = { proportional = \"2 V/mm\" }, \
-             and [[move]] with name, to, speed, acceleration and until",
-        ));
-    };
-    if let Some(name) = names.iter().find(|name| case.moves.iter().all(|m| m.name != **name)) {
-        let known: Vec<String> = case.moves.iter().map(|m| format!("\"{}\"", m.name)).collect();
-        return Err(Error::new(format!("there is no move \"{name}\"")).in_file("--move").allowed(known.join(", ")));
-    }
-    Ok((design, case.moves.iter().filter(|m| names.is_empty() || names.contains(&m.name)).collect()))
+/// A case with its moves as data.
+fn told(tried: &Tried) -> impl serde::Serialize + use<> {
+    let moved: Vec<Moved> = tried.done.iter().map(Done::told).collect();
+    json::moves(&tried.case.title, tried.design.structure.name(), &Loop::of(tried.design), &moved)
 }
 
 /// Runs one move.
@@ -145,7 +133,7 @@ fn one<'a>(
         files.push(write_samples(folder, &name, case, &run).map_err(Failure::work)?);
     }
     let worst = match args.spread.filter(|_| interrupt.signal().is_none()) {
-        Some(share) => Some(worst(case, design, motion, share, solver)?),
+        Some(share) => Some(worst(&case.stage, design, motion, share, solver)?),
         None => None,
     };
     Ok(Done { motion, run, curves, worst, files })
@@ -161,28 +149,6 @@ fn write_samples(folder: &Folder, name: &str, case: &Case, run: &MoveRun) -> Res
     let name = format!("{name}.samples.csv");
     write_atomically(folder.path(&name), text)?;
     Ok(name)
-}
-
-/// The same controller on axes that are not what it takes them for.
-fn worst(case: &Case, design: &Design, motion: &Move, share: f64, solver: Solver) -> Result<Worst> {
-    let mut worst = Worst { error: 0.0, axis: String::new(), last: 0.0, settled: 0, axes: 0 };
-    for (axis, stage) in spread(&case.stage, share) {
-        let (until, window) = (motion.until, motion.window);
-        let setup =
-            Setup { stage: &stage, model: &case.stage, design, profile: &motion.profile, until, window, solver };
-        let run = closed_loop(&setup)?;
-        worst.axes += 1;
-        worst.settled += usize::from(run.figures.settling.is_some() && run.outcome.ending == Ending::Complete);
-        let error = match run.outcome.ending {
-            Ending::Complete => run.figures.cart.peak.value.abs(),
-            _ => f64::INFINITY,
-        };
-        if error > worst.error {
-            (worst.error, worst.axis) = (error, axis);
-        }
-        worst.last = worst.last.max(run.figures.final_cart_error.abs());
-    }
-    Ok(worst)
 }
 
 /// What belongs to all moves: summary, case, report and plots.

@@ -1,7 +1,6 @@
 //! The folder of results. Every file is written under a temporary name and renamed when it is whole.
 
 use super::run::{Run, Setting};
-use super::summary::Summary;
 use super::{page, plots};
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -75,9 +74,9 @@ impl Folder {
     }
 
     /// What belongs to all experiments: summary, case, report and plots.
-    pub fn write_common(&self, setting: &Setting, summary: &Summary, runs: &[Run]) -> Result<()> {
+    pub fn write_common(&self, setting: &Setting, summary: &str, runs: &[Run]) -> Result<()> {
         let case = setting.case;
-        write_atomically(self.path("summary.json"), summary.json())?;
+        write_atomically(self.path("summary.json"), summary)?;
         let text = self.bring_inputs(case)?;
         write_atomically(self.path("case.toml"), &text)?;
         if setting.args.no_report {

@@ -6,7 +6,6 @@ pub mod folder;
 mod page;
 pub mod plots;
 mod run;
-mod summary;
 pub mod table;
 
 use crate::args::Simulate;
@@ -15,8 +14,8 @@ use crate::interrupt::Interrupt;
 use crate::terminal;
 use folder::Folder;
 use run::{Run, Setting};
-use summary::Summary;
-use taut::case::{Case, Experiment};
+use taut::case::Case;
+use taut::json::{self, Simulation};
 use taut::solve::{Ending, Solver};
 use taut::stage::Stage;
 use taut::{Error, Result};
@@ -26,7 +25,7 @@ pub fn run(args: &Simulate) -> Outcome {
     let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
     let case = Case::read_with(&args.case, &changes)?;
     let solver = args.solver(&case.stage)?;
-    let experiments = chosen(&case, &args.experiments)?;
+    let experiments = case.experiments_named(&args.case, &args.experiments)?;
     if args.as_measured {
         measurable(&case, solver, args)?;
     }
@@ -43,12 +42,13 @@ pub fn run(args: &Simulate) -> Outcome {
             break;
         }
     }
-    let summary = Summary::new(&case, solver, &runs);
+    let told: Vec<_> = runs.iter().map(Run::told).collect();
+    let summary = json::text(&Simulation::new(&case, solver, &told));
     if let Some(folder) = &folder {
         folder.write_common(&setting, &summary, &runs).map_err(Failure::work)?;
     }
     if args.json {
-        terminal::show(&summary.json());
+        terminal::show(&summary);
     } else if !args.quiet {
         terminal::show(&table::text(&case, solver, &runs, folder.as_ref()));
     }
@@ -82,22 +82,6 @@ fn measurable(case: &Case, solver: Solver, args: &Simulate) -> Result<()> {
                 .next("leave --solver table3 out, or --as-measured"))
         }
     }
-}
-
-/// The experiments named on the command line, in the file's order; all if none is named.
-fn chosen<'a>(case: &'a Case, names: &[String]) -> Result<Vec<&'a Experiment>> {
-    if case.experiments.is_empty() {
-        return Err(Error::new(format!("\"{}\" has moves, and no experiments", case.title))
-            .next("run its moves with `taut move`, or add an [[experiment]]"));
-    }
-    if let Some(name) = names.iter().find(|name| case.experiments.iter().all(|e| e.name != **name)) {
-        let known: Vec<String> = case.experiments.iter().map(|e| format!("\"{}\"", e.name)).collect();
-        return Err(Error::new(format!("there is no experiment \"{name}\""))
-            .in_file("--experiment")
-            .allowed(known.join(", "))
-            .next("name one of these, or leave --experiment out to run them all"));
-    }
-    Ok(case.experiments.iter().filter(|e| names.is_empty() || names.contains(&e.name)).collect())
 }
 
 /// How it ended, and a word about every run that did not reach its end.

@@ -2,9 +2,9 @@
 
 use super::plots::Named;
 use super::run::Run;
-use super::summary::load_unit;
 use super::table::{early_end, lines};
 use taut::case::Case;
+use taut::json::load_unit;
 use taut::number;
 use taut::report::{Callout, Cell, Page, Table, stage_drawing};
 use taut::solve::Solver;

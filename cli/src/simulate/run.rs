@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 use taut::case::{Case, Experiment};
+use taut::json::{self, Simulated};
 use taut::measure;
 use taut::metrics::{Meter, Metrics};
 use taut::reduction::Reduction;
@@ -53,6 +54,26 @@ pub struct Run<'a> {
     pub files: Vec<String>,
     /// How long solving and writing took.
     pub took: Duration,
+}
+
+impl Run<'_> {
+    /// What the summary says of it.
+    pub fn told(&self) -> Simulated<'_> {
+        Simulated {
+            experiment: self.experiment,
+            outcome: &self.outcome,
+            metrics: &self.metrics,
+            reduction: self.reduction,
+            band: self.band.as_ref().map(|band| json::Band {
+                machines: band.machines,
+                machines_left_out: band.failed,
+                final_drive_angle_rad: band.end(0),
+                final_cart_position_m: band.end(1),
+                final_drive_travel_minus_cart_m: band.end(2),
+            }),
+            files: &self.files,
+        }
+    }
 }
 
 impl<'a> Setting<'a> {

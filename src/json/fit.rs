@@ -1,14 +1,9 @@
-//! The result as data: what `--json` prints and `fit.json` holds. Everything is in SI units.
+//! A fit: `taut fit --json`, `fit.json`.
 
-use super::Found;
+use super::number;
+use crate::case::Case;
+use crate::fit::{Ending, Fit, Profile, Score};
 use serde_json::{Value, json};
-use taut::case::Case;
-use taut::fit::{Posterior, Profile, Score};
-
-/// Numbers that JSON has no word for are null.
-fn number(value: f64) -> Value {
-    if value.is_finite() { json!(value) } else { Value::Null }
-}
 
 fn score(score: Option<Score>) -> Value {
     score.map_or(Value::Null, |score| {
@@ -19,31 +14,6 @@ fn score(score: Option<Score>) -> Value {
             "fit_percent": number(score.percent),
             "lag_one_correlation": number(score.memory),
         })
-    })
-}
-
-/// What was drawn.
-fn drawn(posterior: &Posterior) -> Value {
-    json!({
-        "converged": posterior.doubts().is_empty(),
-        "doubts": posterior.doubts(),
-        "chains": posterior.draws.chains.len(),
-        "draws": posterior.count(),
-        "divergences": posterior.draws.divergences,
-        "evaluations": posterior.draws.evaluations,
-        "interrupted": posterior.draws.interrupted,
-        "inflation": number(posterior.inflation),
-        "fixed_slopes": posterior.fixed_slopes,
-        "parameters": posterior.variables.iter().map(|variable| json!({
-            "name": variable.name,
-            "unit": variable.unit,
-            "mean": number(variable.mean),
-            "standard_deviation": number(variable.deviation),
-            "median": number(variable.median),
-            "interval_95": variable.interval.map(number),
-            "r_hat": number(variable.r_hat),
-            "effective_draws": number(variable.effective),
-        })).collect::<Vec<_>>(),
     })
 }
 
@@ -58,9 +28,8 @@ fn profile(profile: &Profile) -> Value {
     })
 }
 
-/// The text.
-pub fn text(case: &Case, found: &Found) -> String {
-    let fit = &found.fit;
+/// Estimates and how the logs are met; `profiles` are those that were made and `posterior` is what was drawn, if anything was.
+pub fn fit(case: &Case, fit: &Fit, profiles: &[Profile], posterior: Option<Value>) -> Value {
     let parameters: Vec<Value> = fit
         .estimates
         .iter()
@@ -104,11 +73,11 @@ pub fn text(case: &Case, found: &Found) -> String {
         .collect();
     let correlation: Vec<Vec<Value>> =
         fit.correlation.iter().map(|row| row.iter().map(|v| number(*v)).collect()).collect();
-    let value = json!({
+    json!({
         "title": case.title,
         "version": env!("CARGO_PKG_VERSION"),
         "ending": fit.ending.word(),
-        "converged": fit.ending == taut::fit::Ending::Converged,
+        "converged": fit.ending == Ending::Converged,
         "last_step_standard_errors": number(fit.decrement),
         "cost": number(fit.cost),
         "starts": fit.starts.iter().map(|cost| number(*cost)).collect::<Vec<_>>(),
@@ -120,15 +89,12 @@ pub fn text(case: &Case, found: &Found) -> String {
             "quantity": quantity.name(), "unit": quantity.unit(), "value": number(*deviation),
         })).collect::<Vec<_>>(),
         "logs": logs,
-        "profiles": found.profiles.iter().map(profile).collect::<Vec<_>>(),
-        "posterior": found.drawn.as_ref().map_or(Value::Null, drawn),
+        "profiles": profiles.iter().map(profile).collect::<Vec<_>>(),
+        "posterior": posterior,
         "work": {
             "iterations": fit.work.iterations,
             "evaluations": fit.work.evaluations,
             "simulations": fit.work.simulations,
         },
-    });
-    let mut text = serde_json::to_string_pretty(&value).unwrap_or_default();
-    text.push('\n');
-    text
+    })
 }

@@ -1,19 +1,36 @@
-//! The summary as data: what `--json` prints and `summary.json` holds. Units are in the keys.
+//! A simulation: `taut simulate --json`, `summary.json`.
 
-use super::run::Run;
+use crate::case::{Case, Experiment};
+use crate::metrics::{self, Peak, SteadySpeed};
+use crate::plant::Body;
+use crate::reduction::Reduction;
+use crate::solve::{self, Method, Outcome, Solver};
+use crate::stage::{AmplifierMode, Stage};
 use serde::Serialize;
-use taut::case::Case;
-use taut::metrics::{Metrics, Peak, SteadySpeed};
-use taut::plant::Body;
-use taut::solve::{Ending, Event, Method, Solver};
-use taut::stage::{AmplifierMode, Stage};
 
 /// Events listed; the rest is in the events' own file.
 const MOST_EVENTS: usize = 10_000;
 
+/// What is told of one experiment that ran.
+#[derive(Debug, Clone, Copy)]
+pub struct Simulated<'a> {
+    /// What was run.
+    pub experiment: &'a Experiment,
+    /// Events, ending and cost.
+    pub outcome: &'a Outcome,
+    /// What it shows.
+    pub metrics: &'a metrics::Metrics,
+    /// How far its model is from the elastic one, where it is a reduced one.
+    pub reduction: Option<Reduction>,
+    /// What the machines of a posterior do.
+    pub band: Option<Band>,
+    /// Its files.
+    pub files: &'a [String],
+}
+
 /// The whole summary.
-#[derive(Serialize)]
-pub struct Summary {
+#[derive(Debug, Serialize)]
+pub struct Simulation {
     title: String,
     version: &'static str,
     solver: SolverUsed,
@@ -21,7 +38,7 @@ pub struct Summary {
     experiments: Vec<ExperimentFigures>,
 }
 
-#[derive(Serialize)]
+#[derive(Debug, Serialize)]
 struct SolverUsed {
     name: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -32,7 +49,7 @@ struct SolverUsed {
     method: Option<&'static str>,
 }
 
-#[derive(Serialize)]
+#[derive(Debug, Serialize)]
 struct StageFigures {
     pulley_radius_m: f64,
     cart_mass_kg: f64,
@@ -45,41 +62,47 @@ struct StageFigures {
     belt_stiffness_newton_per_m: [f64; 3],
 }
 
-#[derive(Serialize)]
+#[derive(Debug, Serialize)]
 struct ExperimentFigures {
     name: String,
     files: Vec<String>,
     ending: EndingTold,
-    metrics: MetricsTold,
+    metrics: Metrics,
     /// None for the elastic model.
     #[serde(skip_serializing_if = "Option::is_none")]
     reduction: Option<ReductionTold>,
     /// With --draws.
     #[serde(skip_serializing_if = "Option::is_none")]
-    band: Option<BandTold>,
-    events: Vec<EventTold>,
+    band: Option<Band>,
+    events: Vec<Event>,
     events_not_listed: usize,
     cost: CostTold,
 }
 
 /// Where machines drawn from a posterior end: 2.5 %, 50 % and 97.5 % of them below.
-#[derive(Serialize)]
-struct BandTold {
-    machines: usize,
-    machines_left_out: usize,
-    final_drive_angle_rad: [f64; 3],
-    final_cart_position_m: [f64; 3],
-    final_drive_travel_minus_cart_m: [f64; 3],
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Band {
+    /// Machines that reached the end.
+    pub machines: usize,
+    /// Machines that did not.
+    pub machines_left_out: usize,
+    /// φ₁, rad.
+    pub final_drive_angle_rad: [f64; 3],
+    /// x, m.
+    pub final_cart_position_m: [f64; 3],
+    /// r φ₁ − x, m.
+    pub final_drive_travel_minus_cart_m: [f64; 3],
 }
 
-#[derive(Serialize)]
+#[derive(Debug, Serialize)]
 struct EndingTold {
     word: &'static str,
     time_s: f64,
 }
 
-#[derive(Serialize)]
-struct MetricsTold {
+/// What a run shows.
+#[derive(Debug, Serialize)]
+pub struct Metrics {
     end_time_s: f64,
     final_drive_angle_rad: f64,
     final_drive_travel_m: f64,
@@ -105,7 +128,7 @@ struct MetricsTold {
 }
 
 /// A reduced model beside the elastic one.
-#[derive(Serialize)]
+#[derive(Debug, Serialize)]
 struct ReductionTold {
     #[serde(rename = "peak_cart_difference_m")]
     cart: PeakTold,
@@ -118,13 +141,13 @@ struct ReductionTold {
     stretch: PeakTold,
 }
 
-#[derive(Serialize)]
+#[derive(Debug, Serialize)]
 struct PeakTold {
     value: f64,
     time_s: f64,
 }
 
-#[derive(Serialize)]
+#[derive(Debug, Serialize)]
 struct SteadyTold {
     cart_speed_m_s: f64,
     change_m_s: f64,
@@ -136,7 +159,7 @@ struct SteadyTold {
     to_s: f64,
 }
 
-#[derive(Serialize)]
+#[derive(Debug, Serialize)]
 struct CountTold {
     body: &'static str,
     stops: u64,
@@ -144,8 +167,9 @@ struct CountTold {
     reversals: u64,
 }
 
-#[derive(Serialize)]
-struct EventTold {
+/// What a part of the axis began to do.
+#[derive(Debug, Serialize)]
+pub struct Event {
     time_s: f64,
     part: &'static str,
     from: &'static str,
@@ -154,7 +178,7 @@ struct EventTold {
     load_unit: &'static str,
 }
 
-#[derive(Serialize)]
+#[derive(Debug, Serialize)]
 struct CostTold {
     samples: u64,
     input_pieces: u64,
@@ -166,9 +190,9 @@ struct CostTold {
     evaluations: u64,
 }
 
-impl Summary {
+impl Simulation {
     /// The summary of these runs.
-    pub fn new(case: &Case, solver: Solver, runs: &[Run]) -> Self {
+    pub fn new(case: &Case, solver: Solver, runs: &[Simulated]) -> Self {
         Self {
             title: case.title.clone(),
             version: env!("CARGO_PKG_VERSION"),
@@ -176,13 +200,6 @@ impl Summary {
             stage: StageFigures::of(&case.stage),
             experiments: runs.iter().map(|run| ExperimentFigures::of(run, case.stage.amplifier.mode)).collect(),
         }
-    }
-
-    /// As JSON, numbers to the last bit; what is no number is `null`.
-    pub fn json(&self) -> String {
-        let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
-        text.push('\n');
-        text
     }
 }
 
@@ -223,21 +240,15 @@ impl StageFigures {
 }
 
 impl ExperimentFigures {
-    fn of(run: &Run, mode: AmplifierMode) -> Self {
-        let (metrics, outcome) = (&run.metrics, &run.outcome);
-        let (word, time_s) = match outcome.ending {
-            Ending::Complete => ("complete", metrics.end),
-            Ending::TooManyEvents { time } => ("too_many_events", time),
-            Ending::LeftTravel { time } => ("left_travel", time),
-            Ending::Diverged { time } => ("diverged", time),
-            Ending::Interrupted { time } => ("interrupted", time),
-        };
+    fn of(run: &Simulated, mode: AmplifierMode) -> Self {
+        let (metrics, outcome) = (run.metrics, run.outcome);
+        let (word, time_s) = super::ending(outcome.ending, metrics.end);
         let cost = outcome.cost;
         Self {
             name: run.experiment.name.clone(),
-            files: run.files.clone(),
+            files: run.files.to_vec(),
             ending: EndingTold { word, time_s },
-            metrics: MetricsTold::of(metrics, mode),
+            metrics: Metrics::of(metrics, mode),
             reduction: run.reduction.map(|reduction| ReductionTold {
                 cart: reduction.cart.into(),
                 drive: reduction.drive.into(),
@@ -245,14 +256,8 @@ impl ExperimentFigures {
                 encoder_error: reduction.encoder_error.into(),
                 stretch: reduction.stretch.into(),
             }),
-            band: run.band.as_ref().map(|band| BandTold {
-                machines: band.machines,
-                machines_left_out: band.failed,
-                final_drive_angle_rad: band.end(0),
-                final_cart_position_m: band.end(1),
-                final_drive_travel_minus_cart_m: band.end(2),
-            }),
-            events: outcome.events.iter().take(MOST_EVENTS).map(EventTold::of).collect(),
+            band: run.band,
+            events: outcome.events.iter().take(MOST_EVENTS).map(Event::of).collect(),
             events_not_listed: outcome.events.len().saturating_sub(MOST_EVENTS),
             cost: CostTold {
                 samples: cost.samples,
@@ -268,8 +273,9 @@ impl ExperimentFigures {
     }
 }
 
-impl MetricsTold {
-    fn of(metrics: &Metrics, mode: AmplifierMode) -> Self {
+impl Metrics {
+    /// As seen by a meter on a stage whose amplifier works in this way.
+    pub fn of(metrics: &metrics::Metrics, mode: AmplifierMode) -> Self {
         let count = |body: Body| {
             let count = metrics.events[body.index()];
             CountTold { body: body.key(), stops: count.stops, starts: count.starts, reversals: count.reversals }
@@ -316,8 +322,9 @@ impl SteadyTold {
     }
 }
 
-impl EventTold {
-    fn of(event: &Event) -> Self {
+impl Event {
+    /// As the solver found it.
+    pub fn of(event: &solve::Event) -> Self {
         Self {
             time_s: event.time,
             part: event.part.key(),

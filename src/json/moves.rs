@@ -1,54 +1,46 @@
-//! The summary for machines.
+//! Moves in closed loop: `taut move --json`, `summary.json`.
 
-use super::{Done, Tried};
+use super::{ending, peak};
+use crate::case::Move;
+use crate::control::{Deviation, Loop, MoveRun, Worst};
 use serde_json::{Value, json};
-use taut::control::Deviation;
-use taut::metrics::Peak;
-use taut::solve::Ending;
 
-/// As JSON: one object for one case, a list of them for several; numbers to the last bit.
-pub fn text(tried: &[Tried]) -> String {
-    let value = match tried {
-        [one] => case(one),
-        several => Value::Array(several.iter().map(case).collect()),
-    };
-    let mut text = serde_json::to_string_pretty(&value).unwrap_or_default();
-    text.push('\n');
-    text
+/// What is told of one move that ran.
+#[derive(Debug, Clone, Copy)]
+pub struct Moved<'a> {
+    /// What was asked for.
+    pub motion: &'a Move,
+    /// What came of it.
+    pub run: &'a MoveRun,
+    /// What comes of it on axes that are not what the controller takes them for.
+    pub worst: Option<&'a Worst>,
+    /// Its files.
+    pub files: &'a [String],
 }
 
-fn case(tried: &Tried) -> Value {
+/// The moves of a case of this title under a controller of this name.
+pub fn moves(title: &str, structure: &str, timing: &Loop, moved: &[Moved]) -> Value {
     json!({
-        "title": tried.case.title,
+        "title": title,
         "version": env!("CARGO_PKG_VERSION"),
-        "structure": tried.design.structure.name(),
-        "every_s": tried.design.every,
-        "delay_s": tried.design.delay,
-        "moves": tried.done.iter().map(motion).collect::<Vec<_>>(),
+        "structure": structure,
+        "every_s": timing.every,
+        "delay_s": timing.delay,
+        "moves": moved.iter().map(motion).collect::<Vec<_>>(),
     })
-}
-
-fn peak(peak: Peak) -> Value {
-    json!({ "value": peak.value, "time_s": peak.time })
 }
 
 fn deviation(deviation: Deviation) -> Value {
     json!({ "peak_m": deviation.peak.value, "time_s": deviation.peak.time, "rms_m": deviation.rms, "last_m": deviation.last })
 }
 
-fn motion(done: &Done) -> Value {
-    let (run, figures) = (&done.run, &done.run.figures);
-    let (ending, time) = match run.outcome.ending {
-        Ending::Complete => ("complete", run.metrics.end),
-        Ending::TooManyEvents { time } => ("too_many_events", time),
-        Ending::LeftTravel { time } => ("left_travel", time),
-        Ending::Diverged { time } => ("diverged", time),
-        Ending::Interrupted { time } => ("interrupted", time),
-    };
+fn motion(done: &Moved) -> Value {
+    let (run, figures) = (done.run, &done.run.figures);
+    let (word, time) = ending(run.outcome.ending, run.metrics.end);
     let mut value = json!({
         "name": done.motion.name,
         "files": done.files,
-        "ending": { "word": ending, "time_s": time },
+        "ending": { "word": word, "time_s": time },
         "profile_end_s": done.motion.profile.end(),
         "target_m": done.motion.profile.target(),
         "cart_error": deviation(figures.cart),
@@ -71,7 +63,7 @@ fn motion(done: &Done) -> Value {
         "limited_samples": run.samples.1,
         "events": run.outcome.events.len(),
     });
-    if let (Some(worst), Value::Object(object)) = (&done.worst, &mut value) {
+    if let (Some(worst), Value::Object(object)) = (done.worst, &mut value) {
         object.insert(
             "spread".into(),
             json!({

@@ -1,14 +1,14 @@
-//! The result as data: what `--json` prints and `modes.json` holds. Everything is in SI units, frequencies in Hz where they say so.
+//! A linear analysis: `taut modes --json`, `modes.json`. Frequencies are in Hz where they say so.
 
-use super::Analysis;
+use super::number;
+use crate::linear::{Analysis, Discrete, Place, Root, Transfer, Variable};
+use crate::plant::Body;
 use nalgebra::{Complex, DMatrix, DVector};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
-use taut::linear::{Discrete, Place, Root, Transfer, Variable};
-use taut::plant::Body;
 
-/// The text.
-pub fn text(analysis: &Analysis) -> String {
+/// Matrices, poles, zeros, resonances along the travel.
+pub fn modes(analysis: &Analysis) -> Value {
     let system = &analysis.system;
     let operation = analysis.operation;
     let outputs: Vec<Value> = system
@@ -28,7 +28,7 @@ pub fn text(analysis: &Analysis) -> String {
         })
         .collect();
     let stuck: Vec<&str> = Body::ALL.into_iter().filter(|body| operation.held[body.index()]).map(Body::key).collect();
-    let value = json!({
+    json!({
         "title": analysis.case.title,
         "version": env!("CARGO_PKG_VERSION"),
         "operation": {
@@ -50,15 +50,7 @@ pub fn text(analysis: &Analysis) -> String {
         "here": place(&analysis.here),
         "travel": analysis.travel.as_ref().map(|travel| travel.iter().map(place).collect::<Vec<_>>()),
         "discrete": analysis.discrete.as_ref().map(|model| discrete(model, &system.outputs)),
-    });
-    let mut text = serde_json::to_string_pretty(&value).unwrap_or_default();
-    text.push('\n');
-    text
-}
-
-/// Numbers that JSON has no word for are null.
-fn number(value: f64) -> Value {
-    if value.is_finite() { json!(value) } else { Value::Null }
+    })
 }
 
 fn variable(variable: &Variable) -> Value {
@@ -134,7 +126,7 @@ fn discrete(model: &Discrete, outputs: &[Variable]) -> Value {
         .collect();
     json!({
         "sample_time_s": model.sample_time,
-        "hold": super::table::hold(model),
+        "hold": model.hold.words(),
         "delay_s": model.delay,
         "states": model.states,
         "outputs": zeros,

@@ -1,0 +1,37 @@
+"""Belt-driven axes: described in a file, simulated exactly, identified from logs.
+
+    >>> import taut
+    >>> case = taut.Case(taut.template())
+    >>> run = case.simulate("5 V pulse")
+    >>> float(run["cart_position"][-1])  # m
+    0.05382078557947501
+
+Numbers are in SI units everywhere; names of columns and keys of dictionaries say which where they hold bare numbers.
+Mistakes are :class:`taut.Error`, a ``ValueError`` with the text that the command line shows.
+"""
+
+from ._native import Error, Seen, __version__
+from .case import Case, read, template
+from .results import Check, Estimate, Fit, LinearModel, Modes
+from .runs import Run, Runs
+from .sweeps import sweep, sweep_tables
+from .table import Table
+
+__all__ = [
+    "Case",
+    "Check",
+    "Error",
+    "Estimate",
+    "Fit",
+    "LinearModel",
+    "Modes",
+    "Run",
+    "Runs",
+    "Seen",
+    "Table",
+    "__version__",
+    "read",
+    "sweep",
+    "sweep_tables",
+    "template",
+]

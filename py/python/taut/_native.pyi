@@ -1,0 +1,139 @@
+"""What is written in Rust."""
+
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__version__: str
+
+class Error(ValueError):
+    """A mistake in an input, told as the command line tells it: what, where, what is allowed, what to do next."""
+
+    what: str
+    file: str | None
+    line: int | None
+    column: int | None
+    allowed: str | None
+    next: str | None
+
+class Seen:
+    """What a controller knows at a sample. SI units."""
+
+    @property
+    def time(self) -> float:
+        """Time of the sample, s."""
+
+    @property
+    def position(self) -> float:
+        """Measured position, m along the belt: whole counts of the encoder."""
+
+    @property
+    def current(self) -> float:
+        """Measured motor current, A."""
+
+    @property
+    def reference(self) -> float:
+        """Where the cart should be now, m."""
+
+    @property
+    def reference_speed(self) -> float:
+        """How fast it should be, m/s."""
+
+    @property
+    def reference_acceleration(self) -> float:
+        """How much it should accelerate, m/s^2."""
+
+    @property
+    def ahead(self) -> float:
+        """Where it should be when the command acts, m."""
+
+    @property
+    def ahead_speed(self) -> float:
+        """How fast it should be then, m/s."""
+
+    @property
+    def ahead_acceleration(self) -> float:
+        """How much it should accelerate then, m/s^2."""
+
+class Run:
+    @property
+    def arrays(self) -> dict[str, NDArray[np.float64]]: ...
+    @property
+    def names(self) -> list[tuple[str, str, str]]: ...
+    @property
+    def addresses(self) -> list[int]: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def ending(self) -> tuple[str, float]: ...
+    @property
+    def took(self) -> float: ...
+    def figures(self) -> Any: ...
+    def events(self) -> Any: ...
+    def write(self, path: str | PathLike[str]) -> None: ...
+
+class Fit:
+    @property
+    def data(self) -> dict[str, Any]: ...
+    @property
+    def case(self) -> Case: ...
+    @property
+    def draws(self) -> tuple[dict[str, NDArray[np.float64]], list[tuple[str, str, str]]] | None: ...
+
+class Case:
+    @staticmethod
+    def read(path: str, changes: list[str]) -> Case: ...
+    @staticmethod
+    def from_text(path: str, text: str, changes: list[str]) -> Case: ...
+    def changed(self, changes: list[str]) -> Case: ...
+    @property
+    def title(self) -> str: ...
+    @property
+    def text(self) -> str: ...
+    @property
+    def path(self) -> str: ...
+    @property
+    def experiments(self) -> list[str]: ...
+    @property
+    def moves(self) -> list[str]: ...
+    def value(self, key: str) -> Any: ...
+    def save(self, path: str | PathLike[str]) -> None: ...
+    def simulate(
+        self, names: list[str], solver: str | None, tolerance: float | None, step: float | None, method: str | None
+    ) -> list[Run]: ...
+    def run_moves(
+        self,
+        names: list[str],
+        controller: Any,
+        timing: tuple[float | None, float | None, float | None],
+        spread: float | None,
+    ) -> list[Run]: ...
+    def check(self) -> dict[str, Any]: ...
+    def fit(self, effort: tuple[int, int] | None, profiled: bool) -> Fit: ...
+    def modes(
+        self,
+        at: float | None,
+        speed: float | None,
+        stuck: list[str],
+        sample_time: float | None,
+        hold: str | None,
+        delay: float | None,
+        lowest: float | None,
+        highest: float | None,
+        /,
+    ) -> dict[str, Any]: ...
+
+class Sweep:
+    def __init__(self, case: Case) -> None: ...
+    @property
+    def runs(self) -> int: ...
+    def names(self) -> list[tuple[str, str, str]]: ...
+    def rows(
+        self, first: int, count: int, threads: int
+    ) -> tuple[dict[str, NDArray[np.float64]], list[tuple[str, str, str]]]: ...
+
+def template() -> str: ...
+def simulation(runs: list[Run]) -> Any: ...
+def moves(runs: list[Run]) -> Any: ...

@@ -1,0 +1,40 @@
+"""Python values as a case file writes them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+
+def written(value: Any) -> str:
+    """The value in TOML: numbers are SI, texts may carry a unit, lists and dictionaries hold these."""
+    if hasattr(value, "tolist"):  # NumPy's scalars and arrays
+        value = value.tolist()
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, float):
+        # Shortest digits that read back to the same bits; TOML wants a digit on both sides of a point, and writes nan and inf alike.
+        return repr(value) if math.isfinite(value) else str(value)
+    if isinstance(value, str):
+        # Strings of JSON are strings of TOML, but for DEL.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key_text(str(key))} = {written(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(written(item) for item in value) + "]"
+    raise TypeError(f"a case holds numbers, texts, truths, lists and dictionaries, and no {type(value).__name__}")
+
+
+def key_text(key: str) -> str:
+    """A key, in quotes where it needs them."""
+    plain = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
+    return key if plain else json.dumps(key, ensure_ascii=False)
+
+
+def change(key: str, value: Any) -> str:
+    """``KEY=VALUE``, as ``--set`` takes it."""
+    return f"{key}={written(value)}"

@@ -1,0 +1,276 @@
+"""Cases: everything needed to repeat a run."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from os import PathLike
+from typing import Any, Protocol, overload
+
+from . import _html, _native
+from ._toml import change
+from .results import Check, Fit, LinearModel, Modes
+from .runs import Run, Runs
+from .sweeps import sweep
+from .table import Table
+
+
+class Controller(Protocol):
+    """A controller of one's own.
+
+    It may also have ``reset()``, called before a move, and ``limited(given)``, told after each sample what the limit left.
+    """
+
+    def step(self, seen: _native.Seen, /) -> float:
+        """The command, V or A, that follows from what is seen; called once a sample."""
+        ...
+
+
+class Case:
+    """A case file: a stage, and what is done with it.
+
+    ``case["cart.mass"]`` reads a value in SI units, ``case["cart.mass"] = "0.6 kg"`` or ``= 0.6`` writes one: by the keys of
+    the case file, with comments and layout kept, and checked as the file is. ``case.text`` is the file.
+    """
+
+    __slots__ = ("_native",)
+
+    def __init__(self, text: str, path: str | PathLike[str] = "case.toml") -> None:
+        """Reads a case from text. ``path`` stands in messages; other files that the text names are found from its folder."""
+        self._native = _native.Case.from_text(os.fspath(path), text, [])
+
+    @classmethod
+    def _of(cls, native: _native.Case) -> Case:
+        case = cls.__new__(cls)
+        case._native = native
+        return case
+
+    @property
+    def title(self) -> str:
+        """What the case says it is."""
+        return self._native.title
+
+    @property
+    def text(self) -> str:
+        """The case file: read again, it gives the same case."""
+        return self._native.text
+
+    @property
+    def path(self) -> str:
+        """Where it was read from, or as it was called."""
+        return self._native.path
+
+    @property
+    def experiments(self) -> list[str]:
+        """Names of the experiments."""
+        return self._native.experiments
+
+    @property
+    def moves(self) -> list[str]:
+        """Names of the moves in closed loop."""
+        return self._native.moves
+
+    def __getitem__(self, key: str) -> Any:
+        """What stands under a key such as ``cart.mass`` or ``experiment.0.until``: quantities in SI units."""
+        try:
+            return self._native.value(key)
+        except _native.Error as error:
+            raise KeyError(str(error)) from None
+
+    def get(self, key: str, default: Any = None) -> Any:
+        """What stands under a key, or the default."""
+        try:
+            return self[key]
+        except KeyError:
+            return default
+
+    def __contains__(self, key: str) -> bool:
+        return self.get(key) is not None
+
+    def __setitem__(self, key: str, value: Any) -> None:
+        """Writes a value: a number in SI units, a text with a unit, a list or a dictionary of these."""
+        self.update({key: value})
+
+    def update(self, changes: Mapping[str, Any]) -> None:
+        """Writes several values, which are checked together."""
+        self._native = self._native.changed([change(key, value) for key, value in changes.items()])
+
+    def changed(self, changes: Mapping[str, Any]) -> Case:
+        """Another case with these values; this one stays as it is."""
+        return self._of(self._native.changed([change(key, value) for key, value in changes.items()]))
+
+    def copy(self) -> Case:
+        """Another case with the same text."""
+        return self._of(self._native)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Writes the text: under a temporary name first, so that nobody sees half of it."""
+        self._native.save(path)
+
+    @overload
+    def simulate(
+        self,
+        experiment: str,
+        *,
+        solver: str | None = None,
+        tolerance: float | None = None,
+        step: float | None = None,
+        method: str | None = None,
+    ) -> Run: ...
+    @overload
+    def simulate(
+        self,
+        experiment: list[str] | tuple[str, ...] | None = None,
+        *,
+        solver: str | None = None,
+        tolerance: float | None = None,
+        step: float | None = None,
+        method: str | None = None,
+    ) -> Runs: ...
+    def simulate(
+        self,
+        experiment: str | list[str] | tuple[str, ...] | None = None,
+        *,
+        solver: str | None = None,
+        tolerance: float | None = None,
+        step: float | None = None,
+        method: str | None = None,
+    ) -> Run | Runs:
+        """Runs one experiment by its name, several, or all.
+
+        ``solver`` is ``exact``, ``general`` (with ``tolerance``) or ``table3`` (with ``step``, s, and ``method``, ``rk4`` or
+        ``dp5``); by default the one for this stage.
+        """
+        if isinstance(experiment, str):
+            return Run(self._native.simulate([experiment], solver, tolerance, step, method)[0])
+        runs = self._native.simulate(list(experiment or ()), solver, tolerance, step, method)
+        return Runs([Run(run) for run in runs], moved=False)
+
+    def check(self) -> Check:
+        """What the logs can tell of the parameters in [fit], before any fit."""
+        return Check(self._native.check())
+
+    def fit(
+        self, *, profiles: bool = False, posterior: bool = False, draws: int = 1000, chains: int = 4
+    ) -> Fit:
+        """Finds the parameters in [fit] from the logs.
+
+        With ``profiles`` it also holds each parameter beside its estimate and fits the others: ``data["profiles"]``.
+        With ``posterior`` it also draws from the posterior: ``draws`` of each of ``chains`` chains. Ctrl-C ends it.
+        """
+        native = self._native.fit((draws, chains) if posterior else None, profiles)
+        drawn = None if native.draws is None else Table(*native.draws)
+        return Fit(native.data, self._of(native.case), drawn)
+
+    def modes(
+        self,
+        *,
+        at: float | None = None,
+        speed: float | None = None,
+        stuck: Sequence[str] = (),
+        sample_time: float | None = None,
+        hold: str = "zero",
+        delay: float = 0.0,
+        lowest: float | None = None,
+        highest: float | None = None,
+    ) -> Modes:
+        """Linearises the stage while everything slides: matrices, poles, zeros, frequency response, resonances.
+
+        ``at`` is where the cart is (m), ``speed`` how fast it slides (m/s, 0.1 if not said), ``stuck`` which of ``drive``,
+        ``cart``, ``idler`` are held. With ``sample_time`` (s) also a discrete-time model, whose input is held (``zero``,
+        ``first`` or ``tustin``) and late by ``delay`` (s). ``lowest`` and ``highest`` bound the response, Hz.
+        """
+        names = list(stuck)
+        found = self._native.modes(at, speed, names, sample_time, hold, delay, lowest, highest)
+        data = found["data"]
+        inputs, outputs = (data["input"]["name"],), tuple(row["name"] for row in data["outputs"])
+        units = {row["name"]: row["unit"] for row in [data["input"], *data["outputs"]]}
+        states = tuple(row["name"] for row in data["states"])
+        a, b, c, d = found["continuous"]
+        model = LinearModel(a, b, c, d, 0.0, states, inputs, outputs, units)
+        discrete = None
+        if sample_time is not None:
+            a, b, c, d = found["discrete"]
+            late = tuple(data["discrete"]["states"])
+            discrete = LinearModel(a, b, c, d, sample_time, late, inputs, outputs, units)
+        return Modes(data, model, discrete, found["frequency"], found["responses"])
+
+    @overload
+    def move(
+        self,
+        move: str,
+        *,
+        controller: Controller | Callable[[float, float], float] | None = None,
+        every: float | None = None,
+        delay: float | None = None,
+        limit: float | None = None,
+        spread: float | None = None,
+    ) -> Run: ...
+    @overload
+    def move(
+        self,
+        move: list[str] | tuple[str, ...] | None = None,
+        *,
+        controller: Controller | Callable[[float, float], float] | None = None,
+        every: float | None = None,
+        delay: float | None = None,
+        limit: float | None = None,
+        spread: float | None = None,
+    ) -> Runs: ...
+    def move(
+        self,
+        move: str | list[str] | tuple[str, ...] | None = None,
+        *,
+        controller: Controller | Callable[[float, float], float] | None = None,
+        every: float | None = None,
+        delay: float | None = None,
+        limit: float | None = None,
+        spread: float | None = None,
+    ) -> Run | Runs:
+        """Runs one move in closed loop by its name, several, or all; with the case's controller, or one of your own.
+
+        ``controller`` is a function of the measured position and the reference (m), or an object with ``step(seen)``; it
+        returns the command (V or A) and is called once a sample. ``every`` (sample time, s), ``delay`` (from sample to
+        command, s) and ``limit`` (of the command) are the case's unless said. What it raises comes out here. ``spread``
+        also tries the case's controller with each parameter off by this share.
+        """
+        if controller is None and (every, delay, limit) != (None, None, None):
+            raise TypeError("every, delay and limit go with a controller of your own; the case's are in [controller]")
+        if controller is not None and spread is not None:
+            raise TypeError("spread goes with the case's own controller")
+        names = [move] if isinstance(move, str) else list(move or ())
+        runs = [Run(run) for run in self._native.run_moves(names, controller, (every, delay, limit), spread)]
+        return runs[0] if isinstance(move, str) else Runs(runs, moved=True)
+
+    def sweep(self, n: int | None = None, **options: Any) -> Table:
+        """Runs ``n`` machines with parameters varied: :func:`taut.sweep` of this case, with its options."""
+        return sweep(self, n, **options)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Case) and (self.text, self.path) == (other.text, other.path)
+
+    def __hash__(self) -> int:
+        return hash((self.text, self.path))
+
+    def __reduce__(self) -> tuple[type[Case], tuple[str, str]]:
+        return (Case, (self.text, self.path))
+
+    def __repr__(self) -> str:
+        done = [*self.experiments, *self.moves]
+        return f"<taut.Case {self.title!r}: {', '.join(done)}>"
+
+    def _repr_html_(self) -> str:
+        keys = ("cart.mass", "drive_pulley.inertia", "motor.torque_constant", "motor.resistance", "belt.stiffness")
+        rows = [(key, self.get(key)) for key in keys]
+        done = [("experiment", name) for name in self.experiments] + [("move", name) for name in self.moves]
+        return _html.table(self.title, ("key", "SI"), rows + done)
+
+
+def read(path: str | PathLike[str]) -> Case:
+    """Reads a case file."""
+    return Case._of(_native.Case.read(os.fspath(path), []))
+
+
+def template() -> str:
+    """The commented case file that ``taut init`` writes."""
+    return _native.template()

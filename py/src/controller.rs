@@ -1,0 +1,133 @@
+//! A controller written in Python, called once a sample.
+
+use crate::interrupt::Interrupt;
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::intern;
+use pyo3::prelude::*;
+use taut::control::{self, Controller};
+
+/// What a controller knows at a sample. SI units.
+#[pyclass(frozen, get_all, module = "taut")]
+#[derive(Debug, Clone)]
+pub struct Seen {
+    /// Time of the sample, s.
+    time: f64,
+    /// Measured position, m along the belt: whole counts of the encoder.
+    position: f64,
+    /// Measured motor current, A.
+    current: f64,
+    /// Where the cart should be now, m.
+    reference: f64,
+    /// How fast it should be, m/s.
+    reference_speed: f64,
+    /// How much it should accelerate, m/s^2.
+    reference_acceleration: f64,
+    /// Where it should be when the command acts, m.
+    ahead: f64,
+    /// How fast it should be then, m/s.
+    ahead_speed: f64,
+    /// How much it should accelerate then, m/s^2.
+    ahead_acceleration: f64,
+}
+
+#[pymethods]
+impl Seen {
+    fn __repr__(&self) -> String {
+        format!("Seen(time={}, position={}, reference={}, ...)", self.time, self.position, self.reference)
+    }
+}
+
+impl From<&control::Seen> for Seen {
+    fn from(seen: &control::Seen) -> Self {
+        Self {
+            time: seen.time,
+            position: seen.position,
+            current: seen.current,
+            reference: seen.reference.position,
+            reference_speed: seen.reference.speed,
+            reference_acceleration: seen.reference.acceleration,
+            ahead: seen.ahead.position,
+            ahead_speed: seen.ahead.speed,
+            ahead_acceleration: seen.ahead.acceleration,
+        }
+    }
+}
+
+/// How the object is called.
+enum Way {
+    /// `step(seen)`
+    Step,
+    /// `controller(position, reference)`
+    Call,
+}
+
+/// The controller as the library steps it. The interpreter's lock is held while it lives.
+pub struct Own<'a, 'py> {
+    object: Bound<'py, PyAny>,
+    way: Way,
+    interrupt: &'a Interrupt,
+}
+
+impl<'a, 'py> Own<'a, 'py> {
+    /// Looks at what the object can do; what it raises goes to `interrupt`.
+    pub fn new(object: &Bound<'py, PyAny>, interrupt: &'a Interrupt) -> PyResult<Self> {
+        let way = match object.hasattr("step")? {
+            true => Way::Step,
+            false if object.is_callable() => Way::Call,
+            false => {
+                return Err(PyTypeError::new_err(
+                    "a controller is a function of (position, reference), or an object with a method step(seen)",
+                ));
+            }
+        };
+        Ok(Self { object: object.clone(), way, interrupt })
+    }
+
+    fn command(&self, seen: &control::Seen) -> PyResult<f64> {
+        let py = self.object.py();
+        let command = match self.way {
+            Way::Step => self.object.call_method1(intern!(py, "step"), (Seen::from(seen),))?,
+            Way::Call => self.object.call1((seen.position, seen.reference.position))?,
+        };
+        let command: f64 = command.extract()?;
+        match command.is_finite() {
+            true => Ok(command),
+            false => Err(PyValueError::new_err(format!("at {} s the controller's command is {command}", seen.time))),
+        }
+    }
+
+    /// A method that may be there.
+    fn tell(&self, name: &str, with: Option<f64>) -> PyResult<()> {
+        match (self.object.getattr_opt(name)?, with) {
+            (Some(method), Some(value)) => method.call1((value,)).map(|_| ()),
+            (Some(method), None) => method.call0().map(|_| ()),
+            (None, _) => Ok(()),
+        }
+    }
+}
+
+impl Controller for Own<'_, '_> {
+    fn step(&mut self, seen: &control::Seen) -> f64 {
+        if self.interrupt.stop() {
+            return 0.0;
+        }
+        self.command(seen).unwrap_or_else(|exception| {
+            self.interrupt.raise(exception);
+            0.0
+        })
+    }
+
+    fn limited(&mut self, given: f64) {
+        if !self.interrupt.stop()
+            && let Err(exception) = self.tell("limited", Some(given))
+        {
+            self.interrupt.raise(exception);
+        }
+    }
+
+    fn reset(&mut self) {
+        if let Err(exception) = self.tell("reset", None) {
+            self.interrupt.raise(exception);
+        }
+    }
+}

@@ -1,0 +1,37 @@
+//! The Python package `taut`: what is below its Python sources in `python/taut`.
+//!
+//! Every class here is wrapped there by one with docstrings, types, tables and plots. Work that takes long runs without the
+//! interpreter's lock and asks now and then whether Ctrl-C was pressed.
+
+mod case;
+mod columns;
+mod controller;
+mod error;
+mod interrupt;
+mod modes;
+mod runs;
+mod sweep;
+mod value;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use crate::case::{Case, Fit, template};
+    #[pymodule_export]
+    use crate::controller::Seen;
+    #[pymodule_export]
+    use crate::error::Error;
+    #[pymodule_export]
+    use crate::runs::{Run, moves, simulation};
+    #[pymodule_export]
+    use crate::sweep::Sweep;
+
+    use super::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

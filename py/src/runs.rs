@@ -1,0 +1,268 @@
+//! Runs of experiments and moves.
+
+use crate::case::Case;
+use crate::columns::Columns;
+use crate::controller::Own;
+use crate::error::Told;
+use crate::interrupt::Interrupt;
+use crate::value;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+use taut::case::Experiment;
+use taut::control::{Loop, MoveRun, Rows, Standard, Worst, stream, worst};
+use taut::json::{self, Moved, Simulated, Simulation};
+use taut::metrics::{Meter, Metrics};
+use taut::reduction::Reduction;
+use taut::solve::{self, Flow, Outcome, Solver};
+use taut::trajectory::{CsvWriter, ParquetWriter, Trajectory};
+
+/// An experiment or a move that was run, everything in memory.
+#[pyclass(frozen, module = "taut._native")]
+pub struct Run {
+    case: Arc<taut::case::Case>,
+    columns: Columns,
+    what: What,
+    /// Seconds that Rust took.
+    #[pyo3(get)]
+    took: f64,
+}
+
+/// What it was.
+enum What {
+    Experiment { index: usize, solver: Solver, outcome: Outcome, metrics: Box<Metrics>, reduction: Option<Reduction> },
+    Move { index: usize, run: Box<MoveRun>, worst: Option<Worst>, structure: String, timing: Loop },
+}
+
+#[pymethods]
+impl Run {
+    /// Name to array.
+    #[getter]
+    fn arrays(&self, py: Python<'_>) -> Py<PyDict> {
+        self.columns.arrays.clone_ref(py)
+    }
+
+    /// Name, unit and heading of each column.
+    #[getter]
+    fn names(&self, py: Python<'_>) -> Py<PyList> {
+        self.columns.names.clone_ref(py)
+    }
+
+    #[getter]
+    fn addresses(&self) -> Vec<usize> {
+        self.columns.addresses.clone()
+    }
+
+    /// The experiment's or the move's.
+    #[getter]
+    fn name(&self) -> &str {
+        match self.what {
+            What::Experiment { index, .. } => &self.case.experiments[index].name,
+            What::Move { index, .. } => &self.case.moves[index].name,
+        }
+    }
+
+    /// How it ended, in a word, and when, s.
+    #[getter]
+    fn ending(&self) -> (&'static str, f64) {
+        json::ending(self.outcome().ending, self.metrics().end)
+    }
+
+    /// The key figures.
+    fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let told = json::Metrics::of(self.metrics(), self.case.stage.amplifier.mode);
+        value::json(py, &serde_json::to_value(told).unwrap_or_default())
+    }
+
+    /// Every event.
+    fn events<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let told: Vec<_> = self.outcome().events.iter().map(json::Event::of).collect();
+        value::json(py, &serde_json::to_value(told).unwrap_or_default())
+    }
+
+    /// Writes the columns as `taut simulate` does, to .csv or .parquet.
+    fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let trajectory = self.trajectory(py)?;
+        py.detach(|| write(&trajectory, &path)).told(py)
+    }
+}
+
+impl Run {
+    fn outcome(&self) -> &Outcome {
+        match &self.what {
+            What::Experiment { outcome, .. } => outcome,
+            What::Move { run, .. } => &run.outcome,
+        }
+    }
+
+    fn metrics(&self) -> &Metrics {
+        match &self.what {
+            What::Experiment { metrics, .. } => metrics,
+            What::Move { run, .. } => &run.metrics,
+        }
+    }
+
+    /// A copy of the columns, for writers.
+    fn trajectory(&self, py: Python<'_>) -> PyResult<Trajectory> {
+        crate::columns::read(self.columns.arrays.bind(py), self.columns.names.bind(py))
+    }
+}
+
+fn write(trajectory: &Trajectory, path: &std::path::Path) -> taut::Result<()> {
+    match path.extension().and_then(|ending| ending.to_str()) {
+        Some("csv") => {
+            let mut writer = CsvWriter::create(path)?;
+            writer.write(trajectory)?;
+            writer.finish()
+        }
+        Some("parquet") => {
+            let mut writer = ParquetWriter::create(path)?;
+            writer.write(trajectory)?;
+            writer.finish()
+        }
+        _ => Err(taut::Error::new("the ending of this name says no format").in_file(path).allowed(".csv or .parquet")),
+    }
+}
+
+/// Runs experiments of a case.
+pub fn simulate(py: Python<'_>, case: &Case, names: &[String], solver: Solver) -> PyResult<Vec<Run>> {
+    let experiments = case.inner.experiments_named(&case.path, names).told(py)?;
+    experiments.into_iter().map(|experiment| one(py, case, experiment, solver)).collect()
+}
+
+fn one(py: Python<'_>, case: &Case, experiment: &Experiment, solver: Solver) -> PyResult<Run> {
+    let stage = &case.inner.stage;
+    let interrupt = Interrupt::listen();
+    let (found, took) = py.detach(|| {
+        let begin = Instant::now();
+        let mut meter = Meter::new(stage);
+        let mut trajectory = Trajectory::default();
+        let rows = experiment.samples().min(1 << 20) as usize + 1;
+        let outcome = solve::stream(stage, experiment, solver, &mut |block| {
+            meter.take(block);
+            if trajectory.columns.is_empty() {
+                trajectory = Trajectory::with_capacity(&block.columns, rows);
+            }
+            trajectory.append(block);
+            if interrupt.stop() { Flow::Stop } else { Flow::Continue }
+        });
+        let found = outcome.and_then(|outcome| {
+            let metrics = meter.finish(&outcome.events);
+            let reduction = Reduction::of(stage, experiment, solver)?;
+            Ok((trajectory, outcome, metrics, reduction))
+        });
+        (found, begin.elapsed().as_secs_f64())
+    });
+    interrupt.finish()?;
+    let (trajectory, outcome, metrics, reduction) = found.told(py)?;
+    let index = case.inner.experiments.iter().position(|other| std::ptr::eq(other, experiment)).unwrap_or_default();
+    let what = What::Experiment { index, solver, outcome, metrics: Box::new(metrics), reduction };
+    Ok(Run { case: Arc::clone(&case.inner), columns: Columns::of(py, trajectory)?, what, took })
+}
+
+/// The timing of a loop with a controller in Python, where it is not the case's.
+pub type Timing = (Option<f64>, Option<f64>, Option<f64>);
+
+/// Runs moves of a case in closed loop, with its own controller or one in Python.
+pub fn motion(
+    py: Python<'_>,
+    case: &Case,
+    names: &[String],
+    controller: Option<&Bound<'_, PyAny>>,
+    (every, delay, limit): Timing,
+    share: Option<f64>,
+) -> PyResult<Vec<Run>> {
+    let (design, moves) = case.inner.moves_named(&case.path, names).told(py)?;
+    let (stage, solver) = (&case.inner.stage, Solver::of(&case.inner.stage));
+    let usual = Loop::of(design);
+    let timing = Loop {
+        every: every.unwrap_or(usual.every),
+        delay: delay.unwrap_or(usual.delay),
+        limit: limit.or(usual.limit),
+        ..usual
+    };
+    let structure = match controller {
+        None => design.structure.name().to_string(),
+        Some(object) => object.getattr("__name__").or_else(|_| object.get_type().getattr("__name__"))?.to_string(),
+    };
+    let mut runs = Vec::new();
+    for motion in moves {
+        let profile = motion.profile.clone().shaped(&design.shaper);
+        let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
+        let interrupt = Interrupt::listen();
+        let mut trajectory = Trajectory::default();
+        let mut take = |block: &Trajectory| {
+            trajectory.append(block);
+            if interrupt.stop() { Flow::Stop } else { Flow::Continue }
+        };
+        let begin = Instant::now();
+        let run = match controller {
+            Some(object) => {
+                let mut own = Own::new(object, &interrupt)?;
+                stream(stage, &mut own, &timing, &profile, &rows, solver, true, &mut take)
+            }
+            None => py.detach(|| {
+                let mut controller = Standard::new(design, stage)?;
+                stream(stage, &mut controller, &timing, &profile, &rows, solver, true, &mut take)
+            }),
+        };
+        interrupt.finish()?;
+        let run = run.told(py)?;
+        let worst = match share {
+            Some(share) => Some(py.detach(|| worst(stage, design, motion, share, solver)).told(py)?),
+            None => None,
+        };
+        let took = begin.elapsed().as_secs_f64();
+        let index = case.inner.moves.iter().position(|other| std::ptr::eq(other, motion)).unwrap_or_default();
+        let what = What::Move { index, run: Box::new(run), worst, structure: structure.clone(), timing };
+        runs.push(Run { case: Arc::clone(&case.inner), columns: Columns::of(py, trajectory)?, what, took });
+    }
+    Ok(runs)
+}
+
+/// What `taut simulate --json` prints of these runs.
+#[pyfunction]
+pub fn simulation<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound<'py, PyAny>> {
+    let told: Vec<Simulated> = runs
+        .iter()
+        .filter_map(|run| match &run.what {
+            What::Experiment { index, outcome, metrics, reduction, .. } => Some(Simulated {
+                experiment: &run.case.experiments[*index],
+                outcome,
+                metrics,
+                reduction: *reduction,
+                band: None,
+                files: &[],
+            }),
+            What::Move { .. } => None,
+        })
+        .collect();
+    let first = runs.iter().find_map(|run| match run.what {
+        What::Experiment { solver, .. } => Some((&run.case, solver)),
+        What::Move { .. } => None,
+    });
+    let Some((case, solver)) = first else { return Ok(py.None().into_bound(py)) };
+    value::json(py, &serde_json::to_value(Simulation::new(case, solver, &told)).unwrap_or_default())
+}
+
+/// What `taut move --json` prints of these runs.
+#[pyfunction]
+pub fn moves<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound<'py, PyAny>> {
+    let told: Vec<Moved> = runs
+        .iter()
+        .filter_map(|run| match &run.what {
+            What::Move { index, run: moved, worst, .. } => {
+                Some(Moved { motion: &run.case.moves[*index], run: moved, worst: worst.as_ref(), files: &[] })
+            }
+            What::Experiment { .. } => None,
+        })
+        .collect();
+    let first = runs.iter().find_map(|run| match &run.what {
+        What::Move { structure, timing, .. } => Some((&run.case.title, structure, timing)),
+        What::Experiment { .. } => None,
+    });
+    let Some((title, structure, timing)) = first else { return Ok(py.None().into_bound(py)) };
+    value::json(py, &json::moves(title, structure, timing, &told))
+}

@@ -1,0 +1,108 @@
+"""Cases: read, edited, saved, and mistakes told."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import taut
+
+
+def test_values_are_read_in_si_units(case):
+    assert case["motor.resistance"] == 0.71
+    assert case["drive_pulley.radius"] == 0.0194
+    assert case["belt.stiffness"] == [132760.0, 132760.0, 58885.0]
+    assert case['experiment."5 V pulse".input'] == {"pulse": 5.0, "for": 0.25}
+    assert case["experiment.0.name"] == "5 V pulse"
+    # A default that the text does not say.
+    assert case["motor.gear_efficiency"] == 1.0
+    assert "cart.mass" in case and "cart.weight" not in case
+    with pytest.raises(KeyError, match="says nothing of `cart.weight`"):
+        case["cart.weight"]
+
+
+def test_values_are_written_with_comments_kept(case):
+    before = case.text
+    case["cart.mass"] = "600 g"
+    assert case["cart.mass"] == 0.6 and '"600 g"' in case.text
+    case["cart.mass"] = 0.1 + 0.2
+    assert case["cart.mass"] == 0.1 + 0.2
+    case["cart.mass"] = np.float64(0.5)
+    assert case["cart.mass"] == 0.5
+    case["belt.stiffness"] = np.array([1e5, 2e5, 3e5])
+    assert case["belt.stiffness"] == [1e5, 2e5, 3e5]
+    case["experiment.0.input"] = {"step": "3 V", "at": 0.1}
+    assert case["experiment.0.input"] == {"step": 3.0, "at": 0.1}
+    comments = [line for line in before.splitlines() if line.startswith("#")]
+    assert comments and [line for line in case.text.splitlines() if line.startswith("#")] == comments
+
+
+def test_another_case_leaves_this_one_alone(case):
+    other = case.changed({"cart.mass": 1, "experiment.0.until": "2 s"})
+    assert other["cart.mass"] == 1.0 and case["cart.mass"] == 0.362
+    copy = case.copy()
+    copy["cart.mass"] = 2
+    assert case["cart.mass"] == 0.362
+    assert case.copy() == case != copy
+
+
+def test_a_refused_value_changes_nothing(case):
+    before = case.text
+    with pytest.raises(taut.Error):
+        case["cart.mass"] = -1
+    assert case.text == before
+    with pytest.raises(taut.Error, match="not a finite number"):
+        case["cart.mass"] = float("nan")
+    with pytest.raises(TypeError, match="and no object"):
+        case["cart.mass"] = object()
+
+
+def test_mistakes_are_told_as_on_the_command_line(case):
+    with pytest.raises(taut.Error) as caught:
+        case["cart.mass"] = "0.5 m"
+    assert str(caught.value) == (
+        '--set:1:11: cart.mass: "0.5 m" is a length (m); a mass (kg) is wanted\n'
+        '  1 | cart.mass="0.5 m"\n'
+        "    |           ^^^^^^^\n"
+        '  next: write for example mass = "0.362 kg"'
+    )
+    with pytest.raises(ValueError) as caught:
+        taut.Case(taut.template().replace("torque_constant", "torque_konstant"), "axis.toml")
+    error = caught.value
+    assert isinstance(error, taut.Error)
+    assert error.file == "axis.toml" and error.line > 1 and error.column == 1
+    assert error.what == "`motor` has no key `torque_konstant`"
+    assert error.next == "did you mean `torque_constant`?"
+    assert error.allowed.startswith("torque_constant, ")
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.line, again.next) == (str(error), error.line, error.next)
+
+
+@pytest.mark.parametrize("folder", ["case", "mapping"])
+def test_wrong_files_give_their_messages(root, folder):
+    """Every wrong case under tests/bad, with the message that the command line must give."""
+    folder = root / "tests" / "bad" / folder
+    wrong = sorted(folder.glob("*.toml"))
+    assert len(wrong) >= 60
+    for path in wrong:
+        with pytest.raises(taut.Error) as caught:
+            taut.read(path)
+        expected = path.with_suffix(".txt").read_text(encoding="utf-8")
+        assert str(caught.value).replace(f"{folder}/", "") + "\n" == expected, path.name
+
+
+def test_cases_are_read_and_saved(case, tmp_path):
+    path = tmp_path / "axis.toml"
+    case["cart.mass"] = 0.7
+    case.save(path)
+    assert [file.name for file in tmp_path.iterdir()] == ["axis.toml"]
+    read = taut.read(path)
+    assert read.text == case.text and read.path == str(path)
+    assert pickle.loads(pickle.dumps(read)) == read
+    with pytest.raises(taut.Error, match="there is no such file"):
+        taut.read(tmp_path / "none.toml")
+
+
+def test_it_shows_itself(case):
+    assert repr(case).startswith("<taut.Case 'My axis': 5 V pulse")
+    assert "<td>cart.mass</td><td>0.362</td>" in case._repr_html_()

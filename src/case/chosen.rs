@@ -1,0 +1,53 @@
+//! What of a case is asked for by name, told by the names of the command line's options where it is not there.
+
+use super::{Case, Experiment, Move, Plan};
+use crate::design::Design;
+use crate::error::{Error, Result};
+use std::path::Path;
+
+impl Case {
+    /// The experiments of these names, in the case's order; all if none is named. `path` is the case's own.
+    pub fn experiments_named(&self, path: &Path, names: &[String]) -> Result<Vec<&Experiment>> {
+        if self.experiments.is_empty() {
+            return Err(Error::new(format!("\"{}\" has moves, and no experiments", self.title))
+                .in_file(path)
+                .next("run its moves with `taut move`, or add an [[experiment]]"));
+        }
+        let known = || self.experiments.iter().map(|e| e.name.as_str());
+        if let Some(name) = names.iter().find(|name| known().all(|other| other != **name)) {
+            return Err(Error::new(format!("there is no experiment \"{name}\""))
+                .in_file("--experiment")
+                .allowed(quoted(known()))
+                .next("name one of these, or leave --experiment out to run them all"));
+        }
+        Ok(self.experiments.iter().filter(|e| names.is_empty() || names.contains(&e.name)).collect())
+    }
+
+    /// The controller, and the moves of these names in the case's order; all if none is named. `path` is the case's own.
+    pub fn moves_named(&self, path: &Path, names: &[String]) -> Result<(&Design, Vec<&Move>)> {
+        let Some(design) = self.controller.as_ref().filter(|_| !self.moves.is_empty()) else {
+            return Err(Error::new("this case has no move and no controller to run it").in_file(path).next(
+                "add [controller] with every and for example pid = { proportional = \"2 V/mm\" }, \
+                 and [[move]] with name, to, speed, acceleration and until",
+            ));
+        };
+        let known = || self.moves.iter().map(|m| m.name.as_str());
+        if let Some(name) = names.iter().find(|name| known().all(|other| other != **name)) {
+            return Err(Error::new(format!("there is no move \"{name}\"")).in_file("--move").allowed(quoted(known())));
+        }
+        Ok((design, self.moves.iter().filter(|m| names.is_empty() || names.contains(&m.name)).collect()))
+    }
+
+    /// What is to be found from its logs. `path` is the case's own.
+    pub fn fit_plan(&self, path: &Path) -> Result<Plan> {
+        self.fit.clone().ok_or_else(|| {
+            Error::new("this case does not say what is searched for").in_file(path).next(
+                "add a table [fit] with for example free = [\"cart.friction.viscous\", \"cart.friction.coulomb\"]",
+            )
+        })
+    }
+}
+
+fn quoted<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    names.map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
+}

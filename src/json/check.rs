@@ -1,0 +1,54 @@
+//! What logs can tell: `taut check --json`.
+
+use super::number;
+use crate::case::Case;
+use crate::fit::Check;
+use serde_json::{Value, json};
+
+/// What each log shows, how well each parameter would be known, what nothing tells apart.
+pub fn check(case: &Case, found: &Check) -> Value {
+    let known = &found.identifiability;
+    json!({
+        "title": case.title,
+        "complete": known.complete(),
+        "parameters": known.names.iter().enumerate().map(|(j, name)| json!({
+            "name": name,
+            "relative_error": number(known.error[j]),
+            "determined": known.error[j].is_finite(),
+            "sensitivity": number(known.sensitivity[j]),
+        })).collect::<Vec<_>>(),
+        "regression": found.balance.map(|b| json!({
+            "inertia_kg_m2": b.inertia,
+            "viscous_N_m_s_rad": b.viscous,
+            "coulomb_N_m": b.coulomb,
+            "load_N_m": b.load,
+            "errors": b.errors,
+            "unexplained": b.unexplained,
+            "equations": b.equations,
+        })),
+        "singular_values": known.singular.iter().map(|s| number(*s)).collect::<Vec<_>>(),
+        "not_determined": known.groups.iter().zip(&found.choices).map(|(group, choices)| json!({
+            "parameters": group.members.iter().map(|&j| &known.names[j]).collect::<Vec<_>>(),
+            "combinations_determined": group.determined,
+            "words": group.words,
+            "choices": choices,
+        })).collect::<Vec<_>>(),
+        "logs": found.logs.iter().map(|log| json!({
+            "name": log.log,
+            "samples": log.timing.samples,
+            "duration_s": log.timing.duration,
+            "interval_s": log.timing.interval,
+            "notes": log.notes.iter().map(|note| json!({
+                "code": note.code,
+                "severity": note.severity.word(),
+                "column": note.column,
+                "text": note.text,
+            })).collect::<Vec<_>>(),
+        })).collect::<Vec<_>>(),
+        "experiments": found.experiments.iter().map(|experiment| json!({
+            "name": experiment.name,
+            "told": experiment.told,
+            "determined": experiment.determined,
+        })).collect::<Vec<_>>(),
+    })
+}

@@ -1,0 +1,51 @@
+//! Results as data: what `--json` prints, the files of results hold, and the Python package hands out (feature `json`).
+//!
+//! Everything is in SI units, and the keys name them.
+
+mod check;
+mod fit;
+mod modes;
+mod moves;
+#[cfg(feature = "posterior")]
+mod posterior;
+mod simulation;
+
+pub use check::check;
+pub use fit::fit;
+pub use modes::modes;
+pub use moves::{Moved, moves};
+#[cfg(feature = "posterior")]
+pub use posterior::posterior;
+pub use simulation::{Band, Event, Metrics, Simulated, Simulation, load_unit};
+
+use crate::metrics::Peak;
+use crate::solve::Ending;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+/// As a file holds it: indented, numbers to the last bit, a line end behind it.
+pub fn text(value: &impl Serialize) -> String {
+    let mut text = serde_json::to_string_pretty(value).unwrap_or_default();
+    text.push('\n');
+    text
+}
+
+/// Numbers that JSON has no word for are null.
+fn number(value: f64) -> Value {
+    if value.is_finite() { json!(value) } else { Value::Null }
+}
+
+/// How a run ended in a word, and when: at `end` (s) where nothing ended it early.
+pub fn ending(ending: Ending, end: f64) -> (&'static str, f64) {
+    match ending {
+        Ending::Complete => ("complete", end),
+        Ending::TooManyEvents { time } => ("too_many_events", time),
+        Ending::LeftTravel { time } => ("left_travel", time),
+        Ending::Diverged { time } => ("diverged", time),
+        Ending::Interrupted { time } => ("interrupted", time),
+    }
+}
+
+fn peak(peak: Peak) -> Value {
+    json!({ "value": peak.value, "time_s": peak.time })
+}

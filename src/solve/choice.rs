@@ -1,0 +1,65 @@
+//! Which solver, as it is asked for by name.
+
+use super::{Method, Solver};
+use crate::error::{Error, Result};
+use crate::stage::Stage;
+
+/// The name of a solver.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// [`Solver::Exact`]
+    Exact,
+    /// [`Solver::General`]
+    General,
+    /// [`Solver::Table3`]
+    Table3,
+}
+
+/// What was asked for; what is not said is chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Choice {
+    /// By default the one for the stage.
+    pub solver: Option<Kind>,
+    /// Of the general solver.
+    pub tolerance: Option<f64>,
+    /// Of the fixed steps of Table 3, s.
+    pub step: Option<f64>,
+    /// Of the fixed steps of Table 3.
+    pub method: Option<Method>,
+}
+
+impl Choice {
+    /// The solver that is asked for, or else the one for this stage. Options that do not go with it are told by the names of
+    /// the command line.
+    pub fn solver(&self, stage: &Stage) -> Result<Solver> {
+        let solver = match (self.solver, Solver::of(stage)) {
+            (Some(Kind::Table3), _) => {
+                Solver::Table3 { step: self.step.unwrap_or(1e-4), method: self.method.unwrap_or_default() }
+            }
+            (Some(Kind::Exact), _) => Solver::Exact,
+            (Some(Kind::General), _) => Solver::GENERAL,
+            (None, solver) => solver,
+        };
+        let misplaced = |option: &str, what: &str, other: &str| {
+            Err(Error::new(what).in_file(option).next(format!("leave {option} out, or add --solver {other}")))
+        };
+        let fixed = match (self.step, self.method) {
+            (Some(_), _) => Some("--step"),
+            (None, Some(_)) => Some("--method"),
+            (None, None) => None,
+        };
+        match (solver, fixed, self.tolerance) {
+            (Solver::Exact, Some(option), _) => {
+                misplaced(option, "the exact solver has no step and no formula to choose", "table3")
+            }
+            (Solver::General { .. }, Some(option), _) => {
+                misplaced(option, "the general solver chooses its own steps, by one formula", "table3")
+            }
+            (Solver::General { .. }, None, Some(tolerance)) => Ok(Solver::General { tolerance }),
+            (Solver::Exact | Solver::Table3 { .. }, _, Some(_)) => {
+                misplaced("--tolerance", "only the general solver has a tolerance", "general")
+            }
+            _ => Ok(solver),
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! The Python package: built as a wheel, installed into an environment of its own under `target/python`, and tested there.
+
+use crate::Counts;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// What has to be installed, to the digit.
+const REQUIREMENTS: &str = "py/requirements.txt";
+
+/// The oldest Python that works.
+const OLDEST: (u32, u32) = (3, 10);
+
+/// Builds, installs, checks types, tests. False where a program says no.
+pub fn test(counts: &mut Counts) -> Result<bool, String> {
+    let environment = environment()?;
+    let python = program(&environment, "python");
+    let target = target();
+    let wheels = target.join("wheels");
+    // A wheel of an earlier version must not be taken for this one.
+    let _ = std::fs::remove_dir_all(&wheels);
+    let mut build = Command::new(program(&environment, "maturin"));
+    build.args(["build", "--locked", "--manifest-path", "py/Cargo.toml", "--profile", "dev", "--out"]).arg(&wheels);
+    build.arg("--interpreter").arg(&python);
+    if !crate::run(build, counts)? {
+        return Ok(false);
+    }
+    let wheel = std::fs::read_dir(&wheels).ok().and_then(|mut entries| entries.next()?.ok()).map(|entry| entry.path());
+    let wheel = wheel.ok_or("maturin made no wheel")?;
+    let mut install = Command::new(&python);
+    install.args(["-m", "pip", "install", "--quiet", "--no-deps", "--force-reinstall"]).arg(wheel);
+    let mut types = Command::new(program(&environment, "mypy"));
+    types.args(["--config-file", "pyproject.toml", "python/taut"]).current_dir("py");
+    let mut tests = Command::new(&python);
+    tests.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider", "py/tests"]);
+    tests.env("TAUT_PROGRAM", target.join("debug").join(format!("taut{}", std::env::consts::EXE_SUFFIX)));
+    tests.env("MPLBACKEND", "agg").env("PYTHONDONTWRITEBYTECODE", "1");
+    // The program that results are compared with, as the tests of the workspace build it: after those there is nothing left to do.
+    let program = crate::cargo(&["test", "--workspace", "--no-run", "--test", "commands"]);
+    for command in [install, types, program, tests] {
+        if !crate::run(command, counts)? {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// The environment with everything that is required in it.
+fn environment() -> Result<PathBuf, String> {
+    let folder = target().join("python");
+    let wanted = std::fs::read_to_string(REQUIREMENTS).map_err(|e| format!("{REQUIREMENTS} cannot be read: {e}"))?;
+    let installed = folder.join("installed.txt");
+    if std::fs::read_to_string(&installed).is_ok_and(|there| there == wanted) {
+        return Ok(folder);
+    }
+    let python = interpreter()?;
+    let mut make = Command::new(python);
+    make.args(["-m", "venv", "--clear"]).arg(&folder);
+    let mut install = Command::new(program(&folder, "python"));
+    install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--requirement", REQUIREMENTS]);
+    for command in [make, install] {
+        if !crate::run(command, &mut Counts::default())? {
+            return Err(format!(
+                "the environment {} cannot be made; it needs Python's venv (Debian: apt install python3-venv) and PyPI",
+                folder.display()
+            ));
+        }
+    }
+    std::fs::write(&installed, wanted).map_err(|e| format!("{}: {e}", installed.display()))?;
+    Ok(folder)
+}
+
+/// A Python that is new enough.
+fn interpreter() -> Result<&'static str, String> {
+    let version = format!("import sys; sys.exit(sys.version_info < {OLDEST:?})");
+    let answers = |name: &&str| {
+        let answer = Command::new(name).args(["-c", &version]).stdout(Stdio::null()).stderr(Stdio::null()).status();
+        answer.is_ok_and(|status| status.success())
+    };
+    ["python3", "python"].into_iter().find(answers).ok_or_else(|| {
+        format!(
+            "the tests of the Python package need Python {}.{} or later with venv, as python3 on the path \
+             (Debian: apt install python3 python3-venv; others: python.org)",
+            OLDEST.0, OLDEST.1
+        )
+    })
+}
+
+/// A program of the environment.
+fn program(environment: &Path, name: &str) -> PathBuf {
+    let folder = if cfg!(windows) { "Scripts" } else { "bin" };
+    environment.join(folder).join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
+}
+
+/// Where cargo builds.
+fn target() -> PathBuf {
+    let given = std::env::var_os("CARGO_TARGET_DIR").map(PathBuf::from);
+    std::path::absolute(given.unwrap_or_else(|| "target".into())).unwrap_or_else(|_| "target".into())
+}
