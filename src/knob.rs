@@ -227,7 +227,7 @@ impl Knob {
         let keys: Vec<(String, f64)> = keys.iter().zip(&ratios).map(|(key, ratio)| (key.to_string(), *ratio)).collect();
         let range = row.map_or((f64::NEG_INFINITY, f64::INFINITY), |row| (row.range.low, row.range.high));
         let unit = row.map_or("", |row| row.unit);
-        let (low, high) = limits(&name, keys.first().map(|(key, _)| key.as_str()), first, range, bounds)?;
+        let (low, high) = limits(&name, &keys, first, range, bounds)?;
         Ok(Self { name, unit, start: first, low, high, keys, members })
     }
 
@@ -251,7 +251,7 @@ impl Knob {
         }
         let set = keys.iter().map(|key| (key.to_string(), value_of(stage, key).unwrap_or(0.0) / sum)).collect();
         let members = parts.into_iter().map(|(place, value)| (place, value / sum)).collect();
-        let (low, high) = limits(name, None, sum, (0.0, 1e15), bounds)?;
+        let (low, high) = limits(name, &[], sum, (0.0, 1e15), bounds)?;
         Ok(Self { name: name.to_string(), unit, start: sum, low, high, keys: set, members })
     }
 
@@ -363,16 +363,23 @@ pub fn parameter_of(key: &str) -> Option<&'static parameter::Parameter> {
     parameter::find(key).or_else(|| parameter::find(key.rsplit_once('.')?.0))
 }
 
+/// The least and the greatest value: as given for the name, or for any of the keys, which are so many times as large; else far from
+/// the start and within the range.
 fn limits(
     name: &str,
-    key: Option<&str>,
+    keys: &[(String, f64)],
     start: f64,
     (least, most): (f64, f64),
     bounds: &GivenBounds,
 ) -> Result<(f64, f64)> {
-    let given = bounds.iter().find(|(bounded, _)| bounded == name || Some(bounded.as_str()) == key);
+    let factor = |bounded: &str| match keys.iter().find(|(key, _)| key == bounded) {
+        Some((_, factor)) => Some(*factor),
+        None => (bounded == name).then_some(1.0),
+    };
+    let ends = bounds.iter().filter_map(|(bounded, ends)| factor(bounded).map(|factor| ends.map(|end| end / factor)));
+    let given = ends.reduce(|one, other| [one[0].max(other[0]), one[1].min(other[1])]);
     let (low, high) = match given {
-        Some((_, [low, high])) => (*low, *high),
+        Some([low, high]) => (low, high),
         // What may be zero may become zero.
         None if start > 0.0 && least == 0.0 => (0.0, (start * FAR).min(most)),
         None if start > 0.0 && least > 0.0 => ((start / FAR).max(least), (start * FAR).min(most)),

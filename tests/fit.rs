@@ -10,6 +10,7 @@ use taut::control::{Loop, Rows, Standard, stream};
 use taut::design;
 use taut::fit::least_squares::{Bounds, Ending, Options, Residuals, minimise};
 use taut::fit::{Fit, check, fit, inverse_of_square, profiles};
+use taut::knob::Knob;
 use taut::log::{Log, Output, Quantity};
 use taut::signal::Hold;
 use taut::signal::profile::{Leg, Limits, Profile};
@@ -180,6 +181,26 @@ fn the_profile_of_what_is_well_known_is_that_of_a_linear_model() {
     }
     // What is asked to stop leaves out what it has not.
     assert!(taut::fit::profiles(&case, &plan, &found, Some(&|| true)).unwrap().is_empty());
+}
+
+/// What is tied stays within the bounds of each of its keys.
+#[test]
+fn bounds_hold_for_all_that_is_tied() {
+    let stage = Case::from_text("axis.toml", TEMPLATE).unwrap().stage;
+    let keys = ["drive_pulley.friction.viscous", "cart.friction.viscous"];
+    let ratio = stage.cart.friction.forward.viscous / stage.drive_pulley.friction.forward.viscous;
+    let knob = |bounds: &[(&str, [f64; 2])]| {
+        let bounds: Vec<(String, [f64; 2])> = bounds.iter().map(|(key, ends)| (key.to_string(), *ends)).collect();
+        Knob::tied(&stage, &keys, &keys, &bounds)
+    };
+    let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-12, "{a} {b}");
+    let second = knob(&[(keys[1], [10.0, 30.0])]).unwrap();
+    near(second.low, 10.0 / ratio);
+    near(second.high, 30.0 / ratio);
+    let both = knob(&[(keys[0], [0.001, 0.002]), (keys[1], [18.0, 100.0])]).unwrap();
+    near(both.low, 18.0 / ratio);
+    near(both.high, 0.002);
+    assert!(knob(&[(keys[1], [30.0, 40.0])]).is_err());
 }
 
 /// A log that a controller made is met with the input as logged, and with the controller following its reference again.
