@@ -2,8 +2,11 @@
 //!
 //! `UPDATE_EXPECT=1 cargo test --test bad_cases` writes the messages anew; read each of them aloud before keeping it.
 
+#[path = "common/wrong.rs"]
+mod wrong;
+
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use taut::case::Case;
 
 #[test]
@@ -18,30 +21,11 @@ fn every_wrong_log_of_a_case_gives_its_message() {
 }
 
 fn compare(folder: &str) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bad").join(folder);
-    let mut files: Vec<PathBuf> = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    files.retain(|path| path.extension().is_some_and(|e| e == "toml"));
-    files.sort();
-    assert!(files.len() >= 60, "only {} wrong files", files.len());
-
-    let update = std::env::var_os("UPDATE_EXPECT").is_some();
-    let mut wrong = Vec::new();
-    for path in files {
+    let folder = format!("tests/bad/{folder}");
+    wrong::every_message(&folder, "toml", 60, |path| {
         // Messages name the file as the user does; here that is from within the folder.
-        let name = path.file_name().unwrap().to_string_lossy().into_owned();
-        let message = match Case::read(&path) {
-            Ok(_) => "no error".to_string(),
-            Err(error) => error.to_string().replace(&format!("{}/", folder.display()), ""),
-        };
-        let message = format!("{message}\n");
-        let expected = path.with_extension("txt");
-        if update && message != "no error\n" {
-            fs::write(&expected, &message).unwrap();
-        } else if fs::read_to_string(&expected).unwrap_or_default() != message {
-            wrong.push(format!("── {name}\n{message}"));
-        }
-    }
-    assert!(wrong.is_empty(), "these messages are not the expected ones:\n{}", wrong.join("\n"));
+        Some(Case::read(path).err()?.to_string().replace(&format!("{folder}/"), ""))
+    });
 }
 
 #[test]

@@ -1,45 +1,28 @@
 //! Every wrong log in `tests/bad/log` gives exactly the message beside it; `UPDATE_EXPECT=1` writes the messages again.
 
+#[path = "common/wrong.rs"]
+mod wrong;
+
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use taut::log::{read_columns, read_samples};
 
-fn message(file: &Path) -> String {
-    match read_samples(file, "time_s", "voltage_V") {
-        Ok(_) => format!("{} was read without a complaint", file.display()),
-        Err(error) => error.to_string(),
-    }
+fn message(file: &Path) -> Option<String> {
+    Some(read_samples(file, "time_s", "voltage_V").err()?.to_string())
 }
 
 #[test]
 fn wrong_logs_are_told_what_is_wrong_with_them() {
-    let update = std::env::var_os("UPDATE_EXPECT").is_some();
-    let mut files: Vec<PathBuf> = fs::read_dir("tests/bad/log").unwrap().map(|entry| entry.unwrap().path()).collect();
-    files.retain(|file| file.extension().is_some_and(|e| e == "csv"));
-    files.sort();
-    assert!(files.len() >= 30);
-    let mut wrong = Vec::new();
-    for file in files {
-        let message = message(&file) + "\n";
-        assert!(!message.contains("without a complaint"), "{message}");
-        let expected = file.with_extension("txt");
-        if update {
-            fs::write(&expected, &message).unwrap();
-        }
-        if fs::read_to_string(&expected).unwrap_or_default() != message {
-            wrong.push(message);
-        }
-    }
-    assert!(wrong.is_empty(), "{} messages differ from what is expected:\n{}", wrong.len(), wrong.join("\n"));
+    wrong::every_message("tests/bad/log", "csv", 30, message);
 }
 
 #[test]
 fn a_missing_file_and_a_folder() {
     assert_eq!(
-        message(Path::new("tests/bad/log/nowhere.csv")),
+        message(Path::new("tests/bad/log/nowhere.csv")).unwrap(),
         "tests/bad/log/nowhere.csv: there is no such file\n  next: check the name and the folder it is in"
     );
-    let folder = message(Path::new("tests/bad/log"));
+    let folder = message(Path::new("tests/bad/log")).unwrap();
     assert!(folder.starts_with("tests/bad/log: "), "{folder}");
 }
 

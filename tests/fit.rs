@@ -2,19 +2,20 @@
 
 #[path = "common/chance.rs"]
 mod chance;
+#[path = "common/logged.rs"]
+mod logged;
 
 use chance::Chance;
-use std::sync::Arc;
+use logged::logged;
 use taut::case::{Case, Plan, TEMPLATE};
 use taut::control::{Loop, Rows, Standard, stream};
 use taut::design;
 use taut::fit::least_squares::{Bounds, Ending, Options, Residuals, minimise};
 use taut::fit::{Fit, check, fit, inverse_of_square, profiles};
 use taut::knob::Knob;
-use taut::log::{Log, Output, Quantity};
-use taut::signal::Hold;
 use taut::signal::profile::{Leg, Limits, Profile};
 use taut::solve::{Flow, Solver, simulate};
+use taut::trajectory::Trajectory;
 
 /// A problem of NIST's Statistical Reference Datasets (nonlinear regression), with its certified answer.
 struct Nist {
@@ -118,15 +119,7 @@ fn recorded(changes: &[&str], seed: u64, noise: f64) -> Case {
         let run = simulate(&case.stage, experiment, Solver::Exact).unwrap().trajectory;
         let angle = run.get("drive_angle").unwrap().iter();
         let values = angle.map(|v| step * ((v + noise * chance.normal()) / step).round()).collect();
-        experiment.log = Some(Arc::new(Log {
-            name: experiment.name.clone(),
-            file: Default::default(),
-            time: run.get("time").unwrap().to_vec(),
-            input: run.get("voltage").unwrap().to_vec(),
-            hold: Hold::Zero,
-            reference: None,
-            outputs: vec![Output { quantity: Quantity::DriveAngle, absolute: false, values }],
-        }));
+        experiment.log = Some(logged(&experiment.name, &run, values));
     }
     case
 }
@@ -222,30 +215,19 @@ fn a_loop_is_closed_again() {
         Profile::new(0.0, &[Leg::To(0.08, limits), Leg::Wait(0.1), Leg::To(0.02, limits), Leg::Wait(0.2)]).unwrap();
     let rows = Rows { until: profile.end(), every: 1e-3, window: 1e-4 };
     let mut controller = Standard::new(&design, &case.stage).unwrap();
-    let mut columns: [Vec<f64>; 4] = Default::default();
+    let mut run = Trajectory::default();
     let timing = Loop::of(&design);
     stream(&real.stage, &mut controller, &timing, &profile, &rows, Solver::Exact, false, &mut |block| {
-        for (column, name) in columns.iter_mut().zip(["time", "voltage", "reference", "drive_angle"]) {
-            column.extend_from_slice(block.get(name).unwrap());
-        }
+        run.append(block);
         Flow::Continue
     })
     .unwrap();
     let step = std::f64::consts::TAU / 2048.0;
     let mut chance = Chance::new(5);
-    let [time, input, reference, angle] = columns;
-    let values = angle.iter().map(|v| step * ((v + 1e-3 * chance.normal()) / step).round()).collect();
-    let output = Output { quantity: Quantity::DriveAngle, absolute: false, values };
+    let angle = run.get("drive_angle").unwrap().iter();
+    let values = angle.map(|v| step * ((v + 1e-3 * chance.normal()) / step).round()).collect();
     case.experiments.truncate(1);
-    case.experiments[0].log = Some(Arc::new(Log {
-        name: "move".into(),
-        file: Default::default(),
-        time,
-        input,
-        hold: Hold::Zero,
-        reference: Some(reference),
-        outputs: vec![output],
-    }));
+    case.experiments[0].log = Some(logged("move", &run, values));
     let closed = Plan { closed_loop: true, ..plan(&keys) };
     let found = fit(&case, &closed, None, &mut |_| Flow::Continue).unwrap();
     for (estimate, (key, value)) in found.estimates.iter().zip(truth) {

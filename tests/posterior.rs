@@ -2,15 +2,15 @@
 
 #[path = "common/chance.rs"]
 mod chance;
+#[path = "common/logged.rs"]
+mod logged;
 
 use chance::Chance;
-use std::sync::Arc;
+use logged::logged;
 use taut::case::{Case, Plan, Prior, TEMPLATE};
 use taut::fit::least_squares::Residuals;
 use taut::fit::{Fit, Posterior, Problem, fit, machines, posterior};
-use taut::log::{Log, Output, Quantity};
 use taut::posterior::Effort;
-use taut::signal::Hold;
 use taut::solve::{Flow, Solver, simulate};
 
 const COULOMB: &str = "cart.friction.coulomb";
@@ -20,7 +20,7 @@ const VISCOUS: &str = "cart.friction.viscous";
 const NOISE: f64 = 0.01;
 
 /// The first pulse of the template in a few rows, with the log of a machine that has this friction.
-fn logged(viscous: f64, coulomb: f64, seed: u64) -> Case {
+fn with_log(viscous: f64, coulomb: f64, seed: u64) -> Case {
     let rows = ["experiment.0.every=10ms", "experiment.0.until=0.5s"];
     let mut case = Case::from_text_with("axis.toml", TEMPLATE, &rows).unwrap();
     case.experiments.truncate(1);
@@ -30,15 +30,7 @@ fn logged(viscous: f64, coulomb: f64, seed: u64) -> Case {
     let run = simulate(&truth.stage, &truth.experiments[0], Solver::Exact).unwrap().trajectory;
     let mut chance = Chance::new(seed);
     let values = run.get("drive_angle").unwrap().iter().map(|v| v + NOISE * chance.normal()).collect();
-    case.experiments[0].log = Some(Arc::new(Log {
-        name: case.experiments[0].name.clone(),
-        file: Default::default(),
-        time: run.get("time").unwrap().to_vec(),
-        input: run.get("voltage").unwrap().to_vec(),
-        hold: Hold::Zero,
-        reference: None,
-        outputs: vec![Output { quantity: Quantity::DriveAngle, absolute: false, values }],
-    }));
+    case.experiments[0].log = Some(logged(&case.experiments[0].name, &run, values));
     case
 }
 
@@ -70,7 +62,7 @@ fn quantiles(points: &[f64], density: &[f64]) -> [f64; 2] {
 /// what quadrature makes of the same likelihood.
 #[test]
 fn friction_near_zero_has_the_posterior_of_quadrature() {
-    let case = logged(19.0, 0.0, 5);
+    let case = with_log(19.0, 0.0, 5);
     let plan = plan(&[COULOMB]);
     let (found, drawn) = drawn(&case, &plan, 3000);
     assert_eq!(drawn.doubts(), Vec::<String>::new());
@@ -118,7 +110,7 @@ fn intervals_hold_truths_that_are_drawn_from_the_prior() {
     for seed in 1..=machines {
         let mut chance = Chance::new(70_000 + seed);
         let truth = 0.02 * chance.uniform();
-        let case = logged(19.0, truth, seed);
+        let case = with_log(19.0, truth, seed);
         let mut plan = plan(&[COULOMB]);
         plan.priors = vec![(COULOMB.to_string(), Prior::Uniform { low: 0.0, high: 0.02 })];
         let (found, drawn) = drawn(&case, &plan, 400);
@@ -135,7 +127,7 @@ fn intervals_hold_truths_that_are_drawn_from_the_prior() {
 /// A prior that knows better than the log decides; one that knows nothing does not.
 #[test]
 fn priors_count() {
-    let case = logged(19.0, 0.2, 2);
+    let case = with_log(19.0, 0.2, 2);
     let mut plan = plan(&[VISCOUS]);
     let (_, flat) = drawn(&case, &plan, 300);
     let narrow = flat.variables[0].deviation / 10.0;
@@ -152,7 +144,7 @@ fn priors_count() {
 /// The machines of the draws have the friction of the draws, and what the truth does lies between them.
 #[test]
 fn a_band_of_drawn_machines_contains_the_truth() {
-    let case = logged(22.0, 0.3, 4);
+    let case = with_log(22.0, 0.3, 4);
     let plan = plan(&[VISCOUS, COULOMB]);
     let (_, drawn) = drawn(&case, &plan, 150);
     let folder = std::env::temp_dir().join(format!("taut-posterior-{}", std::process::id()));
@@ -190,7 +182,7 @@ fn a_band_of_drawn_machines_contains_the_truth() {
 
 #[test]
 fn draws_repeat_and_end_early() {
-    let case = logged(19.0, 0.2, 3);
+    let case = with_log(19.0, 0.2, 3);
     let plan = plan(&[VISCOUS]);
     let found = fit(&case, &plan, None, &mut |_| Flow::Continue).unwrap();
     let effort = Effort { chains: 2, draws: 50, tune: 50, seed: 9 };

@@ -1,5 +1,8 @@
 //! Input shapers: their laws, the published tables, Klipper's printed results, and other people's numbers.
 
+#[path = "common/wrong.rs"]
+mod wrong;
+
 use std::f64::consts::PI;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -399,27 +402,7 @@ fn a_stage_without_a_measurement() {
 
 #[test]
 fn wrong_files_are_told_what_is_wrong_with_them() {
-    let update = std::env::var_os("UPDATE_EXPECT").is_some();
-    let folder = Path::new("tests/bad/shape");
-    let mut files: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    files.retain(|file| file.extension().is_some_and(|e| e == "csv"));
-    files.sort();
-    assert!(files.len() >= 12);
-    let mut wrong = Vec::new();
-    for file in files {
-        let message = match read_accelerometer(&file) {
-            Ok(_) => panic!("{} was read without a complaint", file.display()),
-            Err(error) => format!("{error}\n"),
-        };
-        let expected = file.with_extension("txt");
-        if update {
-            fs::write(&expected, &message).unwrap();
-        }
-        if fs::read_to_string(&expected).unwrap_or_default() != message {
-            wrong.push(message);
-        }
-    }
-    assert!(wrong.is_empty(), "{} messages differ from what is expected:\n{}", wrong.len(), wrong.join("\n"));
+    wrong::every_message("tests/bad/shape", "csv", 12, |file| Some(read_accelerometer(file).err()?.to_string()));
 }
 
 #[test]
