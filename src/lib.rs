@@ -62,6 +62,7 @@
 //! Without them the library is the physics alone.
 
 pub mod case;
+pub mod chance;
 pub mod control;
 pub mod design;
 pub mod error;

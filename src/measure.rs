@@ -8,13 +8,14 @@
 //! A sample from before time zero shows the state at the start, with no input yet.
 
 use crate::case::Experiment;
+use crate::chance::normal;
 use crate::error::{Error, Result};
 use crate::signal::Signal;
 use crate::solve::{self, Flow, Grid, Outcome, Solution, Solver};
 use crate::stage::{AmplifierMode, Channel, Encoder, EncoderPlace, Measurement, Quantity, Stage};
 use crate::trajectory::{Column, Trajectory};
 use rand_pcg::Pcg64;
-use rand_pcg::rand_core::{Rng, SeedableRng};
+use rand_pcg::rand_core::SeedableRng;
 
 /// Finest raster on which instants are looked for.
 const FINEST: u32 = 1000;
@@ -292,15 +293,4 @@ fn random(seed: u64, experiment: &str, device: &str) -> Pcg64 {
     let hash = bytes
         .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
     Pcg64::seed_from_u64(hash)
-}
-
-/// A normally distributed number: Marsaglia's polar method, with a logarithm that is the same on every machine.
-fn normal(random: &mut Pcg64) -> f64 {
-    loop {
-        let [u, v] = std::array::from_fn(|_| (random.next_u64() >> 11) as f64 * 2f64.powi(-52) - 1.0);
-        let s = u * u + v * v;
-        if s > 0.0 && s < 1.0 {
-            return u * (-2.0 * libm::log(s) / s).sqrt();
-        }
-    }
 }

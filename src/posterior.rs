@@ -3,6 +3,7 @@
 //! Hoffman & Gelman 2014, in the form of the `nuts-rs` library. R̂ and the effective sample size are ours, after Vehtari, Gelman,
 //! Simpson, Carpenter, Bürkner, "Rank-normalization, folding, and localization: An improved R̂", Bayesian Analysis 16 (2021).
 
+use crate::chance::{self, normal_quantile};
 use crate::error::{Error, Result};
 use nuts_rs::{Chain, CpuLogpFunc, CpuMath, CpuMathError, DiagNutsSettings, HasDims, LogpError, Settings};
 use rand_pcg::Pcg64;
@@ -176,11 +177,7 @@ impl Draws {
 
     /// The value below which this share of the draws lies; NaN without draws.
     pub fn quantile(&self, parameter: usize, share: f64) -> f64 {
-        let sorted = self.sorted(parameter);
-        let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
-        let place = share.clamp(0.0, 1.0) * last as f64;
-        let (low, part) = (place.floor() as usize, place.fract());
-        sorted[low] + part * (sorted[(low + 1).min(last)] - sorted[low])
+        chance::quantile(&self.sorted(parameter), share.clamp(0.0, 1.0))
     }
 
     /// Mean of one parameter.
@@ -297,22 +294,6 @@ fn effective(chains: &[Vec<f64>]) -> f64 {
     total / time
 }
 
-/// Φ⁻¹(p): a rational first guess, then Halley's rule on Φ.
-fn normal_quantile(p: f64) -> f64 {
-    let (q, tail) = (p - 0.5, p.min(1.0 - p));
-    // A first guess good to 5e-4 (Abramowitz & Stegun 26.2.23).
-    let t = (-2.0 * tail.ln()).sqrt();
-    let guess = t - (2.515517 + t * (0.802853 + t * 0.010328)) / (1.0 + t * (1.432788 + t * (0.189269 + t * 0.001308)));
-    let mut x = if q < 0.0 { -guess } else { guess };
-    for _ in 0..3 {
-        let error = 0.5 * libm::erfc(-x / std::f64::consts::SQRT_2) - p;
-        let slope = (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt();
-        let step = error / slope;
-        x -= step / (1.0 + 0.5 * x * step);
-    }
-    x
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -366,10 +347,8 @@ mod tests {
 
     #[test]
     fn independent_values_count_in_full_and_correlated_ones_do_not() {
-        use rand_pcg::rand_core::Rng;
         let mut random = Pcg64::seed_from_u64(5);
-        let mut uniform = || (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
-        let white: Vec<f64> = (0..4000).map(|_| normal_quantile(uniform().max(1e-300))).collect();
+        let white: Vec<f64> = (0..4000).map(|_| normal_quantile(chance::uniform(&mut random).max(1e-300))).collect();
         // x_k = φ x_{k−1} + w: n_eff = n (1 − φ)/(1 + φ)
         let (phi, mut x) = (0.8, 0.0);
         let red: Vec<f64> = white

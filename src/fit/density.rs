@@ -13,10 +13,11 @@
 //! otherwise.
 
 use super::least_squares::{Bounds, Differences, Residuals};
+use crate::chance::uniform;
 use crate::posterior::{Draws, Effort, LogDensity, Watch, sample};
 use nalgebra::{DMatrix, DVector};
 use rand_pcg::Pcg64;
-use rand_pcg::rand_core::{Rng, SeedableRng};
+use rand_pcg::rand_core::SeedableRng;
 use std::sync::Mutex;
 
 /// A bound further away than so many standard errors is not felt.
@@ -322,7 +323,7 @@ fn deviations(covariance: &DMatrix<f64>) -> Vec<f64> {
 
 /// Standard normal numbers, by Box and Muller.
 fn normal(random: &mut Pcg64, n: usize) -> Vec<f64> {
-    let mut uniform = || (random.next_u64() >> 11) as f64 * 2f64.powi(-53);
+    let mut uniform = || uniform(random);
     (0..n).map(|_| (-2.0 * (1.0 - uniform()).ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()).collect()
 }
 

@@ -14,10 +14,11 @@
 //! the test is not passed, derivatives over longer steps are tried, and then an evolution strategy that needs none, before it
 //! is called stalled.
 
+use crate::chance::normal;
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand_pcg::Pcg64;
-use rand_pcg::rand_core::{Rng, SeedableRng};
+use rand_pcg::rand_core::SeedableRng;
 
 /// Steps of coarse derivatives, in standard errors of a variable by itself, tried one after the other.
 const COARSER: [f64; 2] = [1.0, 10.0];
@@ -489,17 +490,6 @@ fn evolve(
         pace *= ((paced / damp) * (path.norm() / expected - 1.0)).exp();
     }
     best.cost < before * (1.0 - 1e-6)
-}
-
-/// A normally distributed number.
-fn normal(random: &mut Pcg64) -> f64 {
-    loop {
-        let [u, v] = std::array::from_fn(|_| (random.next_u64() >> 11) as f64 * 2f64.powi(-52) - 1.0);
-        let s = u * u + v * v;
-        if s > 0.0 && s < 1.0 {
-            return u * (-2.0 * libm::log(s) / s).sqrt();
-        }
-    }
 }
 
 /// The step that keeps within the box: what would leave it is put on its edge, and the rest solved anew.

@@ -31,6 +31,7 @@ pub use run::{Extra, Nuisance, Run, Seen};
 pub use uncertainty::{Covariance, inverse_of_square, student};
 
 use crate::case::{Case, Plan};
+use crate::chance;
 use crate::error::{Error, Result};
 use crate::log::Quantity;
 use crate::solve::{Bench, Flow};
@@ -39,7 +40,7 @@ use least_squares::{Minimum, Options, Residuals, minimise};
 use nalgebra::DVector;
 use problem::{ROUNDING, extent};
 use rand_pcg::Pcg64;
-use rand_pcg::rand_core::{Rng, SeedableRng};
+use rand_pcg::rand_core::SeedableRng;
 use std::path::Path;
 
 /// Standard deviations beyond which Huber's loss counts linearly: 95 % efficient with Gaussian noise.
@@ -229,6 +230,7 @@ pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f
         if settled {
             break;
         }
+        let before = first_weight(&problem);
         for &(quantity, deviation) in &fresh {
             problem.weigh(quantity, deviation, true);
         }
@@ -237,10 +239,7 @@ pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f
         let options = Options { huber: if plan.huber { HUBER } else { f64::INFINITY }, ..whole };
         if alike && round == 0 && matches!(best.ending, Ending::Converged | Ending::Stalled) {
             // One weight for all: only the unit of the residuals changes.
-            let factor =
-                problem.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).find(|w| **w > 0.0);
-            let before = first_weight(&problem, &best);
-            if let (Some(now), Some(before)) = (factor, before) {
+            if let (Some(now), Some(before)) = (first_weight(&problem), before) {
                 rescale(&mut best, now / before);
                 break;
             }
@@ -348,19 +347,9 @@ fn alike(a: &Stage, b: &Stage) -> bool {
     sides(a).into_iter().zip(sides(b)).all(|(a, b)| near(a, b))
 }
 
-/// What weight the residuals of a minimum were computed with, from one that is not zero.
-fn first_weight(problem: &Problem, at: &Minimum) -> Option<f64> {
-    let stage = problem.stage_at(&at.x);
-    let run = &problem.runs[0];
-    let mut fresh = vec![0.0; run.rows()];
-    if !run.residuals(&mut Bench::default(), &stage, &problem.extras_of(0, &at.x), &mut fresh) {
-        return None;
-    }
-    // Of outputs; what is known beforehand stands behind them.
-    let outputs = 0..run.seen.len() * run.time.len();
-    let k = outputs.max_by(|&a, &b| fresh[a].abs().total_cmp(&fresh[b].abs()))?;
-    let now = run.seen[k / run.time.len()].weights[k % run.time.len()];
-    if fresh[k] == 0.0 { None } else { Some(now * at.residuals[k] / fresh[k]) }
+/// The first weight of an output that counts.
+fn first_weight(problem: &Problem) -> Option<f64> {
+    problem.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).copied().find(|w| *w > 0.0)
 }
 
 fn rescale(minimum: &mut Minimum, factor: f64) {
@@ -419,7 +408,7 @@ fn elsewhere(problem: &Problem, random: &mut Pcg64) -> Vec<f64> {
     let mut x = problem.start();
     let bounds = problem.bounds();
     for (j, x) in x.iter_mut().enumerate().take(problem.globals()) {
-        let share = (random.next_u64() >> 11) as f64 * 2f64.powi(-53);
+        let share = chance::uniform(random);
         let (low, high) = if j >= problem.knobs.len() {
             (bounds.low[j], bounds.high[j].min(10.0))
         } else if problem.is_log(j) {

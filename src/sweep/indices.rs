@@ -5,7 +5,7 @@
 //! their table 2 (b); total order after M. J. W. Jansen, ibid. (f). Intervals by the bootstrap over the N blocks.
 
 use super::chance::mixed;
-use super::statistics::quantile;
+use crate::chance::quantile;
 
 /// Shares of the bootstrap's replicates that lie below the ends of an interval: 95 %.
 const ENDS: [f64; 2] = [0.025, 0.975];

@@ -27,7 +27,7 @@ mod points;
 mod sobol;
 mod statistics;
 
-pub use distribution::{Distribution, normal_quantile};
+pub use distribution::Distribution;
 pub use indices::{Estimate, Index, indices};
 pub use measures::{Measure, OF_EXPERIMENT, OF_MOVE};
 pub use sobol::{DIMENSIONS, Sobol};

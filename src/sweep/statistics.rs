@@ -1,5 +1,7 @@
 //! What a column of many runs shows: shares, histogram, and what it depends on.
 
+use crate::chance::quantile;
+
 /// How the values of one column are spread; those that are NaN apart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spread {
@@ -53,15 +55,6 @@ impl Spread {
             counts,
         })
     }
-}
-
-/// The quantile of sorted values, between two of them by a straight line (Hyndman & Fan 1996, their definition 7).
-pub fn quantile(sorted: &[f64], share: f64) -> f64 {
-    let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
-    let place = share * last as f64;
-    let below = (place.floor() as usize).min(last);
-    let above = (below + 1).min(last);
-    sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
 }
 
 /// Spearman's rank correlation of the pairs that are both numbers; 0 where one of them does not vary.

@@ -2,6 +2,7 @@
 
 use super::margins::{Margins, Plant};
 use crate::case::{Case, Tuning};
+use crate::chance::uniform;
 use crate::control::feedback::Feedback;
 use crate::control::{Change, PARAMETERS};
 use crate::design::Design;
@@ -11,7 +12,7 @@ use crate::linear::places;
 use crate::number::engineering;
 use crate::stage::Stage;
 use rand_pcg::Pcg64;
-use rand_pcg::rand_core::{Rng, SeedableRng};
+use rand_pcg::rand_core::SeedableRng;
 
 /// Share by which parameters are off where nothing else is said.
 pub const SPREAD: f64 = 0.2;
@@ -247,7 +248,7 @@ impl Family {
         }
         // And what is found by chance, for what no single unknown says.
         let mut random = Pcg64::seed_from_u64(1);
-        let mut share = || (random.next_u64() >> 11) as f64 * 2f64.powi(-53);
+        let mut share = || uniform(&mut random);
         let mut other: Option<(Corner, (f64, Margins))> = None;
         for _ in 0..DRAWS {
             let pick = |values: &[f64], share: f64| values.get((share * values.len() as f64) as usize).copied();

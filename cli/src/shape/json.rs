@@ -11,7 +11,7 @@ pub fn text(found: &Findings) -> String {
     let mut value = one(&found.each[0]);
     value["second"] = found.each.get(1).map_or(Value::Null, one);
     value["comparison"] = found.comparison.as_ref().map_or(Value::Null, comparison);
-    format!("{}\n", serde_json::to_string_pretty(&value).unwrap_or_default())
+    taut::json::text(&value)
 }
 
 fn one(found: &Found) -> Value {

@@ -3,6 +3,7 @@
 use super::run::Setting;
 use rayon::prelude::*;
 use taut::case::Experiment;
+use taut::chance::quantile;
 use taut::report::{Axis, Colour, Figure, Panel, Series, Style};
 use taut::solve::{self, Ending, Flow};
 use taut::stage::Stage;
@@ -152,9 +153,7 @@ fn quantiles(runs: &[[Vec<f64>; 4]], column: usize, rows: usize) -> [Vec<f64>; 3
         values.extend(runs.iter().filter_map(|run| run[column].get(row)));
         values.sort_by(f64::total_cmp);
         for (result, share) in result.iter_mut().zip(SHARES) {
-            let place = share * (values.len() - 1) as f64;
-            let (low, part) = (place.floor() as usize, place.fract());
-            result.push(values[low] + part * (values[(low + 1).min(values.len() - 1)] - values[low]));
+            result.push(quantile(&values, share));
         }
     }
     result

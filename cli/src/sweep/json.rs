@@ -20,9 +20,7 @@ pub fn text(work: &Work, summary: &Summary) -> String {
         "parameters": summary.parameters.iter().map(parameter).collect::<Vec<_>>(),
         "experiments": summary.groups.iter().map(|group| of_group(summary, group)).collect::<Vec<_>>(),
     });
-    let mut text = serde_json::to_string_pretty(&value).unwrap_or_default();
-    text.push('\n');
-    text
+    taut::json::text(&value)
 }
 
 fn spread(spread: &Option<Spread>) -> Value {

@@ -27,9 +27,7 @@ pub fn text(work: &Work) -> String {
         "before": verdict(work, &tuned.before),
         "after": verdict(work, &tuned.after),
     });
-    let mut text = serde_json::to_string_pretty(&value).unwrap_or_default();
-    text.push('\n');
-    text
+    taut::json::text(&value)
 }
 
 fn margins(m: &Margins) -> Value {
