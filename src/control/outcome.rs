@@ -160,8 +160,8 @@ pub fn stream(
     Ok(MoveRun { figures, metrics, outcome, samples, kept: sampled.kept.unwrap_or_default() })
 }
 
-/// Puts the controller of a design, made for `model`, through an experiment along a reference; its input is not asked for. Positions
-/// are read exactly: a count more or less at a sample would make what comes out jump as parameters change.
+/// Puts the controller of a design, made for `model`, through an experiment along a reference that is shaped already; its input is not
+/// asked for. Positions are read exactly: a count more or less at a sample would make what comes out jump as parameters change.
 pub(crate) fn follow(
     stage: &Stage,
     model: &Stage,
@@ -172,8 +172,7 @@ pub(crate) fn follow(
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<solve::Outcome> {
     let mut controller = Standard::new(design, model)?;
-    let profile = profile.clone().shaped(&design.shaper);
-    let mut sampled = Sampled::new(stage, &mut controller, Loop::of(design), &profile, false).exactly();
+    let mut sampled = Sampled::new(stage, &mut controller, Loop::of(design), profile, false).exactly();
     solve::stream_decided(&Stage { encoder: None, ..stage.clone() }, experiment, &mut sampled, solver, sink)
 }
 

@@ -229,7 +229,7 @@ impl Run {
     /// Has the controller of a case follow the reference of the log, instead of taking the input as logged.
     pub fn close(&mut self, case: &Case, log: &Log) {
         if let (Some(design), Some(reference)) = (&case.controller, &log.reference) {
-            let profile = Profile::sampled(&log.time, reference);
+            let profile = Profile::sampled(&log.time, reference).shaped(&design.shaper);
             self.closed = Some(Arc::new(Closed { design: design.clone(), model: case.stage.clone(), profile }));
         }
     }
