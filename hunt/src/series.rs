@@ -177,8 +177,13 @@ impl Series {
         Self { terms, input, change, input_change }
     }
 
-    /// How far, in parts of h, the terms left out are below rounding; `size` has the largest values that were.
-    pub fn reach(&self, size: &[f64; STATES]) -> f64 {
+    /// The most that the input may be up to s = 1.
+    pub fn input_size(&self) -> f64 {
+        self.input[0].high.abs() + self.input_change
+    }
+
+    /// How far, in parts of h, the terms left out are below rounding.
+    pub fn reach(&self, size: &Size) -> f64 {
         let mut reach = f64::INFINITY;
         let mut look = |size: f64, k: usize, term: Double| {
             let term = term.high.abs();
@@ -187,7 +192,7 @@ impl Series {
             }
         };
         for k in [ORDER - 1, ORDER] {
-            for (place, size) in size.iter().enumerate() {
+            for (place, size) in size.states.iter().enumerate() {
                 let early: f64 = (0..8).map(|j| self.terms[j][place].high.abs()).fold(0.0, f64::max);
                 look(size.max(early), k, self.terms[k][place]);
             }
@@ -222,6 +227,15 @@ impl Series {
     }
 }
 
+/// The largest values that states and input had so far.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Size {
+    /// Of each state.
+    pub states: [f64; STATES],
+    /// Of the input.
+    pub input: f64,
+}
+
 /// What rounding may have done to each term of a series.
 pub struct Noise {
     states: [[f64; STATES]; ORDER + 1],
@@ -230,14 +244,16 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// Of `series` over a time `h`; `size` has the largest values that the states had so far.
-    pub fn new(rates: &Rates, series: &Series, h: f64, size: &[f64; STATES]) -> Self {
+    /// Of `series` over a time `h`.
+    pub fn new(rates: &Rates, series: &Series, h: f64, size: &Size) -> Self {
         let mut states = [[0.0; STATES]; ORDER + 1];
-        states[0] = std::array::from_fn(|j| GATHERED * size[j]);
-        let terms = std::array::from_fn(|k| {
+        states[0] = size.states.map(|size| GATHERED * size);
+        let mut terms = std::array::from_fn(|k| {
             let round = |value: Double| 4.0 * ROUNDING * value.high.abs();
             (series.terms[k].map(round), round(series.input[k]))
         });
+        // Of a line or a wave where it crosses zero, the moment is what rounding has touched.
+        terms[0].1 += GATHERED * size.input;
         let mut noise = Self { states, terms };
         for k in 0..ORDER {
             for (place, row) in &rates.rows {

@@ -7,9 +7,9 @@
 use crate::double::Double;
 use crate::input::{self, Piece};
 use crate::law::{Change, Guard, Law, Limit, Mode, Motion, Touch};
-use crate::machine::{CURRENT, Machine, SPEED, STATES, State, Taken, WAY};
+use crate::machine::{CURRENT, Machine, SPEED, State, Taken, WAY};
 use crate::root::{self, Polynomial};
-use crate::series::{Noise, ORDER, Series};
+use crate::series::{Noise, ORDER, Series, Size};
 use std::collections::HashMap;
 use std::rc::Rc;
 use taut::case::Experiment;
@@ -95,7 +95,7 @@ struct Solver<'a> {
     times: &'a [f64],
     z: State,
     /// Largest values so far.
-    size: [f64; STATES],
+    size: Size,
     time: Double,
     mode: Mode,
     laws: HashMap<Mode, Rc<Prepared>>,
@@ -133,7 +133,7 @@ impl<'a> Solver<'a> {
             machine,
             times,
             z,
-            size: z.map(|z| z.high.abs()),
+            size: Size { states: z.map(|z| z.high.abs()), input: 0.0 },
             time: Double::ZERO,
             mode,
             laws: HashMap::new(),
@@ -175,6 +175,7 @@ impl<'a> Solver<'a> {
             let whole = prepared.step.get() >= rest.high;
             let h = if whole { rest } else { Double::from(prepared.step.get()) };
             let series = Series::new(&law.rates, &self.z, piece.series(self.time, h), h);
+            self.size.input = self.size.input.max(series.input_size());
             let reach = series.reach(&self.size);
             if !reach.is_nan() && h.high > 0.0 {
                 prepared.step.set(f64::max(h.high * (0.95 * reach).clamp(1e-6, 2.0), prepared.step.get() * 1e-6));
@@ -186,7 +187,7 @@ impl<'a> Solver<'a> {
             self.record_up_to(after, Some((&series, h)));
             self.z = series.at(s);
             self.time = after;
-            for (size, z) in self.size.iter_mut().zip(&self.z) {
+            for (size, z) in self.size.states.iter_mut().zip(&self.z) {
                 *size = size.max(z.high.abs());
             }
             if !self.z.iter().all(|z| z.high.is_finite()) {
