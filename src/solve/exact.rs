@@ -10,9 +10,10 @@
 
 mod change;
 
+use super::coordinates::{Coordinates, stretches};
 use super::law::{Law, Size, Watch, chain, highest, states};
 use super::propagator::SERIES_ORDER;
-use super::record::Recorder;
+use super::record::{Recorder, Row};
 use super::roots;
 use super::{Cost, Detail, Ending, Event, Flow, Grid, Outcome, Source, held};
 use crate::case::Experiment;
@@ -63,10 +64,11 @@ pub(super) fn run(
 /// A run under way.
 struct Run<'a, const R: usize, const C: usize> {
     plant: &'a Plant,
+    coordinates: Coordinates,
     grid: Grid,
     /// Output interval.
     h: f64,
-    /// State, input and its derivatives, and a one.
+    /// State in the solver's coordinates, input and its derivatives, and a one.
     z: [f64; C],
     mode: Mode,
     law: Rc<Law<R, C>>,
@@ -114,14 +116,17 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         let grid = Grid::new(experiment.every, experiment.until);
         let h = grid.interval();
         let start = experiment.initial.state(plant);
+        let (mut coordinates, inner) = Coordinates::new(plant, &start);
         let mut z = [0.0; C];
-        z[..states::<R>()].copy_from_slice(&start[..states::<R>()]);
+        z[..states::<R>()].copy_from_slice(&inner[..states::<R>()]);
         z[C - 1] = 1.0;
         let mode = plant.first_mode(&start);
+        coordinates.hold(&mode, &inner);
         let shared = propagators(laws);
-        let (law, is_new) = Law::of(laws, plant, mode, h);
+        let (law, is_new) = Law::of(laws, plant, mode, h, coordinates.origin());
         Self {
             plant,
+            coordinates,
             grid,
             h,
             z,
@@ -265,7 +270,8 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     fn put_out(&mut self) {
         self.check();
         if self.recorder.next_row() == self.row && self.trouble.is_none() {
-            self.recorder.push(self.state(), self.z[chain::<R>(0)], self.mode);
+            let inner = self.inner();
+            self.recorder.push(Row::new(&self.coordinates, &inner, self.input()), self.mode);
         }
         if self.recorder.flow == Flow::Stop {
             self.trouble = Some(Ending::Interrupted { time: self.time() });
@@ -468,22 +474,33 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         first.map(|(_, cause)| cause)
     }
 
-    fn state(&self) -> State {
+    /// The state in the solver's coordinates.
+    fn inner(&self) -> State {
         let z = &self.z;
-        let mut state: State = std::array::from_fn(|j| if j < states::<R>() { z[j] } else { 0.0 });
+        let mut inner: State = std::array::from_fn(|j| if j < states::<R>() { z[j] } else { 0.0 });
         if states::<R>() < place::COUNT || !self.plant.has_rotor() {
             // The rotor turns with the drive pulley.
-            (state[place::ROTOR_ANGLE], state[place::ROTOR_SPEED]) = (z[place::DRIVE_ANGLE], z[place::DRIVE_SPEED]);
+            (inner[place::ROTOR_ANGLE], inner[place::ROTOR_SPEED]) = (0.0, z[place::DRIVE_SPEED]);
         }
-        state
+        inner
+    }
+
+    fn state(&self) -> State {
+        self.coordinates.state(&self.inner())
     }
 
     fn input(&self) -> f64 {
         self.z[chain::<R>(0)]
     }
 
+    /// What rounding may have done to the value of a form.
+    fn noise(&self, form: &Form) -> f64 {
+        form.noise(&self.inner(), self.coordinates.origin(), self.input())
+    }
+
     fn value(&self, form: &Form) -> f64 {
-        form.value(self.plant, &self.state(), self.input())
+        let inner = self.inner();
+        form.value_at(&stretches(&inner, self.coordinates.origin()), &inner, self.input())
     }
 }
 

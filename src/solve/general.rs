@@ -9,12 +9,13 @@ mod fall;
 mod model;
 mod stretch;
 
-use super::record::Recorder;
+use super::coordinates::Coordinates;
+use super::record::{Recorder, Row};
 use super::{Cost, Detail, Ending, Event, Flow, Grid, Outcome, Source, check, held};
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
-use crate::plant::{Body, Cause, Limit, Mode, Part, Plant, Status, Switch, place};
+use crate::plant::{Body, Cause, Limit, Mode, Part, Plant, State, Status, Switch, place};
 use crate::stage::AmplifierMode;
 use crate::trajectory::Trajectory;
 use fall::NODES;
@@ -61,8 +62,12 @@ pub(super) fn run(
         .allowed(format!("up to {MOST_STEPS:e} steps"))
         .next("leave out the inductance, the damping or the friction that is as fast as that, or shorten the run"));
     }
-    let model = Model::new(plant);
-    Ok(Run::new(&model, experiment, tolerance, FIRST / fastest, detail, sink).finish(source))
+    let start = experiment.initial.state(plant);
+    let (coordinates, inner) = Coordinates::new(plant, &start);
+    let model = Model::new(plant, coordinates.origin());
+    let mode = plant.first_mode(&start);
+    Ok(Run::new(&model, (coordinates, inner, mode), experiment, tolerance, FIRST / fastest, detail, sink)
+        .finish(source))
 }
 
 /// h·|λ| up to which the formula is stable.
@@ -74,6 +79,7 @@ const FIRST: f64 = 0.3;
 /// A run under way.
 struct Run<'a> {
     model: &'a Model<'a>,
+    coordinates: Coordinates,
     grid: Grid,
     recorder: Recorder<'a>,
     solver: DOP853,
@@ -110,6 +116,7 @@ struct Hit {
 impl<'a> Run<'a> {
     fn new(
         model: &'a Model<'a>,
+        (mut coordinates, start, mode): (Coordinates, State, Mode),
         experiment: &Experiment,
         tolerance: f64,
         first_step: f64,
@@ -118,7 +125,7 @@ impl<'a> Run<'a> {
     ) -> Self {
         let plant = model.plant;
         let grid = Grid::new(experiment.every, experiment.until);
-        let start = experiment.initial.state(plant);
+        coordinates.hold(&mode, &start);
         let mut y = [0.0; MOST];
         y[..place::CURRENT].copy_from_slice(&start[..place::CURRENT]);
         if let Some(current) = model.current {
@@ -130,8 +137,9 @@ impl<'a> Run<'a> {
         // An angle of 1 rad is as much as r at the belt.
         let r = plant.stage().pulley_radius;
         let mut absolute = [tolerance; MOST];
-        absolute[place::CART_POSITION] *= r;
-        absolute[place::CART_SPEED] *= r;
+        for place in [place::DRIVE_ANGLE, place::CART_POSITION, place::CART_SPEED, place::IDLER_ANGLE] {
+            absolute[place] *= r;
+        }
         for body in Body::ALL {
             let friction = plant.friction(body);
             if let (Some(place), Law::LuGre { stiffness, .. }) = (model.bristle[body.index()], friction.law) {
@@ -139,9 +147,9 @@ impl<'a> Run<'a> {
                 absolute[place] = tolerance * friction.forward.breakaway.max(friction.backward.breakaway) / stiffness;
             }
         }
-        let mode = plant.first_mode(&start);
         Self {
             model,
+            coordinates,
             grid,
             recorder: Recorder::new(plant, grid, detail, sink),
             // It is stopped from outside: by its observer.
@@ -215,9 +223,9 @@ impl<'a> Run<'a> {
         match source {
             Source::Signal(signal) => Stretch::new(signal, time, end),
             Source::Decided(decide) => {
-                let (plant, state) = (self.model.plant, self.model.state(&self.y));
-                let current = plant.current(&self.mode).value(plant, &state, before);
-                let (value, until) = decide.decide(time, &state, current);
+                let inner = self.model.inner(&self.y);
+                let current = self.model.value(&self.model.plant.current(&self.mode), &inner, before);
+                let (value, until) = decide.decide(time, &self.coordinates.state(&inner), current);
                 Stretch::of(held(value, time, until), end)
             }
         }
@@ -274,19 +282,19 @@ impl<'a> Run<'a> {
 
     /// Puts out the row that is at `tau`.
     fn put_out(&mut self, field: &Field, tau: f64, y: &Vector) {
-        let state = self.model.state(y);
-        let input = field.input(tau);
+        let inner = self.model.inner(y);
+        let row = Row::new(&self.coordinates, &inner, field.input(tau));
         if self.model.adds {
-            let (extra, _) = self.model.extra(&self.mode.motion, &state, y);
-            self.recorder.push_with(state, input, self.mode, extra);
+            let (extra, _) = self.model.extra(&self.mode.motion, &inner, y);
+            self.recorder.push_with(row, self.mode, extra);
         } else {
-            self.recorder.push(state, input, self.mode);
+            self.recorder.push(row, self.mode);
         }
     }
 
     /// What a body at zero speed does under its present load.
     fn decide(&self, body: Body, input: f64) -> Motion {
-        let (model, state) = (self.model, self.model.state(&self.y));
+        let (model, state) = (self.model, self.model.inner(&self.y));
         let (mode, noise) = (&self.mode, model.noise(body, &self.mode, &state, input));
         if model.load(body, true, mode, &state, input) > model.breakaway(body, true, &state) + noise {
             Motion::Forward
@@ -333,7 +341,7 @@ impl<'a> Run<'a> {
             Cause::BreakForward(body) => (body, Motion::Forward),
             Cause::BreakBackward(body) => (body, Motion::Backward),
         };
-        let (index, state) = (body.index(), self.model.state(&self.y));
+        let (index, state) = (body.index(), self.model.inner(&self.y));
         let from = self.mode.motion[index];
         let side = if to == Motion::Stuck { from } else { to };
         let forward = side != Motion::Backward;
@@ -379,6 +387,7 @@ impl<'a> Run<'a> {
     }
 
     fn enter(&mut self) {
+        self.coordinates.hold(&self.mode, &self.model.inner(&self.y));
         if !self.modes.contains(&self.mode) {
             self.modes.push(self.mode);
         }

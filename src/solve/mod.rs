@@ -2,6 +2,7 @@
 
 mod check;
 mod choice;
+mod coordinates;
 mod exact;
 mod general;
 mod law;

@@ -28,7 +28,7 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
         let form = self.plant.load(body, forward, &mode);
         let law = self.plant.friction(body);
         let resistance = if forward { law.forward.coulomb } else { -law.backward.coulomb };
-        (self.value(&form), resistance, form.noise(self.plant, &self.state(), self.input()))
+        (self.value(&form), resistance, self.noise(&form))
     }
 
     /// What a body at zero speed does under its present load.
@@ -146,8 +146,10 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
 
     /// Takes up the equations of the present mode.
     fn enter(&mut self) {
-        let (law, is_new) = Law::of(self.laws, self.plant, self.mode, self.h);
+        let (law, is_new) = Law::of(self.laws, self.plant, self.mode, self.h, self.coordinates.origin());
         self.law = law;
+        let inner = self.inner();
+        self.coordinates.hold(&self.mode, &inner);
         self.cost.modes += u64::from(is_new);
     }
 
