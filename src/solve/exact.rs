@@ -212,6 +212,18 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     fn set_input(&mut self, piece: &Piece) {
         self.cost.pieces += 1;
         self.fresh = [0; Cause::KINDS];
+        self.take_up(piece);
+        // A load that passes a breakaway by rounding alone does not break it.
+        for guard in &self.law.guards {
+            if let Cause::BreakForward(body) | Cause::BreakBackward(body) = guard.cause {
+                let tolerance = &mut self.slack[body.index()];
+                *tolerance = tolerance.max(2.0 * guard.noise(&self.z));
+            }
+        }
+    }
+
+    /// Puts the input's value and derivatives where the state has them.
+    fn take_up(&mut self, piece: &Piece) {
         if piece.coefficients[1..].iter().all(|&c| c == 0.0) {
             (0..=highest::<R>()).for_each(|k| self.z[chain::<R>(k)] = 0.0);
             self.z[chain::<R>(0)] = piece.coefficients[0];
@@ -442,6 +454,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     fn creep(&mut self, law: &Law<R, C>, distance: f64) -> Option<Cause> {
         self.cost.series += 1;
         let series = law.series(&self.z, distance);
+        let mut sizes = None;
         let mut first: Option<(f64, Cause)> = None;
         // Term 1 of the series is ż · distance: most guards are too far away to fall, as in `look`.
         let change = std::array::from_fn(|j| series[1][j]);
@@ -454,10 +467,18 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             }
             let mut coefficients: [f64; SERIES_ORDER + 1] = std::array::from_fn(|k| guard.value(&series[k]));
             coefficients[0] = self.standing(guard);
-            let order = self.fresh_order(guard.cause);
-            coefficients[..order].fill(0.0);
+            let mut order = self.fresh_order(guard.cause);
+            if order > 0 || coefficients[0] == 0.0 {
+                let sizes = sizes.get_or_insert_with(|| law.sizes(&self.z, distance));
+                order = guard.first_term(&coefficients, sizes, order.max(1));
+            }
+            let sooner = |s: f64| {
+                first.is_none_or(|(earliest, cause)| {
+                    s < earliest || (s == earliest && guard.cause.rank() < cause.rank())
+                })
+            };
             if let Some(s) = roots::first_fall(&coefficients[order..])
-                && first.is_none_or(|(earliest, _)| s < earliest)
+                && sooner(s)
             {
                 first = Some((s, guard.cause));
             }

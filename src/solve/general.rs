@@ -21,6 +21,7 @@ use crate::trajectory::Trajectory;
 use fall::NODES;
 use ivp::dense::StepInterpolant;
 use ivp::methods::{DOP853, Tolerance};
+use ivp::prelude::FirstOrderSystem;
 use ivp::solout::{ControlFlag, SolOut};
 use model::{Field, MOST, Model, Vector};
 use stretch::Stretch;
@@ -316,6 +317,7 @@ impl<'a> Run<'a> {
         }
         let again = self.changes > TURNS_AT_ONCE;
         let input = stretch.input(self.tau);
+        let by_rounding = self.is_by_tolerance(cause, stretch);
         let (body, to) = match cause {
             Cause::GearTorque => {
                 self.mode.gear_torque_positive = !self.mode.gear_torque_positive;
@@ -353,8 +355,19 @@ impl<'a> Run<'a> {
             self.mode.motion[follower.index()] = to;
         }
         let (part, from, to) = (Part::Body(body), Status::Motion(from), Status::Motion(to));
-        Event { time, part, from, to, load }.note(&mut self.events);
+        Event { time, part, from, to, load, by_rounding }.note(&mut self.events);
         self.enter();
+    }
+
+    /// Whether a body stops where the tolerance decides: what still slows it down is less than the formula may be off by.
+    fn is_by_tolerance(&self, cause: Cause, stretch: &Stretch) -> bool {
+        let Cause::Stop(body) = cause else { return false };
+        let field = Field::new(self.model, self.mode, stretch);
+        let mut rate = [0.0; MOST];
+        field.derivative(self.tau, &self.y, &mut rate[..self.model.size]);
+        let place = body.speed_place();
+        // Within the time in which the fastest of it changes.
+        rate[place].abs() * self.first_step / FIRST <= self.absolute[place]
     }
 
     /// Lets a part other than a body do something else.
@@ -363,7 +376,7 @@ impl<'a> Run<'a> {
         let from = self.mode.status(switch.part());
         self.mode.switch(switch);
         let to = self.mode.status(switch.part());
-        Event { time, part: switch.part(), from, to, load: 0.0 }.note(&mut self.events);
+        Event { time, part: switch.part(), from, to, load: 0.0, by_rounding: false }.note(&mut self.events);
         let amplifier = &self.model.plant.stage().amplifier;
         if let (Switch::Current(side), Some(place), AmplifierMode::Voltage) =
             (switch, self.model.current, amplifier.mode)
@@ -399,12 +412,13 @@ impl<'a> Run<'a> {
         for _ in 0..CHANGES_AT_ONCE {
             let field = Field::new(self.model, self.mode, stretch);
             let guards = field.guards(self.tau, &self.y);
-            let fallen = field.watches().into_iter().zip(guards).find(|&(cause, value)| match cause {
+            let falls = |&(cause, value): &(Cause, f64)| match cause {
                 // A speed tells by itself, over the next step.
                 Cause::Stop(_) => false,
                 Cause::GearTorque => value < -self.torque_slack,
                 cause => value < -self.slack[cause.kind()],
-            });
+            };
+            let fallen = field.watches().into_iter().zip(guards).filter(falls).min_by_key(|(cause, _)| cause.rank());
             match fallen {
                 Some((cause, _)) => {
                     self.change(cause, stretch);

@@ -89,7 +89,24 @@ impl<const C: usize> Watch<C> {
 
     /// What rounding may do to its value.
     pub(super) fn noise(&self, z: &[f64; C]) -> f64 {
-        ROUNDING * self.sum(self.count[0], |weight, place| (weight * z[place]).abs())
+        self.noise_of(z)
+    }
+
+    /// What rounding may do to its value, the parts of z being of these sizes.
+    fn noise_of(&self, sizes: &[f64; C]) -> f64 {
+        ROUNDING * self.sum(self.count[0], |weight, place| (weight * sizes[place]).abs())
+    }
+
+    /// The first coefficient along a series, from `first` on, that is more than rounding; those before it count as zero,
+    /// however many there are. `sizes` are those of [`Law::sizes`].
+    pub(super) fn first_term(
+        &self,
+        coefficients: &[f64],
+        sizes: &[[f64; C]; SERIES_ORDER + 1],
+        first: usize,
+    ) -> usize {
+        let counts = |k: &usize| coefficients[*k].abs() > 2.0 * self.noise_of(&sizes[*k]);
+        (first..coefficients.len()).find(counts).unwrap_or(coefficients.len())
     }
 
     /// Its rate of change, `y` being ż.
@@ -345,6 +362,16 @@ impl<const R: usize, const C: usize> Law<R, C> {
     /// Terms of the Taylor series of z over `distance`: z(s · distance) = Σ term_k sᵏ.
     pub(super) fn series(&self, z: &[f64; C], distance: f64) -> [[f64; C]; SERIES_ORDER + 1] {
         self.rate.series(z, distance)
+    }
+
+    /// What rounding may do to ż.
+    pub(super) fn noise_of_rate(&self, z: &[f64; C]) -> [f64; R] {
+        self.rate.absolute().rate(&z.map(f64::abs)).map(|size| ROUNDING * size)
+    }
+
+    /// How large the parts are that the terms of this series are sums of: |A|ᵏ |z| dᵏ/k!.
+    pub(super) fn sizes(&self, z: &[f64; C], distance: f64) -> [[f64; C]; SERIES_ORDER + 1] {
+        self.rate.absolute().series(&z.map(f64::abs), distance)
     }
 
     /// How much √V may grow by itself within `length`.
