@@ -2,6 +2,7 @@
 
 mod check;
 mod choice;
+mod coordinates;
 mod exact;
 mod general;
 mod law;
@@ -72,6 +73,8 @@ pub struct Event {
     pub to: Status,
     /// The force (N) or torque (N m) on a body at that moment, friction apart; 0 for other parts.
     pub load: f64,
+    /// Whether rounding decided when it happened: a stop of a body whose speed tends to zero and in exact numbers never gets there.
+    pub by_rounding: bool,
 }
 
 impl Event {
