@@ -2,8 +2,10 @@
 
 use crate::double::Double;
 use crate::draw::Random;
+use crate::events;
 use crate::law::Motion;
-use crate::solve::{self, Ending, Event, Run};
+use crate::machine::Taken;
+use crate::solve::{self, Ending, Event, Numbers, Run};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use taut::case::{Case, Experiment};
 use taut::solve::{Solution, Solver, simulate};
@@ -28,6 +30,12 @@ const PERTURBED: u64 = 8;
 
 /// So many times what perturbed runs differ by still counts as comparable: a run rounds more often than once.
 const COMPARABLE: f64 = 30.0;
+
+/// How far a body may go while the solvers disagree about what it does, as a share of what positions may differ by and of the body's
+/// way in the run; and how long a stuck body may be told to slide, as a share of the run.
+const AGREEMENT: [f64; 3] = [1e-3, 1e-6, 1e-6];
+/// The moments of the general solver are as good as its positions.
+const AGREEMENT_OF_GENERAL: [f64; 3] = [1.0, 1e-3, 1e-3];
 
 /// Which of taut's solvers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,10 +113,12 @@ pub fn compare(name: &str, text: &str, solvers: &[By]) -> Vec<Compared> {
         let mut all = times.clone();
         // A run that ends early has fewer rows than there are.
         all.extend((times.len() as u64..=grid.intervals()).map(|k| grid.time(k)));
-        let known = independent
-            .get_or_insert_with(|| solve::run(&case.stage, experiment, &all, &mut Double::from, &mut Double::from));
+        let known = independent.get_or_insert_with(|| solve::run(&case.stage, experiment, &all));
         match known {
-            Ok(known) => Pair { stage: &case.stage, experiment, times: &all, by, run: &run, known }.judged(),
+            Ok(known) => {
+                let allowed = allowed(by, &run);
+                Pair { stage: &case.stage, experiment, times: &all, by, run: &run, known, allowed }.judged()
+            }
             Err(why) => fault(by, why.clone()),
         }
     };
@@ -123,51 +133,78 @@ struct Pair<'a> {
     by: By,
     run: &'a Solution,
     known: &'a Run,
+    /// How far positions may be apart, m.
+    allowed: f64,
 }
 
-/// Two times so near that what is undone between them did not happen, and how far moments may be apart: parts of the run.
-const MOMENT: f64 = 1e-9;
+/// How far apart the ends of two runs may be, as a part of the run.
 const NEAR: f64 = 1e-6;
 
 impl Pair<'_> {
     fn judged(&self) -> Compared {
-        let ours = self.rows();
-        let difference = apart(&ours, &self.known.rows);
-        let events = (self.events(&body_events(self.run)), self.events(&self.known.events));
-        let mut wrong = Vec::new();
-        if let Some(why) = self.wrong_end() {
-            wrong.push(why);
-        }
-        if !(difference <= allowed(self.by, self.run)) {
-            wrong.push(format!("positions differ by {difference:.1e} m"));
-        }
-        if let Some(why) = differ(&events.0, &events.1, NEAR * self.experiment.until) {
-            wrong.push(format!("events differ: {why}"));
-        }
+        let difference = apart(&self.rows(), &self.known.rows);
         let count = self.known.events.len();
         let compared = |spread, verdict| Compared { by: self.by, difference, spread, events: count, verdict };
         if let Ending::GaveUp(time, why) = &self.known.ending {
             return compared(None, Verdict::Unknown(format!("the independent solver gave up at {time:e} s: {why}")));
         }
-        if wrong.is_empty() {
+        let wrong_end = self.wrong_end(self.known);
+        let far = !(difference <= self.allowed);
+        let ours = body_events(self.run);
+        let events = events::undone(&ours, &self.known.events, self.experiment.until)
+            .or_else(|| self.disagreement(&ours, self.known));
+        if wrong_end.is_none() && !far && events.is_none() {
             return compared(None, Verdict::Agrees);
         }
-        let told = wrong.join("; ");
         let perturbed = self.perturbed();
         let spread = perturbed.iter().map(|run| apart(&run.rows, &self.known.rows)).fold(0.0, f64::max);
-        let other_events = perturbed
-            .iter()
-            .any(|run| differ(&self.events(&run.events), &events.1, NEAR * self.experiment.until).is_some());
-        let other_end = perturbed
-            .iter()
-            .any(|run| std::mem::discriminant(&run.ending) != std::mem::discriminant(&self.known.ending));
-        let explained = (self.wrong_end().is_none() || other_end)
-            && (difference <= allowed(self.by, self.run) || difference <= COMPARABLE * spread)
-            && (differ(&events.0, &events.1, NEAR * self.experiment.until).is_none()
-                || other_events
-                || difference > ALLOWED);
-        let told = format!("{told}; perturbed runs differ by {spread:.1e} m");
+        let too_far = far && !(difference <= COMPARABLE * spread);
+        let other_end = || perturbed.iter().any(|run| self.wrong_end(run).is_none());
+        let other_events = || {
+            // Where positions differ, events do.
+            far || perturbed.iter().any(|run| self.disagreement(&run.events, self.known).is_some())
+        };
+        let explained = !too_far && (wrong_end.is_none() || other_end()) && (events.is_none() || other_events());
+        let mut told: Vec<String> = wrong_end.into_iter().collect();
+        if far {
+            told.push(format!("positions differ by {difference:.1e} m"));
+        }
+        told.extend(events);
+        told.push(format!("perturbed runs differ by {spread:.1e} m"));
+        let told = told.join("; ");
         compared(Some(spread), if explained { Verdict::IllConditioned(told) } else { Verdict::Unexplained(told) })
+    }
+
+    /// Where bodies do other things than by the independent solver, and that matters.
+    fn disagreement(&self, ours: &[Event], known: &Run) -> Option<String> {
+        let end = match known.ending {
+            Ending::Complete => self.times.last().copied().unwrap_or(0.0),
+            Ending::LeftTravel(time) | Ending::GaveUp(time, _) => time * (1.0 - NEAR),
+        };
+        let found = events::disagreements(ours, &known.events, end);
+        if found.is_empty() {
+            return None;
+        }
+        // Where the bodies are at those moments.
+        let mut moments: Vec<f64> = found.iter().flat_map(|one| one.moments()).chain([self.experiment.until]).collect();
+        moments.sort_by(f64::total_cmp);
+        moments.dedup();
+        let at_moments = solve::run(self.stage, self.experiment, &moments).ok()?;
+        let place = |body: usize, time: f64| {
+            let index = moments.binary_search_by(|moment| moment.total_cmp(&time)).unwrap_or_else(|index| index);
+            at_moments.rows.get(index).map_or(Double::ZERO, |row| row[body])
+        };
+        let farthest = |body: usize| known.rows.iter().map(|row| row[body].high.abs()).fold(0.0, f64::max);
+        let way = |body: usize, from: f64, to: f64| (place(body, to) - place(body, from)).high.abs();
+        let [share, of_run, moment] = match self.by {
+            By::Exact => AGREEMENT,
+            By::General => AGREEMENT_OF_GENERAL,
+        };
+        let matters = |one: &&events::Disagreement| {
+            let near = (share * self.allowed).min(of_run * farthest(one.body()));
+            one.matters(moment * self.experiment.until, near, way)
+        };
+        found.iter().find(matters).map(events::Disagreement::told)
     }
 
     /// r φ₁, x, r φ₃ less the start of the cart.
@@ -181,9 +218,9 @@ impl Pair<'_> {
     }
 
     /// What is wrong with how it ended.
-    fn wrong_end(&self) -> Option<String> {
-        let told = || Some(format!("it ends {:?} instead of {:?}", self.run.outcome.ending, self.known.ending));
-        match (self.run.outcome.ending, &self.known.ending) {
+    fn wrong_end(&self, known: &Run) -> Option<String> {
+        let told = || Some(format!("it ends {:?} instead of {:?}", self.run.outcome.ending, known.ending));
+        match (self.run.outcome.ending, &known.ending) {
             (taut::solve::Ending::Complete, Ending::Complete) => None,
             (taut::solve::Ending::LeftTravel { time }, Ending::LeftTravel(other))
                 if (time - other).abs() <= NEAR * self.experiment.until =>
@@ -194,22 +231,7 @@ impl Pair<'_> {
         }
     }
 
-    /// Changes of each body, without what was undone at once.
-    fn events(&self, events: &[Event]) -> [Vec<Event>; 3] {
-        let mut bodies: [Vec<Event>; 3] = Default::default();
-        for event in events {
-            let list = &mut bodies[event.body];
-            match list.last_mut() {
-                Some(last) if event.time - last.time <= MOMENT * self.experiment.until => last.to = event.to,
-                _ => list.push(*event),
-            }
-            if list.last().is_some_and(|last| last.from == last.to) {
-                list.pop();
-            }
-        }
-        bodies
-    }
-
+    /// Runs of the independent solver with numbers that are off by their last bit; half of them keep their state in so few bits, too.
     fn perturbed(&self) -> Vec<Run> {
         let mut runs = Vec::new();
         for number in 0..PERTURBED {
@@ -221,9 +243,12 @@ impl Pair<'_> {
                     Double::from(value) * (Double::ONE + Double::from(sign * size))
                 }
             };
-            let mut taken = perturb(1, PERTURBATION);
-            let mut of_input = perturb(2, if sines { PERTURBATION_OF_SINES } else { PERTURBATION });
-            runs.extend(solve::run(self.stage, self.experiment, self.times, &mut taken, &mut of_input));
+            let mut machine = perturb(1, PERTURBATION);
+            let mut input = perturb(2, if sines { PERTURBATION_OF_SINES } else { PERTURBATION });
+            let mut kept = perturb(3, PERTURBATION);
+            let kept: Option<Taken> = if number % 2 == 1 { Some(&mut kept) } else { None };
+            let numbers = Numbers { machine: &mut machine, input: &mut input, kept };
+            runs.extend(solve::run_with(self.stage, self.experiment, self.times, numbers));
         }
         runs
     }
@@ -252,27 +277,4 @@ fn body_events(run: &Solution) -> Vec<Event> {
 fn apart(a: &[[Double; 3]], b: &[[Double; 3]]) -> f64 {
     let pairs = a.iter().flatten().zip(b.iter().flatten());
     pairs.map(|(a, b)| (*a - *b).high.abs()).fold(0.0, |most, d| if d.is_nan() { f64::INFINITY } else { d.max(most) })
-}
-
-/// What the lists of events differ by.
-fn differ(ours: &[Vec<Event>; 3], known: &[Vec<Event>; 3], near: f64) -> Option<String> {
-    const NAMES: [&str; 3] = ["drive pulley", "cart", "idler pulley"];
-    for body in 0..3 {
-        let (ours, known) = (&ours[body], &known[body]);
-        let told = |i: usize| {
-            let say = |event: Option<&Event>| match event {
-                Some(e) => format!("{:?} to {:?} at {:e} s", e.from, e.to, e.time),
-                None => "nothing".into(),
-            };
-            Some(format!("{}: {} instead of {}", NAMES[body], say(ours.get(i)), say(known.get(i))))
-        };
-        let same = |(a, b): (&Event, &Event)| a.from == b.from && a.to == b.to && (a.time - b.time).abs() <= near;
-        if let Some(i) = ours.iter().zip(known).position(|pair| !same(pair)) {
-            return told(i);
-        }
-        if ours.len() != known.len() {
-            return told(ours.len().min(known.len()));
-        }
-    }
-    None
 }

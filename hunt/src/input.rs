@@ -39,6 +39,11 @@ impl Piece {
         Self { start, value: self.value + self.slope * later, slope: self.slope, waves: waves.collect() }
     }
 
+    /// A time over which a Taylor series of the input serves: two radians of its fastest wave.
+    pub fn reach(&self) -> f64 {
+        2.0 / self.waves.iter().map(|wave| wave.omega.high.abs()).fold(0.0, f64::max)
+    }
+
     /// Taylor coefficients of u(t + s h) in powers of s.
     pub fn series(&self, t: Double, h: Double) -> Polynomial {
         let mut u = [Double::ZERO; ORDER + 1];

@@ -6,6 +6,7 @@
 pub mod compare;
 pub mod double;
 pub mod draw;
+pub mod events;
 pub mod input;
 pub mod law;
 pub mod machine;

@@ -141,7 +141,7 @@ impl Machine {
             }
         });
         let ends = stage.travel.map(|travel| {
-            let ends = [taken(travel.min) - origin, taken(travel.max) - origin];
+            let ends = [travel.min, travel.max].map(|end| (Double::from(end) - origin) * taken(1.0));
             match travel.stop {
                 None => Ends::Open(ends),
                 Some(stop) => {
@@ -245,18 +245,27 @@ fn friction(law: &taut::friction::Friction, taken: Taken, r: Double) -> Friction
     }
 }
 
+/// Positions at the start that differ by no more of their last places mean a belt without strain: x/r is a rounded number, too.
+const LAST_PLACES: f64 = 4.0;
+
 fn start(stage: &Stage, experiment: &Experiment, taken: Taken, r: Double, origin: Double) -> State {
     let initial = &experiment.initial;
     let mut z = [Double::ZERO; STATES];
-    z[WAY[0]] = taken(initial.drive_angle) * r - origin;
-    z[WAY[1]] = taken(initial.cart_position) - origin;
-    z[WAY[2]] = taken(initial.idler_angle) * r - origin;
+    // Strains, not positions: a number of 64 bits holds the first to their own last place.
+    let mut strain = |angle: f64| {
+        let way = Double::from(stage.pulley_radius) * angle;
+        let strain = way - origin;
+        let rounding = LAST_PLACES * f64::EPSILON * way.high.abs().max(origin.high.abs());
+        if strain.high.abs() <= rounding { Double::ZERO } else { strain * taken(1.0) }
+    };
+    z[WAY[0]] = strain(initial.drive_angle);
+    z[WAY[2]] = strain(initial.idler_angle);
     z[SPEED[0]] = taken(initial.drive_speed) * r;
     z[SPEED[1]] = taken(initial.cart_speed);
     z[SPEED[2]] = taken(initial.idler_speed) * r;
     match stage.belt.model {
         BeltModel::Elastic => {}
-        BeltModel::TwoMass => z[SPEED[2]] = z[SPEED[0]],
+        BeltModel::TwoMass => (z[WAY[2]], z[SPEED[2]]) = (z[WAY[0]], z[SPEED[0]]),
         BeltModel::Rigid => (z[SPEED[0]], z[SPEED[2]]) = (z[SPEED[1]], z[SPEED[1]]),
     }
     z[CURRENT] = taken(initial.motor_current);

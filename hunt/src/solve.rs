@@ -7,7 +7,7 @@
 use crate::double::Double;
 use crate::input::{self, Piece};
 use crate::law::{Change, Guard, Law, Limit, Mode, Motion, Touch};
-use crate::machine::{CURRENT, Machine, SPEED, State, Taken, WAY};
+use crate::machine::{CURRENT, Machine, ROTOR, SPEED, State, Taken, WAY};
 use crate::root::{self, Polynomial};
 use crate::series::{Noise, ORDER, Series, Size};
 use std::collections::HashMap;
@@ -59,19 +59,28 @@ pub struct Run {
     pub steps: usize,
 }
 
-/// Runs `experiment` on `stage` and gives the ways at `times`, which grow; every number of the machine and its start passes
-/// `taken`, every one of the input `taken_of_input`.
-pub fn run(
-    stage: &Stage,
-    experiment: &Experiment,
-    times: &[f64],
-    taken: Taken,
-    taken_of_input: Taken,
-) -> Result<Run, String> {
+/// How the numbers of a case become ours.
+pub struct Numbers<'a> {
+    /// Those of the machine and its start.
+    pub machine: Taken<'a>,
+    /// Those of the input.
+    pub input: Taken<'a>,
+    /// What a state is after each step, as if it were kept in fewer bits.
+    pub kept: Option<Taken<'a>>,
+}
+
+/// Runs `experiment` on `stage` with its numbers as they are and gives the ways at `times`, which grow.
+pub fn run(stage: &Stage, experiment: &Experiment, times: &[f64]) -> Result<Run, String> {
+    let numbers = Numbers { machine: &mut Double::from, input: &mut Double::from, kept: None };
+    run_with(stage, experiment, times, numbers)
+}
+
+/// The same with other numbers.
+pub fn run_with(stage: &Stage, experiment: &Experiment, times: &[f64], numbers: Numbers) -> Result<Run, String> {
     let end = times.last().copied().unwrap_or(0.0);
-    let machine = Machine::new(stage, experiment, taken);
-    let chain = input::chain(&experiment.input, end, taken_of_input)?;
-    let mut solver = Solver::new(&machine, times);
+    let machine = Machine::new(stage, experiment, numbers.machine);
+    let chain = input::chain(&experiment.input, end, numbers.input)?;
+    let mut solver = Solver::new(&machine, times, numbers.kept);
     for (i, piece) in chain.iter().enumerate() {
         let until = chain.get(i + 1).map_or(Double::from(end), |next| next.start);
         solver.settle(piece);
@@ -90,9 +99,10 @@ struct Prepared {
     step: std::cell::Cell<f64>,
 }
 
-struct Solver<'a> {
+struct Solver<'a, 'b> {
     machine: &'a Machine,
     times: &'a [f64],
+    kept: Option<Taken<'b>>,
     z: State,
     /// Largest values so far.
     size: Size,
@@ -108,8 +118,8 @@ struct Solver<'a> {
     steps: usize,
 }
 
-impl<'a> Solver<'a> {
-    fn new(machine: &'a Machine, times: &'a [f64]) -> Self {
+impl<'a, 'b> Solver<'a, 'b> {
+    fn new(machine: &'a Machine, times: &'a [f64], kept: Option<Taken<'b>>) -> Self {
         let z = machine.start;
         let motion = [0, 1, 2].map(|body| {
             let leader = machine.leader(body);
@@ -132,6 +142,7 @@ impl<'a> Solver<'a> {
         Self {
             machine,
             times,
+            kept,
             z,
             size: Size { states: z.map(|z| z.high.abs()), input: 0.0 },
             time: Double::ZERO,
@@ -172,14 +183,25 @@ impl<'a> Solver<'a> {
             let prepared = self.prepared();
             let law = &prepared.law;
             let rest = until - self.time;
-            let whole = prepared.step.get() >= rest.high;
-            let h = if whole { rest } else { Double::from(prepared.step.get()) };
-            let series = Series::new(&law.rates, &self.z, piece.series(self.time, h), h);
-            self.size.input = self.size.input.max(series.input_size());
-            let reach = series.reach(&self.size);
-            if !reach.is_nan() && h.high > 0.0 {
-                prepared.step.set(f64::max(h.high * (0.95 * reach).clamp(1e-6, 2.0), prepared.step.get() * 1e-6));
+            let mut step = prepared.step.get().min(piece.reach());
+            let (series, h, reach) = loop {
+                let h = if step >= rest.high { rest } else { Double::from(step) };
+                let series = Series::new(&law.rates, &self.z, piece.series(self.time, h), h);
+                let reach = series.reach(&self.size);
+                // What is a small part of the step says little about where its series ends.
+                if reach.is_nan() || reach > 0.3 {
+                    break (series, h, reach);
+                }
+                step = h.high * (2.0 * reach).clamp(1e-9, 0.5);
+            };
+            if reach.is_nan() {
+                self.give_up("it diverges");
+                return;
             }
+            let whole = h == rest;
+            let next = h.high * (0.95 * reach).clamp(0.2, 2.0);
+            prepared.step.set(if whole { next.max(step) } else { next });
+            self.size.input = self.size.input.max(series.input_size());
             let part = reach.min(1.0);
             let fall = self.first_fall(law, &series, part, h);
             let s = fall.as_ref().map_or(Double::from(part), |(s, _)| *s);
@@ -187,15 +209,32 @@ impl<'a> Solver<'a> {
             self.record_up_to(after, Some((&series, h)));
             self.z = series.at(s);
             self.time = after;
+            self.keep();
             for (size, z) in self.size.states.iter_mut().zip(&self.z) {
                 *size = size.max(z.high.abs());
-            }
-            if !self.z.iter().all(|z| z.high.is_finite()) {
-                self.give_up("it diverges");
             }
             if let Some((_, change)) = fall {
                 self.fire(change, piece);
             }
+        }
+    }
+
+    /// Rounds what moves as if it were kept in fewer bits: stretches, the cart's way, speeds, the current.
+    fn keep(&mut self) {
+        let Some(kept) = &mut self.kept else { return };
+        let mut change = |value: Double| kept(value.high) - Double::from(value.high);
+        let moves = self.mode.motion.map(|motion| motion != Motion::Stuck);
+        let common = change(self.z[WAY[1]]);
+        let [drive, cart, idler] = WAY.map(|way| self.z[way]);
+        let strain = [change(drive - cart), Double::ZERO, change(idler - cart)];
+        for body in (0..3).filter(|&body| moves[body]) {
+            self.z[WAY[body]] += common + strain[body];
+            let speed = self.z[SPEED[body]];
+            self.z[SPEED[body]] += change(speed);
+        }
+        for place in [CURRENT, ROTOR[1]] {
+            let value = self.z[place];
+            self.z[place] += change(value);
         }
     }
 
@@ -282,7 +321,7 @@ impl<'a> Solver<'a> {
     fn first_broken(&mut self, piece: &Piece) -> Option<Change> {
         let prepared = self.prepared();
         let law = &prepared.law;
-        let step = prepared.step.get();
+        let step = prepared.step.get().min(piece.reach());
         let h = Double::from(if step.is_finite() { step } else { 1.0 });
         let series = Series::new(&law.rates, &self.z, piece.series(self.time, h), h);
         let mut noise = None;
