@@ -84,11 +84,11 @@ impl Coordinates {
     }
 }
 
-/// The stretches r φ₁ − x, x − r φ₃, r φ₃ − r φ₁ (m), φ_r − φ₁ (rad), and x (m), of a state in these coordinates.
+/// The stretches r φ₁ − x, x − r φ₃, r φ₃ − r φ₁ (m), φ_r − φ₁ (rad), and x − x₀ (m), of a state in these coordinates.
 #[inline]
-pub(crate) fn stretches(inner: &State, origin: f64) -> [f64; crate::plant::STRETCHES] {
+pub(crate) fn stretches(inner: &State) -> [f64; crate::plant::STRETCHES] {
     let (d1, d2) = (inner[SPAN_1], inner[SPAN_2]);
-    [d1, d2, -(d1 + d2), inner[TWIST], origin + inner[place::CART_POSITION]]
+    [d1, d2, -(d1 + d2), inner[TWIST], inner[place::CART_POSITION]]
 }
 
 #[cfg(test)]

@@ -13,7 +13,9 @@ mod change;
 use super::coordinates::{Coordinates, stretches};
 use super::law::{Law, Size, Watch, chain, highest, states};
 use super::propagator::SERIES_ORDER;
+use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
 use super::record::{Recorder, Row};
+use super::rounding::Rounding;
 use super::roots;
 use super::{Cost, Detail, Ending, Event, Flow, Grid, Outcome, Source, held};
 use crate::case::Experiment;
@@ -94,6 +96,10 @@ struct Run<'a, const R: usize, const C: usize> {
     changed_at: (u64, f64),
     changes: usize,
     cost: Cost,
+    rounding: Rounding,
+    /// Intervals crossed or halved, and how fast the run gets on by them.
+    questions: u64,
+    pace: Pace,
     trouble: Option<Ending>,
 }
 
@@ -145,6 +151,9 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             changed_at: (0, 0.0),
             changes: 0,
             cost: Cost { modes: u64::from(is_new), ..Cost::default() },
+            rounding: Rounding::default(),
+            questions: 0,
+            pace: Pace::default(),
             trouble: None,
         }
     }
@@ -180,7 +189,10 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             (None, Flow::Continue) => Ending::Complete,
         };
         self.cost.propagators = propagators(self.laws) - self.shared;
-        Outcome { events: self.events, ending, cost: self.cost }
+        self.rounding.swing(self.law.swing, self.time());
+        let steps = self.cost.steps + self.cost.series;
+        let error = Some(self.rounding.bound(steps, self.time(), self.coordinates.origin()));
+        Outcome { events: self.events, ending, cost: self.cost, error }
     }
 
     fn time(&self) -> f64 {
@@ -283,6 +295,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         self.check();
         if self.recorder.next_row() == self.row && self.trouble.is_none() {
             let inner = self.inner();
+            self.rounding.see(self.plant.stage().pulley_radius, &inner);
             self.recorder.push(Row::new(&self.coordinates, &inner, self.input()), self.mode);
         }
         if self.recorder.flow == Flow::Stop {
@@ -379,7 +392,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             distance -= first;
         }
         for level in 0..=law.finest {
-            while distance >= law.length(level) {
+            while distance >= law.length(level) && self.trouble.is_none() {
                 if let Some(cause) = self.cross(&law, level) {
                     return Some(cause);
                 }
@@ -391,6 +404,9 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
 
     /// Crosses an interval of h/2^level.
     fn cross(&mut self, law: &Law<R, C>, level: usize) -> Option<Cause> {
+        if !self.goes_on() {
+            return None;
+        }
         let length = law.length(level);
         match self.look(law, length, Some(level)) {
             Look::Safe(end) => {
@@ -405,6 +421,20 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             Look::Unsure if level < law.finest => self.cross(law, level + 1).or_else(|| self.cross(law, level + 1)),
             Look::Unsure => self.creep(law, length),
         }
+    }
+
+    /// Asks now and then whether to go on, and whether this leads anywhere; false if not.
+    fn goes_on(&mut self) -> bool {
+        self.questions += 1;
+        if self.questions.is_multiple_of(STEPS_BETWEEN_QUESTIONS) && self.trouble.is_none() {
+            self.recorder.ask();
+            if self.recorder.flow == Flow::Stop {
+                self.trouble = Some(Ending::Interrupted { time: self.time() });
+            } else {
+                self.trouble = self.pace.too_stiff(self.questions, self.time(), self.grid.end());
+            }
+        }
+        self.trouble.is_none()
     }
 
     /// Decides, if it can, that no guard falls within `length`.
@@ -521,7 +551,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
 
     fn value(&self, form: &Form) -> f64 {
         let inner = self.inner();
-        form.value_at(&stretches(&inner, self.coordinates.origin()), &inner, self.input())
+        form.value_at(&stretches(&inner), self.coordinates.origin(), &inner, self.input())
     }
 }
 

@@ -10,6 +10,7 @@ mod model;
 mod stretch;
 
 use super::coordinates::Coordinates;
+use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
 use super::record::{Recorder, Row};
 use super::{Cost, Detail, Ending, Event, Flow, Grid, Outcome, Source, check, held};
 use crate::case::Experiment;
@@ -101,6 +102,7 @@ struct Run<'a> {
     torque: f64,
     changed_at: f64,
     changes: usize,
+    pace: Pace,
     events: Vec<Event>,
     modes: Vec<Mode>,
     cost: Cost,
@@ -171,6 +173,7 @@ impl<'a> Run<'a> {
             torque: 0.0,
             changed_at: f64::NEG_INFINITY,
             changes: 0,
+            pace: Pace::default(),
             events: Vec::new(),
             modes: vec![mode],
             cost: Cost::default(),
@@ -215,7 +218,7 @@ impl<'a> Run<'a> {
             (None, Flow::Stop) => Ending::Interrupted { time },
             (None, Flow::Continue) => Ending::Complete,
         };
-        Outcome { events: self.events, ending, cost: self.cost }
+        Outcome { events: self.events, ending, cost: self.cost, error: None }
     }
 
     /// What the input does from `time` on, having been `before`.
@@ -452,11 +455,19 @@ impl SolOut for Observer<'_, '_> {
         let size = y.len();
         let mut end = [0.0; MOST];
         end[..size].copy_from_slice(y);
-        if self.field.is_broken() || !end.iter().sum::<f64>().is_finite() {
+        if !end.iter().sum::<f64>().is_finite() {
             self.run.trouble = Some(Ending::Diverged { time: self.field.stretch.begin + from });
             return ControlFlag::Interrupt;
         }
         self.run.cost.steps += 1;
+        if self.run.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS) {
+            self.run.recorder.ask();
+            self.run.trouble = self.run.pace.too_stiff(
+                self.run.cost.steps,
+                self.field.stretch.begin + to,
+                self.run.grid.end(),
+            );
+        }
         let begin = self.run.y;
         let at = |tau: f64| {
             let mut y = [0.0; MOST];

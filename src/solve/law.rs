@@ -124,6 +124,8 @@ pub(super) struct Law<const R: usize, const C: usize> {
     /// Halvings of the interval until the Taylor series serves.
     pub(super) finest: usize,
     h: f64,
+    /// A bound of the fastest undamped swing, rad/s.
+    pub(super) swing: f64,
     /// Where positions are counted from, m.
     origin: f64,
     rate: Matrix<R, C>,
@@ -170,7 +172,7 @@ impl<const R: usize, const C: usize> Law<R, C> {
             let mut row = [0.0; C];
             row[..states::<R>()].copy_from_slice(&form.on_stretches()[..states::<R>()]);
             row[chain::<R>(0)] = form.input;
-            row[C - 1] = form.constant + form.stretch[POSITION] * origin;
+            row[C - 1] = form.constant_from(origin);
             row
         };
         let mut rate = Matrix::zero();
@@ -267,7 +269,8 @@ impl<const R: usize, const C: usize> Law<R, C> {
         if has_current {
             damp += decay + exchange;
         }
-        let speed: f64 = f64::sqrt(swing) + damp;
+        let swing = f64::sqrt(swing);
+        let speed: f64 = swing + damp;
         let finest = (speed * h / SERIES_REACH).log2().ceil().clamp(0.0, 1000.0) as usize;
 
         Self {
@@ -276,6 +279,7 @@ impl<const R: usize, const C: usize> Law<R, C> {
             forcing,
             finest,
             h,
+            swing,
             origin,
             rate,
             steps: (0..=finest).map(|_| OnceCell::new()).collect(),

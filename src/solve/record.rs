@@ -35,7 +35,7 @@ impl Row {
     /// A state in the solver's coordinates.
     #[inline]
     pub(crate) fn new(coordinates: &Coordinates, inner: &State, input: f64) -> Self {
-        let [d1, d2, _, twist, _] = stretches(inner, 0.0);
+        let [d1, d2, _, twist, _] = stretches(inner);
         Self { state: coordinates.state(inner), stretch: [d1, d2, twist], input }
     }
 }
@@ -108,6 +108,14 @@ impl<'a> Recorder<'a> {
             self.finish();
             self.rows += rows;
         }
+    }
+
+    /// Hands on what there is, be it nothing, to hear whether to go on.
+    pub(crate) fn ask(&mut self) {
+        if self.raw.is_empty() {
+            self.block.columns.iter_mut().for_each(|column| column.values.clear());
+        }
+        self.hand_on();
     }
 
     /// Hands on what is left.

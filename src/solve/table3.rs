@@ -71,7 +71,7 @@ pub(crate) fn run(
     }
     recorder.finish();
     cost.samples = recorder.rows;
-    Ok(Outcome { events: Vec::new(), ending, cost })
+    Ok(Outcome { events: Vec::new(), ending, cost, error: None })
 }
 
 /// The equations (16)-(18) with Table 3 for the friction.

@@ -104,7 +104,11 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
     fn is_by_rounding(&self, cause: Cause) -> bool {
         let Cause::Stop(body) = cause else { return false };
         let place = body.speed_place();
-        self.law.rate(&self.z)[place].abs() <= 20.0 * self.law.noise_of_rate(&self.z)[place]
+        let slows = self.law.rate(&self.z)[place].abs();
+        // Its own speed is known to the rounding of the speeds that it had.
+        let mut sizes = self.z;
+        sizes[place] = self.rounding.largest_speed(body, self.plant.stage().pulley_radius);
+        slows <= 20.0 * self.law.noise_of_rate(&sizes)[place]
     }
 
     /// Lets a part other than a body do something else.
@@ -161,6 +165,7 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
 
     /// Takes up the equations of the present mode.
     fn enter(&mut self) {
+        self.rounding.swing(self.law.swing, self.time());
         let (law, is_new) = Law::of(self.laws, self.plant, self.mode, self.h, self.coordinates.origin());
         self.law = law;
         let inner = self.inner();

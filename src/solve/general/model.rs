@@ -75,7 +75,7 @@ impl<'a> Model<'a> {
     /// The value of a linear form.
     #[inline]
     pub(super) fn value(&self, form: &Form, inner: &State, input: f64) -> f64 {
-        form.value_at(&stretches(inner, self.origin), inner, input)
+        form.value_at(&stretches(inner), self.origin, inner, input)
     }
 
     /// By how much the cart's dry friction is multiplied where it is.
@@ -93,8 +93,8 @@ impl<'a> Model<'a> {
         let Some(make) = self.follows else { return [0.0; 2] };
         let stage = self.plant.stage();
         let [k1, k2, _] = stage.belt.stiffness;
-        let [d1, d2, _, _, x] = stretches(state, self.origin);
-        let [k1x, k2x] = make.stiffness_at(x);
+        let [d1, d2, _, _, way] = stretches(state);
+        let [k1x, k2x] = make.stiffness_at(self.origin + way);
         // (k_j(x) − k_j) d_j
         [(k1x - k1) * d1, (k2x - k2) * d2]
     }
@@ -176,7 +176,6 @@ pub(super) struct Field<'a> {
     mass: [f64; 3],
     pub(super) stretch: &'a Stretch,
     evaluations: Cell<u64>,
-    broken: Cell<bool>,
 }
 
 impl<'a> Field<'a> {
@@ -194,17 +193,11 @@ impl<'a> Field<'a> {
             mass,
             stretch,
             evaluations: Cell::new(0),
-            broken: Cell::new(false),
         }
     }
 
     pub(super) fn evaluations(&self) -> u64 {
         self.evaluations.get()
-    }
-
-    /// Whether a rate was no number.
-    pub(super) fn is_broken(&self) -> bool {
-        self.broken.get()
     }
 
     /// The input at τ.
@@ -302,9 +295,9 @@ impl FirstOrderSystem for Field<'_> {
             rate[rotor + 1] = value(&self.equations.acceleration[ROTOR]);
         }
         if !rate.iter().sum::<f64>().is_finite() {
-            // The formula would shorten its step for ever; so it goes on, and its observer ends the run.
-            self.broken.set(true);
-            rate.fill(0.0);
+            // A trial step that leads nowhere: what is no number fails every test of the error, so the step is refused and a
+            // shorter one tried.
+            rate.fill(f64::NAN);
         }
     }
 }
