@@ -8,14 +8,11 @@ use crate::machine::Taken;
 use crate::solve::{self, Ending, Event, Numbers, Run};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use taut::case::{Case, Experiment};
-use taut::solve::{Solution, Solver, simulate};
+use taut::solve::{ErrorEstimate, Flow, Solution, Solver, simulate};
 use taut::stage::Stage;
 
-/// How far positions may be apart, m.
+/// How far positions of a run may be apart, m, that states nothing of itself; and of one of the general solver at least.
 const ALLOWED: f64 = 1e-9;
-
-/// The same for the general solver at its tolerance here; its steps are not exact.
-const ALLOWED_GENERAL: f64 = 1e-7;
 
 /// Tolerance that the general solver is asked for.
 const TOLERANCE: f64 = 1e-11;
@@ -66,6 +63,8 @@ pub struct Compared {
     pub by: By,
     /// Largest difference of positions, m.
     pub difference: f64,
+    /// How large it may be, m.
+    pub allowed: f64,
     /// What perturbed runs differ by, m, where there were any.
     pub spread: Option<f64>,
     /// Changes of bodies that the independent solver saw.
@@ -74,11 +73,19 @@ pub struct Compared {
     pub verdict: Verdict,
 }
 
-/// How far positions of a run may be off. The one place to ask a run for a bound of its own.
-fn allowed(by: By, _run: &Solution) -> f64 {
-    match by {
-        By::Exact => ALLOWED,
-        By::General => ALLOWED_GENERAL,
+/// How far positions of a run may be off, m: the bound that the run states of itself; of the general solver its own estimate.
+fn allowed(by: By, stage: &Stage, experiment: &Experiment, run: &Solution) -> f64 {
+    let stated = match by {
+        By::Exact => run.outcome.error,
+        By::General => {
+            let mut estimate = ErrorEstimate::new(stage, experiment);
+            estimate.take(&run.trajectory);
+            estimate.finish(stage, experiment, TOLERANCE, &run.outcome, &mut || Flow::Continue).ok().flatten()
+        }
+    };
+    match (by, stated) {
+        (By::Exact, stated) => stated.map_or(ALLOWED, |error| error.value),
+        (By::General, stated) => stated.map_or(ALLOWED, |error| error.value.max(ALLOWED)),
     }
 }
 
@@ -87,6 +94,7 @@ pub fn compare(name: &str, text: &str, solvers: &[By]) -> Vec<Compared> {
     let fault = |by: By, why: String| Compared {
         by,
         difference: 0.0,
+        allowed: ALLOWED,
         spread: None,
         events: 0,
         verdict: Verdict::Unexplained(why),
@@ -116,7 +124,7 @@ pub fn compare(name: &str, text: &str, solvers: &[By]) -> Vec<Compared> {
         let known = independent.get_or_insert_with(|| solve::run(&case.stage, experiment, &all));
         match known {
             Ok(known) => {
-                let allowed = allowed(by, &run);
+                let allowed = allowed(by, &case.stage, experiment, &run);
                 Pair { stage: &case.stage, experiment, times: &all, by, run: &run, known, allowed }.judged()
             }
             Err(why) => fault(by, why.clone()),
@@ -144,7 +152,14 @@ impl Pair<'_> {
     fn judged(&self) -> Compared {
         let difference = apart(&self.rows(), &self.known.rows);
         let count = self.known.events.len();
-        let compared = |spread, verdict| Compared { by: self.by, difference, spread, events: count, verdict };
+        let compared = |spread, verdict| Compared {
+            by: self.by,
+            difference,
+            allowed: self.allowed,
+            spread,
+            events: count,
+            verdict,
+        };
         if let Ending::GaveUp(time, why) = &self.known.ending {
             return compared(None, Verdict::Unknown(format!("the independent solver gave up at {time:e} s: {why}")));
         }
@@ -167,7 +182,7 @@ impl Pair<'_> {
         let explained = !too_far && (wrong_end.is_none() || other_end()) && (events.is_none() || other_events());
         let mut told: Vec<String> = wrong_end.into_iter().collect();
         if far {
-            told.push(format!("positions differ by {difference:.1e} m"));
+            told.push(format!("positions differ by {difference:.1e} m, {:.1e} m allowed", self.allowed));
         }
         told.extend(events);
         told.push(format!("perturbed runs differ by {spread:.1e} m"));

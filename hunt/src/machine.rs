@@ -105,6 +105,8 @@ pub struct Machine {
     pub bandwidth: Option<Double>,
     /// State at time zero.
     pub start: State,
+    /// What the positions given for drive pulley, cart and idler pulley are beyond those of that state: less than a strain.
+    pub beyond: [Double; 3],
     /// Radius of the pulleys.
     pub radius: Double,
     /// Where the cart starts: ways are counted from there.
@@ -172,6 +174,7 @@ impl Machine {
             // 2π f
             bandwidth: amplifier.bandwidth.map(|f| crate::double::PI * 2.0 * taken(f)),
             start: start(stage, experiment, taken, r, origin),
+            beyond: beyond(stage, experiment, origin),
             radius: r,
             origin,
         }
@@ -245,6 +248,23 @@ fn friction(law: &taut::friction::Friction, taken: Taken, r: Double) -> Friction
     }
 }
 
+/// Ways of the pulleys at the start, from that of the cart, as the case gives them.
+fn strains(stage: &Stage, experiment: &Experiment, origin: Double) -> [Double; 2] {
+    let initial = &experiment.initial;
+    [initial.drive_angle, initial.idler_angle].map(|angle| Double::from(stage.pulley_radius) * angle - origin)
+}
+
+fn beyond(stage: &Stage, experiment: &Experiment, origin: Double) -> [Double; 3] {
+    let [drive, idler] =
+        strains(stage, experiment, origin).map(|strain| if is_strain(strain, origin) { Double::ZERO } else { strain });
+    [drive, Double::ZERO, idler]
+}
+
+fn is_strain(strain: Double, origin: Double) -> bool {
+    let way = (strain + origin).high.abs();
+    strain.high.abs() > LAST_PLACES * f64::EPSILON * way.max(origin.high.abs())
+}
+
 /// Positions at the start that differ by no more of their last places mean a belt without strain: x/r is a rounded number, too.
 const LAST_PLACES: f64 = 4.0;
 
@@ -252,14 +272,9 @@ fn start(stage: &Stage, experiment: &Experiment, taken: Taken, r: Double, origin
     let initial = &experiment.initial;
     let mut z = [Double::ZERO; STATES];
     // Strains, not positions: a number of 64 bits holds the first to their own last place.
-    let mut strain = |angle: f64| {
-        let way = Double::from(stage.pulley_radius) * angle;
-        let strain = way - origin;
-        let rounding = LAST_PLACES * f64::EPSILON * way.high.abs().max(origin.high.abs());
-        if strain.high.abs() <= rounding { Double::ZERO } else { strain * taken(1.0) }
-    };
-    z[WAY[0]] = strain(initial.drive_angle);
-    z[WAY[2]] = strain(initial.idler_angle);
+    let [drive, idler] = strains(stage, experiment, origin)
+        .map(|strain| if is_strain(strain, origin) { strain * taken(1.0) } else { Double::ZERO });
+    (z[WAY[0]], z[WAY[2]]) = (drive, idler);
     z[SPEED[0]] = taken(initial.drive_speed) * r;
     z[SPEED[1]] = taken(initial.cart_speed);
     z[SPEED[2]] = taken(initial.idler_speed) * r;

@@ -249,7 +249,7 @@ impl<'a, 'b> Solver<'a, 'b> {
                 Some((series, h)) => series.at((row - self.time) / h),
                 None => self.z,
             };
-            self.rows.push(WAY.map(|way| z[way]));
+            self.rows.push([0, 1, 2].map(|body| z[WAY[body]] + self.machine.beyond[body]));
         }
     }
 
