@@ -293,3 +293,34 @@ fn apart(a: &[[Double; 3]], b: &[[Double; 3]]) -> f64 {
     let pairs = a.iter().flatten().zip(b.iter().flatten());
     pairs.map(|(a, b)| (*a - *b).high.abs()).fold(0.0, |most, d| if d.is_nan() { f64::INFINITY } else { d.max(most) })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A run of a machine one of whose springs is a tenth of a percent stiffer is found out.
+    #[test]
+    fn a_wrong_answer_is_unexplained() {
+        let case = Case::from_text("stage.toml", &crate::draw::stage(1, 0).text).unwrap();
+        let experiment = &case.experiments[0];
+        let mut wrong = case.stage.clone();
+        wrong.belt.stiffness[0] *= 1.001;
+        let judged = |stage: &Stage| {
+            let run = simulate(stage, experiment, Solver::Exact).unwrap();
+            let times = run.trajectory.get("time").unwrap().to_vec();
+            let known = solve::run(&case.stage, experiment, &times).unwrap();
+            let pair = Pair {
+                stage: &case.stage,
+                experiment,
+                times: &times,
+                by: By::Exact,
+                run: &run,
+                known: &known,
+                allowed: ALLOWED,
+            };
+            pair.judged().verdict
+        };
+        assert_eq!(judged(&case.stage), Verdict::Agrees);
+        assert!(judged(&wrong).is_unexplained());
+    }
+}

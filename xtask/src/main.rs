@@ -1,5 +1,7 @@
-//! The project's own chores: `cargo xtask test` checks all that can be checked, `cargo xtask python` the Python package alone.
+//! The project's own chores: `cargo xtask test` checks all that can be checked, `cargo xtask python` the Python package alone,
+//! `cargo xtask hunt` looks for wrong answers.
 
+mod hunt;
 mod python;
 
 use std::io::{BufRead, BufReader};
@@ -49,8 +51,21 @@ fn main() -> ExitCode {
     let steps = match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["test"] => &STEPS[..],
         ["python"] => &[PYTHON],
+        ["hunt", ..] => {
+            return match hunt::hunt(&words[1..]) {
+                Ok(true) => ExitCode::SUCCESS,
+                Ok(false) => ExitCode::FAILURE,
+                Err(told) => {
+                    eprintln!("xtask: {told}");
+                    ExitCode::from(2)
+                }
+            };
+        }
         _ => {
-            eprintln!("usage: cargo xtask test | cargo xtask python");
+            eprintln!(
+                "usage: cargo xtask test | cargo xtask python\n       \
+                 cargo xtask hunt [--part stages]... [--stages N] [--seed S] [--threads N] [--json]"
+            );
             return ExitCode::from(2);
         }
     };
