@@ -52,7 +52,7 @@ pub(super) fn run(
     if !(1e-14..=1e-2).contains(&tolerance) {
         return Err(Error::new(format!("a tolerance of {tolerance:e} is of no use"))
             .allowed("from 1e-14 to 0.01")
-            .next("take 1e-9, which keeps positions to about 1e-11 m"));
+            .next("take 1e-9, the default"));
     }
     let fastest = check::fastest_rate(plant.stage());
     let steps = fastest * experiment.until / REACH;
@@ -462,11 +462,8 @@ impl SolOut for Observer<'_, '_> {
         self.run.cost.steps += 1;
         if self.run.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS) {
             self.run.recorder.ask();
-            self.run.trouble = self.run.pace.too_stiff(
-                self.run.cost.steps,
-                self.field.stretch.begin + to,
-                self.run.grid.end(),
-            );
+            self.run.trouble =
+                self.run.pace.too_stiff(self.run.cost.steps, self.field.stretch.begin + to, self.run.grid.end());
         }
         let begin = self.run.y;
         let at = |tau: f64| {
