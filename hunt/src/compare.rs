@@ -14,6 +14,9 @@ use taut::stage::Stage;
 /// How far positions of a run may be apart, m, that states nothing of itself; and of one of the general solver at least.
 const ALLOWED: f64 = 1e-9;
 
+/// A difference that is none, whatever a run states: a hundredth of an atom's width.
+const LEAST: f64 = 1e-12;
+
 /// Tolerance that the general solver is asked for.
 const TOLERANCE: f64 = 1e-11;
 
@@ -84,7 +87,7 @@ fn allowed(by: By, stage: &Stage, experiment: &Experiment, run: &Solution) -> f6
         }
     };
     match (by, stated) {
-        (By::Exact, stated) => stated.map_or(ALLOWED, |error| error.value),
+        (By::Exact, stated) => stated.map_or(ALLOWED, |error| error.value.max(LEAST)),
         (By::General, stated) => stated.map_or(ALLOWED, |error| error.value.max(ALLOWED)),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::propagator::{Matrix, SERIES_ORDER, SERIES_REACH};
 use crate::friction::Motion;
-use crate::plant::{Body, Cause, Form, Mode, POSITION, Plant, ROTOR, ROUNDING, SPEEDS, STRETCHES, arms, place};
+use crate::plant::{Body, Cause, Form, Mode, Plant, ROTOR, ROUNDING, SPEEDS, STRETCHES, arms, place};
 use crate::signal::DEGREE;
 use std::cell::OnceCell;
 use std::rc::Rc;
