@@ -31,6 +31,28 @@ impl Default for Effort {
     }
 }
 
+/// Most chains: each is a thread.
+const MOST_CHAINS: usize = 100;
+
+/// Most draws of all chains together: they stay in memory.
+const MOST_DRAWS: usize = 10_000_000;
+
+impl Effort {
+    /// Refuses what no sampler can do.
+    pub fn check(&self) -> Result<()> {
+        let &Self { chains, tune, draws, .. } = self;
+        if !(1..=MOST_CHAINS).contains(&chains) {
+            return Err(Error::new(format!("{chains} chains cannot be")).allowed(format!("from 1 to {MOST_CHAINS}")));
+        }
+        let most = MOST_DRAWS / chains;
+        if !(1..=most).contains(&draws) || tune > most {
+            let chains = if chains == 1 { "one chain".into() } else { format!("each of {chains} chains") };
+            return Err(Error::new(format!("{draws} draws of {chains} cannot be")).allowed(format!("from 1 to {most}")));
+        }
+        Ok(())
+    }
+}
+
 /// What was drawn.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draws {
@@ -113,6 +135,7 @@ impl CpuLogpFunc for Density<'_> {
 /// Draws from `log`, each chain beginning at one of `starts` in turn; each on a thread of its own. `watch` sees how far it is, and
 /// may end it early: then each chain keeps as many draws as the shortest has.
 pub fn sample(log: &LogDensity, starts: &[Vec<f64>], effort: Effort, watch: &Watch) -> Result<Draws> {
+    effort.check()?;
     let dimension = starts.first().map_or(0, Vec::len);
     if dimension == 0 || starts.iter().any(|start| start.len() != dimension) {
         return Err(Error::new("a sampler needs points of one or more dimensions to start from"));

@@ -3,7 +3,7 @@
 use super::{Setup, closed_loop};
 use crate::case::Move;
 use crate::design::Design;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::solve::{Ending, Solver};
 use crate::stage::Stage;
 
@@ -71,6 +71,11 @@ pub struct Worst {
 
 /// The same controller, made for `stage`, on axes of which each parameter is off by a `share`.
 pub fn worst(stage: &Stage, design: &Design, motion: &Move, share: f64, solver: Solver) -> Result<Worst> {
+    if !(share > 0.0 && share < 1.0) {
+        return Err(Error::new(format!("parameters cannot be off by a share of {share:?}"))
+            .allowed("above 0, below 1")
+            .next("write 0.2 for 20 %"));
+    }
     let mut worst = Worst::default();
     for (axis, other) in spread(stage, share) {
         let (until, window) = (motion.until, motion.window);

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _html, _native
+from . import _checks, _html, _native
 from ._optional import needed
 from .table import Table
 
@@ -61,7 +61,7 @@ class Run(Table):
 
     def write(self, path: str | PathLike[str]) -> None:
         """Writes the columns to a ``.csv`` or ``.parquet`` file, as ``taut simulate --out`` does."""
-        self._native.write(path)
+        self._native.write(_checks.path(path))
 
     def plot(self, *columns: str) -> Figure:
         """A matplotlib figure of these columns over time, one panel for each unit.
