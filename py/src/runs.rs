@@ -195,7 +195,10 @@ pub fn motion(
     };
     let structure = match controller {
         None => design.structure.name().to_string(),
-        Some(object) => object.getattr("__name__").or_else(|_| object.get_type().getattr("__name__"))?.to_string(),
+        Some(object) => {
+            let name = object.getattr("__name__").or_else(|_| object.get_type().getattr("__name__"))?;
+            name.str()?.to_string_lossy().into_owned()
+        }
     };
     let _inside = match controller {
         Some(_) => Some(Inside::enter()?),
@@ -226,7 +229,12 @@ pub fn motion(
         interrupt.finish()?;
         let run = run?.told(py)?;
         let worst = match share {
-            Some(share) => Some(unlocked(py, || worst(stage, design, motion, share, solver))?.told(py)?),
+            Some(share) => {
+                let interrupt = Interrupt::listen();
+                let found = unlocked(py, || worst(stage, design, motion, share, solver, &|| interrupt.stop()));
+                interrupt.finish()?;
+                found?.told(py)?
+            }
             None => None,
         };
         let took = begin.elapsed().as_secs_f64();

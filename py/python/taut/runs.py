@@ -24,6 +24,8 @@ class Run(Table):
 
     def __init__(self, native: _native.Run) -> None:
         """Made by :meth:`taut.Case.simulate` and :meth:`taut.Case.move`."""
+        if not isinstance(native, _native.Run):
+            raise TypeError(f"runs are made by Case.simulate and Case.move, and not of {type(native).__name__}")
         super().__init__(native.arrays, native.names)
         self._native = native
 
@@ -108,6 +110,8 @@ class Runs(Sequence[Run]):
     def __init__(self, runs: Sequence[Run], moved: bool) -> None:
         """Made by :meth:`taut.Case.simulate` and :meth:`taut.Case.move`."""
         self._runs = list(runs)
+        if not all(isinstance(run, Run) for run in self._runs):
+            raise TypeError("runs are made by Case.simulate and Case.move")
         self._told = _native.moves if moved else _native.simulation
 
     @overload

@@ -119,11 +119,11 @@ def _planned(
     interval: str | float | None,
 ) -> Case:
     """The case with all of it in its text, as the command line does."""
-    if not hasattr(case, "_native"):
+    if not isinstance(getattr(case, "_native", None), _native.Case):
         raise TypeError(f"case: a taut.Case is wanted, and no {type(case).__name__}")
     if not isinstance(vary, (Mapping, type(None))):
         raise TypeError(f"vary: a dictionary is wanted, and no {type(vary).__name__}")
-    given = {"runs": n, "design": design, "seed": seed, "interval": interval, "indices": indices or None}
+    given = {"runs": n, "design": design, "seed": seed, "interval": interval, "indices": True if indices else None}
     changes = {f"sweep.{key}": value for key, value in given.items() if value is not None}
     for key, how in (vary or {}).items():
         changes[f"sweep.vary.{json.dumps(_checks.text('vary', key), ensure_ascii=False)}"] = how
