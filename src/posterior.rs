@@ -392,6 +392,21 @@ mod tests {
         assert!((red / 4000.0 - (1.0 - phi) / (1.0 + phi)).abs() < 0.05, "{red}");
     }
 
+    /// A chain is a thread and a draw is memory: a million chains ended the process.
+    #[test]
+    fn an_effort_that_cannot_be_is_refused() {
+        let told = |chains, draws| Effort { chains, draws, ..Effort::default() }.check().map_err(|e| e.to_string());
+        assert_eq!(told(4, 500), Ok(()));
+        assert_eq!(told(100, 100_000), Ok(()));
+        assert_eq!(told(0, 500), Err("0 chains cannot be\n  allowed: from 1 to 100".into()));
+        assert_eq!(told(1_000_000, 500), Err("1000000 chains cannot be\n  allowed: from 1 to 100".into()));
+        assert_eq!(told(4, 0), Err("0 draws of each of 4 chains cannot be\n  allowed: from 1 to 2500000".into()));
+        assert_eq!(
+            told(1, usize::MAX),
+            Err(format!("{} draws of one chain cannot be\n  allowed: from 1 to 10000000", usize::MAX))
+        );
+    }
+
     #[test]
     fn the_normal_quantile_is_the_inverse() {
         for (p, z) in [(0.5, 0.0), (0.975, 1.959963984540054), (0.025, -1.959963984540054), (1e-6, -4.753424308822899)]
