@@ -200,6 +200,18 @@ fn every_kind_of_input() {
         Signal::Chirp { amplitude: 2.0, from: 1.0, to: 300.0, over: 10.0 }
     );
     assert_eq!(input("{ prbs = 3, bit = '20 ms', seed = 7 }"), Signal::Prbs { amplitude: 3.0, bit: 0.02, seed: 7 });
+    // Above 2⁵³ they were refused; as doubles the first two would be one.
+    for seed in ["9007199254740992", "9007199254740993", "9223372036854775807"] {
+        let whole = seed.parse().unwrap();
+        for text in [seed.to_string(), format!("'{seed}'")] {
+            let signal = input(&format!("{{ prbs = 3, bit = '20 ms', seed = {text} }}"));
+            assert_eq!(signal, Signal::Prbs { amplitude: 3.0, bit: 0.02, seed: whole });
+        }
+    }
+    assert_eq!(
+        input("{ prbs = 3, bit = 1, seed = 1e9 }"),
+        Signal::Prbs { amplitude: 3.0, bit: 1.0, seed: 1_000_000_000 }
+    );
     assert_eq!(
         input("{ table = [[0, 0], ['100 ms', '5 V']] }"),
         Signal::Table { points: vec![[0.0, 0.0], [0.1, 5.0]] }

@@ -98,7 +98,7 @@ fn nested(field: &Field, context: &Context, depth: usize, in_sequence: bool) -> 
         "prbs" => {
             let bit = number("bit")?;
             few_enough(&table, "bit", context.until / bit)?;
-            Signal::Prbs { amplitude: main.number()?, bit, seed: number("seed")? as u64 }
+            Signal::Prbs { amplitude: main.number()?, bit, seed: table.seed()? }
         }
         "table" => points(&main)?,
         "file" => sampled(&main, &table, context)?,

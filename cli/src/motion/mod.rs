@@ -133,7 +133,7 @@ fn one<'a>(
         files.push(write_samples(folder, &name, case, &run).map_err(Failure::work)?);
     }
     let worst = match args.spread.filter(|_| interrupt.signal().is_none()) {
-        Some(share) => Some(worst(&case.stage, design, motion, share, solver)?),
+        Some(share) => worst(&case.stage, design, motion, share, solver, &|| interrupt.signal().is_some())?,
         None => None,
     };
     Ok(Done { motion, run, curves, worst, files })
