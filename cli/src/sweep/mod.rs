@@ -42,7 +42,7 @@ pub fn run(args: &Args) -> Outcome {
     let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
     let case = Case::read_with(&args.case, &changes)?;
     let sweep = Sweep::new(&case).map_err(|error| error.in_file(&args.case))?;
-    let target = Target::of(args)?;
+    let target = Target::of(args, &case)?;
     if args.trajectories {
         trajectories::check(&sweep)?;
     }
@@ -55,8 +55,9 @@ pub fn run(args: &Args) -> Outcome {
     }
     let interrupt = Interrupt::listen();
     let work = Work { args, case: &case, sweep: &sweep, interrupt: &interrupt };
+    let threads = args.threads.unwrap_or(0);
     let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(args.threads.unwrap_or(0))
+        .num_threads(threads)
         .build()
         .map_err(|e| Failure::work(Error::new(format!("the threads cannot be started: {e}"))))?;
     let store = Store::open(&work, &target, pool.current_num_threads())?;
@@ -70,8 +71,7 @@ pub fn run(args: &Args) -> Outcome {
     }
     let summary = pool.install(|| Summary::of(&work, &store)).map_err(Failure::work)?;
     let json = json::text(&work, &summary);
-    let written = output::write(&work, &target, &store, &summary, &json).map_err(Failure::work)?;
-    let Some(written) = written else {
+    let Some(written) = output::write(&work, &target, &store, &summary, &json)? else {
         told_interrupted(&work, &store);
         return Ok(Status::Interrupted(interrupt.signal().unwrap_or(2)));
     };
@@ -119,6 +119,7 @@ pub fn shown(time: Duration) -> String {
     match time.as_secs_f64() {
         seconds if seconds < 100.0 => format!("{seconds:.1} s"),
         seconds if seconds < 6000.0 => format!("{:.0} min", seconds / 60.0),
-        seconds => format!("{:.1} h", seconds / 3600.0),
+        seconds if seconds < 3e5 => format!("{:.1} h", seconds / 3600.0),
+        seconds => format!("{:.0} days", seconds / 86400.0),
     }
 }
