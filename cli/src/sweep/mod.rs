@@ -1,6 +1,7 @@
 //! `taut sweep`: many runs with parameters varied, which go on where they were left.
 
 mod figures;
+mod forecast;
 mod json;
 mod options;
 mod output;
@@ -55,12 +56,13 @@ pub fn run(args: &Args) -> Outcome {
     }
     let interrupt = Interrupt::listen();
     let work = Work { args, case: &case, sweep: &sweep, interrupt: &interrupt };
-    let threads = args.threads.unwrap_or(0);
+    let threads = threads(args, &sweep);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
         .map_err(|e| Failure::work(Error::new(format!("the threads cannot be started: {e}"))))?;
-    let store = Store::open(&work, &target, pool.current_num_threads())?;
+    forecast::told(&work, &target, threads)?;
+    let store = Store::open(&work, &target, threads)?;
     let begin = Instant::now();
     let before = store.done();
     pool.install(|| rows(&work, &store)).map_err(Failure::work)?;
@@ -82,6 +84,17 @@ pub fn run(args: &Args) -> Outcome {
         terminal::show(&table::text(&work, &summary, took, sweep.runs() - before, &written));
     }
     Ok(Status::Done)
+}
+
+/// How many threads: no more than there are processors, or runs.
+fn threads(args: &Args, sweep: &Sweep) -> usize {
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    let useful = processors.min(usize::try_from(sweep.runs()).unwrap_or(usize::MAX)).max(1);
+    if let Some(asked) = args.threads.filter(|&asked| asked > useful && !args.quiet) {
+        let runs = if useful < processors { format!("{useful} runs") } else { format!("{processors} processors") };
+        terminal::show_note(&format!("--threads {asked}: {useful} are started, for there are {runs}"));
+    }
+    args.threads.unwrap_or(processors).min(useful)
 }
 
 /// Runs the chunks that are not there yet, each written when it is whole.
