@@ -225,11 +225,11 @@ fn every_kind_of_input() {
     let slot = |signal: &Signal, lasts| Slot { signal: signal.clone(), lasts };
     assert_eq!(
         input("{ sequence = [{ pulse = 5, for = 0.25, at = 0.5 }, { step = 1, lasts = '1 s' }, { step = 1 }] }"),
-        Signal::Sequence(vec![slot(&pulse, 0.75), slot(&step, 1.0), slot(&step, f64::INFINITY)])
+        Signal::sequence(vec![slot(&pulse, 0.75), slot(&step, 1.0), slot(&step, f64::INFINITY)])
     );
     let ended = input("{ sequence = [{ step = 1, lasts = 1 }] }");
     let zero = Signal::Step { value: 0.0, at: 0.0 };
-    assert_eq!(ended, Signal::Sequence(vec![slot(&step, 1.0), slot(&zero, f64::INFINITY)]));
+    assert_eq!(ended, Signal::sequence(vec![slot(&step, 1.0), slot(&zero, f64::INFINITY)]));
 }
 
 #[test]

@@ -10,7 +10,7 @@ use pyo3::types::{PyDict, PyList};
 use std::path::PathBuf;
 use std::sync::Arc;
 use taut::case::{Plan, TEMPLATE};
-use taut::files::write_atomically;
+use taut::files::{Inputs, write_atomically};
 use taut::fit::{Posterior, Profile, check, fit, posterior, profiles};
 use taut::json;
 use taut::linear::Analysis;
@@ -27,6 +27,11 @@ pub struct Case {
     pub inner: Arc<taut::case::Case>,
     /// Where it lies, or would: paths in it are relative to its folder.
     pub path: PathBuf,
+}
+
+/// The files that a case names, which nothing is written over.
+pub fn inputs(case: &taut::case::Case) -> Inputs {
+    Inputs::new(case.files.iter().map(|file| &file.path))
 }
 
 #[pymethods]
@@ -80,9 +85,9 @@ impl Case {
         value::given(py, &guarded(|| self.inner.value(key))?.told(py)?)
     }
 
-    /// Writes the text, under a temporary name first.
+    /// Writes the text, under a temporary name first; over the file it was read from, but over no log or input of it.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        unlocked(py, || write_atomically(path, &self.inner.text))?.told(py)
+        unlocked(py, || inputs(&self.inner).check(&path).and_then(|()| write_atomically(path, &self.inner.text)))?.told(py)
     }
 
     #[pyo3(signature = (names, solver, tolerance, step, method))]

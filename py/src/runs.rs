@@ -1,6 +1,6 @@
 //! Runs of experiments and moves.
 
-use crate::case::Case;
+use crate::case::{Case, inputs};
 use crate::columns::{self, Columns};
 use crate::controller::Own;
 use crate::error::{Told, guarded, unlocked};
@@ -88,7 +88,7 @@ impl Run {
     /// Writes the columns as `taut simulate` does, to .csv or .parquet.
     fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let trajectory = self.trajectory(py)?;
-        unlocked(py, || write(&trajectory, &path))?.told(py)
+        unlocked(py, || inputs(&self.case).check(&path).and_then(|()| write(&trajectory, &path)))?.told(py)
     }
 }
 
