@@ -244,7 +244,9 @@ pub(crate) fn gcode(bytes: &[u8]) -> Reached {
     };
     assert_eq!(profile.at(-1.0).position, 0.01);
     let places = profile.strokes().flat_map(|(_, from, distance, _)| [from, distance]);
-    let rounding = 1e-12 * places.fold(1.0, |most: f64, place| most.max(place.abs()));
+    // A moment is known to its rounding only, and so is where the cart is then.
+    let farthest = places.fold(1.0, |most: f64, place| most.max(place.abs()));
+    let rounding = 1e-12 * farthest + 4.0 * f64::EPSILON * profile.end() * limits.speed;
     let last = profile.at(profile.end()).position;
     assert!((last - profile.target()).abs() <= rounding, "it ends at {last} and should at {}", profile.target());
     for k in 0..50 {
