@@ -150,6 +150,22 @@ impl Plant {
         &self.stage
     }
 
+    /// ḋ₁ = r φ̇₁ − ẋ, ḋ₂ = ẋ − r φ̇₃ and θ̇ = φ̇_r − φ̇₁, without the speeds of what is stuck; nothing where one body carries both ends.
+    pub(crate) fn stretch_rates(&self, mode: &Mode) -> [Form; 3] {
+        let r = self.stage.pulley_radius;
+        let speed = |body: Body| match mode.motion[body.index()] {
+            Motion::Stuck => Form::ZERO,
+            _ => Form::speed(body.index()),
+        };
+        let [drive, cart, idler] = Body::ALL.map(speed);
+        let apart = |a: Body, b: Body, rate: Form| if self.leader(a) == self.leader(b) { Form::ZERO } else { rate };
+        [
+            apart(Body::DrivePulley, Body::Cart, drive * r - cart),
+            apart(Body::Cart, Body::IdlerPulley, cart - idler * r),
+            if self.has_rotor() { Form::speed(ROTOR) - drive } else { Form::ZERO },
+        ]
+    }
+
     /// The body that this one moves with: itself, unless the belt's model makes several bodies one.
     pub fn leader(&self, body: Body) -> Body {
         match (self.stage.belt.model, body) {

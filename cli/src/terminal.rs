@@ -11,6 +11,12 @@ pub fn show_error(error: &impl Display) {
     let _ = writeln!(io::stderr(), "{word}: {error}");
 }
 
+/// Writes `warning: …` to standard error: for what makes a result not to be relied on.
+pub fn show_warning(told: &impl Display) {
+    let word = paint(io::stderr().is_terminal(), "\u{1b}[1;33m", "warning");
+    let _ = writeln!(io::stderr(), "{word}: {told}");
+}
+
 /// Writes `text` to standard output. Whoever closed the pipe has read enough: that is no error. Anything else, a full disk
 /// say, ends the program with status 1.
 pub fn show(text: &str) {

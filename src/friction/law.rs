@@ -83,10 +83,14 @@ impl Shape {
     }
 
     /// The share of F_b − F_c that is left at q = v/v_s, q counted in the direction of motion.
+    ///
+    /// A trial step may end beyond zero speed, q < 0, before its event is found. There the exponential goes on as it is, so
+    /// that the step is smooth, and from q = −1 on along its tangent, so that it does not overflow.
     #[inline]
     pub(crate) fn share(self, q: f64) -> f64 {
         match self {
             Shape::Gaussian => (-q * q).exp(),
+            Shape::Exponential if q < -1.0 => -E * q,
             Shape::Exponential => (-q).exp(),
         }
     }

@@ -42,6 +42,7 @@ pub fn ending(ending: Ending, end: f64) -> (&'static str, f64) {
         Ending::TooManyEvents { time } => ("too_many_events", time),
         Ending::LeftTravel { time } => ("left_travel", time),
         Ending::Diverged { time } => ("diverged", time),
+        Ending::TooStiff { time, .. } => ("too_stiff", time),
         Ending::Interrupted { time } => ("interrupted", time),
     }
 }

@@ -74,6 +74,9 @@ struct ExperimentFigures {
     /// With --draws.
     #[serde(skip_serializing_if = "Option::is_none")]
     band: Option<Band>,
+    /// By how much r φ₁, x and r φ₃ may be off.
+    position_error_m: Option<f64>,
+    position_error_basis: Option<&'static str>,
     events: Vec<Event>,
     events_not_listed: usize,
     cost: CostTold,
@@ -176,6 +179,7 @@ pub struct Event {
     to: &'static str,
     load: f64,
     load_unit: &'static str,
+    by_rounding: bool,
 }
 
 #[derive(Debug, Serialize)]
@@ -198,7 +202,7 @@ impl Simulation {
             version: env!("CARGO_PKG_VERSION"),
             solver: SolverUsed::of(solver),
             stage: StageFigures::of(&case.stage),
-            experiments: runs.iter().map(|run| ExperimentFigures::of(run, case.stage.amplifier.mode)).collect(),
+            experiments: runs.iter().map(|run| ExperimentFigures::of(run, case.stage.amplifier.mode, solver)).collect(),
         }
     }
 }
@@ -240,7 +244,7 @@ impl StageFigures {
 }
 
 impl ExperimentFigures {
-    fn of(run: &Simulated, mode: AmplifierMode) -> Self {
+    fn of(run: &Simulated, mode: AmplifierMode, solver: Solver) -> Self {
         let (metrics, outcome) = (run.metrics, run.outcome);
         let (word, time_s) = super::ending(outcome.ending, metrics.end);
         let cost = outcome.cost;
@@ -257,6 +261,12 @@ impl ExperimentFigures {
                 stretch: reduction.stretch.into(),
             }),
             band: run.band,
+            position_error_m: run.outcome.error.map(|error| error.value),
+            position_error_basis: match (solver, run.outcome.error) {
+                (_, None) => None,
+                (Solver::Exact, _) => Some("bound of rounding"),
+                _ => Some("a second run with ten times the tolerance"),
+            },
             events: outcome.events.iter().take(MOST_EVENTS).map(Event::of).collect(),
             events_not_listed: outcome.events.len().saturating_sub(MOST_EVENTS),
             cost: CostTold {
@@ -332,6 +342,7 @@ impl Event {
             to: event.to.word(),
             load: event.load,
             load_unit: event.body().map_or("", load_unit),
+            by_rounding: event.by_rounding,
         }
     }
 }

@@ -86,10 +86,31 @@ impl Form {
         row
     }
 
+    /// Its coefficients in the solvers' coordinates, in which stretches stand in the places of angles; r φ₃ − r φ₁ is −d₁ − d₂.
+    pub(crate) fn on_stretches(&self) -> State {
+        let [d1, d2, d3, twist, position] = self.stretch;
+        let mut row = [0.0; place::COUNT];
+        row[place::DRIVE_ANGLE] = d1 - d3;
+        row[place::IDLER_ANGLE] = d2 - d3;
+        row[place::CART_POSITION] = position;
+        row[place::ROTOR_ANGLE] = twist;
+        for (place, speed) in SPEED_PLACE.into_iter().zip(self.speed) {
+            row[place] = speed;
+        }
+        row[place::CURRENT] = self.current;
+        row
+    }
+
     /// Its value, from stretches rather than from large positions, so that little is lost to cancellation.
     #[inline]
     pub fn value(&self, plant: &Plant, state: &State, input: f64) -> f64 {
-        let stretch = stretches(plant.stage().pulley_radius, state);
+        self.value_at(&stretches(plant.stage().pulley_radius, state), 0.0, state, input)
+    }
+
+    /// Its value at these stretches, the cart's position counted from `origin`; speeds and current from `state`, in whichever
+    /// coordinates.
+    #[inline]
+    pub(crate) fn value_at(&self, stretch: &[f64; STRETCHES], origin: f64, state: &State, input: f64) -> f64 {
         let mut sum = 0.0;
         for (&coefficient, stretch) in self.stretch.iter().zip(stretch) {
             sum += coefficient * stretch;
@@ -97,7 +118,13 @@ impl Form {
         for (place, &coefficient) in SPEED_PLACE.into_iter().zip(&self.speed) {
             sum += coefficient * state[place];
         }
-        sum + self.current * state[place::CURRENT] + self.input * input + self.constant
+        sum + self.current * state[place::CURRENT] + self.input * input + self.constant_from(origin)
+    }
+
+    /// Its constant part where positions are counted from `origin`.
+    #[inline]
+    pub(crate) fn constant_from(&self, origin: f64) -> f64 {
+        self.constant + self.stretch[POSITION] * origin
     }
 }
 
@@ -105,12 +132,11 @@ impl Form {
 pub(crate) const ROUNDING: f64 = 5e-15;
 
 impl Form {
-    /// An estimate of the rounding error of its value at this state.
-    pub fn noise(&self, plant: &Plant, state: &State, input: f64) -> f64 {
-        let r = plant.stage().pulley_radius;
-        let row = self.on_state(r);
-        let mut size = (self.input * input).abs() + self.constant.abs();
-        for (coefficient, value) in row.iter().zip(state) {
+    /// An estimate of the rounding error of its value; `inner` is a state in the solvers' coordinates, `origin` where their
+    /// positions are counted from.
+    pub(crate) fn noise(&self, inner: &State, origin: f64, input: f64) -> f64 {
+        let mut size = (self.input * input).abs() + self.constant_from(origin).abs();
+        for (coefficient, value) in self.on_stretches().iter().zip(inner) {
             size += (coefficient * value).abs();
         }
         ROUNDING * size

@@ -266,6 +266,18 @@ impl Cause {
         }
     }
 
+    /// Which of several conditions that have fallen at one instant is settled first: limits, flanks, spans and stops, which
+    /// follow from the state and the input alone; then the gear's torque, which follows from them; then bodies, which break away
+    /// with the load that all of these leave.
+    pub(crate) fn rank(self) -> u8 {
+        match self {
+            Cause::LeaveTravel => 0,
+            Cause::Switch(_) => 1,
+            Cause::GearTorque => 2,
+            Cause::Stop(_) | Cause::BreakForward(_) | Cause::BreakBackward(_) => 3,
+        }
+    }
+
     /// Whether both are of the same part, and it is no body.
     pub(crate) fn is_of_same_part(self, other: Cause) -> bool {
         match (self, other) {

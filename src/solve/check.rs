@@ -182,9 +182,17 @@ pub(super) fn fastest_rate(stage: &Stage) -> f64 {
         (stage.cart.mass, stage.cart.friction, k1 + k2, c1 + c2),
         (stage.idler_pulley.inertia, stage.idler_pulley.friction, (k2 + k3) * r2, (c2 + c3) * r2),
     ];
-    let mut fastest: f64 = match stage.amplifier.mode {
-        _ if motor.inductance > 0.0 => motor.resistance / motor.inductance,
-        _ => 0.0,
+    let emf = motor.torque_constant * motor.back_emf_constant * motor.gear_ratio.powi(2);
+    let shaft = match motor.gear_play {
+        Some(_) => motor.gear_ratio.powi(2) * motor.rotor_inertia,
+        None if rigid => stage.drive_pulley.inertia + stage.idler_pulley.inertia + r2 * stage.cart.mass,
+        None => stage.drive_pulley.inertia,
+    };
+    // Of the current by itself, and of current and motor with each other
+    let mut fastest: f64 = if motor.inductance > 0.0 {
+        f64::max(motor.resistance / motor.inductance, (emf.abs() / (motor.inductance * shaft)).sqrt())
+    } else {
+        emf.abs() / (motor.resistance * shaft)
     };
     fastest = fastest.max(2.0 * PI * stage.amplifier.bandwidth.unwrap_or(0.0));
     if let Some(play) = motor.gear_play {

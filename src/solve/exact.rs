@@ -10,9 +10,12 @@
 
 mod change;
 
+use super::coordinates::{Coordinates, stretches};
 use super::law::{Law, Size, Watch, chain, highest, states};
 use super::propagator::SERIES_ORDER;
-use super::record::Recorder;
+use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
+use super::record::{Recorder, Row};
+use super::rounding::Rounding;
 use super::roots;
 use super::{Cost, Detail, Ending, Event, Flow, Grid, Outcome, Source, held};
 use crate::case::Experiment;
@@ -63,10 +66,11 @@ pub(super) fn run(
 /// A run under way.
 struct Run<'a, const R: usize, const C: usize> {
     plant: &'a Plant,
+    coordinates: Coordinates,
     grid: Grid,
     /// Output interval.
     h: f64,
-    /// State, input and its derivatives, and a one.
+    /// State in the solver's coordinates, input and its derivatives, and a one.
     z: [f64; C],
     mode: Mode,
     law: Rc<Law<R, C>>,
@@ -92,6 +96,10 @@ struct Run<'a, const R: usize, const C: usize> {
     changed_at: (u64, f64),
     changes: usize,
     cost: Cost,
+    rounding: Rounding,
+    /// Intervals crossed or halved, and how fast the run gets on by them.
+    questions: u64,
+    pace: Pace,
     trouble: Option<Ending>,
 }
 
@@ -114,14 +122,17 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         let grid = Grid::new(experiment.every, experiment.until);
         let h = grid.interval();
         let start = experiment.initial.state(plant);
+        let (mut coordinates, inner) = Coordinates::new(plant, &start);
         let mut z = [0.0; C];
-        z[..states::<R>()].copy_from_slice(&start[..states::<R>()]);
+        z[..states::<R>()].copy_from_slice(&inner[..states::<R>()]);
         z[C - 1] = 1.0;
         let mode = plant.first_mode(&start);
+        coordinates.hold(&mode, &inner);
         let shared = propagators(laws);
-        let (law, is_new) = Law::of(laws, plant, mode, h);
+        let (law, is_new) = Law::of(laws, plant, mode, h, coordinates.origin());
         Self {
             plant,
+            coordinates,
             grid,
             h,
             z,
@@ -140,6 +151,9 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             changed_at: (0, 0.0),
             changes: 0,
             cost: Cost { modes: u64::from(is_new), ..Cost::default() },
+            rounding: Rounding::default(),
+            questions: 0,
+            pace: Pace::default(),
             trouble: None,
         }
     }
@@ -175,7 +189,10 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             (None, Flow::Continue) => Ending::Complete,
         };
         self.cost.propagators = propagators(self.laws) - self.shared;
-        Outcome { events: self.events, ending, cost: self.cost }
+        self.rounding.swing(self.law.swing, self.time());
+        let steps = self.cost.steps + self.cost.series;
+        let error = Some(self.rounding.bound(steps, self.time(), self.coordinates.origin()));
+        Outcome { events: self.events, ending, cost: self.cost, error }
     }
 
     fn time(&self) -> f64 {
@@ -207,6 +224,18 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     fn set_input(&mut self, piece: &Piece) {
         self.cost.pieces += 1;
         self.fresh = [0; Cause::KINDS];
+        self.take_up(piece);
+        // A load that passes a breakaway by rounding alone does not break it.
+        for guard in &self.law.guards {
+            if let Cause::BreakForward(body) | Cause::BreakBackward(body) = guard.cause {
+                let tolerance = &mut self.slack[body.index()];
+                *tolerance = tolerance.max(2.0 * guard.noise(&self.z));
+            }
+        }
+    }
+
+    /// Puts the input's value and derivatives where the state has them.
+    fn take_up(&mut self, piece: &Piece) {
         if piece.coefficients[1..].iter().all(|&c| c == 0.0) {
             (0..=highest::<R>()).for_each(|k| self.z[chain::<R>(k)] = 0.0);
             self.z[chain::<R>(0)] = piece.coefficients[0];
@@ -265,7 +294,9 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     fn put_out(&mut self) {
         self.check();
         if self.recorder.next_row() == self.row && self.trouble.is_none() {
-            self.recorder.push(self.state(), self.z[chain::<R>(0)], self.mode);
+            let inner = self.inner();
+            self.rounding.see(self.plant.stage().pulley_radius, &inner);
+            self.recorder.push(Row::new(&self.coordinates, &inner, self.input()), self.mode);
         }
         if self.recorder.flow == Flow::Stop {
             self.trouble = Some(Ending::Interrupted { time: self.time() });
@@ -361,7 +392,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             distance -= first;
         }
         for level in 0..=law.finest {
-            while distance >= law.length(level) {
+            while distance >= law.length(level) && self.trouble.is_none() {
                 if let Some(cause) = self.cross(&law, level) {
                     return Some(cause);
                 }
@@ -373,6 +404,9 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
 
     /// Crosses an interval of h/2^level.
     fn cross(&mut self, law: &Law<R, C>, level: usize) -> Option<Cause> {
+        if !self.goes_on() {
+            return None;
+        }
         let length = law.length(level);
         match self.look(law, length, Some(level)) {
             Look::Safe(end) => {
@@ -387,6 +421,20 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             Look::Unsure if level < law.finest => self.cross(law, level + 1).or_else(|| self.cross(law, level + 1)),
             Look::Unsure => self.creep(law, length),
         }
+    }
+
+    /// Asks now and then whether to go on, and whether this leads anywhere; false if not.
+    fn goes_on(&mut self) -> bool {
+        self.questions += 1;
+        if self.questions.is_multiple_of(STEPS_BETWEEN_QUESTIONS) && self.trouble.is_none() {
+            self.recorder.ask();
+            if self.recorder.flow == Flow::Stop {
+                self.trouble = Some(Ending::Interrupted { time: self.time() });
+            } else {
+                self.trouble = self.pace.too_stiff(self.questions, self.time(), self.grid.end());
+            }
+        }
+        self.trouble.is_none()
     }
 
     /// Decides, if it can, that no guard falls within `length`.
@@ -436,6 +484,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     fn creep(&mut self, law: &Law<R, C>, distance: f64) -> Option<Cause> {
         self.cost.series += 1;
         let series = law.series(&self.z, distance);
+        let mut sizes = None;
         let mut first: Option<(f64, Cause)> = None;
         // Term 1 of the series is ż · distance: most guards are too far away to fall, as in `look`.
         let change = std::array::from_fn(|j| series[1][j]);
@@ -448,10 +497,18 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             }
             let mut coefficients: [f64; SERIES_ORDER + 1] = std::array::from_fn(|k| guard.value(&series[k]));
             coefficients[0] = self.standing(guard);
-            let order = self.fresh_order(guard.cause);
-            coefficients[..order].fill(0.0);
+            let mut order = self.fresh_order(guard.cause);
+            if order > 0 || coefficients[0] == 0.0 {
+                let sizes = sizes.get_or_insert_with(|| law.sizes(&self.z, distance));
+                order = guard.first_term(&coefficients, sizes, order.max(1));
+            }
+            let sooner = |s: f64| {
+                first.is_none_or(|(earliest, cause)| {
+                    s < earliest || (s == earliest && guard.cause.rank() < cause.rank())
+                })
+            };
             if let Some(s) = roots::first_fall(&coefficients[order..])
-                && first.is_none_or(|(earliest, _)| s < earliest)
+                && sooner(s)
             {
                 first = Some((s, guard.cause));
             }
@@ -468,22 +525,33 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         first.map(|(_, cause)| cause)
     }
 
-    fn state(&self) -> State {
+    /// The state in the solver's coordinates.
+    fn inner(&self) -> State {
         let z = &self.z;
-        let mut state: State = std::array::from_fn(|j| if j < states::<R>() { z[j] } else { 0.0 });
+        let mut inner: State = std::array::from_fn(|j| if j < states::<R>() { z[j] } else { 0.0 });
         if states::<R>() < place::COUNT || !self.plant.has_rotor() {
             // The rotor turns with the drive pulley.
-            (state[place::ROTOR_ANGLE], state[place::ROTOR_SPEED]) = (z[place::DRIVE_ANGLE], z[place::DRIVE_SPEED]);
+            (inner[place::ROTOR_ANGLE], inner[place::ROTOR_SPEED]) = (0.0, z[place::DRIVE_SPEED]);
         }
-        state
+        inner
+    }
+
+    fn state(&self) -> State {
+        self.coordinates.state(&self.inner())
     }
 
     fn input(&self) -> f64 {
         self.z[chain::<R>(0)]
     }
 
+    /// What rounding may have done to the value of a form.
+    fn noise(&self, form: &Form) -> f64 {
+        form.noise(&self.inner(), self.coordinates.origin(), self.input())
+    }
+
     fn value(&self, form: &Form) -> f64 {
-        form.value(self.plant, &self.state(), self.input())
+        let inner = self.inner();
+        form.value_at(&stretches(&inner), self.coordinates.origin(), &inner, self.input())
     }
 }
 

@@ -9,17 +9,20 @@ mod fall;
 mod model;
 mod stretch;
 
-use super::record::Recorder;
+use super::coordinates::Coordinates;
+use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
+use super::record::{Recorder, Row};
 use super::{Cost, Detail, Ending, Event, Flow, Grid, Outcome, Source, check, held};
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
-use crate::plant::{Body, Cause, Limit, Mode, Part, Plant, Status, Switch, place};
+use crate::plant::{Body, Cause, Limit, Mode, Part, Plant, State, Status, Switch, place};
 use crate::stage::AmplifierMode;
 use crate::trajectory::Trajectory;
 use fall::NODES;
 use ivp::dense::StepInterpolant;
 use ivp::methods::{DOP853, Tolerance};
+use ivp::prelude::FirstOrderSystem;
 use ivp::solout::{ControlFlag, SolOut};
 use model::{Field, MOST, Model, Vector};
 use stretch::Stretch;
@@ -61,8 +64,12 @@ pub(super) fn run(
         .allowed(format!("up to {MOST_STEPS:e} steps"))
         .next("leave out the inductance, the damping or the friction that is as fast as that, or shorten the run"));
     }
-    let model = Model::new(plant);
-    Ok(Run::new(&model, experiment, tolerance, FIRST / fastest, detail, sink).finish(source))
+    let start = experiment.initial.state(plant);
+    let (coordinates, inner) = Coordinates::new(plant, &start);
+    let model = Model::new(plant, coordinates.origin());
+    let mode = plant.first_mode(&start);
+    Ok(Run::new(&model, (coordinates, inner, mode), experiment, tolerance, FIRST / fastest, detail, sink)
+        .finish(source))
 }
 
 /// h·|λ| up to which the formula is stable.
@@ -74,6 +81,7 @@ const FIRST: f64 = 0.3;
 /// A run under way.
 struct Run<'a> {
     model: &'a Model<'a>,
+    coordinates: Coordinates,
     grid: Grid,
     recorder: Recorder<'a>,
     solver: DOP853,
@@ -94,6 +102,7 @@ struct Run<'a> {
     torque: f64,
     changed_at: f64,
     changes: usize,
+    pace: Pace,
     events: Vec<Event>,
     modes: Vec<Mode>,
     cost: Cost,
@@ -110,6 +119,7 @@ struct Hit {
 impl<'a> Run<'a> {
     fn new(
         model: &'a Model<'a>,
+        (mut coordinates, start, mode): (Coordinates, State, Mode),
         experiment: &Experiment,
         tolerance: f64,
         first_step: f64,
@@ -118,7 +128,7 @@ impl<'a> Run<'a> {
     ) -> Self {
         let plant = model.plant;
         let grid = Grid::new(experiment.every, experiment.until);
-        let start = experiment.initial.state(plant);
+        coordinates.hold(&mode, &start);
         let mut y = [0.0; MOST];
         y[..place::CURRENT].copy_from_slice(&start[..place::CURRENT]);
         if let Some(current) = model.current {
@@ -130,8 +140,9 @@ impl<'a> Run<'a> {
         // An angle of 1 rad is as much as r at the belt.
         let r = plant.stage().pulley_radius;
         let mut absolute = [tolerance; MOST];
-        absolute[place::CART_POSITION] *= r;
-        absolute[place::CART_SPEED] *= r;
+        for place in [place::DRIVE_ANGLE, place::CART_POSITION, place::CART_SPEED, place::IDLER_ANGLE] {
+            absolute[place] *= r;
+        }
         for body in Body::ALL {
             let friction = plant.friction(body);
             if let (Some(place), Law::LuGre { stiffness, .. }) = (model.bristle[body.index()], friction.law) {
@@ -139,9 +150,9 @@ impl<'a> Run<'a> {
                 absolute[place] = tolerance * friction.forward.breakaway.max(friction.backward.breakaway) / stiffness;
             }
         }
-        let mode = plant.first_mode(&start);
         Self {
             model,
+            coordinates,
             grid,
             recorder: Recorder::new(plant, grid, detail, sink),
             // It is stopped from outside: by its observer.
@@ -162,6 +173,7 @@ impl<'a> Run<'a> {
             torque: 0.0,
             changed_at: f64::NEG_INFINITY,
             changes: 0,
+            pace: Pace::default(),
             events: Vec::new(),
             modes: vec![mode],
             cost: Cost::default(),
@@ -206,7 +218,7 @@ impl<'a> Run<'a> {
             (None, Flow::Stop) => Ending::Interrupted { time },
             (None, Flow::Continue) => Ending::Complete,
         };
-        Outcome { events: self.events, ending, cost: self.cost }
+        Outcome { events: self.events, ending, cost: self.cost, error: None }
     }
 
     /// What the input does from `time` on, having been `before`.
@@ -215,9 +227,9 @@ impl<'a> Run<'a> {
         match source {
             Source::Signal(signal) => Stretch::new(signal, time, end),
             Source::Decided(decide) => {
-                let (plant, state) = (self.model.plant, self.model.state(&self.y));
-                let current = plant.current(&self.mode).value(plant, &state, before);
-                let (value, until) = decide.decide(time, &state, current);
+                let inner = self.model.inner(&self.y);
+                let current = self.model.value(&self.model.plant.current(&self.mode), &inner, before);
+                let (value, until) = decide.decide(time, &self.coordinates.state(&inner), current);
                 Stretch::of(held(value, time, until), end)
             }
         }
@@ -274,19 +286,19 @@ impl<'a> Run<'a> {
 
     /// Puts out the row that is at `tau`.
     fn put_out(&mut self, field: &Field, tau: f64, y: &Vector) {
-        let state = self.model.state(y);
-        let input = field.input(tau);
+        let inner = self.model.inner(y);
+        let row = Row::new(&self.coordinates, &inner, field.input(tau));
         if self.model.adds {
-            let (extra, _) = self.model.extra(&self.mode.motion, &state, y);
-            self.recorder.push_with(state, input, self.mode, extra);
+            let (extra, _) = self.model.extra(&self.mode.motion, &inner, y);
+            self.recorder.push_with(row, self.mode, extra);
         } else {
-            self.recorder.push(state, input, self.mode);
+            self.recorder.push(row, self.mode);
         }
     }
 
     /// What a body at zero speed does under its present load.
     fn decide(&self, body: Body, input: f64) -> Motion {
-        let (model, state) = (self.model, self.model.state(&self.y));
+        let (model, state) = (self.model, self.model.inner(&self.y));
         let (mode, noise) = (&self.mode, model.noise(body, &self.mode, &state, input));
         if model.load(body, true, mode, &state, input) > model.breakaway(body, true, &state) + noise {
             Motion::Forward
@@ -308,6 +320,7 @@ impl<'a> Run<'a> {
         }
         let again = self.changes > TURNS_AT_ONCE;
         let input = stretch.input(self.tau);
+        let by_rounding = self.is_by_tolerance(cause, stretch);
         let (body, to) = match cause {
             Cause::GearTorque => {
                 self.mode.gear_torque_positive = !self.mode.gear_torque_positive;
@@ -333,7 +346,7 @@ impl<'a> Run<'a> {
             Cause::BreakForward(body) => (body, Motion::Forward),
             Cause::BreakBackward(body) => (body, Motion::Backward),
         };
-        let (index, state) = (body.index(), self.model.state(&self.y));
+        let (index, state) = (body.index(), self.model.inner(&self.y));
         let from = self.mode.motion[index];
         let side = if to == Motion::Stuck { from } else { to };
         let forward = side != Motion::Backward;
@@ -345,8 +358,19 @@ impl<'a> Run<'a> {
             self.mode.motion[follower.index()] = to;
         }
         let (part, from, to) = (Part::Body(body), Status::Motion(from), Status::Motion(to));
-        Event { time, part, from, to, load }.note(&mut self.events);
+        Event { time, part, from, to, load, by_rounding }.note(&mut self.events);
         self.enter();
+    }
+
+    /// Whether a body stops where the tolerance decides: what still slows it down is less than the formula may be off by.
+    fn is_by_tolerance(&self, cause: Cause, stretch: &Stretch) -> bool {
+        let Cause::Stop(body) = cause else { return false };
+        let field = Field::new(self.model, self.mode, stretch);
+        let mut rate = [0.0; MOST];
+        field.derivative(self.tau, &self.y, &mut rate[..self.model.size]);
+        let place = body.speed_place();
+        // Within the time in which the fastest of it changes.
+        rate[place].abs() * self.first_step / FIRST <= self.absolute[place]
     }
 
     /// Lets a part other than a body do something else.
@@ -355,7 +379,7 @@ impl<'a> Run<'a> {
         let from = self.mode.status(switch.part());
         self.mode.switch(switch);
         let to = self.mode.status(switch.part());
-        Event { time, part: switch.part(), from, to, load: 0.0 }.note(&mut self.events);
+        Event { time, part: switch.part(), from, to, load: 0.0, by_rounding: false }.note(&mut self.events);
         let amplifier = &self.model.plant.stage().amplifier;
         if let (Switch::Current(side), Some(place), AmplifierMode::Voltage) =
             (switch, self.model.current, amplifier.mode)
@@ -379,6 +403,7 @@ impl<'a> Run<'a> {
     }
 
     fn enter(&mut self) {
+        self.coordinates.hold(&self.mode, &self.model.inner(&self.y));
         if !self.modes.contains(&self.mode) {
             self.modes.push(self.mode);
         }
@@ -390,12 +415,13 @@ impl<'a> Run<'a> {
         for _ in 0..CHANGES_AT_ONCE {
             let field = Field::new(self.model, self.mode, stretch);
             let guards = field.guards(self.tau, &self.y);
-            let fallen = field.watches().into_iter().zip(guards).find(|&(cause, value)| match cause {
+            let falls = |&(cause, value): &(Cause, f64)| match cause {
                 // A speed tells by itself, over the next step.
                 Cause::Stop(_) => false,
                 Cause::GearTorque => value < -self.torque_slack,
                 cause => value < -self.slack[cause.kind()],
-            });
+            };
+            let fallen = field.watches().into_iter().zip(guards).filter(falls).min_by_key(|(cause, _)| cause.rank());
             match fallen {
                 Some((cause, _)) => {
                     self.change(cause, stretch);
@@ -429,11 +455,19 @@ impl SolOut for Observer<'_, '_> {
         let size = y.len();
         let mut end = [0.0; MOST];
         end[..size].copy_from_slice(y);
-        if self.field.is_broken() || !end.iter().sum::<f64>().is_finite() {
+        if !end.iter().sum::<f64>().is_finite() {
             self.run.trouble = Some(Ending::Diverged { time: self.field.stretch.begin + from });
             return ControlFlag::Interrupt;
         }
         self.run.cost.steps += 1;
+        if self.run.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS) {
+            self.run.recorder.ask();
+            self.run.trouble = self.run.pace.too_stiff(
+                self.run.cost.steps,
+                self.field.stretch.begin + to,
+                self.run.grid.end(),
+            );
+        }
         let begin = self.run.y;
         let at = |tau: f64| {
             let mut y = [0.0; MOST];

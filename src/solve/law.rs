@@ -2,7 +2,7 @@
 
 use super::propagator::{Matrix, SERIES_ORDER, SERIES_REACH};
 use crate::friction::Motion;
-use crate::plant::{Body, Cause, Form, Mode, Plant, ROTOR, ROUNDING, SPEEDS, STRETCHES, arms, place};
+use crate::plant::{Body, Cause, Form, Mode, POSITION, Plant, ROTOR, ROUNDING, SPEEDS, STRETCHES, arms, place};
 use crate::signal::DEGREE;
 use std::cell::OnceCell;
 use std::rc::Rc;
@@ -89,7 +89,24 @@ impl<const C: usize> Watch<C> {
 
     /// What rounding may do to its value.
     pub(super) fn noise(&self, z: &[f64; C]) -> f64 {
-        ROUNDING * self.sum(self.count[0], |weight, place| (weight * z[place]).abs())
+        self.noise_of(z)
+    }
+
+    /// What rounding may do to its value, the parts of z being of these sizes.
+    fn noise_of(&self, sizes: &[f64; C]) -> f64 {
+        ROUNDING * self.sum(self.count[0], |weight, place| (weight * sizes[place]).abs())
+    }
+
+    /// The first coefficient along a series, from `first` on, that is more than rounding; those before it count as zero,
+    /// however many there are. `sizes` are those of [`Law::sizes`].
+    pub(super) fn first_term(
+        &self,
+        coefficients: &[f64],
+        sizes: &[[f64; C]; SERIES_ORDER + 1],
+        first: usize,
+    ) -> usize {
+        let counts = |k: &usize| coefficients[*k].abs() > 2.0 * self.noise_of(&sizes[*k]);
+        (first..coefficients.len()).find(counts).unwrap_or(coefficients.len())
     }
 
     /// Its rate of change, `y` being ż.
@@ -107,11 +124,14 @@ pub(super) struct Law<const R: usize, const C: usize> {
     /// Halvings of the interval until the Taylor series serves.
     pub(super) finest: usize,
     h: f64,
+    /// A bound of the fastest undamped swing, rad/s.
+    pub(super) swing: f64,
+    /// Where positions are counted from, m.
+    origin: f64,
     rate: Matrix<R, C>,
     steps: Vec<OnceCell<Box<Matrix<R, C>>>>,
     /// Rate at which √V may grow by itself; zero for most machines.
     growth: f64,
-    arms: [[f64; SPEEDS]; STRETCHES],
     inertia: [f64; SPEEDS],
     stiffness: [f64; STRETCHES],
     /// Weight of (di/dt)² in 2V.
@@ -122,18 +142,19 @@ pub(super) struct Law<const R: usize, const C: usize> {
 
 impl<const R: usize, const C: usize> Law<R, C> {
     /// That of a mode and an interval, among those that are known, or a new one, which is added; and whether it is new.
-    pub(super) fn of(known: &mut Vec<Rc<Self>>, plant: &Plant, mode: Mode, h: f64) -> (Rc<Self>, bool) {
-        if let Some(law) = known.iter().find(|law| law.mode == mode && law.h == h) {
+    pub(super) fn of(known: &mut Vec<Rc<Self>>, plant: &Plant, mode: Mode, h: f64, origin: f64) -> (Rc<Self>, bool) {
+        // Only the ends of a travel are places.
+        let origin = if plant.stage().travel.is_some() { origin } else { 0.0 };
+        if let Some(law) = known.iter().find(|law| law.mode == mode && law.h == h && law.origin == origin) {
             return (Rc::clone(law), false);
         }
-        let law = Rc::new(Self::new(plant, mode, h));
+        let law = Rc::new(Self::new(plant, mode, h, origin));
         known.push(Rc::clone(&law));
         (law, true)
     }
 
-    fn new(plant: &Plant, mode: Mode, h: f64) -> Self {
-        let stage = plant.stage();
-        let r = stage.pulley_radius;
+    fn new(plant: &Plant, mode: Mode, h: f64, origin: f64) -> Self {
+        let r = plant.stage().pulley_radius;
         let mut equations = plant.equations(mode);
         // What is stuck has no speed, and a span between two stuck bodies does not change: leaving both out of the
         // conditions lets the bounds know it.
@@ -149,9 +170,9 @@ impl<const R: usize, const C: usize> Law<R, C> {
 
         let row_of = |form: &Form| {
             let mut row = [0.0; C];
-            row[..states::<R>()].copy_from_slice(&form.on_state(r)[..states::<R>()]);
+            row[..states::<R>()].copy_from_slice(&form.on_stretches()[..states::<R>()]);
             row[chain::<R>(0)] = form.input;
-            row[C - 1] = form.constant;
+            row[C - 1] = form.constant_from(origin);
             row
         };
         let mut rate = Matrix::zero();
@@ -162,12 +183,17 @@ impl<const R: usize, const C: usize> Law<R, C> {
         };
         for body in Body::ALL {
             if mode.motion[body.index()] != Motion::Stuck {
-                put(body.speed_place() - 1, &Form::speed(body.index()));
                 put(body.speed_place(), &equations.acceleration[body.index()]);
             }
         }
+        let [d1, d2, twist] = plant.stretch_rates(&mode);
+        put(place::DRIVE_ANGLE, &d1);
+        put(place::IDLER_ANGLE, &d2);
+        if mode.motion[Body::Cart.index()] != Motion::Stuck {
+            put(place::CART_POSITION, &Form::speed(Body::Cart.index()));
+        }
         if plant.has_rotor() {
-            put(place::ROTOR_ANGLE, &Form::speed(ROTOR));
+            put(place::ROTOR_ANGLE, &twist);
             put(place::ROTOR_SPEED, &equations.acceleration[ROTOR]);
         }
         put(place::CURRENT, &equations.current_rate);
@@ -243,7 +269,8 @@ impl<const R: usize, const C: usize> Law<R, C> {
         if has_current {
             damp += decay + exchange;
         }
-        let speed: f64 = f64::sqrt(swing) + damp;
+        let swing = f64::sqrt(swing);
+        let speed: f64 = swing + damp;
         let finest = (speed * h / SERIES_REACH).log2().ceil().clamp(0.0, 1000.0) as usize;
 
         Self {
@@ -252,10 +279,11 @@ impl<const R: usize, const C: usize> Law<R, C> {
             forcing,
             finest,
             h,
+            swing,
+            origin,
             rate,
             steps: (0..=finest).map(|_| OnceCell::new()).collect(),
             growth,
-            arms,
             inertia,
             stiffness,
             magnetic,
@@ -275,18 +303,17 @@ impl<const R: usize, const C: usize> Law<R, C> {
 
     /// √(2V) of ż.
     pub(super) fn size(&self, y: &[f64; R]) -> Size {
-        let [v1, a1, v2, a2, v3, a3, di] = std::array::from_fn::<f64, 7, _>(|j| y[j]);
+        let [d1, a1, v2, a2, d2, a3, di] = std::array::from_fn::<f64, 7, _>(|j| y[j]);
         let [m1, m2, m3, rotor] = self.inertia;
         let [k1, k2, k3, gear, position] = self.stiffness;
-        let r = self.arms[0][0];
-        let (d1, d2, d3) = (r * v1 - v2, v2 - r * v3, r * v3 - r * v1);
+        let d3 = d1 + d2;
         // 2V = Σ m a² + Σ k (Δv)² + w (di/dt)²
         let mut kinetic = m1 * a1 * a1 + m2 * a2 * a2 + m3 * a3 * a3;
         let mut elastic = k1 * d1 * d1 + k2 * d2 * d2 + k3 * d3 * d3 + position * v2 * v2;
         if states::<R>() == place::COUNT {
-            let (v, a) = (y[place::ROTOR_ANGLE], y[place::ROTOR_SPEED]);
+            let (twist, a) = (y[place::ROTOR_ANGLE], y[place::ROTOR_SPEED]);
             kinetic += rotor * a * a;
-            elastic += gear * (v - v1) * (v - v1);
+            elastic += gear * twist * twist;
         }
         Size { mechanical: (kinetic + elastic).sqrt(), magnetic: (self.magnetic * di * di).sqrt() }
     }
@@ -339,6 +366,16 @@ impl<const R: usize, const C: usize> Law<R, C> {
     /// Terms of the Taylor series of z over `distance`: z(s · distance) = Σ term_k sᵏ.
     pub(super) fn series(&self, z: &[f64; C], distance: f64) -> [[f64; C]; SERIES_ORDER + 1] {
         self.rate.series(z, distance)
+    }
+
+    /// What rounding may do to ż.
+    pub(super) fn noise_of_rate(&self, z: &[f64; C]) -> [f64; R] {
+        self.rate.absolute().rate(&z.map(f64::abs)).map(|size| ROUNDING * size)
+    }
+
+    /// How large the parts are that the terms of this series are sums of: |A|ᵏ |z| dᵏ/k!.
+    pub(super) fn sizes(&self, z: &[f64; C], distance: f64) -> [[f64; C]; SERIES_ORDER + 1] {
+        self.rate.absolute().series(&z.map(f64::abs), distance)
     }
 
     /// How much √V may grow by itself within `length`.

@@ -2,15 +2,20 @@
 
 mod check;
 mod choice;
+mod coordinates;
+mod estimate;
 mod exact;
 mod general;
 mod law;
+mod pace;
 mod propagator;
 mod record;
 mod roots;
+mod rounding;
 mod table3;
 
 pub use choice::{Choice, Kind};
+pub use estimate::ErrorEstimate;
 
 use crate::case::Experiment;
 use crate::error::{Error, Result};
@@ -72,6 +77,8 @@ pub struct Event {
     pub to: Status,
     /// The force (N) or torque (N m) on a body at that moment, friction apart; 0 for other parts.
     pub load: f64,
+    /// Whether rounding decided when it happened: a stop of a body whose speed tends to zero and in exact numbers never gets there.
+    pub by_rounding: bool,
 }
 
 impl Event {
@@ -117,11 +124,32 @@ pub enum Ending {
         /// Time reached, s.
         time: f64,
     },
+    /// Something in it changes so fast that at the pace so far it would need more than 1e10 steps.
+    TooStiff {
+        /// Time reached, s.
+        time: f64,
+        /// Steps forecast for the whole run.
+        steps: f64,
+    },
     /// The receiver of the results asked to stop.
     Interrupted {
         /// Time reached, s.
         time: f64,
     },
+}
+
+impl Ending {
+    /// The time reached, s, where it was not the end of the experiment.
+    pub fn time(&self) -> Option<f64> {
+        match *self {
+            Ending::Complete => None,
+            Ending::TooManyEvents { time }
+            | Ending::LeftTravel { time }
+            | Ending::Diverged { time }
+            | Ending::TooStiff { time, .. }
+            | Ending::Interrupted { time } => Some(time),
+        }
+    }
 }
 
 /// What a run cost, in pieces of work rather than seconds.
@@ -154,6 +182,33 @@ pub struct Outcome {
     pub ending: Ending,
     /// What it cost.
     pub cost: Cost,
+    /// By how much positions may be off: of the exact solver a bound of what rounding does; the general solver's is estimated by
+    /// [`ErrorEstimate`], Table 3 with a fixed step has none.
+    pub error: Option<PositionError>,
+}
+
+/// By how much positions at the belt (r φ₁, x, r φ₃) may be off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PositionError {
+    /// That much, m.
+    pub value: f64,
+    /// How far the axis went at most from where it began, m.
+    pub way: f64,
+}
+
+impl PositionError {
+    /// Up to here a result is called exact, m.
+    pub const EXACT: f64 = 1e-9;
+
+    /// Whether it is small enough for the result to be called exact.
+    pub fn is_exact(self) -> bool {
+        self.value <= Self::EXACT
+    }
+
+    /// Whether it is more than a thousandth of the motion, so that the result is not to be relied on.
+    pub fn hides_motion(self) -> bool {
+        !self.is_exact() && self.value > 1e-3 * self.way
+    }
 }
 
 /// A whole run in memory.

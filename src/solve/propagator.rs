@@ -139,6 +139,11 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         }
     }
 
+    /// The matrix of the absolute values of its entries.
+    pub(crate) fn absolute(&self) -> Self {
+        Self { column: self.column.map(|column| column.map(f64::abs)) }
+    }
+
     /// The product of the square part of `self` with `other`.
     #[inline(always)]
     fn product(&self, other: &Self) -> Self {

@@ -1,5 +1,6 @@
 //! From states to the columns that a user sees, block by block.
 
+use super::coordinates::{Coordinates, stretches};
 use super::{Detail, Flow, Grid};
 use crate::friction::{Law, Motion};
 use crate::plant::{Body, Form, Mode, Part, Plant, SPEEDS, STRETCHES, State, place};
@@ -20,13 +21,31 @@ pub(crate) struct Extra {
     pub(crate) bristle: [f64; 3],
 }
 
+/// A row as the solver has it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Row {
+    /// In angles and positions.
+    pub(crate) state: State,
+    /// r φ₁ − x, x − r φ₃ (m) and φ_r − φ₁ (rad), as accurate as the solver has them.
+    pub(crate) stretch: [f64; 3],
+    pub(crate) input: f64,
+}
+
+impl Row {
+    /// A state in the solver's coordinates.
+    #[inline]
+    pub(crate) fn new(coordinates: &Coordinates, inner: &State, input: f64) -> Self {
+        let [d1, d2, _, twist, _] = stretches(inner);
+        Self { state: coordinates.state(inner), stretch: [d1, d2, twist], input }
+    }
+}
+
 /// Collects rows of states and hands them on as blocks of columns.
 pub(crate) struct Recorder<'a> {
     plant: &'a Plant,
     grid: Grid,
     pub(crate) detail: Detail,
-    /// States, with the input.
-    raw: Vec<(State, f64)>,
+    raw: Vec<Row>,
     modes: Vec<Mode>,
     /// One for each row, or none at all where the linear equations say everything.
     extra: Vec<Extra>,
@@ -69,8 +88,8 @@ impl<'a> Recorder<'a> {
 
     /// Adds the next row.
     #[inline]
-    pub(crate) fn push(&mut self, state: State, input: f64, mode: Mode) {
-        self.raw.push((state, input));
+    pub(crate) fn push(&mut self, row: Row, mode: Mode) {
+        self.raw.push(row);
         self.modes.push(mode);
         if self.raw.len() == BLOCK {
             self.hand_on();
@@ -78,9 +97,9 @@ impl<'a> Recorder<'a> {
     }
 
     /// Adds the next row with what its state does not tell.
-    pub(crate) fn push_with(&mut self, state: State, input: f64, mode: Mode, extra: Extra) {
+    pub(crate) fn push_with(&mut self, row: Row, mode: Mode, extra: Extra) {
         self.extra.push(extra);
-        self.push(state, input, mode);
+        self.push(row, mode);
     }
 
     /// Leaves out so many rows.
@@ -89,6 +108,14 @@ impl<'a> Recorder<'a> {
             self.finish();
             self.rows += rows;
         }
+    }
+
+    /// Hands on what there is, be it nothing, to hear whether to go on.
+    pub(crate) fn ask(&mut self) {
+        if self.raw.is_empty() {
+            self.block.columns.iter_mut().for_each(|column| column.values.clear());
+        }
+        self.hand_on();
     }
 
     /// Hands on what is left.
@@ -125,7 +152,8 @@ impl<'a> Recorder<'a> {
         put(next(), |j| self.grid.time(first + j as u64));
         let voltage = next();
         let (p1, w1, x, v, p3, w3) = (next(), next(), next(), next(), next(), next());
-        for (j, &([phi1, omega1, position, speed, phi3, omega3, ..], _)) in raw.iter().enumerate() {
+        for (j, row) in raw.iter().enumerate() {
+            let [phi1, omega1, position, speed, phi3, omega3, ..] = row.state;
             p1[j] = phi1;
             w1[j] = omega1;
             x[j] = position;
@@ -133,21 +161,21 @@ impl<'a> Recorder<'a> {
             p3[j] = phi3;
             w3[j] = omega3;
         }
-        let (p1, w1, x, v, p3, w3) = (&*p1, &*w1, &*x, &*v, &*p3, &*w3);
+        let (w1, x, v, w3) = (&*w1, &*x, &*v, &*w3);
         let r = stage.pulley_radius;
         let [d1, d2, d3, twist, rotor, armature, input, torque, stop] = &mut self.scratch;
         let sized = |column: &mut Vec<f64>| column.resize(rows, 0.0);
         [&mut *d1, d2, d3, twist, rotor, armature, input, torque, stop].into_iter().for_each(sized);
-        put(d1, |j| r * p1[j] - x[j]);
-        put(d2, |j| x[j] - r * p3[j]);
-        put(d3, |j| r * p3[j] - r * p1[j]);
-        put(input, |j| raw[j].1);
+        put(d1, |j| raw[j].stretch[0]);
+        put(d2, |j| raw[j].stretch[1]);
+        put(d3, |j| -(raw[j].stretch[0] + raw[j].stretch[1]));
+        put(input, |j| raw[j].input);
         if plant.has_current_state() {
-            put(armature, |j| raw[j].0[place::CURRENT]);
+            put(armature, |j| raw[j].state[place::CURRENT]);
         }
         if plant.has_rotor() {
-            put(twist, |j| raw[j].0[place::ROTOR_ANGLE] - p1[j]);
-            put(rotor, |j| raw[j].0[place::ROTOR_SPEED]);
+            put(twist, |j| raw[j].stretch[2]);
+            put(rotor, |j| raw[j].state[place::ROTOR_SPEED]);
         }
         let source = Source { stretch: [d1, d2, d3, twist, x], speed: [w1, v, w3, rotor], current: armature, input };
         let (current, f1, f2, f3) = (next(), next(), next(), next());
@@ -253,7 +281,7 @@ impl<'a> Recorder<'a> {
             next().copy_from_slice(input);
         }
         if plant.has_rotor() {
-            put(next(), |j| raw[j].0[place::ROTOR_ANGLE]);
+            put(next(), |j| raw[j].state[place::ROTOR_ANGLE]);
             next().copy_from_slice(rotor);
             next().copy_from_slice(torque);
             put(next(), |j| f64::from(modes[j].gear.code()));
@@ -273,7 +301,7 @@ impl<'a> Recorder<'a> {
                 EncoderPlace::Cart => place::CART_POSITION,
             };
             let counts = encoder.counts_per_unit(stage.motor.gear_ratio);
-            put(next(), |j| (raw[j].0[place] * counts).round());
+            put(next(), |j| (raw[j].state[place] * counts).round());
         }
         for body in bristles(plant) {
             put(next(), |j| extras[j].bristle[body.index()]);

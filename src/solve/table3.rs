@@ -3,12 +3,12 @@
 //! Kept to reproduce the paper and to show what it does: any speed inside a band of ±0.01 is frozen rather than brought
 //! to rest, so the stage creeps after it has stopped, by an amount that depends on the step.
 
-use super::record::Recorder;
+use super::record::{Recorder, Row};
 use super::{Cost, Detail, Ending, Flow, Grid, Method, Outcome};
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::Motion;
-use crate::plant::{Body, Form, Mode, Plant, SPEEDS, State, place};
+use crate::plant::{Body, Form, Mode, Plant, SPEEDS, State, place, stretches};
 use crate::signal::Piece;
 use crate::trajectory::Trajectory;
 
@@ -48,7 +48,8 @@ pub(crate) fn run(
         }
         let input = experiment.input.value(time);
         let motion = model.motion(&state, input);
-        recorder.push(state, input, Mode::of(motion));
+        let [d1, d2, ..] = stretches(plant.stage().pulley_radius, &state);
+        recorder.push(Row { state, stretch: [d1, d2, 0.0], input }, Mode::of(motion));
         if recorder.flow == Flow::Stop {
             ending = Ending::Interrupted { time };
             break;
@@ -70,7 +71,7 @@ pub(crate) fn run(
     }
     recorder.finish();
     cost.samples = recorder.rows;
-    Ok(Outcome { events: Vec::new(), ending, cost })
+    Ok(Outcome { events: Vec::new(), ending, cost, error: None })
 }
 
 /// The equations (16)-(18) with Table 3 for the friction.

@@ -58,12 +58,20 @@ pub enum Status {
     Diverged,
     /// These numbers are no machine: friction below what a model needs, say.
     Refused,
+    /// Something changes so fast that the run would not have ended in time.
+    TooStiff,
 }
 
 impl Status {
     /// All of them, by number.
-    pub const ALL: [Status; 5] =
-        [Status::Complete, Status::LeftTravel, Status::TooManyEvents, Status::Diverged, Status::Refused];
+    pub const ALL: [Status; 6] = [
+        Status::Complete,
+        Status::LeftTravel,
+        Status::TooManyEvents,
+        Status::Diverged,
+        Status::Refused,
+        Status::TooStiff,
+    ];
 
     /// Its number.
     pub fn code(self) -> f64 {
@@ -78,6 +86,7 @@ impl Status {
             Status::TooManyEvents => "too many events",
             Status::Diverged => "diverged",
             Status::Refused => "no machine",
+            Status::TooStiff => "too stiff",
         }
     }
 }
@@ -304,6 +313,7 @@ fn status(ending: Ending) -> Status {
         Ending::LeftTravel { .. } => Status::LeftTravel,
         Ending::TooManyEvents { .. } => Status::TooManyEvents,
         Ending::Diverged { .. } => Status::Diverged,
+        Ending::TooStiff { .. } => Status::TooStiff,
     }
 }
 

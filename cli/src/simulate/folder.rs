@@ -37,10 +37,12 @@ impl Folder {
 
     /// The events as CSV; returns the file's name.
     pub fn write_events(&self, name: &str, events: &[Event]) -> Result<String> {
-        let mut text = String::from("time_s,part,from,to,load\n");
+        let mut text = String::from("time_s,part,from,to,load,by_rounding\n");
         for e in events {
             // Rust's own form of a number reads back to the same bits.
-            let _ = writeln!(text, "{},{},{},{},{}", e.time, e.part.key(), e.from.word(), e.to.word(), e.load);
+            let Event { time, part, from, to, load, by_rounding } = e;
+            let (part, from, to) = (part.key(), from.word(), to.word());
+            let _ = writeln!(text, "{time},{part},{from},{to},{load},{}", u8::from(*by_rounding));
         }
         let name = format!("{name}.events.csv");
         write_atomically(self.path(&name), text)?;

@@ -90,10 +90,14 @@ fn status(runs: &[Run], interrupt: &Interrupt) -> Status {
         if let Some(told) = table::early_end(&run.outcome.ending) {
             terminal::show_error(&format!("the run \"{}\" {told}", run.experiment.name));
         }
+        if let Some(told) = table::hidden(run) {
+            terminal::show_warning(&told);
+        }
     }
+    let relied = |run: &Run| run.outcome.ending == Ending::Complete && table::hidden(run).is_none();
     match interrupt.signal() {
         Some(signal) => Status::Interrupted(signal),
-        None if runs.iter().all(|run| run.outcome.ending == Ending::Complete) => Status::Done,
+        None if runs.iter().all(relied) => Status::Done,
         None => Status::Incomplete,
     }
 }

@@ -14,7 +14,7 @@ use taut::json::{self, Simulated};
 use taut::measure;
 use taut::metrics::{Meter, Metrics};
 use taut::reduction::Reduction;
-use taut::solve::{self, Flow, Solver};
+use taut::solve::{self, ErrorEstimate, Flow, Solver};
 use taut::stage::{BeltModel, Stage};
 #[cfg(feature = "parquet")]
 use taut::trajectory::ParquetWriter;
@@ -86,9 +86,16 @@ impl<'a> Setting<'a> {
         let mut curves = (self.folder.is_some() && !self.args.no_report).then(|| Curves::new(stage));
         let mut progress = Progress::new(experiment, self.args.quiet);
         let mut trouble: Option<Error> = None;
+        let mut estimate = match self.solver {
+            Solver::General { tolerance } => Some((ErrorEstimate::new(stage, experiment), tolerance)),
+            Solver::Exact | Solver::Table3 { .. } => None,
+        };
 
         let mut take = |block: &Trajectory| {
             meter.take(block);
+            if let Some((estimate, _)) = &mut estimate {
+                estimate.take(block);
+            }
             if let Some(curves) = &mut curves {
                 curves.take(block);
             }
@@ -96,7 +103,11 @@ impl<'a> Setting<'a> {
             progress.advance(block.len() as u64, begin);
             if trouble.is_some() || self.interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue }
         };
-        let outcome = solve::stream(stage, experiment, self.solver, &mut take)?;
+        let mut outcome = solve::stream(stage, experiment, self.solver, &mut take)?;
+        if let Some((estimate, tolerance)) = estimate {
+            let mut go_on = || if self.interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue };
+            outcome.error = estimate.finish(stage, experiment, tolerance, &outcome, &mut go_on)?;
+        }
         progress.clear();
         if let Some(trouble) = trouble {
             return Err(Failure::work(trouble));

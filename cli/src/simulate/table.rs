@@ -11,12 +11,12 @@ use taut::metrics::{Balance, Metrics, largest};
 use taut::number;
 use taut::plant::Part;
 use taut::reduction::Reduction;
-use taut::solve::{Ending, Method, Solver};
+use taut::solve::{Ending, Method, PositionError, Solver};
 use taut::stage::BeltModel;
 
 /// The text on the terminal.
 pub fn text(case: &Case, solver: Solver, runs: &[Run], folder: Option<&Folder>) -> String {
-    let mut text = format!("{}\n{}\n", bold(&case.title), solver_words(solver));
+    let mut text = format!("{}\n{}\n", bold(&case.title), solver_words(solver, runs));
     for run in runs {
         let _ = write!(text, "\n{}\n", bold(&run.experiment.name));
         if let Some(told) = early_end(&run.outcome.ending) {
@@ -80,8 +80,13 @@ pub fn early_end(ending: &Ending) -> Option<String> {
             time(at)
         )),
         Ending::Diverged { time: at } => {
-            Some(format!("ended at {}: its state is no number any more; a smaller --step may help", time(at)))
+            Some(format!("ended at {}: its state is no number any more; with --solver table3 a smaller --step may help", time(at)))
         }
+        Ending::TooStiff { time: at, steps } => Some(format!(
+            "ended at {}: too stiff, it would need some {steps:.0e} steps; leave out what changes so fast \
+             (an inductance, a light body, stiff friction), or shorten the run",
+            time(at)
+        )),
         Ending::LeftTravel { time: at } => {
             Some(format!("ended at {}: the cart leaves its travel there, and nothing stops it", time(at)))
         }
@@ -115,8 +120,12 @@ pub fn lines(run: &Run, solver: Solver) -> Vec<(&'static str, String)> {
             "r φ₁ - x",
             format!("at most {} at {}, {} at the end", value(error.value, "m"), time(error.time), value(left, "m")),
         ),
+        ("accuracy", accuracy(run.outcome.error, solver)),
         ("cost", cost(run)),
     ];
+    if matches!(solver, Solver::Table3 { .. }) {
+        lines.retain(|(name, _)| *name != "accuracy");
+    }
     if run.model == BeltModel::Rigid {
         // Nothing stretches in it.
         lines.retain(|(name, _)| !["peak stretch", "peak force", "r φ₁ - x"].contains(name));
@@ -128,6 +137,28 @@ pub fn lines(run: &Run, solver: Solver) -> Vec<(&'static str, String)> {
         lines.insert(lines.len() - 1, ("reduced model", reduced(&reduction)));
     }
     lines
+}
+
+/// By how much positions may be off.
+fn accuracy(error: Option<PositionError>, solver: Solver) -> String {
+    let Some(error) = error else { return "not estimated".into() };
+    let rounded = number::engineering(error.value, "m", 2).replace(['\u{a0}', '\u{202f}'], " ");
+    match solver {
+        Solver::Exact => format!("positions within {rounded}, by a bound of rounding"),
+        _ => format!("positions within some {rounded}, by a second run with ten times the tolerance"),
+    }
+}
+
+/// The word for a result that its error hides.
+pub fn hidden(run: &Run) -> Option<String> {
+    let error = run.outcome.error.filter(|error| error.hides_motion())?;
+    Some(format!(
+        "positions of the run \"{}\" may be off by {}, and it moves by no more than {}: this result is not to be relied on; \
+         shorten the run, or leave out what is so stiff",
+        run.experiment.name,
+        value(error.value, "m"),
+        value(error.way, "m"),
+    ))
 }
 
 /// Where the machines of --draws end.
@@ -203,7 +234,11 @@ fn events(run: &Run, solver: Solver) -> String {
     }
     counts.sort_by_key(|(part, _)| part.order());
     let each: Vec<String> = counts.iter().map(|(part, count)| format!("{} {count}", part.name())).collect();
-    format!("{}: {}", events.len(), each.join(", "))
+    let by_rounding = match events.iter().filter(|event| event.by_rounding).count() {
+        0 => String::new(),
+        n => format!("; of {n} rounding decides when"),
+    };
+    format!("{}: {}{by_rounding}", events.len(), each.join(", "))
 }
 
 fn cost(run: &Run) -> String {
@@ -216,9 +251,12 @@ fn cost(run: &Run) -> String {
     format!("{} rows, {work}", cost.samples)
 }
 
-fn solver_words(solver: Solver) -> String {
+fn solver_words(solver: Solver, runs: &[Run]) -> String {
     match solver {
-        Solver::Exact => "solved exactly".into(),
+        Solver::Exact if runs.iter().all(|run| run.outcome.error.is_some_and(PositionError::is_exact)) => {
+            "solved exactly".into()
+        }
+        Solver::Exact => "solved with matrix exponentials; rounding shows, see the accuracy".into(),
         Solver::General { tolerance } => format!("the general solver, tolerance {tolerance:e}"),
         Solver::Table3 { step, method } => {
             let method = match method {

@@ -4,6 +4,7 @@ use super::Run;
 use crate::friction::Motion;
 use crate::plant::{Body, Cause, Limit, Mode, Part, Status, Switch, place};
 use crate::solve::law::{Law, Watch};
+use crate::solve::propagator::SERIES_ORDER;
 use crate::solve::{Ending, Event};
 use crate::stage::AmplifierMode;
 use std::rc::Rc;
@@ -12,6 +13,9 @@ use std::rc::Rc;
 const EVENTS_AT_LEAST: f64 = 1e5;
 const EVENTS_PER_SECOND: f64 = 1e7;
 const EVENTS_AT_MOST: f64 = 2e7;
+
+/// What counts as one instant, as a share of the reach of the series.
+const MOMENT: f64 = 1e-12;
 
 /// Mode changes allowed at one instant.
 const CHANGES_AT_ONCE: usize = 100;
@@ -28,7 +32,7 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
         let form = self.plant.load(body, forward, &mode);
         let law = self.plant.friction(body);
         let resistance = if forward { law.forward.coulomb } else { -law.backward.coulomb };
-        (self.value(&form), resistance, form.noise(self.plant, &self.state(), self.input()))
+        (self.value(&form), resistance, self.noise(&form))
     }
 
     /// What a body at zero speed does under its present load.
@@ -44,12 +48,14 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
 
     /// Goes into the mode that follows when `cause` ends the present one.
     pub(super) fn change(&mut self, cause: Cause) {
-        let here = (self.row, self.offset);
-        self.changes = if here == self.changed_at { self.changes + 1 } else { 0 };
-        self.changed_at = here;
+        let (row, offset) = self.changed_at;
+        let since = (self.row - row) as f64 * self.h + (self.offset - offset);
+        self.changes = if since <= MOMENT * self.law.reach() { self.changes + 1 } else { 0 };
+        self.changed_at = (self.row, self.offset);
         if self.changes > CHANGES_AT_ONCE {
             self.trouble = Some(Ending::TooManyEvents { time: self.time() });
         }
+        let by_rounding = self.is_by_rounding(cause);
         let (body, to) = match cause {
             Cause::GearTorque => {
                 self.mode.gear_torque_positive = !self.mode.gear_torque_positive;
@@ -90,8 +96,19 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
             self.mode.motion[follower.index()] = to;
         }
         self.slack[body.index()] = if self.changes > TURNS_AT_ONCE { 20.0 } else { 2.0 } * noise;
-        self.note(Part::Body(body), Status::Motion(from), load);
+        self.note(Part::Body(body), Status::Motion(from), load, by_rounding);
         self.enter();
+    }
+
+    /// Whether a body stops where rounding decides: its speed tends to zero for ever, and nothing slows it down any more.
+    fn is_by_rounding(&self, cause: Cause) -> bool {
+        let Cause::Stop(body) = cause else { return false };
+        let place = body.speed_place();
+        let slows = self.law.rate(&self.z)[place].abs();
+        // Its own speed is known to the rounding of the speeds that it had.
+        let mut sizes = self.z;
+        sizes[place] = self.rounding.largest_speed(body, self.plant.stage().pulley_radius);
+        slows <= 20.0 * self.law.noise_of_rate(&sizes)[place]
     }
 
     /// Lets a part other than a body do something else.
@@ -101,7 +118,7 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
         let at_edge = |guard: &Watch<C>| guard.value(&self.z).abs() <= 20.0 * guard.noise(&self.z);
         let gently = self.law.guards.iter().any(|guard| guard.cause == Cause::Switch(switch) && at_edge(guard));
         self.mode.switch(switch);
-        self.note(switch.part(), before, 0.0);
+        self.note(switch.part(), before, 0.0, false);
         self.enter();
         if let (Switch::Current(side), true) = (switch, self.current_stands()) {
             if side != Limit::Inside {
@@ -123,8 +140,8 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
     }
 
     /// Notes an event, unless nothing that shows has changed.
-    fn note(&mut self, part: Part, from: Status, load: f64) {
-        let event = Event { time: self.time(), part, from, to: self.mode.status(part), load };
+    fn note(&mut self, part: Part, from: Status, load: f64, by_rounding: bool) {
+        let event = Event { time: self.time(), part, from, to: self.mode.status(part), load, by_rounding };
         event.note(&mut self.events);
     }
 
@@ -136,6 +153,8 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
             let zero = now.abs() <= 20.0 * noise;
             let index = guard.cause.kind();
             (self.slack[index], self.fresh[index]) = match zero {
+                // A torque that turns again and again without a moment passing is none.
+                false if cause == Cause::GearTorque && self.changes > TURNS_AT_ONCE => (2.0 * now.abs(), 0),
                 false => (0.0, 0),
                 true if self.changes <= TURNS_AT_ONCE => (f64::max(-now, 0.0), 1),
                 // Where rounding moves a part back and forth without a moment passing, it stays where it is.
@@ -146,8 +165,11 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
 
     /// Takes up the equations of the present mode.
     fn enter(&mut self) {
-        let (law, is_new) = Law::of(self.laws, self.plant, self.mode, self.h);
+        self.rounding.swing(self.law.swing, self.time());
+        let (law, is_new) = Law::of(self.laws, self.plant, self.mode, self.h, self.coordinates.origin());
         self.law = law;
+        let inner = self.inner();
+        self.coordinates.hold(&self.mode, &inner);
         self.cost.modes += u64::from(is_new);
     }
 
@@ -155,22 +177,18 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
     pub(super) fn resolve(&mut self) {
         for _ in 0..CHANGES_AT_ONCE {
             let law = Rc::clone(&self.law);
-            let y = law.rate(&self.z);
-            let falls = |guard: &&Watch<C>| {
+            let falls = |guard: &Watch<C>| {
                 let g = self.standing(guard);
-                let slope = guard.slope(&y);
                 if g != 0.0 || self.fresh_order(guard.cause) > 0 {
                     return g < 0.0;
                 }
-                if slope != 0.0 {
-                    return slope < 0.0;
-                }
-                // On the edge and not moving off it at once: the first term of its series that is not zero decides.
+                // On the edge: the first term of its series that is more than rounding decides.
                 let series = law.series(&self.z, law.reach());
-                let terms = series[2..].iter().map(|term| guard.value(term));
-                terms.into_iter().find(|&term| term != 0.0).is_some_and(|term| term < 0.0)
+                let coefficients: [f64; SERIES_ORDER + 1] = std::array::from_fn(|k| guard.value(&series[k]));
+                let first = guard.first_term(&coefficients, &law.sizes(&self.z, law.reach()), 1);
+                coefficients.get(first).is_some_and(|&term| term < 0.0)
             };
-            let fallen = law.guards.iter().find(falls);
+            let fallen = law.guards.iter().filter(|guard| falls(guard)).min_by_key(|guard| guard.cause.rank());
             match fallen {
                 Some(guard) => {
                     self.change(guard.cause);

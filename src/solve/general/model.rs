@@ -2,7 +2,8 @@
 
 use super::stretch::Stretch;
 use crate::friction::{Law, Motion};
-use crate::plant::{Body, Cause, Equations, Form, Mode, Plant, ROTOR, ROUNDING, State, place, stretches};
+use crate::plant::{Body, Cause, Equations, Form, Mode, Plant, ROTOR, ROUNDING, State, place};
+use crate::solve::coordinates::stretches;
 use crate::solve::record::Extra;
 use crate::stage::BeltMake;
 use ivp::prelude::FirstOrderSystem;
@@ -20,6 +21,8 @@ pub(super) const MOST_GUARDS: usize = 18;
 /// A stage made ready for the integrator.
 pub(super) struct Model<'a> {
     pub(super) plant: &'a Plant,
+    /// Where positions are counted from, m.
+    origin: f64,
     /// Where the current stands, if it is a state.
     pub(super) current: Option<usize>,
     /// Where the rotor's angle stands, if it is a state; its speed behind it.
@@ -35,7 +38,7 @@ pub(super) struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    pub(super) fn new(plant: &'a Plant) -> Self {
+    pub(super) fn new(plant: &'a Plant, origin: f64) -> Self {
         let mut size = place::CURRENT;
         let mut room = |there: bool, count: usize| {
             there.then(|| {
@@ -48,30 +51,38 @@ impl<'a> Model<'a> {
         let bristle = Body::ALL.map(|body| room(matches!(plant.friction(body).law, Law::LuGre { .. }), 1));
         let belt = &plant.stage().belt;
         let adds = !plant.stage().is_piecewise_linear();
-        Self { plant, current, rotor, size, bristle, follows: belt.make.filter(|_| belt.follows_cart), adds }
+        Self { plant, origin, current, rotor, size, bristle, follows: belt.make.filter(|_| belt.follows_cart), adds }
     }
 
-    /// The state of the stage.
+    /// The state in the solver's coordinates.
     #[inline]
-    pub(super) fn state(&self, y: &[f64]) -> State {
-        let mut state = [0.0; place::COUNT];
-        for (state, y) in state[..place::CURRENT].iter_mut().zip(y) {
-            *state = *y;
+    pub(super) fn inner(&self, y: &[f64]) -> State {
+        let mut inner = [0.0; place::COUNT];
+        for (inner, y) in inner[..place::CURRENT].iter_mut().zip(y) {
+            *inner = *y;
         }
         if let Some(current) = self.current {
-            state[place::CURRENT] = y[current];
+            inner[place::CURRENT] = y[current];
         }
-        // Where it is no inertia of its own, the rotor turns with the drive pulley.
-        let rotor = self.rotor.unwrap_or(place::DRIVE_ANGLE);
-        (state[place::ROTOR_ANGLE], state[place::ROTOR_SPEED]) = (y[rotor], y[rotor + 1]);
-        state
+        match self.rotor {
+            Some(rotor) => (inner[place::ROTOR_ANGLE], inner[place::ROTOR_SPEED]) = (y[rotor], y[rotor + 1]),
+            // Where it is no inertia of its own, the rotor turns with the drive pulley.
+            None => inner[place::ROTOR_SPEED] = y[place::DRIVE_SPEED],
+        }
+        inner
+    }
+
+    /// The value of a linear form.
+    #[inline]
+    pub(super) fn value(&self, form: &Form, inner: &State, input: f64) -> f64 {
+        form.value_at(&stretches(inner), self.origin, inner, input)
     }
 
     /// By how much the cart's dry friction is multiplied where it is.
     #[inline(always)]
     fn factor(&self, body: Body, state: &State) -> f64 {
         match &self.plant.stage().cart.along {
-            Some(along) if body == Body::Cart => along.factor(state[place::CART_POSITION]),
+            Some(along) if body == Body::Cart => along.factor(self.origin + state[place::CART_POSITION]),
             _ => 1.0,
         }
     }
@@ -82,8 +93,8 @@ impl<'a> Model<'a> {
         let Some(make) = self.follows else { return [0.0; 2] };
         let stage = self.plant.stage();
         let [k1, k2, _] = stage.belt.stiffness;
-        let [d1, d2, ..] = stretches(stage.pulley_radius, state);
-        let [k1x, k2x] = make.stiffness_at(state[place::CART_POSITION]);
+        let [d1, d2, _, _, way] = stretches(state);
+        let [k1x, k2x] = make.stiffness_at(self.origin + way);
         // (k_j(x) − k_j) d_j
         [(k1x - k1) * d1, (k2x - k2) * d2]
     }
@@ -98,15 +109,14 @@ impl<'a> Model<'a> {
 
     /// All forces on a body but its friction, for a body that goes, or is about to go, forward or backward.
     pub(super) fn load(&self, body: Body, forward: bool, mode: &Mode, state: &State, input: f64) -> f64 {
-        let gear_torque_positive = self.plant.current(mode).value(self.plant, state, input) >= 0.0;
+        let gear_torque_positive = self.value(&self.plant.current(mode), state, input) >= 0.0;
         let mode = Mode { gear_torque_positive, ..*mode };
-        self.plant.load(body, forward, &mode).value(self.plant, state, input)
-            + self.loads(self.beyond(state))[body.index()]
+        self.value(&self.plant.load(body, forward, &mode), state, input) + self.loads(self.beyond(state))[body.index()]
     }
 
     /// What rounding may have done to it.
     pub(super) fn noise(&self, body: Body, mode: &Mode, state: &State, input: f64) -> f64 {
-        self.plant.load(body, true, mode).noise(self.plant, state, input)
+        self.plant.load(body, true, mode).noise(state, self.origin, input)
     }
 
     /// What a body at rest holds this way, where it is.
@@ -160,11 +170,12 @@ pub(super) struct Field<'a> {
     model: &'a Model<'a>,
     mode: Mode,
     equations: Equations,
+    /// Rates of the stretches that stand in the places of angles.
+    stretch_rates: [Form; 3],
     /// Inertia that moves with each body.
     mass: [f64; 3],
     pub(super) stretch: &'a Stretch,
     evaluations: Cell<u64>,
-    broken: Cell<bool>,
 }
 
 impl<'a> Field<'a> {
@@ -173,16 +184,20 @@ impl<'a> Field<'a> {
         let equations = plant.equations(mode);
         let of = |b: Body| plant.ratio(b).powi(2) * equations.inertia[b.index()];
         let mass = Body::ALL.map(|body| plant.followers(plant.leader(body)).map(of).sum());
-        Self { model, mode, equations, mass, stretch, evaluations: Cell::new(0), broken: Cell::new(false) }
+        let stretch_rates = plant.stretch_rates(&mode);
+        Self {
+            model,
+            mode,
+            equations,
+            stretch_rates,
+            mass,
+            stretch,
+            evaluations: Cell::new(0),
+        }
     }
 
     pub(super) fn evaluations(&self) -> u64 {
         self.evaluations.get()
-    }
-
-    /// Whether a rate was no number.
-    pub(super) fn is_broken(&self) -> bool {
-        self.broken.get()
     }
 
     /// The input at τ.
@@ -197,20 +212,20 @@ impl<'a> Field<'a> {
 
     /// What the parts of a guard's value come to, and so what an error of a part of it may do.
     pub(super) fn size(&self, index: usize, tau: f64, y: &[f64]) -> f64 {
-        let (plant, state) = (self.model.plant, self.model.state(y));
-        self.equations.guards[index].form.noise(plant, &state, self.input(tau)) / ROUNDING
+        let form = &self.equations.guards[index].form;
+        form.noise(&self.model.inner(y), self.model.origin, self.input(tau)) / ROUNDING
     }
 
     /// The values that must not become negative, in the order of [`Field::watches`].
     pub(super) fn guards(&self, tau: f64, y: &[f64]) -> [f64; MOST_GUARDS] {
         let model = self.model;
-        let (plant, state, input) = (model.plant, model.state(y), self.input(tau));
+        let (plant, state, input) = (model.plant, model.inner(y), self.input(tau));
         let (extra, _) = model.extra(&self.mode.motion, &state, y);
         let load = model.loads(extra.span);
         let mut values = [0.0; MOST_GUARDS];
         let guards = &self.equations.guards;
         for (value, guard) in values.iter_mut().zip(guards) {
-            *value = guard.form.value(plant, &state, input)
+            *value = model.value(&guard.form, &state, input)
                 + match guard.cause {
                     Cause::Stop(_) => 0.0,
                     // a(x) F_b − (load + what the belt adds)
@@ -248,37 +263,41 @@ impl FirstOrderSystem for Field<'_> {
     fn derivative(&self, tau: f64, y: &[f64], rate: &mut [f64]) {
         self.evaluations.set(self.evaluations.get() + 1);
         let model = self.model;
-        let (plant, state, input) = (model.plant, model.state(y), self.input(tau));
+        let (plant, state, input) = (model.plant, model.inner(y), self.input(tau));
         let (extra, bristles) = model.extra(&self.mode.motion, &state, y);
         let load = model.loads(extra.span);
-        let value = |form: &Form| form.value(plant, &state, input);
+        let value = |form: &Form| model.value(form, &state, input);
         for body in Body::ALL {
             let index = body.index();
-            let (position, speed) = (body.speed_place() - 1, body.speed_place());
-            (rate[position], rate[speed]) = match self.mode.motion[index] {
-                Motion::Stuck => (0.0, 0.0),
+            let speed = body.speed_place();
+            rate[speed] = match self.mode.motion[index] {
+                Motion::Stuck => 0.0,
                 // J φ̈ = what is linear + what the belt adds − what the law adds
                 _ => {
                     let leader = plant.leader(body).index();
                     let added = (load[leader] - extra.friction[leader]) / self.mass[index];
-                    (state[speed], value(&self.equations.acceleration[index]) + plant.ratio(body) * added)
+                    value(&self.equations.acceleration[index]) + plant.ratio(body) * added
                 }
             };
             if let Some(place) = model.bristle[index] {
                 rate[place] = bristles[index];
             }
         }
+        let [d1, d2, twist] = &self.stretch_rates;
+        rate[place::DRIVE_ANGLE] = value(d1);
+        rate[place::CART_POSITION] = state[place::CART_SPEED];
+        rate[place::IDLER_ANGLE] = value(d2);
         if let Some(current) = model.current {
             rate[current] = value(&self.equations.current_rate);
         }
         if let Some(rotor) = model.rotor {
-            rate[rotor] = state[place::ROTOR_SPEED];
+            rate[rotor] = value(twist);
             rate[rotor + 1] = value(&self.equations.acceleration[ROTOR]);
         }
         if !rate.iter().sum::<f64>().is_finite() {
-            // The formula would shorten its step for ever; so it goes on, and its observer ends the run.
-            self.broken.set(true);
-            rate.fill(0.0);
+            // A trial step that leads nowhere: what is no number fails every test of the error, so the step is refused and a
+            // shorter one tried.
+            rate.fill(f64::NAN);
         }
     }
 }

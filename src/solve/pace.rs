@@ -1,0 +1,46 @@
+//! How fast a run gets on: whether it will end, and when to ask the receiver whether to go on.
+
+use super::Ending;
+
+/// Steps or looks after which the receiver of the rows is asked again, whether there are new rows or not.
+pub(super) const STEPS_BETWEEN_QUESTIONS: u64 = 4096;
+
+/// Steps before a forecast is made, and the most that a run may need: some minutes to an hour.
+const STEPS_BEFORE_FORECAST: u64 = 1 << 20;
+const MOST_STEPS: f64 = 1e10;
+
+/// Where a run stood when it was looked at last.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Pace {
+    steps: u64,
+    time: f64,
+}
+
+impl Pace {
+    /// The word for a run that at its pace since the last look would need more than [`MOST_STEPS`] steps.
+    pub(super) fn too_stiff(&mut self, steps: u64, time: f64, end: f64) -> Option<Ending> {
+        if steps - self.steps < STEPS_BEFORE_FORECAST {
+            return None;
+        }
+        let per_second = (steps - self.steps) as f64 / (time - self.time);
+        let forecast = steps as f64 + per_second * (end - time);
+        *self = Self { steps, time };
+        // Where no time has passed the forecast is infinite, or no number.
+        (forecast.is_nan() || forecast > MOST_STEPS).then_some(Ending::TooStiff { time, steps: forecast })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_that_crawls_is_told() {
+        let mut pace = Pace::default();
+        assert_eq!(pace.too_stiff(1 << 19, 0.1, 1.0), None);
+        assert_eq!(pace.too_stiff(1 << 20, 0.1, 1.0), None);
+        let ending = pace.too_stiff(1 << 21, 0.1 + 1e-6, 1.0);
+        assert!(matches!(ending, Some(Ending::TooStiff { steps, .. }) if steps > 9e11 && steps < 1e12), "{ending:?}");
+        assert!(matches!(pace.too_stiff(1 << 22, 0.1 + 1e-6, 1.0), Some(Ending::TooStiff { .. })));
+    }
+}
