@@ -114,9 +114,7 @@ fn a_span_that_is_slack_at_time_zero_moved_bodies() {
 /// Stages whose breakaway is above their Coulomb friction, so that it matters which load decides.
 fn sticky() -> impl Strategy<Value = Stage> {
     (random::equipped(Dry::Any), 1.2..4.0_f64).prop_map(|(mut stage, over)| {
-        for friction in
-            [&mut stage.drive_pulley.friction, &mut stage.cart.friction, &mut stage.idler_pulley.friction]
-        {
+        for friction in [&mut stage.drive_pulley.friction, &mut stage.cart.friction, &mut stage.idler_pulley.friction] {
             friction.forward.breakaway *= over;
             friction.backward.breakaway *= over;
         }
@@ -128,10 +126,12 @@ fn sticky() -> impl Strategy<Value = Stage> {
 fn held() -> impl Strategy<Value = Signal> {
     let value = || (0.5..15.0_f64, any::<bool>()).prop_map(|(v, negative)| if negative { -v } else { v });
     prop_oneof![
-        (value(), 2.0..30.0_f64, 0.2..0.8_f64)
-            .prop_map(|(amplitude, frequency, duty)| Signal::Square { amplitude, frequency, duty }),
-        (value(), 0.01..0.1_f64, 0.0..0.05_f64)
-            .prop_map(|(value, duration, at)| Signal::Pulse { value, duration, at }),
+        (value(), 2.0..30.0_f64, 0.2..0.8_f64).prop_map(|(amplitude, frequency, duty)| Signal::Square {
+            amplitude,
+            frequency,
+            duty
+        }),
+        (value(), 0.01..0.1_f64, 0.0..0.05_f64).prop_map(|(value, duration, at)| Signal::Pulse { value, duration, at }),
     ]
 }
 

@@ -122,8 +122,7 @@ fn the_error_of_the_general_solver_was_stated_for_all() {
             Flow::Continue
         })
         .unwrap();
-        let error =
-            estimate.finish(&stage, &experiment, tolerance, &outcome, &mut || Flow::Continue).unwrap().unwrap();
+        let error = estimate.finish(&stage, &experiment, tolerance, &outcome, &mut || Flow::Continue).unwrap().unwrap();
         let general = complete(&stage, &experiment, solver);
         let true_error = apart(&stage, &exact, &general);
         assert!(true_error <= error.value, "{tolerance:e}: off by {true_error:e} m, said {error:?}");
@@ -245,14 +244,18 @@ fn an_exponential_stribeck_curve_overflowed_past_zero_speed() {
 #[test]
 fn a_run_that_would_not_end_is_told_and_can_be_stopped() {
     let text = taut::case::TEMPLATE;
-    let changes = ["drive_pulley.radius=1e9 mm", "motor.gear_ratio=5", "motor.gear_efficiency=0.9", "motor.rotor_inertia=1e-5"];
+    let changes =
+        ["drive_pulley.radius=1e9 mm", "motor.gear_ratio=5", "motor.gear_efficiency=0.9", "motor.rotor_inertia=1e-5"];
     let case = Case::from_text_with("axis.toml", text, &changes).unwrap();
     let (stage, experiment) = (&case.stage, &case.experiments[0]);
     match simulate(stage, experiment, Solver::Exact) {
         Err(_) => {}
         Ok(solution) => {
             let ending = solution.outcome.ending;
-            assert!(matches!(ending, Ending::Complete | Ending::TooStiff { .. } | Ending::TooManyEvents { .. }), "{ending:?}");
+            assert!(
+                matches!(ending, Ending::Complete | Ending::TooStiff { .. } | Ending::TooManyEvents { .. }),
+                "{ending:?}"
+            );
         }
     }
     // Whoever asks it to stop is heard before the first row is full.

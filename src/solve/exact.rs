@@ -12,11 +12,11 @@ mod change;
 
 use super::coordinates::{Coordinates, stretches};
 use super::law::{Law, Size, Watch, chain, highest, states};
-use super::propagator::SERIES_ORDER;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
+use super::propagator::SERIES_ORDER;
 use super::record::{Recorder, Row};
-use super::rounding::Rounding;
 use super::roots;
+use super::rounding::Rounding;
 use super::{Cost, Detail, Ending, Event, Flow, Grid, Outcome, Source, held};
 use crate::case::Experiment;
 use crate::plant::{Cause, Form, Mode, Plant, State, place};

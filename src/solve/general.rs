@@ -462,11 +462,8 @@ impl SolOut for Observer<'_, '_> {
         self.run.cost.steps += 1;
         if self.run.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS) {
             self.run.recorder.ask();
-            self.run.trouble = self.run.pace.too_stiff(
-                self.run.cost.steps,
-                self.field.stretch.begin + to,
-                self.run.grid.end(),
-            );
+            self.run.trouble =
+                self.run.pace.too_stiff(self.run.cost.steps, self.field.stretch.begin + to, self.run.grid.end());
         }
         let begin = self.run.y;
         let at = |tau: f64| {

@@ -99,12 +99,7 @@ impl<const C: usize> Watch<C> {
 
     /// The first coefficient along a series, from `first` on, that is more than rounding; those before it count as zero,
     /// however many there are. `sizes` are those of [`Law::sizes`].
-    pub(super) fn first_term(
-        &self,
-        coefficients: &[f64],
-        sizes: &[[f64; C]; SERIES_ORDER + 1],
-        first: usize,
-    ) -> usize {
+    pub(super) fn first_term(&self, coefficients: &[f64], sizes: &[[f64; C]; SERIES_ORDER + 1], first: usize) -> usize {
         let counts = |k: &usize| coefficients[*k].abs() > 2.0 * self.noise_of(&sizes[*k]);
         (first..coefficients.len()).find(counts).unwrap_or(coefficients.len())
     }

@@ -185,15 +185,7 @@ impl<'a> Field<'a> {
         let of = |b: Body| plant.ratio(b).powi(2) * equations.inertia[b.index()];
         let mass = Body::ALL.map(|body| plant.followers(plant.leader(body)).map(of).sum());
         let stretch_rates = plant.stretch_rates(&mode);
-        Self {
-            model,
-            mode,
-            equations,
-            stretch_rates,
-            mass,
-            stretch,
-            evaluations: Cell::new(0),
-        }
+        Self { model, mode, equations, stretch_rates, mass, stretch, evaluations: Cell::new(0) }
     }
 
     pub(super) fn evaluations(&self) -> u64 {
