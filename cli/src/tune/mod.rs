@@ -40,7 +40,15 @@ pub fn run(args: &Args) -> Outcome {
     let tuning = tuning(args, &case);
     let target = target(args, &case)?;
     let interrupt = Interrupt::listen();
-    let tuned = tune(&case, &tuning, &|| interrupt.signal().is_some()).map_err(|error| error.in_file(&args.case))?;
+    let tuned = match (tune(&case, &tuning, &|| interrupt.signal().is_some()), interrupt.signal()) {
+        (Ok(tuned), _) => tuned,
+        // What was looked at so far says nothing about the rest.
+        (Err(_), Some(signal)) => {
+            terminal::show_error(&"interrupted before any gains were found; nothing was written");
+            return Ok(Status::Interrupted(signal));
+        }
+        (Err(error), None) => return Err(error.in_file(&args.case).into()),
+    };
     let work = Work { case: &case, tuning: &tuning, tuned: &tuned };
     let text = tuned.case_text(&case, &args.case)?;
     let json = json::text(&work);

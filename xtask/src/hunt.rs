@@ -1,0 +1,117 @@
+//! `cargo xtask hunt`: looks for what is wrong with larger means than the tests have, each part with a seed and a budget.
+
+mod faults;
+mod mutants;
+mod readers;
+mod stages;
+
+/// What is asked for.
+pub struct Hunt {
+    parts: Vec<Part>,
+    /// Random stages.
+    stages: u64,
+    seed: u64,
+    /// For each reader, s.
+    seconds: u64,
+    /// Kills of each command.
+    kills: u64,
+    /// Changes of the source.
+    mutants: usize,
+    /// Only this one of them.
+    only: Option<usize>,
+    /// Whether they are shown, and not run.
+    list: bool,
+}
+
+/// A part of the hunt.
+#[derive(Clone, Copy, PartialEq)]
+enum Part {
+    Stages,
+    Readers,
+    Faults,
+    Mutants,
+}
+
+const PARTS: [(&str, Part); 4] =
+    [("stages", Part::Stages), ("readers", Part::Readers), ("faults", Part::Faults), ("mutants", Part::Mutants)];
+
+pub const USAGE: &str = "cargo xtask hunt [--part stages|readers|faults|mutants]... [--seed S]
+                       [--stages N] [--seconds B] [--kills N] [--mutants N [--list | --only K]]";
+
+impl Hunt {
+    /// From the words behind `hunt`; without `--part` all parts but the mutants, which take hours.
+    pub fn new(words: &[&str]) -> Result<Self, String> {
+        let mut hunt = Self {
+            parts: Vec::new(),
+            stages: 10_000,
+            seed: 1,
+            seconds: 300,
+            kills: 200,
+            mutants: 100,
+            only: None,
+            list: false,
+        };
+        let mut words = words.iter();
+        while let Some(&word) = words.next() {
+            if word == "--list" {
+                hunt.list = true;
+                continue;
+            }
+            let value = *words.next().ok_or_else(|| format!("{word} wants a value"))?;
+            let number = || value.parse::<u64>().map_err(|_| format!("{word} wants a whole number, not {value}"));
+            match word {
+                "--part" => {
+                    let known = PARTS.iter().find(|(name, _)| *name == value);
+                    hunt.parts.push(known.ok_or_else(|| format!("there is no part {value}"))?.1);
+                }
+                "--stages" => hunt.stages = number()?,
+                "--seed" => hunt.seed = number()?,
+                "--seconds" => hunt.seconds = number()?,
+                "--kills" => hunt.kills = number()?,
+                "--mutants" => hunt.mutants = number()? as usize,
+                "--only" => hunt.only = Some(number()? as usize),
+                _ => return Err(format!("{word} is not known")),
+            }
+        }
+        if hunt.parts.is_empty() {
+            hunt.parts = vec![Part::Stages, Part::Readers, Part::Faults];
+        }
+        Ok(hunt)
+    }
+
+    /// Does the parts one after another; all of them, also where one has found something.
+    pub fn run(&self) -> Result<(), String> {
+        let mut found = Vec::new();
+        for part in &self.parts {
+            let done = match part {
+                Part::Stages => stages::run(self.stages, self.seed),
+                Part::Readers => readers::run(self.seconds, self.seed),
+                Part::Faults => faults::run(self.kills, self.seed),
+                Part::Mutants => mutants::run(self.mutants, self.seed, self.only, self.list),
+            };
+            found.extend(done.err());
+        }
+        if found.is_empty() { Ok(()) } else { Err(found.join("\n")) }
+    }
+}
+
+/// Runs a cargo command to its end.
+fn succeeds(command: &mut std::process::Command) -> Result<(), String> {
+    let status = command.status().map_err(|error| format!("cargo cannot be started: {error}"))?;
+    if status.success() { Ok(()) } else { Err(format!("failed: {command:?}")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_read_and_mistakes_told() {
+        let hunt = Hunt::new(&["--part", "faults", "--seed", "7", "--part", "readers"]).unwrap();
+        assert!(hunt.parts == [Part::Faults, Part::Readers] && hunt.seed == 7);
+        assert_eq!(Hunt::new(&["--part", "others"]).err().unwrap(), "there is no part others");
+        assert_eq!(Hunt::new(&["--stages", "many"]).err().unwrap(), "--stages wants a whole number, not many");
+        assert_eq!(Hunt::new(&["--seed"]).err().unwrap(), "--seed wants a value");
+        assert_eq!(Hunt::new(&["--fast", "1"]).err().unwrap(), "--fast is not known");
+    }
+}
