@@ -147,6 +147,17 @@ fn clocks() {
     says(&few, "few-samples", "30 samples");
 }
 
+/// A last time of 1e308, such as a damaged file has, made the number of samples that are missing overflow.
+#[test]
+fn a_time_beyond_all_others_is_a_gap() {
+    let (_, mut log) = clean();
+    let last = log.time.len() - 1;
+    log.time[last] = 1e308;
+    says(&log, "gaps", "one gap of 1e308 s after 1.999 s");
+    log.time[last - 1] = 1e300;
+    says(&log, "gaps", "2 gaps");
+}
+
 #[test]
 fn faults_of_single_columns() {
     let (_, log) = clean();

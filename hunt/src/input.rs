@@ -110,7 +110,7 @@ fn pieces(signal: &Signal, until: f64, taken: Taken) -> Result<Vec<Piece>, Strin
         }
         Signal::Sequence(slots) => {
             let (mut start, mut chains) = (zero, Vec::new());
-            for slot in slots {
+            for slot in slots.slots() {
                 let end = if slot.lasts.is_finite() { start + taken(slot.lasts) } else { Double::from(f64::INFINITY) };
                 let own = chain(&slot.signal, f64::min(slot.lasts, until), taken)?;
                 let shifted = own.into_iter().map(|piece| Piece { start: piece.start + start, ..piece });

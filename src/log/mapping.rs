@@ -156,6 +156,12 @@ impl Mapping {
         }
     }
 
+    /// Whether the numbers in the first column have to increase from the first row to the last.
+    fn is_ordered(&self) -> bool {
+        let increases = matches!(&self.time, Clock::Column(time) if time.scale > 0.0);
+        increases && self.filter.is_none() && self.split.is_none()
+    }
+
     /// Reads the runs; the text tells a run of a split file from the others.
     pub fn read(&self) -> Result<Vec<(Option<String>, Log)>> {
         let mut sources: Vec<(Role, &Source)> = Vec::new();
@@ -170,6 +176,7 @@ impl Mapping {
         let request = Request {
             columns: &ids,
             complete,
+            ordered: self.is_ordered(),
             units_row: true,
             dialect: self.dialect,
             filter: self.filter.as_ref(),
@@ -275,6 +282,7 @@ impl Columns<'_> {
         let window = self.window(&time, zero, &rows, run)?;
         let start = mapping.from.map_or(first, |from| zero + from);
         let within = rows.start + window.start..rows.start + window.end;
+        let time_from_start = self.from_start(&time[window.clone()], start, within.start)?;
         let mut outputs = Vec::new();
         for (i, role) in self.roles.iter().enumerate() {
             let Role::Output(quantity) = *role else { continue };
@@ -291,7 +299,7 @@ impl Columns<'_> {
         let mut log = Log {
             name: String::new(),
             file: mapping.file.clone(),
-            time: time[window.clone()].iter().map(|t| t - start).collect(),
+            time: time_from_start,
             input: vec![0.0; within.len()],
             hold: mapping.hold,
             reference: None,
@@ -349,6 +357,22 @@ impl Columns<'_> {
             return Err(self.sheet.error(0, row, what).allowed("times that increase from row to row").next(next));
         }
         Ok(time[rows].to_vec())
+    }
+
+    /// These times, the first of them in row `first`, from `start` (s) on. A time so far off that no difference is left is told.
+    fn from_start(&self, time: &[f64], start: f64, first: usize) -> Result<Vec<f64>> {
+        let shifted: Vec<f64> = time.iter().map(|t| t - start).collect();
+        let lost = (1..shifted.len()).find(|&k| !(shifted[k].is_finite() && shifted[k] > shifted[k - 1]));
+        let Some(k) = lost else { return Ok(shifted) };
+        let (here, there) = (self.sheet.row(first + k), self.sheet.row(first + k - 1));
+        let what = format!(
+            "counted from the log's beginning at {}, the times {} in {there} and {} in {here} are no longer apart",
+            show(start, "s"),
+            show(time[k - 1], "s"),
+            show(time[k], "s")
+        );
+        let error = self.sheet.error(0, first + k, what);
+        Err(error.allowed("a first time within 1e15 intervals of the others").next("leave out the row that is far off"))
     }
 
     /// What to do about a clock that goes back in this row.

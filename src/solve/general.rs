@@ -66,6 +66,7 @@ pub(super) fn run(
     }
     let start = experiment.initial.state(plant);
     let (coordinates, inner) = Coordinates::new(plant, &start);
+    let plant = &*plant.seen_from(coordinates.origin());
     let model = Model::new(plant, coordinates.origin());
     let mode = plant.first_mode(&start);
     Ok(Run::new(&model, (coordinates, inner, mode), experiment, tolerance, FIRST / fastest, detail, sink)

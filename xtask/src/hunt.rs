@@ -1,65 +1,141 @@
-//! `cargo xtask hunt`: hunts for wrong answers, part by part; each part is a command of the crate `taut-hunt`.
+//! `cargo xtask hunt`: looks for what is wrong with larger means than the tests have, each part with a seed and a budget.
 
-/// The parts: a name, and what to give to cargo.
-const PARTS: [(&str, &[&str]); 1] = [("stages", &["run", "--release", "--package", "taut-hunt", "--", "stages"])];
+mod faults;
+mod mutants;
+mod readers;
+mod stages;
 
-/// Runs the parts that the words name, all of them where they name none, each with the other words. False where one of them has found
-/// something.
-pub fn hunt(words: &[String]) -> Result<bool, String> {
-    let (parts, rest) = split(words)?;
-    let mut clean = true;
-    for (name, command) in parts {
-        eprintln!("== hunt: {name}");
-        let status = crate::cargo(command).args(&rest).status();
-        clean &= status.map_err(|e| format!("cargo cannot be started: {e}"))?.success();
-    }
-    Ok(clean)
+/// What is asked for.
+pub struct Hunt {
+    parts: Vec<Part>,
+    /// Random stages.
+    stages: u64,
+    seed: u64,
+    /// For each reader, s.
+    seconds: u64,
+    /// Kills of each command.
+    kills: u64,
+    /// Changes of the source.
+    mutants: usize,
+    /// Only this one of them.
+    only: Option<usize>,
+    /// Whether they are shown, and not run.
+    list: bool,
+    /// Threads of the stages, all processors unless said.
+    threads: Option<u64>,
+    /// Whether the stages are told as JSON.
+    json: bool,
 }
 
-/// A part and its command.
-type Part = (&'static str, &'static [&'static str]);
+/// A part of the hunt.
+#[derive(Clone, Copy, PartialEq)]
+enum Part {
+    Stages,
+    Readers,
+    Faults,
+    Mutants,
+}
 
-/// The parts asked for, and the words that are not about them.
-fn split(words: &[String]) -> Result<(Vec<Part>, Vec<String>), String> {
-    let (mut parts, mut rest) = (Vec::new(), Vec::new());
-    let mut words = words.iter();
-    while let Some(word) = words.next() {
-        if word != "--part" {
-            rest.push(word.clone());
-            continue;
-        }
-        let name = words.next().map_or("", String::as_str);
-        let Some(part) = PARTS.into_iter().find(|(known, _)| *known == name) else {
-            let known = PARTS.map(|(known, _)| known).join(", ");
-            return Err(format!("--part {name}: there is no such part of the hunt; there is {known}"));
+const PARTS: [(&str, Part); 4] =
+    [("stages", Part::Stages), ("readers", Part::Readers), ("faults", Part::Faults), ("mutants", Part::Mutants)];
+
+pub const USAGE: &str = "cargo xtask hunt [--part stages|readers|faults|mutants]... [--seed S]
+                       [--stages N [--threads N] [--json]] [--seconds B] [--kills N] [--mutants N [--list | --only K]]";
+
+impl Hunt {
+    /// From the words behind `hunt`. The size of a part names it, too; without any all parts but the mutants, which take hours.
+    pub fn new(words: &[&str]) -> Result<Self, String> {
+        let mut hunt = Self {
+            parts: Vec::new(),
+            stages: 10_000,
+            seed: 1,
+            seconds: 300,
+            kills: 200,
+            mutants: 100,
+            only: None,
+            list: false,
+            threads: None,
+            json: false,
         };
-        parts.push(part);
+        let mut sized = Vec::new();
+        let mut words = words.iter();
+        while let Some(&word) = words.next() {
+            match word {
+                "--list" => hunt.list = true,
+                "--json" => hunt.json = true,
+                _ => {}
+            }
+            if ["--list", "--json"].contains(&word) {
+                continue;
+            }
+            let value = *words.next().ok_or_else(|| format!("{word} wants a value"))?;
+            let number = || value.parse::<u64>().map_err(|_| format!("{word} wants a whole number, not {value}"));
+            match word {
+                "--part" => {
+                    let known = PARTS.iter().find(|(name, _)| *name == value);
+                    hunt.parts.push(known.ok_or_else(|| format!("there is no part {value}"))?.1);
+                }
+                "--stages" => hunt.stages = number()?,
+                "--seed" => hunt.seed = number()?,
+                "--seconds" => hunt.seconds = number()?,
+                "--kills" => hunt.kills = number()?,
+                "--mutants" => hunt.mutants = number()? as usize,
+                "--only" => hunt.only = Some(number()? as usize),
+                "--threads" => hunt.threads = Some(number()?),
+                _ => return Err(format!("{word} is not known")),
+            }
+            match word {
+                "--stages" => sized.push(Part::Stages),
+                "--seconds" => sized.push(Part::Readers),
+                "--kills" => sized.push(Part::Faults),
+                "--mutants" | "--only" => sized.push(Part::Mutants),
+                _ => {}
+            }
+        }
+        if hunt.parts.is_empty() {
+            hunt.parts = sized;
+        }
+        if hunt.parts.is_empty() {
+            hunt.parts = vec![Part::Stages, Part::Readers, Part::Faults];
+        }
+        Ok(hunt)
     }
-    if parts.is_empty() {
-        parts.extend(PARTS);
+
+    /// Does the parts one after another; all of them, also where one has found something.
+    pub fn run(&self) -> Result<(), String> {
+        let mut found = Vec::new();
+        for part in &self.parts {
+            let done = match part {
+                Part::Stages => stages::run(self.stages, self.seed, self.threads, self.json),
+                Part::Readers => readers::run(self.seconds, self.seed),
+                Part::Faults => faults::run(self.kills, self.seed),
+                Part::Mutants => mutants::run(self.mutants, self.seed, self.only, self.list),
+            };
+            found.extend(done.err());
+        }
+        if found.is_empty() { Ok(()) } else { Err(found.join("\n")) }
     }
-    Ok((parts, rest))
+}
+
+/// Runs a cargo command to its end.
+fn succeeds(command: &mut std::process::Command) -> Result<(), String> {
+    let status = command.status().map_err(|error| format!("cargo cannot be started: {error}"))?;
+    if status.success() { Ok(()) } else { Err(format!("failed: {command:?}")) }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn words(text: &str) -> Vec<String> {
-        text.split_whitespace().map(str::to_string).collect()
-    }
-
     #[test]
-    fn parts_are_named_and_the_rest_is_passed_on() {
-        let (parts, rest) = split(&words("--stages 50 --part stages --seed 3")).unwrap();
-        assert_eq!(parts.iter().map(|(name, _)| *name).collect::<Vec<_>>(), ["stages"]);
-        assert_eq!(rest, words("--stages 50 --seed 3"));
-        assert_eq!(split(&words("--seed 3")).unwrap().0.len(), PARTS.len());
-    }
-
-    #[test]
-    fn a_part_that_is_not_there_is_told() {
-        let told = split(&words("--part stagse")).unwrap_err();
-        assert_eq!(told, "--part stagse: there is no such part of the hunt; there is stages");
+    fn words_are_read_and_mistakes_told() {
+        let hunt = Hunt::new(&["--part", "faults", "--seed", "7", "--part", "readers"]).unwrap();
+        assert!(hunt.parts == [Part::Faults, Part::Readers] && hunt.seed == 7);
+        assert!(Hunt::new(&["--stages", "5", "--seed", "3"]).unwrap().parts == [Part::Stages]);
+        assert_eq!(Hunt::new(&[]).unwrap().parts.len(), 3);
+        assert_eq!(Hunt::new(&["--part", "others"]).err().unwrap(), "there is no part others");
+        assert_eq!(Hunt::new(&["--stages", "many"]).err().unwrap(), "--stages wants a whole number, not many");
+        assert_eq!(Hunt::new(&["--seed"]).err().unwrap(), "--seed wants a value");
+        assert_eq!(Hunt::new(&["--fast", "1"]).err().unwrap(), "--fast is not known");
     }
 }

@@ -1,5 +1,5 @@
 //! The project's own chores: `cargo xtask test` checks all that can be checked, `cargo xtask python` the Python package alone,
-//! `cargo xtask hunt` looks for wrong answers.
+//! `cargo xtask hunt` looks for what is wrong with larger means.
 
 mod hunt;
 mod python;
@@ -48,28 +48,22 @@ const fn step(what: &'static str, command: &'static [&'static str]) -> Step {
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
-    let steps = match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        ["test"] => &STEPS[..],
-        ["python"] => &[PYTHON],
-        ["hunt", ..] => {
-            return match hunt::hunt(&words[1..]) {
-                Ok(true) => ExitCode::SUCCESS,
-                Ok(false) => ExitCode::FAILURE,
-                Err(told) => {
-                    eprintln!("xtask: {told}");
-                    ExitCode::from(2)
-                }
-            };
-        }
+    let done = match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["test"] => test(&STEPS),
+        ["python"] => test(&[PYTHON]),
+        ["hunt", ref words @ ..] => match hunt::Hunt::new(words) {
+            Ok(hunt) => hunt.run(),
+            Err(told) => {
+                eprintln!("xtask: {told}\nusage: {}", hunt::USAGE);
+                return ExitCode::from(2);
+            }
+        },
         _ => {
-            eprintln!(
-                "usage: cargo xtask test | cargo xtask python\n       \
-                 cargo xtask hunt [--part stages]... [--stages N] [--seed S] [--threads N] [--json]"
-            );
+            eprintln!("usage: cargo xtask test | cargo xtask python | {}", hunt::USAGE);
             return ExitCode::from(2);
         }
     };
-    match test(steps) {
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(told) => {
             eprintln!("\nxtask: {told}");

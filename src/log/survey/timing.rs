@@ -100,8 +100,8 @@ impl Timing {
             notes.push(Note::new("jitter", severity, text));
         }
         if let Some(longest) = self.gaps.iter().max_by(|a, b| a.length.total_cmp(&b.length)) {
-            let missing: usize = self.gaps.iter().map(|gap| gap.missing).sum();
-            let share = missing as f64 / (missing + self.samples) as f64;
+            let missing = self.gaps.iter().fold(0_usize, |sum, gap| sum.saturating_add(gap.missing));
+            let share = missing as f64 / (missing as f64 + self.samples as f64);
             let (at, length) = (shown(longest.at, "s"), shown(longest.length, "s"));
             let text = match self.gaps.len() {
                 1 => format!("one gap of {length} after {at}, where {missing} samples are missing"),

@@ -1,0 +1,256 @@
+//! Small changes of a source file: what a slip of the hand could make of it.
+
+use std::fmt;
+use std::ops::Range;
+use std::path::Path;
+use syn::spanned::Spanned;
+use syn::visit::{self, Visit};
+use syn::{BinOp, Expr, Lit, Stmt, UnOp};
+
+/// A change of an expression or a statement.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Change {
+    /// The file, from the repository on.
+    pub file: String,
+    line: usize,
+    /// The function it is in.
+    within: String,
+    /// What is changed, in bytes.
+    pub place: Range<usize>,
+    was: String,
+    will: String,
+    kind: Kind,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kind {
+    /// An expression becomes another.
+    Expression,
+    /// A statement is left out.
+    Statement,
+    /// The body of a function begins with a return.
+    Return,
+}
+
+impl Change {
+    /// The changed text, with the original one where number `k` is not turned on.
+    pub fn switched(&self, k: usize) -> String {
+        let (was, will) = (&self.was, &self.will);
+        match self.kind {
+            Kind::Expression => format!("(if crate::mutant::on({k}) {{ {will} }} else {{ {was} }})"),
+            Kind::Statement => format!("if !crate::mutant::on({k}) {{ {was} }}"),
+            Kind::Return => format!("{{ if crate::mutant::on({k}) {{ return {will}; }} {was} }}"),
+        }
+    }
+}
+
+impl fmt::Display for Change {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let short = |text: &str| {
+            let one = text.split_whitespace().collect::<Vec<_>>().join(" ");
+            if one.chars().count() > 70 { one.chars().take(67).chain("...".chars()).collect() } else { one }
+        };
+        write!(f, "{}:{} {}: ", self.file, self.line, self.within)?;
+        match self.kind {
+            Kind::Expression => write!(f, "`{}` becomes `{}`", short(&self.was), short(&self.will)),
+            Kind::Statement => write!(f, "`{}` is left out", short(&self.was)),
+            Kind::Return => write!(f, "returns `{}` at once", self.will),
+        }
+    }
+}
+
+/// All changes of the files in a folder, and of the file beside it that is its module.
+pub fn all(folder: &str, changes: &mut Vec<Change>) -> Result<(), String> {
+    let mut files = Vec::new();
+    let module = format!("{folder}.rs");
+    if Path::new(&module).is_file() {
+        files.push(module);
+    }
+    gather(folder, &mut files)?;
+    files.sort();
+    for file in files {
+        let text = std::fs::read_to_string(&file).map_err(|error| format!("{file}: {error}"))?;
+        let parsed = syn::parse_file(&text).map_err(|error| format!("{file}: {error}"))?;
+        let mut finder = Finder { file: &file, text: &text, within: Vec::new(), changes };
+        finder.visit_file(&parsed);
+    }
+    Ok(())
+}
+
+fn gather(folder: &str, files: &mut Vec<String>) -> Result<(), String> {
+    for entry in std::fs::read_dir(folder).map_err(|error| format!("{folder}: {error}"))?.flatten() {
+        let path = format!("{folder}/{}", entry.file_name().to_string_lossy());
+        if entry.path().is_dir() {
+            gather(&path, files)?;
+        } else if path.ends_with(".rs") && !path.ends_with("/tests.rs") {
+            files.push(path);
+        }
+    }
+    Ok(())
+}
+
+/// Another order, by a generator of Knuth's (MMIX).
+pub fn shuffle(changes: &mut [Change], seed: u64) {
+    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    for k in (1..changes.len()).rev() {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        changes.swap(k, ((state >> 33) % (k as u64 + 1)) as usize);
+    }
+}
+
+struct Finder<'a> {
+    file: &'a str,
+    text: &'a str,
+    within: Vec<String>,
+    changes: &'a mut Vec<Change>,
+}
+
+impl Finder<'_> {
+    fn add(&mut self, spanned: &impl Spanned, will: impl Into<String>, kind: Kind) {
+        let place = spanned.span().byte_range();
+        let line = spanned.span().start().line;
+        let was = self.text[place.clone()].to_string();
+        let within = self.within.last().cloned().unwrap_or_default();
+        self.changes.push(Change { file: self.file.into(), line, within, place, was, will: will.into(), kind });
+    }
+
+    fn text_of(&self, spanned: &impl Spanned) -> String {
+        self.text[spanned.span().byte_range()].to_string()
+    }
+
+    fn function(&mut self, name: &str, output: &syn::ReturnType, block: &syn::Block) {
+        self.within.push(name.to_string());
+        if let syn::ReturnType::Type(_, kind) = output {
+            for value in defaults(&self.text_of(kind)) {
+                self.add(block, *value, Kind::Return);
+            }
+        }
+        self.visit_block(block);
+        self.within.pop();
+    }
+
+    /// What the condition of an `if` or a `while` may be instead.
+    fn condition(&mut self, condition: &Expr) {
+        let text = self.text_of(condition);
+        let has_pattern = text.split(|c: char| !c.is_alphanumeric()).any(|word| word == "let");
+        if !has_pattern {
+            self.add(condition, format!("!({text})"), Kind::Expression);
+        }
+    }
+}
+
+/// Values that a function of this type may return at once.
+fn defaults(kind: &str) -> &'static [&'static str] {
+    match kind {
+        "bool" => &["true", "false"],
+        "f64" => &["0.0", "1.0"],
+        "usize" | "u64" => &["0", "1"],
+        kind if kind.starts_with("Option<") => &["None"],
+        kind if kind.starts_with("Vec<") => &["Vec::new()"],
+        "Result<()>" => &["Ok(())"],
+        _ => &[],
+    }
+}
+
+/// What a binary operator may be instead.
+fn others(operator: &BinOp) -> &'static [&'static str] {
+    match operator {
+        BinOp::Lt(_) => &["<=", ">"],
+        BinOp::Le(_) => &["<", ">"],
+        BinOp::Gt(_) => &[">=", "<"],
+        BinOp::Ge(_) => &[">", "<"],
+        BinOp::Eq(_) => &["!="],
+        BinOp::Ne(_) => &["=="],
+        BinOp::And(_) => &["||"],
+        BinOp::Or(_) => &["&&"],
+        BinOp::Add(_) => &["-"],
+        BinOp::Sub(_) => &["+"],
+        BinOp::Mul(_) => &["/"],
+        BinOp::Div(_) => &["*"],
+        BinOp::AddAssign(_) => &["-="],
+        BinOp::SubAssign(_) => &["+="],
+        BinOp::MulAssign(_) => &["/="],
+        _ => &[],
+    }
+}
+
+fn is_test(attributes: &[syn::Attribute]) -> bool {
+    attributes.iter().any(|attribute| attribute.path().is_ident("test") || attribute.path().is_ident("cfg"))
+}
+
+impl<'a> Visit<'a> for Finder<'_> {
+    fn visit_item_mod(&mut self, item: &'a syn::ItemMod) {
+        if !is_test(&item.attrs) {
+            visit::visit_item_mod(self, item);
+        }
+    }
+
+    // What is computed when the program is built cannot be switched.
+    fn visit_item_const(&mut self, _: &'a syn::ItemConst) {}
+    fn visit_item_static(&mut self, _: &'a syn::ItemStatic) {}
+    fn visit_impl_item_const(&mut self, _: &'a syn::ImplItemConst) {}
+    fn visit_type(&mut self, _: &'a syn::Type) {}
+    fn visit_pat(&mut self, _: &'a syn::Pat) {}
+    fn visit_attribute(&mut self, _: &'a syn::Attribute) {}
+    fn visit_generic_argument(&mut self, _: &'a syn::GenericArgument) {}
+
+    fn visit_expr_repeat(&mut self, expression: &'a syn::ExprRepeat) {
+        self.visit_expr(&expression.expr);
+    }
+
+    fn visit_item_fn(&mut self, item: &'a syn::ItemFn) {
+        if item.sig.constness.is_none() && !is_test(&item.attrs) {
+            self.function(&item.sig.ident.to_string(), &item.sig.output, &item.block);
+        }
+    }
+
+    fn visit_impl_item_fn(&mut self, item: &'a syn::ImplItemFn) {
+        if item.sig.constness.is_none() {
+            self.function(&item.sig.ident.to_string(), &item.sig.output, &item.block);
+        }
+    }
+
+    fn visit_stmt(&mut self, statement: &'a Stmt) {
+        if let Stmt::Expr(Expr::MethodCall(_) | Expr::Assign(_) | Expr::Call(_) | Expr::Binary(_), Some(_)) = statement
+        {
+            self.add(statement, "", Kind::Statement);
+        }
+        visit::visit_stmt(self, statement);
+    }
+
+    fn visit_expr_if(&mut self, expression: &'a syn::ExprIf) {
+        self.condition(&expression.cond);
+        visit::visit_expr_if(self, expression);
+    }
+
+    fn visit_expr_binary(&mut self, expression: &'a syn::ExprBinary) {
+        let (left, right) = (self.text_of(&expression.left), self.text_of(&expression.right));
+        let has_pattern = matches!(*expression.left, Expr::Let(_)) || matches!(*expression.right, Expr::Let(_));
+        if !has_pattern {
+            for other in others(&expression.op) {
+                self.add(expression, format!("{left} {other} {right}"), Kind::Expression);
+            }
+        }
+        visit::visit_expr_binary(self, expression);
+    }
+
+    fn visit_expr_unary(&mut self, expression: &'a syn::ExprUnary) {
+        if matches!(expression.op, UnOp::Neg(_) | UnOp::Not(_)) {
+            self.add(expression, self.text_of(&expression.expr), Kind::Expression);
+        }
+        visit::visit_expr_unary(self, expression);
+    }
+
+    fn visit_expr_lit(&mut self, expression: &'a syn::ExprLit) {
+        let text = self.text_of(expression);
+        match &expression.lit {
+            Lit::Float(value) => {
+                let zero = value.base10_parse::<f64>().is_ok_and(|value| value == 0.0);
+                self.add(expression, if zero { "1.0".into() } else { format!("2.0 * {text}") }, Kind::Expression);
+            }
+            Lit::Int(_) => self.add(expression, format!("{text} + 1"), Kind::Expression),
+            Lit::Bool(value) => self.add(expression, (!value.value).to_string(), Kind::Expression),
+            _ => {}
+        }
+    }
+}
