@@ -29,7 +29,7 @@ const PERTURBATION_OF_SINES: f64 = 1e-14;
 const PERTURBED: u64 = 8;
 
 /// So many times what perturbed runs differ by still counts as comparable: a run rounds more often than once.
-const COMPARABLE: f64 = 30.0;
+const COMPARABLE: f64 = 5.0;
 
 /// How far a body may go while the solvers disagree about what it does, as a share of what positions may differ by and of the body's
 /// way in the run; and how long a stuck body may be told to slide, as a share of the run.
