@@ -1,4 +1,4 @@
-//! Random numbers from a generator, and shares of distributions and of samples.
+//! Random numbers from a generator, hashes, and shares of distributions and of samples.
 
 use libm::{log, sqrt};
 use rand_pcg::Pcg64;
@@ -19,6 +19,13 @@ pub fn normal(random: &mut Pcg64) -> f64 {
         }
     }
 }
+
+/// FNV-1a of 64 bits: a number that stands for these bytes, the same on every machine.
+pub fn hash(bytes: impl IntoIterator<Item = u8>) -> u64 {
+    bytes.into_iter().fold(FNV_BEGIN, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
+}
+
+const FNV_BEGIN: u64 = 0xcbf2_9ce4_8422_2325;
 
 /// The quantile of sorted values, between two of them by a straight line (Hyndman & Fan 1996, their definition 7).
 pub fn quantile(sorted: &[f64], share: f64) -> f64 {

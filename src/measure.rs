@@ -288,9 +288,7 @@ fn convert(value: f64, channel: &Channel) -> f64 {
 
 /// The random numbers of one device in one run: others do not change when a device or an experiment is added.
 fn random(seed: u64, experiment: &str, device: &str) -> Pcg64 {
-    // FNV-1a, 64 bits; the generator spreads it over its own seed.
+    // The generator spreads it over its own seed.
     let bytes = seed.to_le_bytes().into_iter().chain(experiment.bytes()).chain([0]).chain(device.bytes());
-    let hash = bytes
-        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
-    Pcg64::seed_from_u64(hash)
+    Pcg64::seed_from_u64(crate::chance::hash(bytes))
 }

@@ -90,12 +90,20 @@ impl Range {
         low && high && (!self.whole || value.fract() == 0.0)
     }
 
+    /// Whether it goes as far as a seed may.
+    fn is_seed(&self) -> bool {
+        self.whole && self.high == i64::MAX as f64
+    }
+
     /// In words, with the unit: `from 0 to 1`, `above zero: from 1e-15 kg to 1e15 kg`.
     pub fn describe(&self, unit: &str) -> String {
         let with_unit = |v: f64| match unit {
             "" => rounded(v),
             _ => format!("{} {unit}", rounded(v)),
         };
+        if self.is_seed() {
+            return format!("a whole number from 0 to {}", i64::MAX);
+        }
         let (low, high) = (with_unit(self.low), with_unit(self.high));
         let whole = if self.whole { "a whole number " } else { "" };
         match (self.above, self.below) {
@@ -112,6 +120,7 @@ impl Range {
         let text = match (self.low, self.high) {
             (low, high) if low <= -FAR && high >= FAR => "any".to_string(),
             (low, high) if high >= FAR && low > 0.0 && low < 1e-9 => "> 0".to_string(),
+            (low, _) if self.is_seed() => format!("{} … {}", shortest(low), i64::MAX),
             (low, high) if high >= FAR => format!("≥ {}", shortest(low)),
             (low, high) => format!(
                 "{}{} … {}{}",
@@ -146,8 +155,8 @@ const NOT_NEGATIVE: Range = Range::NOT_NEGATIVE;
 const TIME: Range = Range::new(0.0, 1e9);
 const DURATION: Range = Range::new(1e-12, 1e9);
 const FREQUENCY: Range = Range::new(1e-9, 1e9);
-/// Whole numbers that a double holds.
-const SEED: Range = Range::whole(0.0, 9_007_199_254_740_991.0);
+/// Whole numbers that TOML has, 0 to 2⁶³ − 1: read by their digits, as a double does not hold all of them.
+const SEED: Range = Range { below: true, ..Range::whole(0.0, i64::MAX as f64) };
 const UP_TO_ONE: Range = Range { above: true, ..Range::new(0.0, 1.0) };
 
 /// Friction of one body: the rows with that body's key, symbols, units and examples.

@@ -14,7 +14,8 @@ pub use mode::{Cause, Contact, Guard, Limit, Mode, Part, Status, Switch};
 pub use power::Power;
 
 use crate::friction::{Friction, Motion, Side};
-use crate::stage::{AmplifierMode, BeltModel, Stage};
+use crate::stage::{AmplifierMode, BeltModel, Stage, Travel};
+use std::borrow::Cow;
 
 /// Places in the state vector: φ₁, φ₁′, x, x′, φ₃, φ₃′ (eq. 6, in the paper's order), then the armature current.
 pub mod place {
@@ -148,6 +149,19 @@ impl Plant {
     /// The stage.
     pub fn stage(&self) -> &Stage {
         &self.stage
+    }
+
+    /// The same with the cart's position counted from `origin`: the ends of its travel move there, before anything is multiplied
+    /// with them.
+    pub(crate) fn seen_from(&self, origin: f64) -> Cow<'_, Self> {
+        match self.stage.travel {
+            Some(travel) if origin != 0.0 => {
+                let mut plant = self.clone();
+                plant.stage.travel = Some(Travel { min: travel.min - origin, max: travel.max - origin, ..travel });
+                Cow::Owned(plant)
+            }
+            _ => Cow::Borrowed(self),
+        }
     }
 
     /// ḋ₁ = r φ̇₁ − ẋ, ḋ₂ = ẋ − r φ̇₃ and θ̇ = φ̇_r − φ̇₁, without the speeds of what is stuck; nothing where one body carries both ends.

@@ -31,6 +31,28 @@ impl Default for Effort {
     }
 }
 
+/// Most chains: each is a thread.
+const MOST_CHAINS: usize = 100;
+
+/// Most draws of all chains together: they stay in memory.
+const MOST_DRAWS: usize = 10_000_000;
+
+impl Effort {
+    /// Refuses what no sampler can do.
+    pub fn check(&self) -> Result<()> {
+        let &Self { chains, tune, draws, .. } = self;
+        if !(1..=MOST_CHAINS).contains(&chains) {
+            return Err(Error::new(format!("{chains} chains cannot be")).allowed(format!("from 1 to {MOST_CHAINS}")));
+        }
+        let most = MOST_DRAWS / chains;
+        if !(1..=most).contains(&draws) || tune > most {
+            let chains = if chains == 1 { "one chain".into() } else { format!("each of {chains} chains") };
+            return Err(Error::new(format!("{draws} draws of {chains} cannot be")).allowed(format!("from 1 to {most}")));
+        }
+        Ok(())
+    }
+}
+
 /// What was drawn.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draws {
@@ -113,6 +135,7 @@ impl CpuLogpFunc for Density<'_> {
 /// Draws from `log`, each chain beginning at one of `starts` in turn; each on a thread of its own. `watch` sees how far it is, and
 /// may end it early: then each chain keeps as many draws as the shortest has.
 pub fn sample(log: &LogDensity, starts: &[Vec<f64>], effort: Effort, watch: &Watch) -> Result<Draws> {
+    effort.check()?;
     let dimension = starts.first().map_or(0, Vec::len);
     if dimension == 0 || starts.iter().any(|start| start.len() != dimension) {
         return Err(Error::new("a sampler needs points of one or more dimensions to start from"));
@@ -367,6 +390,21 @@ mod tests {
         let (white, red) = (of(&white).effective(0), of(&red).effective(0));
         assert!((3200.0..5200.0).contains(&white), "{white}");
         assert!((red / 4000.0 - (1.0 - phi) / (1.0 + phi)).abs() < 0.05, "{red}");
+    }
+
+    /// A chain is a thread and a draw is memory: a million chains ended the process.
+    #[test]
+    fn an_effort_that_cannot_be_is_refused() {
+        let told = |chains, draws| Effort { chains, draws, ..Effort::default() }.check().map_err(|e| e.to_string());
+        assert_eq!(told(4, 500), Ok(()));
+        assert_eq!(told(100, 100_000), Ok(()));
+        assert_eq!(told(0, 500), Err("0 chains cannot be\n  allowed: from 1 to 100".into()));
+        assert_eq!(told(1_000_000, 500), Err("1000000 chains cannot be\n  allowed: from 1 to 100".into()));
+        assert_eq!(told(4, 0), Err("0 draws of each of 4 chains cannot be\n  allowed: from 1 to 2500000".into()));
+        assert_eq!(
+            told(1, usize::MAX),
+            Err(format!("{} draws of one chain cannot be\n  allowed: from 1 to 10000000", usize::MAX))
+        );
     }
 
     #[test]

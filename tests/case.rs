@@ -200,6 +200,18 @@ fn every_kind_of_input() {
         Signal::Chirp { amplitude: 2.0, from: 1.0, to: 300.0, over: 10.0 }
     );
     assert_eq!(input("{ prbs = 3, bit = '20 ms', seed = 7 }"), Signal::Prbs { amplitude: 3.0, bit: 0.02, seed: 7 });
+    // Above 2⁵³ they were refused; as doubles the first two would be one.
+    for seed in ["9007199254740992", "9007199254740993", "9223372036854775807"] {
+        let whole = seed.parse().unwrap();
+        for text in [seed.to_string(), format!("'{seed}'")] {
+            let signal = input(&format!("{{ prbs = 3, bit = '20 ms', seed = {text} }}"));
+            assert_eq!(signal, Signal::Prbs { amplitude: 3.0, bit: 0.02, seed: whole });
+        }
+    }
+    assert_eq!(
+        input("{ prbs = 3, bit = 1, seed = 1e9 }"),
+        Signal::Prbs { amplitude: 3.0, bit: 1.0, seed: 1_000_000_000 }
+    );
     assert_eq!(
         input("{ table = [[0, 0], ['100 ms', '5 V']] }"),
         Signal::Table { points: vec![[0.0, 0.0], [0.1, 5.0]] }
@@ -213,11 +225,11 @@ fn every_kind_of_input() {
     let slot = |signal: &Signal, lasts| Slot { signal: signal.clone(), lasts };
     assert_eq!(
         input("{ sequence = [{ pulse = 5, for = 0.25, at = 0.5 }, { step = 1, lasts = '1 s' }, { step = 1 }] }"),
-        Signal::Sequence(vec![slot(&pulse, 0.75), slot(&step, 1.0), slot(&step, f64::INFINITY)])
+        Signal::sequence(vec![slot(&pulse, 0.75), slot(&step, 1.0), slot(&step, f64::INFINITY)])
     );
     let ended = input("{ sequence = [{ step = 1, lasts = 1 }] }");
     let zero = Signal::Step { value: 0.0, at: 0.0 };
-    assert_eq!(ended, Signal::Sequence(vec![slot(&step, 1.0), slot(&zero, f64::INFINITY)]));
+    assert_eq!(ended, Signal::sequence(vec![slot(&step, 1.0), slot(&zero, f64::INFINITY)]));
 }
 
 #[test]

@@ -396,3 +396,99 @@ fn the_compensated_reference_balances_the_belt() {
     let drive = r * needed.force[0] - r * f1 + r * f3 - 0.0016 * needed.drive.speed / r - 0.015;
     assert!((6.3e-5 * needed.drive.acceleration / r - drive).abs() < 1e-10);
 }
+
+/// A controller whose limit was NaN or negative was clamped with it, which panics; and a delay of 1e9 samples asked for as much memory.
+#[test]
+fn a_timing_that_is_none_is_refused() {
+    struct Idle;
+    impl taut::control::Controller for Idle {
+        fn step(&mut self, _: &taut::control::Seen) -> f64 {
+            1.0
+        }
+        fn reset(&mut self) {}
+    }
+    let (stage, limits) = (rig(), Limits { speed: 0.3, acceleration: 5.0, jerk: None, snap: None });
+    let profile = Profile::new(0.0, &[Leg::To(0.01, limits)]).unwrap();
+    let told = |timing: Loop, window: f64| {
+        let rows = Rows { until: 0.1, every: 1e-3, window };
+        let run = stream(&stage, &mut Idle, &timing, &profile, &rows, Solver::Exact, false, &mut |_| Flow::Continue);
+        run.err().map(|error| error.to_string())
+    };
+    let good = Loop { every: 1e-3, delay: 0.0, limit: None, lead: 0.0 };
+    assert_eq!(told(good, 1e-4), None);
+    assert_eq!(told(Loop { limit: Some(f64::MIN_POSITIVE), delay: 1.0, ..good }, 1e-4), None);
+    for limit in [f64::NAN, -1.0, 0.0, -0.0, f64::INFINITY] {
+        let expected =
+            format!("the limit of the command cannot be {limit:?}\n  allowed: above zero, in V or A; none at all");
+        assert_eq!(told(Loop { limit: Some(limit), ..good }, 1e-4).as_deref(), Some(expected.as_str()));
+    }
+    for every in [f64::NAN, 0.0, -1e-3, f64::INFINITY] {
+        let expected = format!("a loop cannot be sampled every {every:?} s\n  allowed: above zero");
+        assert_eq!(told(Loop { every, ..good }, 1e-4).as_deref(), Some(expected.as_str()));
+    }
+    for delay in [f64::NAN, -1e-9, 1.1, 1e9, f64::INFINITY] {
+        let expected = format!("a command cannot be {delay:?} s late\n  allowed: from zero to 1000 sample times");
+        assert_eq!(told(Loop { delay, ..good }, 1e-4).as_deref(), Some(expected.as_str()));
+    }
+    for lead in [f64::NAN, -1.0, f64::INFINITY] {
+        let expected = format!("a controller cannot look {lead:?} s ahead\n  allowed: from zero on");
+        assert_eq!(told(Loop { lead, ..good }, 1e-4).as_deref(), Some(expected.as_str()));
+    }
+    assert_eq!(
+        told(Loop { every: 1e-12, ..good }, 1e-4).as_deref(),
+        Some(
+            "a sample every 1e-12 s makes 1e11 of them in 0.1 s\n  allowed: up to 1e9\n  next: take a longer sample time, or a shorter run"
+        )
+    );
+    assert_eq!(told(good, f64::NAN).as_deref(), Some("the cart cannot settle within NaN m\n  allowed: above zero"));
+}
+
+/// PD and cascades without integrals gathered what the limit had left in an integral that nothing empties: after a second at its limit such
+/// a loop stood beside its target for ever.
+#[test]
+fn a_limit_leaves_nothing_behind_where_there_is_no_integral() {
+    use taut::control::{Controller, Seen};
+    let pid = Pid { proportional: 1000.0, integral: 0.0, derivative: 0.0, filter: 200.0, tracking: 0.05 };
+    let inner = CurrentLoop { proportional: 0.3, integral: 0.0, limit: Some(1.0) };
+    let cascade =
+        Cascade { position: 60.0, speed: 10.0, speed_integral: 0.0, filter: 200.0, tracking: 0.02, current: None };
+    let loops = [
+        Structure::Pid(pid),
+        Structure::Cascade(cascade),
+        Structure::Cascade(Cascade { current: Some(inner), ..cascade }),
+    ];
+    for structure in loops {
+        let name = structure.name();
+        let mut controller = Standard::new(&design(structure), &rig()).unwrap();
+        controller.reset();
+        let mut step = |error: f64| {
+            let reference = Reference::at(error);
+            let seen = Seen { time: 0.0, reference, ahead: reference, position: 0.0, current: 0.0 };
+            let asked = controller.step(&seen);
+            controller.limited(asked.clamp(-0.1, 0.1));
+            asked
+        };
+        let first = step(0.1);
+        assert!(first > 0.2, "{name}: {first}");
+        for _ in 0..1000 {
+            assert_eq!(step(0.1), first, "{name}: the same error asks for the same");
+        }
+        assert_eq!(step(0.0), 0.0, "{name}: no error asks for nothing");
+    }
+}
+
+/// A share of one made masses of nothing, and what was told then was of masses.
+#[test]
+fn a_spread_that_is_no_share_is_refused() {
+    let case = Case::read("stages/sollmann-jouaneh/controllers/pid.toml").unwrap();
+    let (design, motion) = (case.controller.as_ref().unwrap(), &case.moves[0]);
+    for share in [f64::NAN, -0.2, 0.0, 1.0, f64::INFINITY] {
+        let told = taut::control::worst(&case.stage, design, motion, share, Solver::Exact, &|| false).unwrap_err();
+        let expected = format!(
+            "parameters cannot be off by a share of {share:?}\n  allowed: above 0, below 1\n  next: write 0.2 for 20 %"
+        );
+        assert_eq!(told.to_string(), expected);
+    }
+    let stopped = taut::control::worst(&case.stage, design, motion, 0.2, Solver::Exact, &|| true).unwrap();
+    assert_eq!(stopped, None);
+}

@@ -355,7 +355,7 @@ fn edges_anywhere() {
                 Signal::Step { value: 4.0, at: 0.25 + 5e-13 },
             ]),
         ),
-        ("sequence", Signal::Sequence(vec![slot(five(), 0.25), slot(Signal::Step { value: 0.0, at: 0.0 }, 1.0)])),
+        ("sequence", Signal::sequence(vec![slot(five(), 0.25), slot(Signal::Step { value: 0.0, at: 0.0 }, 1.0)])),
         ("sampled", Signal::Sampled { times: vec![0.0, 0.25], values: vec![5.0, 0.0], hold: Hold::Zero }),
     ] {
         let got = final_of(input);

@@ -336,3 +336,37 @@ fn what_cannot_be_sampled_is_said() {
     let late = exact * Complex::new(0.0, -100.0 * 0.5e-5).exp();
     assert!((at(Hold::Zero) - late).norm() < 1e-6 * exact.norm());
 }
+
+/// A delay that rounding does not tell from none made a model with no place for it: an index past the end.
+#[test]
+fn a_delay_below_rounding_is_none() {
+    let system = StateSpace::of(&table2(), Operation::default()).unwrap();
+    let none = system.discrete(1e-3, Hold::Zero, 0.0).unwrap();
+    for delay in [5e-324, 1e-300, 1e-20, 1e-16] {
+        let model = system.discrete(1e-3, Hold::Zero, delay).unwrap();
+        assert_eq!((&model.a, &model.b, model.states.len()), (&none.a, &none.b, none.states.len()), "{delay:e}");
+    }
+    assert_eq!(system.discrete(1e-3, Hold::Zero, 1e-14).unwrap().states.len(), none.states.len() + 1);
+}
+
+/// A place that is no number is within no travel and outside none: without a travel its eigenvalues were sought for ever.
+#[test]
+fn a_question_whose_numbers_are_none_is_refused() {
+    use taut::linear::{Analysis, Question};
+    let case = taut::case::Case::from_text("axis.toml", taut::case::TEMPLATE).unwrap();
+    let told = |question: Question| Analysis::of(&case, &question).unwrap_err().to_string();
+    let nan = f64::NAN;
+    let usual = Question::default();
+    for (question, expected) in [
+        (Question { at: Some(nan), ..usual }, "--at: NaN is of no use here\n  allowed: a finite number, in m"),
+        (
+            Question { speed: Some(f64::INFINITY), ..usual },
+            "--speed: inf is of no use here\n  allowed: a finite number, in m/s",
+        ),
+        (Question { delay: nan, ..usual }, "--delay: NaN is of no use here\n  allowed: a finite number, in s"),
+        (Question { from: Some(0.0), ..usual }, "--from: 0.0 is of no use here\n  allowed: above zero, in Hz"),
+        (Question { to: Some(-1.0), ..usual }, "--to: -1.0 is of no use here\n  allowed: above zero, in Hz"),
+    ] {
+        assert_eq!(told(question), expected);
+    }
+}

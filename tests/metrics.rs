@@ -243,7 +243,7 @@ fn a_short_pulse_does_not_become_steady_and_a_triangle_has_no_constant_stretch()
 #[test]
 fn the_last_stretch_counts_and_its_sign() {
     let turn = |value, lasts| Slot { signal: Signal::Step { value, at: 0.0 }, lasts };
-    let input = Signal::Sequence(vec![turn(5.0, 0.5), turn(0.0, 0.5), turn(-5.0, 0.5), turn(0.0, f64::INFINITY)]);
+    let input = Signal::sequence(vec![turn(5.0, 0.5), turn(0.0, 0.5), turn(-5.0, 0.5), turn(0.0, f64::INFINITY)]);
     let (_, metrics) = run(&table4(), input, 2.0);
     let steady = metrics.steady_speed.unwrap();
     assert!(steady.reached && steady.value < 0.0 && steady.input == -5.0);

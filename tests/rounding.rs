@@ -276,3 +276,19 @@ fn a_run_that_would_not_end_is_told_and_can_be_stopped() {
     }
     assert!(asked > 0);
 }
+
+/// Cases that the hunt against an independent solver found: each of them ended early, and the true solution does not.
+#[test]
+fn what_the_hunt_found_stays_found() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/hunted");
+    let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    assert!(files.len() >= 4, "{files:?}");
+    for file in files {
+        let case = Case::read(&file).unwrap();
+        for experiment in &case.experiments {
+            let solution = simulate(&case.stage, experiment, Solver::of(&case.stage)).unwrap();
+            assert_eq!(solution.outcome.ending, Ending::Complete, "{}", file.display());
+        }
+    }
+}

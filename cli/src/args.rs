@@ -233,7 +233,7 @@ pub struct Sweep {
     /// How machines are chosen: random, latin-hypercube, sobol, grid or one-at-a-time [default: random]
     #[arg(long, value_name = "DESIGN")]
     pub design: Option<String>,
-    /// Which draws [default: 1]
+    /// Which draws: a whole number from 0 to 9223372036854775807 [default: 1]
     #[arg(long, value_name = "NUMBER")]
     pub seed: Option<u64>,
     /// Also compute Sobol' indices: N (k + 2) runs for k parameters

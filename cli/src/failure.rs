@@ -27,7 +27,11 @@ pub type Outcome = Result<Status, Failure>;
 
 impl Failure {
     /// The input was right, and still the work could not be done: a full disk, say.
-    pub fn work(error: Error) -> Self {
+    pub fn work(mut error: Error) -> Self {
+        // A file of results is called what it will be called.
+        if let Some(place) = &mut error.place {
+            place.file = taut::files::shown(&place.file);
+        }
         Self { error, status: 1 }
     }
 }

@@ -4,6 +4,7 @@ mod args;
 mod check;
 mod failure;
 mod fit;
+mod folder;
 mod init;
 mod interrupt;
 mod modes;

@@ -17,6 +17,12 @@ pub fn show_warning(told: &impl Display) {
     let _ = writeln!(io::stderr(), "{word}: {told}");
 }
 
+/// Writes `note: …` to standard error.
+pub fn show_note(note: &impl Display) {
+    let word = paint(io::stderr().is_terminal(), "\u{1b}[1m", "note");
+    let _ = writeln!(io::stderr(), "{word}: {note}");
+}
+
 /// Writes `text` to standard output. Whoever closed the pipe has read enough: that is no error. Anything else, a full disk
 /// say, ends the program with status 1.
 pub fn show(text: &str) {
@@ -37,14 +43,24 @@ pub fn bold(text: &str) -> String {
 
 /// What clap has to say: help and version are answers, all else is a mistake in the input.
 pub fn show_help_or_mistake(told: &clap::Error) -> ExitCode {
-    let _ = told.print();
     match told.kind() {
-        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => ExitCode::SUCCESS,
-        _ => ExitCode::from(2),
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
+            let text = told.render();
+            let coloured = io::stdout().is_terminal() && colour_wanted();
+            show(&if coloured { text.ansi().to_string() } else { text.to_string() });
+            ExitCode::SUCCESS
+        }
+        _ => {
+            let _ = told.print();
+            ExitCode::from(2)
+        }
     }
 }
 
 fn paint(terminal: bool, colour: &str, text: &str) -> String {
-    let wanted = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-    if terminal && wanted { format!("{colour}{text}\u{1b}[0m") } else { text.to_string() }
+    if terminal && colour_wanted() { format!("{colour}{text}\u{1b}[0m") } else { text.to_string() }
+}
+
+fn colour_wanted() -> bool {
+    std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }

@@ -40,7 +40,7 @@ fn ctrl_c_keeps_what_there_is_and_leaves_nothing_half_written() {
         taut(folder.path()).arg("simulate").arg(case).args(["--out", "out", "--no-report"]).spawn().unwrap();
     // It is under way when its table has begun, under a temporary name.
     let begin = Instant::now();
-    let temporary = out.join(".5-v-pulse.csv.0.tmp");
+    let temporary = out.join(".0.taut.tmp/.5-v-pulse.csv.0.taut.tmp");
     while fs::metadata(&temporary).map_or(0, |file| file.len()) == 0 {
         assert!(begin.elapsed() < Duration::from_secs(60), "it never began");
         std::thread::sleep(Duration::from_millis(5));

@@ -211,6 +211,30 @@ fn mistakes_on_the_command_line_are_told() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is left of them");
 }
 
+/// A sweep of 10^12 runs began to write; one on 100,000 threads started them all.
+#[test]
+fn a_sweep_says_before_it_begins_what_it_takes() {
+    let folder = TempDir::new().unwrap();
+    let case = stage("table4.toml");
+    let sweep = |more: &[&str]| {
+        let mut run = Command::new(env!("CARGO_BIN_EXE_taut"));
+        run.current_dir(folder.path()).args(["sweep", &case, "--vary", "all=20%", "--no-report"]).args(more);
+        let output = run.output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    let begin = Instant::now();
+    let (status, told) = sweep(&["--runs", "1e12", "--out", "runs.csv"]);
+    assert!(status == Some(2) && begin.elapsed() < Duration::from_secs(20));
+    assert!(told.starts_with("error: --runs: 1000000000000 runs make a file of about "), "{told}");
+    assert!(told.contains(" TB while it is made\n  allowed: up to 10000000000 runs\n"), "{told}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    let (status, told) = sweep(&["--runs", "1e1", "--threads", "100000", "--out", "runs.csv"]);
+    assert_eq!(status, Some(0));
+    let started = std::thread::available_parallelism().unwrap().get().min(10);
+    assert!(told.starts_with(&format!("note: --threads 100000: {started} are started, for there are ")), "{told}");
+    assert_eq!(fs::read_to_string(folder.path().join("runs.csv")).unwrap().lines().count(), 11);
+}
+
 /// Section 3 of the paper, which `taut paper` computes by a way of its own.
 #[test]
 fn the_papers_study_is_a_sweep() {

@@ -1,7 +1,7 @@
 //! Cases and what is done with them.
 
 use crate::columns::Columns;
-use crate::error::Told;
+use crate::error::{Told, guarded, unlocked};
 use crate::interrupt::Interrupt;
 use crate::{modes, runs, value};
 use pyo3::exceptions::PyValueError;
@@ -10,7 +10,7 @@ use pyo3::types::{PyDict, PyList};
 use std::path::PathBuf;
 use std::sync::Arc;
 use taut::case::{Plan, TEMPLATE};
-use taut::files::write_atomically;
+use taut::files::{Inputs, write_atomically};
 use taut::fit::{Posterior, Profile, check, fit, posterior, profiles};
 use taut::json;
 use taut::linear::Analysis;
@@ -29,19 +29,24 @@ pub struct Case {
     pub path: PathBuf,
 }
 
+/// The files that a case names, which nothing is written over.
+pub fn inputs(case: &taut::case::Case) -> Inputs {
+    Inputs::new(case.files.iter().map(|file| &file.path))
+}
+
 #[pymethods]
 impl Case {
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf, changes: Vec<String>) -> PyResult<Self> {
         let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-        let inner = py.detach(|| taut::case::Case::read_with(&path, &changes)).told(py)?;
+        let inner = unlocked(py, || taut::case::Case::read_with(&path, &changes))?.told(py)?;
         Ok(Self { inner: Arc::new(inner), path })
     }
 
     #[staticmethod]
     fn from_text(py: Python<'_>, path: PathBuf, text: &str, changes: Vec<String>) -> PyResult<Self> {
         let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-        let inner = py.detach(|| taut::case::Case::from_text_with(&path, text, &changes)).told(py)?;
+        let inner = unlocked(py, || taut::case::Case::from_text_with(&path, text, &changes))?.told(py)?;
         Ok(Self { inner: Arc::new(inner), path })
     }
 
@@ -77,12 +82,12 @@ impl Case {
 
     /// What stands under a key, in SI units.
     fn value<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
-        value::given(py, &self.inner.value(key).told(py)?)
+        value::given(py, &guarded(|| self.inner.value(key))?.told(py)?)
     }
 
-    /// Writes the text, under a temporary name first.
+    /// Writes the text, under a temporary name first; over the file it was read from, but over no log or input of it.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        write_atomically(path, &self.inner.text).told(py)
+        unlocked(py, || inputs(&self.inner).check(&path).and_then(|()| write_atomically(path, &self.inner.text)))?.told(py)
     }
 
     #[pyo3(signature = (names, solver, tolerance, step, method))]
@@ -99,7 +104,7 @@ impl Case {
         let methods = [("rk4", Method::RungeKutta4), ("dp5", Method::DormandPrince5)];
         let solver = solver.map(|name| one_of("solver", name, &kinds)).transpose()?;
         let method = method.map(|name| one_of("method", name, &methods)).transpose()?;
-        let solver = Choice { solver, tolerance, step, method }.solver(&self.inner.stage).told(py)?;
+        let solver = guarded(|| Choice { solver, tolerance, step, method }.solver(&self.inner.stage))?.told(py)?;
         runs::simulate(py, self, &names, solver)
     }
 
@@ -117,20 +122,23 @@ impl Case {
 
     fn check<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let plan = self.inner.fit_plan(&self.path).told(py)?;
-        let found = py.detach(|| check(&self.inner, &plan)).told(py)?;
-        value::json(py, &json::check(&self.inner, &found))
+        let found = unlocked(py, || check(&self.inner, &plan))?.told(py)?;
+        value::json(py, &guarded(|| json::check(&self.inner, &found))?)
     }
 
     /// Fits, and draws from the posterior if so many draws and chains are asked for.
     fn fit(&self, py: Python<'_>, effort: Option<(usize, usize)>, profiled: bool) -> PyResult<Fit> {
         let plan = self.inner.fit_plan(&self.path).told(py)?;
+        let effort = effort.map(|(draws, chains)| Effort { chains, draws, tune: TUNE, seed: plan.seed });
+        // Before the fit, which may take long.
+        effort.map_or(Ok(()), |effort| effort.check()).told(py)?;
         let interrupt = Interrupt::listen();
-        let found = py.detach(|| self.fitted(&plan, effort, profiled, &interrupt));
+        let found = unlocked(py, || self.fitted(&plan, effort, profiled, &interrupt));
         interrupt.finish()?;
-        let (fit, profiles, drawn) = found.told(py)?;
-        let text = fit.case_text(&self.inner, &self.path).told(py)?;
+        let (fit, profiles, drawn) = found?.told(py)?;
+        let text = guarded(|| fit.case_text(&self.inner, &self.path))?.told(py)?;
         let case = Self::from_text(py, self.path.clone(), &text, Vec::new())?;
-        let told = json::fit(&self.inner, &fit, &profiles, drawn.as_ref().map(json::posterior));
+        let told = guarded(|| json::fit(&self.inner, &fit, &profiles, drawn.as_ref().map(json::posterior)))?;
         let draws = drawn.map(|drawn| Columns::of(py, drawn.table())).transpose()?;
         Ok(Fit { data: value::json(py, &told)?.unbind(), case: Py::new(py, case)?, draws })
     }
@@ -149,7 +157,7 @@ impl Case {
         to: Option<f64>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let question = modes::question(at, speed, &stuck, sample_time, hold, delay, from, to)?;
-        let analysis = py.detach(|| Analysis::of(&self.inner, &question)).told(py)?;
+        let analysis = unlocked(py, || Analysis::of(&self.inner, &question))?.told(py)?;
         modes::answers(py, &analysis)
     }
 }
@@ -158,7 +166,7 @@ impl Case {
     fn fitted(
         &self,
         plan: &Plan,
-        effort: Option<(usize, usize)>,
+        effort: Option<Effort>,
         profiled: bool,
         interrupt: &Interrupt,
     ) -> taut::Result<(taut::fit::Fit, Vec<Profile>, Option<Posterior>)> {
@@ -167,8 +175,7 @@ impl Case {
         let found = fit(&self.inner, plan, Some(&stop), &mut |_| flow(interrupt.stop()))?;
         let profiles = if profiled { profiles(&self.inner, plan, &found, Some(&stop))? } else { Vec::new() };
         let drawn = match effort.filter(|_| !interrupt.stop()) {
-            Some((draws, chains)) => {
-                let effort = Effort { chains, draws, tune: TUNE, seed: plan.seed };
+            Some(effort) => {
                 let watch = |_| !interrupt.stop();
                 Some(interrupt.beside(|| posterior(&self.inner, plan, &found, effort, &watch))?)
             }

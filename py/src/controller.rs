@@ -1,7 +1,7 @@
 //! A controller written in Python, called once a sample.
 
 use crate::interrupt::Interrupt;
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
 use pyo3::intern;
 use pyo3::prelude::*;
 use taut::control::{self, Controller};
@@ -89,10 +89,18 @@ impl<'a, 'py> Own<'a, 'py> {
             Way::Step => self.object.call_method1(intern!(py, "step"), (Seen::from(seen),))?,
             Way::Call => self.object.call1((seen.position, seen.reference.position))?,
         };
-        let command: f64 = command.extract()?;
-        match command.is_finite() {
-            true => Ok(command),
-            false => Err(PyValueError::new_err(format!("at {} s the controller's command is {command}", seen.time))),
+        let time = seen.time;
+        match command.extract::<f64>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            Ok(value) => Err(PyValueError::new_err(format!("at {time} s the controller's command is {value}"))),
+            Err(error) if error.is_instance_of::<PyOverflowError>(py) => {
+                Err(PyValueError::new_err(format!("at {time} s the controller's command is beyond any number in use")))
+            }
+            Err(error) if error.is_instance_of::<PyTypeError>(py) => {
+                let kind = command.get_type().name()?;
+                Err(PyTypeError::new_err(format!("at {time} s the controller's command is no number: {kind}")))
+            }
+            Err(error) => Err(error),
         }
     }
 

@@ -1,7 +1,8 @@
 //! Mistakes of the user as exceptions, with the text that the command line shows.
 
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 pyo3::create_exception!(
     taut,
@@ -10,6 +11,36 @@ pyo3::create_exception!(
     "A mistake in an input, told as the command line tells it: what, where, what is allowed, what to do next.\n\n\
      Attributes: what (the sentence alone), file, line, column, allowed, next; None where there is none."
 );
+
+pyo3::create_exception!(
+    taut,
+    Bug,
+    PyRuntimeError,
+    "A mistake in taut itself, which no input should bring about; where it happened stands on the standard error."
+);
+
+/// Does `work`. A panic in it is a mistake of ours: it becomes [`Bug`], which `except Exception` catches, after Rust has told
+/// place and backtrace on the standard error.
+pub fn guarded<T>(work: impl FnOnce() -> T) -> PyResult<T> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
+        let told = panic.downcast_ref::<String>().map(String::as_str);
+        let told = told.or(panic.downcast_ref::<&str>().copied()).unwrap_or("a panic without words");
+        Bug::new_err(format!(
+            "this is a bug in taut: {told}\n  next: report it with the case and the call; the standard error says where it happened"
+        ))
+    })
+}
+
+/// The same without the interpreter's lock.
+pub fn unlocked<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    py.detach(|| guarded(work))
+}
+
+/// Fails as a bug does: for the test that tells how such a one comes out.
+#[pyfunction]
+pub fn fail_as_a_bug(py: Python<'_>, told: String) -> PyResult<()> {
+    unlocked(py, || panic!("{told}"))
+}
 
 /// The exception for what the library says.
 pub fn told(py: Python<'_>, error: taut::Error) -> PyErr {

@@ -1,6 +1,7 @@
 //! Ctrl-C while the interpreter waits for Rust.
 
 use pyo3::prelude::*;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::RecvTimeoutError;
@@ -60,18 +61,19 @@ impl Interrupt {
         let result = std::thread::scope(|scope| {
             scope.spawn(move || {
                 // The receiver waits until it has come.
-                let _ = done.send(work());
+                let _ = done.send(catch_unwind(AssertUnwindSafe(work)));
             });
             loop {
                 match wait.recv_timeout(Duration::from_millis(PATIENCE)) {
                     Ok(result) => break result,
                     Err(RecvTimeoutError::Timeout) => self.ask(),
-                    Err(RecvTimeoutError::Disconnected) => panic!("the work has panicked"),
+                    Err(RecvTimeoutError::Disconnected) => break Err(Box::new("the work has ended without a result")),
                 }
             }
         });
         self.watched.store(false, Ordering::Relaxed);
-        result
+        // A panic goes on where it would have gone without a thread between.
+        result.unwrap_or_else(|panic| resume_unwind(panic))
     }
 
     /// Stops with this exception.

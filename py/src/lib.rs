@@ -22,7 +22,7 @@ mod _native {
     #[pymodule_export]
     use crate::controller::Seen;
     #[pymodule_export]
-    use crate::error::Error;
+    use crate::error::{Bug, Error, fail_as_a_bug};
     #[pymodule_export]
     use crate::runs::{Run, moves, simulation};
     #[pymodule_export]

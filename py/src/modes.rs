@@ -1,5 +1,6 @@
 //! A linear analysis: its data, and its matrices as arrays.
 
+use crate::error::guarded;
 use crate::value;
 use nalgebra::{DMatrix, DVector};
 use numpy::{IntoPyArray, PyArrayMethods};
@@ -42,7 +43,7 @@ pub fn question(
 /// Data as `--json` has it, matrices, and the frequency response: magnitude and phase of each output.
 pub fn answers<'py>(py: Python<'py>, analysis: &Analysis) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
-    dict.set_item("data", value::json(py, &json::modes(analysis))?)?;
+    dict.set_item("data", value::json(py, &guarded(|| json::modes(analysis))?)?)?;
     let system = &analysis.system;
     dict.set_item("continuous", matrices(py, &system.a, &system.b, &system.c, &system.d)?)?;
     if let Some(model) = &analysis.discrete {

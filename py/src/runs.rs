@@ -1,13 +1,15 @@
 //! Runs of experiments and moves.
 
-use crate::case::Case;
-use crate::columns::Columns;
+use crate::case::{Case, inputs};
+use crate::columns::{self, Columns};
 use crate::controller::Own;
-use crate::error::Told;
+use crate::error::{Told, guarded, unlocked};
 use crate::interrupt::Interrupt;
 use crate::value;
+use pyo3::exceptions::PyRecursionError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
+use std::cell::Cell;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
@@ -72,20 +74,21 @@ impl Run {
 
     /// The key figures.
     fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let told = json::Metrics::of(self.metrics(), self.case.stage.amplifier.mode);
-        value::json(py, &serde_json::to_value(told).unwrap_or_default())
+        let mode = self.case.stage.amplifier.mode;
+        let told = guarded(|| serde_json::to_value(json::Metrics::of(self.metrics(), mode)).unwrap_or_default())?;
+        value::json(py, &told)
     }
 
     /// Every event.
     fn events<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let told: Vec<_> = self.outcome().events.iter().map(json::Event::of).collect();
-        value::json(py, &serde_json::to_value(told).unwrap_or_default())
+        let events = || self.outcome().events.iter().map(json::Event::of).collect::<Vec<_>>();
+        value::json(py, &guarded(|| serde_json::to_value(events()).unwrap_or_default())?)
     }
 
     /// Writes the columns as `taut simulate` does, to .csv or .parquet.
     fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let trajectory = self.trajectory(py)?;
-        py.detach(|| write(&trajectory, &path)).told(py)
+        unlocked(py, || inputs(&self.case).check(&path).and_then(|()| write(&trajectory, &path)))?.told(py)
     }
 }
 
@@ -132,10 +135,16 @@ pub fn simulate(py: Python<'_>, case: &Case, names: &[String], solver: Solver) -
     experiments.into_iter().map(|experiment| one(py, case, experiment, solver)).collect()
 }
 
+/// About as many columns as a run has.
+const COLUMNS: usize = 24;
+
+const FEWER: &str = "take a longer interval `every`, or write rows to a file as they come: taut simulate --out DIR";
+
 fn one(py: Python<'_>, case: &Case, experiment: &Experiment, solver: Solver) -> PyResult<Run> {
     let stage = &case.inner.stage;
+    columns::fit(py, experiment.samples() as f64, COLUMNS, FEWER)?;
     let interrupt = Interrupt::listen();
-    let (found, took) = py.detach(|| {
+    let found = unlocked(py, || {
         let begin = Instant::now();
         let mut meter = Meter::new(stage);
         let mut trajectory = Trajectory::default();
@@ -156,6 +165,7 @@ fn one(py: Python<'_>, case: &Case, experiment: &Experiment, solver: Solver) -> 
         (found, begin.elapsed().as_secs_f64())
     });
     interrupt.finish()?;
+    let (found, took) = found?;
     let (trajectory, outcome, metrics, reduction) = found.told(py)?;
     let index = case.inner.experiments.iter().position(|other| std::ptr::eq(other, experiment)).unwrap_or_default();
     let what = What::Experiment { index, solver, outcome, metrics: Box::new(metrics), reduction };
@@ -185,12 +195,20 @@ pub fn motion(
     };
     let structure = match controller {
         None => design.structure.name().to_string(),
-        Some(object) => object.getattr("__name__").or_else(|_| object.get_type().getattr("__name__"))?.to_string(),
+        Some(object) => {
+            let name = object.getattr("__name__").or_else(|_| object.get_type().getattr("__name__"))?;
+            name.str()?.to_string_lossy().into_owned()
+        }
+    };
+    let _inside = match controller {
+        Some(_) => Some(Inside::enter()?),
+        None => None,
     };
     let mut runs = Vec::new();
     for motion in moves {
         let profile = motion.profile.clone().shaped(&design.shaper);
         let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
+        columns::fit(py, rows.until / rows.every, COLUMNS, FEWER)?;
         let interrupt = Interrupt::listen();
         let mut trajectory = Trajectory::default();
         let mut take = |block: &Trajectory| {
@@ -201,17 +219,22 @@ pub fn motion(
         let run = match controller {
             Some(object) => {
                 let mut own = Own::new(object, &interrupt)?;
-                stream(stage, &mut own, &timing, &profile, &rows, solver, true, &mut take)
+                guarded(|| stream(stage, &mut own, &timing, &profile, &rows, solver, false, &mut take))
             }
-            None => py.detach(|| {
+            None => unlocked(py, || {
                 let mut controller = Standard::new(design, stage)?;
-                stream(stage, &mut controller, &timing, &profile, &rows, solver, true, &mut take)
+                stream(stage, &mut controller, &timing, &profile, &rows, solver, false, &mut take)
             }),
         };
         interrupt.finish()?;
-        let run = run.told(py)?;
+        let run = run?.told(py)?;
         let worst = match share {
-            Some(share) => Some(py.detach(|| worst(stage, design, motion, share, solver)).told(py)?),
+            Some(share) => {
+                let interrupt = Interrupt::listen();
+                let found = unlocked(py, || worst(stage, design, motion, share, solver, &|| interrupt.stop()));
+                interrupt.finish()?;
+                found?.told(py)?
+            }
             None => None,
         };
         let took = begin.elapsed().as_secs_f64();
@@ -220,6 +243,35 @@ pub fn motion(
         runs.push(Run { case: Arc::clone(&case.inner), columns: Columns::of(py, trajectory)?, what, took });
     }
     Ok(runs)
+}
+
+/// How many moves with a controller in Python run within each other on this thread.
+struct Inside;
+
+thread_local! {
+    static DEPTH: Cell<usize> = const { Cell::new(0) };
+}
+
+impl Inside {
+    /// A controller that runs moves with itself would go on until the stack is full, which ends the interpreter.
+    fn enter() -> PyResult<Self> {
+        const DEEPEST: usize = 16;
+        match DEPTH.get() {
+            depth if depth >= DEEPEST => Err(PyRecursionError::new_err(format!(
+                "moves are nested {DEEPEST} deep: a controller runs a move whose controller runs a move, and so on"
+            ))),
+            depth => {
+                DEPTH.set(depth + 1);
+                Ok(Self)
+            }
+        }
+    }
+}
+
+impl Drop for Inside {
+    fn drop(&mut self) {
+        DEPTH.set(DEPTH.get() - 1);
+    }
 }
 
 /// What `taut simulate --json` prints of these runs.
@@ -244,7 +296,8 @@ pub fn simulation<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<
         What::Move { .. } => None,
     });
     let Some((case, solver)) = first else { return Ok(py.None().into_bound(py)) };
-    value::json(py, &serde_json::to_value(Simulation::new(case, solver, &told)).unwrap_or_default())
+    let told = guarded(|| serde_json::to_value(Simulation::new(case, solver, &told)).unwrap_or_default())?;
+    value::json(py, &told)
 }
 
 /// What `taut move --json` prints of these runs.
@@ -264,5 +317,5 @@ pub fn moves<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound
         What::Experiment { .. } => None,
     });
     let Some((title, structure, timing)) = first else { return Ok(py.None().into_bound(py)) };
-    value::json(py, &json::moves(title, structure, timing, &told))
+    value::json(py, &guarded(|| json::moves(title, structure, timing, &told))?)
 }

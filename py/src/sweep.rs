@@ -1,8 +1,8 @@
 //! Many runs: rows by number, on threads of this machine.
 
 use crate::case::Case;
-use crate::columns::Columns;
-use crate::error::Told;
+use crate::columns::{self, Columns};
+use crate::error::{Told, unlocked};
 use crate::interrupt::Interrupt;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -23,7 +23,7 @@ pub struct Sweep {
 impl Sweep {
     #[new]
     fn new(py: Python<'_>, case: &Case) -> PyResult<Self> {
-        let inner = py.detach(|| taut::sweep::Sweep::new(&case.inner).map_err(|error| error.in_file(&case.path)));
+        let inner = unlocked(py, || taut::sweep::Sweep::new(&case.inner).map_err(|error| error.in_file(&case.path)))?;
         Ok(Self { inner: inner.told(py)? })
     }
 
@@ -41,10 +41,13 @@ impl Sweep {
     /// The rows of `count` runs from `first` on: columns by name, and name, unit and heading of each. The same bits for any
     /// number of threads; 0 is one for each processor.
     fn rows(&self, py: Python<'_>, first: u64, count: u64, threads: usize) -> PyResult<(Py<PyDict>, Py<PyList>)> {
+        let rows = count.min(self.inner.runs().saturating_sub(first));
+        let piecewise = "taut.sweep_tables hands the rows on piece by piece";
+        columns::fit(py, rows as f64, self.inner.columns().len(), piecewise)?;
         let interrupt = Interrupt::listen();
-        let table = py.detach(|| self.table(first, count, threads, &interrupt));
+        let table = unlocked(py, || self.table(first, count, threads, &interrupt));
         interrupt.finish()?;
-        let columns = Columns::of(py, table.map_err(PyRuntimeError::new_err)?)?;
+        let columns = Columns::of(py, table?.map_err(PyRuntimeError::new_err)?)?;
         Ok((columns.arrays, columns.names))
     }
 }
@@ -60,9 +63,12 @@ impl Sweep {
         if threads == 1 {
             return Ok(rows(first.min(end), end));
         }
+        let begins: Vec<u64> = (first..end).step_by(CHUNK as usize).collect();
+        // More threads than processors or pieces would only wait.
+        let processors = std::thread::available_parallelism().map_or(1, usize::from);
+        let threads = if threads == 0 { processors } else { threads.min(processors) }.min(begins.len().max(1));
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|e| format!("the threads cannot be started: {e}"))?;
-        let begins: Vec<u64> = (first..end).step_by(CHUNK as usize).collect();
         let part = |from: u64| rows(from, (from + CHUNK).min(end));
         let parts: Vec<Trajectory> = interrupt.beside(|| pool.install(|| begins.into_par_iter().map(part).collect()));
         let mut table = Trajectory::with_capacity(self.inner.columns(), end.saturating_sub(first) as usize);

@@ -167,3 +167,20 @@ def test_runs_in_threads_are_the_same(case):
     [thread.start() for thread in threads]
     [thread.join() for thread in threads]
     assert len(found) == 8 and all(np.array_equal(run["cart_position"], alone) for run in found)
+
+
+def test_a_result_replaces_no_file_that_the_case_reads(tmp_path):
+    """A run written as the log of its own case took the place of what was measured."""
+    log = tmp_path / "u.csv"
+    log.write_text("t,u\n0,5\n0.25,0\n")
+    text = taut.template().replace('{ pulse = "5 V", for = "0.25 s" }', '{ file = "u.csv", time = "t", column = "u" }', 1)
+    assert "u.csv" in text
+    path = tmp_path / "axis.toml"
+    path.write_text(text)
+    case = taut.read(path)
+    run = case.simulate("5 V pulse")
+    for write in (run.write, case.save):
+        with pytest.raises(taut.Error, match="would replace the file that it is made from"):
+            write(log)
+    assert log.read_text() == "t,u\n0,5\n0.25,0\n"
+    case.save(path)

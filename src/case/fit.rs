@@ -182,7 +182,7 @@ pub(super) fn plan(root: &Table, experiments: &[Experiment]) -> Result<Option<Pl
         nuisance,
         huber,
         starts: table.number("starts")? as usize,
-        seed: table.number("seed")? as u64,
+        seed: table.seed()?,
         held_out,
         until: table.number_if_given("until")?,
         windows: table.number_if_given("windows")?,

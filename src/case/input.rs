@@ -98,7 +98,7 @@ fn nested(field: &Field, context: &Context, depth: usize, in_sequence: bool) -> 
         "prbs" => {
             let bit = number("bit")?;
             few_enough(&table, "bit", context.until / bit)?;
-            Signal::Prbs { amplitude: main.number()?, bit, seed: number("seed")? as u64 }
+            Signal::Prbs { amplitude: main.number()?, bit, seed: table.seed()? }
         }
         "table" => points(&main)?,
         "file" => sampled(&main, &table, context)?,
@@ -262,7 +262,7 @@ fn sequence(field: &Field, context: &Context, depth: usize) -> Result<Signal> {
     if slots.last().is_some_and(|slot| slot.lasts.is_finite()) {
         slots.push(Slot { signal: Signal::Step { value: 0.0, at: 0.0 }, lasts: f64::INFINITY });
     }
-    Ok(Signal::Sequence(slots))
+    Ok(Signal::sequence(slots))
 }
 
 /// How long a signal takes of itself, s, if it comes to an end.

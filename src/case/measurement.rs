@@ -29,7 +29,7 @@ pub(super) fn measurement(root: &Table, stage: &Stage, experiments: &[Experiment
         every: table.number_if_given("every")?,
         delay: table.number("delay")?,
         jitter: table.number("jitter")?,
-        seed: table.number("seed")? as u64,
+        seed: table.seed()?,
         channels,
     };
     for experiment in experiments {

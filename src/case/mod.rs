@@ -1,5 +1,6 @@
 //! The case file: TOML in, a [`Case`] out, and every mistake told with its line.
 
+mod bounds;
 mod chosen;
 mod controller;
 mod fit;
@@ -24,6 +25,7 @@ pub use sweep::{Kinds, Origin, Sampling, Sweeping, Variation};
 pub use template::TEMPLATE;
 pub use tune::{Cost, Known, Tuning};
 
+use crate::chance::hash;
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::log::Log;
@@ -43,6 +45,9 @@ const MOST_SAMPLES: f64 = 1e9;
 
 /// Longest name of an experiment, in characters.
 const LONGEST_NAME: usize = 100;
+
+/// Longest name of an experiment's files, in bytes: file systems allow 255, and `-peak-motor-current-histogram.svg` follows.
+const LONGEST_FILE_NAME: usize = 200;
 
 /// Everything needed to repeat a run.
 #[derive(Debug, Clone)]
@@ -265,7 +270,7 @@ impl Case {
 /// The content of a file, up to a little more than a case may have: what is too long is told with the rest.
 fn read_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    std::fs::File::open(path)?.take(tree::LARGEST_FILE as u64 + 1).read_to_end(&mut bytes)?;
+    std::fs::File::open(path)?.take(bounds::LARGEST_FILE as u64 + 1).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
@@ -292,9 +297,14 @@ impl Experiment {
     }
 }
 
-/// A name as that of a file: `5 V pulse` becomes `5-v-pulse`.
+/// A name as that of a file: `5 V pulse` becomes `5-v-pulse`. Of a name that is too long for one, the end is a hash.
 pub fn file_name(name: &str) -> String {
-    name.to_lowercase().chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect()
+    let plain: String = name.to_lowercase().chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect();
+    if plain.len() <= LONGEST_FILE_NAME {
+        return plain;
+    }
+    let hash = format!("-{:016x}", hash(name.bytes()));
+    format!("{}{hash}", &plain[..plain.floor_char_boundary(LONGEST_FILE_NAME - hash.len())])
 }
 
 /// Where the paths of a case begin, and what was read from there.

@@ -96,6 +96,20 @@ impl<'a> Field<'a> {
         Ok(value)
     }
 
+    /// A seed, all of whose digits count: a double would round those beyond 2⁵³.
+    pub fn seed(&self) -> Result<u64> {
+        let digits = match &self.node.kind {
+            Kind::Integer(value) => Some(*value),
+            Kind::Text(text) => text.trim().parse().ok(),
+            _ => None,
+        };
+        match digits.and_then(|value| u64::try_from(value).ok()) {
+            Some(seed) => Ok(seed),
+            // 1e9, say; or the mistake is told.
+            None => self.number().map(|value| value as u64),
+        }
+    }
+
     pub fn text(&self) -> Result<&'a str> {
         match &self.node.kind {
             Kind::Text(text) => Ok(text),
@@ -300,6 +314,14 @@ impl<'a> Table<'a> {
                 .fail(format!("this makes {key} {} {}", rounded(value), row.unit))
                 .allowed(row.range.describe(row.unit))),
             _ => Ok(value),
+        }
+    }
+
+    /// The number `seed`, or its default.
+    pub fn seed(&self) -> Result<u64> {
+        match self.optional("seed") {
+            Some(field) => field.seed(),
+            None => self.number("seed").map(|value| value as u64),
         }
     }
 

@@ -173,7 +173,7 @@ pub(super) fn sweeping(root: &Table, context: &Context) -> Result<Option<Sweepin
                 .allowed(format!("up to {} s, and no more than 1e9 rows", experiment.until)));
         }
     }
-    Ok(Some(Sweeping { runs, design, seed: table.number("seed")? as u64, interval, vary, from, indices }))
+    Ok(Some(Sweeping { runs, design, seed: table.seed()?, interval, vary, from, indices }))
 }
 
 fn origin(field: &Field, context: &Context) -> Result<Origin> {

@@ -1,12 +1,10 @@
 //! TOML with places: every value knows where it stands, so that every mistake can be told with its line.
 
+use super::bounds;
 use crate::error::{Error, Place, Result};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml_edit::{Document, Item, Value};
-
-/// Largest case file, in bytes; what is longer than that belongs into a CSV file.
-pub(super) const LARGEST_FILE: usize = 16 << 20;
 
 /// The text of a case and where it came from.
 pub(super) struct Source {
@@ -66,12 +64,7 @@ impl Source {
     /// The root table, or where the text is no TOML.
     pub fn tree(&self) -> Result<Node> {
         let text = self.text.as_str();
-        if text.len() > LARGEST_FILE {
-            return Err(Error::new("this case file is too large")
-                .in_file(&self.name)
-                .allowed(format!("up to {LARGEST_FILE} bytes"))
-                .next("put long tables into a CSV file, and read it with input = { file = ... }"));
-        }
+        bounds::check(self)?;
         if let Some(at) = text.find('\0') {
             return Err(Error::new("this is not a text file: it holds a zero byte")
                 .at(self.place(at..at))

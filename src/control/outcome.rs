@@ -129,8 +129,9 @@ pub fn stream(
     keep: bool,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<MoveRun> {
-    if !(timing.every > 0.0 && timing.every.is_finite() && timing.delay >= 0.0 && timing.delay.is_finite()) {
-        return Err(Error::new("a loop needs a sample time above zero, and a delay that is not negative"));
+    timing.check(rows.until)?;
+    if !(rows.window > 0.0 && rows.window.is_finite()) {
+        return Err(Error::new(format!("the cart cannot settle within {:?} m", rows.window)).allowed("above zero"));
     }
     let start = profile.start();
     let angle = start / stage.pulley_radius;

@@ -33,9 +33,11 @@ impl PidState {
         proportional * error + self.integral + derivative * self.slope
     }
 
-    /// Back-calculation: the integral follows what the limit leaves.
+    /// Back-calculation: the integral follows what the limit leaves. Without a gain there is none: nothing would ever empty it again.
     pub fn limited(&mut self, excess: f64) {
-        self.integral += (self.every / self.gains.tracking).min(1.0) * excess;
+        if self.gains.integral != 0.0 {
+            self.integral += (self.every / self.gains.tracking).min(1.0) * excess;
+        }
     }
 
     /// Forgets.
@@ -73,7 +75,7 @@ impl CascadeState {
         let Some(inner) = gains.current else { return output };
         let asked = output + forward;
         let held = inner.limit.map_or(asked, |limit| asked.clamp(-limit, limit));
-        self.speed_integral += self.share() * (held - asked);
+        self.push_speed(self.share() * (held - asked));
         let error = held - current;
         self.current_integral += inner.integral * self.every * error;
         inner.proportional * error + self.current_integral
@@ -88,17 +90,22 @@ impl CascadeState {
         (self.every / self.gains.tracking).min(1.0)
     }
 
+    /// Adds to the speed loop's integral, if it has one: of a gain of zero nothing would ever empty it again.
+    fn push_speed(&mut self, change: f64) {
+        if self.gains.speed_integral != 0.0 {
+            self.speed_integral += change;
+        }
+    }
+
     /// Back-calculation in the innermost loop.
     pub fn limited(&mut self, excess: f64) {
         let share = self.share() * excess;
-        match self.gains.current {
-            None => self.speed_integral += share,
-            Some(inner) => {
-                self.current_integral += share;
-                if inner.proportional > 0.0 {
-                    self.speed_integral += share / inner.proportional;
-                }
-            }
+        let Some(inner) = self.gains.current else { return self.push_speed(share) };
+        if inner.integral != 0.0 {
+            self.current_integral += share;
+        }
+        if inner.proportional > 0.0 {
+            self.push_speed(share / inner.proportional);
         }
     }
 

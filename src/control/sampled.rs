@@ -1,6 +1,8 @@
 //! The loop closed: samples, counts, delay and limit between a controller and the axis.
 
+use crate::error::{Error, Result};
 use crate::plant::{State, place};
+use crate::quantity::rounded;
 use crate::signal::profile::{Profile, Reference};
 use crate::solve::Decide;
 use crate::stage::{Encoder, EncoderPlace, Stage};
@@ -221,7 +223,41 @@ pub fn measures_cart(stage: &Stage) -> bool {
     stage.encoder.is_some_and(|encoder| encoder.at == EncoderPlace::Cart)
 }
 
+/// Most samples that a command may wait for.
+const MOST_DELAY: f64 = 1000.0;
+
+/// Most samples of a run.
+const MOST_SAMPLES: f64 = 1e9;
+
 impl Loop {
+    /// Refuses what is no timing of a run that ends at `until`, s.
+    pub(super) fn check(&self, until: f64) -> Result<()> {
+        let &Self { every, delay, limit, lead } = self;
+        let wrong = |what: String, allowed: &str| Err(Error::new(what).allowed(allowed));
+        if !(every > 0.0 && every.is_finite()) {
+            return wrong(format!("a loop cannot be sampled every {every:?} s"), "above zero");
+        }
+        if until / every > MOST_SAMPLES {
+            let samples = rounded(until / every);
+            return wrong(format!("a sample every {every:?} s makes {samples} of them in {until:?} s"), "up to 1e9")
+                .map_err(|error| error.next("take a longer sample time, or a shorter run"));
+        }
+        if !(0.0..=MOST_DELAY * every).contains(&delay) {
+            return wrong(format!("a command cannot be {delay:?} s late"), "from zero to 1000 sample times");
+        }
+        if !limit.is_none_or(|limit| limit > 0.0 && limit.is_finite()) {
+            let limit = limit.unwrap_or(f64::NAN);
+            return wrong(
+                format!("the limit of the command cannot be {limit:?}"),
+                "above zero, in V or A; none at all",
+            );
+        }
+        if !(lead >= 0.0 && lead.is_finite()) {
+            return wrong(format!("a controller cannot look {lead:?} s ahead"), "from zero on");
+        }
+        Ok(())
+    }
+
     /// That of a design.
     pub fn of(design: &crate::design::Design) -> Self {
         let lead = design.feed_forward.lead.unwrap_or(design.delay + 0.5 * design.every);

@@ -1,11 +1,12 @@
 //! The axis with each of its parameters wrong by some share.
 
-use super::{Setup, closed_loop};
+use super::{Loop, Rows, Standard, stream};
 use crate::case::Move;
 use crate::design::Design;
-use crate::error::Result;
-use crate::solve::{Ending, Solver};
+use crate::error::{Error, Result};
+use crate::solve::{Ending, Flow, Solver};
 use crate::stage::Stage;
+use crate::trajectory::Trajectory;
 
 /// Multiplies a parameter of a stage by a factor.
 pub type Change = fn(&mut Stage, f64);
@@ -69,13 +70,32 @@ pub struct Worst {
     pub axes: usize,
 }
 
-/// The same controller, made for `stage`, on axes of which each parameter is off by a `share`.
-pub fn worst(stage: &Stage, design: &Design, motion: &Move, share: f64, solver: Solver) -> Result<Worst> {
+/// The same controller, made for `stage`, on axes of which each parameter is off by a `share`. None where `stop` said so, which is
+/// asked with every block of rows.
+pub fn worst(
+    stage: &Stage,
+    design: &Design,
+    motion: &Move,
+    share: f64,
+    solver: Solver,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<Worst>> {
+    if !(share > 0.0 && share < 1.0) {
+        return Err(Error::new(format!("parameters cannot be off by a share of {share:?}"))
+            .allowed("above 0, below 1")
+            .next("write 0.2 for 20 %"));
+    }
     let mut worst = Worst::default();
+    let profile = motion.profile.clone().shaped(&design.shaper);
+    let timing = Loop::of(design);
+    let rows = Rows { until: motion.until, every: timing.every.min(motion.until), window: motion.window };
     for (axis, other) in spread(stage, share) {
-        let (until, window) = (motion.until, motion.window);
-        let setup = Setup { stage: &other, model: stage, design, profile: &motion.profile, until, window, solver };
-        let run = closed_loop(&setup)?;
+        let mut controller = Standard::new(design, stage)?;
+        let mut sink = |_: &Trajectory| if stop() { Flow::Stop } else { Flow::Continue };
+        let run = stream(&other, &mut controller, &timing, &profile, &rows, solver, false, &mut sink)?;
+        if stop() {
+            return Ok(None);
+        }
         worst.axes += 1;
         worst.settled += usize::from(run.figures.settling.is_some() && run.outcome.ending == Ending::Complete);
         let error = match run.outcome.ending {
@@ -87,7 +107,7 @@ pub fn worst(stage: &Stage, design: &Design, motion: &Move, share: f64, solver: 
         }
         worst.last = worst.last.max(run.figures.final_cart_error.abs());
     }
-    Ok(worst)
+    Ok(Some(worst))
 }
 
 fn viscous(friction: &mut crate::friction::Friction, factor: f64) {

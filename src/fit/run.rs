@@ -312,7 +312,7 @@ impl Run {
         if !matches!(input, Signal::Sampled { .. }) {
             if delay > 0.0 {
                 let nothing = solve_slot(Signal::Step { value: 0.0, at: 0.0 }, delay);
-                input = Signal::Sequence(vec![nothing, solve_slot(input, f64::INFINITY)]);
+                input = Signal::sequence(vec![nothing, solve_slot(input, f64::INFINITY)]);
             }
             if offset != 0.0 {
                 input = Signal::Sum(vec![input, Signal::Step { value: offset, at: 0.0 }]);

@@ -75,6 +75,7 @@ impl<'a> Analysis<'a> {
             held: question.held,
         };
         let stage = &case.stage;
+        numbers(question)?;
         within(case, question)?;
         let system = StateSpace::of(stage, operation).map_err(|error| error.in_file("--at"))?;
         let transfers = system.transfers()?;
@@ -87,6 +88,26 @@ impl<'a> Analysis<'a> {
         let (words, sticks) = (assumptions(stage, operation), sticks(stage, operation));
         Ok(Self { case, operation, system, transfers, words, sticks, here, travel: along, responses, discrete })
     }
+}
+
+/// Refuses a question whose numbers are none.
+fn numbers(question: &Question) -> Result<()> {
+    let &Question { speed, at, delay, from, to, .. } = question;
+    let finite = |value: f64| value.is_finite();
+    let frequency = |value: f64| value > 0.0 && value.is_finite();
+    let asked: [(&str, Option<f64>, fn(f64) -> bool, &str); 5] = [
+        ("--speed", speed, finite, "a finite number, in m/s"),
+        ("--at", at, finite, "a finite number, in m"),
+        ("--delay", Some(delay), finite, "a finite number, in s"),
+        ("--from", from, frequency, "above zero, in Hz"),
+        ("--to", to, frequency, "above zero, in Hz"),
+    ];
+    for (option, value, good, allowed) in asked {
+        if let Some(value) = value.filter(|value| !good(*value)) {
+            return Err(Error::new(format!("{value:?} is of no use here")).in_file(option).allowed(allowed));
+        }
+    }
+    Ok(())
 }
 
 /// Refuses a place outside the travel.

@@ -219,6 +219,10 @@ impl Discrete {
     ) {
         let n = self.a.nrows();
         let late = whole + usize::from(parts.is_some());
+        if late == 0 {
+            // Less than rounding.
+            return;
+        }
         let outputs = self.c.nrows();
         // States u[k−1], u[k−2], … u[k−late]
         let extended =

@@ -5,7 +5,7 @@
 //! line not longer than 1 MiB.
 
 use super::lines::{Fields, Lines, open};
-use super::sheet::{ColumnId, Dialect, Request, Sheet};
+use super::sheet::{ColumnId, Dialect, Request, Sheet, check_numbers};
 use crate::error::{Error, Place, Result};
 use std::io::BufRead;
 use std::path::Path;
@@ -132,7 +132,7 @@ impl<R: BufRead> Row<'_, R> {
             sheet.columns[i].push(number);
         }
         sheet.rows.push(self.lines.number);
-        Ok(())
+        check_numbers(self.lines.file, self.request.columns.len(), sheet.rows.len())
     }
 
     /// The number in the i-th wanted column; NaN where it is missing and may be.

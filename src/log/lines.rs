@@ -132,7 +132,7 @@ const REMARKS: [&str; 3] = ["#", "%", "//"];
 
 /// The lines of a file, one at a time.
 pub(super) struct Lines<'a, R> {
-    file: &'a Path,
+    pub file: &'a Path,
     input: R,
     /// Of the current line, from 1.
     pub number: usize,

@@ -156,6 +156,12 @@ impl Mapping {
         }
     }
 
+    /// Whether the numbers in the first column have to increase from the first row to the last.
+    fn is_ordered(&self) -> bool {
+        let increases = matches!(&self.time, Clock::Column(time) if time.scale > 0.0);
+        increases && self.filter.is_none() && self.split.is_none()
+    }
+
     /// Reads the runs; the text tells a run of a split file from the others.
     pub fn read(&self) -> Result<Vec<(Option<String>, Log)>> {
         let mut sources: Vec<(Role, &Source)> = Vec::new();
@@ -170,6 +176,7 @@ impl Mapping {
         let request = Request {
             columns: &ids,
             complete,
+            ordered: self.is_ordered(),
             units_row: true,
             dialect: self.dialect,
             filter: self.filter.as_ref(),

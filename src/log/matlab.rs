@@ -10,14 +10,24 @@ use super::lines::unreadable;
 use super::sheet::{ColumnId, Request, Sheet};
 use crate::error::{Error, Result};
 use flate2::read::ZlibDecoder;
-use std::io::{self, Read};
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// Bytes of the header.
 const HEADER: usize = 128;
 
-/// Largest file, and largest array once unpacked, bytes.
+/// Largest file, and what the wanted variables may take once unpacked, all together, bytes.
 const LARGEST: u64 = 1 << 30;
+
+/// Longest description of an array that stands before its numbers, bytes: class, dimensions or name.
+const LONGEST_WORDS: usize = 4096;
+
+/// Most variables.
+const MOST_VARIABLES: usize = 100_000;
+
+/// Numbers that are unpacked at a time.
+const BLOCK: usize = 8192;
 
 /// How MATLAB and Python write what is read here.
 const SAVE: &str = "save it again, in MATLAB with save('log.mat', '-v7'), in Python with scipy.io.savemat";
@@ -55,32 +65,46 @@ pub(super) fn read(file: &Path, beginning: &[u8], request: &Request<'_>) -> Resu
         return Err(fail("this is no MATLAB file of version 5 to 7; it may be one of version 4, or damaged").next(SAVE));
     }
     let wanted = request.all_columns().map(|id| Wanted::new(file, id)).collect::<Result<Vec<_>>>()?;
-    let mut bytes = Vec::new();
-    let input = std::fs::File::open(file).map_err(|error| unreadable(file, &error))?;
-    input.take(LARGEST + 1).read_to_end(&mut bytes).map_err(|error| unreadable(file, &error))?;
-    if bytes.len() as u64 > LARGEST {
+    let mut input = Input::open(file)?;
+    if input.length > LARGEST {
         return Err(fail("this file is larger than 1 GiB").next("save only the variables that are needed"));
     }
-    let variables = variables(&bytes, &wanted).map_err(|error| {
+    let damaged = |error: io::Error| {
         let told = match error.kind() {
             io::ErrorKind::UnexpectedEof => "this MATLAB file breaks off before its end".to_string(),
             _ => format!("this MATLAB file is damaged: {error}"),
         };
         fail(&told).next(SAVE)
-    })?;
-    let columns = wanted.iter().map(|wanted| wanted.values(file, &variables)).collect::<Result<Vec<_>>>()?;
-    let lengths = columns.iter().map(Vec::len).zip(&wanted);
-    if let Some((first, (length, other))) =
-        columns.first().map(Vec::len).zip(lengths.into_iter().find(|(n, _)| *n != columns[0].len()))
-    {
+    };
+    let variables = input.variables().map_err(damaged)?;
+    let parts = wanted.iter().map(|wanted| wanted.part(file, &variables)).collect::<Result<Vec<_>>>()?;
+    if let Some((other, part)) = wanted.iter().zip(&parts).find(|(_, part)| part.length != parts[0].length) {
+        let (first, length) = (parts[0].length, part.length);
         let what = format!("{} has {first} values and {} has {length}", shown(&wanted[0].text), shown(&other.text));
         return Err(fail(&what).allowed("variables of the same length").next("save them with one value per sample"));
     }
-    if columns.first().is_none_or(Vec::is_empty) {
+    if parts.first().is_none_or(|part| part.length == 0) {
         return Err(fail("the variables are empty").next("check that the recording was saved"));
     }
+    within_budget(file, &variables, &parts)?;
+    let columns = input.columns(&variables, &parts, request.ordered).map_err(damaged)?;
     let names = wanted.iter().take(request.columns.len()).map(|wanted| shown(&wanted.text)).collect();
-    Sheet::from_columns(file, names, &columns, request)
+    Sheet::from_columns(file, names, columns, request)
+}
+
+/// Refuses what would take too much memory, by what the variables say of themselves; they hold no more than that.
+fn within_budget(file: &Path, variables: &[Variable], parts: &[Part]) -> Result<()> {
+    super::sheet::check_numbers(file, parts.len(), parts[0].length)?;
+    let read = variables.iter().enumerate().filter(|(k, _)| parts.iter().any(|part| part.variable == *k));
+    // As doubles: how they are stored is known only when they are unpacked.
+    let bytes = read.fold(0u64, |sum, (_, variable)| sum.saturating_add(8 * variable.count().unwrap_or(0) as u64));
+    if bytes <= LARGEST {
+        return Ok(());
+    }
+    Err(Error::new(format!("the wanted variables take {} MiB once unpacked", bytes >> 20))
+        .in_file(file)
+        .allowed("up to 1024 MiB")
+        .next("save the columns that are needed as variables of their own"))
 }
 
 /// A variable that is asked for, or a column or row of one.
@@ -88,14 +112,22 @@ struct Wanted {
     /// As it was asked for: `data(:,2)`.
     text: String,
     name: String,
-    part: Part,
+    which: Which,
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Part {
+enum Which {
     Vector,
     Column(usize),
     Row(usize),
+}
+
+/// Where the numbers of a wanted variable are: within the variable, stored column by column, every `step`-th from `first` on.
+struct Part {
+    variable: usize,
+    first: usize,
+    step: usize,
+    length: usize,
 }
 
 impl Wanted {
@@ -105,26 +137,26 @@ impl Wanted {
                 format!("column {} is asked for by number; this MATLAB file holds variables with names", id.shown());
             return Err(Error::new(what).in_file(file).next("name the variable, or a column of one as \"data(:,2)\""));
         };
-        let whole = Self { text: text.clone(), name: text.clone(), part: Part::Vector };
+        let whole = Self { text: text.clone(), name: text.clone(), which: Which::Vector };
         let Some((name, rest)) = text.strip_suffix(')').and_then(|text| text.split_once('(')) else { return Ok(whole) };
         let number = |text: &str| text.trim().parse::<usize>().ok().filter(|&k| k > 0);
-        let part = match rest.split_once(',') {
-            Some((all, k)) if all.trim() == ":" => number(k).map(Part::Column),
-            Some((k, all)) if all.trim() == ":" => number(k).map(Part::Row),
+        let which = match rest.split_once(',') {
+            Some((all, k)) if all.trim() == ":" => number(k).map(Which::Column),
+            Some((k, all)) if all.trim() == ":" => number(k).map(Which::Row),
             _ => None,
         };
-        match part {
-            Some(part) => Ok(Self { name: name.trim().to_string(), part, ..whole }),
+        match which {
+            Some(which) => Ok(Self { name: name.trim().to_string(), which, ..whole }),
             None => Err(Error::new(format!("{} is neither a variable nor a part of one", shown(text)))
                 .in_file(file)
                 .allowed("a name such as x, a column such as x(:,2), a row such as x(2,:)")),
         }
     }
 
-    fn values(&self, file: &Path, variables: &[Variable]) -> Result<Vec<f64>> {
+    fn part(&self, file: &Path, variables: &[Variable]) -> Result<Part> {
         let fail = |what: String| Error::new(what).in_file(file);
         let name = shown(&self.name);
-        let Some(variable) = variables.iter().find(|variable| variable.name == self.name) else {
+        let Some(place) = variables.iter().position(|variable| variable.name == self.name) else {
             let list: Vec<String> = variables.iter().take(20).map(Variable::described).collect();
             let error = fail(format!("there is no variable {name}")).allowed(list.join(", "));
             return Err(match near(&self.name, variables.iter().map(|v| v.name.as_str())) {
@@ -132,32 +164,34 @@ impl Wanted {
                 None => error.next("name one of these variables"),
             });
         };
+        let variable = &variables[place];
         let size = variable.size();
-        let Content::Numbers(values) = &variable.content else {
+        if !variable.is_numeric() || variable.complex {
             let kind = variable.kind();
             let error = fail(format!("{name} is {kind}, which is not read")).allowed("arrays of real numbers");
             return Err(error.next(variable.remedy()));
-        };
+        }
         let &[rows, columns] = &variable.dimensions[..] else {
             return Err(fail(format!("{name} has {} dimensions ({size})", variable.dimensions.len()))
                 .allowed("vectors and matrices")
                 .next("save the part that is the log as a variable of its own"));
         };
-        match self.part {
-            Part::Vector if rows == 1 || columns == 1 || values.is_empty() => Ok(values.clone()),
-            Part::Vector => {
+        let part = |first: usize, step: usize, length: usize| Part { variable: place, first, step, length };
+        match self.which {
+            Which::Vector if rows.min(columns) <= 1 => Ok(part(0, 1, rows.saturating_mul(columns))),
+            Which::Vector => {
                 let (part, other) =
                     if rows >= columns { ("(:,1)", "its first column") } else { ("(1,:)", "its first row") };
                 Err(fail(format!("{name} is a matrix of {size} numbers"))
                     .allowed("a vector, or a part of a matrix")
                     .next(format!("write \"{}{part}\" for {other}, and so on", self.name)))
             }
-            Part::Column(k) if k <= columns => Ok(values[(k - 1) * rows..k * rows].to_vec()),
-            Part::Row(k) if k <= rows => Ok(values[k - 1..].iter().step_by(rows).copied().collect()),
-            Part::Column(_) | Part::Row(_) => {
+            Which::Column(k) if k <= columns => Ok(part((k - 1).saturating_mul(rows), 1, rows)),
+            Which::Row(k) if k <= rows => Ok(part(k - 1, rows, columns)),
+            Which::Column(_) | Which::Row(_) => {
                 let what = format!("{} is outside of {name}, which has {size} numbers", shown(&self.text));
                 let (word, most) =
-                    if matches!(self.part, Part::Row(_)) { ("rows", rows) } else { ("columns", columns) };
+                    if matches!(self.which, Which::Row(_)) { ("rows", rows) } else { ("columns", columns) };
                 Err(fail(what).allowed(format!("{word} 1 to {most}")))
             }
         }
@@ -168,15 +202,12 @@ impl Wanted {
 struct Variable {
     name: String,
     class: u8,
+    complex: bool,
     dimensions: Vec<usize>,
-    content: Content,
-}
-
-enum Content {
-    Numbers(Vec<f64>),
-    Complex,
-    /// Of another kind, or not asked for.
-    Passed,
+    /// Where its element is in the file, behind its tag; its length, and whether it is packed.
+    begin: u64,
+    length: u64,
+    packed: bool,
 }
 
 impl Variable {
@@ -185,26 +216,31 @@ impl Variable {
     }
 
     fn kind(&self) -> &'static str {
-        match (self.class, &self.content) {
-            (1, _) => "a cell array",
-            (2, _) => "a struct",
-            (4, _) => "text",
-            (5, _) => "a sparse matrix",
-            (_, Content::Complex) => "an array of complex numbers",
+        match self.class {
+            1 => "a cell array",
+            2 => "a struct",
+            4 => "text",
+            5 => "a sparse matrix",
+            _ if self.complex => "an array of complex numbers",
             _ => "an object",
         }
     }
 
     fn remedy(&self) -> String {
         let name = &self.name;
-        let made = match (self.class, &self.content) {
-            (1, _) => format!("t = cell2mat({name}(:,1))"),
-            (4, _) => format!("t = str2double({name})"),
-            (5, _) => format!("t = full({name})"),
-            (_, Content::Complex) => format!("t = real({name})"),
+        let made = match self.class {
+            1 => format!("t = cell2mat({name}(:,1))"),
+            4 => format!("t = str2double({name})"),
+            5 => format!("t = full({name})"),
+            _ if self.complex => format!("t = real({name})"),
             _ => format!("t = {name}.t"),
         };
         format!("save its numbers as a variable of their own: {made}; save('log.mat', 't', '-v7')")
+    }
+
+    /// How many numbers it says it has.
+    fn count(&self) -> Option<usize> {
+        self.dimensions.iter().try_fold(1usize, |n, &d| n.checked_mul(d))
     }
 
     fn is_numeric(&self) -> bool {
@@ -219,33 +255,151 @@ impl Variable {
     }
 }
 
-/// All variables of a file, with the numbers of the wanted ones.
-fn variables(bytes: &[u8], wanted: &[Wanted]) -> io::Result<Vec<Variable>> {
-    let big = bytes.get(126..HEADER) == Some(b"MI");
-    let mut input = bytes.get(HEADER..).ok_or(io::ErrorKind::UnexpectedEof)?;
-    let mut found = Vec::new();
-    while !input.is_empty() {
-        let mut outer = Elements { input, big };
-        let (kind, size, _) = outer.tag()?;
-        let body = outer.input.get(..size).ok_or(io::ErrorKind::UnexpectedEof)?;
-        let variable = match kind {
-            COMPRESSED => {
-                let mut inner = Elements { input: ZlibDecoder::new(body), big };
-                match inner.tag()? {
-                    (MATRIX, ..) => Some(inner.variable(wanted)?),
-                    _ => None,
+/// The file, of which only what is wanted is unpacked.
+struct Input {
+    file: BufReader<File>,
+    length: u64,
+    big: bool,
+}
+
+impl Input {
+    fn open(file: &Path) -> Result<Self> {
+        let open = || {
+            let mut input = BufReader::new(File::open(file)?);
+            let length = input.get_ref().metadata()?.len();
+            input.seek(SeekFrom::Start(126))?;
+            let mut order = [0; 2];
+            input.read_exact(&mut order)?;
+            Ok(Self { file: input, length, big: order == *b"MI" })
+        };
+        open().map_err(|error| unreadable(file, &error))
+    }
+
+    /// What all variables say of themselves.
+    fn variables(&mut self) -> io::Result<Vec<Variable>> {
+        let mut place = HEADER as u64;
+        let mut found = Vec::new();
+        while place < self.length {
+            self.file.seek(SeekFrom::Start(place))?;
+            let (kind, length, short) = Elements { input: &mut self.file, big: self.big }.tag()?;
+            let (begin, length) = (place + 8, if short.is_some() { 0 } else { length as u64 });
+            if begin + length > self.length {
+                return Err(io::ErrorKind::UnexpectedEof.into());
+            }
+            if matches!(kind, MATRIX | COMPRESSED) {
+                let described = self.element(begin, length, kind == COMPRESSED)?.map(|mut inner| inner.variable());
+                let described =
+                    described.transpose()?.map(|v| Variable { begin, length, packed: kind == COMPRESSED, ..v });
+                // What has no name is MATLAB's own.
+                found.extend(described.filter(|variable| !variable.name.is_empty()));
+                if found.len() > MOST_VARIABLES {
+                    return Err(bad("it has more than 100,000 variables"));
                 }
             }
-            MATRIX => Some(Elements { input: body, big }.variable(wanted)?),
-            _ => None,
-        };
-        // What has no name is MATLAB's own.
-        found.extend(variable.filter(|variable| !variable.name.is_empty()));
-        // Compressed elements are not filled up to eight bytes.
-        let size = if kind == COMPRESSED { size } else { size.next_multiple_of(8) };
-        input = outer.input.get(size..).unwrap_or_default();
+            // Compressed elements are not filled up to eight bytes.
+            place = begin + if kind == COMPRESSED { length } else { length.next_multiple_of(8) };
+        }
+        Ok(found)
     }
-    Ok(found)
+
+    /// The inside of an array that lies here; none if it is of another kind.
+    fn element(&mut self, begin: u64, length: u64, packed: bool) -> io::Result<Option<Elements<Box<dyn Read + '_>>>> {
+        self.file.seek(SeekFrom::Start(begin))?;
+        let body = (&mut self.file).take(length);
+        let input: Box<dyn Read> = if packed { Box::new(ZlibDecoder::new(body)) } else { Box::new(body) };
+        let mut inner = Elements { input, big: self.big };
+        Ok(match packed.then(|| inner.tag()).transpose()? {
+            None | Some((MATRIX, ..)) => Some(inner),
+            Some(_) => None,
+        })
+    }
+
+    /// The numbers of the parts, each variable unpacked once. Where the first part has to increase, all end with the
+    /// first number that does not: what follows is of no use, and a file may be packed a thousand times over.
+    fn columns(&mut self, variables: &[Variable], parts: &[Part], ordered: bool) -> io::Result<Vec<Vec<f64>>> {
+        let mut columns: Vec<Vec<f64>> = parts.iter().map(|_| Vec::new()).collect();
+        let mut length = parts.first().map_or(0, |part| part.length);
+        let first = usize::from(ordered);
+        if ordered {
+            self.numbers(&variables[parts[0].variable], parts, &[0], &mut columns, length, true)?;
+            length = columns[0].len();
+        }
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for k in first..parts.len() {
+            match groups.iter_mut().find(|group| parts[group[0]].variable == parts[k].variable) {
+                Some(group) => group.push(k),
+                None => groups.push(vec![k]),
+            }
+        }
+        for group in groups {
+            self.numbers(&variables[parts[group[0]].variable], parts, &group, &mut columns, length, false)?;
+        }
+        Ok(columns)
+    }
+
+    /// So many numbers of `these` parts, which are of one variable.
+    fn numbers(
+        &mut self,
+        variable: &Variable,
+        parts: &[Part],
+        these: &[usize],
+        columns: &mut [Vec<f64>],
+        length: usize,
+        ordered: bool,
+    ) -> io::Result<()> {
+        let big = self.big;
+        let inner = self.element(variable.begin, variable.length, variable.packed)?;
+        let mut inner = inner.ok_or(io::ErrorKind::UnexpectedEof)?;
+        inner.variable()?;
+        let (kind, size, short) = inner.tag()?;
+        let width = width(kind)?;
+        if variable.count().and_then(|n| n.checked_mul(width)) != Some(size) {
+            return Err(bad("an array does not have as many numbers as it says"));
+        }
+        let mut data: Box<dyn Read> = match &short {
+            Some(data) => Box::new(&data[..size]),
+            None => inner.input,
+        };
+        let end = these.iter().map(|&k| parts[k].first + parts[k].step * (length - 1) + 1).max().unwrap_or(0);
+        let mut block = vec![0; width * BLOCK];
+        for begin in (0..end).step_by(BLOCK) {
+            let bytes = &mut block[..width * BLOCK.min(end - begin)];
+            data.read_exact(bytes)?;
+            let numbers = values(kind, bytes, big)?;
+            for &k in these {
+                parts[k].take(&numbers, begin, length, &mut columns[k]);
+            }
+            let times = &mut columns[these[0]];
+            let known = begin.saturating_sub(parts[these[0]].first) / parts[these[0]].step;
+            if ordered && let Some(i) = (known.max(1)..times.len()).find(|&i| times[i] <= times[i - 1]) {
+                times.truncate(i + 1);
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Part {
+    /// Adds what a block of the variable's numbers, from number `begin` on, has of it, up to `length` in all.
+    fn take(&self, block: &[f64], begin: usize, length: usize, column: &mut Vec<f64>) {
+        while column.len() < length {
+            let place = self.first + self.step * column.len();
+            let Some(number) = place.checked_sub(begin).and_then(|place| block.get(place)) else { return };
+            column.push(*number);
+        }
+    }
+}
+
+/// Bytes of a number.
+fn width(kind: u32) -> io::Result<usize> {
+    Ok(match kind {
+        1 | 2 => 1,
+        3 | 4 => 2,
+        5..=7 => 4,
+        9 | 12 | 13 => 8,
+        _ => return Err(bad("an array has numbers of an unknown type")),
+    })
 }
 
 /// Elements one after another.
@@ -277,28 +431,24 @@ impl<R: Read> Elements<R> {
         }
     }
 
-    /// The next element whole.
+    /// The next element whole; it is short.
     fn element(&mut self) -> io::Result<(u32, Vec<u8>)> {
         let (kind, size, short) = self.tag()?;
         if let Some(data) = short {
             return Ok((kind, data[..size].to_vec()));
         }
-        if size as u64 > LARGEST {
-            return Err(bad("an array is larger than 1 GiB"));
+        if size > LONGEST_WORDS {
+            return Err(bad("the name or the dimensions of an array are longer than 4096 bytes"));
         }
-        let mut data = Vec::new();
-        let all = size.next_multiple_of(8);
-        (&mut self.input).take(all as u64).read_to_end(&mut data)?;
-        // The last element may lack what fills it up.
-        if data.len() < size {
-            return Err(io::ErrorKind::UnexpectedEof.into());
-        }
-        data.truncate(size);
+        let mut data = vec![0; size];
+        self.input.read_exact(&mut data)?;
+        let filling = (size.next_multiple_of(8) - size) as u64;
+        io::copy(&mut (&mut self.input).take(filling), &mut io::sink())?;
         Ok((kind, data))
     }
 
-    /// A variable, whose tag has been read.
-    fn variable(&mut self, wanted: &[Wanted]) -> io::Result<Variable> {
+    /// What a variable says of itself, before its numbers; its tag has been read.
+    fn variable(&mut self) -> io::Result<Variable> {
         let (_, flags) = self.element()?;
         let flags = flags.get(..4).and_then(|word| word.try_into().ok()).ok_or(bad("an array has no class"))?;
         let flags = self.number(flags);
@@ -312,21 +462,7 @@ impl<R: Read> Elements<R> {
         };
         let (_, name) = self.element()?;
         let name = String::from_utf8_lossy(&name).into_owned();
-        let mut variable = Variable { name, class, dimensions, content: Content::Passed };
-        if !variable.is_numeric() || wanted.iter().all(|wanted| wanted.name != variable.name) {
-            return Ok(variable);
-        }
-        if complex {
-            variable.content = Content::Complex;
-            return Ok(variable);
-        }
-        let (kind, data) = self.element()?;
-        let numbers = values(kind, &data, self.big)?;
-        if variable.dimensions.iter().try_fold(1usize, |n, &d| n.checked_mul(d)) != Some(numbers.len()) {
-            return Err(bad("an array does not have as many numbers as it says"));
-        }
-        variable.content = Content::Numbers(numbers);
-        Ok(variable)
+        Ok(Variable { name, class, complex, dimensions, begin: 0, length: 0, packed: false })
     }
 }
 

@@ -92,7 +92,7 @@ pub fn read_columns(file: &Path, names: &[&str]) -> Result<Vec<Vec<f64>>> {
 /// The columns called `time` and `column` of a file; the times must increase from row to row.
 pub fn read_samples(file: &Path, time: &str, column: &str) -> Result<(Vec<f64>, Vec<f64>)> {
     let ids = [time, column].map(ColumnId::from);
-    let mut sheet = Sheet::read(file, &Request::complete(&ids))?;
+    let mut sheet = Sheet::read(file, &Request { ordered: true, ..Request::complete(&ids) })?;
     let times = &sheet.columns[0];
     for (before, row) in (1..times.len()).enumerate() {
         let (t, last) = (times[row], times[before]);

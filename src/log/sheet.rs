@@ -8,6 +8,24 @@ use std::path::{Path, PathBuf};
 /// Most values of a column that a message lists.
 const LISTED: usize = 10;
 
+/// Most numbers that are read from one file: 256 MiB, and a few times as much while they become logs.
+const MOST_NUMBERS: usize = 1 << 25;
+
+/// Refuses more numbers than that.
+pub(super) fn check_numbers(file: &Path, columns: usize, rows: usize) -> Result<()> {
+    if columns.saturating_mul(rows) <= MOST_NUMBERS {
+        return Ok(());
+    }
+    let what = match columns {
+        1 => format!("{rows} rows are too many"),
+        n => format!("{rows} rows of {n} columns are too many"),
+    };
+    Err(Error::new(what)
+        .in_file(file)
+        .allowed(format!("up to {} rows of that many columns", MOST_NUMBERS / columns.max(1)))
+        .next("save a part of the recording, every n-th row of it, or fewer columns"))
+}
+
 /// A column of a file.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum ColumnId {
@@ -63,6 +81,8 @@ pub(super) struct Request<'a> {
     pub columns: &'a [ColumnId],
     /// How many of them, from the first on, must have a value in every row.
     pub complete: usize,
+    /// Whether the first column has to increase: rows behind the first one that breaks this may then be missing.
+    pub ordered: bool,
     /// Whether a row under the header may name the units.
     pub units_row: bool,
     pub dialect: Dialect,
@@ -75,7 +95,15 @@ impl<'a> Request<'a> {
     /// These columns, with a value in every row.
     pub fn complete(columns: &'a [ColumnId]) -> Self {
         let complete = columns.len();
-        Self { columns, complete, units_row: false, dialect: Dialect::default(), filter: None, split: None }
+        Self {
+            columns,
+            complete,
+            ordered: false,
+            units_row: false,
+            dialect: Dialect::default(),
+            filter: None,
+            split: None,
+        }
     }
 
     /// The wanted columns, then that of the filter, then that of the split.
@@ -133,13 +161,18 @@ impl Sheet {
     }
 
     /// From whole columns: the wanted ones, then that of the filter, then that of the split.
-    pub fn from_columns(file: &Path, names: Vec<String>, columns: &[Vec<f64>], request: &Request<'_>) -> Result<Self> {
+    pub fn from_columns(
+        file: &Path,
+        names: Vec<String>,
+        mut columns: Vec<Vec<f64>>,
+        request: &Request<'_>,
+    ) -> Result<Self> {
         let mut sheet = Self { file: file.to_path_buf(), names, ..Self::default() };
         sheet.begin(request);
-        let wanted = request.columns.len();
         let rows = columns.first().map_or(0, Vec::len);
+        let others = columns.split_off(request.columns.len());
         for row in 0..rows {
-            let mut rest = columns[wanted..].iter().map(|column| shortest(column[row]));
+            let mut rest = others.iter().map(|column| shortest(column[row]));
             if let Some(filter) = request.filter {
                 let value = rest.next().unwrap_or_default();
                 sheet.note_filtered(&value);
@@ -150,7 +183,7 @@ impl Sheet {
             if request.split.is_some() {
                 sheet.note_run(&rest.next().unwrap_or_default());
             }
-            for (i, theirs) in columns[..wanted].iter().enumerate() {
+            for (i, theirs) in columns.iter().enumerate() {
                 let value = theirs[row];
                 if value.is_infinite() || (value.is_nan() && i < request.complete) {
                     let what = if value.is_nan() { "has no value" } else { "is infinite" };
@@ -161,10 +194,14 @@ impl Sheet {
                     };
                     return Err(error.allowed("a finite number").next(next));
                 }
-                sheet.columns[i].push(value);
             }
             sheet.rows.push(row + 1);
         }
+        for column in &mut columns {
+            sheet.rows.iter().enumerate().for_each(|(k, row)| column[k] = column[row - 1]);
+            column.truncate(sheet.rows.len());
+        }
+        sheet.columns = columns;
         Ok(sheet)
     }
 

@@ -104,13 +104,12 @@ impl Form {
     /// Its value, from stretches rather than from large positions, so that little is lost to cancellation.
     #[inline]
     pub fn value(&self, plant: &Plant, state: &State, input: f64) -> f64 {
-        self.value_at(&stretches(plant.stage().pulley_radius, state), 0.0, state, input)
+        self.value_at(&stretches(plant.stage().pulley_radius, state), state, input)
     }
 
-    /// Its value at these stretches, the cart's position counted from `origin`; speeds and current from `state`, in whichever
-    /// coordinates.
+    /// Its value at these stretches; speeds and current from `state`, in whichever coordinates.
     #[inline]
-    pub(crate) fn value_at(&self, stretch: &[f64; STRETCHES], origin: f64, state: &State, input: f64) -> f64 {
+    pub(crate) fn value_at(&self, stretch: &[f64; STRETCHES], state: &State, input: f64) -> f64 {
         let mut sum = 0.0;
         for (&coefficient, stretch) in self.stretch.iter().zip(stretch) {
             sum += coefficient * stretch;
@@ -118,13 +117,7 @@ impl Form {
         for (place, &coefficient) in SPEED_PLACE.into_iter().zip(&self.speed) {
             sum += coefficient * state[place];
         }
-        sum + self.current * state[place::CURRENT] + self.input * input + self.constant_from(origin)
-    }
-
-    /// Its constant part where positions are counted from `origin`.
-    #[inline]
-    pub(crate) fn constant_from(&self, origin: f64) -> f64 {
-        self.constant + self.stretch[POSITION] * origin
+        sum + self.current * state[place::CURRENT] + self.input * input + self.constant
     }
 }
 
@@ -132,10 +125,9 @@ impl Form {
 pub(crate) const ROUNDING: f64 = 5e-15;
 
 impl Form {
-    /// An estimate of the rounding error of its value; `inner` is a state in the solvers' coordinates, `origin` where their
-    /// positions are counted from.
-    pub(crate) fn noise(&self, inner: &State, origin: f64, input: f64) -> f64 {
-        let mut size = (self.input * input).abs() + self.constant_from(origin).abs();
+    /// An estimate of the rounding error of its value; `inner` is a state in the solvers' coordinates.
+    pub(crate) fn noise(&self, inner: &State, input: f64) -> f64 {
+        let mut size = (self.input * input).abs() + self.constant.abs();
         for (coefficient, value) in self.on_stretches().iter().zip(inner) {
             size += (coefficient * value).abs();
         }

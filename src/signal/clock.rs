@@ -52,6 +52,51 @@ impl Now {
     }
 }
 
+/// Signals one after another, each on its own clock; the last goes on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sequence {
+    slots: Vec<Slot>,
+    /// When each turn begins, on the sequence's clock, s; and what rounding left over of it.
+    starts: Vec<(f64, f64)>,
+}
+
+impl Sequence {
+    /// These turns in this order; those that last no time are passed over.
+    pub fn new(slots: Vec<Slot>) -> Self {
+        // The running sum of the turns is start + rest, so that ten turns of 0.1 s end at 1 s.
+        let mut sum = (0.0, 0.0);
+        let mut begin = |slot: &Slot| {
+            let start = sum;
+            let (next, error) = two_sum(sum.0, slot.lasts.max(0.0));
+            sum = two_sum(next, sum.1 + error);
+            start
+        };
+        let starts = slots.iter().map(&mut begin).collect();
+        Self { slots, starts }
+    }
+
+    /// The turns.
+    pub fn slots(&self) -> &[Slot] {
+        &self.slots
+    }
+
+    /// Whose turn it is `now`, found by halving: a look-up costs the logarithm of the number of turns. None without turns.
+    pub(super) fn turn(&self, now: Now) -> Option<Turn<'_>> {
+        // The first turn whose end, the start of the next, is not reached.
+        let ends = self.starts.get(1..)?;
+        let place = ends.partition_point(|(end, _)| now.reached(*end));
+        let (slot, &(start, rest)) = (self.slots.get(place)?, self.starts.get(place)?);
+        let end = ends.get(place).map_or(f64::INFINITY, |(end, _)| *end);
+        Some(Turn { signal: &slot.signal, now: now.showing((now.t - start) - rest), start, rest, end })
+    }
+
+    /// When all turns are over, s; none if the last one has no end.
+    pub(super) fn duration(&self) -> Option<f64> {
+        let (Some(last), Some((start, _))) = (self.slots.last(), self.starts.last()) else { return Some(0.0) };
+        Some(start + if last.lasts.is_finite() { last.lasts.max(0.0) } else { last.signal.duration()? })
+    }
+}
+
 /// A slot's turn in a sequence.
 pub(super) struct Turn<'a> {
     /// Whose turn it is.
@@ -59,37 +104,17 @@ pub(super) struct Turn<'a> {
     /// The moment on its own clock.
     pub now: Now,
     /// When the turn began, on the sequence's clock, s; and what rounding left over of it.
-    pub start: f64,
+    start: f64,
     rest: f64,
     /// When it ends; infinite for the last.
     pub end: f64,
 }
 
-impl<'a> Turn<'a> {
-    fn new(slot: &'a Slot, now: Now, (start, rest): (f64, f64), end: f64) -> Self {
-        Self { signal: &slot.signal, now: now.showing((now.t - start) - rest), start, rest, end }
-    }
-
+impl Turn<'_> {
     /// A time on the slot's clock, read on the sequence's.
     pub fn outside(&self, t: f64) -> f64 {
         self.start + (t + self.rest)
     }
-}
-
-/// Whose turn it is `now`; slots that last no time are passed over, the last goes on. None without slots.
-pub(super) fn turn(slots: &[Slot], now: Now) -> Option<Turn<'_>> {
-    let (last, earlier) = slots.split_last()?;
-    // The running sum of the turns is start + rest, so that ten turns of 0.1 s end at 1 s.
-    let (mut start, mut rest) = (0.0, 0.0);
-    for slot in earlier {
-        let (next, error) = two_sum(start, slot.lasts.max(0.0));
-        let (next, next_rest) = two_sum(next, rest + error);
-        if !now.reached(next) {
-            return Some(Turn::new(slot, now, (start, rest), next));
-        }
-        (start, rest) = (next, next_rest);
-    }
-    Some(Turn::new(last, now, (start, rest), f64::INFINITY))
 }
 
 /// a + b, rounded, and the error of that.

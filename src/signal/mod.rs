@@ -19,6 +19,7 @@ mod smooth;
 mod tests;
 
 use clock::Now;
+pub use clock::Sequence;
 
 /// Highest power of time in a [`Piece`].
 pub const DEGREE: usize = 7;
@@ -146,7 +147,7 @@ pub enum Signal {
     /// All of these added.
     Sum(Vec<Signal>),
     /// One after another, each on its own clock; the last goes on.
-    Sequence(Vec<Slot>),
+    Sequence(Sequence),
 }
 
 /// One sine of a multisine.
@@ -201,6 +202,11 @@ impl Part {
 }
 
 impl Signal {
+    /// One after another, each on its own clock; the last goes on.
+    pub fn sequence(slots: Vec<Slot>) -> Self {
+        Self::Sequence(Sequence::new(slots))
+    }
+
     /// The piece that holds at time `t`, s, from `t` on; at a seam, the one that begins there.
     ///
     /// `piece(0.0)`, then `piece(previous.end)` and so on visits every seam once; `end` is later than `t`, and infinite
@@ -235,11 +241,7 @@ impl Signal {
             Self::Table { points } => Some(points.last().map_or(0.0, |p| p[0].max(0.0))),
             Self::Sampled { times, .. } => Some(times.last().map_or(0.0, |t| t.max(0.0))),
             Self::Sum(signals) => signals.iter().try_fold(0.0, |end: f64, s| Some(end.max(s.duration()?))),
-            Self::Sequence(slots) => {
-                let Some(last) = slots.last() else { return Some(0.0) };
-                let turn = clock::turn(slots, Now::at(f64::MAX)).map_or(0.0, |turn| turn.start);
-                Some(turn + if last.lasts.is_finite() { last.lasts.max(0.0) } else { last.signal.duration()? })
-            }
+            Self::Sequence(turns) => turns.duration(),
         }
     }
 
@@ -268,8 +270,8 @@ impl Signal {
                 }
                 sum
             }
-            Self::Sequence(slots) => {
-                let Some(turn) = clock::turn(slots, now) else { return Part::held(0.0, f64::INFINITY) };
+            Self::Sequence(turns) => {
+                let Some(turn) = turns.turn(now) else { return Part::held(0.0, f64::INFINITY) };
                 let part = turn.signal.part(turn.now);
                 Part { end: turn.outside(part.end).min(turn.end), ..part }
             }
@@ -292,7 +294,7 @@ impl Signal {
             Self::Table { points } => edges::Points::of_table(points).value(now),
             Self::Sampled { times, values, hold } => edges::Points::of_samples(times, values, *hold).value(now),
             Self::Sum(signals) => signals.iter().map(|signal| signal.value_at(now)).sum::<f64>() + 0.0,
-            Self::Sequence(slots) => clock::turn(slots, now).map_or(0.0, |turn| turn.signal.value_at(turn.now)),
+            Self::Sequence(turns) => turns.turn(now).map_or(0.0, |turn| turn.signal.value_at(turn.now)),
         }
     }
 }
@@ -307,7 +309,7 @@ impl Signal {
             Signal::Sampled { hold: Hold::Linear, .. } => 1,
             Signal::Sine { .. } | Signal::Chirp { .. } | Signal::Multisine { .. } => DEGREE,
             Signal::Sum(parts) => parts.iter().map(Signal::degree).max().unwrap_or(0),
-            Signal::Sequence(slots) => slots.iter().map(|slot| slot.signal.degree()).max().unwrap_or(0),
+            Signal::Sequence(turns) => turns.slots().iter().map(|slot| slot.signal.degree()).max().unwrap_or(0),
         }
     }
 }

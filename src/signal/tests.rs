@@ -56,7 +56,10 @@ fn negated(signal: &Signal) -> Signal {
         Signal::Table { points } => points.iter_mut().for_each(|p| p[1] = -p[1]),
         Signal::Sampled { values, .. } => values.iter_mut().for_each(|v| *v = -*v),
         Signal::Sum(signals) => signals.iter_mut().for_each(|s| *s = negated(s)),
-        Signal::Sequence(slots) => slots.iter_mut().for_each(|slot| slot.signal = negated(&slot.signal)),
+        Signal::Sequence(turns) => {
+            let slots = turns.slots().iter().map(|slot| Slot { signal: negated(&slot.signal), lasts: slot.lasts });
+            *turns = Sequence::new(slots.collect());
+        }
     }
     signal
 }
@@ -118,7 +121,7 @@ fn any_signal() -> impl Strategy<Value = Signal> {
         let slot = (inner.clone(), lasts).prop_map(|(signal, lasts)| Slot { signal, lasts });
         prop_oneof![
             prop::collection::vec(inner, 0..4).prop_map(Signal::Sum),
-            prop::collection::vec(slot, 0..4).prop_map(Signal::Sequence),
+            prop::collection::vec(slot, 0..4).prop_map(Signal::sequence),
         ]
     })
 }
@@ -170,7 +173,7 @@ proptest! {
             Signal::Chirp { amplitude: 1.0, from: a, to: b, over: c },
             Signal::Prbs { amplitude: 1.0, bit: a, seed: 1 },
             Signal::Table { points: vec![[a, 1.0], [b, 2.0], [c, 3.0]] },
-            Signal::Sequence(vec![
+            Signal::sequence(vec![
                 Slot { signal: Signal::Step { value: 1.0, at: 0.0 }, lasts: a },
                 Slot { signal: Signal::Step { value: 1.0, at: b }, lasts: c },
             ]),
@@ -211,7 +214,7 @@ fn no_seam_is_missed_or_doubled() {
     assert_eq!(seams(&twice, 1000.01), 30_000);
     // In a sequence the clocks differ as well.
     let slot = |lasts| Slot { signal: square(10.0, 0.5), lasts };
-    let turns = Signal::Sequence(vec![slot(0.1), slot(0.7), slot(0.3), slot(1.1), slot(1.0)]);
+    let turns = Signal::sequence(vec![slot(0.1), slot(0.7), slot(0.3), slot(1.1), slot(1.0)]);
     assert_eq!(seams(&Signal::Sum(vec![turns.clone(), square(10.0, 0.5)]), 1000.01), seams(&turns, 1000.01));
     assert_eq!(seams(&turns, 1000.01), 20_000);
     assert_eq!(seams(&Signal::Sine { amplitude: 1.0, frequency: 3.0, phase: 0.3, offset: 1.0 }, 100.001), 7800);
@@ -221,12 +224,22 @@ fn no_seam_is_missed_or_doubled() {
 #[test]
 fn ten_turns_of_a_tenth_end_at_one() {
     let slot = |value| Slot { signal: Signal::Step { value, at: 0.0 }, lasts: 0.1 };
-    let signal = Signal::Sequence((0..11).map(|k| slot(f64::from(k))).collect());
+    let signal = Signal::sequence((0..11).map(|k| slot(f64::from(k))).collect());
     let ends: Vec<f64> = walk(&signal, 1.0).iter().map(|p| p.end).take(10).collect();
     assert_eq!(ends, (1..=10).map(|k| 0.1 * f64::from(k)).collect::<Vec<_>>());
     assert_eq!(ends[9], 1.0);
     assert_eq!(signal.value(0.3), 3.0);
     assert_eq!(signal.duration(), Some(1.1));
+}
+
+/// Each look-up counted the turns from the first on: a million of them, met one after another, would have taken hours.
+#[test]
+fn a_million_turns_are_met_in_no_time() {
+    let slot = |k: u32| Slot { signal: Signal::Step { value: f64::from(k), at: 0.0 }, lasts: 0.1 };
+    let signal = Signal::sequence((0..1_000_000).map(slot).collect());
+    assert_eq!(seams(&signal, 99_999.95), 999_999);
+    assert_eq!((signal.value(0.0), signal.value(1234.5), signal.value(1e9)), (0.0, 12345.0, 999_999.0));
+    assert_eq!(signal.duration(), Some(100_000.0));
 }
 
 #[test]
@@ -300,7 +313,7 @@ fn nothing_hangs_or_breaks_where_nothing_is_said() {
         Signal::Table { points: vec![] },
         Signal::Sampled { times: vec![0.0, 1.0], values: vec![], hold: Hold::Linear },
         Signal::Sum(vec![]),
-        Signal::Sequence(vec![]),
+        Signal::sequence(vec![]),
         Signal::Multisine { tones: vec![] },
         Signal::Pulse { value: 1.0, duration: 0.0, at: 0.0 },
         Signal::Chirp { amplitude: 1.0, from: 1.0, to: 2.0, over: 0.0 },
@@ -335,8 +348,8 @@ fn durations() {
     let slots = |lasts| {
         vec![Slot { signal: Signal::Step { value: 1.0, at }, lasts: 2.0 }, Slot { signal: pulse.clone(), lasts }]
     };
-    assert_eq!(Signal::Sequence(slots(1.0)).duration(), Some(3.0));
-    assert_eq!(Signal::Sequence(slots(f64::INFINITY)).duration(), Some(2.75));
+    assert_eq!(Signal::sequence(slots(1.0)).duration(), Some(3.0));
+    assert_eq!(Signal::sequence(slots(f64::INFINITY)).duration(), Some(2.75));
 }
 
 /// Run with `--ignored --nocapture` in release: the cost of a call, in nanoseconds.

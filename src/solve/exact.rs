@@ -53,6 +53,7 @@ pub(super) fn run(
     detail: Detail,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Outcome {
+    let plant = &*plant.seen_from(experiment.initial.cart_position);
     // Eight moving quantities (three positions, three speeds, current, input) serve straight inputs; smooth ones carry
     // their derivatives along.
     // A rotor that turns by itself adds two.
@@ -129,7 +130,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         let mode = plant.first_mode(&start);
         coordinates.hold(&mode, &inner);
         let shared = propagators(laws);
-        let (law, is_new) = Law::of(laws, plant, mode, h, coordinates.origin());
+        let (law, is_new) = Law::of(laws, plant, mode, h);
         Self {
             plant,
             coordinates,
@@ -546,12 +547,12 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
 
     /// What rounding may have done to the value of a form.
     fn noise(&self, form: &Form) -> f64 {
-        form.noise(&self.inner(), self.coordinates.origin(), self.input())
+        form.noise(&self.inner(), self.input())
     }
 
     fn value(&self, form: &Form) -> f64 {
         let inner = self.inner();
-        form.value_at(&stretches(&inner), self.coordinates.origin(), &inner, self.input())
+        form.value_at(&stretches(&inner), &inner, self.input())
     }
 }
 

@@ -52,7 +52,7 @@ pub(super) fn run(
     if !(1e-14..=1e-2).contains(&tolerance) {
         return Err(Error::new(format!("a tolerance of {tolerance:e} is of no use"))
             .allowed("from 1e-14 to 0.01")
-            .next("take 1e-9, which keeps positions to about 1e-11 m"));
+            .next("take 1e-9, the default"));
     }
     let fastest = check::fastest_rate(plant.stage());
     let steps = fastest * experiment.until / REACH;
@@ -66,6 +66,7 @@ pub(super) fn run(
     }
     let start = experiment.initial.state(plant);
     let (coordinates, inner) = Coordinates::new(plant, &start);
+    let plant = &*plant.seen_from(coordinates.origin());
     let model = Model::new(plant, coordinates.origin());
     let mode = plant.first_mode(&start);
     Ok(Run::new(&model, (coordinates, inner, mode), experiment, tolerance, FIRST / fastest, detail, sink)

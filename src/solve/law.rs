@@ -2,7 +2,7 @@
 
 use super::propagator::{Matrix, SERIES_ORDER, SERIES_REACH};
 use crate::friction::Motion;
-use crate::plant::{Body, Cause, Form, Mode, POSITION, Plant, ROTOR, ROUNDING, SPEEDS, STRETCHES, arms, place};
+use crate::plant::{Body, Cause, Form, Mode, Plant, ROTOR, ROUNDING, SPEEDS, STRETCHES, arms, place};
 use crate::signal::DEGREE;
 use std::cell::OnceCell;
 use std::rc::Rc;
@@ -121,8 +121,8 @@ pub(super) struct Law<const R: usize, const C: usize> {
     h: f64,
     /// A bound of the fastest undamped swing, rad/s.
     pub(super) swing: f64,
-    /// Where positions are counted from, m.
-    origin: f64,
+    /// Ends of the travel, m.
+    ends: Option<[f64; 2]>,
     rate: Matrix<R, C>,
     steps: Vec<OnceCell<Box<Matrix<R, C>>>>,
     /// Rate at which √V may grow by itself; zero for most machines.
@@ -137,18 +137,18 @@ pub(super) struct Law<const R: usize, const C: usize> {
 
 impl<const R: usize, const C: usize> Law<R, C> {
     /// That of a mode and an interval, among those that are known, or a new one, which is added; and whether it is new.
-    pub(super) fn of(known: &mut Vec<Rc<Self>>, plant: &Plant, mode: Mode, h: f64, origin: f64) -> (Rc<Self>, bool) {
-        // Only the ends of a travel are places.
-        let origin = if plant.stage().travel.is_some() { origin } else { 0.0 };
-        if let Some(law) = known.iter().find(|law| law.mode == mode && law.h == h && law.origin == origin) {
+    pub(super) fn of(known: &mut Vec<Rc<Self>>, plant: &Plant, mode: Mode, h: f64) -> (Rc<Self>, bool) {
+        // Of one stage, seen from several places: the ends of the travel are what differs.
+        let ends = plant.stage().travel.map(|travel| [travel.min, travel.max]);
+        if let Some(law) = known.iter().find(|law| law.mode == mode && law.h == h && law.ends == ends) {
             return (Rc::clone(law), false);
         }
-        let law = Rc::new(Self::new(plant, mode, h, origin));
+        let law = Rc::new(Self::new(plant, mode, h));
         known.push(Rc::clone(&law));
         (law, true)
     }
 
-    fn new(plant: &Plant, mode: Mode, h: f64, origin: f64) -> Self {
+    fn new(plant: &Plant, mode: Mode, h: f64) -> Self {
         let r = plant.stage().pulley_radius;
         let mut equations = plant.equations(mode);
         // What is stuck has no speed, and a span between two stuck bodies does not change: leaving both out of the
@@ -167,7 +167,7 @@ impl<const R: usize, const C: usize> Law<R, C> {
             let mut row = [0.0; C];
             row[..states::<R>()].copy_from_slice(&form.on_stretches()[..states::<R>()]);
             row[chain::<R>(0)] = form.input;
-            row[C - 1] = form.constant_from(origin);
+            row[C - 1] = form.constant;
             row
         };
         let mut rate = Matrix::zero();
@@ -275,7 +275,7 @@ impl<const R: usize, const C: usize> Law<R, C> {
             finest,
             h,
             swing,
-            origin,
+            ends: plant.stage().travel.map(|travel| [travel.min, travel.max]),
             rate,
             steps: (0..=finest).map(|_| OnceCell::new()).collect(),
             growth,

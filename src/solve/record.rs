@@ -26,8 +26,8 @@ pub(crate) struct Extra {
 pub(crate) struct Row {
     /// In angles and positions.
     pub(crate) state: State,
-    /// r φ₁ − x, x − r φ₃ (m) and φ_r − φ₁ (rad), as accurate as the solver has them.
-    pub(crate) stretch: [f64; 3],
+    /// r φ₁ − x, x − r φ₃ (m), φ_r − φ₁ (rad) and x − x₀ (m), as accurate as the solver has them.
+    pub(crate) stretch: [f64; 4],
     pub(crate) input: f64,
 }
 
@@ -35,8 +35,8 @@ impl Row {
     /// A state in the solver's coordinates.
     #[inline]
     pub(crate) fn new(coordinates: &Coordinates, inner: &State, input: f64) -> Self {
-        let [d1, d2, _, twist, _] = stretches(inner);
-        Self { state: coordinates.state(inner), stretch: [d1, d2, twist], input }
+        let [d1, d2, _, twist, way] = stretches(inner);
+        Self { state: coordinates.state(inner), stretch: [d1, d2, twist, way], input }
     }
 }
 
@@ -50,7 +50,7 @@ pub(crate) struct Recorder<'a> {
     /// One for each row, or none at all where the linear equations say everything.
     extra: Vec<Extra>,
     /// Columns that are only needed on the way: stretches, rotor, current and input, gear torque and force of the stops.
-    scratch: [Vec<f64>; 9],
+    scratch: [Vec<f64>; 10],
     block: Trajectory,
     sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
     /// Rows handed on.
@@ -161,14 +161,17 @@ impl<'a> Recorder<'a> {
             p3[j] = phi3;
             w3[j] = omega3;
         }
-        let (w1, x, v, w3) = (&*w1, &*x, &*v, &*w3);
+        let (w1, v, w3) = (&*w1, &*v, &*w3);
         let r = stage.pulley_radius;
-        let [d1, d2, d3, twist, rotor, armature, input, torque, stop] = &mut self.scratch;
+        let [d1, d2, d3, twist, way, rotor, armature, input, torque, stop] = &mut self.scratch;
         let sized = |column: &mut Vec<f64>| column.resize(rows, 0.0);
-        [&mut *d1, d2, d3, twist, rotor, armature, input, torque, stop].into_iter().for_each(sized);
+        [&mut *d1, d2, d3, twist, way, rotor, armature, input, torque, stop].into_iter().for_each(sized);
         put(d1, |j| raw[j].stretch[0]);
         put(d2, |j| raw[j].stretch[1]);
         put(d3, |j| -(raw[j].stretch[0] + raw[j].stretch[1]));
+        if stage.travel.is_some() {
+            put(way, |j| raw[j].stretch[3]);
+        }
         put(input, |j| raw[j].input);
         if plant.has_current_state() {
             put(armature, |j| raw[j].state[place::CURRENT]);
@@ -177,7 +180,7 @@ impl<'a> Recorder<'a> {
             put(twist, |j| raw[j].stretch[2]);
             put(rotor, |j| raw[j].state[place::ROTOR_SPEED]);
         }
-        let source = Source { stretch: [d1, d2, d3, twist, x], speed: [w1, v, w3, rotor], current: armature, input };
+        let source = Source { stretch: [d1, d2, d3, twist, way], speed: [w1, v, w3, rotor], current: armature, input };
         let (current, f1, f2, f3) = (next(), next(), next(), next());
         let alike = |same: fn(&Mode, &Mode) -> bool| {
             modes.chunk_by(same).scan(0, |start, rows| {

@@ -49,7 +49,7 @@ pub(crate) fn run(
         let input = experiment.input.value(time);
         let motion = model.motion(&state, input);
         let [d1, d2, ..] = stretches(plant.stage().pulley_radius, &state);
-        recorder.push(Row { state, stretch: [d1, d2, 0.0], input }, Mode::of(motion));
+        recorder.push(Row { state, stretch: [d1, d2, 0.0, state[place::CART_POSITION]], input }, Mode::of(motion));
         if recorder.flow == Flow::Stop {
             ending = Ending::Interrupted { time };
             break;

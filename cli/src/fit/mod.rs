@@ -7,19 +7,19 @@ pub mod table;
 
 use crate::args::Fit as Args;
 use crate::failure::{Failure, Outcome, Status};
+use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
 use crate::terminal;
 use indicatif::ProgressBar;
 use std::io::IsTerminal;
-use std::path::{Component, Path, PathBuf};
 use std::time::{Duration, Instant};
+use taut::Result;
 use taut::case::Case;
 use taut::files::write_atomically;
 use taut::fit::{Ending, Fit, Posterior, Profile, fit, profiles};
 use taut::json;
 use taut::solve::Flow;
 use taut::trajectory::CsvWriter;
-use taut::{Error, Result};
 
 /// How long a fit may take before its progress is shown.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -38,10 +38,14 @@ pub fn run(args: &Args) -> Outcome {
     let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
     let case = Case::read_with(&args.case, &changes)?;
     let plan = case.fit_plan(&args.case)?;
-    if let Some(folder) = &args.out {
-        std::fs::create_dir_all(folder)
-            .map_err(|e| Error::new(format!("this folder cannot be made: {e}")).in_file(folder))?;
-    }
+    let folder = match &args.out {
+        Some(root) => {
+            let folder = Folder::create(root, folder::inputs(&args.case, &case), names(args))?;
+            folder::leading(&case, folder.root())?;
+            Some(folder)
+        }
+        None => None,
+    };
     let interrupt = Interrupt::listen();
     let begin = Instant::now();
     let mut progress = Progress::new(!args.quiet);
@@ -65,8 +69,9 @@ pub fn run(args: &Args) -> Outcome {
     let took = begin.elapsed();
     let json = json::text(&json::fit(&case, &found.fit, &found.profiles, found.drawn.as_ref().map(json::posterior)));
     let mut written = Vec::new();
-    if let Some(folder) = &args.out {
+    if let Some(folder) = &folder {
         written = write(args, folder, &case, &found, &json).map_err(Failure::work)?;
+        folder.place()?;
     }
     if args.json {
         terminal::show(&json);
@@ -81,40 +86,30 @@ pub fn run(args: &Args) -> Outcome {
     })
 }
 
+/// The files that will be written.
+fn names(args: &Args) -> impl Iterator<Item = &'static str> {
+    let report = (!args.no_report).then_some("report.html");
+    ["fitted.toml", "fit.json"].into_iter().chain(args.posterior.then_some("posterior.csv")).chain(report)
+}
+
 /// Writes the files; returns their names.
-fn write(args: &Args, folder: &Path, case: &Case, found: &Found, json: &str) -> Result<Vec<&'static str>> {
+fn write(args: &Args, folder: &Folder, case: &Case, found: &Found, json: &str) -> Result<Vec<&'static str>> {
     let text = found.fit.case_text(case, &args.case)?;
-    // Paths in it lead from its own folder to the same files.
-    let fitted = Case::from_text(&args.case, &text)?;
-    let text = fitted.text_with(|file| between(folder, &file.path));
-    write_atomically(folder.join("fitted.toml"), &text)?;
-    write_atomically(folder.join("fit.json"), json)?;
+    let text = folder::leading(&Case::from_text(&args.case, &text)?, folder.root())?;
+    write_atomically(folder.path("fitted.toml"), &text)?;
+    write_atomically(folder.path("fit.json"), json)?;
     let mut names = vec!["fitted.toml", "fit.json"];
     if let Some(drawn) = &found.drawn {
-        let mut writer = CsvWriter::create(folder.join("posterior.csv"))?;
+        let mut writer = CsvWriter::create(folder.path("posterior.csv"))?;
         writer.write(&drawn.table())?;
         writer.finish()?;
         names.push("posterior.csv");
     }
     if !args.no_report {
-        page::page(case, found, &text).write(folder.join("report.html"))?;
+        page::page(case, found, &text).write(folder.path("report.html"))?;
         names.push("report.html");
     }
     Ok(names)
-}
-
-/// The way from a folder to a file, with `/` between the parts.
-pub fn between(folder: &Path, file: &Path) -> String {
-    let whole = |path: &Path| -> PathBuf { std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf()) };
-    let (from, to) = (whole(folder), whole(file));
-    let (from, to): (Vec<Component>, Vec<Component>) = (from.components().collect(), to.components().collect());
-    let same = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
-    if same == 0 {
-        return file.display().to_string();
-    }
-    let up = std::iter::repeat_n("..".to_string(), from.len() - same);
-    let down = to[same..].iter().map(|part| part.as_os_str().to_string_lossy().into_owned());
-    up.chain(down).collect::<Vec<_>>().join("/")
 }
 
 /// What is shown of a fit that takes longer than one likes to wait.

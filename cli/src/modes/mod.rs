@@ -6,16 +6,17 @@ mod table;
 
 use crate::args::{BodyName, HoldName, Modes as Args};
 use crate::failure::{Failure, Outcome, Status};
+use crate::folder::{self, Folder};
+use crate::simulate::plots;
 use crate::terminal;
 use std::f64::consts::PI;
 use std::fmt::Write;
-use std::path::Path;
+use taut::Result;
 use taut::case::Case;
 use taut::files::write_atomically;
 use taut::json;
 use taut::linear::{Analysis, Hold, Question};
 use taut::stage::BeltModel;
-use taut::{Error, Result};
 
 /// Reads the case, linearises, writes, tells.
 pub fn run(args: &Args) -> Outcome {
@@ -25,9 +26,10 @@ pub fn run(args: &Args) -> Outcome {
     let json = json::text(&json::modes(&analysis));
     let mut written = Vec::new();
     if let Some(folder) = &args.out {
-        std::fs::create_dir_all(folder)
-            .map_err(|e| Error::new(format!("this folder cannot be made: {e}")).in_file(folder))?;
-        written = write(&analysis, args, folder, &json).map_err(Failure::work)?;
+        let names = ["modes.json", "frequency-response.csv", "report.html"];
+        let folder = Folder::create(folder, folder::inputs(&args.case, &case), names)?;
+        written = write(&analysis, args, &folder, &json).map_err(Failure::work)?;
+        folder.place()?;
     }
     if args.json {
         terminal::show(&json);
@@ -73,19 +75,16 @@ pub fn along(analysis: &Analysis) -> &'static str {
 }
 
 /// Writes the files; returns their names.
-fn write(analysis: &Analysis, args: &Args, folder: &Path, json: &str) -> Result<Vec<&'static str>> {
-    write_atomically(folder.join("modes.json"), json)?;
-    write_atomically(folder.join("frequency-response.csv"), csv(analysis))?;
+fn write(analysis: &Analysis, args: &Args, folder: &Folder, json: &str) -> Result<Vec<&'static str>> {
+    write_atomically(folder.path("modes.json"), json)?;
+    write_atomically(folder.path("frequency-response.csv"), csv(analysis))?;
     let mut names = vec!["modes.json", "frequency-response.csv"];
     if !args.no_report {
         let figures = figures::all(analysis);
-        page::page(analysis, &figures).write(folder.join("report.html"))?;
-        let plots = folder.join("plots");
-        std::fs::create_dir_all(&plots)
-            .map_err(|e| Error::new(format!("this folder cannot be made: {e}")).in_file(&plots))?;
+        page::page(analysis, &figures).write(folder.path("report.html"))?;
+        folder.make("plots")?;
         for (name, figure) in &figures {
-            figure.write_svg(plots.join(format!("{name}.svg")))?;
-            figure.write_png(plots.join(format!("{name}.png")))?;
+            plots::write_both(&folder.path("plots").join(name), figure)?;
         }
         names.extend(["report.html", "plots/"]);
     }

@@ -6,13 +6,14 @@ mod table;
 
 use crate::args::Move as Args;
 use crate::failure::{Failure, Outcome, Status};
+use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
-use crate::simulate::folder::Folder;
 use crate::simulate::plots;
 use crate::simulate::table::early_end;
 use crate::terminal;
 use figures::Curves;
 use std::fmt::Write;
+use std::path::Path;
 use taut::case::{Case, Move};
 use taut::control::{Loop, MoveRun, Rows, Standard, Worst, stream, worst};
 use taut::design::Design;
@@ -56,7 +57,12 @@ pub fn run(args: &Args) -> Outcome {
             .next("name one case, or leave --out out")
             .into());
     }
-    let folder = args.out.as_deref().map(Folder::create).transpose()?;
+    let folder = match (&args.out, &cases[..], &args.case[..]) {
+        (Some(root), [case], [path]) => {
+            Some(Folder::create(root, folder::inputs(path, case), names(args, case, path)?)?)
+        }
+        _ => None,
+    };
     let interrupt = Interrupt::listen();
     let mut tried = Vec::new();
     for (case, path) in cases.iter().zip(&args.case) {
@@ -76,6 +82,7 @@ pub fn run(args: &Args) -> Outcome {
     };
     if let (Some(folder), [tried]) = (&folder, &tried[..]) {
         write(folder, tried, args, &json).map_err(Failure::work)?;
+        folder.place()?;
     }
     if args.json {
         terminal::show(&json);
@@ -86,6 +93,16 @@ pub fn run(args: &Args) -> Outcome {
         }
     }
     Ok(status(&tried, &interrupt))
+}
+
+/// The files that will be written, but for plots.
+fn names(args: &Args, case: &Case, path: &Path) -> Result<Vec<String>> {
+    let (_, moves) = case.moves_named(path, &args.moves)?;
+    let tables = ["csv", "events.csv", "samples.csv"];
+    let tables = moves.iter().flat_map(|one| tables.map(|ending| format!("{}.{ending}", one.file_name())));
+    let report = (!args.no_report).then(|| "report.html".to_string());
+    let common = ["summary.json", "case.toml"].map(str::to_string);
+    Ok(tables.chain(common).chain(report).chain(folder::brought(case).into_values()).collect())
 }
 
 /// A case with its moves as data.
@@ -133,7 +150,7 @@ fn one<'a>(
         files.push(write_samples(folder, &name, case, &run).map_err(Failure::work)?);
     }
     let worst = match args.spread.filter(|_| interrupt.signal().is_none()) {
-        Some(share) => Some(worst(&case.stage, design, motion, share, solver)?),
+        Some(share) => worst(&case.stage, design, motion, share, solver, &|| interrupt.signal().is_some())?,
         None => None,
     };
     Ok(Done { motion, run, curves, worst, files })

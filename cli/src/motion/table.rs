@@ -1,7 +1,7 @@
 //! The key figures for people.
 
 use super::{Done, Tried};
-use crate::simulate::folder::Folder;
+use crate::folder::Folder;
 use crate::simulate::table::{early_end, time, value};
 use crate::terminal::bold;
 use std::fmt::Write;

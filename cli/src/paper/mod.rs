@@ -21,15 +21,15 @@ mod words;
 
 use crate::args::Paper;
 use crate::failure::{Failure, Outcome, Status};
+use crate::folder::Folder;
 use crate::terminal;
 use claims::{Claim, Kind, Verdict};
 use findings::Findings;
 use plots::Plot;
 use rayon::prelude::*;
-use std::fs;
 use std::path::Path;
-use taut::error::{Error, Result};
-use taut::files::write_atomically;
+use taut::Result;
+use taut::files::{Inputs, write_atomically};
 
 /// Where the results go unless told otherwise.
 const FOLDER: &str = "out/paper";
@@ -37,18 +37,15 @@ const FOLDER: &str = "out/paper";
 /// Recomputes the paper, writes report, claims, figures and data, and tells the verdicts on the terminal.
 pub fn run(args: &Paper) -> Outcome {
     let out = args.out.as_deref().unwrap_or(Path::new(FOLDER));
-    let text = recompute(out, args.json).map_err(Failure::work)?;
-    terminal::show(&text);
-    Ok(Status::Done)
-}
-
-/// The whole, and what the terminal shows of it.
-fn recompute(out: &Path, json: bool) -> Result<String> {
-    let findings = Findings::new()?;
+    // It reads no files.
+    let folder = Folder::create(out, Inputs::default(), [""; 0])?;
+    let findings = Findings::new().map_err(Failure::work)?;
     let claims = claims(&findings);
     let plots = plots(&findings);
-    write(out, &findings, &claims, &plots)?;
-    Ok(if json { claims::json(&claims) } else { table(&claims, out) })
+    write(&folder, &findings, &claims, &plots).map_err(Failure::work)?;
+    folder.place()?;
+    terminal::show(&if args.json { claims::json(&claims) } else { table(&claims, out) });
+    Ok(Status::Done)
 }
 
 /// Every claim: the paper's sentences in its order, then P1 to P10, then independent numbers.
@@ -67,13 +64,9 @@ fn plots(findings: &Findings) -> Vec<Plot> {
 }
 
 /// report.html, claims.json, figures/*.svg, figures/*.png, data/*.csv.
-fn write(out: &Path, findings: &Findings, claims: &[Claim], plots: &[Plot]) -> Result<()> {
-    let (figures, data) = (out.join("figures"), out.join("data"));
-    for folder in [&figures, &data] {
-        fs::create_dir_all(folder).map_err(|e| {
-            Error::new(format!("this folder cannot be made: {e}")).in_file(folder).next("choose another with --out")
-        })?;
-    }
+fn write(folder: &Folder, findings: &Findings, claims: &[Claim], plots: &[Plot]) -> Result<()> {
+    let (figures, data) = (folder.path("figures"), folder.path("data"));
+    ["figures", "data"].into_iter().try_for_each(|name| folder.make(name))?;
     let stage = &findings.sets.table4.stage;
     let drawings = [
         ("figure-01-02", taut::report::stage_drawing(&findings.sets.table1.stage)),
@@ -87,11 +80,11 @@ fn write(out: &Path, findings: &Findings, claims: &[Claim], plots: &[Plot]) -> R
             picture(&figures, &plot.file, &plot.figure.svg())
         })
     };
-    let page = || report::page(findings, claims, plots).write(out.join("report.html"));
+    let page = || report::page(findings, claims, plots).write(folder.path("report.html"));
     let (drawn, page) = rayon::join(drawn, page);
     drawn?;
     page?;
-    write_atomically(out.join("claims.json"), claims::json(claims))
+    write_atomically(folder.path("claims.json"), claims::json(claims))
 }
 
 /// An SVG and the PNG of it.

@@ -7,6 +7,8 @@ mod table;
 
 use crate::args::{AxisName, MotorName, Shape as Args};
 use crate::failure::{Failure, Outcome, Status};
+use crate::folder::Folder;
+use crate::simulate::plots;
 use crate::terminal;
 use std::path::{Path, PathBuf};
 use taut::case::Case;
@@ -14,7 +16,7 @@ use taut::control::compare::{Comparison, compare};
 use taut::control::resonance::{Drive, Resonance, resonances};
 use taut::control::shaping::{Choice, Criterion, Target, choose};
 use taut::control::spectrum::{Axis, Spectrum};
-use taut::files::write_atomically;
+use taut::files::{Inputs, write_atomically};
 use taut::log::read_accelerometer;
 use taut::{Error, Result};
 
@@ -30,6 +32,8 @@ enum Source {
 /// A file with what was found for it.
 pub struct Found {
     file: PathBuf,
+    /// What a case names besides, and is read with it.
+    also: Vec<PathBuf>,
     source: Source,
     criterion: Criterion,
     choice: Choice,
@@ -55,9 +59,10 @@ pub fn run(args: &Args) -> Outcome {
     let json = json::text(&found);
     let mut written = Vec::new();
     if let Some(folder) = &args.out {
-        std::fs::create_dir_all(folder)
-            .map_err(|e| Error::new(format!("this folder cannot be made: {e}")).in_file(folder))?;
-        written = write(args, folder, &found, &json).map_err(Failure::work)?;
+        let inputs = Inputs::new(found.each.iter().flat_map(|one| std::iter::once(&one.file).chain(&one.also)));
+        let folder = Folder::create(folder, inputs, ["shape.json", "report.html"])?;
+        written = write(args, &folder, &found, &json).map_err(Failure::work)?;
+        folder.place()?;
     }
     if args.json {
         terminal::show(&json);
@@ -76,7 +81,7 @@ fn find(args: &Args, file: &Path) -> Result<Found> {
         criterion.corner.speed = speed;
     }
     let is_case = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
-    let source = if is_case { model(args, file)? } else { measured(args, file)? };
+    let (source, also) = if is_case { model(args, file)? } else { (measured(args, file)?, Vec::new()) };
     // What the model knows is better than a guess; what the user says, better still.
     let known = match &source {
         Source::Model { modes, .. } => Some(damping(modes)),
@@ -91,7 +96,7 @@ fn find(args: &Args, file: &Path) -> Result<Found> {
         Source::Model { modes, .. } => Target::Modes { modes, uncertainty: args.uncertainty.unwrap_or(UNCERTAINTY) },
     };
     let choice = choose(target, &criterion).map_err(|e| e.in_file(file))?;
-    Ok(Found { file: file.to_path_buf(), source, criterion, choice })
+    Ok(Found { file: file.to_path_buf(), also, source, criterion, choice })
 }
 
 /// The mean damping ratio of the modes that move the cart most, over the travel.
@@ -100,7 +105,7 @@ fn damping(modes: &[Resonance]) -> f64 {
     main.iter().sum::<f64>() / main.len().max(1) as f64
 }
 
-fn model(args: &Args, file: &Path) -> Result<Source> {
+fn model(args: &Args, file: &Path) -> Result<(Source, Vec<PathBuf>)> {
     if args.axis.is_some() {
         let error = Error::new("a case file has no accelerometer").in_file("--axis");
         return Err(error.next("leave --axis out, or give a spectrum"));
@@ -112,7 +117,8 @@ fn model(args: &Args, file: &Path) -> Result<Source> {
         Some(MotorName::Held) | None => Drive::Held,
     };
     let modes = resonances(&case.stage, drive).map_err(|e| e.in_file(file))?;
-    Ok(Source::Model { title: case.title, drive, modes })
+    let also = case.files.into_iter().map(|file| file.path).collect();
+    Ok((Source::Model { title: case.title, drive, modes }, also))
 }
 
 fn measured(args: &Args, file: &Path) -> Result<Source> {
@@ -142,20 +148,19 @@ fn measured(args: &Args, file: &Path) -> Result<Source> {
 }
 
 /// Writes the files; returns their names.
-fn write(args: &Args, folder: &Path, found: &Findings, json: &str) -> Result<Vec<String>> {
-    write_atomically(folder.join("shape.json"), json)?;
+fn write(args: &Args, folder: &Folder, found: &Findings, json: &str) -> Result<Vec<String>> {
+    write_atomically(folder.path("shape.json"), json)?;
     let mut names = vec!["shape.json".to_string()];
     if args.no_report {
         return Ok(names);
     }
     let figures = figures::figures(found);
     for (name, figure) in &figures {
-        figure.write_svg(folder.join(format!("{name}.svg")))?;
-        figure.write_png(folder.join(format!("{name}.png")))?;
+        plots::write_both(&folder.path(name), figure)?;
         names.push(format!("{name}.svg"));
         names.push(format!("{name}.png"));
     }
-    page::page(found, &figures).write(folder.join("report.html"))?;
+    page::page(found, &figures).write(folder.path("report.html"))?;
     names.push("report.html".into());
     Ok(names)
 }

@@ -2,19 +2,19 @@
 
 mod band;
 mod curves;
-pub mod folder;
 mod page;
 pub mod plots;
 mod run;
 pub mod table;
 
-use crate::args::Simulate;
+use crate::args::{Format, Simulate};
 use crate::failure::{Failure, Outcome, Status};
+use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
 use crate::terminal;
-use folder::Folder;
 use run::{Run, Setting};
-use taut::case::Case;
+use taut::case::{Case, Experiment};
+use taut::files::write_atomically;
 use taut::json::{self, Simulation};
 use taut::solve::{Ending, Solver};
 use taut::stage::Stage;
@@ -30,7 +30,10 @@ pub fn run(args: &Simulate) -> Outcome {
         measurable(&case, solver, args)?;
     }
     let machines = machines(&case, args)?;
-    let folder = args.out.as_deref().map(Folder::create).transpose()?;
+    let mut inputs = folder::inputs(&args.case, &case);
+    args.draws.iter().for_each(|file| inputs.add(file));
+    let create = |root| Folder::create(root, inputs, names(args, &case, &experiments));
+    let folder = args.out.as_deref().map(create).transpose()?;
     let interrupt = Interrupt::listen();
     let setting =
         Setting { args, case: &case, solver, folder: folder.as_ref(), interrupt: &interrupt, machines: &machines };
@@ -45,7 +48,8 @@ pub fn run(args: &Simulate) -> Outcome {
     let told: Vec<_> = runs.iter().map(Run::told).collect();
     let summary = json::text(&Simulation::new(&case, solver, &told));
     if let Some(folder) = &folder {
-        folder.write_common(&setting, &summary, &runs).map_err(Failure::work)?;
+        write(folder, &setting, &summary, &runs).map_err(Failure::work)?;
+        folder.place()?;
     }
     if args.json {
         terminal::show(&summary);
@@ -53,6 +57,38 @@ pub fn run(args: &Simulate) -> Outcome {
         terminal::show(&table::text(&case, solver, &runs, folder.as_ref()));
     }
     Ok(status(&runs, &interrupt))
+}
+
+/// The files that will be written, but for plots.
+fn names(args: &Simulate, case: &Case, experiments: &[&Experiment]) -> Vec<String> {
+    let endings = ["csv", "parquet", "events.csv", "measured.csv", "band.csv"];
+    let endings = endings.iter().filter(|ending| match **ending {
+        "csv" => args.format.contains(&Format::Csv),
+        #[cfg(feature = "parquet")]
+        "parquet" => args.format.contains(&Format::Parquet),
+        "measured.csv" => args.as_measured,
+        "band.csv" => args.draws.is_some(),
+        ending => ending == "events.csv",
+    });
+    let tables = endings.flat_map(|ending| experiments.iter().map(move |one| format!("{}.{ending}", one.file_name())));
+    let report = (!args.no_report).then(|| "report.html".to_string());
+    let common = ["summary.json", "case.toml"].map(str::to_string);
+    tables.chain(common).chain(report).chain(folder::brought(case).into_values()).collect()
+}
+
+/// What belongs to all experiments: summary, case, report and plots.
+fn write(folder: &Folder, setting: &Setting, summary: &str, runs: &[Run]) -> Result<()> {
+    let case = setting.case;
+    write_atomically(folder.path("summary.json"), summary)?;
+    let text = folder.bring_inputs(case)?;
+    write_atomically(folder.path("case.toml"), &text)?;
+    if setting.args.no_report {
+        return Ok(());
+    }
+    let figures: Vec<_> = runs.iter().map(|run| plots::figures(case, run)).collect();
+    page::page(case, &text, setting.solver, runs, &figures).write(folder.path("report.html"))?;
+    folder.make("plots")?;
+    plots::write(&folder.path("plots"), runs, &figures)
 }
 
 /// The machines of --draws.

@@ -2,7 +2,7 @@
 
 use super::curves::{Curves, Samples};
 use super::run::Run;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use taut::Result;
 use taut::case::Case;
@@ -112,6 +112,17 @@ impl Plot<'_> {
     }
 }
 
+/// Writes a figure as SVG and PNG. Names may hold points: endings are added, not replaced.
+pub fn write_both(path: &Path, figure: &Figure) -> Result<()> {
+    let with = |ending: &str| {
+        let mut whole = path.as_os_str().to_os_string();
+        whole.push(ending);
+        PathBuf::from(whole)
+    };
+    figure.write_svg(with(".svg"))?;
+    figure.write_png(with(".png"))
+}
+
 /// Writes every figure as SVG and PNG.
 pub fn write(folder: &Path, runs: &[Run], figures: &[Vec<Named>]) -> Result<()> {
     let names: Vec<String> = runs.iter().map(|run| run.experiment.file_name()).collect();
@@ -129,9 +140,7 @@ pub fn write_all(folder: &Path, runs: &[String], figures: &[Vec<Named>]) -> Resu
     let next = AtomicUsize::new(0);
     let work = || -> Result<()> {
         while let Some((path, figure)) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
-            // Names may hold points: endings are added, not replaced.
-            figure.write_svg(format!("{}.svg", path.display()))?;
-            figure.write_png(format!("{}.png", path.display()))?;
+            write_both(path, figure)?;
         }
         Ok(())
     };

@@ -2,9 +2,9 @@
 
 use super::band::Band;
 use super::curves::{Curves, Samples};
-use super::folder::Folder;
 use crate::args::{Format, Simulate};
 use crate::failure::Failure;
+use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;

@@ -1,8 +1,8 @@
 //! The summary for people: a small table for each experiment.
 
 use super::band::Band;
-use super::folder::Folder;
 use super::run::Run;
+use crate::folder::Folder;
 use crate::terminal::bold;
 use std::fmt::Write;
 use std::time::Duration;

@@ -1,6 +1,7 @@
 //! `taut sweep`: many runs with parameters varied, which go on where they were left.
 
 mod figures;
+mod forecast;
 mod json;
 mod options;
 mod output;
@@ -42,7 +43,7 @@ pub fn run(args: &Args) -> Outcome {
     let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
     let case = Case::read_with(&args.case, &changes)?;
     let sweep = Sweep::new(&case).map_err(|error| error.in_file(&args.case))?;
-    let target = Target::of(args)?;
+    let target = Target::of(args, &case)?;
     if args.trajectories {
         trajectories::check(&sweep)?;
     }
@@ -55,11 +56,13 @@ pub fn run(args: &Args) -> Outcome {
     }
     let interrupt = Interrupt::listen();
     let work = Work { args, case: &case, sweep: &sweep, interrupt: &interrupt };
+    let threads = threads(args, &sweep);
     let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(args.threads.unwrap_or(0))
+        .num_threads(threads)
         .build()
         .map_err(|e| Failure::work(Error::new(format!("the threads cannot be started: {e}"))))?;
-    let store = Store::open(&work, &target, pool.current_num_threads())?;
+    forecast::told(&work, &target, threads)?;
+    let store = Store::open(&work, &target, threads)?;
     let begin = Instant::now();
     let before = store.done();
     pool.install(|| rows(&work, &store)).map_err(Failure::work)?;
@@ -70,8 +73,7 @@ pub fn run(args: &Args) -> Outcome {
     }
     let summary = pool.install(|| Summary::of(&work, &store)).map_err(Failure::work)?;
     let json = json::text(&work, &summary);
-    let written = output::write(&work, &target, &store, &summary, &json).map_err(Failure::work)?;
-    let Some(written) = written else {
+    let Some(written) = output::write(&work, &target, &store, &summary, &json)? else {
         told_interrupted(&work, &store);
         return Ok(Status::Interrupted(interrupt.signal().unwrap_or(2)));
     };
@@ -82,6 +84,17 @@ pub fn run(args: &Args) -> Outcome {
         terminal::show(&table::text(&work, &summary, took, sweep.runs() - before, &written));
     }
     Ok(Status::Done)
+}
+
+/// How many threads: no more than there are processors, or runs.
+fn threads(args: &Args, sweep: &Sweep) -> usize {
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    let useful = processors.min(usize::try_from(sweep.runs()).unwrap_or(usize::MAX)).max(1);
+    if let Some(asked) = args.threads.filter(|&asked| asked > useful && !args.quiet) {
+        let runs = if useful < processors { format!("{useful} runs") } else { format!("{processors} processors") };
+        terminal::show_note(&format!("--threads {asked}: {useful} are started, for there are {runs}"));
+    }
+    args.threads.unwrap_or(processors).min(useful)
 }
 
 /// Runs the chunks that are not there yet, each written when it is whole.
@@ -119,6 +132,7 @@ pub fn shown(time: Duration) -> String {
     match time.as_secs_f64() {
         seconds if seconds < 100.0 => format!("{seconds:.1} s"),
         seconds if seconds < 6000.0 => format!("{:.0} min", seconds / 60.0),
-        seconds => format!("{:.1} h", seconds / 3600.0),
+        seconds if seconds < 3e5 => format!("{:.1} h", seconds / 3600.0),
+        seconds => format!("{:.0} days", seconds / 86400.0),
     }
 }

@@ -1,7 +1,11 @@
 //! From the command line to changes of the case, and to where results go.
 
 use crate::args::Sweep as Args;
+use crate::failure::Failure;
+use crate::folder::{self, Folder};
 use std::path::{Path, PathBuf};
+use taut::case::Case;
+use taut::files::Inputs;
 use taut::{Error, Result};
 
 /// The command line as changes of the case: what is swept stands in its text, and that repeats it.
@@ -34,42 +38,64 @@ pub fn changes(args: &Args) -> Result<Vec<String>> {
     Ok(changes)
 }
 
+/// The file of the rows in a folder of results.
+const ROWS: &str = if cfg!(feature = "parquet") { "runs.parquet" } else { "runs.csv" };
+
+/// What the folder of the parts is called, behind the name of the file of the rows.
+pub const PARTS: &str = ".parts";
+
 /// Where the results go.
 pub enum Target {
     Nowhere,
     /// The rows, as Parquet or CSV.
     File(PathBuf),
     /// A folder of rows, summary, case, report and plots.
-    Folder(PathBuf),
+    Folder(Folder),
 }
 
 impl Target {
     /// What `--out` says; the folder for it is made.
-    pub fn of(args: &Args) -> Result<Self> {
+    pub fn of(args: &Args, case: &Case) -> std::result::Result<Self, Failure> {
+        let inputs = folder::inputs(&args.case, case);
+        let target = Self::named(args, case, &inputs)?;
+        if let Some(rows) = target.rows() {
+            inputs.check(&rows)?;
+            inputs.check(&trajectories(&rows))?;
+            inputs.check_folder(&beside(&rows, PARTS))?;
+        }
+        Ok(target)
+    }
+
+    fn named(args: &Args, case: &Case, inputs: &Inputs) -> std::result::Result<Self, Failure> {
         let Some(out) = &args.out else { return Ok(Self::Nowhere) };
         let ending = out.extension().map(|ending| ending.to_string_lossy().to_lowercase());
         let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
         match ending.as_deref() {
             Some("csv") | Some("parquet") => {
                 if out.is_dir() {
-                    return Err(Error::new("this is a folder").in_file(out).next("name a file in it"));
+                    return Err(Error::new("this is a folder").in_file(out).next("name a file in it").into());
                 }
                 if !parent.is_dir() {
                     return Err(Error::new(format!("there is no folder {}", parent.display()))
                         .in_file(out)
-                        .next("make it first, or name another"));
+                        .next("make it first, or name another")
+                        .into());
                 }
                 if !cfg!(feature = "parquet") && ending.as_deref() == Some("parquet") {
-                    return Err(Error::new("this program was built without Parquet").in_file(out).allowed("FILE.csv"));
+                    let error = Error::new("this program was built without Parquet").in_file(out);
+                    return Err(error.allowed("FILE.csv").into());
                 }
                 Ok(Self::File(out.clone()))
             }
             Some(other) if !out.is_dir() => Err(Error::new(format!("rows are not written as .{other}"))
                 .in_file("--out")
-                .allowed("FILE.parquet, FILE.csv, or a folder")),
+                .allowed("FILE.parquet, FILE.csv, or a folder")
+                .into()),
             _ => {
-                crate::simulate::folder::Folder::create(out)?;
-                Ok(Self::Folder(out.clone()))
+                let report = (!args.no_report).then(|| "report.html".to_string());
+                let names = [ROWS, "sweep.json", "case.toml"].map(str::to_string).into_iter().chain(report);
+                let names = names.chain(folder::brought(case).into_values());
+                Folder::create(out, inputs.clone(), names).map(Self::Folder)
             }
         }
     }
@@ -79,11 +105,17 @@ impl Target {
         match self {
             Self::Nowhere => None,
             Self::File(path) => Some(path.clone()),
-            Self::Folder(folder) => {
-                Some(folder.join(if cfg!(feature = "parquet") { "runs.parquet" } else { "runs.csv" }))
-            }
+            Self::Folder(folder) => Some(folder.root().join(ROWS)),
         }
     }
+}
+
+/// The file of the trajectories, beside that of the rows.
+pub fn trajectories(rows: &Path) -> PathBuf {
+    let mut name = rows.file_stem().unwrap_or_default().to_os_string();
+    name.push("-trajectories.");
+    name.push(rows.extension().unwrap_or_default());
+    rows.with_file_name(name)
 }
 
 /// A path with something behind its name.

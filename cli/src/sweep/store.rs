@@ -4,7 +4,7 @@
 //! each chunk: its columns one after another as doubles, little end first. The folder goes when the rows are written.
 
 use super::Work;
-use super::options::{Target, beside};
+use super::options::{PARTS, Target, beside};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -12,7 +12,7 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::Instant;
-use taut::files::write_atomically;
+use taut::files::{remove_abandoned, write_atomically};
 use taut::trajectory::{Column, Trajectory};
 use taut::{Error, Result};
 
@@ -50,7 +50,7 @@ impl Store {
     pub fn open(work: &Work, target: &Target, threads: usize) -> Result<Self> {
         let sweep = work.sweep;
         let (headings, runs) = (sweep.columns().to_vec(), sweep.runs());
-        let folder = target.rows().map(|rows| beside(&rows, ".parts"));
+        let folder = target.rows().map(|rows| beside(&rows, PARTS));
         let mut store = Self { folder, kept: Mutex::default(), headings, runs, chunk: 1 };
         let Some(folder) = store.folder.clone() else {
             store.chunk = chunk(work, threads);
@@ -92,8 +92,8 @@ impl Store {
         for entry in fs::read_dir(folder).map_err(told)? {
             let entry = entry.map_err(told)?;
             let name = entry.file_name().to_string_lossy().into_owned();
-            if name.ends_with(".tmp") {
-                let _ = fs::remove_file(entry.path());
+            if name.ends_with(".taut.tmp") {
+                remove_abandoned(&entry.path());
             }
             let Some(chunk) = name.strip_suffix(".part").and_then(|number| number.parse::<u64>().ok()) else {
                 continue;
@@ -220,18 +220,12 @@ fn chunk(work: &Work, threads: usize) -> u64 {
     ((CHUNK_TIME / each) as u64).clamp(1, LARGEST).min(fair).next_power_of_two()
 }
 
-/// FNV-1a, of everything that rows follow from: the text of the case with what the command line changed, and the files it names.
+/// A hash of everything that rows follow from: the text of the case with what the command line changed, and the files it names.
 fn fingerprint(work: &Work) -> Result<String> {
-    let mut hash: u64 = 0xcbf2_9ce4_8422_2325;
-    let mut take = |bytes: &[u8]| {
-        for byte in bytes {
-            hash = (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3);
-        }
-    };
-    take(work.case.text.as_bytes());
+    let mut bytes = work.case.text.clone().into_bytes();
     for path in work.case.files.iter().map(|file| &file.path) {
-        take(&fs::read(path).map_err(|e| Error::new(e.to_string()).in_file(path))?);
+        bytes.extend(fs::read(path).map_err(|e| Error::new(e.to_string()).in_file(path))?);
     }
-    work.sweep.columns().iter().for_each(|column| take(column.heading().as_bytes()));
-    Ok(format!("{hash:016x}"))
+    work.sweep.columns().iter().for_each(|column| bytes.extend(column.heading().into_bytes()));
+    Ok(format!("{:016x}", taut::chance::hash(bytes)))
 }

@@ -2,7 +2,6 @@
 
 use super::Work;
 use super::output::Writer;
-use std::path::Path;
 use taut::solve::{self, Flow, Solver};
 use taut::sweep::Sweep;
 use taut::trajectory::{Column, Trajectory};
@@ -31,8 +30,7 @@ pub fn check(sweep: &Sweep) -> Result<()> {
 }
 
 /// Writes them with the number of the run and of the experiment in front; false where it was interrupted.
-pub fn write(work: &Work, parts: &Path, path: &Path) -> Result<bool> {
-    let mut writer = Writer::create(parts, path)?;
+pub fn write(work: &Work, writer: &mut Writer) -> Result<bool> {
     let mut wide = Trajectory::default();
     for run in 0..work.sweep.runs() {
         let stage = work.sweep.machine(run);
@@ -58,7 +56,6 @@ pub fn write(work: &Work, parts: &Path, path: &Path) -> Result<bool> {
             }
         }
     }
-    writer.finish()?;
     Ok(true)
 }
 

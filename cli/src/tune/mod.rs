@@ -7,11 +7,13 @@ mod table;
 
 use crate::args::Tune as Args;
 use crate::failure::{Failure, Outcome, Status};
+use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
+use crate::simulate::plots;
 use crate::terminal;
 use std::path::{Path, PathBuf};
 use taut::case::{Case, Cost, Tuning};
-use taut::files::write_atomically;
+use taut::files::{Inputs, write_atomically};
 use taut::tune::{Tuned, tune};
 use taut::{Error, Result};
 
@@ -21,7 +23,7 @@ enum Target {
     /// The case file alone.
     File(PathBuf),
     /// A folder of case file, summary, report and plots.
-    Folder(PathBuf),
+    Folder(Folder),
 }
 
 /// What was asked for and what came of it.
@@ -36,7 +38,7 @@ pub fn run(args: &Args) -> Outcome {
     let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
     let case = Case::read_with(&args.case, &changes)?;
     let tuning = tuning(args, &case);
-    let target = target(args)?;
+    let target = target(args, &case)?;
     let interrupt = Interrupt::listen();
     let tuned = match (tune(&case, &tuning, &|| interrupt.signal().is_some()), interrupt.signal()) {
         (Ok(tuned), _) => tuned,
@@ -59,6 +61,7 @@ pub fn run(args: &Args) -> Outcome {
         }
         Target::Folder(folder) => {
             written = write(&work, folder, &text, &json, args).map_err(Failure::work)?;
+            folder.place()?;
         }
     }
     if args.json {
@@ -83,29 +86,35 @@ fn tuning(args: &Args, case: &Case) -> Tuning {
     tuning
 }
 
-/// Where to write; never over a case file, unless that is asked for.
-fn target(args: &Args) -> Result<Target> {
+/// Where to write; never over a file that is read, unless that is asked for.
+fn target(args: &Args, case: &Case) -> std::result::Result<Target, Failure> {
     if args.in_place {
         return Ok(Target::File(args.case.clone()));
     }
     let Some(out) = &args.out else { return Ok(Target::Nowhere) };
-    let is_file = out.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
-    let path = if is_file { out.clone() } else { out.join("tuned.toml") };
-    let same = match (std::fs::canonicalize(&path), std::fs::canonicalize(&args.case)) {
-        (Ok(path), Ok(case)) => path == case,
-        _ => false,
-    };
-    if same {
-        return Err(Error::new("this is the case file itself")
-            .in_file("--out")
-            .next("name another, or say --in-place"));
+    let inputs = folder::inputs(&args.case, case);
+    if !out.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+        let report = (!args.no_report).then(|| "report.html".to_string());
+        let names = ["tuned.toml", "tune.json"].map(str::to_string).into_iter().chain(report);
+        let names = names.chain(folder::brought(case).into_values());
+        return Folder::create(out, inputs, names).map(Target::Folder);
     }
-    if is_file && path.exists() {
-        return Err(Error::new(format!("{} is there already", path.display()))
+    let own = Inputs::new([&args.case]);
+    own.check(out).map_err(|error| error.next("name another --out, or say --in-place"))?;
+    inputs.check(out)?;
+    if out.exists() {
+        return Err(Error::new(format!("{} is there already", out.display()))
             .in_file("--out")
-            .next("name another file, or a folder; --in-place changes the case file itself"));
+            .next("name another file, or a folder; --in-place changes the case file itself")
+            .into());
     }
-    Ok(if is_file { Target::File(path) } else { Target::Folder(out.clone()) })
+    folder::leading(case, parent(out))?;
+    Ok(Target::File(out.clone()))
+}
+
+/// The folder that a file is in.
+fn parent(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// The text for a place of its own: paths in it lead from there to the same files.
@@ -113,12 +122,10 @@ fn moved(text: &str, args: &Args, path: &Path) -> Result<String> {
     if args.in_place {
         return Ok(text.to_string());
     }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    Ok(Case::from_text(&args.case, text)?.text_with(|file| crate::fit::between(folder, &file.path)))
+    folder::leading(&Case::from_text(&args.case, text)?, parent(path))
 }
 
-fn write(work: &Work, folder: &Path, text: &str, json: &str, args: &Args) -> Result<Vec<String>> {
-    let folder = crate::simulate::folder::Folder::create(folder)?;
+fn write(work: &Work, folder: &Folder, text: &str, json: &str, args: &Args) -> Result<Vec<String>> {
     let text = folder.bring_inputs(&Case::from_text(&args.case, text)?)?;
     write_atomically(folder.path("tuned.toml"), &text)?;
     write_atomically(folder.path("tune.json"), json)?;
@@ -128,9 +135,7 @@ fn write(work: &Work, folder: &Path, text: &str, json: &str, args: &Args) -> Res
         page::page(work, &text, &figures).write(folder.path("report.html"))?;
         folder.make("plots")?;
         for (name, figure) in &figures {
-            let path = folder.path("plots").join(name);
-            figure.write_svg(format!("{}.svg", path.display()))?;
-            figure.write_png(format!("{}.png", path.display()))?;
+            plots::write_both(&folder.path("plots").join(name), figure)?;
         }
         names.extend(["report.html".to_string(), "plots/".to_string()]);
     }

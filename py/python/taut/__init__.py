@@ -10,7 +10,7 @@ Numbers are in SI units everywhere; names of columns and keys of dictionaries sa
 Mistakes are :class:`taut.Error`, a ``ValueError`` with the text that the command line shows.
 """
 
-from ._native import Error, Seen, __version__
+from ._native import Bug, Error, Seen, __version__
 from .case import Case, read, template
 from .results import Check, Estimate, Fit, LinearModel, Modes
 from .runs import Run, Runs
@@ -18,6 +18,7 @@ from .sweeps import sweep, sweep_tables
 from .table import Table
 
 __all__ = [
+    "Bug",
     "Case",
     "Check",
     "Error",

@@ -18,6 +18,9 @@ class Error(ValueError):
     allowed: str | None
     next: str | None
 
+class Bug(RuntimeError):
+    """A mistake in taut itself, which no input should bring about; where it happened stands on the standard error."""
+
 class Seen:
     """What a controller knows at a sample. SI units."""
 
@@ -135,5 +138,6 @@ class Sweep:
     ) -> tuple[dict[str, NDArray[np.float64]], list[tuple[str, str, str]]]: ...
 
 def template() -> str: ...
+def fail_as_a_bug(told: str) -> None: ...
 def simulation(runs: list[Run]) -> Any: ...
 def moves(runs: list[Run]) -> Any: ...

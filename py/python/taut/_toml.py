@@ -7,14 +7,24 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from ._checks import text
 
-def written(value: Any) -> str:
+
+DEEPEST = 32
+"""How deep lists and dictionaries may hold each other: no case needs as much, and what holds itself has no end."""
+
+
+def written(value: Any, depth: int = 0) -> str:
     """The value in TOML: numbers are SI, texts may carry a unit, lists and dictionaries hold these."""
+    if depth > DEEPEST:
+        raise ValueError(f"lists and dictionaries hold each other more than {DEEPEST} deep")
     if hasattr(value, "tolist"):  # NumPy's scalars and arrays
         value = value.tolist()
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
+        if abs(value) > 10**300:
+            raise ValueError("a whole number of more than 300 digits is none of a case")
         return str(value)
     if isinstance(value, float):
         # Shortest digits that read back to the same bits; TOML wants a digit on both sides of a point, and writes nan and inf alike.
@@ -23,9 +33,9 @@ def written(value: Any) -> str:
         # Strings of JSON are strings of TOML, but for DEL.
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key_text(str(key))} = {written(item)}" for key, item in value.items()) + " }"
+        return "{ " + ", ".join(f"{key_text(str(key))} = {written(item, depth + 1)}" for key, item in value.items()) + " }"
     if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(written(item) for item in value) + "]"
+        return "[" + ", ".join(written(item, depth + 1) for item in value) + "]"
     raise TypeError(f"a case holds numbers, texts, truths, lists and dictionaries, and no {type(value).__name__}")
 
 
@@ -37,4 +47,4 @@ def key_text(key: str) -> str:
 
 def change(key: str, value: Any) -> str:
     """``KEY=VALUE``, as ``--set`` takes it."""
-    return f"{key}={written(value)}"
+    return f"{text('key', key)}={text(key, written(value))}"

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from typing import Any, Protocol, overload
 
-from . import _html, _native
+from . import _checks, _html, _native
 from ._toml import change
 from .results import Check, Fit, LinearModel, Modes
 from .runs import Run, Runs
@@ -37,7 +36,7 @@ class Case:
 
     def __init__(self, text: str, path: str | PathLike[str] = "case.toml") -> None:
         """Reads a case from text. ``path`` stands in messages; other files that the text names are found from its folder."""
-        self._native = _native.Case.from_text(os.fspath(path), text, [])
+        self._native = _native.Case.from_text(_checks.path(path), _checks.text("text", text), [])
 
     @classmethod
     def _of(cls, native: _native.Case) -> Case:
@@ -73,7 +72,7 @@ class Case:
     def __getitem__(self, key: str) -> Any:
         """What stands under a key such as ``cart.mass`` or ``experiment.0.until``: quantities in SI units."""
         try:
-            return self._native.value(key)
+            return self._native.value(_checks.text("key", key))
         except _native.Error as error:
             raise KeyError(str(error)) from None
 
@@ -105,7 +104,7 @@ class Case:
 
     def save(self, path: str | PathLike[str]) -> None:
         """Writes the text: under a temporary name first, so that nobody sees half of it."""
-        self._native.save(path)
+        self._native.save(_checks.path(path))
 
     @overload
     def simulate(
@@ -141,10 +140,11 @@ class Case:
         ``solver`` is ``exact``, ``general`` (with ``tolerance``) or ``table3`` (with ``step``, s, and ``method``, ``rk4`` or
         ``dp5``); by default the one for this stage.
         """
-        if isinstance(experiment, str):
-            return Run(self._native.simulate([experiment], solver, tolerance, step, method)[0])
-        runs = self._native.simulate(list(experiment or ()), solver, tolerance, step, method)
-        return Runs([Run(run) for run in runs], moved=False)
+        one = isinstance(experiment, str)
+        names = _checks.names("experiment", [experiment] if isinstance(experiment, str) else experiment)
+        how = (_checks.word("solver", solver), _checks.number("tolerance", tolerance), _checks.number("step", step))
+        runs = [Run(run) for run in self._native.simulate(names, *how, _checks.word("method", method))]
+        return runs[0] if one else Runs(runs, moved=False)
 
     def check(self) -> Check:
         """What the logs can tell of the parameters in [fit], before any fit."""
@@ -158,7 +158,8 @@ class Case:
         With ``profiles`` it also holds each parameter beside its estimate and fits the others: ``data["profiles"]``.
         With ``posterior`` it also draws from the posterior: ``draws`` of each of ``chains`` chains. Ctrl-C ends it.
         """
-        native = self._native.fit((draws, chains) if posterior else None, profiles)
+        effort = (_checks.whole("draws", draws, 1), _checks.whole("chains", chains, 1))
+        native = self._native.fit(effort if posterior else None, bool(profiles))
         drawn = None if native.draws is None else Table(*native.draws)
         return Fit(native.data, self._of(native.case), drawn)
 
@@ -180,8 +181,17 @@ class Case:
         ``cart``, ``idler`` are held. With ``sample_time`` (s) also a discrete-time model, whose input is held (``zero``,
         ``first`` or ``tustin``) and late by ``delay`` (s). ``lowest`` and ``highest`` bound the response, Hz.
         """
-        names = list(stuck)
-        found = self._native.modes(at, speed, names, sample_time, hold, delay, lowest, highest)
+        n = _checks.number
+        found = self._native.modes(
+            n("at", at),
+            n("speed", speed),
+            _checks.names("stuck", stuck),
+            n("sample_time", sample_time),
+            _checks.word("hold", hold),
+            n("delay", delay),
+            n("lowest", lowest),
+            n("highest", highest),
+        )
         data = found["data"]
         inputs, outputs = (data["input"]["name"],), tuple(row["name"] for row in data["outputs"])
         units = {row["name"]: row["unit"] for row in [data["input"], *data["outputs"]]}
@@ -192,7 +202,7 @@ class Case:
         if sample_time is not None:
             a, b, c, d = found["discrete"]
             late = tuple(data["discrete"]["states"])
-            discrete = LinearModel(a, b, c, d, sample_time, late, inputs, outputs, units)
+            discrete = LinearModel(a, b, c, d, float(sample_time), late, inputs, outputs, units)
         return Modes(data, model, discrete, found["frequency"], found["responses"])
 
     @overload
@@ -238,8 +248,10 @@ class Case:
             raise TypeError("every, delay and limit go with a controller of your own; the case's are in [controller]")
         if controller is not None and spread is not None:
             raise TypeError("spread goes with the case's own controller")
-        names = [move] if isinstance(move, str) else list(move or ())
-        runs = [Run(run) for run in self._native.run_moves(names, controller, (every, delay, limit), spread)]
+        names = _checks.names("move", [move] if isinstance(move, str) else move)
+        timing = (_checks.number("every", every), _checks.number("delay", delay), _checks.number("limit", limit))
+        share = _checks.number("spread", spread)
+        runs = [Run(run) for run in self._native.run_moves(names, controller, timing, share)]
         return runs[0] if isinstance(move, str) else Runs(runs, moved=True)
 
     def sweep(self, n: int | None = None, **options: Any) -> Table:
@@ -268,7 +280,7 @@ class Case:
 
 def read(path: str | PathLike[str]) -> Case:
     """Reads a case file."""
-    return Case._of(_native.Case.read(os.fspath(path), []))
+    return Case._of(_native.Case.read(_checks.path(path), []))
 
 
 def template() -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _html, _native
+from . import _checks, _html, _native
 from ._optional import needed
 from .table import Table
 
@@ -24,6 +24,8 @@ class Run(Table):
 
     def __init__(self, native: _native.Run) -> None:
         """Made by :meth:`taut.Case.simulate` and :meth:`taut.Case.move`."""
+        if not isinstance(native, _native.Run):
+            raise TypeError(f"runs are made by Case.simulate and Case.move, and not of {type(native).__name__}")
         super().__init__(native.arrays, native.names)
         self._native = native
 
@@ -61,7 +63,7 @@ class Run(Table):
 
     def write(self, path: str | PathLike[str]) -> None:
         """Writes the columns to a ``.csv`` or ``.parquet`` file, as ``taut simulate --out`` does."""
-        self._native.write(path)
+        self._native.write(_checks.path(path))
 
     def plot(self, *columns: str) -> Figure:
         """A matplotlib figure of these columns over time, one panel for each unit.
@@ -108,6 +110,8 @@ class Runs(Sequence[Run]):
     def __init__(self, runs: Sequence[Run], moved: bool) -> None:
         """Made by :meth:`taut.Case.simulate` and :meth:`taut.Case.move`."""
         self._runs = list(runs)
+        if not all(isinstance(run, Run) for run in self._runs):
+            raise TypeError("runs are made by Case.simulate and Case.move")
         self._told = _native.moves if moved else _native.simulation
 
     @overload

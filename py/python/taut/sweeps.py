@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from . import _native
+from . import _checks, _native
 from ._optional import needed
 from .table import Table, arrow_table
 
@@ -52,6 +52,7 @@ def sweep(
     costs time, and no row.
     """
     changed = _planned(case, n, vary, design, seed, indices, interval)
+    threads = _checks.whole("threads", threads, 0)
     if client is None:
         if chunk is not None:
             raise TypeError("chunk goes with client: on one machine threads take turns by themselves")
@@ -118,16 +119,23 @@ def _planned(
     interval: str | float | None,
 ) -> Case:
     """The case with all of it in its text, as the command line does."""
-    given = {"runs": n, "design": design, "seed": seed, "interval": interval, "indices": indices or None}
+    if not isinstance(getattr(case, "_native", None), _native.Case):
+        raise TypeError(f"case: a taut.Case is wanted, and no {type(case).__name__}")
+    if not isinstance(vary, (Mapping, type(None))):
+        raise TypeError(f"vary: a dictionary is wanted, and no {type(vary).__name__}")
+    given = {"runs": n, "design": design, "seed": seed, "interval": interval, "indices": True if indices else None}
     changes = {f"sweep.{key}": value for key, value in given.items() if value is not None}
-    changes |= {f"sweep.vary.{json.dumps(key, ensure_ascii=False)}": how for key, how in (vary or {}).items()}
+    for key, how in (vary or {}).items():
+        changes[f"sweep.vary.{json.dumps(_checks.text('vary', key), ensure_ascii=False)}"] = how
     return case.changed(changes) if changes else case
 
 
 def _tables(case: Case, client: Client, chunk: int | None) -> Iterator[pyarrow.Table]:
     arrow = needed("pyarrow", "pyarrow", "sweep() on Dask")
+    if not (hasattr(client, "submit") and hasattr(client, "nthreads")):
+        raise TypeError(f"client: a Client of Dask is wanted, and no {type(client).__name__}")
     native = _native.Sweep(case._native)
-    size = chunk or _chunk(native)
+    size = _chunk(native) if chunk is None else _checks.whole("chunk", chunk, 1)
     text, path = case.text, os.path.abspath(case.path)
     workers: Any = client
     threads = sum(workers.nthreads().values()) or 1

@@ -166,7 +166,7 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
     /// Takes up the equations of the present mode.
     fn enter(&mut self) {
         self.rounding.swing(self.law.swing, self.time());
-        let (law, is_new) = Law::of(self.laws, self.plant, self.mode, self.h, self.coordinates.origin());
+        let (law, is_new) = Law::of(self.laws, self.plant, self.mode, self.h);
         self.law = law;
         let inner = self.inner();
         self.coordinates.hold(&self.mode, &inner);

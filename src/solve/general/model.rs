@@ -75,7 +75,7 @@ impl<'a> Model<'a> {
     /// The value of a linear form.
     #[inline]
     pub(super) fn value(&self, form: &Form, inner: &State, input: f64) -> f64 {
-        form.value_at(&stretches(inner), self.origin, inner, input)
+        form.value_at(&stretches(inner), inner, input)
     }
 
     /// By how much the cart's dry friction is multiplied where it is.
@@ -116,7 +116,7 @@ impl<'a> Model<'a> {
 
     /// What rounding may have done to it.
     pub(super) fn noise(&self, body: Body, mode: &Mode, state: &State, input: f64) -> f64 {
-        self.plant.load(body, true, mode).noise(state, self.origin, input)
+        self.plant.load(body, true, mode).noise(state, input)
     }
 
     /// What a body at rest holds this way, where it is.
@@ -205,7 +205,7 @@ impl<'a> Field<'a> {
     /// What the parts of a guard's value come to, and so what an error of a part of it may do.
     pub(super) fn size(&self, index: usize, tau: f64, y: &[f64]) -> f64 {
         let form = &self.equations.guards[index].form;
-        form.noise(&self.model.inner(y), self.model.origin, self.input(tau)) / ROUNDING
+        form.noise(&self.model.inner(y), self.input(tau)) / ROUNDING
     }
 
     /// The values that must not become negative, in the order of [`Field::watches`].

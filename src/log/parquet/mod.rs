@@ -1,8 +1,10 @@
 //! Columns from Parquet files.
 
+mod pages;
+
 use super::csv::{near, shown};
 use super::lines::unreadable;
-use super::sheet::{ColumnId, Request, Sheet};
+use super::sheet::{ColumnId, Request, Sheet, check_numbers};
 use crate::error::{Error, Result};
 use ::parquet::basic::{LogicalType, TimeUnit, Type};
 use ::parquet::column::reader::{ColumnReader, ColumnReaderImpl};
@@ -14,8 +16,8 @@ use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-/// Most rows.
-const MOST_ROWS: i64 = 1 << 27;
+/// Rows that are read at a time.
+const BLOCK: usize = 8192;
 
 /// Reads the wanted columns.
 pub(super) fn read(file: &Path, request: &Request<'_>) -> Result<Sheet> {
@@ -23,26 +25,30 @@ pub(super) fn read(file: &Path, request: &Request<'_>) -> Result<Sheet> {
     let reader = SerializedFileReader::new(input).map_err(|error| damaged(file, &error))?;
     let metadata = reader.metadata().file_metadata();
     let schema = metadata.schema_descr();
-    if metadata.num_rows() > MOST_ROWS {
-        let error = Error::new(format!("the file has {} rows", metadata.num_rows())).in_file(file);
-        return Err(error.allowed(format!("up to {MOST_ROWS}")).next("save a part of it, or every n-th row"));
-    }
-    if metadata.num_rows() == 0 {
+    // What the whole file says of its rows may differ from what its groups say, and those are read.
+    let groups = reader.metadata().row_groups().iter().map(|group| usize::try_from(group.num_rows()).unwrap_or(0));
+    let rows = groups.fold(0, usize::saturating_add);
+    if rows == 0 {
         let error = Error::new("the file names its columns but has no rows").in_file(file);
         return Err(error.allowed("at least one row of numbers").next("check that the recording was saved"));
     }
     let places = request.all_columns().map(|id| find(file, schema.columns(), id)).collect::<Result<Vec<_>>>()?;
+    check_numbers(file, places.len(), rows)?;
     let names: Vec<String> = places.iter().map(|&k| shown(&schema.column(k).path().string())).collect();
-    let mut columns = Vec::new();
-    for (&place, name) in places.iter().zip(&names) {
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    let mut length = rows;
+    for (k, (&place, name)) in places.iter().zip(&names).enumerate() {
         check_kind(file, &schema.column(place), name)?;
+        pages::check(file, reader.metadata(), place)?;
+        let ordered = request.ordered && k == 0;
         // The library behind this does not withstand every damage: what it cannot read ends as an error all the same.
-        let read = catch_unwind(AssertUnwindSafe(|| column(&reader, place)));
+        let read = catch_unwind(AssertUnwindSafe(|| column(&reader, place, length, ordered)));
         let read = read.unwrap_or_else(|_| Err(ParquetError::General("it is damaged".into())));
         columns.push(read.map_err(|error| damaged(file, &error))?);
+        length = columns[k].len();
     }
     let wanted = request.columns.len();
-    let mut sheet = Sheet::from_columns(file, names[..wanted].to_vec(), &columns, request)?;
+    let mut sheet = Sheet::from_columns(file, names[..wanted].to_vec(), columns, request)?;
     for (unit, &place) in sheet.units.iter_mut().zip(&places) {
         let key = format!("unit.{}", schema.column(place).path().string());
         let written = metadata.key_value_metadata().into_iter().flatten().find(|pair| pair.key == key);
@@ -108,52 +114,81 @@ fn stamp(column: &ColumnDescriptor) -> Option<&'static str> {
     }
 }
 
-/// All values of a column; NaN where there is none. Time stamps count from the first, so that a double holds them.
-fn column(reader: &SerializedFileReader<File>, place: usize) -> ParquetResult<Vec<f64>> {
+/// The first values of a column; NaN where there is none. Time stamps count from the first, so that a double holds them.
+/// Where they have to increase, they end with the first that does not.
+fn column(reader: &SerializedFileReader<File>, place: usize, length: usize, ordered: bool) -> ParquetResult<Vec<f64>> {
     let schema = reader.metadata().file_metadata().schema_descr();
     let descriptor = schema.column(place);
     let is_stamp = stamp(&descriptor).is_some();
     let mut first = None;
-    let mut values = Vec::new();
+    let most = descriptor.max_def_level();
+    let mut values = Values { values: Vec::new(), length, ordered };
     for group in 0..reader.num_row_groups() {
         let group = reader.get_row_group(group)?;
         let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
-        let most = descriptor.max_def_level();
         match group.get_column_reader(place)? {
-            ColumnReader::BoolColumnReader(column) => {
-                append(column, rows, most, &mut values, |x| f64::from(u8::from(*x)))?;
-            }
-            ColumnReader::Int32ColumnReader(column) => append(column, rows, most, &mut values, |x| f64::from(*x))?,
-            ColumnReader::Int64ColumnReader(column) => append(column, rows, most, &mut values, |x| {
+            ColumnReader::BoolColumnReader(column) => values.append(column, rows, most, |x| f64::from(u8::from(*x)))?,
+            ColumnReader::Int32ColumnReader(column) => values.append(column, rows, most, |x| f64::from(*x))?,
+            ColumnReader::Int64ColumnReader(column) => values.append(column, rows, most, |x| {
                 let zero = if is_stamp { *first.get_or_insert(*x) } else { 0 };
                 x.wrapping_sub(zero) as f64
             })?,
-            ColumnReader::FloatColumnReader(column) => append(column, rows, most, &mut values, |x| f64::from(*x))?,
-            ColumnReader::DoubleColumnReader(column) => append(column, rows, most, &mut values, |x| *x)?,
+            ColumnReader::FloatColumnReader(column) => values.append(column, rows, most, |x| f64::from(*x))?,
+            ColumnReader::DoubleColumnReader(column) => values.append(column, rows, most, |x| *x)?,
             _ => return Err(ParquetError::General("a column does not hold numbers".into())),
         }
+        if values.values.len() == values.length {
+            break;
+        }
     }
-    Ok(values)
+    Ok(values.values)
 }
 
-fn append<T: DataType>(
-    mut column: ColumnReaderImpl<T>,
-    rows: usize,
-    most: i16,
-    values: &mut Vec<f64>,
-    mut number: impl FnMut(&T::T) -> f64,
-) -> ParquetResult<()> {
-    let (mut numbers, mut levels) = (Vec::new(), Vec::new());
-    let there = (most > 0).then_some(&mut levels);
-    let (records, ..) = column.read_records(rows, there, None, &mut numbers)?;
-    if records != rows {
-        return Err(ParquetError::General("a column has fewer rows than its file".into()));
+/// Values of a column, as far as they are read.
+struct Values {
+    values: Vec<f64>,
+    /// So many are wanted.
+    length: usize,
+    /// Whether they have to increase.
+    ordered: bool,
+}
+
+impl Values {
+    /// Adds those of a group, a block at a time.
+    fn append<T: DataType>(
+        &mut self,
+        mut column: ColumnReaderImpl<T>,
+        rows: usize,
+        most: i16,
+        mut number: impl FnMut(&T::T) -> f64,
+    ) -> ParquetResult<()> {
+        let (mut numbers, mut levels) = (Vec::new(), Vec::new());
+        let mut left = rows.min(self.length - self.values.len());
+        while left > 0 {
+            (numbers.clear(), levels.clear());
+            let count = left.min(BLOCK);
+            let there = (most > 0).then_some(&mut levels);
+            let (records, ..) = column.read_records(count, there, None, &mut numbers)?;
+            if records != count {
+                return Err(ParquetError::General("a column has fewer rows than its file".into()));
+            }
+            let mut numbers = numbers.iter();
+            let mut next = || numbers.next().map_or(f64::NAN, &mut number);
+            let known = self.values.len();
+            match most {
+                0 => self.values.extend((0..count).map(|_| next())),
+                _ => self.values.extend(levels.iter().map(|&level| if level == most { next() } else { f64::NAN })),
+            }
+            if self.ordered {
+                let values = &self.values;
+                if let Some(end) = (known.max(1)..values.len()).find(|&i| values[i] <= values[i - 1]) {
+                    self.length = end + 1;
+                    self.values.truncate(end + 1);
+                    return Ok(());
+                }
+            }
+            left -= count;
+        }
+        Ok(())
     }
-    let mut numbers = numbers.iter();
-    let mut next = || numbers.next().map_or(f64::NAN, &mut number);
-    match most {
-        0 => values.extend((0..rows).map(|_| next())),
-        _ => values.extend(levels.iter().map(|&level| if level == most { next() } else { f64::NAN })),
-    }
-    Ok(())
 }

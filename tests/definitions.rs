@@ -1,0 +1,743 @@
+//! What the documents define, made again from their words: inputs, random numbers, devices, runs of a sweep, controllers.
+//!
+//! Nothing here calls the library's own function for what it makes; each text stands in `docs/case-file.md`, `docs/random.md` or
+//! `docs/control.md`. A change of either that the other does not follow fails here.
+
+use std::f64::consts::PI;
+use taut::case::{Case, Experiment, TEMPLATE};
+use taut::control::{Controller, Seen, Standard};
+use taut::measure::measure;
+use taut::signal::Signal;
+use taut::signal::profile::Reference;
+use taut::solve::{Grid, Solver, simulate};
+use taut::sweep::Sweep;
+
+fn case(changes: &[&str]) -> Case {
+    Case::from_text_with("axis.toml", TEMPLATE, changes).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The signal of an input as the case file writes it.
+fn input(text: &str) -> Signal {
+    case(&[&format!("experiment.0.input={text}"), "experiment.0.until=60", "experiment.0.every=1"]).experiments[0]
+        .input
+        .clone()
+}
+
+/// A signal and its pieces, against the formula of the document.
+fn same(text: &str, end: f64, tolerance: f64, formula: impl Fn(f64) -> f64) {
+    let signal = input(text);
+    for k in -20..4001 {
+        // Times that are no seams, and a few that are.
+        let t = f64::from(k) * end / 4000.0;
+        let (ours, theirs) = (signal.value(t), formula(t));
+        assert!((ours - theirs).abs() <= tolerance, "{text} at {t}: {ours}, and by the document {theirs}");
+        let piece = signal.piece(t).value(t);
+        assert!((piece - theirs).abs() <= tolerance, "{text} at {t}: {piece}, and by the document {theirs}");
+    }
+}
+
+// ---- docs/case-file.md, Inputs ----
+
+#[test]
+fn waves_and_edges_are_those_of_the_document() {
+    let before = |t: f64, u: f64| if t < 0.0 { 0.0 } else { u };
+    same("{ step = 5, at = 0.1003 }", 1.0, 0.0, |t| if t >= 0.1003 { 5.0 } else { 0.0 });
+    same("{ pulse = 5, for = 0.25, at = 0.1 }", 1.0, 0.0, |t| if (0.1..0.35).contains(&t) { 5.0 } else { 0.0 });
+    same("{ ramp = 1.2, over = 0.5, at = 0.1 }", 1.0, 1e-15, |t| match t {
+        t if t < 0.1 => 0.0,
+        t if t < 0.6 => 1.2 * (t - 0.1) / 0.5,
+        _ => 1.2,
+    });
+    same("{ triangle = 3, frequency = 7 }", 1.0, 1e-12, |t| {
+        let s = 7.0 * t - (7.0 * t + 0.5).floor();
+        before(
+            t,
+            match s {
+                s if s > 0.25 => 4.0 * 3.0 * (0.5 - s),
+                s if s < -0.25 => -4.0 * 3.0 * (0.5 + s),
+                s => 4.0 * 3.0 * s,
+            },
+        )
+    });
+    same("{ square = 3, frequency = 8, duty = 0.3 }", 1.0, 0.0, |t| {
+        let turns = 8.0 * t;
+        before(t, if turns - turns.floor() < 0.3 - 1e-12 { 3.0 } else { -3.0 })
+    });
+    same("{ sine = 3, frequency = 7, phase = 0.4, offset = 0.1 }", 1.0, 1e-12, |t| {
+        before(t, 0.1 + 3.0 * (2.0 * PI * 7.0 * t + 0.4).sin())
+    });
+}
+
+#[test]
+fn a_chirp_and_a_multisine_are_those_of_the_document() {
+    let before = |t: f64, u: f64| if t < 0.0 { 0.0 } else { u };
+    for (f1, f2, length) in [(1.0, 300.0, 2.0), (80.0, 0.0, 0.7)] {
+        let text = format!("{{ chirp = 2, from = {f1}, to = {f2}, over = {length} }}");
+        same(&text, 1.5 * length, 1e-11, |t| {
+            let turns = f1 * t + (f2 - f1) * t * t / (2.0 * length);
+            before(t, if t < length { 2.0 * (2.0 * PI * turns).sin() } else { 0.0 })
+        });
+    }
+    let sum = |t: f64, frequencies: &[f64]| {
+        let n = frequencies.len() as f64;
+        let tone = |(j, f): (usize, &f64)| {
+            let k = (j + 1) as f64;
+            (2.0 * PI * f * t - PI * k * (k - 1.0) / n).sin()
+        };
+        before(t, 0.2 * frequencies.iter().enumerate().map(tone).sum::<f64>())
+    };
+    let spread: Vec<f64> = (1..=50).map(|k| 1.0 + (50.0 - 1.0) * f64::from(k - 1) / 49.0).collect();
+    same("{ multisine = 0.2, from = 1, to = 50, tones = 50 }", 2.0, 1e-11, |t| sum(t, &spread));
+    same("{ multisine = 0.2, frequencies = [1, 3, 10] }", 2.0, 1e-11, |t| sum(t, &[1.0, 3.0, 10.0]));
+}
+
+/// The finaliser of SplitMix64, from `docs/random.md`.
+fn mix(x: u64) -> u64 {
+    let z = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+#[test]
+fn the_bits_of_a_prbs_are_those_of_the_document() {
+    const P: usize = 1_048_575;
+    // b_k = b_{k−3} ⊕ b_{k−20}, b₋₁ = 1 and b₋₂ … b₋₂₀ = 0
+    let mut bits = vec![0u8; 19];
+    bits.push(1);
+    for k in 20..P + 20 {
+        bits.push(bits[k - 3] ^ bits[k - 20]);
+    }
+    let bits = &bits[20..];
+    assert_eq!(mix(0), 0xe220_a839_7b1d_cdaf);
+    assert_eq!(mix(1) % P as u64, 143_240);
+    let text: String = (0..32).map(|k| char::from(b'0' + bits[(143_240 + k) % P])).collect();
+    let document = include_str!("../docs/case-file.md");
+    assert!(document.contains(&format!("With seed 1 the first 32 are `{text}`, and o is 143240.")));
+    for seed in [0, 1, 2, 12345, (1 << 53) + 1, i64::MAX as u64] {
+        let o = (mix(seed) % P as u64) as usize;
+        let signal = input(&format!("{{ prbs = 3, bit = 0.02, seed = {seed} }}"));
+        for k in 0..3000 {
+            let expected = if bits[(o + k) % P] == 1 { 3.0 } else { -3.0 };
+            assert_eq!(signal.value((k as f64 + 0.5) * 0.02), expected, "seed {seed}, bit {k}");
+            assert_eq!(signal.value(k as f64 * 0.02), expected, "seed {seed}, edge of bit {k}");
+        }
+        assert_eq!(signal.value(-1e-9), 0.0);
+    }
+    // It comes again after P bits.
+    let (signal, o) = (input("{ prbs = 3, bit = 1e-4 }"), 143_240);
+    for k in [P - 1, P, P + 1] {
+        assert_eq!(signal.value((k as f64 + 0.5) * 1e-4), if bits[(o + k) % P] == 1 { 3.0 } else { -3.0 });
+    }
+}
+
+/// A file was held before its first row and after its last, or not: the document did not say which.
+#[test]
+fn a_file_and_a_table_are_zero_before_and_held_after() {
+    let folder = std::env::temp_dir().join(format!("taut-definitions-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join("u.csv"), "t,u\n0.1,5\n0.2,7\n0.25,-1\n0.4,2\n").unwrap();
+    let rows = [[0.1, 5.0], [0.2, 7.0], [0.25, -1.0], [0.4, 2.0]];
+    let line = |t: f64| {
+        let k = rows.iter().position(|row| row[0] > t);
+        match k {
+            Some(0) => 0.0,
+            None => 2.0,
+            Some(k) => {
+                let ([t0, v0], [t1, v1]) = (rows[k - 1], rows[k]);
+                v0 + (v1 - v0) * (t - t0) / (t1 - t0)
+            }
+        }
+    };
+    let held = |t: f64| rows.iter().rev().find(|row| row[0] <= t).map_or(0.0, |row| row[1]);
+    let read = |input: &str| {
+        let changes = [format!("experiment.0.input={input}")];
+        let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
+        let case = Case::from_text_with(folder.join("axis.toml"), TEMPLATE, &changes);
+        case.unwrap_or_else(|error| panic!("{error}")).experiments[0].input.clone()
+    };
+    let check = |input: &str, formula: &dyn Fn(f64) -> f64| {
+        let signal = read(input);
+        for t in [-1.0, 0.0, 0.0999, 0.1, 0.15, 0.19999, 0.2, 0.22, 0.25, 0.3, 0.3999, 0.4, 0.5, 100.0] {
+            let (value, piece) = (signal.value(t), signal.piece(t).value(t));
+            assert!(
+                (value - formula(t)).abs() < 1e-12 && (piece - formula(t)).abs() < 1e-12,
+                "{input} at {t}: {value}"
+            );
+        }
+    };
+    check("{ file = 'u.csv', time = 't', column = 'u' }", &held);
+    check("{ file = 'u.csv', time = 't', column = 'u', hold = 'linear' }", &line);
+    check("{ table = [[0.1, 5], [0.2, 7], [0.25, -1], [0.4, 2]] }", &line);
+    // In a sequence they last up to their last time; the last value is left as soon as it is reached.
+    let file = "{ file = 'u.csv', time = 't', column = 'u', hold = 'linear' }";
+    check(&format!("{{ sequence = [{file}, {{ step = 9, at = 0.05 }}] }}"), &|t| match t {
+        t if t < 0.4 => line(t),
+        t if t < 0.45 => 0.0,
+        _ => 9.0,
+    });
+    check(&format!("{{ sum = [{file}, {{ step = 9, at = 0.05 }}] }}"), &|t| {
+        line(t) + if t >= 0.05 { 9.0 } else { 0.0 }
+    });
+    let _ = std::fs::remove_dir_all(&folder);
+}
+
+// ---- docs/random.md ----
+
+/// PCG XSL RR 128/64, begun from a number of 64 bits.
+struct Pcg {
+    state: u128,
+    increment: u128,
+}
+
+impl Pcg {
+    const M: u128 = 47_026_247_687_942_121_848_144_207_491_837_523_525;
+
+    fn new(mut h: u64) -> Self {
+        let words: Vec<u128> = (0..8)
+            .map(|_| {
+                h = h.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(11_634_580_027_462_260_723);
+                u128::from(((((h >> 18) ^ h) >> 27) as u32).rotate_right((h >> 59) as u32))
+            })
+            .collect();
+        let joined = |w: &[u128]| w[0] + (w[1] << 32) + (w[2] << 64) + (w[3] << 96);
+        let (a, c) = (joined(&words[..4]), joined(&words[4..]) | 1);
+        Self { state: a.wrapping_add(c).wrapping_mul(Self::M).wrapping_add(c), increment: c }
+    }
+
+    fn next(&mut self) -> u64 {
+        self.state = self.state.wrapping_mul(Self::M).wrapping_add(self.increment);
+        let (high, low) = ((self.state >> 64) as u64, self.state as u64);
+        (high ^ low).rotate_right((self.state >> 122) as u32)
+    }
+
+    fn normal(&mut self) -> f64 {
+        loop {
+            let mut side = || (self.next() >> 11) as f64 * 2f64.powi(-52) - 1.0;
+            let (u, v) = (side(), side());
+            let s = u * u + v * v;
+            if 0.0 < s && s < 1.0 {
+                return u * (-2.0 * s.ln() / s).sqrt();
+            }
+        }
+    }
+}
+
+/// The PCG64 of a device.
+fn device(seed: u64, experiment: &str, name: &str) -> (u64, Pcg) {
+    let mut h = 14_695_981_039_346_656_037u64;
+    for byte in seed.to_le_bytes().iter().chain(experiment.as_bytes()).chain(&[0]).chain(name.as_bytes()) {
+        h = (h ^ u64::from(*byte)).wrapping_mul(1_099_511_628_211);
+    }
+    (h, Pcg::new(h))
+}
+
+#[test]
+fn the_generator_begins_as_the_document_says() {
+    let mut random = Pcg::new(1);
+    assert_eq!([random.next(), random.next()], [15_492_934_433_077_865_799, 319_104_231_195_455_319]);
+    assert_eq!(device(1, "5 V pulse", "jitter").0, 1_923_885_783_084_046_118);
+}
+
+#[test]
+fn noise_steps_and_counts_are_those_of_the_document() {
+    for seed in [1, (1 << 53) + 1] {
+        let case = case(&[
+            &format!("measurement.seed={seed}"),
+            "measurement.motor_current={ step = 0.01, noise = 0.05, range = 1.234 }",
+            "measurement.cart_speed.noise=0.002",
+            "motor.gear_ratio=5.9",
+        ]);
+        let (experiment, measurement) = (&case.experiments[0], case.measurement.as_ref().unwrap());
+        let log = measure(&case.stage, measurement, experiment, Solver::Exact).unwrap().trajectory;
+        let run = simulate(&case.stage, experiment, Solver::Exact).unwrap().trajectory;
+        let encoder = case.stage.encoder.unwrap();
+        let (mut noise, mut other) =
+            (device(seed, "5 V pulse", "motor_current").1, device(seed, "5 V pulse", "cart_speed").1);
+        let counts = 4.0 * 5.9 * encoder.lines / (2.0 * PI);
+        for k in 0..run.len() {
+            let of = |name: &str| run.get(name).unwrap()[k];
+            let seen = |name: &str| log.get(name).unwrap()[k];
+            let steps = ((of("motor_current") + 0.05 * noise.normal()) / 0.01).round().clamp(-123.0, 123.0);
+            assert!((seen("motor_current") - 0.01 * steps).abs() < 1e-12, "row {k}");
+            assert!((seen("cart_speed") - (of("cart_speed") + 0.002 * other.normal())).abs() < 1e-15, "row {k}");
+            let count = (of("drive_angle") * counts).round();
+            assert_eq!(seen("encoder_count"), count);
+            assert!((seen("drive_angle") - count / counts).abs() < 1e-12);
+        }
+        assert!(log.get("motor_current").unwrap().iter().any(|i| *i == 1.23), "the range is reached");
+    }
+}
+
+/// Whether a sample beyond half an interval was drawn again or clipped, and what it saw there, nobody could know.
+#[test]
+fn jitter_is_clipped_at_half_an_interval() {
+    let case = case(&[
+        "experiment.0.input={ sine = 5, frequency = 3 }",
+        "measurement.jitter=0.25 ms",
+        "measurement.delay=0.4 ms",
+        "measurement.every=1 ms",
+        "measurement.cart_position={}",
+        "measurement.seed=3",
+    ]);
+    let (experiment, measurement) = (&case.experiments[0], case.measurement.as_ref().unwrap());
+    let log = measure(&case.stage, measurement, experiment, Solver::Exact).unwrap().trajectory;
+    // The run at every T/100, and beyond its end.
+    let fine = Experiment { every: 1e-5, until: 1.002, log: None, ..experiment.clone() };
+    let run = simulate(&case.stage, &fine, Solver::Exact).unwrap().trajectory;
+    let truth = run.get("cart_position").unwrap();
+    let (mut random, mut clipped) = (device(3, "5 V pulse", "jitter").1, 0);
+    for k in 0..=1000 {
+        let drawn = 0.25e-3 * random.normal();
+        let late = drawn.clamp(-0.5e-3, 0.5e-3);
+        clipped += usize::from(late != drawn);
+        let instant = f64::from(k) * 1e-3 - 0.4e-3 + late;
+        let expected = if instant < 0.0 {
+            0.0
+        } else {
+            let place = instant / 1e-5;
+            let (j, share) = (place as usize, place.fract());
+            truth[j] + share * (truth[j + 1] - truth[j])
+        };
+        let seen = log.get("cart_position").unwrap()[k as usize];
+        // Joined by straight lines at every T/20 there, at every T/100 here: (T/20)² |ẍ| / 8, |ẍ| < 30 m/s²
+        assert!((seen - expected).abs() < 1e-8, "sample {k}: {seen} and {expected}");
+        assert_eq!(log.get("time").unwrap()[k as usize], Grid::new(1e-3, 1.0).time(k as u64));
+    }
+    assert!((30..65).contains(&clipped), "{clipped} of 1001: 4.6 % of samples");
+}
+
+/// The permutation of 0 … n − 1.
+fn permuted(i: u64, n: u64, key: u64) -> u64 {
+    let length = if n <= 1 { 0 } else { 64 - (n - 1).leading_zeros() };
+    let b = length.div_ceil(2).max(1);
+    let mut value = i;
+    loop {
+        let (mut l, mut r) = (value >> b, value & ((1 << b) - 1));
+        for round in 0..6u64 {
+            (l, r) = (r, l ^ (mix(key ^ mix((round << 40) ^ r)) & ((1 << b) - 1)));
+        }
+        value = (l << b) | r;
+        if value < n {
+            return value;
+        }
+    }
+}
+
+fn swept(design: &str, seed: u64, runs: u64) -> Vec<Vec<f64>> {
+    let changes = [
+        format!("sweep.runs={runs}"),
+        format!("sweep.seed={seed}"),
+        format!("sweep.design=\"{design}\""),
+        "sweep.vary.\"cart.mass\"=uniform(1 kg, 2 kg)".into(),
+        "sweep.vary.\"motor.resistance\"=uniform(1 ohm, 3 ohm)".into(),
+        "sweep.vary.\"cart.load\"=values(5 N, 6 N, 7 N)".into(),
+    ];
+    let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
+    let table = Sweep::new(&case(&changes)).unwrap().values(0, runs as usize);
+    (1..4).map(|column| table.columns[column].values.clone()).collect()
+}
+
+#[test]
+fn runs_of_a_sweep_are_those_of_the_document() {
+    let value = |j: usize, u: f64| match j {
+        0 => 1.0 + u,
+        1 => 1.0 + 2.0 * u,
+        _ => [5.0, 6.0, 7.0][(u * 3.0) as usize],
+    };
+    let n = 100;
+    for seed in [1, 7, (1 << 60) + 1] {
+        let mut random = Pcg::new(seed);
+        let x: Vec<f64> = (0..3 * n).map(|_| ((random.next() >> 11) as f64 + 0.5) * 2f64.powi(-53)).collect();
+        let (plain, cube, sobol) =
+            (swept("random", seed, n), swept("latin-hypercube", seed, n), swept("sobol", seed, n));
+        for i in 0..n {
+            for j in 0..3 {
+                let u = x[3 * i as usize + j];
+                let close = |found: &[Vec<f64>], u: f64| {
+                    let (found, wanted) = (found[j][i as usize], value(j, u));
+                    assert!((found - wanted).abs() < 1e-12, "seed {seed}, run {i}, parameter {j}: {found}, {wanted}");
+                };
+                close(&plain, u);
+                close(&cube, (permuted(i, n, mix(seed ^ mix(j as u64))) as f64 + u) / n as f64);
+                close(&sobol, scrambled(i, j, seed));
+            }
+        }
+    }
+}
+
+/// Sobol' point i of the first three dimensions, scrambled.
+fn scrambled(i: u64, j: usize, seed: u64) -> f64 {
+    // new-joe-kuo-6.21201: d s a m: 2 1 0 1; 3 2 1 1 3
+    let mut m: Vec<u64> = match j {
+        0 => vec![1; 53],
+        1 => vec![1],
+        _ => vec![1, 3],
+    };
+    while m.len() < 53 {
+        let k = m.len();
+        m.push(match j {
+            1 => (m[k - 1] << 1) ^ m[k - 1],
+            _ => (m[k - 1] << 1) ^ (m[k - 2] << 2) ^ m[k - 2],
+        });
+    }
+    let bits = (0..53).filter(|k| i >> k & 1 == 1).fold(0, |bits, k| bits ^ (m[k] << (52 - k)));
+    let key = mix(seed ^ mix(j as u64 + 1));
+    let mut flips = 0u64;
+    for b in 0..32u32 {
+        let above = if b == 0 { 0 } else { bits >> (53 - b) };
+        flips |= (mix(key ^ ((1u64 << b) + above)) >> 63) << (52 - b);
+    }
+    flips |= mix(key ^ ((1u64 << 32) + (bits >> 21))) >> 43;
+    ((bits ^ flips) as f64 + 0.5) * 2f64.powi(-53)
+}
+
+// ---- docs/control.md, Sample by sample ----
+
+const AXIS: [&str; 8] = [
+    "motor.gear_ratio=1.7",
+    "motor.gear_efficiency=0.8",
+    "motor.rotor_inertia=4e-6",
+    "motor.inductance=0.3 mH",
+    "amplifier.gain=1.5",
+    "cart.load=-0.4",
+    "cart.friction={ viscous = 19, coulomb = 0.2, static = 0.3, viscous_backward = 15, coulomb_backward = 0.25 }",
+    "encoder={ at = 'drive_pulley', lines = 512 }",
+];
+
+/// T, and the limit of the command.
+const T: f64 = 1e-3;
+const LIMIT: f64 = 6.0;
+
+/// What one sample's structure does: reference, measured position, current and feed-forward as a current, to a command.
+struct Made {
+    step: Box<dyn FnMut(&Reference, f64, f64, f64) -> f64>,
+    limited: Box<dyn FnMut(f64)>,
+}
+
+/// The controller of the library beside that of the document, on samples drawn by chance.
+fn compare(controller: &str, mut made: Made, around: impl Fn(&Case, &Reference, f64, f64) -> [f64; 2], target: bool) {
+    let text = format!(
+        "{TEMPLATE}\n[controller]\nevery = {T}\nlimit = {LIMIT}\n{controller}\n\
+         [[move]]\nname = \"m\"\nto = 0.01\nspeed = 0.3\nacceleration = 5\nuntil = 1\n"
+    );
+    let case = Case::from_text_with("axis.toml", &text, &AXIS).unwrap_or_else(|error| panic!("{error}"));
+    let mut ours = Standard::new(case.controller.as_ref().unwrap(), &case.stage).unwrap();
+    ours.reset();
+    let mut random = Pcg::new(5);
+    let mut draw = |size: f64| size * random.normal();
+    let mut most: f64 = 0.0;
+    for k in 0..400 {
+        let mut reference = || Reference {
+            position: draw(0.01),
+            speed: draw(0.3),
+            acceleration: draw(5.0),
+            jerk: draw(300.0),
+            snap: draw(1e4),
+        };
+        let (now, ahead) = (reference(), reference());
+        let (position, current) = (draw(0.01), draw(5.0));
+        let seen = Seen { time: f64::from(k) * T, reference: now, ahead, position, current };
+        let [forward, inner] = around(&case, &ahead, 0.0, 0.0);
+        let wanted = if target { elastic(&case, &now).0 } else { now };
+        let asked = (made.step)(&wanted, position, current, inner) + forward;
+        let found = ours.step(&seen);
+        assert!((found - asked).abs() <= 1e-9 * asked.abs().max(1.0), "{controller}, sample {k}: {found}, {asked}");
+        let given = asked.clamp(-LIMIT, LIMIT);
+        ours.limited(given);
+        (made.limited)(given - asked);
+        most = most.max((given - asked).abs());
+    }
+    assert!(most > 1.0, "{controller}: the limit has to hold now and then, or nothing is shown");
+}
+
+fn none(_: &Case, _: &Reference, _: f64, _: f64) -> [f64; 2] {
+    [0.0; 2]
+}
+
+fn shared<S: 'static>(
+    state: S,
+    step: impl Fn(&mut S, &Reference, f64, f64, f64) -> f64 + 'static,
+    limited: impl Fn(&mut S, f64) + 'static,
+) -> Made {
+    let state = std::rc::Rc::new(std::cell::RefCell::new(state));
+    let other = state.clone();
+    Made {
+        step: Box::new(move |y, p, i, w| step(&mut state.borrow_mut(), y, p, i, w)),
+        limited: Box::new(move |excess| limited(&mut other.borrow_mut(), excess)),
+    }
+}
+
+/// Speed: v_k = a v_{k−1} + (1 − a) (p_k − p_{k−1})/T
+#[derive(Default)]
+struct Speed(Option<f64>, f64);
+
+impl Speed {
+    fn step(&mut self, p: f64, filter: f64) -> f64 {
+        let a = (-2.0 * PI * filter * T).exp();
+        self.1 = a * self.1 + (1.0 - a) * (p - self.0.unwrap_or(p)) / T;
+        self.0 = Some(p);
+        self.1
+    }
+}
+
+#[test]
+fn pid_is_that_of_the_document() {
+    #[derive(Default)]
+    struct State {
+        integral: f64,
+        slope: f64,
+        last: Option<f64>,
+    }
+    let made = || {
+        shared(
+            State::default(),
+            |s, y, p, _, _| {
+                let (e, tau) = (y.position - p, 1.0 / (2.0 * PI * 150.0));
+                s.slope = (tau * s.slope + e - s.last.unwrap_or(e)) / (tau + T);
+                s.last = Some(e);
+                s.integral += 30e3 * T * e;
+                300.0 * e + s.integral + 10.0 * s.slope
+            },
+            |s, excess| s.integral += (T / 0.02f64).min(1.0) * excess,
+        )
+    };
+    let pid = "pid = { proportional = 300, integral = 30e3, derivative = 10, filter = 150, tracking = 0.02 }";
+    compare(pid, made(), none, false);
+    let rigid = |case: &Case, y: &Reference, _: f64, _: f64| [rigid_command(case, y), 0.0];
+    compare(
+        &format!("{pid}\nfeed_forward = {{ model = \"rigid\", inertia = 0.9, friction = 0.7 }}"),
+        made(),
+        rigid,
+        false,
+    );
+    let stretched = |case: &Case, y: &Reference, _: f64, _: f64| [elastic_command(case, y), 0.0];
+    let elastic = "feed_forward = { model = \"elastic\", inertia = 0.9, friction = 0.7, compensate_stretch = true }";
+    compare(&format!("{pid}\n{elastic}"), made(), stretched, true);
+}
+
+#[test]
+fn filters_are_those_of_the_document() {
+    // Of each filter b₀ b₁ b₂ a₁ a₂, from N(s)/(s² + 2 ζ s + 1) with s = c (z − 1)/(z + 1)
+    let of = |f: f64, n: [f64; 3], zeta: f64| {
+        let c = 1.0 / (PI * f * T).min(0.49 * PI).tan();
+        let over =
+            |[n2, n1, n0]: [f64; 3]| [n2 * c * c + n1 * c + n0, 2.0 * n0 - 2.0 * n2 * c * c, n2 * c * c - n1 * c + n0];
+        (over(n), over([1.0, 2.0 * zeta, 1.0]))
+    };
+    let filters = [of(190.0, [1.0, 2.0 * 0.1, 1.0], 0.7), of(300.0, [0.0, 0.0, 1.0], 0.6)];
+    // The last two inputs and outputs of each.
+    let made = shared(
+        [[0.0f64; 4]; 2],
+        move |s, y, p, _, _| {
+            let mut u = 1500.0 * (y.position - p);
+            for (past, (b, a)) in s.iter_mut().zip(&filters) {
+                let out = (b[0] * u + b[1] * past[0] + b[2] * past[1] - a[1] * past[2] - a[2] * past[3]) / a[0];
+                *past = [u, past[0], out, past[2]];
+                u = out;
+            }
+            u
+        },
+        |_, _| {},
+    );
+    let filters = "filters = [{ notch = 190, depth = 0.1, damping = 0.7 }, { low_pass = 300, damping = 0.6 }]";
+    compare(&format!("pid = {{ proportional = 1500 }}\n{filters}"), made, none, false);
+}
+
+#[derive(Default)]
+struct Loops {
+    speed: Speed,
+    outer: f64,
+    inner: f64,
+}
+
+#[test]
+fn cascades_are_those_of_the_document() {
+    let share = |tracking: f64| (T / tracking).min(1.0);
+    let made = shared(
+        Loops::default(),
+        |s, y, p, _, _| {
+            let error = 60.0 * (y.position - p) + y.speed - s.speed.step(p, 120.0);
+            s.outer += 800.0 * T * error;
+            13.0 * error + s.outer
+        },
+        move |s, excess| s.outer += share(0.03) * excess,
+    );
+    let cascade = "cascade = { position = 60, speed = 13, speed_integral = 800, filter = 120, tracking = 0.03 }";
+    compare(cascade, made, none, false);
+    let made = shared(
+        Loops::default(),
+        move |s, y, p, i, w| {
+            let error = 60.0 * (y.position - p) + y.speed - s.speed.step(p, 120.0);
+            s.outer += 800.0 * T * error;
+            let asked = 13.0 * error + s.outer + w;
+            let held = asked.clamp(-8.0, 8.0);
+            s.outer += share(0.03) * (held - asked);
+            s.inner += 200.0 * T * (held - i);
+            0.3 * (held - i) + s.inner
+        },
+        move |s, excess| {
+            s.inner += share(0.03) * excess;
+            s.outer += share(0.03) * excess / 0.3;
+        },
+    );
+    let split = |case: &Case, y: &Reference, _: f64, _: f64| {
+        let (stage, one) = (&case.stage, Mass::of(case));
+        let motor = &stage.motor;
+        let r = stage.pulley_radius;
+        let voltage = motor.gear_ratio * motor.back_emf_constant * y.speed / (r * stage.amplifier.gain);
+        let rest = rigid_command(case, y) - voltage;
+        [voltage, rest * one.push * r / (motor.gear_ratio * motor.torque_constant)]
+    };
+    let inner = "current = { proportional = 0.3, integral = 200, limit = 8 }";
+    let cascade = cascade.replace(" }", &format!(", {inner} }}"));
+    let feed = "feed_forward = { model = \"rigid\", inertia = 0.9, friction = 0.7 }";
+    compare(&format!("{cascade}\n{feed}"), made, split, false);
+}
+
+#[test]
+fn sliding_mode_and_fuzzy_rules_are_those_of_the_document() {
+    let case = case(&AXIS);
+    let one = Mass::of(&case);
+    #[derive(Default)]
+    struct State {
+        speed: Speed,
+        sum: f64,
+    }
+    let (lambda, kappa, reaching, layer) = (40.0, 300.0, 7.0, 0.3);
+    let made = shared(
+        State::default(),
+        move |s, y, p, _, _| {
+            let (e, rho) = (y.position - p, y.speed - s.speed.step(p, 120.0));
+            s.sum += T * e;
+            let sigma: f64 = rho + lambda * e + kappa * s.sum;
+            one.mass * (lambda * rho + kappa * e + reaching * (sigma / layer).clamp(-1.0, 1.0)) / one.push
+        },
+        move |s, excess| {
+            s.sum += f64::min(lambda * T, 1.0) * excess * one.push * layer / (one.mass * kappa * reaching);
+        },
+    );
+    let sliding = "sliding_mode = { bandwidth = 40, reaching = 7, boundary = 0.3, integral = 300, filter = 120 }";
+    compare(&format!("{sliding}\nfeed_forward = {{ model = \"none\" }}"), made, none, false);
+
+    let rules = [[-1.0, -0.4, 0.1], [-0.5, 0.05, 0.6], [0.0, 0.5, 0.9]];
+    let surface = move |e: f64, rate: f64| {
+        let place = |x: f64| (x.clamp(-1.0, 1.0) + 1.0).min(2.0 - 1e-15);
+        let (x, y) = (place(e), place(rate));
+        let (i, j, a, b) = (x as usize, y as usize, x.fract(), y.fract());
+        (1.0 - a) * ((1.0 - b) * rules[i][j] + b * rules[i][j + 1])
+            + a * ((1.0 - b) * rules[i + 1][j] + b * rules[i + 1][j + 1])
+    };
+    for slope in [false, true] {
+        let made = shared(
+            (Speed::default(), 0.0),
+            move |s, y, p, _, _| {
+                let rate = y.speed - s.0.step(p, 120.0);
+                let value = surface((y.position - p) / 0.01, rate / 0.6);
+                s.1 = if slope { s.1 + T * 1500.0 * value } else { 9.0 * value };
+                s.1
+            },
+            move |s, excess| s.1 += if slope { excess } else { 0.0 },
+        );
+        let kind = if slope { "slope = 1500" } else { "command = 9" };
+        let table = "[[-1, -0.4, 0.1], [-0.5, 0.05, 0.6], [0, 0.5, 0.9]]";
+        let fuzzy = format!("fuzzy = {{ error = 0.01, rate = 0.6, {kind}, rules = {table}, filter = 120 }}");
+        compare(&fuzzy, made, none, false);
+    }
+}
+
+/// All bodies as one mass at the belt.
+#[derive(Clone, Copy)]
+struct Mass {
+    mass: f64,
+    viscous: [f64; 2],
+    coulomb: [f64; 2],
+    /// g: force per unit of the command at rest.
+    push: f64,
+}
+
+impl Mass {
+    fn of(case: &Case) -> Self {
+        let s = &case.stage;
+        let (r, n) = (s.pulley_radius, s.motor.gear_ratio);
+        let pulleys = s.drive_pulley.inertia + n * n * s.motor.rotor_inertia + s.idler_pulley.inertia;
+        let (drive, idler, cart) = (s.drive_pulley.friction, s.idler_pulley.friction, s.cart.friction);
+        let side = |forward: bool| (drive.side(forward), idler.side(forward), cart.side(forward));
+        Self {
+            mass: s.cart.mass + pulleys / (r * r),
+            viscous: [true, false].map(|f| side(f).2.viscous + (side(f).0.viscous + side(f).1.viscous) / (r * r)),
+            coulomb: [true, false].map(|f| side(f).2.coulomb + (side(f).0.coulomb + side(f).1.coulomb) / r),
+            push: s.amplifier.gain * s.motor.gear_efficiency * n * s.motor.torque_constant / (r * s.motor.resistance),
+        }
+    }
+}
+
+fn sign(y: &Reference) -> f64 {
+    match (y.speed, y.acceleration) {
+        (v, _) if v != 0.0 => v.signum(),
+        (_, a) if a != 0.0 => a.signum(),
+        _ => 0.0,
+    }
+}
+
+/// The command for a force and its rate at a speed, in voltage mode.
+fn command(case: &Case, force: f64, rate: f64, speed: f64) -> f64 {
+    let (s, motor) = (&case.stage, &case.stage.motor);
+    let n = motor.gear_ratio;
+    let eta = if force * speed < 0.0 { 1.0 / motor.gear_efficiency } else { motor.gear_efficiency };
+    let current = |f: f64| f * s.pulley_radius / (eta * n * motor.torque_constant);
+    let back = n * motor.back_emf_constant * speed / s.pulley_radius;
+    (motor.resistance * current(force) + motor.inductance * current(rate) + back) / s.amplifier.gain
+}
+
+/// p = 0.9, q = 0.7.
+fn rigid_command(case: &Case, y: &Reference) -> f64 {
+    let (one, s) = (Mass::of(case), sign(y));
+    let side = usize::from(s < 0.0);
+    let friction = one.viscous[side] * y.speed + s * one.coulomb[side];
+    let force = 0.9 * one.mass * y.acceleration + 0.7 * friction - case.stage.cart.load;
+    command(case, force, 0.9 * one.mass * y.jerk, y.speed)
+}
+
+/// y₁ with two derivatives, and F and Ḟ with all of inertia and friction.
+fn elastic(case: &Case, y: &Reference) -> (Reference, f64, f64) {
+    let stage = &case.stage;
+    let (r, n, s) = (stage.pulley_radius, stage.motor.gear_ratio, sign(y));
+    let forward = s >= 0.0;
+    let (cart, idler) = (stage.cart.friction.side(forward), stage.idler_pulley.friction.side(forward));
+    let drive = stage.drive_pulley.friction.side(forward);
+    let [k1, k2, k3] = stage.belt.stiffness;
+    let (m, j2) = (stage.cart.mass, stage.idler_pulley.inertia);
+    let j1 = stage.drive_pulley.inertia + n * n * stage.motor.rotor_inertia;
+    let load = [
+        m * y.acceleration + cart.viscous * y.speed + s * cart.coulomb - stage.cart.load,
+        m * y.jerk + cart.viscous * y.acceleration,
+        m * y.snap + cart.viscous * y.jerk,
+    ];
+    let pull = [
+        (j2 * y.acceleration / r + idler.viscous * y.speed / r + s * idler.coulomb) / r,
+        (j2 * y.jerk + idler.viscous * y.acceleration) / (r * r),
+        (j2 * y.snap + idler.viscous * y.jerk) / (r * r),
+    ];
+    let k = k1 + k2 * k3 / (k2 + k3);
+    let stretch = |d: usize| (load[d] + pull[d] * k2 / (k2 + k3)) / k;
+    let first = Reference {
+        position: y.position + stretch(0),
+        speed: y.speed + stretch(1),
+        acceleration: y.acceleration + stretch(2),
+        ..*y
+    };
+    let own = j1 * first.acceleration / (r * r) + drive.viscous * first.speed / (r * r) + s * drive.coulomb / r;
+    let rate = j1 * y.jerk / (r * r) + drive.viscous * first.acceleration / (r * r) + load[1] + pull[1];
+    (first, own + load[0] + pull[0], rate)
+}
+
+/// p = 0.9, q = 0.7.
+fn elastic_command(case: &Case, y: &Reference) -> f64 {
+    let (first, force, rate) = elastic(case, y);
+    let (one, s) = (Mass::of(case), sign(y));
+    let side = usize::from(s < 0.0);
+    let friction = one.viscous[side] * y.speed + s * one.coulomb[side];
+    let less = (1.0 - 0.7) * friction + (1.0 - 0.9) * one.mass * first.acceleration;
+    command(case, force - less, rate, first.speed)
+}
