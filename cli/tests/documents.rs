@@ -158,6 +158,7 @@ fn what_the_documents_name_is_there() {
         "docs/scale.md",
         "docs/shape.md",
         "docs/sweep.md",
+        "docs/trust.md",
         "docs/tune.md",
         "docs/solver.md",
         "docs/general-solver.md",
@@ -171,7 +172,7 @@ fn what_the_documents_name_is_there() {
         "stages/emps/README.md",
         "stages/two-mass/README.md",
     ];
-    let folders = ["src", "cli", "stages", "tests", "examples", "docs", "authorities", "py", "xtask", ".ci"];
+    let folders = ["src", "cli", "stages", "tests", "examples", "docs", "authorities", "py", "xtask", "hunt", ".ci"];
     let mut missing = Vec::new();
     for document in documents {
         let text = read(document);

@@ -21,6 +21,10 @@ pub struct Hunt {
     only: Option<usize>,
     /// Whether they are shown, and not run.
     list: bool,
+    /// Threads of the stages, all processors unless said.
+    threads: Option<u64>,
+    /// Whether the stages are told as JSON.
+    json: bool,
 }
 
 /// A part of the hunt.
@@ -36,10 +40,10 @@ const PARTS: [(&str, Part); 4] =
     [("stages", Part::Stages), ("readers", Part::Readers), ("faults", Part::Faults), ("mutants", Part::Mutants)];
 
 pub const USAGE: &str = "cargo xtask hunt [--part stages|readers|faults|mutants]... [--seed S]
-                       [--stages N] [--seconds B] [--kills N] [--mutants N [--list | --only K]]";
+                       [--stages N [--threads N] [--json]] [--seconds B] [--kills N] [--mutants N [--list | --only K]]";
 
 impl Hunt {
-    /// From the words behind `hunt`; without `--part` all parts but the mutants, which take hours.
+    /// From the words behind `hunt`. The size of a part names it, too; without any all parts but the mutants, which take hours.
     pub fn new(words: &[&str]) -> Result<Self, String> {
         let mut hunt = Self {
             parts: Vec::new(),
@@ -50,11 +54,18 @@ impl Hunt {
             mutants: 100,
             only: None,
             list: false,
+            threads: None,
+            json: false,
         };
+        let mut sized = Vec::new();
         let mut words = words.iter();
         while let Some(&word) = words.next() {
-            if word == "--list" {
-                hunt.list = true;
+            match word {
+                "--list" => hunt.list = true,
+                "--json" => hunt.json = true,
+                _ => {}
+            }
+            if ["--list", "--json"].contains(&word) {
                 continue;
             }
             let value = *words.next().ok_or_else(|| format!("{word} wants a value"))?;
@@ -70,8 +81,19 @@ impl Hunt {
                 "--kills" => hunt.kills = number()?,
                 "--mutants" => hunt.mutants = number()? as usize,
                 "--only" => hunt.only = Some(number()? as usize),
+                "--threads" => hunt.threads = Some(number()?),
                 _ => return Err(format!("{word} is not known")),
             }
+            match word {
+                "--stages" => sized.push(Part::Stages),
+                "--seconds" => sized.push(Part::Readers),
+                "--kills" => sized.push(Part::Faults),
+                "--mutants" | "--only" => sized.push(Part::Mutants),
+                _ => {}
+            }
+        }
+        if hunt.parts.is_empty() {
+            hunt.parts = sized;
         }
         if hunt.parts.is_empty() {
             hunt.parts = vec![Part::Stages, Part::Readers, Part::Faults];
@@ -84,7 +106,7 @@ impl Hunt {
         let mut found = Vec::new();
         for part in &self.parts {
             let done = match part {
-                Part::Stages => stages::run(self.stages, self.seed),
+                Part::Stages => stages::run(self.stages, self.seed, self.threads, self.json),
                 Part::Readers => readers::run(self.seconds, self.seed),
                 Part::Faults => faults::run(self.kills, self.seed),
                 Part::Mutants => mutants::run(self.mutants, self.seed, self.only, self.list),
@@ -109,6 +131,8 @@ mod tests {
     fn words_are_read_and_mistakes_told() {
         let hunt = Hunt::new(&["--part", "faults", "--seed", "7", "--part", "readers"]).unwrap();
         assert!(hunt.parts == [Part::Faults, Part::Readers] && hunt.seed == 7);
+        assert!(Hunt::new(&["--stages", "5", "--seed", "3"]).unwrap().parts == [Part::Stages]);
+        assert_eq!(Hunt::new(&[]).unwrap().parts.len(), 3);
         assert_eq!(Hunt::new(&["--part", "others"]).err().unwrap(), "there is no part others");
         assert_eq!(Hunt::new(&["--stages", "many"]).err().unwrap(), "--stages wants a whole number, not many");
         assert_eq!(Hunt::new(&["--seed"]).err().unwrap(), "--seed wants a value");

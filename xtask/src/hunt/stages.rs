@@ -3,8 +3,14 @@
 use super::succeeds;
 use crate::cargo;
 
-pub fn run(stages: u64, seed: u64) -> Result<(), String> {
-    let (stages, seed) = (stages.to_string(), seed.to_string());
-    let words = ["run", "--release", "--package", "taut-hunt", "--", "--stages", &stages, "--seed", &seed];
-    succeeds(&mut cargo(&words))
+pub fn run(stages: u64, seed: u64, threads: Option<u64>, json: bool) -> Result<(), String> {
+    let mut command = cargo(&["run", "--release", "--package", "taut-hunt", "--", "stages"]);
+    command.args(["--stages", &stages.to_string(), "--seed", &seed.to_string()]);
+    if let Some(threads) = threads {
+        command.args(["--threads", &threads.to_string()]);
+    }
+    if json {
+        command.arg("--json");
+    }
+    succeeds(&mut command)
 }

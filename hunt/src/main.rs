@@ -1,0 +1,131 @@
+//! `taut-hunt`: what `cargo xtask hunt` runs.
+
+use clap::{Parser, Subcommand};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+use taut_hunt::compare::{By, compare};
+use taut_hunt::stages::{self, Hunt};
+
+/// Hunts for wrong answers of taut.
+#[derive(Parser)]
+#[command(name = "taut-hunt", version)]
+struct Arguments {
+    #[command(subcommand)]
+    part: Part,
+}
+
+#[derive(Subcommand)]
+enum Part {
+    /// Random stages against an independent solver.
+    Stages(Stages),
+}
+
+#[derive(clap::Args)]
+struct Stages {
+    /// How many.
+    #[arg(long, default_value_t = 1000)]
+    stages: u64,
+    /// Which ones; the same seed gives the same.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// The number of the first one.
+    #[arg(long, default_value_t = 0)]
+    first: u64,
+    /// Threads; as many as processors unless given. They do not change the result.
+    #[arg(long)]
+    threads: Option<usize>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+    /// Print the cases that are ill-conditioned or unknown, too.
+    #[arg(long)]
+    all: bool,
+    /// Print the case of a stage, `--first`, and no more.
+    #[arg(long)]
+    show: bool,
+    /// Compare the first experiment of this case file by both solvers, instead of random ones.
+    #[arg(long, value_name = "FILE")]
+    case: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    match Arguments::parse().part {
+        Part::Stages(arguments) => arguments.run(),
+    }
+}
+
+impl Stages {
+    fn run(&self) -> ExitCode {
+        if let Some(path) = &self.case {
+            return one_case(path);
+        }
+        if self.show {
+            print!("{}", taut_hunt::draw::stage(self.seed, self.first).text);
+            return ExitCode::SUCCESS;
+        }
+        let stop = Arc::new(AtomicBool::new(false));
+        // Ctrl-C ends it after the stages under way; what is done is shown.
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGINT, Arc::clone(&stop));
+        let processors = std::thread::available_parallelism().map_or(1, usize::from);
+        let threads = self.threads.unwrap_or(processors).clamp(1, 256);
+        let hunt = Hunt {
+            seed: self.seed,
+            first: self.first,
+            count: self.stages,
+            threads,
+            progress: true,
+            stop: Arc::clone(&stop),
+        };
+        let begin = Instant::now();
+        let outcomes = hunt.run();
+        let unexplained = outcomes.iter().flat_map(|o| &o.compared).filter(|c| c.verdict.is_unexplained()).count();
+        if self.json {
+            println!("{:#}", stages::json(&hunt, &outcomes));
+        } else {
+            print!("{}", stages::told(self.seed, &outcomes, self.all));
+            println!(
+                "Seed {}, {} of {} stages from number {}, {:.0} s on {threads} threads: {unexplained} unexplained.\n",
+                self.seed,
+                outcomes.len(),
+                self.stages,
+                self.first,
+                begin.elapsed().as_secs_f64()
+            );
+            print!("{}", stages::table(&outcomes));
+        }
+        match (unexplained, stop.load(Ordering::Relaxed)) {
+            (1.., _) => ExitCode::FAILURE,
+            (0, true) => ExitCode::from(130),
+            (0, false) => ExitCode::SUCCESS,
+        }
+    }
+}
+
+/// Compares the case of a file.
+fn one_case(path: &std::path::Path) -> ExitCode {
+    let text = match std::fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(error) => {
+            eprintln!("error: {} cannot be read: {error}", path.display());
+            return ExitCode::from(2);
+        }
+    };
+    let mut status = ExitCode::SUCCESS;
+    for compared in compare(&path.display().to_string(), &text, &[By::Exact, By::General]) {
+        println!(
+            "{:?}: {}, positions within {:.1e} m, {} body events; {}",
+            compared.by,
+            compared.verdict.word(),
+            compared.difference,
+            compared.events,
+            compared.verdict.told()
+        );
+        if compared.verdict.is_unexplained() {
+            status = ExitCode::FAILURE;
+        }
+    }
+    status
+}

@@ -1,0 +1,276 @@
+//! The hunt over random stages: many of them on several threads, and the table of what came out.
+
+use crate::compare::{By, Compared, Verdict, compare};
+use crate::draw::{self, Kind};
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Every so many stages the general solver is asked, too.
+const GENERAL_EVERY: u64 = 20;
+
+/// A stage that runs longer is named.
+const LONG: Duration = Duration::from_secs(60);
+
+/// What to hunt.
+#[derive(Debug, Clone)]
+pub struct Hunt {
+    /// Which stages.
+    pub seed: u64,
+    /// The number of the first one.
+    pub first: u64,
+    /// How many.
+    pub count: u64,
+    /// Threads.
+    pub threads: usize,
+    /// Whether to tell on the way how far it is.
+    pub progress: bool,
+    /// What ends it early.
+    pub stop: Arc<AtomicBool>,
+}
+
+/// A stage that was compared.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// Its number.
+    pub number: u64,
+    /// Its case file.
+    pub text: String,
+    /// What it has.
+    pub kinds: Vec<Kind>,
+    /// What the solvers said.
+    pub compared: Vec<Compared>,
+}
+
+/// Compares the stage of this number.
+pub fn one(seed: u64, number: u64) -> Outcome {
+    let drawn = draw::stage(seed, number);
+    let solvers: &[By] = if number % GENERAL_EVERY == 0 { &[By::Exact, By::General] } else { &[By::Exact] };
+    let compared = compare(&format!("stage-{number}.toml"), &drawn.text, solvers);
+    Outcome { number, text: drawn.text, kinds: drawn.kinds, compared }
+}
+
+impl Hunt {
+    /// Compares all of them; the same whatever the number of threads. Those that were done, in the order of their numbers.
+    pub fn run(&self) -> Vec<Outcome> {
+        let next = AtomicU64::new(0);
+        let (done, unexplained) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let found = Mutex::new(Vec::new());
+        let busy: Vec<Mutex<Option<(u64, Instant)>>> = (0..self.threads).map(|_| Mutex::new(None)).collect();
+        let over = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            let workers: Vec<_> = busy
+                .iter()
+                .map(|busy| {
+                    let (next, done, unexplained, found) = (&next, &done, &unexplained, &found);
+                    scope.spawn(move || {
+                        while !self.stop.load(Ordering::Relaxed) {
+                            let index = next.fetch_add(1, Ordering::Relaxed);
+                            if index >= self.count {
+                                break;
+                            }
+                            let number = self.first + index;
+                            *lock(busy) = Some((number, Instant::now()));
+                            let outcome = one(self.seed, number);
+                            *lock(busy) = None;
+                            done.fetch_add(1, Ordering::Relaxed);
+                            let faults = outcome.compared.iter().filter(|c| c.verdict.is_unexplained()).count();
+                            unexplained.fetch_add(faults, Ordering::Relaxed);
+                            lock(found).push(outcome);
+                        }
+                    })
+                })
+                .collect();
+            if self.progress {
+                scope.spawn(|| self.tell(&done, &unexplained, &busy, &over));
+            }
+            for worker in workers {
+                // A panic of taut is caught where it happens.
+                let _ = worker.join();
+            }
+            over.store(true, Ordering::Relaxed);
+        });
+        let mut found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
+        found.sort_by_key(|outcome: &Outcome| outcome.number);
+        found
+    }
+
+    /// How far it is, on standard error.
+    fn tell(
+        &self,
+        done: &AtomicUsize,
+        unexplained: &AtomicUsize,
+        busy: &[Mutex<Option<(u64, Instant)>>],
+        over: &AtomicBool,
+    ) {
+        let begin = Instant::now();
+        let mut told = begin;
+        while !over.load(Ordering::Relaxed) {
+            std::thread::sleep(Duration::from_millis(100));
+            if told.elapsed() < Duration::from_secs(10) {
+                continue;
+            }
+            told = Instant::now();
+            let (done, elapsed) = (done.load(Ordering::Relaxed), begin.elapsed().as_secs_f64());
+            let rest = (self.count as f64 - done as f64) * elapsed / done.max(1) as f64;
+            let faults = unexplained.load(Ordering::Relaxed);
+            eprintln!("{done} of {} stages, {faults} unexplained; about {:.0} s left", self.count, rest);
+            for (number, since) in busy.iter().filter_map(|busy| *lock(busy)) {
+                if since.elapsed() > LONG {
+                    eprintln!("  stage {number} has been running for {:.0} s", since.elapsed().as_secs_f64());
+                }
+            }
+        }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Verdict {
+    /// Whether it is a find.
+    pub fn is_unexplained(&self) -> bool {
+        matches!(self, Verdict::Unexplained(_))
+    }
+
+    /// Its name.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Verdict::Agrees => "agrees",
+            Verdict::IllConditioned(_) => "ill-conditioned",
+            Verdict::Unknown(_) => "unknown",
+            Verdict::Unexplained(_) => "unexplained",
+        }
+    }
+
+    /// What it says beyond that.
+    pub fn told(&self) -> &str {
+        match self {
+            Verdict::Agrees => "",
+            Verdict::IllConditioned(told) | Verdict::Unknown(told) | Verdict::Unexplained(told) => told,
+        }
+    }
+}
+
+/// A line of the table.
+#[derive(Debug, Clone, Default)]
+struct Line {
+    name: String,
+    stages: usize,
+    agrees: usize,
+    ill_conditioned: usize,
+    unknown: usize,
+    unexplained: usize,
+    /// The largest difference among those that agree, m.
+    worst: f64,
+    /// Changes of bodies.
+    events: usize,
+}
+
+impl Line {
+    fn of<'a>(name: &str, compared: impl Iterator<Item = &'a Compared>) -> Self {
+        let mut line = Self { name: name.into(), ..Self::default() };
+        for compared in compared {
+            line.stages += 1;
+            line.events += compared.events;
+            match compared.verdict {
+                Verdict::Agrees => {
+                    line.agrees += 1;
+                    line.worst = line.worst.max(compared.difference);
+                }
+                Verdict::IllConditioned(_) => line.ill_conditioned += 1,
+                Verdict::Unknown(_) => line.unknown += 1,
+                Verdict::Unexplained(_) => line.unexplained += 1,
+            }
+        }
+        line
+    }
+
+    fn json(&self) -> Value {
+        json!({
+            "stages": self.name,
+            "compared": self.stages,
+            "agreeing": self.agrees,
+            "ill_conditioned": self.ill_conditioned,
+            "unknown": self.unknown,
+            "unexplained": self.unexplained,
+            "worst_agreeing_m": self.worst,
+            "events": self.events,
+        })
+    }
+}
+
+fn lines(outcomes: &[Outcome]) -> Vec<Line> {
+    let by = |by: By| move |outcome: &'_ Outcome| outcome.compared.iter().find(|compared| compared.by == by).cloned();
+    let all = |solver: By, kind: Option<Kind>| -> Vec<Compared> {
+        let of_kind = outcomes.iter().filter(|outcome| kind.is_none_or(|kind| outcome.kinds.contains(&kind)));
+        of_kind.filter_map(by(solver)).collect()
+    };
+    let mut lines = vec![Line::of("all", all(By::Exact, None).iter())];
+    lines.extend(Kind::ALL.map(|kind| Line::of(kind.name(), all(By::Exact, Some(kind)).iter())));
+    lines.push(Line::of("all, by the general solver", all(By::General, None).iter()));
+    lines
+}
+
+/// The table of a hunt, in Markdown.
+pub fn table(outcomes: &[Outcome]) -> String {
+    let mut text = String::from(
+        "| stages | compared | agreeing | ill-conditioned | unknown | unexplained | worst agreeing | body events |\n\
+         |---|---|---|---|---|---|---|---|\n",
+    );
+    for line in lines(outcomes) {
+        let Line { name, stages, agrees, ill_conditioned, unknown, unexplained, worst, events } = line;
+        let _ = writeln!(
+            text,
+            "| {name} | {stages} | {agrees} | {ill_conditioned} | {unknown} | {unexplained} | {worst:.1e} m | {events} |"
+        );
+    }
+    text
+}
+
+/// The stages that do not agree, with their cases.
+pub fn told(seed: u64, outcomes: &[Outcome], all: bool) -> String {
+    let mut text = String::new();
+    for outcome in outcomes {
+        for compared in &outcome.compared {
+            if compared.verdict.is_unexplained() || (all && compared.verdict != Verdict::Agrees) {
+                let solver = match compared.by {
+                    By::Exact => "exact",
+                    By::General => "general",
+                };
+                let (number, word, why) = (outcome.number, compared.verdict.word(), compared.verdict.told());
+                let _ =
+                    writeln!(text, "# seed {seed}, stage {number}, {solver} solver, {word}: {why}\n{}", outcome.text);
+            }
+        }
+    }
+    text
+}
+
+/// All of it as data.
+pub fn json(hunt: &Hunt, outcomes: &[Outcome]) -> Value {
+    let apart = outcomes.iter().flat_map(|outcome| outcome.compared.iter().map(move |compared| (outcome, compared)));
+    let apart = apart.filter(|(_, compared)| compared.verdict != Verdict::Agrees).map(|(outcome, compared)| {
+        json!({
+            "number": outcome.number,
+            "solver": match compared.by { By::Exact => "exact", By::General => "general" },
+            "verdict": compared.verdict.word(),
+            "told": compared.verdict.told(),
+            "difference_m": compared.difference,
+            "perturbed_m": compared.spread,
+            "case": outcome.text,
+        })
+    });
+    json!({
+        "part": "stages",
+        "seed": hunt.seed,
+        "first": hunt.first,
+        "asked": hunt.count,
+        "done": outcomes.len(),
+        "table": lines(outcomes).iter().map(Line::json).collect::<Vec<_>>(),
+        "not_agreeing": apart.collect::<Vec<_>>(),
+    })
+}
