@@ -72,6 +72,12 @@ impl Run {
         json::ending(self.outcome().ending, self.metrics().end)
     }
 
+    /// By how much positions may be off, m, where it is known.
+    #[getter]
+    fn position_error(&self) -> Option<f64> {
+        self.outcome().error.map(|error| error.value)
+    }
+
     /// The key figures.
     fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let mode = self.case.stage.amplifier.mode;

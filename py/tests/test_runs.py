@@ -38,6 +38,7 @@ def test_a_run_has_columns_units_and_figures(case):
     assert run.metrics["final_cart_position_m"] == run["cart_position"][-1] == 0.05382078557947501
     assert len(run.events) == 15
     assert run.events[0]["part"] == "drive" and run.events[0]["load_unit"] == "N m"
+    assert not run.events[0]["by_rounding"] and run.position_error is not None and run.position_error < 1e-9
     with pytest.raises(KeyError, match="there is no column 'speed'; there are time, "):
         run["speed"]
 

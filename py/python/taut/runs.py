@@ -41,8 +41,13 @@ class Run(Table):
 
     @property
     def ending(self) -> str:
-        """How it ended: ``complete``, ``left_travel``, ``too_many_events``, ``diverged``."""
+        """How it ended: ``complete``, ``left_travel``, ``too_many_events``, ``too_stiff``, ``diverged``."""
         return self._native.ending[0]
+
+    @property
+    def position_error(self) -> float | None:
+        """By how much positions at the belt may be off, m: the exact solver's bound of rounding; ``None`` for the others."""
+        return self._native.position_error
 
     @property
     def metrics(self) -> dict[str, Any]:
@@ -52,7 +57,7 @@ class Run(Table):
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """Every stick, slip and reversal: ``time_s``, ``part``, ``from``, ``to``, ``load``, ``load_unit``."""
+        """Every stick, slip and reversal: ``time_s``, ``part``, ``from``, ``to``, ``load``, ``load_unit``, ``by_rounding``."""
         events: list[dict[str, Any]] = self._native.events()
         return events
 

@@ -20,6 +20,7 @@ const AREAS: [(&str, &[&str]); 4] = [
 
 const SOLVER: &[&str] = &[
     "lib",
+    "cost",
     "elements",
     "instant",
     "rounding",

@@ -51,8 +51,18 @@ pub enum Ended {
 impl Tree {
     /// All files of the repository, anew.
     pub fn make() -> Result<Self, String> {
-        let root = std::env::current_dir().map_err(|error| error.to_string())?.join("target/mutants");
+        let here = std::env::current_dir().map_err(|error| error.to_string())?;
+        let root = here.join("target/mutants/taut");
         let _ = fs::remove_dir_all(&root);
+        // Data that some tests read stand beside the repository.
+        #[cfg(unix)]
+        if let Ok(shared) = here.join("../shared").canonicalize() {
+            let made = fs::create_dir_all(&root).and_then(|()| {
+                let link = here.join("target/mutants/shared");
+                if link.exists() { Ok(()) } else { std::os::unix::fs::symlink(shared, link) }
+            });
+            made.map_err(|error| format!("target/mutants: {error}"))?;
+        }
         let listed = Command::new("git").args(["ls-files", "-z", "--cached"]).output();
         let listed = listed.map_err(|error| format!("git cannot be started: {error}"))?;
         for name in String::from_utf8_lossy(&listed.stdout).split('\0').filter(|name| Path::new(name).is_file()) {
@@ -131,7 +141,7 @@ impl Tree {
         let mut command = cargo(words);
         // With the packages that are built already.
         command.args(["--package", "taut", "--features", FEATURES, "--message-format=json"]).current_dir(&self.root);
-        command.env("CARGO_TARGET_DIR", "..").stderr(Stdio::null());
+        command.env("CARGO_TARGET_DIR", "../..").stderr(Stdio::null());
         command
     }
 
