@@ -147,7 +147,6 @@ mod matlab {
 
 /// A text of tables makes hundreds of bytes of every one of its own: 9 MB of headers took 455 MB.
 mod case {
-    use super::*;
     use taut::case::{Case, TEMPLATE};
 
     fn message(text: &str) -> String {
