@@ -228,8 +228,8 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         self.take_up(piece);
         // A load that passes a breakaway by rounding alone does not break it.
         for guard in &self.law.guards {
-            if let Cause::BreakForward(body) | Cause::BreakBackward(body) = guard.cause {
-                let tolerance = &mut self.slack[body.index()];
+            if let Cause::BreakForward(_) | Cause::BreakBackward(_) = guard.cause {
+                let tolerance = &mut self.slack[guard.cause.kind()];
                 *tolerance = tolerance.max(2.0 * guard.noise(&self.z));
             }
         }

@@ -352,15 +352,23 @@ impl<'a> Run<'a> {
         let side = if to == Motion::Stuck { from } else { to };
         let forward = side != Motion::Backward;
         let load = self.model.load(body, forward, &self.mode, &state, input);
-        let holds = self.model.breakaway(body, forward, &state);
-        let noise = f64::max(2.0 * self.model.noise(body, &self.mode, &state, input), 1e-12 * holds);
-        self.slack[index] = if again { 10.0 } else { 1.0 } * noise;
+        for (cause, tolerance) in self.tolerances_at_rest(body, input) {
+            self.slack[cause.kind()] = if again { 10.0 } else { 1.0 } * tolerance;
+        }
         for follower in self.model.plant.followers(body) {
             self.mode.motion[follower.index()] = to;
         }
         let (part, from, to) = (Part::Body(body), Status::Motion(from), Status::Motion(to));
         Event { time, part, from, to, load, by_rounding }.note(&mut self.events);
         self.enter();
+    }
+
+    /// By how much the load on a body at rest may pass its breakaway on either side before it counts: what rounding may do to it.
+    fn tolerances_at_rest(&self, body: Body, input: f64) -> [(Cause, f64); 2] {
+        let inner = self.model.inner(&self.y);
+        let noise = 2.0 * self.model.noise(body, &self.mode, &inner, input);
+        [(Cause::BreakForward(body), true), (Cause::BreakBackward(body), false)]
+            .map(|(cause, forward)| (cause, noise.max(1e-12 * self.model.breakaway(body, forward, &inner))))
     }
 
     /// Whether a body stops where the tolerance decides: what still slows it down is less than the formula may be off by.
@@ -413,6 +421,16 @@ impl<'a> Run<'a> {
     /// Changes modes, without time passing, until every load that is held can be.
     fn resolve(&mut self, stretch: &Stretch) {
         let time = stretch.begin + self.tau;
+        if self.tau == 0.0 {
+            // After an edge of the input too, a load that passes a breakaway by rounding alone does not break it.
+            let plant = self.model.plant;
+            for body in plant.leaders().filter(|body| self.mode.motion[body.index()] == Motion::Stuck) {
+                for (cause, tolerance) in self.tolerances_at_rest(body, stretch.input(0.0)) {
+                    let own = &mut self.slack[cause.kind()];
+                    *own = own.max(tolerance);
+                }
+            }
+        }
         for _ in 0..CHANGES_AT_ONCE {
             let field = Field::new(self.model, self.mode, stretch);
             let guards = field.guards(self.tau, &self.y);
