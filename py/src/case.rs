@@ -87,7 +87,8 @@ impl Case {
 
     /// Writes the text, under a temporary name first; over the file it was read from, but over no log or input of it.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        unlocked(py, || inputs(&self.inner).check(&path).and_then(|()| write_atomically(path, &self.inner.text)))?.told(py)
+        unlocked(py, || inputs(&self.inner).check(&path).and_then(|()| write_atomically(path, &self.inner.text)))?
+            .told(py)
     }
 
     #[pyo3(signature = (names, solver, tolerance, step, method))]
