@@ -235,7 +235,7 @@ fn a_folder_whose_name_is_not_utf_8_is_written_whole() {
         let mut run = taut(at);
         run.arg(command).arg("rig.toml").arg("--out").arg(&out);
         if command == "tune" {
-            run.args(["--no-report", "--set", "tune.cost=none"]);
+            run.args(["--no-report", "--set", "tune.cost=none", "--set", "tune.bandwidth=8Hz"]);
         }
         let output = run.output().unwrap();
         assert!(matches!(output.status.code(), Some(0 | 1)), "{command}: {output:?}");

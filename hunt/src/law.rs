@@ -300,14 +300,11 @@ impl Builder<'_> {
     fn spans(&mut self) -> [Form; 3] {
         let m = self.machine;
         let [k, c] = m.belt;
-        let span = |j: usize, a: usize, b: usize, k: Double, c: Double| {
-            let _ = j;
-            (way(a) - way(b)) * k + (speed(a) - speed(b)) * c
-        };
+        let span = |a: usize, b: usize, k: Double, c: Double| (way(a) - way(b)) * k + (speed(a) - speed(b)) * c;
         match m.model {
             BeltModel::Rigid => [Form::default(); 3],
             BeltModel::Elastic => {
-                let forces = [span(0, 0, 1, k[0], c[0]), span(1, 1, 2, k[1], c[1]), span(2, 2, 0, k[2], c[2])];
+                let forces = [span(0, 1, k[0], c[0]), span(1, 2, k[1], c[1]), span(2, 0, k[2], c[2])];
                 [0, 1, 2].map(|j| self.taut_or_slack(j, forces[j]))
             }
             BeltModel::TwoMass => {
@@ -315,8 +312,8 @@ impl Builder<'_> {
                 let sum = k[1] + k[2];
                 let k23 = k[1] * k[2] / sum;
                 let c23 = (c[1] * k[2] * k[2] + c[2] * k[1] * k[1]) / (sum * sum);
-                let f1 = self.taut_or_slack(0, span(0, 0, 1, k[0], c[0]));
-                let f2 = self.taut_or_slack(1, span(1, 1, 2, k23, c23));
+                let f1 = self.taut_or_slack(0, span(0, 1, k[0], c[0]));
+                let f2 = self.taut_or_slack(1, span(1, 2, k23, c23));
                 [f1, f2, f2]
             }
         }

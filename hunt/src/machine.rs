@@ -135,22 +135,7 @@ impl Machine {
         let slope = taken(stage.cart.inclination).sin_cos().0;
         let force = taken(stage.cart.load) - mass[1] * slope * GRAVITY;
         let origin = Double::from(experiment.initial.cart_position);
-        let play = motor.gear_play.map(|play| {
-            let (half, k, c) = (taken(play.backlash) * 0.5 * r, taken(play.stiffness) / r2, taken(play.damping) / r2);
-            match play.backlash > 0.0 {
-                true => Play::Loose(Flanks { ends: [-half, half], stiffness: k, damping: c }),
-                false => Play::Tight(k, c),
-            }
-        });
-        let ends = stage.travel.map(|travel| {
-            let ends = [travel.min, travel.max].map(|end| (Double::from(end) - origin) * taken(1.0));
-            match travel.stop {
-                None => Ends::Open(ends),
-                Some(stop) => {
-                    Ends::Stops(Flanks { ends, stiffness: taken(stop.stiffness), damping: taken(stop.damping) })
-                }
-            }
-        });
+        let (play, ends) = (play(stage, taken, r), ends(stage, taken, origin));
         let amplifier = &stage.amplifier;
         Self {
             model: stage.belt.model,
@@ -224,6 +209,27 @@ impl Machine {
     pub fn current_moves(&self) -> bool {
         if self.current_mode { self.bandwidth.is_some() } else { self.inductance > Double::ZERO }
     }
+}
+
+/// The gear, where it gives way.
+fn play(stage: &Stage, taken: Taken, r: Double) -> Option<Play> {
+    let play = stage.motor.gear_play?;
+    let r2 = r * r;
+    let (half, k, c) = (taken(play.backlash) * 0.5 * r, taken(play.stiffness) / r2, taken(play.damping) / r2);
+    Some(match play.backlash > 0.0 {
+        true => Play::Loose(Flanks { ends: [-half, half], stiffness: k, damping: c }),
+        false => Play::Tight(k, c),
+    })
+}
+
+/// The ends of the travel, from where the cart starts.
+fn ends(stage: &Stage, taken: Taken, origin: Double) -> Option<Ends> {
+    let travel = stage.travel?;
+    let ends = [travel.min, travel.max].map(|end| (Double::from(end) - origin) * taken(1.0));
+    Some(match travel.stop {
+        None => Ends::Open(ends),
+        Some(stop) => Ends::Stops(Flanks { ends, stiffness: taken(stop.stiffness), damping: taken(stop.damping) }),
+    })
 }
 
 fn friction(law: &taut::friction::Friction, taken: Taken, r: Double) -> Friction {

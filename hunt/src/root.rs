@@ -53,7 +53,7 @@ fn search(c: &Polynomial, depth: u32) -> Option<Double> {
     let mut right = left;
     for i in 0..ORDER {
         for j in (i..ORDER).rev() {
-            right[j] = right[j] + right[j + 1];
+            right[j] += right[j + 1];
         }
     }
     search(&right, depth + 1).map(|s| (s + Double::ONE) * half)

@@ -47,7 +47,7 @@ pub struct Outcome {
 /// Compares the stage of this number.
 pub fn one(seed: u64, number: u64) -> Outcome {
     let drawn = draw::stage(seed, number);
-    let solvers: &[By] = if number % GENERAL_EVERY == 0 { &[By::Exact, By::General] } else { &[By::Exact] };
+    let solvers: &[By] = if number.is_multiple_of(GENERAL_EVERY) { &[By::Exact, By::General] } else { &[By::Exact] };
     let compared = compare(&format!("stage-{number}.toml"), &drawn.text, solvers);
     Outcome { number, text: drawn.text, kinds: drawn.kinds, compared }
 }

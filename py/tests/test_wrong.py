@@ -462,6 +462,9 @@ def test_sweeps_with_nonsense(short):
         if not many:
             allowed(lambda: short.sweep(value, vary=vary), told("sweep", value))
         for option in "vary", "design", "seed", "indices", "interval", "threads", "client", "chunk":
+            # A row each nanosecond is long, and not wrong.
+            if option == "interval" and isinstance(value, (int, float)) and 0 < value < 1e-4:
+                continue
             call = {"vary": vary, option: value}
             allowed(lambda: short.sweep(2, **call), told("sweep", 2, **call))
             if option not in ("threads", "client"):

@@ -95,19 +95,16 @@ fn numbers(question: &Question) -> Result<()> {
     let &Question { speed, at, delay, from, to, .. } = question;
     let finite = |value: f64| value.is_finite();
     let frequency = |value: f64| value > 0.0 && value.is_finite();
-    let asked: [(&str, Option<f64>, fn(f64) -> bool, &str); 5] = [
-        ("--speed", speed, finite, "a finite number, in m/s"),
-        ("--at", at, finite, "a finite number, in m"),
-        ("--delay", Some(delay), finite, "a finite number, in s"),
-        ("--from", from, frequency, "above zero, in Hz"),
-        ("--to", to, frequency, "above zero, in Hz"),
-    ];
-    for (option, value, good, allowed) in asked {
-        if let Some(value) = value.filter(|value| !good(*value)) {
-            return Err(Error::new(format!("{value:?} is of no use here")).in_file(option).allowed(allowed));
-        }
-    }
-    Ok(())
+    let wrong = |option: &str, value: Option<f64>, good: fn(f64) -> bool, allowed: &str| {
+        let value = value.filter(|value| !good(*value));
+        value.map(|value| Error::new(format!("{value:?} is of no use here")).in_file(option).allowed(allowed))
+    };
+    let found = wrong("--speed", speed, finite, "a finite number, in m/s")
+        .or_else(|| wrong("--at", at, finite, "a finite number, in m"))
+        .or_else(|| wrong("--delay", Some(delay), finite, "a finite number, in s"))
+        .or_else(|| wrong("--from", from, frequency, "above zero, in Hz"))
+        .or_else(|| wrong("--to", to, frequency, "above zero, in Hz"));
+    found.map_or(Ok(()), Err)
 }
 
 /// Refuses a place outside the travel.

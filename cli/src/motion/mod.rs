@@ -125,7 +125,7 @@ fn one<'a>(
     let profile = motion.profile.clone().shaped(&design.shaper);
     let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
     let name = motion.file_name();
-    let writer = folder.map(|folder| CsvWriter::create(folder.path(&format!("{name}.csv")))).transpose();
+    let writer = folder.map(|folder| CsvWriter::create(folder.path(format!("{name}.csv")))).transpose();
     let mut writer = writer.map_err(Failure::work)?;
     let mut curves = folder.is_some().then(|| Curves::new(stage)).filter(|_| !args.no_report);
     let mut trouble = None;

@@ -56,7 +56,7 @@ pub fn run(args: &Simulate) -> Outcome {
     } else if !args.quiet {
         terminal::show(&table::text(&case, solver, &runs, folder.as_ref()));
     }
-    Ok(status(&runs, &interrupt))
+    Ok(status(&runs, solver, &interrupt))
 }
 
 /// The files that will be written, but for plots.
@@ -121,10 +121,15 @@ fn measurable(case: &Case, solver: Solver, args: &Simulate) -> Result<()> {
 }
 
 /// How it ended, and a word about every run that did not reach its end.
-fn status(runs: &[Run], interrupt: &Interrupt) -> Status {
+fn status(runs: &[Run], solver: Solver, interrupt: &Interrupt) -> Status {
     for run in runs {
         if let Some(told) = table::early_end(&run.outcome.ending) {
-            terminal::show_error(&format!("the run \"{}\" {told}", run.experiment.name));
+            let advice = match (run.outcome.ending, solver) {
+                (Ending::Diverged { .. }, Solver::Table3 { .. }) => "; a smaller --step may help",
+                (Ending::Diverged { .. }, Solver::General { .. }) => "; a smaller --tolerance may help",
+                _ => "",
+            };
+            terminal::show_error(&format!("the run \"{}\" {told}{advice}", run.experiment.name));
         }
         if let Some(told) = table::hidden(run) {
             terminal::show_warning(&told);

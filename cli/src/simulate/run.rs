@@ -142,7 +142,7 @@ impl<'a> Setting<'a> {
     /// Runs it once more, as its recorder sees it, and writes the log.
     fn record(&self, experiment: &Experiment, folder: &Folder) -> std::result::Result<Samples, Failure> {
         let Case { stage, measurement, .. } = self.case;
-        let mut writer = CsvWriter::create(folder.path(&log_name(experiment))).map_err(Failure::work)?;
+        let mut writer = CsvWriter::create(folder.path(log_name(experiment))).map_err(Failure::work)?;
         let mut samples = Samples::new(stage);
         let mut trouble: Option<Error> = None;
         let mut take = |block: &Trajectory| {
@@ -162,10 +162,10 @@ impl<'a> Setting<'a> {
         let asked = &self.args.format;
         let formats = asked.iter().enumerate().filter(|&(k, format)| !asked[..k].contains(format)).map(|(_, f)| f);
         let create = |format: &Format| match format {
-            Format::Csv => CsvWriter::create(folder.path(&format!("{}.csv", experiment.file_name()))).map(Writer::Csv),
+            Format::Csv => CsvWriter::create(folder.path(format!("{}.csv", experiment.file_name()))).map(Writer::Csv),
             #[cfg(feature = "parquet")]
             Format::Parquet => {
-                let path = folder.path(&format!("{}.parquet", experiment.file_name()));
+                let path = folder.path(format!("{}.parquet", experiment.file_name()));
                 ParquetWriter::create(path).map(|writer| Writer::Parquet(Box::new(writer)))
             }
         };

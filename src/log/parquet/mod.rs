@@ -165,7 +165,8 @@ impl Values {
         let (mut numbers, mut levels) = (Vec::new(), Vec::new());
         let mut left = rows.min(self.length - self.values.len());
         while left > 0 {
-            (numbers.clear(), levels.clear());
+            numbers.clear();
+            levels.clear();
             let count = left.min(BLOCK);
             let there = (most > 0).then_some(&mut levels);
             let (records, ..) = column.read_records(count, there, None, &mut numbers)?;

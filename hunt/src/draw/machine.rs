@@ -1,0 +1,256 @@
+//! Motor, amplifier, bodies, belt and travel of a random stage.
+
+use super::{Draw, Kind, Sizes};
+use std::f64::consts::PI;
+use std::fmt::Write;
+
+/// What the motor takes to move the machine, and what it has.
+pub(super) struct Scale {
+    /// Volts or amperes at the amplifier's input.
+    pub(super) input: f64,
+    /// Amperes of the current at the start, where it is a state.
+    pub(super) current: Option<f64>,
+}
+
+/// Motor and amplifier as far as they depend on each other.
+struct Drive {
+    resistance: f64,
+    inductance: f64,
+    current_mode: bool,
+    bandwidth: Option<f64>,
+    voltage_limit: bool,
+    current_limit: bool,
+}
+
+impl Draw {
+    pub(super) fn motor(&mut self, sizes: &Sizes) -> Scale {
+        let r = sizes.radius;
+        let all: f64 = sizes.mass.iter().sum();
+        let n = if self.random.chance(0.5) { 1.0 } else { self.decades(0.1, 30.0) };
+        let kt = self.decades(1e-3, 1.0);
+        let ke = match self.random.below(20) {
+            0 => 0.0,
+            1 => self.decades(1e-9 * kt, kt),
+            2..7 => self.decades(0.3 * kt, 3.0 * kt),
+            _ => kt,
+        };
+        let brake = self.random.decades(1e-3, 30.0) / sizes.time;
+        // K_t K_e n²/(R r² m) is how fast the back-EMF brakes everything.
+        let resistance = match ke > 1e-3 * kt {
+            true => (kt * ke * n * n / (r * r * all * brake)).clamp(1e-6, 1e9),
+            false => self.random.decades(0.1, 10.0),
+        };
+        let resistance = self.digits(resistance);
+        let current_mode = self.random.chance(0.25);
+        let bandwidth = (current_mode && self.random.chance(0.6)).then(|| self.decades(1.0, 2000.0) / sizes.time);
+        let mut inductance = match self.random.chance(0.35) {
+            true => resistance * sizes.time / self.random.decades(1.0, 2000.0),
+            false => 0.0,
+        };
+        let [mut voltage_limit, mut current_limit] = [(); 2].map(|()| self.random.chance(0.35));
+        if current_mode && voltage_limit && bandwidth.is_some() != (inductance > 0.0) {
+            (voltage_limit, inductance) = (bandwidth.is_none(), 0.0);
+        }
+        if !voltage_limit && !current_limit && self.random.chance(0.1) {
+            current_limit = true;
+        }
+        inductance = self.digits(inductance);
+        let amperes = sizes.force * r / (n * kt);
+        let drive = Drive { resistance, inductance, current_mode, bandwidth, voltage_limit, current_limit };
+        self.table("motor");
+        self.line("torque_constant", kt);
+        self.line("back_emf_constant", ke);
+        self.line("resistance", resistance);
+        if inductance > 0.0 {
+            self.kind(Kind::Inductance);
+            self.line("inductance", inductance);
+            self.faster(resistance / inductance);
+        }
+        self.line("gear_ratio", n);
+        self.gear(sizes, n);
+        // How fast motor and drive pulley exchange energy, or the back-EMF brakes it.
+        let exchange = kt * ke * n * n / (r * r * sizes.mass[0]);
+        if inductance > 0.0 {
+            self.faster((exchange / inductance).sqrt());
+        } else if !current_mode {
+            self.faster(exchange / resistance);
+        }
+        self.amplifier(&drive, amperes)
+    }
+
+    fn amplifier(&mut self, drive: &Drive, amperes: f64) -> Scale {
+        let volts = amperes * drive.resistance;
+        self.table("amplifier");
+        if drive.current_mode {
+            self.kind(Kind::Current);
+            self.text.push_str("mode = \"current\"\n");
+        }
+        let gain = match self.random.chance(0.7) {
+            true => 1.0,
+            false => self.decades(0.1, 10.0) * if self.random.chance(0.3) { -1.0 } else { 1.0 },
+        };
+        self.line("gain", gain);
+        if let Some(bandwidth) = drive.bandwidth {
+            let bandwidth = self.digits((bandwidth / (2.0 * PI)).max(1e-8));
+            self.line("bandwidth", bandwidth);
+            self.faster(2.0 * PI * bandwidth);
+        }
+        let mut bound = f64::INFINITY;
+        if drive.voltage_limit {
+            self.kind(Kind::Limits);
+            let limit = volts * self.random.decades(0.05, 3.0);
+            self.line("voltage_limit", limit.max(1e-14));
+        }
+        if drive.current_limit {
+            self.kind(Kind::Limits);
+            let limit = amperes * self.random.decades(0.05, 3.0);
+            bound = self.digits(limit.max(1e-14));
+            self.line("current_limit", bound);
+        }
+        let moves = if drive.current_mode { drive.bandwidth.is_some() } else { drive.inductance > 0.0 };
+        let current = moves.then(|| (amperes * self.random.even(-1.0, 1.0)).clamp(-0.99 * bound, 0.99 * bound));
+        Scale { input: if drive.current_mode { amperes } else { volts } / gain.abs(), current }
+    }
+
+    fn gear(&mut self, sizes: &Sizes, n: f64) {
+        let r = sizes.radius;
+        let play = self.random.chance(0.2);
+        let mut rotor = 0.0;
+        if play || self.random.chance(0.5) {
+            rotor = sizes.mass[0] * self.random.decades(0.01, 10.0);
+            self.line("rotor_inertia", rotor * r * r / (n * n));
+        }
+        if play {
+            self.kind(Kind::Play);
+            let k = sizes.stiffness[self.random.below(3)] * self.random.decades(0.1, 10.0);
+            let light = rotor.min(sizes.mass[0]);
+            let c =
+                if self.random.chance(0.5) { 0.0 } else { 2.0 * self.random.decades(1e-3, 1.0) * (k * light).sqrt() };
+            let backlash = if self.random.chance(0.2) { 0.0 } else { sizes.way * self.random.decades(1e-4, 0.3) / r };
+            self.line("gear_stiffness", k * r * r);
+            self.line("gear_damping", c * r * r);
+            self.line("backlash", backlash.min(6.0));
+            self.faster((2.0 * k / light).sqrt().max(2.0 * c / light));
+        } else if self.random.chance(0.35) {
+            self.kind(Kind::Losses);
+            let efficiency = if self.random.chance(0.2) { self.even(0.1, 0.5) } else { self.even(0.5, 0.999) };
+            self.line("gear_efficiency", efficiency);
+        }
+    }
+
+    /// `friction = { … }` of a body that counts as `mass` at the belt; `arm` makes a force a torque.
+    fn friction(&mut self, sizes: &Sizes, mass: f64, arm: f64) -> String {
+        let side = |draw: &mut Self| {
+            let slow = mass * draw.random.decades(1e-3, 30.0) / sizes.time;
+            let viscous = match draw.random.below(12) {
+                0..3 => 0.0,
+                3 => mass * draw.fastest * draw.random.decades(0.05, 3.0),
+                _ => slow,
+            };
+            let common = sizes.force * draw.random.decades(1e-3, 3.0);
+            let coulomb = match draw.random.below(20) {
+                0..4 => 0.0,
+                4 => common * draw.random.decades(1e3, 1e6),
+                _ => common,
+            };
+            let over = match draw.random.below(10) {
+                0..4 => 1.0,
+                4..8 => draw.random.even(1.0, 2.0),
+                _ => draw.random.decades(2.0, 10.0),
+            };
+            // Breakaway alone, too.
+            let coulomb_or_less = if draw.random.chance(0.05) { 0.0 } else { coulomb };
+            [viscous * arm * arm, coulomb_or_less * arm, coulomb * over * arm].map(|value| draw.digits(value))
+        };
+        let forward = side(self);
+        let backward = if self.random.chance(0.25) { side(self) } else { forward };
+        self.faster(2.0 * forward[0].max(backward[0]) / (arm * arm * mass));
+        if forward[2] > forward[1] || backward[2] > backward[1] {
+            self.kind(Kind::Static);
+        }
+        let [viscous, coulomb, at_rest] = forward;
+        let mut text = format!("viscous = {viscous:e}, coulomb = {coulomb:e}, static = {:e}", at_rest.max(coulomb));
+        if backward != forward {
+            self.kind(Kind::Asymmetric);
+            let [viscous, coulomb, at_rest] = backward;
+            let _ = write!(
+                text,
+                ", viscous_backward = {viscous:e}, coulomb_backward = {coulomb:e}, static_backward = {:e}",
+                at_rest.max(coulomb)
+            );
+        }
+        format!("friction = {{ {text} }}\n")
+    }
+
+    pub(super) fn bodies(&mut self, sizes: &Sizes) {
+        let r = sizes.radius;
+        let [m1, m2, m3] = sizes.mass;
+        let drive = self.friction(sizes, m1, r);
+        let idler = if sizes.symmetric { drive.clone() } else { self.friction(sizes, m3, r) };
+        let cart = self.friction(sizes, m2, 1.0);
+        self.table("drive_pulley");
+        self.line("radius", r);
+        self.line("inertia", m1 * r * r);
+        self.text.push_str(&drive);
+        self.table("idler_pulley");
+        self.line("inertia", m3 * r * r);
+        self.text.push_str(&idler);
+        self.table("cart");
+        self.line("mass", m2);
+        self.text.push_str(&cart);
+        if self.random.chance(0.2) {
+            let load = sizes.force * self.random.even(-1.0, 1.0);
+            self.line("load", load);
+        }
+        if self.random.chance(0.07) {
+            let most = (sizes.force / (9.8 * m2)).min(1.0);
+            let inclination = most * self.random.even(-1.0, 1.0);
+            self.line("inclination", inclination);
+        }
+    }
+
+    pub(super) fn belt(&mut self, sizes: &Sizes) {
+        let [k1, k2, k3] = sizes.stiffness;
+        let [c1, c2, c3] = sizes.damping;
+        self.table("belt");
+        let _ = writeln!(self.text, "stiffness = [{k1:e}, {k2:e}, {k3:e}]\ndamping = [{c1:e}, {c2:e}, {c3:e}]");
+        let _ = writeln!(self.text, "model = \"{}\"", sizes.model);
+        if sizes.model != "rigid" && self.random.chance(0.25) {
+            self.kind(Kind::Slack);
+            let pretension = sizes.force * self.random.decades(0.01, 10.0);
+            self.line("pretension", pretension.max(1e-14));
+        }
+    }
+
+    /// Where the cart starts.
+    pub(super) fn place(&mut self) -> f64 {
+        match self.random.below(20) {
+            0..11 => 0.0,
+            11..16 => self.even(-1.0, 1.0),
+            _ => {
+                self.kind(Kind::Far);
+                self.decades(1.0, 1000.0) * if self.random.chance(0.5) { -1.0 } else { 1.0 }
+            }
+        }
+    }
+
+    pub(super) fn travel(&mut self, sizes: &Sizes, start: f64) {
+        if !self.random.chance(0.25) {
+            return;
+        }
+        self.kind(Kind::Travel);
+        let [low, high] = [(); 2].map(|()| sizes.way * self.random.decades(0.01, 2.0));
+        let (low, high) = (self.digits(start - low), self.digits(start + high));
+        let margin = 1e-9 * start.abs().max(1e-6);
+        self.table("travel");
+        let _ = writeln!(self.text, "min = {:e}\nmax = {:e}", low.min(start - margin), high.max(start + margin));
+        if self.random.chance(0.85) {
+            let k = sizes.stiffness[self.random.below(3)] * self.random.decades(0.1, 10.0);
+            let m = sizes.mass[1];
+            let c = if self.random.chance(0.5) { 0.0 } else { 2.0 * self.random.decades(1e-3, 1.0) * (k * m).sqrt() };
+            self.line("stop_stiffness", k);
+            self.line("stop_damping", c);
+            self.faster((2.0 * k / m).sqrt().max(2.0 * c / m));
+        }
+    }
+}
