@@ -160,6 +160,8 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             self.set_input(&piece);
             self.resolve();
             if time >= end {
+                // Behind a last, shorter interval it stands at the last row, too.
+                (self.row, self.offset) = (self.grid.intervals(), 0.0);
                 self.put_out();
                 break;
             }
@@ -184,7 +186,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
 
     /// The row at or before `time` and how far behind it; next to a row means on it.
     fn locate(&self, time: f64) -> (u64, f64) {
-        let last = self.grid.intervals();
+        let last = self.grid.even();
         let mut row = ((time / self.h) as u64).min(last);
         while row > 0 && self.grid.time(row) > time {
             row -= 1;
@@ -195,12 +197,13 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         let offset = time - self.grid.time(row);
         // What a sum of decimal times may be off by; no part of the interval, which may be long.
         let near = (8.0 * f64::EPSILON * time).min(1e-9 * self.h);
-        if offset <= near || row == last {
-            (row, 0.0)
-        } else if self.h - offset <= near {
-            (row + 1, 0.0)
-        } else {
-            (row, offset)
+        // The last interval may be shorter: what is left of the run behind the last row at this distance.
+        let length = if row < last { self.h } else { self.grid.rest() };
+        match (row < last, length - offset <= near) {
+            _ if offset <= near => (row, 0.0),
+            (true, true) => (row + 1, 0.0),
+            (false, true) => (row, length),
+            (_, false) => (row, offset),
         }
     }
 

@@ -10,6 +10,7 @@ mod record;
 mod roots;
 mod table3;
 
+pub use crate::trajectory::Grid;
 pub use choice::{Choice, Kind};
 
 use crate::case::Experiment;
@@ -251,49 +252,6 @@ fn held(value: f64, start: f64, end: f64) -> Piece {
     let mut coefficients = [0.0; DEGREE + 1];
     coefficients[0] = value;
     Piece { start, end: if end > start { end } else { f64::INFINITY }, coefficients }
-}
-
-/// The times at which rows are put out: 0, `every`, 2 `every`, … up to `until`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Grid {
-    every: f64,
-    until: f64,
-    /// Number of intervals.
-    intervals: u64,
-    /// Whether the intervals fill the run, so that row k is at k·until/intervals, rounded once.
-    whole: bool,
-}
-
-impl Grid {
-    /// The rows of an experiment.
-    pub fn new(every: f64, until: f64) -> Self {
-        let ratio = until / every;
-        let nearest = ratio.round();
-        let whole = (ratio - nearest).abs() <= 1e-9 * nearest.max(1.0) && nearest >= 1.0;
-        let intervals = if whole { nearest } else { ratio.floor() };
-        Self { every, until, intervals: intervals as u64, whole }
-    }
-
-    /// Time of row `k`, s.
-    #[inline]
-    pub fn time(&self, k: u64) -> f64 {
-        if self.whole { k as f64 * self.until / self.intervals as f64 } else { k as f64 * self.every }
-    }
-
-    /// Number of intervals; there is one row more.
-    pub fn intervals(&self) -> u64 {
-        self.intervals
-    }
-
-    /// Length of an interval, s.
-    pub fn interval(&self) -> f64 {
-        if self.whole { self.until / self.intervals as f64 } else { self.every }
-    }
-
-    /// Time of the last row, s: where the run ends.
-    pub fn end(&self) -> f64 {
-        self.time(self.intervals)
-    }
 }
 
 /// Runs `experiment` on `stage` and keeps everything in memory.

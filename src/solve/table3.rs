@@ -28,13 +28,13 @@ pub(crate) fn run(
 ) -> Result<Outcome> {
     let model = Model::new(plant)?;
     let grid = Grid::new(experiment.every, experiment.until);
-    let substeps = (grid.interval() / step - 1e-9).ceil().max(1.0);
+    let steps = |interval: f64| (interval / step - 1e-9).ceil().max(1.0);
+    let substeps = steps(grid.interval());
     if !substeps.is_finite() || step.is_nan() || step <= 0.0 || substeps * grid.intervals() as f64 > 1e12 {
         return Err(Error::new(format!("a step of {step:e} s would take more than 1e12 steps"))
             .allowed("a step above zero, such as 1e-4 s")
             .next("choose a larger step"));
     }
-    let h = grid.interval() / substeps;
     let mut state = experiment.initial.state(plant);
     let mut recorder = Recorder::new(plant, grid, Detail::Full, sink);
     let mut cost = Cost { modes: 1, ..Cost::default() };
@@ -56,6 +56,9 @@ pub(crate) fn run(
         if row == grid.intervals() {
             break;
         }
+        let interval = if row < grid.even() { grid.interval() } else { grid.rest() };
+        let substeps = steps(interval);
+        let h = interval / substeps;
         for k in 0..substeps as u64 {
             // A step sees the input as it is at its beginning: an edge at its end belongs to the next one.
             let t = time + k as f64 * h;

@@ -1,10 +1,12 @@
 //! Named, unit-bearing columns over time: what a simulation computes and what a log records.
 
 mod csv;
+mod grid;
 #[cfg(feature = "parquet")]
 mod parquet;
 
 pub use csv::CsvWriter;
+pub use grid::Grid;
 #[cfg(feature = "parquet")]
 pub use parquet::ParquetWriter;
 
