@@ -9,8 +9,10 @@
 //! g = w·z therefore changes no faster than |w|·√(2V), |w| being the norm dual to V; and likewise its slope, with ẏ.
 
 mod change;
+mod shown;
 
 use super::law::{Law, Size, Watch, chain, highest, states};
+use super::observe::Output;
 use super::propagator::SERIES_ORDER;
 use super::record::Recorder;
 use super::roots;
@@ -18,7 +20,7 @@ use super::{Cost, Detail, Ending, Event, Flow, Grid, Outcome, Source, held};
 use crate::case::Experiment;
 use crate::plant::{Cause, Form, Mode, Plant, State, place};
 use crate::signal::Piece;
-use crate::trajectory::Trajectory;
+use shown::Watching;
 use std::rc::Rc;
 
 /// For so small a part of the series' reach a speed that has left zero is still told by its series alone.
@@ -42,21 +44,14 @@ impl Laws {
 }
 
 /// Runs the experiment with the laws of this plant that are known so far.
-pub(super) fn run(
-    plant: &Plant,
-    experiment: &Experiment,
-    source: Source,
-    laws: &mut Laws,
-    detail: Detail,
-    sink: &mut dyn FnMut(&Trajectory) -> Flow,
-) -> Outcome {
+pub(super) fn run(plant: &Plant, experiment: &Experiment, source: Source, laws: &mut Laws, output: Output) -> Outcome {
     // Eight moving quantities (three positions, three speeds, current, input) serve straight inputs; smooth ones carry
     // their derivatives along.
     // A rotor that turns by itself adds two.
     match (source.degree() <= 1, plant.has_rotor()) {
-        (true, false) => Run::new(plant, experiment, &mut laws.straight, detail, sink).finish(source),
-        (true, true) => Run::new(plant, experiment, &mut laws.rotor, detail, sink).finish(source),
-        (false, _) => Run::new(plant, experiment, &mut laws.smooth, detail, sink).finish(source),
+        (true, false) => Run::new(plant, experiment, &mut laws.straight, output.within()).finish(source),
+        (true, true) => Run::new(plant, experiment, &mut laws.rotor, output.within()).finish(source),
+        (false, _) => Run::new(plant, experiment, &mut laws.smooth, output.within()).finish(source),
     }
 }
 
@@ -87,6 +82,7 @@ struct Run<'a, const R: usize, const C: usize> {
     row: u64,
     offset: f64,
     recorder: Recorder<'a>,
+    watching: Watching,
     events: Vec<Event>,
     /// Where the last mode change was, and how many there have been there.
     changed_at: (u64, f64),
@@ -104,13 +100,7 @@ enum Look<const C: usize> {
 }
 
 impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
-    fn new(
-        plant: &'a Plant,
-        experiment: &Experiment,
-        laws: &'a mut Vec<Rc<Law<R, C>>>,
-        detail: Detail,
-        sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
-    ) -> Self {
+    fn new(plant: &'a Plant, experiment: &Experiment, laws: &'a mut Vec<Rc<Law<R, C>>>, output: Output<'a>) -> Self {
         let grid = Grid::new(experiment.every, experiment.until);
         let h = grid.interval();
         let start = experiment.initial.state(plant);
@@ -135,7 +125,8 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             input_curvature: 0.0,
             row: 0,
             offset: 0.0,
-            recorder: Recorder::new(plant, grid, detail, sink),
+            recorder: Recorder::new(plant, grid, output),
+            watching: Watching::new(),
             events: Vec::new(),
             changed_at: (0, 0.0),
             changes: 0,
@@ -159,6 +150,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             };
             self.set_input(&piece);
             self.resolve();
+            self.jumped();
             if time >= end {
                 // Behind a last, shorter interval it stands at the last row, too.
                 (self.row, self.offset) = (self.grid.intervals(), 0.0);
@@ -169,6 +161,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             self.reach(row, offset);
             time = piece.end.min(end);
         }
+        self.end_shown();
         self.recorder.finish();
         self.cost.samples = self.recorder.rows;
         let ending = match (self.trouble, self.recorder.flow) {
@@ -250,10 +243,11 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
                 }
             }
             let ahead = if self.row < row { self.h } else { offset };
-            match self.advance(ahead - self.offset) {
+            match self.advance_shown(ahead - self.offset) {
                 Some(cause) => {
                     self.change(cause);
                     self.resolve();
+                    self.jumped();
                 }
                 None if self.row < row => {
                     self.row += 1;
@@ -313,8 +307,12 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             return false;
         }
         let resting = y.iter().all(|&rate| rate == 0.0);
-        if resting && self.input() == 0.0 && self.recorder.detail == Detail::Metrics {
-            // Rows that say nothing new.
+        let bow = self.is_observed().then(|| self.bow(&law, self.h, safe as f64 * self.h));
+        if let (true, Some(bow)) = (resting, &bow) {
+            let (begin, z) = (self.time(), self.z);
+            self.move_shown(&law, begin, safe as f64 * self.h, z, bow);
+        }
+        if resting && self.recorder.detail == Detail::None {
             self.recorder.skip(safe - 1);
             self.row += safe;
             return true;
@@ -327,8 +325,14 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
                     return true;
                 }
             }
-            if !resting {
-                step.advance(&mut self.z);
+            match &bow {
+                _ if resting => {}
+                Some(bow) => {
+                    let mut end = self.z;
+                    step.advance(&mut end);
+                    self.move_shown(&law, self.grid.time(self.row), self.h, end, bow);
+                }
+                None => step.advance(&mut self.z),
             }
             self.row += 1;
         }
@@ -350,6 +354,20 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             Cause::BreakForward(_) | Cause::BreakBackward(_) => 0,
             cause => self.fresh[cause.kind()],
         }
+    }
+
+    /// The same as [`Run::advance`], and shows the way to whoever observes.
+    fn advance_shown(&mut self, distance: f64) -> Option<Cause> {
+        if !self.is_observed() {
+            return self.advance(distance);
+        }
+        let (law, before, begin, offset) = (Rc::clone(&self.law), self.z, self.time(), self.offset);
+        let cause = self.advance(distance);
+        let (after, length) = (self.z, self.offset - offset);
+        self.z = before;
+        let bow = self.bow(&law, length, length);
+        self.move_shown(&law, begin, length, after, &bow);
+        cause
     }
 
     /// Advances by `distance`, at most an interval; stops at the first guard that falls and says why.
@@ -472,13 +490,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     }
 
     fn state(&self) -> State {
-        let z = &self.z;
-        let mut state: State = std::array::from_fn(|j| if j < states::<R>() { z[j] } else { 0.0 });
-        if states::<R>() < place::COUNT || !self.plant.has_rotor() {
-            // The rotor turns with the drive pulley.
-            (state[place::ROTOR_ANGLE], state[place::ROTOR_SPEED]) = (z[place::DRIVE_ANGLE], z[place::DRIVE_SPEED]);
-        }
-        state
+        state_of::<R, C>(self.plant, &self.z)
     }
 
     fn input(&self) -> f64 {
@@ -488,6 +500,16 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     fn value(&self, form: &Form) -> f64 {
         form.value(self.plant, &self.state(), self.input())
     }
+}
+
+/// The state that `z` stands for.
+fn state_of<const R: usize, const C: usize>(plant: &Plant, z: &[f64; C]) -> State {
+    let mut state: State = std::array::from_fn(|j| if j < states::<R>() { z[j] } else { 0.0 });
+    if states::<R>() < place::COUNT || !plant.has_rotor() {
+        // The rotor turns with the drive pulley.
+        (state[place::ROTOR_ANGLE], state[place::ROTOR_SPEED]) = (z[place::DRIVE_ANGLE], z[place::DRIVE_SPEED]);
+    }
+    state
 }
 
 /// Matrices computed so far.

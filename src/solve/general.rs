@@ -7,16 +7,17 @@
 
 mod fall;
 mod model;
+mod shown;
 mod stretch;
 
+use super::observe::Output;
 use super::record::Recorder;
-use super::{Cost, Detail, Ending, Event, Flow, Grid, Outcome, Source, check, held};
+use super::{Cost, Ending, Event, Flow, Grid, Outcome, Source, check, held};
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
 use crate::plant::{Body, Cause, Limit, Mode, Part, Plant, Status, Switch, place};
 use crate::stage::AmplifierMode;
-use crate::trajectory::Trajectory;
 use fall::NODES;
 use ivp::dense::StepInterpolant;
 use ivp::methods::{DOP853, Tolerance};
@@ -43,8 +44,7 @@ pub(super) fn run(
     experiment: &Experiment,
     source: Source,
     tolerance: f64,
-    detail: Detail,
-    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+    output: Output,
 ) -> Result<Outcome> {
     if !(1e-14..=1e-2).contains(&tolerance) {
         return Err(Error::new(format!("a tolerance of {tolerance:e} is of no use"))
@@ -62,7 +62,7 @@ pub(super) fn run(
         .next("leave out the inductance, the damping or the friction that is as fast as that, or shorten the run"));
     }
     let model = Model::new(plant);
-    Ok(Run::new(&model, experiment, tolerance, FIRST / fastest, detail, sink).finish(source))
+    Ok(Run::new(&model, experiment, tolerance, FIRST / fastest, output.within()).finish(source))
 }
 
 /// h·|λ| up to which the formula is stable.
@@ -96,6 +96,7 @@ struct Run<'a> {
     changes: usize,
     events: Vec<Event>,
     modes: Vec<Mode>,
+    shown: Option<shown::Shown>,
     cost: Cost,
     trouble: Option<Ending>,
 }
@@ -108,14 +109,7 @@ struct Hit {
 }
 
 impl<'a> Run<'a> {
-    fn new(
-        model: &'a Model<'a>,
-        experiment: &Experiment,
-        tolerance: f64,
-        first_step: f64,
-        detail: Detail,
-        sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
-    ) -> Self {
+    fn new(model: &'a Model<'a>, experiment: &Experiment, tolerance: f64, first_step: f64, output: Output<'a>) -> Self {
         let plant = model.plant;
         let grid = Grid::new(experiment.every, experiment.until);
         let start = experiment.initial.state(plant);
@@ -143,7 +137,7 @@ impl<'a> Run<'a> {
         Self {
             model,
             grid,
-            recorder: Recorder::new(plant, grid, detail, sink),
+            recorder: Recorder::new(plant, grid, output),
             // It is stopped from outside: by its observer.
             solver: DOP853 {
                 max_steps: usize::MAX - 1,
@@ -164,6 +158,7 @@ impl<'a> Run<'a> {
             changes: 0,
             events: Vec::new(),
             modes: vec![mode],
+            shown: None,
             cost: Cost::default(),
             trouble: None,
         }
@@ -198,6 +193,7 @@ impl<'a> Run<'a> {
             }
             stretch = next;
         }
+        self.end_shown(&stretch);
         self.recorder.finish();
         self.cost.samples = self.recorder.rows;
         self.cost.modes = self.modes.len() as u64;
@@ -442,6 +438,7 @@ impl SolOut for Observer<'_, '_> {
         };
         self.hit = self.first_fall(from, to, &begin, &end, &at);
         let until = self.hit.as_ref().map_or(to, |hit| hit.tau);
+        self.show(from, until, &begin, &at);
         // A row on an edge or an event shows what comes after it.
         let stretch = self.field.stretch;
         let near = (8.0 * f64::EPSILON * stretch.end).min(1e-9 * self.run.grid.interval());

@@ -1,5 +1,6 @@
 //! From states to the columns that a user sees, block by block.
 
+use super::observe::{Observe, Output};
 use super::{Detail, Flow, Grid};
 use crate::friction::{Law, Motion};
 use crate::plant::{Body, Form, Mode, Part, Plant, SPEEDS, STRETCHES, State, place};
@@ -34,6 +35,8 @@ pub(crate) struct Recorder<'a> {
     scratch: [Vec<f64>; 9],
     block: Trajectory,
     sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
+    /// Whoever sees what is between the rows, too.
+    pub(crate) observer: Option<&'a mut dyn Observe>,
     /// Rows handed on.
     pub(crate) rows: u64,
     /// What the receiver answered last.
@@ -41,12 +44,7 @@ pub(crate) struct Recorder<'a> {
 }
 
 impl<'a> Recorder<'a> {
-    pub(crate) fn new(
-        plant: &'a Plant,
-        grid: Grid,
-        detail: Detail,
-        sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
-    ) -> Self {
+    pub(crate) fn new(plant: &'a Plant, grid: Grid, Output { detail, sink, observer }: Output<'a>) -> Self {
         Self {
             plant,
             grid,
@@ -57,6 +55,7 @@ impl<'a> Recorder<'a> {
             scratch: Default::default(),
             block: Trajectory { columns: headings(plant, detail) },
             sink,
+            observer,
             rows: 0,
             flow: Flow::Continue,
         }
@@ -70,6 +69,10 @@ impl<'a> Recorder<'a> {
     /// Adds the next row.
     #[inline]
     pub(crate) fn push(&mut self, state: State, input: f64, mode: Mode) {
+        if self.detail == Detail::None {
+            self.rows += 1;
+            return;
+        }
         self.raw.push((state, input));
         self.modes.push(mode);
         if self.raw.len() == BLOCK {
@@ -79,16 +82,15 @@ impl<'a> Recorder<'a> {
 
     /// Adds the next row with what its state does not tell.
     pub(crate) fn push_with(&mut self, state: State, input: f64, mode: Mode, extra: Extra) {
-        self.extra.push(extra);
+        if self.detail != Detail::None {
+            self.extra.push(extra);
+        }
         self.push(state, input, mode);
     }
 
-    /// Leaves out so many rows.
+    /// Counts so many rows that nobody is to see.
     pub(crate) fn skip(&mut self, rows: u64) {
-        if rows > 0 {
-            self.finish();
-            self.rows += rows;
-        }
+        self.rows += rows;
     }
 
     /// Hands on what is left.

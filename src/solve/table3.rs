@@ -3,14 +3,14 @@
 //! Kept to reproduce the paper and to show what it does: any speed inside a band of ±0.01 is frozen rather than brought
 //! to rest, so the stage creeps after it has stopped, by an amount that depends on the step.
 
+use super::observe::{Gap, Output, QUANTITIES, Reading, Readout};
 use super::record::Recorder;
-use super::{Cost, Detail, Ending, Flow, Grid, Method, Outcome};
+use super::{Cost, Ending, Flow, Grid, Method, Outcome};
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::Motion;
 use crate::plant::{Body, Form, Mode, Plant, SPEEDS, State, place};
 use crate::signal::Piece;
-use crate::trajectory::Trajectory;
 
 /// Half-width of Table 3's band of "zero" speed, rad/s for the pulleys and m/s for the cart.
 const BAND: f64 = 0.01;
@@ -24,7 +24,7 @@ pub(crate) fn run(
     experiment: &Experiment,
     step: f64,
     method: Method,
-    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+    output: Output,
 ) -> Result<Outcome> {
     let model = Model::new(plant)?;
     let grid = Grid::new(experiment.every, experiment.until);
@@ -36,7 +36,8 @@ pub(crate) fn run(
             .next("choose a larger step"));
     }
     let mut state = experiment.initial.state(plant);
-    let mut recorder = Recorder::new(plant, grid, Detail::Full, sink);
+    let mut recorder = Recorder::new(plant, grid, output.within());
+    let readout = Readout::new(plant, &Mode::of([Motion::Free; 3]));
     let mut cost = Cost { modes: 1, ..Cost::default() };
     let mut ending = Ending::Complete;
     for row in 0..=grid.intervals() {
@@ -53,6 +54,15 @@ pub(crate) fn run(
             ending = Ending::Interrupted { time };
             break;
         }
+        // Nothing is known but its steps, and an edge of the input counts from the next one on.
+        let mode = Mode::of(motion);
+        let mut show = |begin: f64, length: f64, from: &Reading, to: &Reading| {
+            if let Some(observer) = &mut recorder.observer {
+                observer.pass(&Gap { begin, length, from, to, bow: &[0.0; QUANTITIES], mode: &mode });
+            }
+        };
+        let mut before = readout.read(&state, input);
+        show(time, 0.0, &before, &before);
         if row == grid.intervals() {
             break;
         }
@@ -67,9 +77,19 @@ pub(crate) fn run(
                 Method::RungeKutta4 => step.runge_kutta_4(&state),
                 Method::DormandPrince5 => step.dormand_prince_5(&state),
             };
+            let after = readout.read(&state, step.input.value(t + h));
+            show(t, h, &before, &after);
+            before = after;
         }
         cost.steps += substeps as u64;
         cost.evaluations += substeps as u64 * if method == Method::RungeKutta4 { 4 } else { 6 };
+    }
+    let time = match ending {
+        Ending::Diverged { time } | Ending::Interrupted { time } => time,
+        _ => grid.end(),
+    };
+    if let Some(observer) = &mut recorder.observer {
+        observer.end(time, &state, &Mode::of(model.motion(&state, experiment.input.value(time))));
     }
     recorder.finish();
     cost.samples = recorder.rows;

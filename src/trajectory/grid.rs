@@ -81,7 +81,7 @@ impl Grid {
 
 /// An interval as a fraction, so that multiples of it are rounded once.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Interval {
+pub(crate) struct Interval {
     length: f64,
     /// The fraction p/q.
     over: f64,
@@ -99,7 +99,7 @@ const WHOLE: f64 = 9_007_199_254_740_992.0;
 const LARGEST: f64 = 1e6;
 
 impl Interval {
-    fn of(length: f64) -> Self {
+    pub(crate) fn of(length: f64) -> Self {
         let (over, under) = decimal(length).or_else(|| fraction(length)).unwrap_or((length, 1.0));
         let exact = if over.fract() == 0.0 { (WHOLE / over) as u64 } else { 0 };
         Self { length, over, under, exact, rest: length.mul_add(-under, over) / under }
@@ -107,7 +107,7 @@ impl Interval {
 
     /// k p/q, rounded.
     #[inline]
-    fn times(&self, k: u64) -> f64 {
+    pub(crate) fn times(&self, k: u64) -> f64 {
         if k <= self.exact {
             return k as f64 * self.over / self.under;
         }

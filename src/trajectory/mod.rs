@@ -7,6 +7,7 @@ mod parquet;
 
 pub use csv::CsvWriter;
 pub use grid::Grid;
+pub(crate) use grid::Interval;
 #[cfg(feature = "parquet")]
 pub use parquet::ParquetWriter;
 

@@ -82,13 +82,12 @@ impl<'a> Setting<'a> {
         let begin = Instant::now();
         let stage = &self.case.stage;
         let mut writers = self.writers(experiment).map_err(Failure::work)?;
-        let mut meter = Meter::new(stage);
+        let mut meter = Meter::new(stage, experiment);
         let mut curves = (self.folder.is_some() && !self.args.no_report).then(|| Curves::new(stage));
         let mut progress = Progress::new(experiment, self.args.quiet);
         let mut trouble: Option<Error> = None;
 
         let mut take = |block: &Trajectory| {
-            meter.take(block);
             if let Some(curves) = &mut curves {
                 curves.take(block);
             }
@@ -96,7 +95,7 @@ impl<'a> Setting<'a> {
             progress.advance(block.len() as u64, begin);
             if trouble.is_some() || self.interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue }
         };
-        let outcome = solve::stream(stage, experiment, self.solver, &mut take)?;
+        let outcome = solve::stream_observed(stage, experiment, self.solver, &mut meter, &mut take)?;
         progress.clear();
         if let Some(trouble) = trouble {
             return Err(Failure::work(trouble));

@@ -160,7 +160,7 @@ fn reduced(reduction: &Reduction) -> String {
 
 fn steady(metrics: &Metrics) -> String {
     let Some(steady) = metrics.steady_speed else {
-        return "none: no constant input lasts 20 samples".into();
+        return "none: no constant input lasts a fiftieth of the run".into();
     };
     let balance = match steady.analytic {
         Balance::At(balance) => format!("forces balance at {}", speed(balance)),
@@ -181,6 +181,9 @@ fn stop(metrics: &Metrics, solver: Solver) -> String {
         Some(at) => time(at),
         None if matches!(solver, Solver::Table3 { .. }) => {
             format!("none: Table 3 freezes speeds and creeps on, cart at {}", speed(metrics.final_cart_speed))
+        }
+        None if metrics.bodies_rest => {
+            format!("the rotor still turns at the end, at {}", value(metrics.final_rotor_speed, "rad/s"))
         }
         None => format!("still moving at the end, cart at {}", speed(metrics.final_cart_speed)),
     }
