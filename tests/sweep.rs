@@ -3,8 +3,8 @@
 mod common;
 
 use taut::case::{Case, Sampling};
-use taut::metrics::{Meter, Metrics};
-use taut::solve::{Bench, Detail, Flow, Solver, stream};
+use taut::metrics::Meter;
+use taut::solve::{Bench, Flow, Solver, stream_observed};
 use taut::sweep::{DIMENSIONS, OF_EXPERIMENT, Sobol, Spread, Status, Sweep, indices, rank_correlation};
 use taut::trajectory::Trajectory;
 
