@@ -26,6 +26,9 @@ use std::rc::Rc;
 /// For so small a part of the series' reach a speed that has left zero is still told by its series alone.
 const SOON: f64 = 1e-6;
 
+/// Intervals looked at closer after which a bound is made anew.
+const OFTEN: usize = 8;
+
 /// What runs of one plant can share: the modes that were made ready.
 #[derive(Default)]
 pub(super) struct Laws {
@@ -307,7 +310,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             return false;
         }
         let resting = y.iter().all(|&rate| rate == 0.0);
-        let bow = self.is_observed().then(|| self.bow(&law, self.h, safe as f64 * self.h));
+        let mut bow = self.is_observed().then(|| self.bow(&law, self.h, safe as f64 * self.h));
         if let (true, Some(bow)) = (resting, &bow) {
             let (begin, z) = (self.time(), self.z);
             self.move_shown(&law, begin, safe as f64 * self.h, z, bow);
@@ -318,6 +321,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             return true;
         }
         let step = law.step(0);
+        let mut closer = 0;
         for j in 0..safe {
             if j > 0 {
                 self.put_out();
@@ -325,12 +329,17 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
                     return true;
                 }
             }
-            match &bow {
+            match &mut bow {
                 _ if resting => {}
                 Some(bow) => {
                     let mut end = self.z;
                     step.advance(&mut end);
-                    self.move_shown(&law, self.grid.time(self.row), self.h, end, bow);
+                    closer += usize::from(self.move_shown(&law, self.grid.time(self.row), self.h, end, bow));
+                    if closer == OFTEN {
+                        // What swings has died down since.
+                        closer = 0;
+                        *bow = self.bow(&law, self.h, (safe - j) as f64 * self.h);
+                    }
                 }
                 None => step.advance(&mut self.z),
             }

@@ -1,5 +1,6 @@
 //! A run seen without rows: what an [`Observe`]r is shown of the motion between events, changes of the input and rows.
 
+use super::propagator::Matrix;
 use super::{Detail, Flow};
 use crate::plant::{Body, Form, Mode, Plant, SPEEDS, STRETCHES, State, arms, place};
 use crate::trajectory::Trajectory;
@@ -126,6 +127,9 @@ impl Curve {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Polynomial(pub [f64; TERMS]);
 
+/// C(7, k)
+const BINOMIAL: [f64; TERMS] = [1.0, 7.0, 21.0, 35.0, 35.0, 21.0, 7.0, 1.0];
+
 /// Places at which a polynomial is looked at first: it swings no faster than these tell.
 const LOOKS: usize = 16;
 
@@ -144,9 +148,17 @@ impl Polynomial {
         (2..TERMS).rev().fold(0.0, |sum, k| sum * s + (k * (k - 1)) as f64 * self.0[k])
     }
 
-    /// A bound of its magnitude on 0..1.
+    /// A bound of its magnitude on 0..1: the largest of its coefficients in Bernstein's form, b_k = Σ_j C(k, j)/C(n, j) c_j.
+    #[inline]
     pub fn bound(&self) -> f64 {
-        self.0.iter().map(|c| c.abs()).sum()
+        // Each step adds neighbours: Pascal's triangle.
+        let mut b: [f64; TERMS] = std::array::from_fn(|k| self.0[k] / BINOMIAL[k]);
+        for i in 1..TERMS {
+            for k in (i..TERMS).rev() {
+                b[k] += b[k - 1];
+            }
+        }
+        b.iter().fold(0.0, |most: f64, b| most.max(b.abs()))
     }
 
     /// Whether it certainly has no zero.
@@ -247,12 +259,15 @@ pub trait Observe {
     fn end(&mut self, time: f64, state: &State, mode: &Mode);
 }
 
+/// Number of entries of a form: stretches, speeds, current, input, one.
+const ENTRIES: usize = STRETCHES + SPEEDS + 3;
+
 /// What a stage shows in one mode: readings as linear forms.
 #[derive(Debug, Clone)]
 pub(super) struct Readout {
     pub(super) forms: [Form; QUANTITIES],
     /// By entry of a form (stretches, speeds, current, input, one): what each adds to every quantity.
-    columns: [Reading; STRETCHES + SPEEDS + 3],
+    matrix: Matrix<QUANTITIES, ENTRIES>,
     radius: f64,
     /// Limits of voltage and current: what they hold is not beyond them by one bit.
     limits: [f64; 2],
@@ -274,16 +289,16 @@ impl Readout {
         forms[reading::ROTOR_SPEED] = Form::speed(if plant.has_rotor() { crate::plant::ROTOR } else { 0 });
         forms[reading::VOLTAGE] = plant.voltage(mode);
         forms[reading::CART_POSITION] = Form::stretch(crate::plant::POSITION);
-        let mut columns = [[0.0; QUANTITIES]; STRETCHES + SPEEDS + 3];
+        let mut matrix = Matrix::zero();
         for (q, form) in forms.iter().enumerate() {
             let entries = form.stretch.iter().chain(&form.speed).chain([&form.current, &form.input, &form.constant]);
-            for (column, entry) in columns.iter_mut().zip(entries) {
-                column[q] = *entry;
+            for (column, entry) in entries.into_iter().enumerate() {
+                matrix.set(q, column, *entry);
             }
         }
         let limit = |limit: Option<f64>| limit.unwrap_or(f64::INFINITY);
         let limits = [limit(stage.amplifier.voltage_limit), limit(stage.amplifier.current_limit)];
-        Self { forms, columns, radius: r, limits }
+        Self { forms, matrix, radius: r, limits }
     }
 
     /// What is read in `state` under `input`.
@@ -309,14 +324,7 @@ impl Readout {
         let twist = state[place::ROTOR_ANGLE] - state[place::DRIVE_ANGLE];
         let speeds = [place::DRIVE_SPEED, place::CART_SPEED, place::IDLER_SPEED, place::ROTOR_SPEED].map(|j| state[j]);
         let [w1, v, w3, rotor] = speeds;
-        let entries = [p1 - x, x - p3, p3 - p1, twist, x, w1, v, w3, rotor, state[place::CURRENT], input, one];
-        let mut sum = [0.0; QUANTITIES];
-        for (column, entry) in self.columns.iter().zip(entries) {
-            for (sum, factor) in sum.iter_mut().zip(column) {
-                *sum += factor * entry;
-            }
-        }
-        sum
+        self.matrix.rate(&[p1 - x, x - p3, p3 - p1, twist, x, w1, v, w3, rotor, state[place::CURRENT], input, one])
     }
 }
 
