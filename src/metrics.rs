@@ -223,9 +223,14 @@ impl Observe for Meter {
     fn see(&mut self, curve: &Curve) {
         for (q, peak) in self.peaks.iter_mut().enumerate() {
             let course = curve.of(q);
-            if course.bound() > peak.value.abs() {
-                let (s, value) = course.largest(0.0, 1.0);
+            let (low, high) = course.range();
+            if high > peak.value.abs() {
+                let (s, value) = course.greatest(0.0, 1.0);
                 peak.take(value, curve.begin + s * curve.length);
+            }
+            if -low > peak.value.abs() {
+                let (s, value) = course.negative().greatest(0.0, 1.0);
+                peak.take(-value, curve.begin + s * curve.length);
             }
         }
         if let Some(plateau) = &mut self.plateau {

@@ -322,11 +322,13 @@ impl Observe for Gauge<'_> {
     fn see(&mut self, curve: &Curve) {
         self.meter.see(curve);
         self.power(curve);
+        // A seam that is as near as rounding is behind.
+        let shortest = SHORTEST + 16.0 * f64::EPSILON * (curve.begin + curve.length) / curve.length;
         let mut from = 0.0;
         while from < 1.0 {
             let begin = curve.begin + from * curve.length;
             let (coefficients, until) = self.profile.piece(begin);
-            let to = ((until - curve.begin) / curve.length).max(from + SHORTEST).min(1.0);
+            let to = ((until - curve.begin) / curve.length).max(from + shortest).min(1.0);
             self.track(curve, (from, to), &shifted(&coefficients, from, curve.length));
             from = to;
         }

@@ -95,18 +95,18 @@ impl Curve {
     pub(super) fn through(begin: f64, length: f64, from: &[Reading; 4], to: &[Reading; 4]) -> Self {
         let mut terms = [[0.0; QUANTITIES]; TERMS];
         terms[..4].copy_from_slice(from);
+        let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (from, to);
+        let [.., c4, c5, c6, c7] = &mut terms;
         for q in 0..QUANTITIES {
-            let [a0, a1, a2, a3] = from.map(|term| term[q]);
-            let [b0, b1, b2, b3] = to.map(|term| term[q]);
             // What the first four terms leave at the other end, by order.
-            let r0 = b0 - (a0 + a1 + a2 + a3);
-            let r1 = b1 - (a1 + 2.0 * a2 + 3.0 * a3);
-            let r2 = b2 - (a2 + 3.0 * a3);
-            let r3 = b3 - a3;
-            terms[4][q] = 35.0 * r0 - 15.0 * r1 + 5.0 * r2 - r3;
-            terms[5][q] = -84.0 * r0 + 39.0 * r1 - 14.0 * r2 + 3.0 * r3;
-            terms[6][q] = 70.0 * r0 - 34.0 * r1 + 13.0 * r2 - 3.0 * r3;
-            terms[7][q] = -20.0 * r0 + 10.0 * r1 - 4.0 * r2 + r3;
+            let r0 = b0[q] - (a0[q] + a1[q] + a2[q] + a3[q]);
+            let r1 = b1[q] - (a1[q] + 2.0 * a2[q] + 3.0 * a3[q]);
+            let r2 = b2[q] - (a2[q] + 3.0 * a3[q]);
+            let r3 = b3[q] - a3[q];
+            c4[q] = 35.0 * r0 - 15.0 * r1 + 5.0 * r2 - r3;
+            c5[q] = -84.0 * r0 + 39.0 * r1 - 14.0 * r2 + 3.0 * r3;
+            c6[q] = 70.0 * r0 - 34.0 * r1 + 13.0 * r2 - 3.0 * r3;
+            c7[q] = -20.0 * r0 + 10.0 * r1 - 4.0 * r2 + r3;
         }
         Self { begin, length, terms }
     }
@@ -131,7 +131,7 @@ pub struct Polynomial(pub [f64; TERMS]);
 const BINOMIAL: [f64; TERMS] = [1.0, 7.0, 21.0, 35.0, 35.0, 21.0, 7.0, 1.0];
 
 /// Places at which a polynomial is looked at first: it swings no faster than these tell.
-const LOOKS: usize = 16;
+const LOOKS: usize = 8;
 
 impl Polynomial {
     /// The value at `s`.
@@ -151,6 +151,13 @@ impl Polynomial {
     /// A bound of its magnitude on 0..1: the largest of its coefficients in Bernstein's form, b_k = Σ_j C(k, j)/C(n, j) c_j.
     #[inline]
     pub fn bound(&self) -> f64 {
+        let (low, high) = self.range();
+        high.max(-low)
+    }
+
+    /// Bounds of its values on 0..1, in the same way.
+    #[inline]
+    pub fn range(&self) -> (f64, f64) {
         // Each step adds neighbours: Pascal's triangle.
         let mut b: [f64; TERMS] = std::array::from_fn(|k| self.0[k] / BINOMIAL[k]);
         for i in 1..TERMS {
@@ -158,7 +165,7 @@ impl Polynomial {
                 b[k] += b[k - 1];
             }
         }
-        b.iter().fold(0.0, |most: f64, b| most.max(b.abs()))
+        b.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &b| (low.min(b), high.max(b)))
     }
 
     /// Whether it certainly has no zero.

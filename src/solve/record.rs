@@ -128,12 +128,13 @@ impl<'a> Recorder<'a> {
         let voltage = next();
         let (p1, w1, x, v, p3, w3) = (next(), next(), next(), next(), next(), next());
         for (j, &([phi1, omega1, position, speed, phi3, omega3, ..], _)) in raw.iter().enumerate() {
-            p1[j] = phi1;
-            w1[j] = omega1;
-            x[j] = position;
-            v[j] = speed;
-            p3[j] = phi3;
-            w3[j] = omega3;
+            // −0 + 0 is 0.
+            p1[j] = phi1 + 0.0;
+            w1[j] = omega1 + 0.0;
+            x[j] = position + 0.0;
+            v[j] = speed + 0.0;
+            p3[j] = phi3 + 0.0;
+            w3[j] = omega3 + 0.0;
         }
         let (p1, w1, x, v, p3, w3) = (&*p1, &*w1, &*x, &*v, &*p3, &*w3);
         let r = stage.pulley_radius;
@@ -143,7 +144,7 @@ impl<'a> Recorder<'a> {
         put(d1, |j| r * p1[j] - x[j]);
         put(d2, |j| x[j] - r * p3[j]);
         put(d3, |j| r * p3[j] - r * p1[j]);
-        put(input, |j| raw[j].1);
+        put(input, |j| raw[j].1 + 0.0);
         if plant.has_current_state() {
             put(armature, |j| raw[j].0[place::CURRENT]);
         }
@@ -231,16 +232,16 @@ impl<'a> Recorder<'a> {
                 let out = &mut friction[start..start + same.len()];
                 match motion {
                     Motion::Stuck if alone => {
-                        put(out, |j| plant.friction_value(body, motion, 0.0, own(body, start + j)));
+                        put(out, |j| plant.friction_value(body, motion, 0.0, own(body, start + j)) + 0.0);
                     }
                     Motion::Stuck => put(out, |j| {
                         let sum = |(least, most): (f64, f64), follower| {
                             let (load, ratio) = (own(follower, start + j), plant.ratio(follower));
                             (least + ratio * load.0, most + ratio * load.1)
                         };
-                        plant.friction_value(body, motion, 0.0, plant.followers(body).fold((0.0, 0.0), sum))
+                        plant.friction_value(body, motion, 0.0, plant.followers(body).fold((0.0, 0.0), sum)) + 0.0
                     }),
-                    _ => put(out, |j| plant.friction_value(body, motion, speed[start + j], (0.0, 0.0))),
+                    _ => put(out, |j| plant.friction_value(body, motion, speed[start + j], (0.0, 0.0)) + 0.0),
                 }
                 start += same.len();
             }
@@ -255,7 +256,7 @@ impl<'a> Recorder<'a> {
             next().copy_from_slice(input);
         }
         if plant.has_rotor() {
-            put(next(), |j| raw[j].0[place::ROTOR_ANGLE]);
+            put(next(), |j| raw[j].0[place::ROTOR_ANGLE] + 0.0);
             next().copy_from_slice(rotor);
             next().copy_from_slice(torque);
             put(next(), |j| f64::from(modes[j].gear.code()));
@@ -275,7 +276,7 @@ impl<'a> Recorder<'a> {
                 EncoderPlace::Cart => place::CART_POSITION,
             };
             let counts = encoder.counts_per_unit(stage.motor.gear_ratio);
-            put(next(), |j| (raw[j].0[place] * counts).round());
+            put(next(), |j| (raw[j].0[place] * counts).round() + 0.0);
         }
         for body in bristles(plant) {
             put(next(), |j| extras[j].bristle[body.index()]);
