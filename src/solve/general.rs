@@ -7,18 +7,19 @@
 
 mod fall;
 mod model;
+mod shown;
 mod stretch;
 
 use super::coordinates::Coordinates;
+use super::observe::Output;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
 use super::record::{Recorder, Row};
-use super::{Cost, Detail, Ending, Event, Flow, Grid, Outcome, Source, check, held};
+use super::{Cost, Ending, Event, Flow, Grid, Outcome, Source, check, held};
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
 use crate::plant::{Body, Cause, Limit, Mode, Part, Plant, State, Status, Switch, place};
 use crate::stage::AmplifierMode;
-use crate::trajectory::Trajectory;
 use fall::NODES;
 use ivp::dense::StepInterpolant;
 use ivp::methods::{DOP853, Tolerance};
@@ -46,8 +47,7 @@ pub(super) fn run(
     experiment: &Experiment,
     source: Source,
     tolerance: f64,
-    detail: Detail,
-    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+    output: Output,
 ) -> Result<Outcome> {
     if !(1e-14..=1e-2).contains(&tolerance) {
         return Err(Error::new(format!("a tolerance of {tolerance:e} is of no use"))
@@ -69,8 +69,8 @@ pub(super) fn run(
     let plant = &*plant.seen_from(coordinates.origin());
     let model = Model::new(plant, coordinates.origin());
     let mode = plant.first_mode(&start);
-    Ok(Run::new(&model, (coordinates, inner, mode), experiment, tolerance, FIRST / fastest, detail, sink)
-        .finish(source))
+    let start = (coordinates, inner, mode);
+    Ok(Run::new(&model, start, experiment, tolerance, FIRST / fastest, output.within()).finish(source))
 }
 
 /// h·|λ| up to which the formula is stable.
@@ -106,6 +106,7 @@ struct Run<'a> {
     pace: Pace,
     events: Vec<Event>,
     modes: Vec<Mode>,
+    shown: Option<shown::Shown>,
     cost: Cost,
     trouble: Option<Ending>,
 }
@@ -124,8 +125,7 @@ impl<'a> Run<'a> {
         experiment: &Experiment,
         tolerance: f64,
         first_step: f64,
-        detail: Detail,
-        sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
+        output: Output<'a>,
     ) -> Self {
         let plant = model.plant;
         let grid = Grid::new(experiment.every, experiment.until);
@@ -155,7 +155,7 @@ impl<'a> Run<'a> {
             model,
             coordinates,
             grid,
-            recorder: Recorder::new(plant, grid, detail, sink),
+            recorder: Recorder::new(plant, grid, output),
             // It is stopped from outside: by its observer.
             solver: DOP853 {
                 max_steps: usize::MAX - 1,
@@ -177,6 +177,7 @@ impl<'a> Run<'a> {
             pace: Pace::default(),
             events: Vec::new(),
             modes: vec![mode],
+            shown: None,
             cost: Cost::default(),
             trouble: None,
         }
@@ -211,6 +212,7 @@ impl<'a> Run<'a> {
             }
             stretch = next;
         }
+        self.end_shown(&stretch);
         self.recorder.finish();
         self.cost.samples = self.recorder.rows;
         self.cost.modes = self.modes.len() as u64;
@@ -492,6 +494,7 @@ impl SolOut for Observer<'_, '_> {
         };
         self.hit = self.first_fall(from, to, &begin, &end, &at);
         let until = self.hit.as_ref().map_or(to, |hit| hit.tau);
+        self.show(from, until, &begin, &at);
         // A row on an edge or an event shows what comes after it.
         let stretch = self.field.stretch;
         let near = (8.0 * f64::EPSILON * stretch.end).min(1e-9 * self.run.grid.interval());
