@@ -321,7 +321,7 @@ fn both_solvers_have_the_same_metrics() {
     let mut stage = table4();
     stage.motor.inductance = 5e-4;
     stage.amplifier.voltage_limit = Some(4.0);
-    let input = Signal::Sequence(vec![
+    let input = Signal::sequence(vec![
         Slot { signal: Signal::Sine { amplitude: 5.0, frequency: 7.0, phase: 0.3, offset: 0.5 }, lasts: 0.3 },
         Slot { signal: Signal::Step { value: -3.0, at: 0.0 }, lasts: f64::INFINITY },
     ]);
