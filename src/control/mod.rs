@@ -26,7 +26,7 @@ mod standard;
 pub mod state_feedback;
 mod welch;
 
-pub(crate) use outcome::follow;
+pub(crate) use outcome::{follow, tracking};
 pub use outcome::{Deviation, Figures, MoveRun, Rows, Setup, close, closed_loop, stream};
 pub use sampled::{Controller, Loop, Sample, Seen, measures_cart};
 pub use spread::{Change, PARAMETERS, Worst, spread, worst};

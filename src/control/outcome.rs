@@ -93,6 +93,68 @@ pub fn closed_loop(setup: &Setup) -> Result<MoveRun> {
     close(setup.stage, &mut controller, &timing, &profile, setup.until, setup.window, setup.solver)
 }
 
+/// How a design tracks a profile, and nothing else: what a search looks at thousands of times. Between the ends of what is held the
+/// error is taken for a cubic.
+pub(crate) fn tracking(setup: &Setup) -> Result<(solve::Ending, Deviation)> {
+    let mut controller = Standard::new(setup.design, setup.model)?;
+    let profile = setup.profile.clone().shaped(&setup.design.shaper);
+    let timing = Loop::of(setup.design);
+    let experiment = at_rest(setup.stage, &profile, setup.until, timing.every.min(setup.until));
+    let mut sampled = Sampled::new(setup.stage, &mut controller, timing, &profile, false);
+    let mut tracker = Tracker { profile: &profile, squares: 0.0, error: Deviation::default() };
+    let (detail, solver) = (Detail::None, setup.solver);
+    let sink = &mut |_: &Trajectory| Flow::Continue;
+    let outcome =
+        solve::stream_decided_observed(setup.stage, &experiment, &mut sampled, solver, detail, &mut tracker, sink)?;
+    Ok((outcome.ending, Deviation { rms: (tracker.squares / setup.until).sqrt(), ..tracker.error }))
+}
+
+/// A run from rest at the start of a profile, without an input of its own.
+fn at_rest(stage: &Stage, profile: &Profile, until: f64, every: f64) -> Experiment {
+    let start = profile.start();
+    let angle = start / stage.pulley_radius;
+    Experiment {
+        name: String::new(),
+        input: Signal::Step { value: 0.0, at: 0.0 },
+        until,
+        every,
+        initial: Initial { drive_angle: angle, cart_position: start, idler_angle: angle, ..Initial::default() },
+        log: None,
+    }
+}
+
+/// Gathers the cart's error from the ends of gaps.
+struct Tracker<'a> {
+    profile: &'a Profile,
+    squares: f64,
+    error: Deviation,
+}
+
+impl Observe for Tracker<'_> {
+    fn pass(&mut self, gap: &Gap) -> bool {
+        let error = |time: f64, reading: &solve::Reading| {
+            let y = self.profile.at(time);
+            (reading[reading::CART_POSITION] - y.position, reading[reading::CART_SPEED] - y.speed)
+        };
+        let (h, end) = (gap.length, gap.begin + gap.length);
+        let ((a, from), (b, to)) = (error(gap.begin, gap.from), error(end, gap.to));
+        // Hermite's cubic in the middle, and Simpson's rule.
+        let middle = 0.5 * (a + b) + 0.125 * h * (from - to);
+        self.squares += h / 6.0 * (a * a + 4.0 * middle * middle + b * b);
+        for (value, time) in [(a, gap.begin), (middle, gap.begin + 0.5 * h), (b, end)] {
+            if value.abs() > self.error.peak.value.abs() {
+                self.error.peak = Peak { value, time };
+            }
+        }
+        self.error.last = b;
+        false
+    }
+
+    fn see(&mut self, _: &Curve) {}
+
+    fn end(&mut self, _: f64, _: &State, _: &Mode) {}
+}
+
 /// Runs any controller along a profile, from rest at its start, for `until` s; the cart has settled within `window` (m) of its target.
 pub fn close(
     stage: &Stage,
@@ -150,16 +212,7 @@ fn run(
     if !(rows.window > 0.0 && rows.window.is_finite()) {
         return Err(Error::new(format!("the cart cannot settle within {:?} m", rows.window)).allowed("above zero"));
     }
-    let start = profile.start();
-    let angle = start / stage.pulley_radius;
-    let experiment = Experiment {
-        name: String::new(),
-        input: Signal::Step { value: 0.0, at: 0.0 },
-        until: rows.until,
-        every: rows.every,
-        initial: Initial { drive_angle: angle, cart_position: start, idler_angle: angle, ..Initial::default() },
-        log: None,
-    };
+    let experiment = at_rest(stage, profile, rows.until, rows.every);
     controller.reset();
     let mut sampled = Sampled::new(stage, controller, *timing, profile, keep).until(rows.until);
     let mut gauge = Gauge::new(stage, &experiment, profile, rows.window);

@@ -217,7 +217,12 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             _ if offset <= near => (row, 0.0),
             (true, true) => (row + 1, 0.0),
             (false, true) => (row, length),
-            (_, false) => (row, offset),
+            (_, false) => {
+                // Halves, quarters and eighths of the interval, for which there are matrices, are hit to the last bit.
+                let eighth = 0.125 * self.h;
+                let snapped = (offset / eighth).round() * eighth;
+                (row, if (offset - snapped).abs() <= near { snapped } else { offset })
+            }
         }
     }
 

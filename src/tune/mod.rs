@@ -19,7 +19,7 @@ pub use search::{Found, minimise};
 
 use crate::case::{Case, Cost, Move, Tuning};
 use crate::control::feedback::Feedback;
-use crate::control::{Deviation, Setup, closed_loop};
+use crate::control::{Deviation, Setup, closed_loop, tracking};
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::linear::{Operation, travel};
@@ -308,12 +308,11 @@ impl Work<'_> {
     fn error(&self, axis: &Stage, design: &Design, cost: Cost) -> f64 {
         let (mut peak, mut squares, mut time) = (0.0_f64, 0.0, 0.0);
         for motion in &self.case.moves {
-            let Ok(run) = closed_loop(&self.setup(axis, design, motion)) else { return f64::INFINITY };
-            if run.outcome.ending != Ending::Complete {
+            let Ok((Ending::Complete, cart)) = tracking(&self.setup(axis, design, motion)) else {
                 return f64::INFINITY;
-            }
-            peak = peak.max(run.figures.cart.peak.value.abs());
-            squares += run.figures.cart.rms.powi(2) * motion.until;
+            };
+            peak = peak.max(cart.peak.value.abs());
+            squares += cart.rms.powi(2) * motion.until;
             time += motion.until;
         }
         if cost == Cost::Peak { peak } else { (squares / time).sqrt() }

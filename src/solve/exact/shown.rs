@@ -15,6 +15,9 @@ const MOST_CURVES: u64 = 2_000_000;
 /// Room for what a cubic is off where it only tells whether to look closer.
 const MARGIN: f64 = 1.05;
 
+/// Lengths that differ by less than this share are one.
+const SAME: f64 = 1e-10;
+
 /// Curves in a row that are right before longer ones are tried.
 const RIGHT: u32 = 32;
 
@@ -120,13 +123,14 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
     /// Shows a way of any length that begins at `z`, in parts that there are matrices for and a rest that a series tells.
     fn show_closer(&mut self, law: &Law<R, C>, mut z: [f64; C], mut begin: f64, mut length: f64) {
         for level in 0..=law.finest {
-            while length >= law.length(level) {
+            // What a sum of times is off by makes no difference here.
+            while length >= law.length(level) * (1.0 - SAME) {
                 z = self.show_level(law, z, begin, level);
                 begin += law.length(level);
                 length -= law.length(level);
             }
         }
-        if length > 0.0 {
+        if length > SAME * law.reach() {
             let series = law.series(&z, length);
             let end = std::array::from_fn(|j| series.iter().rev().fold(0.0, |sum, term| sum + term[j]));
             let curve = self.curve(law, &self.sight(law, &z), &self.sight(law, &end), begin, length);
