@@ -79,9 +79,7 @@ pub fn early_end(ending: &Ending) -> Option<String> {
             "ended at {}: sticks, slips and strikes pile up there, more often than a machine has them",
             time(at)
         )),
-        Ending::Diverged { time: at } => {
-            Some(format!("ended at {}: its state has grown beyond all numbers", time(at)))
-        }
+        Ending::Diverged { time: at } => Some(format!("ended at {}: its state has grown beyond all numbers", time(at))),
         Ending::TooStiff { time: at, steps } => Some(format!(
             "ended at {}: too stiff, it would need some {steps:.0e} steps; leave out what changes so fast \
              (an inductance, a light body, stiff friction), or shorten the run",
