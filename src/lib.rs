@@ -6,7 +6,7 @@
 //! ```
 //! use taut::case::{Case, TEMPLATE};
 //! use taut::metrics::Meter;
-//! use taut::solve::{Ending, Solver, simulate};
+//! use taut::solve::{Ending, Flow, Solver, simulate, stream_observed};
 //!
 //! // A case file, here the one that `taut init` writes, with another mass.
 //! let case = Case::from_text_with("axis.toml", TEMPLATE, &["cart.mass=0.5 kg"])?;
@@ -26,9 +26,9 @@
 //! assert_eq!((first.time, first.part.name(), first.to.word()), (0.0, "drive pulley", "forward"));
 //!
 //! // The key figures.
-//! let mut meter = Meter::new(&case.stage);
-//! meter.take(&solution.trajectory);
-//! let metrics = meter.finish(&solution.outcome.events);
+//! let mut meter = Meter::new(&case.stage, experiment);
+//! let outcome = stream_observed(&case.stage, experiment, Solver::Exact, &mut meter, &mut |_| Flow::Continue)?;
+//! let metrics = meter.finish(&outcome.events);
 //! assert!(metrics.settled && metrics.stop_time < Some(0.5));
 //! # Ok::<(), taut::Error>(())
 //! ```

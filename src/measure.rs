@@ -61,7 +61,8 @@ pub fn stream(
         return Err(Error::new("nothing is recorded: there is no encoder and no other recorded quantity")
             .next("add [encoder], or [measurement] with a quantity such as motor_current = { step = \"10 mA\" }"));
     }
-    let grid = Grid::new(measurement.every.unwrap_or(experiment.every), experiment.until);
+    // A recorder keeps its rhythm: what is left of the run behind its last beat it does not see.
+    let grid = Grid::new(measurement.every.unwrap_or(experiment.every), experiment.until).beats();
     let raster = Raster::new(grid.interval(), measurement);
     let devices = Device::all(stage, measurement, experiment);
 
@@ -77,12 +78,9 @@ pub fn stream(
         Flow::Stop
     })?;
 
-    let points = grid.intervals() * u64::from(raster.points) + raster.beyond;
-    let fine = Experiment {
-        every: grid.interval() / f64::from(raster.points),
-        until: grid.end() * (points as f64 / (points - raster.beyond) as f64),
-        ..experiment.clone()
-    };
+    let points = (grid.intervals() * u64::from(raster.points) + raster.beyond).max(1);
+    let every = grid.interval() / f64::from(raster.points);
+    let fine = Experiment { every, until: points as f64 * every, ..experiment.clone() };
     let mut recorder = Recorder {
         grid,
         raster,

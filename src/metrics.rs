@@ -1,17 +1,24 @@
 //! What a run shows: where it ended, how fast it went, what it put on belt and motor, when it stopped, and how far the
 //! encoder's pulley and the cart were apart.
 //!
-//! A [`Meter`] is fed with blocks of rows and keeps no row, so that a run of any length needs the same memory.
-//! What it reports are values at rows: a peak between two rows is not seen, so the output interval should resolve it.
-//! Events, which the exact solver locates by themselves, are exact.
+//! A [`Meter`] observes a run as it goes on and keeps nothing of it, so that a run of any length needs the same memory. It sees the motion
+//! between rows, on both sides of every event and jump of the input: what it reports does not depend on the output interval but for
+//! rounding. Of the paper's Table 3 it sees the steps.
 
+use crate::case::Experiment;
 use crate::friction::Motion;
-use crate::solve::Event;
+use crate::plant::{Mode, State, place};
+use crate::solve::{Curve, Event, Gap, Observe, reading};
 use crate::stage::{AmplifierMode, Stage};
-use crate::trajectory::Trajectory;
 
-/// Rows that a stretch of constant input needs before its last tenth says something.
-const SHORTEST_STRETCH: u64 = 20;
+/// Share of the run that a stretch of constant input has to last before a steady speed is sought in it.
+const SHORTEST: f64 = 0.02;
+
+/// The last part of such a stretch, in which the speed must have become steady.
+const LATE: f64 = 0.1;
+
+/// Share of its largest speed up to which a rotor that turns by itself counts as resting.
+const RESTING: f64 = 1e-6;
 
 /// What a steady speed may still change by, relative to itself.
 const STEADY: f64 = 0.01;
@@ -19,23 +26,24 @@ const STEADY: f64 = 0.01;
 /// The key figures of one run. SI units; r is the pulleys' pitch radius, φ₁ the drive pulley's angle, x the cart's position.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Metrics {
-    /// Rows seen.
-    pub rows: u64,
-    /// Time of the last row, s.
+    /// When the run ended, s.
     pub end: f64,
-    /// φ₁ in the last row, rad.
+    /// φ₁ at the end, rad.
     pub final_drive_angle: f64,
-    /// r φ₁ in the last row, m: where an encoder at the drive pulley says the cart is.
+    /// r φ₁ at the end, m: where an encoder at the drive pulley says the cart is.
     pub final_drive_travel: f64,
-    /// x in the last row, m: where the cart is.
+    /// x at the end, m: where the cart is.
     pub final_cart_position: f64,
-    /// ẋ in the last row, m/s.
+    /// ẋ at the end, m/s.
     pub final_cart_speed: f64,
+    /// φ̇_r at the end, rad/s: the rotor's speed seen from behind the gear, φ̇₁ where the gear is stiff.
+    pub final_rotor_speed: f64,
     /// ẋ of largest magnitude, m/s.
     pub peak_cart_speed: Peak,
     /// r φ̇₁ of largest magnitude, m/s.
     pub peak_drive_speed: Peak,
-    /// What the cart's speed settles at under constant input; none if no input but zero stays for 20 rows.
+    /// What the cart's speed settles at under constant input; none if no input but zero lasts a fiftieth of the run, or the run ended
+    /// before that input did.
     pub steady_speed: Option<SteadySpeed>,
     /// Stretch of spans 1, 2, 3 of largest magnitude, m: r φ₁ − x, x − r φ₃, r φ₃ − r φ₁; negative where the span is
     /// shorter than at rest (an axis whose belt is tensioned by more than that is meant).
@@ -47,17 +55,22 @@ pub struct Metrics {
     /// r φ₁ − x of largest magnitude, m: by how much an encoder at the drive pulley misses the cart.
     /// The same length as the stretch of span 1, seen as an error of measurement.
     pub peak_encoder_error: Peak,
-    /// When the last body came to rest, s, if all three are stuck in the last row: the time of the last event; 0 if
-    /// nothing ever moved. None while anything moves, where a body has no dry friction to stick by, and for a
-    /// solver that locates no events (`table3` freezes speeds and creeps on).
+    /// When everything came to rest, s, if it has: the time of the last event of a body, or when a rotor that turns by itself was last
+    /// faster than a millionth of its largest speed, whichever is later; 0 if nothing ever moved. None while anything moves, where a body
+    /// has no dry friction to stick by, and for a solver that locates no events (`table3` freezes speeds and creeps on).
     pub stop_time: Option<f64>,
-    /// Whether all three bodies are stuck, at a speed of exactly zero, in the last row.
+    /// Whether everything is at rest at the end: bodies and rotor.
     pub settled: bool,
+    /// Whether all three bodies are stuck at the end, at a speed of exactly zero.
+    pub bodies_rest: bool,
+    /// Whether the rotor is at rest at the end: that of a gear with play turns no faster than a millionth of its largest speed. True for
+    /// a stiff gear, whose rotor is part of the drive pulley.
+    pub rotor_rests: bool,
     /// Events of drive pulley, cart, idler pulley.
     pub events: [EventCount; 3],
 }
 
-/// The value of largest magnitude, with its sign, and the first time it was seen.
+/// The value of largest magnitude, with its sign, and when that was.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Peak {
     /// The value, in the unit of what was looked at.
@@ -66,10 +79,11 @@ pub struct Peak {
     pub time: f64,
 }
 
-/// The cart's speed at the end of the last stretch of time on which the input was constant and not zero.
+/// The cart's speed at the end of the last stretch of time on which the input was constant and not zero, and that lasted at least a
+/// fiftieth of the run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SteadySpeed {
-    /// Its speed in the last row of that stretch, m/s.
+    /// Its speed at the end of that stretch, m/s.
     pub value: f64,
     /// The difference of largest and least speed within the last tenth of that stretch, m/s.
     pub change: f64,
@@ -79,7 +93,7 @@ pub struct SteadySpeed {
     pub analytic: Balance,
     /// The input, V or A.
     pub input: f64,
-    /// Times of the first and last row of that stretch, s.
+    /// Where that stretch begins and ends, s.
     pub stretch: (f64, f64),
 }
 
@@ -102,105 +116,62 @@ impl EventCount {
 }
 
 impl Peak {
-    /// Looks at the next values.
-    fn see(&mut self, times: &[f64], values: impl Iterator<Item = f64> + Clone) {
-        // First how large any gets, which is quick; only if that is news, which one it was.
-        let larger = |most: f64, value: f64| if value.abs() > most { value.abs() } else { most };
-        let most = values.clone().fold(0.0, larger);
-        if most > self.value.abs()
-            && let Some((&time, value)) = times.iter().zip(values).find(|(_, value)| value.abs() == most)
-        {
+    /// Takes a value that is larger.
+    fn take(&mut self, value: f64, time: f64) {
+        if value.abs() > self.value.abs() {
             *self = Peak { value, time };
         }
     }
 }
 
-/// Gathers [`Metrics`] from blocks of rows.
+/// Quantities of a reading that peaks are sought of: the first ones.
+const PEAKS: usize = reading::CURRENT + 1;
+
+/// A bound that passes a peak by no more than this share of it is no reason to look closer.
+const NEWS: f64 = 1e-9;
+
+/// Gathers [`Metrics`] from a run that it observes.
 #[derive(Debug, Clone)]
 pub struct Meter {
     stage: Stage,
+    peaks: [Peak; PEAKS],
     seen: Metrics,
-    plateau: Plateau,
-    /// The last plateau that was long enough, with its input.
-    steady: Option<Plateau>,
-    /// Whether everything was stuck in every row so far.
-    never_moved: bool,
+    plateau: Option<Plateau>,
+    /// Whether any body slid or was free.
+    moved: bool,
+    /// The rotor, where it is an inertia of its own.
+    rotor: Option<Rotor>,
 }
 
 impl Meter {
-    /// A meter for runs of `stage`.
-    pub fn new(stage: &Stage) -> Self {
+    /// A meter for a run of `experiment` on `stage`.
+    pub fn new(stage: &Stage, experiment: &Experiment) -> Self {
+        Self::with(stage, Held::last(experiment))
+    }
+
+    /// The same where the last stretch of constant input is known.
+    pub(crate) fn with(stage: &Stage, held: Option<Held>) -> Self {
         Self {
             stage: stage.clone(),
+            peaks: [Peak::default(); PEAKS],
             seen: Metrics::default(),
-            plateau: Plateau::new(0.0),
-            steady: None,
-            never_moved: true,
+            plateau: held.map(Plateau::new),
+            moved: false,
+            rotor: stage.motor.gear_play.map(|_| Rotor::default()),
         }
     }
 
-    /// Takes the next rows; columns that are missing count as zero.
-    pub fn take(&mut self, block: &Trajectory) {
-        let Some(last) = block.len().checked_sub(1) else { return };
-        let column = |name: &str| block.get(name).unwrap_or(&[]);
-        let r = self.stage.pulley_radius;
-        let time = column("time");
-        let [drive, cart, idler] = ["drive_angle", "cart_position", "idler_angle"].map(column);
-        let [drive_speed, cart_speed, idler_speed] = ["drive_speed", "cart_speed", "idler_speed"].map(column);
-        let input = block.get("input").unwrap_or(column("voltage"));
-        let states = ["drive_state", "cart_state", "idler_state"].map(column);
-
-        let seen = &mut self.seen;
-        seen.peak_cart_speed.see(time, cart_speed.iter().copied());
-        seen.peak_drive_speed.see(time, drive_speed.iter().map(|w| r * w));
-        seen.peak_stretch[0].see(time, drive.iter().zip(cart).map(|(p1, x)| r * p1 - x));
-        seen.peak_stretch[1].see(time, cart.iter().zip(idler).map(|(x, p3)| x - r * p3));
-        seen.peak_stretch[2].see(time, idler.iter().zip(drive).map(|(p3, p1)| r * p3 - r * p1));
-        seen.peak_encoder_error = seen.peak_stretch[0];
-        for (peak, name) in seen.peak_force.iter_mut().zip(["span1_force", "span2_force", "span3_force"]) {
-            peak.see(time, column(name).iter().copied());
-        }
-        seen.peak_current.see(time, column("motor_current").iter().copied());
-
-        let stuck = |row: usize| states.iter().all(|state| state.get(row) == Some(&f64::from(Motion::Stuck.code())));
-        self.never_moved = self.never_moved && (0..=last).all(stuck);
-        let at = |values: &[f64]| values.get(last).copied().unwrap_or(0.0);
-        seen.rows += block.len() as u64;
-        seen.end = at(time);
-        seen.final_drive_angle = at(drive);
-        seen.final_drive_travel = r * at(drive);
-        seen.final_cart_position = at(cart);
-        seen.final_cart_speed = at(cart_speed);
-        seen.settled = stuck(last) && [drive_speed, cart_speed, idler_speed].iter().all(|speed| at(speed) == 0.0);
-
-        let mut row = 0;
-        for alike in input.chunk_by(|a, b| a.to_bits() == b.to_bits()) {
-            if alike[0].to_bits() != self.plateau.input.to_bits() {
-                self.close_plateau(alike[0]);
-            }
-            let rows = row..row + alike.len();
-            // Of a stretch without input nothing is asked.
-            if alike[0] != 0.0 {
-                for (&time, &speed) in time.iter().zip(cart_speed).take(rows.end).skip(rows.start) {
-                    self.plateau.add(time, speed);
-                }
-            }
-            row = rows.end;
-        }
-    }
-
-    fn close_plateau(&mut self, next_input: f64) {
-        let done = std::mem::replace(&mut self.plateau, Plateau::new(next_input));
-        if done.input != 0.0 && done.rows >= SHORTEST_STRETCH {
-            self.steady = Some(done);
-        }
-    }
-
-    /// The metrics of the run whose rows were taken and whose events these are.
-    pub fn finish(mut self, events: &[Event]) -> Metrics {
-        self.close_plateau(0.0);
+    /// The metrics of the run that was observed and whose events these are.
+    pub fn finish(self, events: &[Event]) -> Metrics {
         let mut metrics = self.seen;
-        metrics.steady_speed = self.steady.map(|plateau| plateau.steady_speed(&self.stage));
+        let peak = |q: usize| self.peaks[q];
+        metrics.peak_cart_speed = peak(reading::CART_SPEED);
+        metrics.peak_drive_speed = peak(reading::DRIVE_SPEED);
+        metrics.peak_stretch = std::array::from_fn(|span| peak(reading::STRETCH + span));
+        metrics.peak_force = std::array::from_fn(|span| peak(reading::FORCE + span));
+        metrics.peak_current = peak(reading::CURRENT);
+        metrics.peak_encoder_error = metrics.peak_stretch[0];
+        metrics.steady_speed = self.plateau.and_then(|plateau| plateau.steady_speed(&self.stage));
         for event in events {
             let Some(body) = event.body() else { continue };
             let count = &mut metrics.events[body.index()];
@@ -212,81 +183,216 @@ impl Meter {
                 count.reversals += 1;
             }
         }
-        metrics.stop_time = match events.iter().rfind(|event| event.body().is_some()) {
-            Some(last) => Some(last.time).filter(|_| metrics.settled),
-            None => Some(0.0).filter(|_| metrics.settled && self.never_moved),
+        metrics.rotor_rests = self.rotor.is_none_or(|rotor| rotor.rests);
+        let bodies = match events.iter().rfind(|event| event.body().is_some()) {
+            Some(last) => Some(last.time),
+            None => Some(0.0).filter(|_| !self.moved),
         };
+        let rotor = self.rotor.map_or(0.0, |rotor| rotor.turned);
+        metrics.settled = metrics.bodies_rest && metrics.rotor_rests;
+        metrics.stop_time = bodies.map(|time| time.max(rotor)).filter(|_| metrics.settled);
         metrics
     }
 }
 
-/// A stretch of constant input, remembered as least and greatest speeds of up to 1024 parts of equal length.
-#[derive(Debug, Clone)]
-struct Plateau {
-    input: f64,
-    rows: u64,
-    begin: f64,
-    end: f64,
-    last: f64,
-    /// Rows in each part; doubles whenever there are too many parts.
-    width: u64,
-    /// Rows that the last part still takes.
-    room: u64,
-    parts: Vec<Part>,
+impl Observe for Meter {
+    fn pass(&mut self, gap: &Gap) -> bool {
+        let end = gap.begin + gap.length;
+        let (mut news, mut closer) = (false, false);
+        for (q, peak) in self.peaks.iter().enumerate() {
+            let height = peak.value.abs();
+            news |= gap.from[q].abs().max(gap.to[q].abs()) > height;
+            closer |= gap.bound(q) > height * (1.0 + NEWS);
+        }
+        if news {
+            for (q, peak) in self.peaks.iter_mut().enumerate() {
+                peak.take(gap.from[q], gap.begin);
+                peak.take(gap.to[q], end);
+            }
+        }
+        if let Some(plateau) = &mut self.plateau {
+            closer |= plateau.pass(gap);
+        }
+        if let Some(rotor) = &mut self.rotor {
+            closer |= rotor.pass(gap);
+        }
+        self.moved |= gap.length > 0.0 && gap.mode.motion.iter().any(|motion| *motion != Motion::Stuck);
+        closer && gap.length > 0.0
+    }
+
+    fn see(&mut self, curve: &Curve) {
+        for (q, peak) in self.peaks.iter_mut().enumerate() {
+            let course = curve.of(q);
+            let (low, high) = course.range();
+            if high > peak.value.abs() {
+                let (s, value) = course.greatest(0.0, 1.0);
+                peak.take(value, curve.begin + s * curve.length);
+            }
+            if -low > peak.value.abs() {
+                let (s, value) = course.negative().greatest(0.0, 1.0);
+                peak.take(-value, curve.begin + s * curve.length);
+            }
+        }
+        if let Some(plateau) = &mut self.plateau {
+            plateau.see(curve);
+        }
+        if let Some(rotor) = &mut self.rotor {
+            rotor.see(curve);
+        }
+    }
+
+    fn end(&mut self, time: f64, state: &State, mode: &Mode) {
+        let seen = &mut self.seen;
+        seen.end = time;
+        seen.final_drive_angle = state[place::DRIVE_ANGLE];
+        seen.final_drive_travel = self.stage.pulley_radius * state[place::DRIVE_ANGLE];
+        seen.final_cart_position = state[place::CART_POSITION];
+        seen.final_cart_speed = state[place::CART_SPEED];
+        seen.final_rotor_speed = state[place::ROTOR_SPEED];
+        let speeds = [place::DRIVE_SPEED, place::CART_SPEED, place::IDLER_SPEED].map(|place| state[place]);
+        seen.bodies_rest = mode.motion == [Motion::Stuck; 3] && speeds == [0.0; 3];
+        if let Some(rotor) = &mut self.rotor {
+            rotor.rests = state[place::ROTOR_SPEED].abs() <= RESTING * rotor.fastest;
+        }
+    }
 }
 
-/// Least and greatest speed from one row to another.
-#[derive(Debug, Clone, Copy)]
-struct Part {
+/// A rotor that is an inertia of its own: nothing holds it, so it comes to rest as what swings does, by and by.
+#[derive(Debug, Clone, Copy, Default)]
+struct Rotor {
+    /// Its largest speed so far, rad/s.
+    fastest: f64,
+    /// When it last turned faster than a share [`RESTING`] of that, s.
+    turned: f64,
+    rests: bool,
+}
+
+impl Rotor {
+    fn pass(&mut self, gap: &Gap) -> bool {
+        let (q, end) = (reading::ROTOR_SPEED, gap.begin + gap.length);
+        let (from, to) = (gap.from[q].abs(), gap.to[q].abs());
+        self.fastest = self.fastest.max(from).max(to);
+        let slow = RESTING * self.fastest;
+        if to > slow {
+            self.turned = self.turned.max(end);
+        } else if from > slow {
+            self.turned = self.turned.max(gap.begin);
+        }
+        let bound = gap.bound(q);
+        bound > self.fastest * (1.0 + NEWS) || (to <= slow && bound > slow)
+    }
+
+    fn see(&mut self, curve: &Curve) {
+        let speed = curve.of(reading::ROTOR_SPEED);
+        self.fastest = self.fastest.max(speed.largest(0.0, 1.0).1.abs());
+        let slow = RESTING * self.fastest;
+        let shifted = |by: f64| {
+            let mut shifted = speed;
+            shifted.0[0] += by;
+            shifted.zeros(0.0, 1.0).last().copied()
+        };
+        if let Some(s) = shifted(slow).into_iter().chain(shifted(-slow)).reduce(f64::max) {
+            self.turned = self.turned.max(curve.begin + s * curve.length);
+        }
+    }
+}
+
+/// A stretch of time on which the input is constant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Held {
+    input: f64,
+    begin: f64,
     end: f64,
-    least: f64,
-    greatest: f64,
+}
+
+impl Held {
+    /// The last one of an experiment that is not zero and no shorter than [`SHORTEST`] of the run.
+    pub(crate) fn last(experiment: &Experiment) -> Option<Self> {
+        let until = experiment.until;
+        let long = |held: &Held| held.input != 0.0 && held.end - held.begin >= SHORTEST * until * (1.0 - 1e-9);
+        let (mut last, mut held, mut time) = (None, Held { input: 0.0, begin: 0.0, end: 0.0 }, 0.0);
+        while time < until {
+            let piece = experiment.input.piece(time);
+            let input = if piece.degree() == 0 { piece.coefficients[0] } else { 0.0 };
+            if input.to_bits() != held.input.to_bits() {
+                last = Some(held).filter(long).or(last);
+                held = Held { input, begin: time, end: time };
+            }
+            time = piece.end.min(until);
+            held.end = time;
+        }
+        Some(held).filter(long).or(last)
+    }
+}
+
+/// What the cart's speed does at the end of a stretch of constant input.
+#[derive(Debug, Clone)]
+struct Plateau {
+    held: Held,
+    /// Where its last part begins.
+    late: f64,
+    /// Times as near as this are one.
+    near: f64,
+    /// The least and greatest speed there.
+    range: (f64, f64),
+    /// The speed at its end, where that was reached.
+    last: Option<f64>,
 }
 
 impl Plateau {
-    const PARTS: usize = 1024;
-
-    fn new(input: f64) -> Self {
-        Self { input, rows: 0, begin: 0.0, end: 0.0, last: 0.0, width: 1, room: 0, parts: Vec::new() }
+    fn new(held: Held) -> Self {
+        Self {
+            held,
+            late: held.end - LATE * (held.end - held.begin),
+            near: 16.0 * f64::EPSILON * held.end,
+            range: (f64::INFINITY, f64::NEG_INFINITY),
+            last: None,
+        }
     }
 
-    fn add(&mut self, time: f64, speed: f64) {
-        if self.rows == 0 {
-            self.begin = time;
-        }
-        if self.room == 0 {
-            if self.parts.len() == Self::PARTS {
-                let join = |pair: &[Part]| Part {
-                    end: pair[1].end,
-                    least: pair[0].least.min(pair[1].least),
-                    greatest: pair[0].greatest.max(pair[1].greatest),
-                };
-                self.parts = self.parts.chunks_exact(2).map(join).collect();
-                self.width *= 2;
-            }
-            self.parts.push(Part { end: time, least: speed, greatest: speed });
-            self.room = self.width;
-        } else if let Some(part) = self.parts.last_mut() {
-            *part = Part { end: time, least: part.least.min(speed), greatest: part.greatest.max(speed) };
-        }
-        self.room -= 1;
-        self.rows += 1;
-        (self.end, self.last) = (time, speed);
+    fn take(&mut self, speed: f64) {
+        self.range = (self.range.0.min(speed), self.range.1.max(speed));
     }
 
-    fn steady_speed(&self, stage: &Stage) -> SteadySpeed {
-        // The part in which the last tenth begins counts whole.
-        let from = self.end - 0.1 * (self.end - self.begin);
-        let late = self.parts.iter().filter(|part| part.end >= from);
-        let (least, greatest) = late.fold((self.last, self.last), |(a, b), p| (a.min(p.least), b.max(p.greatest)));
-        SteadySpeed {
-            value: self.last,
-            change: greatest - least,
-            reached: greatest - least <= STEADY * self.last.abs(),
-            analytic: balanced_speed(stage, self.input, self.last),
-            input: self.input,
-            stretch: (self.begin, self.end),
+    fn pass(&mut self, gap: &Gap) -> bool {
+        let (begin, end) = (gap.begin, gap.begin + gap.length);
+        if end < self.late - self.near || end > self.held.end + self.near {
+            return false;
         }
+        let (from, to) = (gap.from[reading::CART_SPEED], gap.to[reading::CART_SPEED]);
+        self.take(to);
+        if begin >= self.late - self.near {
+            self.take(from);
+        }
+        if end >= self.held.end - self.near {
+            self.last = Some(to);
+        }
+        let (low, high) = gap.range(reading::CART_SPEED);
+        let news = NEWS * low.abs().max(high.abs());
+        begin < self.late - self.near || low < self.range.0 - news || high > self.range.1 + news
+    }
+
+    fn see(&mut self, curve: &Curve) {
+        let end = curve.begin + curve.length;
+        if end < self.late || end > self.held.end + self.near {
+            return;
+        }
+        let speed = curve.of(reading::CART_SPEED);
+        let from = ((self.late - curve.begin) / curve.length).clamp(0.0, 1.0);
+        self.take(speed.greatest(from, 1.0).1);
+        self.take(-speed.negative().greatest(from, 1.0).1);
+    }
+
+    fn steady_speed(&self, stage: &Stage) -> Option<SteadySpeed> {
+        let (value, change) = (self.last?, self.range.1 - self.range.0);
+        Some(SteadySpeed {
+            value,
+            change,
+            reached: change <= STEADY * value.abs(),
+            analytic: balanced_speed(stage, self.held.input, value),
+            input: self.held.input,
+            stretch: (self.held.begin, self.held.end),
+        })
     }
 }
 

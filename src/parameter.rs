@@ -451,7 +451,7 @@ const MEASUREMENT: &[Parameter] = &[
 #[rustfmt::skip]
 const EXPERIMENT: &[Parameter] = &[
     row("experiment.until", "", "s", Required, DURATION, "1 s", "End of the run."),
-    row("experiment.every", "", "s", Required, DURATION, "1 ms", "Interval between the rows of the result; it does not affect the accuracy."),
+    row("experiment.every", "", "s", Required, DURATION, "1 ms", "Interval between the rows of the result, the last of which is at the end; it affects neither accuracy nor figures."),
 ];
 
 #[rustfmt::skip]
@@ -578,7 +578,7 @@ const TUNE: &[Parameter] = &[
 const SWEEP: &[Parameter] = &[
     row("sweep.runs", "N", "", Words("required where machines are drawn"), Range::whole(1.0, 1e12), "100000", "How many machines are run; `grid` and `one-at-a-time` say it themselves."),
     row("sweep.seed", "", "", Value(1.0), SEED, "1", "Which draws; the same seed gives the same ones."),
-    row("sweep.interval", "", "s", Words("the experiment's `every`"), DURATION, "1 ms", "Interval between the rows that metrics are taken from; it does not affect the accuracy of the motion."),
+    row("sweep.interval", "", "s", Words("the experiment's `every`"), DURATION, "1 ms", "Interval between the rows of `--trajectories`; figures do not depend on it."),
 ];
 
 #[rustfmt::skip]
@@ -590,7 +590,7 @@ const MOVE: &[Parameter] = &[
     row("move.jerk", "", "m/s^3", Words("none: a trapezoid"), POSITIVE, "200 m/s^3", "Largest jerk."),
     row("move.snap", "", "m/s^4", Words("none: third order"), POSITIVE, "20000 m/s^4", "Largest snap; only with `jerk`."),
     row("move.until", "", "s", Required, DURATION, "1 s", "End of the run."),
-    row("move.every", "", "s", Words("the controller's `every`"), DURATION, "1 ms", "Interval between the rows of the result; it does not affect the accuracy."),
+    row("move.every", "", "s", Words("the controller's `every`"), DURATION, "1 ms", "Interval between the rows of the result, the last of which is at the end; it affects neither accuracy nor figures."),
     row("move.window", "", "m", Value(1e-4), POSITIVE, "50 um", "How near its target the cart counts as settled."),
     row("move.points.to", "", "m", Required, ANY, "50 mm", "Each point of a list, or its `to`."),
     row("move.points.speed", "", "m/s", Words("the move's"), POSITIVE, "0.1 m/s", "Largest speed on the way there."),

@@ -3,7 +3,7 @@
 use crate::case::Experiment;
 use crate::error::Result;
 use crate::metrics::{Meter, Peak, largest};
-use crate::solve::{Ending, Flow, Solver, stream};
+use crate::solve::{Ending, Flow, Solver, stream_observed};
 use crate::stage::{Belt, BeltModel, Stage};
 use crate::trajectory::Trajectory;
 
@@ -66,9 +66,8 @@ struct Travel {
 
 fn travel(stage: &Stage, experiment: &Experiment, solver: Solver) -> Result<Option<Travel>> {
     let (mut time, mut cart, mut drive) = (Vec::new(), Vec::new(), Vec::new());
-    let mut meter = Meter::new(stage);
-    let outcome = stream(stage, experiment, solver, &mut |rows: &Trajectory| {
-        meter.take(rows);
+    let mut meter = Meter::new(stage, experiment);
+    let outcome = stream_observed(stage, experiment, solver, &mut meter, &mut |rows: &Trajectory| {
         let column = |name| rows.get(name).unwrap_or(&[]);
         time.extend(column("time"));
         cart.extend(column("cart_position"));

@@ -1,134 +1,153 @@
-//! The metrics of runs, against definitions written a second time on whole trajectories.
+//! The metrics of runs, against definitions written a second time on whole trajectories, and whatever their rows.
 
 mod common;
 
 use common::random::{self, Dry};
 use common::{experiment, table1, table4};
 use proptest::prelude::*;
+use taut::case::Experiment;
 use taut::friction::{Along, Friction, Law, Shape};
 use taut::metrics::{Balance, Meter, Metrics, Peak, balanced_speed, largest};
 use taut::signal::{Signal, Slot};
-use taut::solve::{Method, Solution, Solver, simulate};
-use taut::stage::{AmplifierMode, Stage};
+use taut::solve::{Ending, Flow, Method, Solution, Solver, stream_observed};
+use taut::stage::{AmplifierMode, GearPlay, Stage};
 use taut::trajectory::Trajectory;
 
-/// The metrics of a whole run, fed in blocks of so many rows.
-fn measure(stage: &Stage, solution: &Solution, rows: usize) -> Metrics {
-    let mut meter = Meter::new(stage);
-    for from in (0..solution.trajectory.len()).step_by(rows) {
-        let mut block = solution.trajectory.clone();
-        for column in &mut block.columns {
-            column.values = column.values[from..column.values.len().min(from + rows)].to_vec();
-        }
-        meter.take(&block);
-    }
-    meter.finish(&solution.outcome.events)
+/// Runs it with a meter beside.
+fn watched(stage: &Stage, experiment: &Experiment, solver: Solver) -> (Solution, Metrics) {
+    let mut meter = Meter::new(stage, experiment);
+    let mut trajectory = Trajectory::default();
+    let outcome = stream_observed(stage, experiment, solver, &mut meter, &mut |block| {
+        trajectory.append(block);
+        Flow::Continue
+    })
+    .unwrap();
+    let metrics = meter.finish(&outcome.events);
+    (Solution { trajectory, outcome }, metrics)
 }
 
 fn run(stage: &Stage, input: Signal, until: f64) -> (Solution, Metrics) {
-    let solution = simulate(stage, &experiment(input, until), Solver::Exact).unwrap();
-    let metrics = measure(stage, &solution, 256);
-    (solution, metrics)
+    watched(stage, &experiment(input, until), Solver::Exact)
 }
 
-/// Rows as structures: the second way to look at them.
-struct Row {
-    time: f64,
-    input: f64,
-    drive: f64,
-    cart: f64,
-    idler: f64,
-    speed: f64,
-    current: f64,
-    stuck: bool,
+/// The same with another output interval.
+fn every(stage: &Stage, input: &Signal, until: f64, every: f64, solver: Solver) -> (Solution, Metrics) {
+    watched(stage, &Experiment { every, ..experiment(input.clone(), until) }, solver)
 }
 
-fn rows(stage: &Stage, trajectory: &Trajectory) -> Vec<Row> {
-    let get = |name: &str, row: usize| trajectory.get(name).unwrap()[row];
-    let input = if trajectory.get("input").is_some() { "input" } else { "voltage" };
-    (0..trajectory.len())
-        .map(|k| Row {
-            time: get("time", k),
-            input: get(input, k),
-            drive: stage.pulley_radius * get("drive_angle", k),
-            cart: get("cart_position", k),
-            idler: stage.pulley_radius * get("idler_angle", k),
-            speed: get("cart_speed", k),
-            current: get("motor_current", k),
-            stuck: ["drive_state", "cart_state", "idler_state"].iter().all(|state| get(state, k) == 0.0),
-        })
-        .collect()
+/// Peaks with their names.
+fn peaks(metrics: &Metrics) -> Vec<(String, Peak)> {
+    let mut peaks = vec![
+        ("cart speed".to_string(), metrics.peak_cart_speed),
+        ("drive speed".into(), metrics.peak_drive_speed),
+        ("current".into(), metrics.peak_current),
+    ];
+    for span in 0..3 {
+        peaks.push((format!("stretch {}", span + 1), metrics.peak_stretch[span]));
+        peaks.push((format!("force {}", span + 1), metrics.peak_force[span]));
+    }
+    peaks
 }
 
-/// The first row of largest magnitude, by sorting.
-fn peak(rows: &[Row], value: impl Fn(&Row) -> f64) -> Peak {
-    let mut all: Vec<(usize, f64)> = rows.iter().map(&value).enumerate().collect();
-    all.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()).then(a.0.cmp(&b.0)));
-    match all[0] {
-        (_, 0.0) => Peak::default(),
-        (row, value) => Peak { value, time: rows[row].time },
+/// The largest magnitudes in rows, in the same order.
+fn largest_rows(stage: &Stage, trajectory: &Trajectory) -> Vec<f64> {
+    let get = |name: &str| trajectory.get(name).unwrap().to_vec();
+    let r = stage.pulley_radius;
+    let [p1, x, p3] = ["drive_angle", "cart_position", "idler_angle"].map(get);
+    let apart = |a: &[f64], ra: f64, b: &[f64], rb: f64| a.iter().zip(b).map(|(a, b)| ra * a - rb * b).collect();
+    let speed: Vec<f64> = get("drive_speed").iter().map(|w| r * w).collect();
+    let mut columns = vec![get("cart_speed"), speed, get("motor_current")];
+    columns.extend([apart(&p1, r, &x, 1.0), get("span1_force"), apart(&x, 1.0, &p3, r), get("span2_force")]);
+    columns.extend([apart(&p3, r, &p1, r), get("span3_force")]);
+    columns.iter().map(|column| column.iter().fold(0.0, |most: f64, value| most.max(value.abs()))).collect()
+}
+
+proptest! {
+    #![proptest_config(random::cases(64))]
+    /// Peaks were those of rows: a current 26 % low, a force in a span 14.5 % low where a stage howls.
+    #[test]
+    fn peaks_are_those_of_a_fine_run(stage in random::equipped(Dry::Any), input in random::input()) {
+        let (coarse, metrics) = every(&stage, &input, 0.1, 1e-3, Solver::Exact);
+        let (fine, _) = every(&stage, &input, 0.1, 2e-6, Solver::Exact);
+        prop_assume!(coarse.outcome.ending == Ending::Complete && fine.outcome.ending == Ending::Complete);
+        for ((name, peak), row) in peaks(&metrics).iter().zip(largest_rows(&stage, &fine.trajectory)) {
+            let found = peak.value.abs();
+            prop_assert!(row <= found * (1.0 + 1e-7) + 1e-13, "{name}: a row has {row}, the peak is {found}");
+            // A machine may change faster than the fine rows tell, but not by much.
+            prop_assert!(found <= row * (1.0 + 5e-3) + 1e-13, "{name}: peak {found}, rows {row}");
+        }
+    }
+
+    /// Metrics were made of rows: "no constant input lasts 20 samples", and other peaks with another interval.
+    #[test]
+    fn metrics_do_not_depend_on_the_output_interval(stage in random::equipped(Dry::Any), input in random::input()) {
+        let [one, fine, odd] = [1e-3, 1e-4, 0.37e-3].map(|h| every(&stage, &input, 0.3, h, Solver::Exact));
+        for (other, metrics) in [&fine, &odd] {
+            prop_assume!(one.0.outcome.ending == Ending::Complete && other.outcome.ending == Ending::Complete);
+            prop_assume!(one.0.outcome.events.len() == other.outcome.events.len());
+            for ((name, a), (_, b)) in peaks(&one.1).iter().zip(peaks(metrics)) {
+                let (a, b) = (a.value, b.value);
+                prop_assert!((a.abs() - b.abs()).abs() <= 1e-8 * a.abs() + 1e-12, "{name}: {a} and {b}");
+            }
+            prop_assert_eq!(one.1.settled, metrics.settled);
+            prop_assert_eq!(one.1.stop_time.is_some(), metrics.stop_time.is_some());
+            prop_assert!((one.1.stop_time.unwrap_or(0.0) - metrics.stop_time.unwrap_or(0.0)).abs() < 1e-7);
+            prop_assert_eq!(one.1.steady_speed.is_some(), metrics.steady_speed.is_some());
+            if let (Some(a), Some(b)) = (one.1.steady_speed, metrics.steady_speed) {
+                prop_assert!((a.value - b.value).abs() <= 1e-7 * a.value.abs() + 1e-12, "{a:?} {b:?}");
+                prop_assert!((a.change - b.change).abs() <= 1e-7 * a.value.abs() + 1e-12, "{a:?} {b:?}");
+                prop_assert_eq!(a.stretch, b.stretch);
+            }
+        }
+    }
+
+    #[test]
+    fn metrics_are_what_their_definitions_say(stage in random::stage(Dry::Any), input in random::input()) {
+        let (solution, metrics) = run(&stage, input.clone(), 0.4);
+        let get = |name: &str| solution.trajectory.get(name).unwrap();
+        let last = |name: &str| *get(name).last().unwrap();
+        let r = stage.pulley_radius;
+        prop_assert_eq!(metrics.end, 0.4);
+        prop_assert_eq!(metrics.final_cart_position, last("cart_position"));
+        prop_assert_eq!(metrics.final_drive_travel, r * last("drive_angle"));
+        prop_assert_eq!(metrics.peak_encoder_error, metrics.peak_stretch[0]);
+        let rest = |row: usize| ["drive_state", "cart_state", "idler_state"].iter().all(|state| get(state)[row] == 0.0);
+        let rows = solution.trajectory.len();
+        prop_assert_eq!(metrics.settled, rest(rows - 1));
+
+        // Once all are stuck to the end, no event follows; the moment before, one moved.
+        let events = &solution.outcome.events;
+        let moving = (0..rows).rposition(|row| !rest(row)).map_or(0.0, |row| get("time")[row]);
+        match metrics.stop_time {
+            Some(stop) => prop_assert!(rest(rows - 1) && stop >= moving && events.iter().all(|e| e.time <= stop)),
+            None => prop_assert!(!rest(rows - 1)),
+        }
+        let counted: u64 = metrics.events.iter().map(|count| count.total()).sum();
+        prop_assert_eq!(counted, events.len() as u64);
+
+        // The last tenth of the last stretch of constant input, by the rows of a finer run.
+        if let Some(found) = metrics.steady_speed {
+            let (begin, end) = found.stretch;
+            prop_assert!(end - begin >= 0.008 - 1e-12 && found.input != 0.0);
+            let (fine, _) = every(&stage, &input, 0.4, 1e-5, Solver::Exact);
+            let (time, speed) = (fine.trajectory.get("time").unwrap(), fine.trajectory.get("cart_speed").unwrap());
+            let late: Vec<f64> = time.iter().zip(speed).filter(|(t, _)| (end - 0.1 * (end - begin) - 1e-9..=end + 1e-9).contains(*t)).map(|(_, v)| *v).collect();
+            let change = late.iter().fold(f64::MIN, |a, v| a.max(*v)) - late.iter().fold(f64::MAX, |a, v| a.min(*v));
+            // The last of these rows is up to an interval before the end.
+            let step = late.windows(2).fold(1e-9, |most: f64, pair| most.max((pair[1] - pair[0]).abs()));
+            prop_assert!((found.value - late.last().unwrap()).abs() <= 2.0 * step, "{found:?}");
+            prop_assert!((found.change - change).abs() <= 2.0 * step, "{found:?} {change}");
+            prop_assert_eq!(found.reached, found.change <= 0.01 * found.value.abs());
+        }
     }
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
-    #[test]
-    fn metrics_are_what_their_definitions_say(stage in random::stage(Dry::Any), input in random::input(), block in 1usize..400) {
-        let solution = simulate(&stage, &experiment(input, 0.4), Solver::Exact).unwrap();
-        let metrics = measure(&stage, &solution, block);
-        let rows = rows(&stage, &solution.trajectory);
-        let last = rows.last().unwrap();
-        prop_assert_eq!(metrics.rows, 401);
-        prop_assert_eq!(metrics.end, 0.4);
-        prop_assert_eq!((metrics.final_cart_position, metrics.final_drive_travel), (last.cart, last.drive));
-        prop_assert_eq!(metrics.peak_cart_speed, peak(&rows, |r| r.speed));
-        prop_assert_eq!(metrics.peak_current, peak(&rows, |r| r.current));
-        prop_assert_eq!(metrics.peak_stretch[0], peak(&rows, |r| r.drive - r.cart));
-        prop_assert_eq!(metrics.peak_stretch[1], peak(&rows, |r| r.cart - r.idler));
-        prop_assert_eq!(metrics.peak_stretch[2], peak(&rows, |r| r.idler - r.drive));
-        prop_assert_eq!(metrics.peak_encoder_error, peak(&rows, |r| r.drive - r.cart));
-        prop_assert_eq!(metrics.settled, last.stuck);
-
-        // Once all are stuck to the end, no event follows; the moment before, one moved.
-        let events = &solution.outcome.events;
-        let moving = rows.iter().rposition(|r| !r.stuck).map_or(0.0, |row| rows[row].time);
-        match metrics.stop_time {
-            Some(stop) => prop_assert!(last.stuck && stop >= moving && events.iter().all(|e| e.time <= stop)),
-            None => prop_assert!(!last.stuck),
-        }
-        let counted: u64 = metrics.events.iter().map(|count| count.total()).sum();
-        prop_assert_eq!(counted, events.len() as u64);
-
-        // The last run of equal inputs, found by walking backwards.
-        let mut end = rows.len();
-        let steady = loop {
-            if end == 0 {
-                break None;
-            }
-            let value = rows[end - 1].input;
-            let begin = rows[..end].iter().rposition(|r| r.input != value).map_or(0, |row| row + 1);
-            if value != 0.0 && end - begin >= 20 {
-                break Some(&rows[begin..end]);
-            }
-            end = begin;
-        };
-        prop_assert_eq!(metrics.steady_speed.is_some(), steady.is_some());
-        if let (Some(found), Some(stretch)) = (metrics.steady_speed, steady) {
-            let (first, last) = (&stretch[0], &stretch[stretch.len() - 1]);
-            let from = last.time - 0.1 * (last.time - first.time);
-            let late = || stretch.iter().filter(|r| r.time >= from).map(|r| r.speed);
-            let change = late().fold(f64::MIN, f64::max) - late().fold(f64::MAX, f64::min);
-            prop_assert_eq!((found.value, found.change, found.input), (last.speed, change, last.input));
-            prop_assert_eq!(found.reached, change <= 0.01 * last.speed.abs());
-            prop_assert_eq!(found.stretch, (first.time, last.time));
-        }
-    }
-
     /// Under a constant input every machine without a breakaway to hold it ends at the speed of the balance.
     #[test]
     fn a_long_step_ends_at_the_balance_of_forces(stage in random::stage(Dry::Any), input in prop_oneof![3.0..12.0f64, -12.0..-3.0f64]) {
-        let long = simulate(&stage, &experiment(Signal::Step { value: input, at: 0.0 }, 5.0), Solver::Exact).unwrap();
-        let metrics = measure(&stage, &long, 256);
+        let (_, metrics) = run(&stage, Signal::Step { value: input, at: 0.0 }, 5.0);
         let steady = metrics.steady_speed.unwrap();
         if let Balance::At(analytic) = steady.analytic
             && steady.reached
@@ -151,7 +170,7 @@ fn the_five_volt_pulse_of_the_paper() {
     assert!(metrics.stop_time.is_some_and(|stop| stop > 0.25 && stop < 0.5));
     let steady = metrics.steady_speed.unwrap();
     // The rise takes 26 ms: after ten times that nothing changes any more.
-    assert!(steady.reached && steady.stretch == (0.0, 0.249), "{steady:?}");
+    assert!(steady.reached && steady.stretch == (0.0, 0.25), "{steady:?}");
     assert!((steady.value / steady.analytic.speed().unwrap() - 1.0).abs() < 1e-3, "{steady:?}");
     assert_eq!(metrics.peak_encoder_error, metrics.peak_stretch[0]);
 }
@@ -202,8 +221,7 @@ fn a_friction_curve_counts_in_the_balance() {
         for volts in [4.0, -4.0] {
             let stage = of(law);
             let step = experiment(Signal::Step { value: volts, at: 0.0 }, 2.0);
-            let long = simulate(&stage, &step, Solver::GENERAL).unwrap();
-            let steady = measure(&stage, &long, 256).steady_speed.unwrap();
+            let steady = watched(&stage, &step, Solver::GENERAL).1.steady_speed.unwrap();
             let balance = steady.analytic.speed().unwrap();
             assert!((steady.value - balance).abs() < 1e-9, "{law:?}: {steady:?}");
             // The curve is worth more than half a millimetre per second there.
@@ -247,7 +265,7 @@ fn the_last_stretch_counts_and_its_sign() {
     let (_, metrics) = run(&table4(), input, 2.0);
     let steady = metrics.steady_speed.unwrap();
     assert!(steady.reached && steady.value < 0.0 && steady.input == -5.0);
-    assert_eq!(steady.stretch, (1.0, 1.499));
+    assert_eq!(steady.stretch, (1.0, 1.5));
 }
 
 #[test]
@@ -267,20 +285,64 @@ fn table3_does_not_stop() {
     let stage = table4();
     let pulse = experiment(Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 }, 1.0);
     let solver = Solver::Table3 { step: 1e-4, method: Method::RungeKutta4 };
-    let metrics = measure(&stage, &simulate(&stage, &pulse, solver).unwrap(), 256);
+    let (_, metrics) = watched(&stage, &pulse, solver);
     assert_eq!(metrics.stop_time, None);
 }
 
-/// Whatever the length of a run, the last tenth is found to a five-hundredth of the stretch.
+/// A rotor behind a gear with play went on spinning in runs that were "settled": nothing looked at it.
 #[test]
-fn long_stretches_are_remembered_in_parts() {
-    let stage = table4();
-    let mut long = experiment(Signal::Step { value: 5.0, at: 0.0 }, 0.1);
-    long.every = 1e-6;
-    let fine = measure(&stage, &simulate(&stage, &long, Solver::Exact).unwrap(), 1000).steady_speed.unwrap();
-    long.every = 1e-4;
-    let coarse = measure(&stage, &simulate(&stage, &long, Solver::Exact).unwrap(), 1000).steady_speed.unwrap();
-    assert!((fine.change / coarse.change - 1.0).abs() < 0.03, "{fine:?} {coarse:?}");
+fn a_spinning_rotor_behind_play_is_not_settled() {
+    let mut stage = table4();
+    stage.motor.rotor_inertia = 2e-6;
+    // Half a turn of play: the rotor turns freely in it.
+    stage.motor.gear_play = Some(GearPlay { backlash: 3.0, stiffness: 50.0, damping: 0.01 });
+    // Pushed off for 20 ms, it coasts against its own back-EMF and has not arrived at the flank yet.
+    let input = Signal::Pulse { value: 0.3, duration: 0.02, at: 0.0 };
+    let (spinning, metrics) = run(&stage, input.clone(), 0.03);
+    let speed = *spinning.trajectory.get("rotor_speed").unwrap().last().unwrap();
+    assert!(speed > 0.1, "{speed}");
+    assert!(metrics.bodies_rest && !metrics.rotor_rests && !metrics.settled, "{metrics:?}");
+    assert_eq!((metrics.stop_time, metrics.final_rotor_speed), (None, speed));
+
+    // In time it comes to rest, at one time whatever the rows.
+    let stops = [1e-3, 1e-4, 0.37e-3].map(|h| every(&stage, &input, 5.0, h, Solver::Exact).1);
+    let stop = stops[0].stop_time.unwrap();
+    assert!(stops.iter().all(|m| m.settled && (m.stop_time.unwrap() - stop).abs() < 1e-9), "{stops:?}");
+    let (fine, _) = every(&stage, &input, 5.0, 1e-4, Solver::Exact);
+    let (time, speed) = (fine.trajectory.get("time").unwrap(), fine.trajectory.get("rotor_speed").unwrap());
+    let fastest = speed.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+    let last = speed.iter().rposition(|v| v.abs() > 1e-6 * fastest).unwrap();
+    assert!(stop >= time[last] && stop <= time[last + 1] + 1e-6, "{stop} {}", time[last]);
+}
+
+/// What both solvers see between their steps is the same.
+#[test]
+fn both_solvers_have_the_same_metrics() {
+    let mut stage = table4();
+    stage.motor.inductance = 5e-4;
+    stage.amplifier.voltage_limit = Some(4.0);
+    let input = Signal::sequence(vec![
+        Slot { signal: Signal::Sine { amplitude: 5.0, frequency: 7.0, phase: 0.3, offset: 0.5 }, lasts: 0.3 },
+        Slot { signal: Signal::Step { value: -3.0, at: 0.0 }, lasts: f64::INFINITY },
+    ]);
+    let [exact, general] =
+        [Solver::Exact, Solver::General { tolerance: 1e-11 }].map(|solver| every(&stage, &input, 0.6, 1e-3, solver).1);
+    for ((name, a), (_, b)) in peaks(&exact).iter().zip(peaks(&general)) {
+        assert!((a.value - b.value).abs() <= 1e-6 * a.value.abs(), "{name}: {a:?} {b:?}");
+        assert!((a.time - b.time).abs() <= 1e-5, "{name}: {a:?} {b:?}");
+    }
+    let (a, b) = (exact.steady_speed.unwrap(), general.steady_speed.unwrap());
+    assert!((a.value - b.value).abs() < 1e-8 && (a.change - b.change).abs() < 1e-8 && a.stretch == b.stretch);
+}
+
+/// Only as long as the steady speed was sought by rows could a short pulse have none because of them.
+#[test]
+fn a_constant_input_counts_by_its_time() {
+    let pulse = |duration| Signal::Pulse { value: 5.0, duration, at: 0.0 };
+    for h in [1e-2, 1e-3] {
+        assert!(every(&table4(), &pulse(0.02), 1.0, h, Solver::Exact).1.steady_speed.is_some());
+        assert!(every(&table4(), &pulse(0.0199), 1.0, h, Solver::Exact).1.steady_speed.is_none());
+    }
 }
 
 #[test]

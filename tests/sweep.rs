@@ -3,8 +3,8 @@
 mod common;
 
 use taut::case::{Case, Sampling};
-use taut::metrics::{Meter, Metrics};
-use taut::solve::{Bench, Detail, Flow, Solver, stream};
+use taut::metrics::Meter;
+use taut::solve::{Bench, Flow, Solver, stream_observed};
 use taut::sweep::{DIMENSIONS, OF_EXPERIMENT, Sobol, Spread, Status, Sweep, indices, rank_correlation};
 use taut::trajectory::Trajectory;
 
@@ -274,21 +274,14 @@ fn a_bench_shows_what_a_stream_shows() {
             stage.cart.mass *= 1.0 + share;
             bench.mount(&stage).unwrap();
             for experiment in &case.experiments {
-                let (mut whole, mut short) = (Meter::new(&stage), Meter::new(&stage));
-                let outcome = stream(&stage, experiment, Solver::of(&stage), &mut |block| {
-                    whole.take(block);
-                    Flow::Continue
-                })
-                .unwrap();
-                let other = bench
-                    .run(experiment, Detail::Metrics, &mut |block| {
-                        short.take(block);
-                        Flow::Continue
-                    })
-                    .unwrap();
+                let (mut whole, mut short) = (Meter::new(&stage, experiment), Meter::new(&stage, experiment));
+                let outcome =
+                    stream_observed(&stage, experiment, Solver::of(&stage), &mut whole, &mut |_| Flow::Continue)
+                        .unwrap();
+                let other = bench.observe(experiment, &mut short).unwrap();
                 assert_eq!((&outcome.events, outcome.ending), (&other.events, other.ending), "{file}");
                 let (whole, short) = (whole.finish(&outcome.events), short.finish(&other.events));
-                assert_eq!(Metrics { rows: 0, ..whole }, Metrics { rows: 0, ..short }, "{file}: {}", experiment.name);
+                assert_eq!(whole, short, "{file}: {}", experiment.name);
                 compared += 1;
             }
         }
@@ -321,10 +314,16 @@ fn figures_are_those_of_the_authority() {
                 let value = table.get(&format!("{experiment}.{name}")).unwrap()[row];
                 match expected.as_f64() {
                     Some(expected) => {
-                        assert!(
-                            (value - expected).abs() <= 1e-9 * expected.abs().max(1e-3),
-                            "{name}: {value}, {expected}"
-                        );
+                        // Peaks of the motion; the authority has those of dense rows, which miss their tops.
+                        let near = match name {
+                            _ if name == "peak_cart_speed_time" => 2e-3,
+                            _ if name.starts_with("peak") => 2e-4 * expected.abs(),
+                            _ => 1e-9 * expected.abs().max(1e-3),
+                        };
+                        assert!((value - expected).abs() <= near, "{name}: {value}, {expected}");
+                        if name.starts_with("peak") && !name.ends_with("_time") {
+                            assert!(value.abs() >= expected.abs() * (1.0 - 1e-9), "{name}: {value}, {expected}");
+                        }
                     }
                     None => assert!(value.is_nan(), "{name}: {value}"),
                 }

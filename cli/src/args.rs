@@ -239,7 +239,7 @@ pub struct Sweep {
     /// Also compute Sobol' indices: N (k + 2) runs for k parameters
     #[arg(long)]
     pub indices: bool,
-    /// Interval between the rows that key figures are taken from [default: the experiment's]
+    /// Interval between the rows of --trajectories; figures do not depend on it [default: the experiment's]
     #[arg(long, value_name = "TIME")]
     pub interval: Option<String>,
     /// The file of the rows (ends in .parquet or .csv), or the folder for it, a summary, a report and plots

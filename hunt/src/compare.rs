@@ -11,7 +11,8 @@ use taut::case::{Case, Experiment};
 use taut::solve::{ErrorEstimate, Flow, Solution, Solver, simulate};
 use taut::stage::Stage;
 
-/// How far positions of a run may be apart, m, that states nothing of itself; and of one of the general solver at least.
+/// How far positions of a run may be apart, m, that states nothing of itself; and of one of the general solver at
+/// least.
 const ALLOWED: f64 = 1e-9;
 
 /// A difference that is none, whatever a run states: a hundredth of an atom's width.
@@ -20,7 +21,8 @@ const LEAST: f64 = 1e-12;
 /// Tolerance that the general solver is asked for.
 const TOLERANCE: f64 = 1e-11;
 
-/// By how much numbers of a case are perturbed, relative to them; of a sine, which taut puts together from polynomials good to
+/// By how much numbers of a case are perturbed, relative to them; of a sine, which taut puts together from polynomials
+/// good to
 /// 1e-14 of its peak, as much as that.
 const PERTURBATION: f64 = 4e-16;
 const PERTURBATION_OF_SINES: f64 = 1e-14;
@@ -29,12 +31,14 @@ const PERTURBATION_OF_SINES: f64 = 1e-14;
 const PERTURBED: u64 = 8;
 
 /// So many times what perturbed runs differ by still counts as comparable: a run rounds more often than once.
-const COMPARABLE: f64 = 5.0;
+const COMPARABLE: f64 = 30.0;
 
-/// How far a body may go while the solvers disagree about what it does, as a share of what positions may differ by and of the body's
+/// How far a body may go while the solvers disagree about what it does, as a share of what positions may differ by and
+/// of the body's
 /// way in the run; and how long a stuck body may be told to slide, as a share of the run.
 const AGREEMENT: [f64; 3] = [1e-3, 1e-6, 1e-6];
-/// The moments of the general solver are as good as its positions: it may have a body creep that is stuck, as long as that shows in no position.
+/// The moments of the general solver are as good as its positions: it may have a body creep that is stuck, as long as
+/// that shows in no position.
 const AGREEMENT_OF_GENERAL: [f64; 3] = [1.0, 1e-3, f64::INFINITY];
 
 /// Which of taut's solvers.
@@ -76,7 +80,8 @@ pub struct Compared {
     pub verdict: Verdict,
 }
 
-/// How far positions of a run may be off, m: the bound that the run states of itself; of the general solver its own estimate.
+/// How far positions of a run may be off, m: the bound that the run states of itself; of the general solver its own
+/// estimate.
 fn allowed(by: By, stage: &Stage, experiment: &Experiment, run: &Solution) -> f64 {
     let stated = match by {
         By::Exact => run.outcome.error,
@@ -249,7 +254,8 @@ impl Pair<'_> {
         }
     }
 
-    /// Runs of the independent solver with numbers that are off by their last bit; half of them keep their state in so few bits, too.
+    /// Runs of the independent solver with numbers that are off by their last bit; half of them keep their state in so
+    /// few bits, too.
     fn perturbed(&self) -> Vec<Run> {
         let mut runs = Vec::new();
         for number in 0..PERTURBED {

@@ -1,7 +1,9 @@
 //! What bodies do over time, by two solvers: where they disagree, and whether it matters.
 //!
-//! Moments of events are as sharp as what happens there: a body that comes to rest with next to no force on it does so at next to any time.
-//! So events are compared by what lies between them. Where one solver has a body slide and the other has it stuck, or slide the other
+//! Moments of events are as sharp as what happens there: a body that comes to rest with next to no force on it does so
+//! at next to any time.
+//! So events are compared by what lies between them. Where one solver has a body slide and the other has it stuck, or
+//! slide the other
 //! way, the body must go next to no way; and where the independent solver has it stuck, that must not last.
 
 use crate::law::Motion;
@@ -30,7 +32,8 @@ impl Disagreement {
         format!("the {} is {ours:?} instead of {known:?} from {from:e} s to {to:e} s", NAMES[*body])
     }
 
-    /// Whether it matters: a stuck body may be told to slide for `moment`, and `way` gives how far the independent solver has a body go
+    /// Whether it matters: a stuck body may be told to slide for `moment`, and `way` gives how far the independent
+    /// solver has a body go
     /// between two moments, m, which may be `near`.
     pub fn matters(&self, moment: f64, near: f64, way: impl Fn(usize, f64, f64) -> f64) -> bool {
         if self.known == Motion::Stuck {

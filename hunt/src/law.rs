@@ -96,7 +96,8 @@ pub struct Guard {
 pub struct Law {
     /// Rates of the states.
     pub rates: Rates,
-    /// Conditions: first those of limits, gear, spans and stops, then those of the bodies. In this order they settle at one instant: a
+    /// Conditions: first those of limits, gear, spans and stops, then those of the bodies. In this order they settle at
+    /// one instant: a
     /// body breaks away under the load that there is, not under one that a limit or a slack span takes away at once.
     pub guards: Vec<Guard>,
 }

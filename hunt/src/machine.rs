@@ -1,13 +1,16 @@
 //! The numbers of a stage as the independent solver wants them: all along the belt, in numbers of 106 bits.
 //!
-//! A pulley of inertia J and radius r counts as a mass J/r² that goes the way y = r φ, a torque τ as a force τ/r, an angular
-//! viscosity B as B/r². Ways are counted from where the cart starts, so that a start far from the origin costs no digits.
+//! A pulley of inertia J and radius r counts as a mass J/r² that goes the way y = r φ, a torque τ as a force τ/r, an
+//! angular
+//! viscosity B as B/r². Ways are counted from where the cart starts, so that a start far from the origin costs no
+//! digits.
 
 use crate::double::Double;
 use taut::case::Experiment;
 use taut::stage::{AmplifierMode, BeltModel, GRAVITY, Stage};
 
-/// Places in the state: ways and speeds along the belt of drive pulley, cart and idler pulley, the current, way and speed of a
+/// Places in the state: ways and speeds along the belt of drive pulley, cart and idler pulley, the current, way and
+/// speed of a
 /// rotor that turns by itself.
 pub const STATES: usize = 9;
 /// Way of body 0, 1, 2; its speed stands behind it.
@@ -105,7 +108,8 @@ pub struct Machine {
     pub bandwidth: Option<Double>,
     /// State at time zero.
     pub start: State,
-    /// What the positions given for drive pulley, cart and idler pulley are beyond those of that state: less than a strain.
+    /// What the positions given for drive pulley, cart and idler pulley are beyond those of that state: less than a
+    /// strain.
     pub beyond: [Double; 3],
     /// Radius of the pulleys.
     pub radius: Double,
@@ -271,7 +275,8 @@ fn is_strain(strain: Double, origin: Double) -> bool {
     strain.high.abs() > LAST_PLACES * f64::EPSILON * way.max(origin.high.abs())
 }
 
-/// Positions at the start that differ by no more of their last places mean a belt without strain: x/r is a rounded number, too.
+/// Positions at the start that differ by no more of their last places mean a belt without strain: x/r is a rounded
+/// number, too.
 const LAST_PLACES: f64 = 4.0;
 
 fn start(stage: &Stage, experiment: &Experiment, taken: Taken, r: Double, origin: Double) -> State {

@@ -1,7 +1,9 @@
 //! The independent solver: Taylor series of order 32 in numbers of 106 bits, from one change of mode to the next.
 //!
-//! A condition of the present mode is a polynomial on each step; its first fall, found to the last bit, ends the mode. At that
-//! instant everything settles, limits, gear, spans and stops before bodies: a condition that is zero but for rounding is judged by
+//! A condition of the present mode is a polynomial on each step; its first fall, found to the last bit, ends the mode.
+//! At that
+//! instant everything settles, limits, gear, spans and stops before bodies: a condition that is zero but for rounding
+//! is judged by
 //! the first term of its series that is not, and what fails changes, one after the other, until all hold.
 
 use crate::double::Double;

@@ -152,11 +152,10 @@ fn one(py: Python<'_>, case: &Case, experiment: &Experiment, solver: Solver) -> 
     let interrupt = Interrupt::listen();
     let found = unlocked(py, || {
         let begin = Instant::now();
-        let mut meter = Meter::new(stage);
+        let mut meter = Meter::new(stage, experiment);
         let mut trajectory = Trajectory::default();
         let rows = experiment.samples().min(1 << 20) as usize + 1;
-        let outcome = solve::stream(stage, experiment, solver, &mut |block| {
-            meter.take(block);
+        let outcome = solve::stream_observed(stage, experiment, solver, &mut meter, &mut |block| {
             if trajectory.columns.is_empty() {
                 trajectory = Trajectory::with_capacity(&block.columns, rows);
             }

@@ -32,6 +32,7 @@ use crate::log::Log;
 use crate::plant::{Plant, State};
 use crate::signal::Signal;
 use crate::stage::{AmplifierMode, Measurement, Stage};
+use crate::trajectory::Grid;
 use reader::{Field, Table};
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -291,9 +292,9 @@ impl Experiment {
         file_name(&self.name)
     }
 
-    /// Number of rows of its result, the first at time zero.
+    /// Number of rows of its result, the first at time zero, the last at its end.
     pub fn samples(&self) -> u64 {
-        (self.until / self.every * (1.0 + 1e-12)).floor() as u64 + 1
+        Grid::new(self.every, self.until).intervals().saturating_add(1)
     }
 }
 

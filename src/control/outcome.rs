@@ -6,9 +6,10 @@ use crate::case::{Experiment, Initial};
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::metrics::{Meter, Metrics, Peak};
+use crate::plant::{Limit, Mode, State, place};
 use crate::signal::Signal;
 use crate::signal::profile::Profile;
-use crate::solve::{self, Flow, Solver};
+use crate::solve::{self, Curve, Detail, Flow, Gap, Observe, Polynomial, Solver, TERMS, reading};
 use crate::stage::Stage;
 use crate::trajectory::{Column, Trajectory};
 
@@ -17,13 +18,13 @@ use crate::trajectory::{Column, Trajectory};
 pub struct Deviation {
     /// Its largest magnitude, with its sign, m.
     pub peak: Peak,
-    /// Its root mean square over the run, m.
+    /// Its root mean square over the time of the run, m.
     pub rms: f64,
-    /// In the last row, m.
+    /// At the end, m.
     pub last: f64,
 }
 
-/// What a move shows. All but the counts of samples are seen at rows: a row each sample shows what is held in between.
+/// What a move shows: peaks over all instants and not only over rows, integrals over time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Figures {
     /// r φ₁ − y: the drive pulley from the cart's reference. A controller that makes up for the belt's stretch means part of it.
@@ -103,7 +104,7 @@ pub fn close(
     solver: Solver,
 ) -> Result<MoveRun> {
     let rows = Rows { until, every: timing.every.min(until), window };
-    stream(stage, controller, timing, profile, &rows, solver, false, &mut |_| Flow::Continue)
+    run(stage, controller, timing, profile, &rows, solver, (Detail::None, false), &mut |_| Flow::Continue)
 }
 
 /// Which rows are put out, and the window.
@@ -129,6 +130,22 @@ pub fn stream(
     keep: bool,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<MoveRun> {
+    let mut wide = Wide::default();
+    let sink = &mut |block: &Trajectory| sink(wide.of(profile, block));
+    run(stage, controller, timing, profile, rows, solver, (Detail::Full, keep), sink)
+}
+
+#[allow(clippy::too_many_arguments)]
+fn run(
+    stage: &Stage,
+    controller: &mut dyn Controller,
+    timing: &Loop,
+    profile: &Profile,
+    rows: &Rows,
+    solver: Solver,
+    (detail, keep): (Detail, bool),
+    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+) -> Result<MoveRun> {
     timing.check(rows.until)?;
     if !(rows.window > 0.0 && rows.window.is_finite()) {
         return Err(Error::new(format!("the cart cannot settle within {:?} m", rows.window)).allowed("above zero"));
@@ -144,19 +161,12 @@ pub fn stream(
         log: None,
     };
     controller.reset();
-    let mut sampled = Sampled::new(stage, controller, *timing, profile, keep);
-    let mut meter = Meter::new(stage);
-    let mut gauge = Gauge::new(stage, profile, rows);
-    let mut wide = Trajectory::default();
-    let outcome = solve::stream_decided(stage, &experiment, &mut sampled, solver, &mut |block| {
-        meter.take(block);
-        gauge.take(block);
-        gauge.widen(block, &mut wide);
-        sink(&wide)
-    })?;
-    let mut figures = gauge.finish();
-    figures.limited = sampled.limited as f64 * timing.every;
-    let metrics = meter.finish(&outcome.events);
+    let mut sampled = Sampled::new(stage, controller, *timing, profile, keep).until(rows.until);
+    let mut gauge = Gauge::new(stage, &experiment, profile, rows.window);
+    let outcome = solve::stream_decided_observed(stage, &experiment, &mut sampled, solver, detail, &mut gauge, sink)?;
+    let (mut figures, metrics) = gauge.finish(&outcome.events);
+    figures.limited = sampled.held_back;
+    figures.restlessness = sampled.turns as f64 / metrics.end.max(f64::MIN_POSITIVE);
     let samples = (sampled.samples, sampled.limited);
     Ok(MoveRun { figures, metrics, outcome, samples, kept: sampled.kept.unwrap_or_default() })
 }
@@ -177,135 +187,233 @@ pub(crate) fn follow(
     solve::stream_decided(&Stage { encoder: None, ..stage.clone() }, experiment, &mut sampled, solver, sink)
 }
 
-/// Gathers the figures row by row.
+/// Gathers the figures of a move that it observes.
 struct Gauge<'a> {
+    meter: Meter,
     profile: &'a Profile,
-    rows: Rows,
+    window: f64,
     radius: f64,
-    limits: [Option<f64>; 2],
+    /// Begin and direction of the last stroke.
     last_stroke: (f64, f64),
     target: f64,
     seen: Figures,
+    /// ∫ of the squares of following error, cart error, voltage and current.
     squares: [f64; 4],
-    count: f64,
+    /// When the cart was outside its window for the last time after the profile.
     outside: Option<f64>,
-    reference: Vec<f64>,
-    error: Vec<f64>,
-    way: f64,
-    turns: f64,
-    command: f64,
+    /// Whether the amplifier stands at a limit where it is now.
+    saturated: bool,
     end: f64,
 }
 
 impl<'a> Gauge<'a> {
-    fn new(stage: &Stage, profile: &'a Profile, rows: &Rows) -> Self {
+    fn new(stage: &Stage, experiment: &Experiment, profile: &'a Profile, window: f64) -> Self {
         let last = profile.strokes().last().map_or((0.0, 0.0), |(begin, _, distance, _)| (begin, distance));
         Self {
+            meter: Meter::new(stage, experiment),
             profile,
-            rows: *rows,
+            window,
             radius: stage.pulley_radius,
-            limits: [stage.amplifier.voltage_limit, stage.amplifier.current_limit],
             last_stroke: last,
             target: profile.target(),
             seen: Figures::default(),
             squares: [0.0; 4],
-            count: 0.0,
             outside: None,
-            reference: Vec::new(),
-            error: Vec::new(),
-            way: 0.0,
-            turns: 0.0,
-            command: 0.0,
+            saturated: false,
             end: 0.0,
         }
     }
 
-    fn take(&mut self, block: &Trajectory) {
-        let column = |name: &str| block.get(name).unwrap_or(&[]);
-        let [time, drive, cart] = ["time", "drive_angle", "cart_position"].map(column);
-        let [voltage, current] = ["voltage", "motor_current"].map(column);
-        let command = block.get("input").unwrap_or(voltage);
-        self.reference.clear();
-        self.error.clear();
-        let (every, window) = (self.rows.every, self.rows.window);
-        let done = self.profile.end();
-        let peak = |peak: &mut Peak, value: f64, time: f64| {
-            if value.abs() > peak.value.abs() {
-                *peak = Peak { value, time };
+    /// What voltage and current do over a curve.
+    fn power(&mut self, curve: &Curve) {
+        let (v, i) = (curve.of(reading::VOLTAGE), curve.of(reading::CURRENT));
+        larger(&mut self.seen.voltage.0, &v, (0.0, 1.0), curve);
+        larger(&mut self.seen.current.0, &i, (0.0, 1.0), curve);
+        let h = curve.length;
+        self.squares[2] += h * integral((0.0, 1.0), |s| v.at(s).powi(2));
+        self.squares[3] += h * integral((0.0, 1.0), |s| i.at(s).powi(2));
+        // Energy that goes in and energy that comes back, parted where either changes its sign.
+        let mut seams = vec![0.0];
+        for turning in [v, i].iter().filter(|quantity| !quantity.keeps_its_sign()) {
+            seams.extend(turning.zeros(0.0, 1.0));
+        }
+        seams.push(1.0);
+        seams.sort_by(f64::total_cmp);
+        for pair in seams.windows(2) {
+            let energy = h * integral((pair[0], pair[1]), |s| v.at(s) * i.at(s));
+            if energy > 0.0 { self.seen.energy.0 += energy } else { self.seen.energy.1 -= energy }
+        }
+        if self.saturated {
+            self.seen.amplifier_limited += h;
+        }
+    }
+
+    /// What the cart does over the part of a curve on which the reference is one polynomial.
+    fn track(&mut self, curve: &Curve, part: (f64, f64), reference: &Polynomial) {
+        let (x, stretch) = (curve.of(reading::CART_POSITION), curve.of(reading::STRETCH));
+        // x − y and r φ₁ − y = x − y + d₁
+        let error = Polynomial(std::array::from_fn(|k| x.0[k] - reference.0[k]));
+        let following = Polynomial(std::array::from_fn(|k| error.0[k] + stretch.0[k]));
+        larger(&mut self.seen.cart.peak, &error, part, curve);
+        larger(&mut self.seen.following.peak, &following, part, curve);
+        self.squares[0] += curve.length * integral(part, |s| following.at(s).powi(2));
+        self.squares[1] += curve.length * integral(part, |s| error.at(s).powi(2));
+    }
+
+    /// Where the cart is from its target, once the last stroke and the profile have passed.
+    fn settle(&mut self, curve: &Curve) {
+        let mut away = curve.of(reading::CART_POSITION);
+        away.0[0] -= self.target;
+        let share = |time: f64| ((time - curve.begin) / curve.length).max(0.0);
+        let (last, done) = (share(self.last_stroke.0), share(self.profile.end()));
+        if last < 1.0 && self.last_stroke.1 != 0.0 {
+            let beyond = if self.last_stroke.1 > 0.0 { away } else { away.negative() };
+            if beyond.bound() > self.seen.overshoot {
+                self.seen.overshoot = self.seen.overshoot.max(beyond.greatest(last, 1.0).1);
             }
-        };
+        }
+        if done < 1.0 && away.bound() > self.window {
+            if away.at(1.0).abs() > self.window {
+                self.outside = Some(curve.begin + curve.length);
+                return;
+            }
+            let edges = [-self.window, self.window].map(|edge| {
+                let mut beyond = away;
+                beyond.0[0] -= edge;
+                beyond.zeros(done, 1.0).last().copied()
+            });
+            if let Some(s) = edges.into_iter().flatten().reduce(f64::max) {
+                self.outside = Some(curve.begin + s * curve.length);
+            }
+        }
+    }
+
+    fn finish(mut self, events: &[solve::Event]) -> (Figures, Metrics) {
         let seen = &mut self.seen;
-        for row in 0..block.len() {
-            let (t, y) = (time[row], self.profile.at(time[row]).position);
-            let (following, error) = (self.radius * drive[row] - y, cart[row] - y);
-            let (v, i) = (voltage[row], current[row]);
-            self.reference.push(y);
-            self.error.push(error);
-            peak(&mut seen.following.peak, following, t);
-            peak(&mut seen.cart.peak, error, t);
-            peak(&mut seen.voltage.0, v, t);
-            peak(&mut seen.current.0, i, t);
-            for (sum, value) in self.squares.iter_mut().zip([following, error, v, i]) {
-                *sum += value * value;
-            }
-            (seen.following.last, seen.cart.last) = (following, error);
-            let power = v * i;
-            if power > 0.0 {
-                seen.energy.0 += power * every
-            } else {
-                seen.energy.1 -= power * every
-            }
-            let at = |limit: Option<f64>, value: f64| limit.is_some_and(|limit| value.abs() >= limit * (1.0 - 1e-12));
-            if at(self.limits[0], v) || at(self.limits[1], i) {
-                seen.amplifier_limited += every;
-            }
-            if t >= self.last_stroke.0 && self.last_stroke.1 != 0.0 {
-                seen.overshoot = seen.overshoot.max(self.last_stroke.1.signum() * (cart[row] - self.target));
-            }
-            if t >= done && (cart[row] - self.target).abs() > window {
-                self.outside = Some(t);
-            }
-            let change = command[row] - self.command;
-            if change * self.way < 0.0 {
-                self.turns += 1.0;
-            }
-            if change != 0.0 {
-                self.way = change;
-            }
-            self.command = command[row];
-            self.end = t;
-            self.count += 1.0;
-        }
-    }
-
-    /// The block with reference and error behind its own columns.
-    fn widen(&self, block: &Trajectory, wide: &mut Trajectory) {
-        let own = block.columns.len();
-        if wide.columns.len() != own + 2 {
-            wide.columns.clone_from(&block.columns);
-            wide.columns.push(Column::new("reference", "m"));
-            wide.columns.push(Column::new("cart_error", "m"));
-        }
-        let sources = block.columns.iter().map(|column| &column.values).chain([&self.reference, &self.error]);
-        for (to, from) in wide.columns.iter_mut().zip(sources) {
-            to.values.clone_from(from);
-        }
-    }
-
-    fn finish(self) -> Figures {
-        let mut seen = self.seen;
-        let [following, cart, voltage, current] = self.squares.map(|sum| (sum / self.count.max(1.0)).sqrt());
+        let [following, cart, voltage, current] =
+            self.squares.map(|sum| (sum / self.end.max(f64::MIN_POSITIVE)).sqrt());
         (seen.following.rms, seen.cart.rms, seen.voltage.1, seen.current.1) = (following, cart, voltage, current);
         seen.final_cart_error = seen.cart.last;
         let done = self.profile.end();
         seen.settling = match self.outside {
             _ if self.end < done => None,
             None => Some(0.0),
-            // It has settled if a row inside followed.
-            Some(last) if last + 0.5 * self.rows.every < self.end => Some(last + self.rows.every - done),
+            // It has settled if it came in again.
+            Some(last) if last < self.end => Some(last - done),
             Some(_) => None,
         };
-        seen.restlessness = self.turns / self.end.max(f64::MIN_POSITIVE);
-        seen
+        (self.seen, self.meter.finish(events))
+    }
+}
+
+impl Observe for Gauge<'_> {
+    fn pass(&mut self, gap: &Gap) -> bool {
+        self.meter.pass(gap);
+        self.saturated = gap.mode.voltage != Limit::Inside || gap.mode.current != Limit::Inside;
+        for (peak, q) in [(&mut self.seen.voltage.0, reading::VOLTAGE), (&mut self.seen.current.0, reading::CURRENT)] {
+            for (value, time) in [(gap.from[q], gap.begin), (gap.to[q], gap.begin + gap.length)] {
+                if value.abs() > peak.value.abs() {
+                    *peak = Peak { value, time };
+                }
+            }
+        }
+        true
+    }
+
+    fn see(&mut self, curve: &Curve) {
+        self.meter.see(curve);
+        self.power(curve);
+        // A seam that is as near as rounding is behind.
+        let shortest = SHORTEST + 16.0 * f64::EPSILON * (curve.begin + curve.length) / curve.length;
+        let mut from = 0.0;
+        while from < 1.0 {
+            let begin = curve.begin + from * curve.length;
+            let (coefficients, until) = self.profile.piece(begin);
+            let to = ((until - curve.begin) / curve.length).max(from + shortest).min(1.0);
+            self.track(curve, (from, to), &shifted(&coefficients, from, curve.length));
+            from = to;
+        }
+        self.settle(curve);
+    }
+
+    fn end(&mut self, time: f64, state: &State, mode: &Mode) {
+        self.meter.end(time, state, mode);
+        let y = self.profile.at(time).position;
+        self.end = time;
+        self.seen.cart.last = state[place::CART_POSITION] - y;
+        self.seen.following.last = self.radius * state[place::DRIVE_ANGLE] - y;
+    }
+}
+
+/// Least share of a curve that a piece of the reference is looked at.
+const SHORTEST: f64 = 1e-9;
+
+/// Σ c_k τᵏ, τ = (s − `from`) · `length`, in powers of s.
+fn shifted(coefficients: &[f64; 5], from: f64, length: f64) -> Polynomial {
+    let mut terms = [0.0; TERMS];
+    terms[..5].copy_from_slice(coefficients);
+    let mut power = 1.0;
+    for term in &mut terms {
+        *term *= power;
+        power *= length;
+    }
+    // Horner, again and again: in powers of s instead of s − from.
+    if from != 0.0 {
+        for i in 0..4 {
+            for j in (i..4).rev() {
+                terms[j] -= from * terms[j + 1];
+            }
+        }
+    }
+    Polynomial(terms)
+}
+
+/// Takes the largest magnitude on a part of a curve, if it is news.
+fn larger(peak: &mut Peak, quantity: &Polynomial, part: (f64, f64), curve: &Curve) {
+    if quantity.bound() > peak.value.abs() {
+        let (s, value) = quantity.largest(part.0, part.1);
+        if value.abs() > peak.value.abs() {
+            *peak = Peak { value, time: curve.begin + s * curve.length };
+        }
+    }
+}
+
+/// Places and weights of Gauss and Legendre's rule of eight places on −1..1, one half of them: exact for polynomials of degree 15, and products
+/// of two [`Polynomial`]s have degree 14.
+const GAUSS: [(f64, f64); 4] = [
+    (0.183_434_642_495_649_8, 0.362_683_783_378_362),
+    (0.525_532_409_916_329, 0.313_706_645_877_887_3),
+    (0.796_666_477_413_626_7, 0.222_381_034_453_374_48),
+    (0.960_289_856_497_536_3, 0.101_228_536_290_376_26),
+];
+
+/// The integral over s on a part of 0..1.
+fn integral((from, to): (f64, f64), value: impl Fn(f64) -> f64) -> f64 {
+    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+    GAUSS.iter().map(|(x, w)| w * (value(middle - half * x) + value(middle + half * x))).sum::<f64>() * half
+}
+
+/// Blocks of rows with reference and error behind their own columns.
+#[derive(Default)]
+struct Wide {
+    block: Trajectory,
+}
+
+impl Wide {
+    fn of(&mut self, profile: &Profile, block: &Trajectory) -> &Trajectory {
+        let own = block.columns.len();
+        if self.block.columns.len() != own + 2 {
+            self.block.columns.clone_from(&block.columns);
+            self.block.columns.push(Column::new("reference", "m"));
+            self.block.columns.push(Column::new("cart_error", "m"));
+        }
+        let column = |name: &str| block.get(name).unwrap_or(&[]);
+        let reference: Vec<f64> = column("time").iter().map(|&t| profile.at(t).position).collect();
+        let error: Vec<f64> = column("cart_position").iter().zip(&reference).map(|(x, y)| x - y).collect();
+        let sources = block.columns.iter().map(|column| &column.values).chain([&reference, &error]);
+        for (to, from) in self.block.columns.iter_mut().zip(sources) {
+            to.values.clone_from(from);
+        }
+        &self.block
     }
 }

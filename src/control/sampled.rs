@@ -6,6 +6,7 @@ use crate::quantity::rounded;
 use crate::signal::profile::{Profile, Reference};
 use crate::solve::Decide;
 use crate::stage::{Encoder, EncoderPlace, Stage};
+use crate::trajectory::Interval;
 use std::collections::VecDeque;
 
 /// What a controller knows at a sample.
@@ -91,6 +92,8 @@ pub(super) struct Sampled<'a> {
     controller: &'a mut dyn Controller,
     profile: &'a Profile,
     timing: Loop,
+    /// Its samples.
+    clock: Interval,
     sensor: Sensor,
     /// Next sample, and the place in it: at the sample, or where a delayed command takes over.
     k: u64,
@@ -99,8 +102,14 @@ pub(super) struct Sampled<'a> {
     rest: f64,
     waiting: VecDeque<f64>,
     acting: f64,
-    /// Samples at the limit.
+    /// Samples at the limit, and for how long their commands were held, s.
     pub(super) limited: u64,
+    pub(super) held_back: f64,
+    /// Changes of direction of what acts, and the last change of it that was none of zero.
+    pub(super) turns: u64,
+    way: f64,
+    /// End of the run, s.
+    until: f64,
     pub(super) samples: u64,
     pub(super) kept: Option<Vec<Sample>>,
 }
@@ -126,6 +135,7 @@ impl<'a> Sampled<'a> {
             controller,
             profile,
             timing,
+            clock: Interval::of(timing.every),
             sensor: Sensor::new(stage),
             k: 0,
             halfway: false,
@@ -133,6 +143,10 @@ impl<'a> Sampled<'a> {
             waiting: std::iter::repeat_n(0.0, whole as usize).collect(),
             acting: 0.0,
             limited: 0,
+            held_back: 0.0,
+            turns: 0,
+            way: 0.0,
+            until: f64::INFINITY,
             samples: 0,
             kept: keep.then(Vec::new),
         }
@@ -140,6 +154,23 @@ impl<'a> Sampled<'a> {
 }
 
 impl Sampled<'_> {
+    /// For a run that ends there: what is held then is held no longer.
+    pub(super) fn until(mut self, until: f64) -> Self {
+        self.until = until;
+        self
+    }
+
+    /// Has the next command act from `time` on.
+    fn act(&mut self, time: f64) {
+        let next = self.waiting.pop_front().unwrap_or(0.0);
+        let change = next - self.acting;
+        if time < self.until {
+            self.turns += u64::from(change * self.way < 0.0);
+            self.way = if change == 0.0 { self.way } else { change };
+        }
+        self.acting = next;
+    }
+
     /// With positions read exactly and not in counts.
     pub(super) fn exactly(mut self) -> Self {
         self.sensor.counts = None;
@@ -150,12 +181,12 @@ impl Sampled<'_> {
 impl Decide for Sampled<'_> {
     fn decide(&mut self, _: f64, state: &State, current: f64) -> (f64, f64) {
         let Loop { every, lead, limit, .. } = self.timing;
-        let time = self.k as f64 * every;
+        let time = self.clock.times(self.k);
         if self.halfway {
             self.halfway = false;
             self.k += 1;
-            self.acting = self.waiting.pop_front().unwrap_or(0.0);
-            return (self.acting, time + every);
+            self.act(time + self.rest);
+            return (self.acting, self.clock.times(self.k));
         }
         let seen = Seen {
             time,
@@ -170,7 +201,10 @@ impl Decide for Sampled<'_> {
         let given = limit.map_or(asked, |limit| asked.clamp(-limit, limit));
         self.controller.limited(given);
         self.samples += 1;
-        self.limited += u64::from(given != asked);
+        if given != asked {
+            self.limited += 1;
+            self.held_back += every.min(self.until - time).max(0.0);
+        }
         if let Some(kept) = &mut self.kept {
             kept.push(Sample { time, reference: seen.reference.position, measured: seen.position, asked, given });
         }
@@ -180,8 +214,8 @@ impl Decide for Sampled<'_> {
             return (self.acting, time + self.rest);
         }
         self.k += 1;
-        self.acting = self.waiting.pop_front().unwrap_or(0.0);
-        (self.acting, self.k as f64 * every)
+        self.act(time);
+        (self.acting, self.clock.times(self.k))
     }
 }
 

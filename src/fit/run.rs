@@ -8,7 +8,7 @@ use crate::signal::Signal;
 use crate::signal::profile::Profile;
 use crate::solve::{Bench, Detail, Ending, Flow, Solver};
 use crate::stage::Stage;
-use crate::trajectory::Trajectory;
+use crate::trajectory::{Grid, Trajectory};
 use std::sync::Arc;
 
 /// Share of an interval by which times may be off an even raster and still count as on it: the solver then answers at the
@@ -180,7 +180,8 @@ impl Run {
             (every, every * (last / every).ceil().max(1.0))
         };
         // On the raster, where the solver need not stop twice for a sample.
-        let times = if even { (0..n).map(|k| k as f64 * until / (n - 1) as f64).collect() } else { time.clone() };
+        let grid = Grid::new(every, until);
+        let times = if even { (0..n as u64).map(|k| grid.time(k)).collect() } else { time.clone() };
         let input = match &experiment.input {
             Signal::Sampled { times: own, .. } if *own == log.time => {
                 Signal::Sampled { times, values: logged.clone(), hold: log.hold }

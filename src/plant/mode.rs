@@ -238,11 +238,12 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// Number of kinds that [`Cause::kind`] tells apart: on the three bodies, the gear's torque, three spans, and for each of gear, voltage,
-    /// current and end stop one for each state that it may lead to.
-    pub(crate) const KINDS: usize = 7 + 4 * 3;
+    /// Number of kinds that [`Cause::kind`] tells apart: on the three bodies, the gear's torque, three spans, for each of gear, voltage,
+    /// current and end stop one for each state that it may lead to, and on the three bodies once more.
+    pub(crate) const KINDS: usize = 7 + 4 * 3 + 3;
 
-    /// Which condition it belongs to; breakaway stands with the body.
+    /// Which condition it belongs to; breakaway forward stands with the body, breakaway backward, which may be of quite another size,
+    /// by itself.
     pub(crate) fn kind(self) -> usize {
         let limit = |limit| match limit {
             Limit::Inside => 0,
@@ -255,7 +256,8 @@ impl Cause {
             Contact::Low | Contact::LowLoose => 2,
         };
         match self {
-            Cause::Stop(body) | Cause::BreakForward(body) | Cause::BreakBackward(body) => body.index(),
+            Cause::Stop(body) | Cause::BreakForward(body) => body.index(),
+            Cause::BreakBackward(body) => 19 + body.index(),
             Cause::GearTorque => 3,
             Cause::Switch(Switch::Span(span, _)) => 4 + span,
             Cause::Switch(Switch::Gear(to)) => 7 + contact(to),

@@ -65,6 +65,21 @@ pub struct Stroke {
 }
 
 impl Stroke {
+    /// The end of the polynomial that holds `t` after the beginning.
+    fn seam(&self, t: f64) -> f64 {
+        let middle = 0.5 * self.duration;
+        let first = t <= middle;
+        let tau = if first { t } else { self.duration - t };
+        let index = self.pieces.partition_point(|(begin, _)| *begin <= tau).max(1) - 1;
+        let begins = |index: usize| self.pieces.get(index).map(|(begin, _)| *begin);
+        // The second half mirrors the first.
+        if first {
+            begins(index + 1).map_or(middle, |next| next.min(middle))
+        } else {
+            self.duration - begins(index).unwrap_or(0.0)
+        }
+    }
+
     /// The quickest of its kind over `distance` (m, of either sign) within `limits`.
     ///
     /// ```
@@ -333,6 +348,44 @@ impl Profile {
         let mut reference = stroke.at(t - begin);
         reference.position += from;
         reference
+    }
+
+    /// The position from `t` on as a polynomial Σ c_k (time − t)ᵏ, m, and until when it holds, s.
+    pub(crate) fn piece(&self, t: f64) -> ([f64; 5], f64) {
+        if self.shaper.is_empty() {
+            return self.plain_piece(t);
+        }
+        let mut sum = ([0.0; 5], f64::INFINITY);
+        for &[late, part] in &self.shaper {
+            let (coefficients, until) = self.plain_piece(t - late);
+            sum.0.iter_mut().zip(coefficients).for_each(|(sum, c)| *sum += part * c);
+            sum.1 = sum.1.min(until + late);
+        }
+        sum
+    }
+
+    fn plain_piece(&self, t: f64) -> ([f64; 5], f64) {
+        let rest = |position: f64, until: Option<f64>| ([position, 0.0, 0.0, 0.0, 0.0], until.unwrap_or(f64::INFINITY));
+        if let Some((_, last)) = self.samples.last() {
+            let k = self.samples.partition_point(|(time, _)| *time <= t);
+            let Some((after, next)) = self.samples.get(k) else { return rest(last.position, None) };
+            let Some((before, this)) = k.checked_sub(1).map(|k| &self.samples[k]) else {
+                return rest(self.start, Some(*after));
+            };
+            let slope = (next.position - this.position) / (after - before);
+            return ([this.position + slope * (t - before), slope, 0.0, 0.0, 0.0], *after);
+        }
+        let index = self.strokes.partition_point(|(begin, ..)| *begin <= t);
+        let next = self.strokes.get(index).map(|(begin, ..)| *begin);
+        let Some((begin, [from, to], stroke)) = index.checked_sub(1).and_then(|index| self.strokes.get(index)) else {
+            return rest(self.start, next);
+        };
+        if t - begin >= stroke.duration {
+            return rest(*to, next);
+        }
+        let Reference { position, speed, acceleration, jerk, snap } = stroke.at(t - begin);
+        let coefficients = [from + position, speed, acceleration / 2.0, jerk / 6.0, snap / 24.0];
+        (coefficients, begin + stroke.seam(t - begin))
     }
 
     /// When the last leg ends, s, a shaper apart.

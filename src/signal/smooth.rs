@@ -29,15 +29,34 @@ pub(super) fn multisine(now: Now, tones: &[Tone]) -> Part {
             *value += a * (theta + omega * (half * x)).sin();
         }
     }
-    Part { end, coefficients: polynomial(&values, half, now.t - middle) }
+    let mut coefficients = polynomial(&values, half, now.t - middle);
+    if sum(now, tones) == 0.0 {
+        // A sine that starts from zero does, to the last bit.
+        coefficients[0] = 0.0;
+    }
+    Part { end, coefficients }
 }
 
 pub(super) fn multisine_value(now: Now, tones: &[Tone]) -> f64 {
     if lattice(now, tones).is_none() {
         return mean(tones);
     }
-    // u = Σ a sin(2π f t + φ)
-    tones.iter().map(|tone| tone.amplitude * (TAU * turns(tone.frequency, now.t) + tone.phase).sin()).sum::<f64>()
+    sum(now, tones)
+}
+
+/// u = Σ a sin(2π f t + φ)
+fn sum(now: Now, tones: &[Tone]) -> f64 {
+    tones.iter().map(|tone| tone.amplitude * sine(turns(tone.frequency, now.t), tone.phase)).sum::<f64>() + 0.0
+}
+
+/// sin(2π x + φ); without a phase exactly zero after every half turn.
+fn sine(x: f64, phase: f64) -> f64 {
+    if phase != 0.0 {
+        return (TAU * x + phase).sin();
+    }
+    let halves = (2.0 * x).round();
+    let rest = (TAU * (x - 0.5 * halves)).sin();
+    if halves.rem_euclid(2.0) == 0.0 { rest } else { -rest }
 }
 
 /// Stretches per second; None if nothing oscillates, or too fast for the clock.
@@ -103,11 +122,15 @@ impl Chirp {
             let s = half * x;
             a * (theta + s * (omega + beta * s)).sin()
         });
-        Part { end, coefficients: polynomial(&values, half, now.t - middle) }
+        let mut coefficients = polynomial(&values, half, now.t - middle);
+        if self.value(now) == 0.0 {
+            coefficients[0] = 0.0;
+        }
+        Part { end, coefficients }
     }
 
     pub fn value(&self, now: Now) -> f64 {
-        if self.stretches(now) == 0.0 { 0.0 } else { self.amplitude * (TAU * self.turns(now.t)).sin() }
+        if self.stretches(now) == 0.0 { 0.0 } else { self.amplitude * sine(self.turns(now.t), 0.0) + 0.0 }
     }
 }
 

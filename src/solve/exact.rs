@@ -9,9 +9,11 @@
 //! g = w·z therefore changes no faster than |w|·√(2V), |w| being the norm dual to V; and likewise its slope, with ẏ.
 
 mod change;
+mod shown;
 
 use super::coordinates::{Coordinates, stretches};
 use super::law::{Law, Size, Watch, chain, highest, states};
+use super::observe::Output;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
 use super::propagator::SERIES_ORDER;
 use super::record::{Recorder, Row};
@@ -21,11 +23,14 @@ use super::{Cost, Detail, Ending, Event, Flow, Grid, Outcome, Source, held};
 use crate::case::Experiment;
 use crate::plant::{Cause, Form, Mode, Plant, State, place};
 use crate::signal::Piece;
-use crate::trajectory::Trajectory;
+use shown::Watching;
 use std::rc::Rc;
 
 /// For so small a part of the series' reach a speed that has left zero is still told by its series alone.
 const SOON: f64 = 1e-6;
+
+/// Intervals looked at closer after which a bound is made anew.
+const OFTEN: usize = 8;
 
 /// What runs of one plant can share: the modes that were made ready.
 #[derive(Default)]
@@ -45,22 +50,15 @@ impl Laws {
 }
 
 /// Runs the experiment with the laws of this plant that are known so far.
-pub(super) fn run(
-    plant: &Plant,
-    experiment: &Experiment,
-    source: Source,
-    laws: &mut Laws,
-    detail: Detail,
-    sink: &mut dyn FnMut(&Trajectory) -> Flow,
-) -> Outcome {
+pub(super) fn run(plant: &Plant, experiment: &Experiment, source: Source, laws: &mut Laws, output: Output) -> Outcome {
     let plant = &*plant.seen_from(experiment.initial.cart_position);
     // Eight moving quantities (three positions, three speeds, current, input) serve straight inputs; smooth ones carry
     // their derivatives along.
     // A rotor that turns by itself adds two.
     match (source.degree() <= 1, plant.has_rotor()) {
-        (true, false) => Run::new(plant, experiment, &mut laws.straight, detail, sink).finish(source),
-        (true, true) => Run::new(plant, experiment, &mut laws.rotor, detail, sink).finish(source),
-        (false, _) => Run::new(plant, experiment, &mut laws.smooth, detail, sink).finish(source),
+        (true, false) => Run::new(plant, experiment, &mut laws.straight, output.within()).finish(source),
+        (true, true) => Run::new(plant, experiment, &mut laws.rotor, output.within()).finish(source),
+        (false, _) => Run::new(plant, experiment, &mut laws.smooth, output.within()).finish(source),
     }
 }
 
@@ -92,6 +90,7 @@ struct Run<'a, const R: usize, const C: usize> {
     row: u64,
     offset: f64,
     recorder: Recorder<'a>,
+    watching: Watching,
     events: Vec<Event>,
     /// Where the last mode change was, and how many there have been there.
     changed_at: (u64, f64),
@@ -113,13 +112,7 @@ enum Look<const C: usize> {
 }
 
 impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
-    fn new(
-        plant: &'a Plant,
-        experiment: &Experiment,
-        laws: &'a mut Vec<Rc<Law<R, C>>>,
-        detail: Detail,
-        sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
-    ) -> Self {
+    fn new(plant: &'a Plant, experiment: &Experiment, laws: &'a mut Vec<Rc<Law<R, C>>>, output: Output<'a>) -> Self {
         let grid = Grid::new(experiment.every, experiment.until);
         let h = grid.interval();
         let start = experiment.initial.state(plant);
@@ -147,7 +140,8 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             input_curvature: 0.0,
             row: 0,
             offset: 0.0,
-            recorder: Recorder::new(plant, grid, detail, sink),
+            recorder: Recorder::new(plant, grid, output),
+            watching: Watching::new(),
             events: Vec::new(),
             changed_at: (0, 0.0),
             changes: 0,
@@ -174,7 +168,10 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             };
             self.set_input(&piece);
             self.resolve();
+            self.jumped();
             if time >= end {
+                // Behind a last, shorter interval it stands at the last row, too.
+                (self.row, self.offset) = (self.grid.intervals(), 0.0);
                 self.put_out();
                 break;
             }
@@ -182,6 +179,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             self.reach(row, offset);
             time = piece.end.min(end);
         }
+        self.end_shown();
         self.recorder.finish();
         self.cost.samples = self.recorder.rows;
         let ending = match (self.trouble, self.recorder.flow) {
@@ -202,7 +200,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
 
     /// The row at or before `time` and how far behind it; next to a row means on it.
     fn locate(&self, time: f64) -> (u64, f64) {
-        let last = self.grid.intervals();
+        let last = self.grid.even();
         let mut row = ((time / self.h) as u64).min(last);
         while row > 0 && self.grid.time(row) > time {
             row -= 1;
@@ -213,12 +211,13 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         let offset = time - self.grid.time(row);
         // What a sum of decimal times may be off by; no part of the interval, which may be long.
         let near = (8.0 * f64::EPSILON * time).min(1e-9 * self.h);
-        if offset <= near || row == last {
-            (row, 0.0)
-        } else if self.h - offset <= near {
-            (row + 1, 0.0)
-        } else {
-            (row, offset)
+        // The last interval may be shorter: what is left of the run behind the last row at this distance.
+        let length = if row < last { self.h } else { self.grid.rest() };
+        match (row < last, length - offset <= near) {
+            _ if offset <= near => (row, 0.0),
+            (true, true) => (row + 1, 0.0),
+            (false, true) => (row, length),
+            (_, false) => (row, offset),
         }
     }
 
@@ -228,8 +227,8 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         self.take_up(piece);
         // A load that passes a breakaway by rounding alone does not break it.
         for guard in &self.law.guards {
-            if let Cause::BreakForward(body) | Cause::BreakBackward(body) = guard.cause {
-                let tolerance = &mut self.slack[body.index()];
+            if let Cause::BreakForward(_) | Cause::BreakBackward(_) = guard.cause {
+                let tolerance = &mut self.slack[guard.cause.kind()];
                 *tolerance = tolerance.max(2.0 * guard.noise(&self.z));
             }
         }
@@ -277,10 +276,11 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
                 }
             }
             let ahead = if self.row < row { self.h } else { offset };
-            match self.advance(ahead - self.offset) {
+            match self.advance_shown(ahead - self.offset) {
                 Some(cause) => {
                     self.change(cause);
                     self.resolve();
+                    self.jumped();
                 }
                 None if self.row < row => {
                     self.row += 1;
@@ -342,13 +342,18 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             return false;
         }
         let resting = y.iter().all(|&rate| rate == 0.0);
-        if resting && self.input() == 0.0 && self.recorder.detail == Detail::Metrics {
-            // Rows that say nothing new.
+        let mut bow = self.is_observed().then(|| self.bow(&law, self.h, safe as f64 * self.h));
+        if let (true, Some(bow)) = (resting, &bow) {
+            let (begin, z) = (self.time(), self.z);
+            self.move_shown(&law, begin, safe as f64 * self.h, z, bow);
+        }
+        if resting && self.recorder.detail == Detail::None {
             self.recorder.skip(safe - 1);
             self.row += safe;
             return true;
         }
         let step = law.step(0);
+        let mut closer = 0;
         for j in 0..safe {
             if j > 0 {
                 self.put_out();
@@ -356,8 +361,19 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
                     return true;
                 }
             }
-            if !resting {
-                step.advance(&mut self.z);
+            match &mut bow {
+                _ if resting => {}
+                Some(bow) => {
+                    let mut end = self.z;
+                    step.advance(&mut end);
+                    closer += usize::from(self.move_shown(&law, self.grid.time(self.row), self.h, end, bow));
+                    if closer == OFTEN {
+                        // What swings has died down since.
+                        closer = 0;
+                        *bow = self.bow(&law, self.h, (safe - j) as f64 * self.h);
+                    }
+                }
+                None => step.advance(&mut self.z),
             }
             self.row += 1;
         }
@@ -379,6 +395,20 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             Cause::BreakForward(_) | Cause::BreakBackward(_) => 0,
             cause => self.fresh[cause.kind()],
         }
+    }
+
+    /// The same as [`Run::advance`], and shows the way to whoever observes.
+    fn advance_shown(&mut self, distance: f64) -> Option<Cause> {
+        if !self.is_observed() {
+            return self.advance(distance);
+        }
+        let (law, before, begin, offset) = (Rc::clone(&self.law), self.z, self.time(), self.offset);
+        let cause = self.advance(distance);
+        let (after, length) = (self.z, self.offset - offset);
+        self.z = before;
+        let bow = self.bow(&law, length, length);
+        self.move_shown(&law, begin, length, after, &bow);
+        cause
     }
 
     /// Advances by `distance`, at most an interval; stops at the first guard that falls and says why.
@@ -528,13 +558,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
 
     /// The state in the solver's coordinates.
     fn inner(&self) -> State {
-        let z = &self.z;
-        let mut inner: State = std::array::from_fn(|j| if j < states::<R>() { z[j] } else { 0.0 });
-        if states::<R>() < place::COUNT || !self.plant.has_rotor() {
-            // The rotor turns with the drive pulley.
-            (inner[place::ROTOR_ANGLE], inner[place::ROTOR_SPEED]) = (0.0, z[place::DRIVE_SPEED]);
-        }
-        inner
+        inner_of::<R, C>(self.plant, &self.z)
     }
 
     fn state(&self) -> State {
@@ -554,6 +578,16 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         let inner = self.inner();
         form.value_at(&stretches(&inner), &inner, self.input())
     }
+}
+
+/// The state in the solver's coordinates that `z` stands for.
+fn inner_of<const R: usize, const C: usize>(plant: &Plant, z: &[f64; C]) -> State {
+    let mut inner: State = std::array::from_fn(|j| if j < states::<R>() { z[j] } else { 0.0 });
+    if states::<R>() < place::COUNT || !plant.has_rotor() {
+        // The rotor turns with the drive pulley.
+        (inner[place::ROTOR_ANGLE], inner[place::ROTOR_SPEED]) = (0.0, z[place::DRIVE_SPEED]);
+    }
+    inner
 }
 
 /// Matrices computed so far.

@@ -7,18 +7,19 @@
 
 mod fall;
 mod model;
+mod shown;
 mod stretch;
 
 use super::coordinates::Coordinates;
+use super::observe::Output;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
 use super::record::{Recorder, Row};
-use super::{Cost, Detail, Ending, Event, Flow, Grid, Outcome, Source, check, held};
+use super::{Cost, Ending, Event, Flow, Grid, Outcome, Source, check, held};
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
 use crate::plant::{Body, Cause, Limit, Mode, Part, Plant, State, Status, Switch, place};
 use crate::stage::AmplifierMode;
-use crate::trajectory::Trajectory;
 use fall::NODES;
 use ivp::dense::StepInterpolant;
 use ivp::methods::{DOP853, Tolerance};
@@ -46,8 +47,7 @@ pub(super) fn run(
     experiment: &Experiment,
     source: Source,
     tolerance: f64,
-    detail: Detail,
-    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+    output: Output,
 ) -> Result<Outcome> {
     if !(1e-14..=1e-2).contains(&tolerance) {
         return Err(Error::new(format!("a tolerance of {tolerance:e} is of no use"))
@@ -69,8 +69,8 @@ pub(super) fn run(
     let plant = &*plant.seen_from(coordinates.origin());
     let model = Model::new(plant, coordinates.origin());
     let mode = plant.first_mode(&start);
-    Ok(Run::new(&model, (coordinates, inner, mode), experiment, tolerance, FIRST / fastest, detail, sink)
-        .finish(source))
+    let start = (coordinates, inner, mode);
+    Ok(Run::new(&model, start, experiment, tolerance, FIRST / fastest, output.within()).finish(source))
 }
 
 /// h·|λ| up to which the formula is stable.
@@ -106,6 +106,7 @@ struct Run<'a> {
     pace: Pace,
     events: Vec<Event>,
     modes: Vec<Mode>,
+    shown: Option<shown::Shown>,
     cost: Cost,
     trouble: Option<Ending>,
 }
@@ -124,8 +125,7 @@ impl<'a> Run<'a> {
         experiment: &Experiment,
         tolerance: f64,
         first_step: f64,
-        detail: Detail,
-        sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
+        output: Output<'a>,
     ) -> Self {
         let plant = model.plant;
         let grid = Grid::new(experiment.every, experiment.until);
@@ -155,7 +155,7 @@ impl<'a> Run<'a> {
             model,
             coordinates,
             grid,
-            recorder: Recorder::new(plant, grid, detail, sink),
+            recorder: Recorder::new(plant, grid, output),
             // It is stopped from outside: by its observer.
             solver: DOP853 {
                 max_steps: usize::MAX - 1,
@@ -177,6 +177,7 @@ impl<'a> Run<'a> {
             pace: Pace::default(),
             events: Vec::new(),
             modes: vec![mode],
+            shown: None,
             cost: Cost::default(),
             trouble: None,
         }
@@ -211,6 +212,7 @@ impl<'a> Run<'a> {
             }
             stretch = next;
         }
+        self.end_shown(&stretch);
         self.recorder.finish();
         self.cost.samples = self.recorder.rows;
         self.cost.modes = self.modes.len() as u64;
@@ -352,15 +354,23 @@ impl<'a> Run<'a> {
         let side = if to == Motion::Stuck { from } else { to };
         let forward = side != Motion::Backward;
         let load = self.model.load(body, forward, &self.mode, &state, input);
-        let holds = self.model.breakaway(body, forward, &state);
-        let noise = f64::max(2.0 * self.model.noise(body, &self.mode, &state, input), 1e-12 * holds);
-        self.slack[index] = if again { 10.0 } else { 1.0 } * noise;
+        for (cause, tolerance) in self.tolerances_at_rest(body, input) {
+            self.slack[cause.kind()] = if again { 10.0 } else { 1.0 } * tolerance;
+        }
         for follower in self.model.plant.followers(body) {
             self.mode.motion[follower.index()] = to;
         }
         let (part, from, to) = (Part::Body(body), Status::Motion(from), Status::Motion(to));
         Event { time, part, from, to, load, by_rounding }.note(&mut self.events);
         self.enter();
+    }
+
+    /// By how much the load on a body at rest may pass its breakaway on either side before it counts: what rounding may do to it.
+    fn tolerances_at_rest(&self, body: Body, input: f64) -> [(Cause, f64); 2] {
+        let inner = self.model.inner(&self.y);
+        let noise = 2.0 * self.model.noise(body, &self.mode, &inner, input);
+        [(Cause::BreakForward(body), true), (Cause::BreakBackward(body), false)]
+            .map(|(cause, forward)| (cause, noise.max(1e-12 * self.model.breakaway(body, forward, &inner))))
     }
 
     /// Whether a body stops where the tolerance decides: what still slows it down is less than the formula may be off by.
@@ -413,6 +423,16 @@ impl<'a> Run<'a> {
     /// Changes modes, without time passing, until every load that is held can be.
     fn resolve(&mut self, stretch: &Stretch) {
         let time = stretch.begin + self.tau;
+        if self.tau == 0.0 {
+            // After an edge of the input too, a load that passes a breakaway by rounding alone does not break it.
+            let plant = self.model.plant;
+            for body in plant.leaders().filter(|body| self.mode.motion[body.index()] == Motion::Stuck) {
+                for (cause, tolerance) in self.tolerances_at_rest(body, stretch.input(0.0)) {
+                    let own = &mut self.slack[cause.kind()];
+                    *own = own.max(tolerance);
+                }
+            }
+        }
         for _ in 0..CHANGES_AT_ONCE {
             let field = Field::new(self.model, self.mode, stretch);
             let guards = field.guards(self.tau, &self.y);
@@ -474,6 +494,7 @@ impl SolOut for Observer<'_, '_> {
         };
         self.hit = self.first_fall(from, to, &begin, &end, &at);
         let until = self.hit.as_ref().map_or(to, |hit| hit.tau);
+        self.show(from, until, &begin, &at);
         // A row on an edge or an event shows what comes after it.
         let stretch = self.field.stretch;
         let near = (8.0 * f64::EPSILON * stretch.end).min(1e-9 * self.run.grid.interval());

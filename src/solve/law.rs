@@ -1,9 +1,12 @@
 //! One mode made ready for the exact solver: its matrices, its guards, and how fast anything in it can change.
 
+mod shown;
+
 use super::propagator::{Matrix, SERIES_ORDER, SERIES_REACH};
 use crate::friction::Motion;
 use crate::plant::{Body, Cause, Form, Mode, Plant, ROTOR, ROUNDING, SPEEDS, STRETCHES, arms, place};
 use crate::signal::DEGREE;
+pub(super) use shown::Shown;
 use std::cell::OnceCell;
 use std::rc::Rc;
 
@@ -133,6 +136,8 @@ pub(super) struct Law<const R: usize, const C: usize> {
     magnetic: f64,
     /// Whether the current moves anything, or anything the current.
     coupled: bool,
+    /// What an observer is shown.
+    shown: OnceCell<Box<Shown>>,
 }
 
 impl<const R: usize, const C: usize> Law<R, C> {
@@ -283,6 +288,7 @@ impl<const R: usize, const C: usize> Law<R, C> {
             stiffness,
             magnetic,
             coupled: exchange > 0.0 && equations.acceleration[shaft].current != 0.0,
+            shown: OnceCell::new(),
         }
     }
 

@@ -7,6 +7,7 @@ mod estimate;
 mod exact;
 mod general;
 mod law;
+mod observe;
 mod pace;
 mod propagator;
 mod record;
@@ -14,8 +15,11 @@ mod roots;
 mod rounding;
 mod table3;
 
+pub use crate::trajectory::Grid;
 pub use choice::{Choice, Kind};
 pub use estimate::ErrorEstimate;
+use observe::Output;
+pub use observe::{Curve, Gap, Observe, Polynomial, QUANTITIES, Reading, TERMS, reading};
 
 use crate::case::Experiment;
 use crate::error::{Error, Result};
@@ -242,10 +246,10 @@ pub enum Detail {
     /// All of them.
     #[default]
     Full,
-    /// Those that [`crate::metrics::Meter`] looks at, without friction, encoder and what the stage adds.
+    /// Position, speeds, voltage, current, forces and states, without friction, encoder and what the stage adds.
     Lean,
-    /// The same; and of a stage that rests without input, for which nothing changes, only the first row and the last.
-    Metrics,
+    /// No rows at all: for an observer.
+    None,
 }
 
 /// Runs one experiment after another on one stage after another, and keeps what can be used again: bit for bit what [`stream`] gives,
@@ -276,13 +280,25 @@ impl Bench {
         detail: Detail,
         sink: &mut dyn FnMut(&Trajectory) -> Flow,
     ) -> Result<Outcome> {
-        let Some(plant) = &self.plant else {
-            return Err(Error::new("there is no stage to run").next("take one up with Bench::mount"));
-        };
+        let Some(plant) = &self.plant else { return Err(nothing_mounted()) };
         check::experiment(plant, experiment)?;
+        let output = Output { detail, sink, observer: None };
         let source = Source::Signal(&experiment.input);
-        run_with(plant, experiment, source, Solver::of(plant.stage()), &mut self.laws, detail, sink)
+        run_with(plant, experiment, source, Solver::of(plant.stage()), &mut self.laws, output)
     }
+
+    /// The same for an observer alone: no rows are made.
+    pub fn observe(&mut self, experiment: &Experiment, observer: &mut dyn Observe) -> Result<Outcome> {
+        let Some(plant) = &self.plant else { return Err(nothing_mounted()) };
+        check::experiment(plant, experiment)?;
+        let output = Output { detail: Detail::None, sink: &mut |_| Flow::Continue, observer: Some(observer) };
+        let source = Source::Signal(&experiment.input);
+        run_with(plant, experiment, source, Solver::of(plant.stage()), &mut self.laws, output)
+    }
+}
+
+fn nothing_mounted() -> Error {
+    Error::new("there is no stage to run").next("take one up with Bench::mount")
 }
 
 /// Where the input comes from.
@@ -306,49 +322,6 @@ fn held(value: f64, start: f64, end: f64) -> Piece {
     let mut coefficients = [0.0; DEGREE + 1];
     coefficients[0] = value;
     Piece { start, end: if end > start { end } else { f64::INFINITY }, coefficients }
-}
-
-/// The times at which rows are put out: 0, `every`, 2 `every`, … up to `until`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Grid {
-    every: f64,
-    until: f64,
-    /// Number of intervals.
-    intervals: u64,
-    /// Whether the intervals fill the run, so that row k is at k·until/intervals, rounded once.
-    whole: bool,
-}
-
-impl Grid {
-    /// The rows of an experiment.
-    pub fn new(every: f64, until: f64) -> Self {
-        let ratio = until / every;
-        let nearest = ratio.round();
-        let whole = (ratio - nearest).abs() <= 1e-9 * nearest.max(1.0) && nearest >= 1.0;
-        let intervals = if whole { nearest } else { ratio.floor() };
-        Self { every, until, intervals: intervals as u64, whole }
-    }
-
-    /// Time of row `k`, s.
-    #[inline]
-    pub fn time(&self, k: u64) -> f64 {
-        if self.whole { k as f64 * self.until / self.intervals as f64 } else { k as f64 * self.every }
-    }
-
-    /// Number of intervals; there is one row more.
-    pub fn intervals(&self) -> u64 {
-        self.intervals
-    }
-
-    /// Length of an interval, s.
-    pub fn interval(&self) -> f64 {
-        if self.whole { self.until / self.intervals as f64 } else { self.every }
-    }
-
-    /// Time of the last row, s: where the run ends.
-    pub fn end(&self) -> f64 {
-        self.time(self.intervals)
-    }
 }
 
 /// Runs `experiment` on `stage` and keeps everything in memory.
@@ -401,7 +374,31 @@ pub fn stream(
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<Outcome> {
     let plant = checked(stage, experiment, solver)?;
-    run(&plant, experiment, Source::Signal(&experiment.input), solver, sink)
+    run(&plant, experiment, Source::Signal(&experiment.input), solver, Detail::Full, None, sink)
+}
+
+/// The same, with an observer that sees what is between the rows, too: a [`crate::metrics::Meter`], or one's own.
+///
+/// ```
+/// use taut::case::{Case, TEMPLATE};
+/// use taut::metrics::Meter;
+/// use taut::solve::{Flow, Solver, stream_observed};
+/// let case = Case::from_text("axis.toml", TEMPLATE)?;
+/// let experiment = &case.experiments[0];
+/// let mut meter = Meter::new(&case.stage, experiment);
+/// let outcome = stream_observed(&case.stage, experiment, Solver::Exact, &mut meter, &mut |_| Flow::Continue)?;
+/// assert!(meter.finish(&outcome.events).peak_current.value > 1.0);
+/// # Ok::<(), taut::Error>(())
+/// ```
+pub fn stream_observed(
+    stage: &Stage,
+    experiment: &Experiment,
+    solver: Solver,
+    observer: &mut dyn Observe,
+    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+) -> Result<Outcome> {
+    let plant = checked(stage, experiment, solver)?;
+    run(&plant, experiment, Source::Signal(&experiment.input), solver, Detail::Full, Some(observer), sink)
 }
 
 /// The same with an input that is decided as the run goes on; that of `experiment` counts for nothing.
@@ -435,7 +432,21 @@ pub fn stream_decided(
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<Outcome> {
     let plant = checked(stage, experiment, solver)?;
-    run(&plant, experiment, Source::Decided(decide), solver, sink)
+    run(&plant, experiment, Source::Decided(decide), solver, Detail::Full, None, sink)
+}
+
+/// The same with an observer, and columns as `detail` has them.
+pub fn stream_decided_observed(
+    stage: &Stage,
+    experiment: &Experiment,
+    decide: &mut dyn Decide,
+    solver: Solver,
+    detail: Detail,
+    observer: &mut dyn Observe,
+    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+) -> Result<Outcome> {
+    let plant = checked(stage, experiment, solver)?;
+    run(&plant, experiment, Source::Decided(decide), solver, detail, Some(observer), sink)
 }
 
 /// The equations of what makes sense as a run.
@@ -454,9 +465,15 @@ fn run(
     experiment: &Experiment,
     source: Source,
     solver: Solver,
+    detail: Detail,
+    observer: Option<&mut dyn Observe>,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<Outcome> {
-    run_with(plant, experiment, source, solver, &mut exact::Laws::default(), Detail::Full, sink)
+    let output = match observer {
+        Some(observer) => Output { detail, sink, observer: Some(observer) },
+        None => Output { detail, sink, observer: None },
+    };
+    run_with(plant, experiment, source, solver, &mut exact::Laws::default(), output)
 }
 
 fn run_with(
@@ -465,13 +482,12 @@ fn run_with(
     source: Source,
     solver: Solver,
     laws: &mut exact::Laws,
-    detail: Detail,
-    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+    output: Output,
 ) -> Result<Outcome> {
     match (solver, source) {
-        (Solver::General { tolerance }, source) => general::run(plant, experiment, source, tolerance, detail, sink),
-        (Solver::Exact, source) => Ok(exact::run(plant, experiment, source, laws, detail, sink)),
-        (Solver::Table3 { step, method }, Source::Signal(_)) => table3::run(plant, experiment, step, method, sink),
+        (Solver::General { tolerance }, source) => general::run(plant, experiment, source, tolerance, output),
+        (Solver::Exact, source) => Ok(exact::run(plant, experiment, source, laws, output)),
+        (Solver::Table3 { step, method }, Source::Signal(_)) => table3::run(plant, experiment, step, method, output),
         (Solver::Table3 { .. }, Source::Decided(_)) => {
             Err(Error::new("the paper's Table 3 has a fixed step and no sampled input")
                 .next("take the exact solver, or the general one"))

@@ -1,6 +1,7 @@
 //! From states to the columns that a user sees, block by block.
 
 use super::coordinates::{Coordinates, stretches};
+use super::observe::{Observe, Output};
 use super::{Detail, Flow, Grid};
 use crate::friction::{Law, Motion};
 use crate::plant::{Body, Form, Mode, Part, Plant, SPEEDS, STRETCHES, State, place};
@@ -53,6 +54,8 @@ pub(crate) struct Recorder<'a> {
     scratch: [Vec<f64>; 10],
     block: Trajectory,
     sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
+    /// Whoever sees what is between the rows, too.
+    pub(crate) observer: Option<&'a mut dyn Observe>,
     /// Rows handed on.
     pub(crate) rows: u64,
     /// What the receiver answered last.
@@ -60,12 +63,7 @@ pub(crate) struct Recorder<'a> {
 }
 
 impl<'a> Recorder<'a> {
-    pub(crate) fn new(
-        plant: &'a Plant,
-        grid: Grid,
-        detail: Detail,
-        sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
-    ) -> Self {
+    pub(crate) fn new(plant: &'a Plant, grid: Grid, Output { detail, sink, observer }: Output<'a>) -> Self {
         Self {
             plant,
             grid,
@@ -76,6 +74,7 @@ impl<'a> Recorder<'a> {
             scratch: Default::default(),
             block: Trajectory { columns: headings(plant, detail) },
             sink,
+            observer,
             rows: 0,
             flow: Flow::Continue,
         }
@@ -89,6 +88,10 @@ impl<'a> Recorder<'a> {
     /// Adds the next row.
     #[inline]
     pub(crate) fn push(&mut self, row: Row, mode: Mode) {
+        if self.detail == Detail::None {
+            self.rows += 1;
+            return;
+        }
         self.raw.push(row);
         self.modes.push(mode);
         if self.raw.len() == BLOCK {
@@ -98,24 +101,25 @@ impl<'a> Recorder<'a> {
 
     /// Adds the next row with what its state does not tell.
     pub(crate) fn push_with(&mut self, row: Row, mode: Mode, extra: Extra) {
-        self.extra.push(extra);
+        if self.detail != Detail::None {
+            self.extra.push(extra);
+        }
         self.push(row, mode);
     }
 
-    /// Leaves out so many rows.
+    /// Counts so many rows that nobody is to see.
     pub(crate) fn skip(&mut self, rows: u64) {
-        if rows > 0 {
-            self.finish();
-            self.rows += rows;
-        }
+        self.rows += rows;
     }
 
     /// Hands on what there is, be it nothing, to hear whether to go on.
     pub(crate) fn ask(&mut self) {
-        if self.raw.is_empty() {
+        if !self.raw.is_empty() {
+            self.hand_on();
+        } else if self.flow == Flow::Continue {
             self.block.columns.iter_mut().for_each(|column| column.values.clear());
+            self.flow = (self.sink)(&self.block);
         }
-        self.hand_on();
     }
 
     /// Hands on what is left.
@@ -154,12 +158,13 @@ impl<'a> Recorder<'a> {
         let (p1, w1, x, v, p3, w3) = (next(), next(), next(), next(), next(), next());
         for (j, row) in raw.iter().enumerate() {
             let [phi1, omega1, position, speed, phi3, omega3, ..] = row.state;
-            p1[j] = phi1;
-            w1[j] = omega1;
-            x[j] = position;
-            v[j] = speed;
-            p3[j] = phi3;
-            w3[j] = omega3;
+            // −0 + 0 is 0.
+            p1[j] = phi1 + 0.0;
+            w1[j] = omega1 + 0.0;
+            x[j] = position + 0.0;
+            v[j] = speed + 0.0;
+            p3[j] = phi3 + 0.0;
+            w3[j] = omega3 + 0.0;
         }
         let (w1, v, w3) = (&*w1, &*v, &*w3);
         let r = stage.pulley_radius;
@@ -172,7 +177,7 @@ impl<'a> Recorder<'a> {
         if stage.travel.is_some() {
             put(way, |j| raw[j].stretch[3]);
         }
-        put(input, |j| raw[j].input);
+        put(input, |j| raw[j].input + 0.0);
         if plant.has_current_state() {
             put(armature, |j| raw[j].state[place::CURRENT]);
         }
@@ -260,16 +265,16 @@ impl<'a> Recorder<'a> {
                 let out = &mut friction[start..start + same.len()];
                 match motion {
                     Motion::Stuck if alone => {
-                        put(out, |j| plant.friction_value(body, motion, 0.0, own(body, start + j)));
+                        put(out, |j| plant.friction_value(body, motion, 0.0, own(body, start + j)) + 0.0);
                     }
                     Motion::Stuck => put(out, |j| {
                         let sum = |(least, most): (f64, f64), follower| {
                             let (load, ratio) = (own(follower, start + j), plant.ratio(follower));
                             (least + ratio * load.0, most + ratio * load.1)
                         };
-                        plant.friction_value(body, motion, 0.0, plant.followers(body).fold((0.0, 0.0), sum))
+                        plant.friction_value(body, motion, 0.0, plant.followers(body).fold((0.0, 0.0), sum)) + 0.0
                     }),
-                    _ => put(out, |j| plant.friction_value(body, motion, speed[start + j], (0.0, 0.0))),
+                    _ => put(out, |j| plant.friction_value(body, motion, speed[start + j], (0.0, 0.0)) + 0.0),
                 }
                 start += same.len();
             }
@@ -284,7 +289,7 @@ impl<'a> Recorder<'a> {
             next().copy_from_slice(input);
         }
         if plant.has_rotor() {
-            put(next(), |j| raw[j].state[place::ROTOR_ANGLE]);
+            put(next(), |j| raw[j].state[place::ROTOR_ANGLE] + 0.0);
             next().copy_from_slice(rotor);
             next().copy_from_slice(torque);
             put(next(), |j| f64::from(modes[j].gear.code()));
@@ -304,7 +309,7 @@ impl<'a> Recorder<'a> {
                 EncoderPlace::Cart => place::CART_POSITION,
             };
             let counts = encoder.counts_per_unit(stage.motor.gear_ratio);
-            put(next(), |j| (raw[j].state[place] * counts).round());
+            put(next(), |j| (raw[j].state[place] * counts).round() + 0.0);
         }
         for body in bristles(plant) {
             put(next(), |j| extras[j].bristle[body.index()]);

@@ -3,14 +3,14 @@
 //! Kept to reproduce the paper and to show what it does: any speed inside a band of ±0.01 is frozen rather than brought
 //! to rest, so the stage creeps after it has stopped, by an amount that depends on the step.
 
+use super::observe::{Gap, Output, QUANTITIES, Reading, Readout};
 use super::record::{Recorder, Row};
-use super::{Cost, Detail, Ending, Flow, Grid, Method, Outcome};
+use super::{Cost, Ending, Flow, Grid, Method, Outcome};
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::Motion;
 use crate::plant::{Body, Form, Mode, Plant, SPEEDS, State, place, stretches};
 use crate::signal::Piece;
-use crate::trajectory::Trajectory;
 
 /// Half-width of Table 3's band of "zero" speed, rad/s for the pulleys and m/s for the cart.
 const BAND: f64 = 0.01;
@@ -24,19 +24,20 @@ pub(crate) fn run(
     experiment: &Experiment,
     step: f64,
     method: Method,
-    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+    output: Output,
 ) -> Result<Outcome> {
     let model = Model::new(plant)?;
     let grid = Grid::new(experiment.every, experiment.until);
-    let substeps = (grid.interval() / step - 1e-9).ceil().max(1.0);
+    let steps = |interval: f64| (interval / step - 1e-9).ceil().max(1.0);
+    let substeps = steps(grid.interval());
     if !substeps.is_finite() || step.is_nan() || step <= 0.0 || substeps * grid.intervals() as f64 > 1e12 {
         return Err(Error::new(format!("a step of {step:e} s would take more than 1e12 steps"))
             .allowed("a step above zero, such as 1e-4 s")
             .next("choose a larger step"));
     }
-    let h = grid.interval() / substeps;
     let mut state = experiment.initial.state(plant);
-    let mut recorder = Recorder::new(plant, grid, Detail::Full, sink);
+    let mut recorder = Recorder::new(plant, grid, output.within());
+    let readout = Readout::new(plant, &Mode::of([Motion::Free; 3]));
     let mut cost = Cost { modes: 1, ..Cost::default() };
     let mut ending = Ending::Complete;
     for row in 0..=grid.intervals() {
@@ -54,9 +55,22 @@ pub(crate) fn run(
             ending = Ending::Interrupted { time };
             break;
         }
+        // Nothing is known but its steps, and an edge of the input counts from the next one on.
+        let mode = Mode::of(motion);
+        let mut show = |begin: f64, length: f64, from: &Reading, to: &Reading| {
+            if let Some(observer) = &mut recorder.observer {
+                observer.pass(&Gap { begin, length, from, to, bow: &[0.0; QUANTITIES], mode: &mode });
+            }
+        };
+        let read = |state: &State, input: f64| readout.read(&inner_of(plant, state), 0.0, input);
+        let mut before = read(&state, input);
+        show(time, 0.0, &before, &before);
         if row == grid.intervals() {
             break;
         }
+        let interval = if row < grid.even() { grid.interval() } else { grid.rest() };
+        let substeps = steps(interval);
+        let h = interval / substeps;
         for k in 0..substeps as u64 {
             // A step sees the input as it is at its beginning: an edge at its end belongs to the next one.
             let t = time + k as f64 * h;
@@ -65,13 +79,33 @@ pub(crate) fn run(
                 Method::RungeKutta4 => step.runge_kutta_4(&state),
                 Method::DormandPrince5 => step.dormand_prince_5(&state),
             };
+            let after = read(&state, step.input.value(t + h));
+            show(t, h, &before, &after);
+            before = after;
         }
         cost.steps += substeps as u64;
         cost.evaluations += substeps as u64 * if method == Method::RungeKutta4 { 4 } else { 6 };
     }
+    let time = match ending {
+        Ending::Diverged { time } | Ending::Interrupted { time } => time,
+        _ => grid.end(),
+    };
+    if let Some(observer) = &mut recorder.observer {
+        observer.end(time, &state, &Mode::of(model.motion(&state, experiment.input.value(time))));
+    }
     recorder.finish();
     cost.samples = recorder.rows;
     Ok(Outcome { events: Vec::new(), ending, cost, error: None })
+}
+
+/// A state with stretches in the places of angles, as readings are made from.
+fn inner_of(plant: &Plant, state: &State) -> State {
+    let [d1, d2, _, twist, _] = stretches(plant.stage().pulley_radius, state);
+    let mut inner = *state;
+    inner[place::DRIVE_ANGLE] = d1;
+    inner[place::IDLER_ANGLE] = d2;
+    inner[place::ROTOR_ANGLE] = twist;
+    inner
 }
 
 /// The equations (16)-(18) with Table 3 for the friction.

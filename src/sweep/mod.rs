@@ -38,8 +38,8 @@ use crate::control::{self, MoveRun, Setup};
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::knob::{Breakaways, Knob};
-use crate::metrics::Meter;
-use crate::solve::{self, Bench, Detail, Ending, Flow, Solver};
+use crate::metrics::{Held, Meter};
+use crate::solve::{self, Bench, Ending, Flow, Solver};
 use crate::stage::Stage;
 use crate::trajectory::{Column, Trajectory};
 use points::Points;
@@ -201,6 +201,7 @@ impl Sweep {
         let mut values = Vec::with_capacity(self.headings.len());
         let mut stage = self.stage.clone();
         let mut bench = Bench::default();
+        let held: Vec<Option<Held>> = self.experiments.iter().map(Held::last).collect();
         for run in self.range(first, count) {
             if stop() {
                 return None;
@@ -209,14 +210,9 @@ impl Sweep {
             stage.clone_from(&self.stage);
             self.turn(&mut stage, run, &values);
             let machine = bench.mount(&stage);
-            for experiment in &self.experiments {
-                let mut meter = Meter::new(&stage);
-                let outcome = machine.clone().and_then(|()| {
-                    bench.run(experiment, Detail::Metrics, &mut |block| {
-                        meter.take(block);
-                        Flow::Continue
-                    })
-                });
+            for (experiment, held) in self.experiments.iter().zip(&held) {
+                let mut meter = Meter::with(&stage, *held);
+                let outcome = machine.clone().and_then(|()| bench.observe(experiment, &mut meter));
                 let told = outcome.map(|outcome| (outcome.ending, meter.finish(&outcome.events)));
                 put_measures(told, OF_EXPERIMENT, &mut values);
             }

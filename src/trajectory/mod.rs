@@ -1,10 +1,13 @@
 //! Named, unit-bearing columns over time: what a simulation computes and what a log records.
 
 mod csv;
+mod grid;
 #[cfg(feature = "parquet")]
 mod parquet;
 
 pub use csv::CsvWriter;
+pub use grid::Grid;
+pub(crate) use grid::Interval;
 #[cfg(feature = "parquet")]
 pub use parquet::ParquetWriter;
 

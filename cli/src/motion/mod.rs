@@ -161,7 +161,8 @@ fn write_samples(folder: &Folder, name: &str, case: &Case, run: &MoveRun) -> Res
     let unit = if case.stage.amplifier.mode == taut::stage::AmplifierMode::Current { "A" } else { "V" };
     let mut text = format!("time_s,reference_m,measured_m,asked_{unit},given_{unit}\n");
     for s in &run.kept {
-        let _ = writeln!(text, "{},{},{},{},{}", s.time, s.reference, s.measured, s.asked, s.given);
+        let _ =
+            writeln!(text, "{},{},{},{},{}", s.time, s.reference + 0.0, s.measured + 0.0, s.asked + 0.0, s.given + 0.0);
     }
     let name = format!("{name}.samples.csv");
     write_atomically(folder.path(&name), text)?;

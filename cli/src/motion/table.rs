@@ -2,7 +2,7 @@
 
 use super::{Done, Tried};
 use crate::folder::Folder;
-use crate::simulate::table::{early_end, time, value};
+use crate::simulate::table::{early_end, plain, time, value};
 use crate::terminal::bold;
 use std::fmt::Write;
 use taut::control::compensation::Rigid;
@@ -14,8 +14,8 @@ use taut::stage::{AmplifierMode, EncoderPlace, Stage};
 /// A length in µm, in mm from 10 mm on.
 fn length(metres: f64) -> String {
     match metres.abs() {
-        m if m < 1e-2 => format!("{:.1} µm", metres * 1e6),
-        _ => format!("{:.3} mm", metres * 1e3),
+        m if m < 1e-2 => format!("{} µm", plain(metres * 1e6, 1)),
+        _ => format!("{} mm", plain(metres * 1e3, 3)),
     }
 }
 

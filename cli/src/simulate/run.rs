@@ -82,7 +82,7 @@ impl<'a> Setting<'a> {
         let begin = Instant::now();
         let stage = &self.case.stage;
         let mut writers = self.writers(experiment).map_err(Failure::work)?;
-        let mut meter = Meter::new(stage);
+        let mut meter = Meter::new(stage, experiment);
         let mut curves = (self.folder.is_some() && !self.args.no_report).then(|| Curves::new(stage));
         let mut progress = Progress::new(experiment, self.args.quiet);
         let mut trouble: Option<Error> = None;
@@ -92,7 +92,6 @@ impl<'a> Setting<'a> {
         };
 
         let mut take = |block: &Trajectory| {
-            meter.take(block);
             if let Some((estimate, _)) = &mut estimate {
                 estimate.take(block);
             }
@@ -103,7 +102,7 @@ impl<'a> Setting<'a> {
             progress.advance(block.len() as u64, begin);
             if trouble.is_some() || self.interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue }
         };
-        let mut outcome = solve::stream(stage, experiment, self.solver, &mut take)?;
+        let mut outcome = solve::stream_observed(stage, experiment, self.solver, &mut meter, &mut take)?;
         if let Some((estimate, tolerance)) = estimate {
             let mut go_on = || if self.interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue };
             outcome.error = estimate.finish(stage, experiment, tolerance, &outcome, &mut go_on)?;

@@ -44,11 +44,16 @@ pub fn value(value: f64, unit: &str) -> String {
     number::engineering(value, unit, 5).replace(['\u{a0}', '\u{202f}'], " ").replace('−', "-")
 }
 
+/// A number with so many decimals, and never `-0.00`.
+pub fn plain(value: f64, decimals: usize) -> String {
+    number::fixed(value, decimals).replace('−', "-").replace('\u{202f}', " ")
+}
+
 /// A length of travel in mm, far ones in m.
 pub fn travel(metres: f64) -> String {
     match metres.abs() {
         m if m < 1e-4 && m > 0.0 => value(metres, "m"),
-        m if m < 10.0 => format!("{:.4} mm", metres * 1e3),
+        m if m < 10.0 => format!("{} mm", plain(metres * 1e3, 4)),
         _ => value(metres, "m"),
     }
 }
@@ -57,7 +62,7 @@ pub fn travel(metres: f64) -> String {
 pub fn speed(metres_per_second: f64) -> String {
     match metres_per_second.abs() {
         v if v < 1e-3 && v > 0.0 => value(metres_per_second, "m/s"),
-        v if v < 10.0 => format!("{:.2} mm/s", metres_per_second * 1e3),
+        v if v < 10.0 => format!("{} mm/s", plain(metres_per_second * 1e3, 2)),
         _ => value(metres_per_second, "m/s"),
     }
 }
@@ -189,7 +194,7 @@ fn reduced(reduction: &Reduction) -> String {
 
 fn steady(metrics: &Metrics) -> String {
     let Some(steady) = metrics.steady_speed else {
-        return "none: no constant input lasts 20 samples".into();
+        return "none: no constant input lasts a fiftieth of the run".into();
     };
     let balance = match steady.analytic {
         Balance::At(balance) => format!("forces balance at {}", speed(balance)),
@@ -210,6 +215,9 @@ fn stop(metrics: &Metrics, solver: Solver) -> String {
         Some(at) => time(at),
         None if matches!(solver, Solver::Table3 { .. }) => {
             format!("none: Table 3 freezes speeds and creeps on, cart at {}", speed(metrics.final_cart_speed))
+        }
+        None if metrics.bodies_rest => {
+            format!("the rotor still turns at the end, at {}", value(metrics.final_rotor_speed, "rad/s"))
         }
         None => format!("still moving at the end, cart at {}", speed(metrics.final_cart_speed)),
     }

@@ -95,7 +95,10 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
         for follower in self.plant.followers(body) {
             self.mode.motion[follower.index()] = to;
         }
-        self.slack[body.index()] = if self.changes > TURNS_AT_ONCE { 20.0 } else { 2.0 } * noise;
+        let tolerance = if self.changes > TURNS_AT_ONCE { 20.0 } else { 2.0 } * noise;
+        for side in [Cause::BreakForward(body), Cause::BreakBackward(body)] {
+            self.slack[side.kind()] = tolerance;
+        }
         self.note(Part::Body(body), Status::Motion(from), load, by_rounding);
         self.enter();
     }

@@ -61,7 +61,7 @@ const fn inverse() -> [[f64; NODES]; NODES] {
 }
 
 /// The polynomial through values at k/7.
-fn through(values: &[f64; NODES]) -> [f64; NODES] {
+pub(super) fn through(values: &[f64; NODES]) -> [f64; NODES] {
     COEFFICIENTS.map(|row| row.iter().zip(values).fold(0.0, |sum, (c, v)| sum + c * v))
 }
 

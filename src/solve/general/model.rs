@@ -22,7 +22,7 @@ pub(super) const MOST_GUARDS: usize = 18;
 pub(super) struct Model<'a> {
     pub(super) plant: &'a Plant,
     /// Where positions are counted from, m.
-    origin: f64,
+    pub(super) origin: f64,
     /// Where the current stands, if it is a state.
     pub(super) current: Option<usize>,
     /// Where the rotor's angle stands, if it is a state; its speed behind it.

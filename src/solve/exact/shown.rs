@@ -1,0 +1,235 @@
+//! What an observer is shown of a run: every interval, and closer where something may happen within.
+
+use super::Run;
+use crate::plant::State;
+use crate::solve::law::{Law, Shown, chain};
+use crate::solve::observe::{Curve, Gap, QUANTITIES, Reading};
+use std::rc::Rc;
+
+/// What a curve may be off in the middle, as a share of the largest value seen of that quantity.
+const OFF: f64 = 1e-9;
+
+/// Curves of a run that are looked at closer at most: what swings more often than that between its rows is not seen whole.
+const MOST_CURVES: u64 = 2_000_000;
+
+/// Room for what a cubic is off where it only tells whether to look closer.
+const MARGIN: f64 = 1.05;
+
+/// Curves in a row that are right before longer ones are tried.
+const RIGHT: u32 = 32;
+
+/// An instant as an observer sees it.
+struct Sight<const R: usize, const C: usize> {
+    z: [f64; C],
+    rate: [f64; R],
+    value: Reading,
+    slope: Reading,
+}
+
+/// Where an observer is.
+pub(super) struct Watching {
+    /// What is read now, where nothing has jumped since.
+    now: Option<Reading>,
+    /// The largest magnitudes seen.
+    scale: Reading,
+    /// Curves tried.
+    curves: u64,
+    /// Halvings of the output interval after which curves were right lately, and how many in a row.
+    level: usize,
+    right: u32,
+}
+
+impl Watching {
+    pub(super) fn new() -> Self {
+        Self { now: None, scale: [0.0; QUANTITIES], curves: 0, level: 0, right: 0 }
+    }
+}
+
+impl<const R: usize, const C: usize> Run<'_, R, C> {
+    /// Whether somebody observes.
+    pub(super) fn is_observed(&self) -> bool {
+        self.recorder.observer.is_some()
+    }
+
+    /// Input or mode may have jumped: what is read now has to be read anew.
+    pub(super) fn jumped(&mut self) {
+        self.watching.now = None;
+    }
+
+    /// The run has ended.
+    pub(super) fn end_shown(&mut self) {
+        let (time, state, mode) = (self.time(), self.state(), self.mode);
+        if self.is_observed() {
+            let law = Rc::clone(&self.law);
+            let shown = law.shown(self.plant);
+            self.show(shown, time, 0.0, &self.z.clone(), &[0.0; QUANTITIES]);
+        }
+        if let Some(observer) = &mut self.recorder.observer {
+            observer.end(time, &state, &mode);
+        }
+    }
+
+    /// How far readings can be off a straight line over intervals of this length, within `whole` from now on.
+    pub(super) fn bow(&self, law: &Law<R, C>, interval: f64, whole: f64) -> Reading {
+        self.bow_from(law, &self.z, interval, whole)
+    }
+
+    fn bow_from(&self, law: &Law<R, C>, z: &[f64; C], interval: f64, whole: f64) -> Reading {
+        let shown = law.shown(self.plant);
+        law.bow(shown, &law.rate(z), (self.input_rate, self.input_curvature), (interval, whole))
+    }
+
+    /// Shows the interval of `length` that began at `begin` and has led to `end`; says whether the observer wants to see closer.
+    fn show(&mut self, shown: &Shown, begin: f64, length: f64, end: &[f64; C], bow: &Reading) -> bool {
+        let origin = self.coordinates.origin();
+        let to = shown.readout.read(&self.inner_of(end), origin, end[chain::<R>(0)]);
+        let from = match self.watching.now {
+            Some(from) => from,
+            None => shown.readout.read(&self.inner(), origin, self.input()),
+        };
+        self.watching.now = Some(to);
+        self.ask(begin, length, &from, &to, bow)
+    }
+
+    fn ask(&mut self, begin: f64, length: f64, from: &Reading, to: &Reading, bow: &Reading) -> bool {
+        for (scale, to) in self.watching.scale.iter_mut().zip(to) {
+            *scale = scale.max(to.abs());
+        }
+        let gap = Gap { begin, length, from, to, bow, mode: &self.mode };
+        self.recorder.observer.as_mut().is_some_and(|observer| observer.pass(&gap))
+    }
+
+    /// Moves on to `end`, `length` from now, in the present mode, and shows the way there; says whether it was looked at closer.
+    pub(super) fn move_shown(
+        &mut self,
+        law: &Law<R, C>,
+        begin: f64,
+        length: f64,
+        end: [f64; C],
+        bow: &Reading,
+    ) -> bool {
+        let start = self.z;
+        let closer = self.show(law.shown(self.plant), begin, length, &end, bow);
+        if closer {
+            self.show_closer(law, start, begin, length);
+        }
+        self.z = end;
+        closer
+    }
+
+    /// Shows a way of any length that begins at `z`, in parts that there are matrices for and a rest that a series tells.
+    fn show_closer(&mut self, law: &Law<R, C>, mut z: [f64; C], mut begin: f64, mut length: f64) {
+        for level in 0..=law.finest {
+            while length >= law.length(level) {
+                z = self.show_level(law, z, begin, level);
+                begin += law.length(level);
+                length -= law.length(level);
+            }
+        }
+        if length > 0.0 {
+            let series = law.series(&z, length);
+            let end = std::array::from_fn(|j| series.iter().rev().fold(0.0, |sum, term| sum + term[j]));
+            let curve = self.curve(law, &self.sight(law, &z), &self.sight(law, &end), begin, length);
+            self.see(&curve);
+        }
+    }
+
+    /// Shows an interval of h/2^level from `z` on in parts so short that cubics tell where there is something to see; returns its end.
+    fn show_level(&mut self, law: &Law<R, C>, z: [f64; C], begin: f64, level: usize) -> [f64; C] {
+        let fine = self.watching.level.saturating_sub(1).clamp(level, law.finest);
+        let (parts, length) = (1_u64 << (fine - level).min(60), law.length(fine));
+        let mut from = self.sight(law, &z);
+        for part in 0..parts {
+            let mut end = from.z;
+            law.step(fine).advance(&mut end);
+            let to = self.sight(law, &end);
+            let begin = begin + part as f64 * length;
+            if self.asks(&from, &to, begin, length) {
+                self.show_curve(law, &from, &to, begin, fine);
+            }
+            from = to;
+        }
+        from.z
+    }
+
+    /// Whether the observer wants to see closer what a cubic tells of a way: with slopes a and b at its ends and d between, it is off a
+    /// straight line by s (1 − s) ((a − d)(1 − s) − (b − d) s).
+    fn asks(&mut self, from: &Sight<R, C>, to: &Sight<R, C>, begin: f64, length: f64) -> bool {
+        let bow: Reading = std::array::from_fn(|q| {
+            let across = to.value[q] - from.value[q];
+            let (a, b) = ((from.slope[q] * length - across).abs(), (to.slope[q] * length - across).abs());
+            0.25 * MARGIN * if a > b { a } else { b }
+        });
+        self.ask(begin, length, &from.value, &to.value, &bow)
+    }
+
+    /// Shows an interval of h/2^level as a curve, or two halves of it where that is not right.
+    fn show_curve(&mut self, law: &Law<R, C>, from: &Sight<R, C>, to: &Sight<R, C>, begin: f64, level: usize) {
+        self.watching.curves += 1;
+        let length = law.length(level);
+        let curve = self.curve(law, from, to, begin, length);
+        if level == law.finest || self.watching.curves > MOST_CURVES {
+            self.see(&curve);
+            return;
+        }
+        let mut middle = from.z;
+        law.step(level + 1).advance(&mut middle);
+        let middle = self.sight(law, &middle);
+        let near = |((is, told), scale): ((&f64, f64), &f64)| (is - told).abs() <= OFF * scale;
+        if middle.value.iter().zip(curve.at(0.5)).zip(&self.watching.scale).all(near) {
+            // What has been right for a while may be right over a longer way.
+            self.watching.right += 1;
+            if self.watching.right >= RIGHT {
+                (self.watching.right, self.watching.level) = (0, level.saturating_sub(1));
+            }
+            self.see(&curve);
+            return;
+        }
+        (self.watching.right, self.watching.level) = (0, self.watching.level.max(level + 1));
+        let half = 0.5 * length;
+        for (from, to, begin) in [(from, &middle, begin), (&middle, to, begin + half)] {
+            if self.asks(from, to, begin, half) {
+                self.show_curve(law, from, to, begin, level + 1);
+            }
+        }
+    }
+
+    /// What is to be seen of `z`.
+    fn sight(&self, law: &Law<R, C>, z: &[f64; C]) -> Sight<R, C> {
+        let readout = &law.shown(self.plant).readout;
+        let rate = law.rate(z);
+        let value = readout.read(&self.inner_of(z), self.coordinates.origin(), z[chain::<R>(0)]);
+        Sight { z: *z, rate, value, slope: self.rates(law, &rate) }
+    }
+
+    /// Rates of what is read, `rate` being that of z.
+    fn rates(&self, law: &Law<R, C>, rate: &[f64; R]) -> Reading {
+        let mut wide = [0.0; C];
+        wide[..R].copy_from_slice(rate);
+        law.shown(self.plant).readout.change(&self.inner_of(&wide), wide[chain::<R>(0)])
+    }
+
+    /// The curve between two sights.
+    fn curve(&self, law: &Law<R, C>, from: &Sight<R, C>, to: &Sight<R, C>, begin: f64, length: f64) -> Curve {
+        let terms = |sight: &Sight<R, C>| {
+            let second = law.rate_of_rate(&sight.rate);
+            let third = law.rate_of_rate(&second);
+            // q, q̇ h, q̈ h²/2, q⃛ h³/6
+            let [h1, h2, h3] = [length, length * length / 2.0, length * length * length / 6.0];
+            let (slope, second, third) = (sight.slope, self.rates(law, &second), self.rates(law, &third));
+            [sight.value, slope.map(|v| v * h1), second.map(|v| v * h2), third.map(|v| v * h3)]
+        };
+        Curve::through(begin, length, &terms(from), &terms(to))
+    }
+
+    fn see(&mut self, curve: &Curve) {
+        if let Some(observer) = &mut self.recorder.observer {
+            observer.see(curve);
+        }
+    }
+
+    /// The state in the solver's coordinates that `z` stands for.
+    fn inner_of(&self, z: &[f64; C]) -> State {
+        super::inner_of::<R, C>(self.plant, z)
+    }
+}

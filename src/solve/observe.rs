@@ -1,0 +1,359 @@
+//! A run seen without rows: what an [`Observe`]r is shown of the motion between events, changes of the input and rows.
+
+use super::coordinates::stretches;
+use super::propagator::Matrix;
+use super::{Detail, Flow};
+use crate::plant::{Body, Form, Mode, Plant, SPEEDS, STRETCHES, State, arms, place};
+use crate::trajectory::Trajectory;
+
+/// Number of quantities in a [`Reading`].
+pub const QUANTITIES: usize = 12;
+
+/// What is read off a run at one instant, in the order of [`reading`]. SI units.
+pub type Reading = [f64; QUANTITIES];
+
+/// Places in a [`Reading`].
+pub mod reading {
+    /// ẋ, m/s.
+    pub const CART_SPEED: usize = 0;
+    /// r φ̇₁, m/s.
+    pub const DRIVE_SPEED: usize = 1;
+    /// Stretch of span 1, m; those of spans 2 and 3 behind it.
+    pub const STRETCH: usize = 2;
+    /// Force in span 1, N; those in spans 2 and 3 behind it.
+    pub const FORCE: usize = 5;
+    /// Motor current, A.
+    pub const CURRENT: usize = 8;
+    /// φ̇_r, rad/s: the rotor's speed seen from behind the gear.
+    pub const ROTOR_SPEED: usize = 9;
+    /// Voltage at the motor's terminals, V.
+    pub const VOLTAGE: usize = 10;
+    /// x, m.
+    pub const CART_POSITION: usize = 11;
+}
+
+/// A part of a run with one mode and no jump of the input in it, told by its ends.
+#[derive(Debug, Clone, Copy)]
+pub struct Gap<'a> {
+    /// Where it begins, s.
+    pub begin: f64,
+    /// How long it is, s; 0 for a single instant.
+    pub length: f64,
+    /// What is read at its beginning.
+    pub from: &'a Reading,
+    /// What is read at its end.
+    pub to: &'a Reading,
+    /// By how much a quantity can be off the straight line between the two; infinite where no bound is known.
+    pub bow: &'a Reading,
+    /// What everything does.
+    pub mode: &'a Mode,
+}
+
+impl Gap<'_> {
+    /// A bound of the magnitude of quantity `q` within.
+    #[inline(always)]
+    pub fn bound(&self, q: usize) -> f64 {
+        let (middle, half) = (0.5 * (self.from[q] + self.to[q]).abs(), 0.5 * (self.to[q] - self.from[q]).abs());
+        middle + rise(half, self.bow[q])
+    }
+
+    /// Bounds of the value of quantity `q` within, from below and above.
+    pub fn range(&self, q: usize) -> (f64, f64) {
+        let (middle, half) = (0.5 * (self.from[q] + self.to[q]), 0.5 * (self.to[q] - self.from[q]).abs());
+        let rise = rise(half, self.bow[q]);
+        (middle - rise, middle + rise)
+    }
+}
+
+/// By how much a line from −`half` to `half` with a parabola of height `bow` on it rises above zero:
+/// max over s of half (2s − 1) + 4 bow s (1 − s).
+#[inline(always)]
+fn rise(half: f64, bow: f64) -> f64 {
+    if half >= 2.0 * bow { half } else { 0.25 * half * half / bow + bow }
+}
+
+/// Number of coefficients of a [`Curve`].
+pub const TERMS: usize = 8;
+
+/// A part of a run on which every quantity is a polynomial of time, as near as makes no difference.
+#[derive(Debug, Clone, Copy)]
+pub struct Curve {
+    /// Where it begins, s.
+    pub begin: f64,
+    /// How long it is, s.
+    pub length: f64,
+    /// Coefficients of the powers of s, the share of the length: what is read is Σ terms_k sᵏ.
+    pub terms: [Reading; TERMS],
+}
+
+impl Curve {
+    /// The polynomial of one quantity.
+    pub fn of(&self, q: usize) -> Polynomial {
+        Polynomial(self.terms.map(|term| term[q]))
+    }
+
+    /// The curve from values and the first three derivatives by s, each over its order's factorial, at both ends.
+    pub(super) fn through(begin: f64, length: f64, from: &[Reading; 4], to: &[Reading; 4]) -> Self {
+        let mut terms = [[0.0; QUANTITIES]; TERMS];
+        terms[..4].copy_from_slice(from);
+        let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (from, to);
+        let [.., c4, c5, c6, c7] = &mut terms;
+        for q in 0..QUANTITIES {
+            // What the first four terms leave at the other end, by order.
+            let r0 = b0[q] - (a0[q] + a1[q] + a2[q] + a3[q]);
+            let r1 = b1[q] - (a1[q] + 2.0 * a2[q] + 3.0 * a3[q]);
+            let r2 = b2[q] - (a2[q] + 3.0 * a3[q]);
+            let r3 = b3[q] - a3[q];
+            c4[q] = 35.0 * r0 - 15.0 * r1 + 5.0 * r2 - r3;
+            c5[q] = -84.0 * r0 + 39.0 * r1 - 14.0 * r2 + 3.0 * r3;
+            c6[q] = 70.0 * r0 - 34.0 * r1 + 13.0 * r2 - 3.0 * r3;
+            c7[q] = -20.0 * r0 + 10.0 * r1 - 4.0 * r2 + r3;
+        }
+        Self { begin, length, terms }
+    }
+
+    /// What is read at the share `s` of the length.
+    pub fn at(&self, s: f64) -> Reading {
+        let mut sum = self.terms[TERMS - 1];
+        for term in self.terms[..TERMS - 1].iter().rev() {
+            for (sum, term) in sum.iter_mut().zip(term) {
+                *sum = *sum * s + term;
+            }
+        }
+        sum
+    }
+}
+
+/// Σ c_k sᵏ on 0..1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Polynomial(pub [f64; TERMS]);
+
+/// C(7, k)
+const BINOMIAL: [f64; TERMS] = [1.0, 7.0, 21.0, 35.0, 35.0, 21.0, 7.0, 1.0];
+
+/// Places at which a polynomial is looked at first: it swings no faster than these tell.
+const LOOKS: usize = 8;
+
+impl Polynomial {
+    /// The value at `s`.
+    #[inline(always)]
+    pub fn at(&self, s: f64) -> f64 {
+        self.0.iter().rev().fold(0.0, |sum, c| sum * s + c)
+    }
+
+    fn slope(&self, s: f64) -> f64 {
+        (1..TERMS).rev().fold(0.0, |sum, k| sum * s + k as f64 * self.0[k])
+    }
+
+    fn bend(&self, s: f64) -> f64 {
+        (2..TERMS).rev().fold(0.0, |sum, k| sum * s + (k * (k - 1)) as f64 * self.0[k])
+    }
+
+    /// A bound of its magnitude on 0..1: the largest of its coefficients in Bernstein's form, b_k = Σ_j C(k, j)/C(n, j) c_j.
+    #[inline]
+    pub fn bound(&self) -> f64 {
+        let (low, high) = self.range();
+        high.max(-low)
+    }
+
+    /// Bounds of its values on 0..1, in the same way.
+    #[inline]
+    pub fn range(&self) -> (f64, f64) {
+        // Each step adds neighbours: Pascal's triangle.
+        let mut b: [f64; TERMS] = std::array::from_fn(|k| self.0[k] / BINOMIAL[k]);
+        for i in 1..TERMS {
+            for k in (i..TERMS).rev() {
+                b[k] += b[k - 1];
+            }
+        }
+        b.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &b| (low.min(b), high.max(b)))
+    }
+
+    /// Whether it certainly has no zero.
+    pub fn keeps_its_sign(&self) -> bool {
+        self.0[0].abs() > self.0[1..].iter().map(|c| c.abs()).sum()
+    }
+
+    /// Where between `from` and `to` it is greatest, and its value there.
+    pub fn greatest(&self, from: f64, to: f64) -> (f64, f64) {
+        let place = |k: usize| if k == LOOKS { to } else { from + (to - from) * k as f64 / LOOKS as f64 };
+        let mut best = (from, self.at(from));
+        let mut index = 0;
+        for k in 1..=LOOKS {
+            let value = self.at(place(k));
+            if value > best.1 {
+                (best, index) = ((place(k), value), k);
+            }
+        }
+        let (low, high) = (place(index.saturating_sub(1)), place((index + 1).min(LOOKS)));
+        // Newton's method on the slope, kept between the neighbours.
+        let mut s = best.0;
+        for _ in 0..8 {
+            let bend = self.bend(s);
+            if bend >= 0.0 {
+                break;
+            }
+            let next = (s - self.slope(s) / bend).clamp(low, high);
+            let done = (next - s).abs() <= 1e-12;
+            s = next;
+            if done {
+                break;
+            }
+        }
+        let value = self.at(s);
+        if value > best.1 { (s, value) } else { best }
+    }
+
+    /// Where between `from` and `to` its magnitude is largest, and its value there.
+    pub fn largest(&self, from: f64, to: f64) -> (f64, f64) {
+        let (high, low) = (self.greatest(from, to), self.negative().greatest(from, to));
+        if low.1 > high.1 { (low.0, -low.1) } else { high }
+    }
+
+    /// The same with the other sign.
+    pub fn negative(&self) -> Self {
+        Self(self.0.map(|c| -c))
+    }
+
+    /// Places between `from` and `to` where its sign changes, in order.
+    pub fn zeros(&self, from: f64, to: f64) -> Vec<f64> {
+        let place = |k: usize| if k == LOOKS { to } else { from + (to - from) * k as f64 / LOOKS as f64 };
+        let mut zeros = Vec::new();
+        let (mut before, mut value) = (from, self.at(from));
+        for k in 1..=LOOKS {
+            let (here, next) = (place(k), self.at(place(k)));
+            if (value < 0.0) != (next < 0.0) {
+                zeros.push(self.zero(before, here, value < 0.0));
+            }
+            (before, value) = (here, next);
+        }
+        zeros
+    }
+
+    /// The zero between `low` and `high`, where the sign differs; `rising` if it is negative at `low`.
+    fn zero(&self, mut low: f64, mut high: f64, rising: bool) -> f64 {
+        let mut s = 0.5 * (low + high);
+        for _ in 0..60 {
+            let value = self.at(s);
+            if (value < 0.0) == rising {
+                low = s
+            } else {
+                high = s
+            }
+            // Newton's step where it stays between, else the middle.
+            let newton = s - value / self.slope(s);
+            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+            if (next - s).abs() <= 1e-15 || high - low <= 1e-15 {
+                return next;
+            }
+            s = next;
+        }
+        s
+    }
+}
+
+/// Whoever is shown a run as it goes on: every instant of it, and not only those of its rows.
+///
+/// The run comes in [`Gap`]s, each beginning where the last one ended; before and after a jump of the input or a change of mode are two gaps'
+/// ends. Whoever wants to know what is in a gap is shown it in smaller ones or as a [`Curve`].
+pub trait Observe {
+    /// Takes the next gap, or one within the last that it wanted to see closer; says whether it wants to see closer into this one.
+    fn pass(&mut self, gap: &Gap) -> bool;
+
+    /// Takes what is in a gap that it wanted to see closer.
+    fn see(&mut self, curve: &Curve);
+
+    /// The run has ended, in this state.
+    fn end(&mut self, time: f64, state: &State, mode: &Mode);
+}
+
+/// Number of entries of a form: stretches, speeds, current, input, one.
+const ENTRIES: usize = STRETCHES + SPEEDS + 3;
+
+/// What a stage shows in one mode: readings as linear forms.
+#[derive(Debug, Clone)]
+pub(super) struct Readout {
+    pub(super) forms: [Form; QUANTITIES],
+    /// By entry of a form (stretches, speeds, current, input, one): what each adds to every quantity.
+    matrix: Matrix<QUANTITIES, ENTRIES>,
+    /// Limits of voltage and current: what they hold is not beyond them by one bit.
+    limits: [f64; 2],
+}
+
+impl Readout {
+    pub(super) fn new(plant: &Plant, mode: &Mode) -> Self {
+        let (stage, r) = (plant.stage(), plant.stage().pulley_radius);
+        let mut forms = [Form::ZERO; QUANTITIES];
+        forms[reading::CART_SPEED] = Form::speed(1);
+        forms[reading::DRIVE_SPEED] = Form::speed(0) * r;
+        for (span, force) in plant.span_forces(mode).into_iter().enumerate() {
+            // Between bodies that move as one nothing stretches.
+            let apart = leading_arms(plant, span).iter().any(|arm| arm.abs() > 1e-12 * (1.0 + r));
+            forms[reading::STRETCH + span] = if apart { Form::stretch(span) } else { Form::ZERO };
+            forms[reading::FORCE + span] = force;
+        }
+        forms[reading::CURRENT] = plant.current(mode);
+        forms[reading::ROTOR_SPEED] = Form::speed(if plant.has_rotor() { crate::plant::ROTOR } else { 0 });
+        forms[reading::VOLTAGE] = plant.voltage(mode);
+        forms[reading::CART_POSITION] = Form::stretch(crate::plant::POSITION);
+        let mut matrix = Matrix::zero();
+        for (q, form) in forms.iter().enumerate() {
+            let entries = form.stretch.iter().chain(&form.speed).chain([&form.current, &form.input, &form.constant]);
+            for (column, entry) in entries.into_iter().enumerate() {
+                matrix.set(q, column, *entry);
+            }
+        }
+        let limit = |limit: Option<f64>| limit.unwrap_or(f64::INFINITY);
+        let limits = [limit(stage.amplifier.voltage_limit), limit(stage.amplifier.current_limit)];
+        Self { forms, matrix, limits }
+    }
+
+    /// What is read in a state in the solver's coordinates, whose positions are counted from `origin`, under `input`.
+    #[inline]
+    pub(super) fn read(&self, inner: &State, origin: f64, input: f64) -> Reading {
+        let mut reading = self.sum(inner, input, 1.0);
+        reading[reading::CART_POSITION] += origin;
+        let [voltage, current] = self.limits;
+        reading[reading::VOLTAGE] = reading[reading::VOLTAGE].clamp(-voltage, voltage);
+        reading[reading::CURRENT] = reading[reading::CURRENT].clamp(-current, current);
+        reading
+    }
+
+    /// The same of a change of state and input.
+    #[inline]
+    pub(super) fn change(&self, inner: &State, input: f64) -> Reading {
+        self.sum(inner, input, 0.0)
+    }
+
+    #[inline(always)]
+    fn sum(&self, inner: &State, input: f64, one: f64) -> Reading {
+        let [d1, d2, d3, twist, way] = stretches(inner);
+        let speeds = [place::DRIVE_SPEED, place::CART_SPEED, place::IDLER_SPEED, place::ROTOR_SPEED].map(|j| inner[j]);
+        let [w1, v, w3, rotor] = speeds;
+        self.matrix.rate(&[d1, d2, d3, twist, way, w1, v, w3, rotor, inner[place::CURRENT], input, one])
+    }
+}
+
+/// By how much a span stretches per way of each body that leads others: its arms, those of followers put on their leader.
+pub(super) fn leading_arms(plant: &Plant, span: usize) -> [f64; 3] {
+    let arms = arms(plant.stage().pulley_radius)[span];
+    Body::ALL.map(|body| plant.followers(body).map(|follower| plant.ratio(follower) * arms[follower.index()]).sum())
+}
+
+/// Where a run goes: blocks of rows to a receiver, and all that is between them to an observer.
+pub(crate) struct Output<'a> {
+    pub(crate) detail: Detail,
+    pub(crate) sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
+    pub(crate) observer: Option<&'a mut dyn Observe>,
+}
+
+impl<'a> Output<'a> {
+    /// The same for a part of its life.
+    pub(crate) fn within<'b>(self) -> Output<'b>
+    where
+        'a: 'b,
+    {
+        let observer = self.observer.map(|observer| -> &'b mut dyn Observe { observer });
+        Output { detail: self.detail, sink: self.sink, observer }
+    }
+}

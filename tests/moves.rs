@@ -1,0 +1,150 @@
+//! The figures of moves in closed loop, against dense quadratures, and whatever their rows.
+
+use taut::case::{Case, Move};
+use taut::control::{Loop, MoveRun, Rows, Standard, stream};
+use taut::solve::{Ending, Flow, Solver};
+use taut::trajectory::Trajectory;
+
+/// A move of a controller's case with a row every `every`, and these rows.
+fn moved(case: &Case, motion: &Move, every: f64) -> (MoveRun, Trajectory) {
+    let design = case.controller.as_ref().unwrap();
+    let mut controller = Standard::new(design, &case.stage).unwrap();
+    let profile = motion.profile.clone().shaped(&design.shaper);
+    let rows = Rows { until: motion.until, every, window: motion.window };
+    let mut trajectory = Trajectory::default();
+    let solver = Solver::of(&case.stage);
+    let run = stream(&case.stage, &mut controller, &Loop::of(design), &profile, &rows, solver, false, &mut |block| {
+        trajectory.append(block);
+        Flow::Continue
+    })
+    .unwrap();
+    assert_eq!(run.outcome.ending, Ending::Complete);
+    (run, trajectory)
+}
+
+fn case(name: &str, changes: &[&str]) -> Case {
+    let file = format!("{}/stages/sollmann-jouaneh/controllers/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    Case::read_with(file, changes).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn near(name: &str, a: f64, b: f64, share: f64) {
+    assert!((a - b).abs() <= share * b.abs() + 1e-15, "{name}: {a} and {b}, {:e}", (a - b) / b);
+}
+
+/// ∫ by Simpson's rule over pairs of rows; no jump falls within a pair.
+fn simpson(h: f64, values: &[[f64; 2]]) -> f64 {
+    values.chunks_exact(2).map(|pair| h / 3.0 * (pair[0][0] + 4.0 * pair[1][0] + pair[1][1])).sum()
+}
+
+/// Energy of a move was a sum over rows, one too many: 10 mJ for 9.01; errors and currents were means over rows, with whatever the last sample did.
+#[test]
+fn integrals_are_those_of_a_dense_quadrature() {
+    for (name, limit) in [("pid-elastic", None), ("cascade", None), ("pid", Some("limit"))] {
+        let changes: &[&str] = if limit.is_some() { &["controller.limit=5 V"] } else { &[] };
+        let case = case(name, changes);
+        let (motor, motion) = (case.stage.motor, &case.moves[0]);
+        let h = 1e-5;
+        let (run, rows) = moved(&case, motion, h);
+        let get = |name: &str| rows.get(name).unwrap();
+        let [voltage, speed, cart, error, drive, reference] =
+            ["voltage", "drive_speed", "cart_position", "cart_error", "drive_angle", "reference"].map(get);
+        // On an interval the voltage is held, and the current follows the speed: i = (v − K_e n φ̇)/R, which is also just before the voltage jumps.
+        let current = |k: usize, at: usize| {
+            (voltage[k] - motor.back_emf_constant * motor.gear_ratio * speed[at]) / motor.resistance
+        };
+        let n = rows.len() - 1;
+        let both =
+            |of: &dyn Fn(usize, usize) -> f64| -> Vec<[f64; 2]> { (0..n).map(|k| [of(k, k), of(k, k + 1)]).collect() };
+        let power = both(&|k, at| voltage[k] * current(k, at));
+        let net = simpson(h, &power);
+        let figures = &run.figures;
+        near("net energy", figures.energy.0 - figures.energy.1, net, 1e-8);
+        let back: f64 = power.iter().map(|[a, b]| h * 0.5 * ((-a).max(0.0) + (-b).max(0.0))).sum();
+        near("energy back", figures.energy.1, back, 1e-3);
+        let rms =
+            |of: &dyn Fn(usize, usize) -> f64| (simpson(h, &both(&|k, at| of(k, at).powi(2))) / motion.until).sqrt();
+        near("rms voltage", figures.voltage.1, rms(&|k, _| voltage[k]), 1e-8);
+        near("rms current", figures.current.1, rms(&current), 1e-8);
+        near("rms error", figures.cart.rms, rms(&|_, at| error[at]), 1e-7);
+        let r = case.stage.pulley_radius;
+        near("rms following", figures.following.rms, rms(&|_, at| r * drive[at] - reference[at]), 1e-7);
+
+        // Peaks: no row passes them, and the nearest comes close.
+        let most = |values: &[f64]| values.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+        let currents: Vec<f64> = (0..n).flat_map(|k| [current(k, k), current(k, k + 1)]).collect();
+        for (name, peak, rows) in [
+            ("error", figures.cart.peak.value, most(error)),
+            ("voltage", figures.voltage.0.value, most(voltage)),
+            ("current", figures.current.0.value, most(&currents)),
+        ] {
+            assert!(rows <= peak.abs() * (1.0 + 1e-9) && peak.abs() <= rows * (1.0 + 1e-3), "{name}: {peak} {rows}");
+        }
+        let beyond = cart.iter().map(|x| x - motion.profile.target()).fold(0.0, f64::max);
+        assert!(beyond <= figures.overshoot + 1e-12 && figures.overshoot <= beyond + 1e-9, "{beyond} {figures:?}");
+        let last = cart
+            .iter()
+            .zip(get("time"))
+            .filter(|(x, t)| **t >= motion.profile.end() && (**x - motion.profile.target()).abs() > motion.window);
+        let settled = last.last().map_or(0.0, |(_, t)| t - motion.profile.end());
+        let settling = figures.settling.unwrap();
+        assert!(settling >= settled - 1e-12 && settling <= settled + 1.001 * h, "{settling} {settled}");
+        // Samples at the limit, each held for its time.
+        assert_eq!(run.samples.1 > 0, limit.is_some());
+        near("limited", figures.limited, run.samples.1 as f64 * 1e-3, 1e-12);
+    }
+}
+
+/// Figures of moves were made of rows.
+#[test]
+fn figures_do_not_depend_on_the_rows() {
+    for (name, changes) in [
+        ("pid-elastic", &["amplifier.voltage_limit=4 V"][..]),
+        // It howls: the belt's resonance is driven through motor and delay.
+        ("pid", &["controller.pid.derivative=16 V s/m"][..]),
+        ("cascade-current", &[][..]),
+        ("pid-shaped", &["motor.inductance=0.5 mH", "amplifier.current_limit=6 A"][..]),
+    ] {
+        let case = case(name, changes);
+        for motion in &case.moves[..1] {
+            let [one, fine, odd] = [1e-3, 1e-4, 0.37e-3].map(|every| moved(&case, motion, every).0);
+            for other in [&fine, &odd] {
+                let (a, b) = (&one.figures, &other.figures);
+                for (what, a, b) in [
+                    ("error", a.cart.peak.value, b.cart.peak.value),
+                    ("rms error", a.cart.rms, b.cart.rms),
+                    ("following", a.following.peak.value, b.following.peak.value),
+                    ("voltage", a.voltage.0.value, b.voltage.0.value),
+                    ("rms voltage", a.voltage.1, b.voltage.1),
+                    ("current", a.current.0.value, b.current.0.value),
+                    ("rms current", a.current.1, b.current.1),
+                    ("energy in", a.energy.0, b.energy.0),
+                    ("energy back", a.energy.1, b.energy.1),
+                    ("overshoot", a.overshoot, b.overshoot),
+                    ("settling", a.settling.unwrap_or(0.0), b.settling.unwrap_or(0.0)),
+                    ("restlessness", a.restlessness, b.restlessness),
+                    ("amplifier", a.amplifier_limited, b.amplifier_limited),
+                    ("force", one.metrics.peak_force[0].value, other.metrics.peak_force[0].value),
+                ] {
+                    assert!((a.abs() - b.abs()).abs() <= 1e-6 * a.abs() + 1e-12, "{name} {what}: {a} {b}");
+                }
+            }
+        }
+    }
+}
+
+/// The time that the amplifier stands at its limit was that of rows, one too many.
+#[test]
+fn the_amplifier_is_saturated_for_as_long_as_it_is() {
+    let case = case("pid-elastic", &["amplifier.voltage_limit=4 V"]);
+    let h = 2e-6;
+    let (run, rows) = moved(&case, &case.moves[0], h);
+    let voltage = rows.get("voltage").unwrap();
+    let at_limit = voltage[..voltage.len() - 1].iter().filter(|v| v.abs() >= 4.0 * (1.0 - 1e-12)).count();
+    let switches = run.outcome.events.iter().filter(|event| event.part.key() == "voltage").count();
+    assert!(at_limit > 1000, "{at_limit}");
+    assert!(
+        (run.figures.amplifier_limited - at_limit as f64 * h).abs() <= (switches + 1) as f64 * h,
+        "{:?}",
+        run.figures
+    );
+}
