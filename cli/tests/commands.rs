@@ -113,7 +113,7 @@ fn the_folder_holds_what_it_should_and_nothing_else() {
         assert!(!report.contains(outside), "the report asks for another file: {outside}");
     }
     let events = fs::read_to_string(out.join("5-v-pulse.events.csv")).unwrap();
-    assert!(events.starts_with("time_s,part,from,to,load\n0,drive,stuck,forward,"), "{events}");
+    assert!(events.starts_with("time_s,part,from,to,load,by_rounding\n0,drive,stuck,forward,"), "{events}");
     assert_eq!(events.lines().count(), 16);
 }
 
