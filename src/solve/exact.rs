@@ -83,6 +83,8 @@ struct Run<'a, const R: usize, const C: usize> {
     /// Without it a body that comes to rest just at its limit would chatter on the last bit. The same for all else that is
     /// watched where it is zero but for rounding, and would count as wrong in either state.
     slack: [f64; Cause::KINDS],
+    /// Whether the input has changed, and what rounding does to the loads on stuck bodies is to be looked at anew.
+    at_edge: bool,
     /// Bounds of |u̇| and |ü| on the present piece.
     input_rate: f64,
     input_curvature: f64,
@@ -136,6 +138,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             law,
             fresh: [0; Cause::KINDS],
             slack: [0.0; Cause::KINDS],
+            at_edge: true,
             input_rate: 0.0,
             input_curvature: 0.0,
             row: 0,
@@ -229,14 +232,8 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     fn set_input(&mut self, piece: &Piece) {
         self.cost.pieces += 1;
         self.fresh = [0; Cause::KINDS];
+        self.at_edge = true;
         self.take_up(piece);
-        // A load that passes a breakaway by rounding alone does not break it.
-        for guard in &self.law.guards {
-            if let Cause::BreakForward(_) | Cause::BreakBackward(_) = guard.cause {
-                let tolerance = &mut self.slack[guard.cause.kind()];
-                *tolerance = tolerance.max(2.0 * guard.noise(&self.z));
-            }
-        }
     }
 
     /// Puts the input's value and derivatives where the state has them.

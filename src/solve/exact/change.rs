@@ -14,6 +14,9 @@ const EVENTS_AT_LEAST: f64 = 1e5;
 const EVENTS_PER_SECOND: f64 = 1e7;
 const EVENTS_AT_MOST: f64 = 2e7;
 
+/// The rank of conditions on bodies.
+const BODIES: u8 = 3;
+
 /// What counts as one instant, as a share of the reach of the series.
 const MOMENT: f64 = 1e-12;
 
@@ -176,6 +179,16 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
         self.cost.modes += u64::from(is_new);
     }
 
+    /// A load that passes a breakaway by rounding alone does not break it.
+    fn tolerate_loads(&mut self, law: &Law<R, C>) {
+        for guard in &law.guards {
+            if let Cause::BreakForward(_) | Cause::BreakBackward(_) = guard.cause {
+                let tolerance = &mut self.slack[guard.cause.kind()];
+                *tolerance = tolerance.max(2.0 * guard.noise(&self.z));
+            }
+        }
+    }
+
     /// Changes modes, without time passing, until every guard holds.
     pub(super) fn resolve(&mut self) {
         for _ in 0..CHANGES_AT_ONCE {
@@ -192,6 +205,14 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
                 coefficients.get(first).is_some_and(|&term| term < 0.0)
             };
             let fallen = law.guards.iter().filter(|guard| falls(guard)).min_by_key(|guard| guard.cause.rank());
+            // What does not depend on bodies is settled: now their loads are known, and to which rounding.
+            if self.at_edge && fallen.is_none_or(|guard| guard.cause.rank() == BODIES) {
+                self.at_edge = false;
+                self.tolerate_loads(&law);
+                if fallen.is_some() {
+                    continue;
+                }
+            }
             match fallen {
                 Some(guard) => {
                     self.change(guard.cause);
