@@ -21,6 +21,7 @@ const AREAS: [(&str, &[&str]); 4] = [
 const SOLVER: &[&str] = &[
     "lib",
     "cost",
+    "table3",
     "elements",
     "instant",
     "rounding",
