@@ -26,8 +26,8 @@ mod standard;
 pub mod state_feedback;
 mod welch;
 
-pub(crate) use outcome::{follow, tracking};
 pub use outcome::{Deviation, Figures, MoveRun, Rows, Setup, close, closed_loop, stream};
+pub(crate) use outcome::{follow, tracking};
 pub use sampled::{Controller, Loop, Sample, Seen, measures_cart};
 pub use spread::{Change, PARAMETERS, Worst, spread, worst};
 pub use standard::Standard;

@@ -252,8 +252,9 @@ struct Gauge<'a> {
     seen: Figures,
     /// ∫ of the squares of following error, cart error, voltage and current.
     squares: [f64; 4],
-    /// When the cart was outside its window for the last time after the profile.
+    /// When the cart was outside its window for the last time after the profile, and whether it is now.
     outside: Option<f64>,
+    is_outside: bool,
     /// Whether the amplifier stands at a limit where it is now.
     saturated: bool,
     end: f64,
@@ -272,6 +273,7 @@ impl<'a> Gauge<'a> {
             seen: Figures::default(),
             squares: [0.0; 4],
             outside: None,
+            is_outside: false,
             saturated: false,
             end: 0.0,
         }
@@ -325,8 +327,9 @@ impl<'a> Gauge<'a> {
                 self.seen.overshoot = self.seen.overshoot.max(beyond.greatest(last, 1.0).1);
             }
         }
+        self.is_outside = done < 1.0 && away.at(1.0).abs() > self.window;
         if done < 1.0 && away.bound() > self.window {
-            if away.at(1.0).abs() > self.window {
+            if self.is_outside {
                 self.outside = Some(curve.begin + curve.length);
                 return;
             }
@@ -349,11 +352,9 @@ impl<'a> Gauge<'a> {
         seen.final_cart_error = seen.cart.last;
         let done = self.profile.end();
         seen.settling = match self.outside {
-            _ if self.end < done => None,
+            _ if self.end < done || self.is_outside => None,
             None => Some(0.0),
-            // It has settled if it came in again.
-            Some(last) if last < self.end => Some(last - done),
-            Some(_) => None,
+            Some(last) => Some(last - done),
         };
         (self.seen, self.meter.finish(events))
     }
