@@ -282,7 +282,7 @@ impl Columns<'_> {
         let window = self.window(&time, zero, &rows, run)?;
         let start = mapping.from.map_or(first, |from| zero + from);
         let within = rows.start + window.start..rows.start + window.end;
-        let time_from_start = self.from_start(&time[window.clone()], start, within.start)?;
+        let time_from_start = self.counted_from(&time[window.clone()], start, within.start)?;
         let mut outputs = Vec::new();
         for (i, role) in self.roles.iter().enumerate() {
             let Role::Output(quantity) = *role else { continue };
@@ -360,7 +360,7 @@ impl Columns<'_> {
     }
 
     /// These times, the first of them in row `first`, from `start` (s) on. A time so far off that no difference is left is told.
-    fn from_start(&self, time: &[f64], start: f64, first: usize) -> Result<Vec<f64>> {
+    fn counted_from(&self, time: &[f64], start: f64, first: usize) -> Result<Vec<f64>> {
         let shifted: Vec<f64> = time.iter().map(|t| t - start).collect();
         let lost = (1..shifted.len()).find(|&k| !(shifted[k].is_finite() && shifted[k] > shifted[k - 1]));
         let Some(k) = lost else { return Ok(shifted) };

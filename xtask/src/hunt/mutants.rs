@@ -76,7 +76,7 @@ impl Score {
     fn take(&mut self, k: usize, change: &Change, programs: &[Program]) {
         let concerned = AREAS.iter().find(|(folder, _)| change.file.starts_with(folder)).map_or(&[][..], |area| area.1);
         let named = |name: &&str| programs.iter().find(|program| program.name == **name);
-        for program in concerned.iter().filter_map(|name| named(&name)) {
+        for program in concerned.iter().filter_map(named) {
             let (noticed, count) = match program.run(k) {
                 Ended::Well => continue,
                 Ended::Badly => ("fails", &mut self.failed),
