@@ -121,7 +121,7 @@ impl Interval {
 /// p and q = 10ⁿ with p/q = `value` to the last bit and at most fifteen digits in p.
 fn decimal(value: f64) -> Option<(f64, f64)> {
     let powers = (0..=22).map(|n| 10_f64.powi(n));
-    powers.map(|q| ((value * q).round(), q)).find(|&(p, q)| p >= 1.0 && p < 1e15 && p / q == value)
+    powers.map(|q| ((value * q).round(), q)).find(|&(p, q)| (1.0..1e15).contains(&p) && p / q == value)
 }
 
 /// Small p and q with p/q = `value` to the last bit, by its continued fraction: 1/3 of a second, 1/44100.

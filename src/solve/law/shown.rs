@@ -29,9 +29,9 @@ impl Shown {
         let (mut dual, mut unsprung) = ([Size::ZERO; QUANTITIES], [0.0; QUANTITIES]);
         for (q, form) in readout.forms.iter().enumerate() {
             let mut held = 0.0;
-            for span in 0..3 {
+            for (span, at_rest) in at_rest.into_iter().enumerate() {
                 let factor = form.stretch[span];
-                if factor == 0.0 || at_rest[span] {
+                if factor == 0.0 || at_rest {
                     continue;
                 }
                 if law.stiffness[span] > 0.0 {
