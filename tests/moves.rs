@@ -85,7 +85,7 @@ fn integrals_are_those_of_a_dense_quadrature() {
             .iter()
             .zip(get("time"))
             .filter(|(x, t)| **t >= motion.profile.end() && (**x - motion.profile.target()).abs() > motion.window);
-        let last = last.last().map(|(_, t)| *t);
+        let last = last.map(|(_, t)| *t).next_back();
         match figures.settling {
             Some(settling) => {
                 let settled = last.map_or(0.0, |t| t - motion.profile.end());

@@ -30,8 +30,9 @@ pub(super) fn multisine(now: Now, tones: &[Tone]) -> Part {
         }
     }
     let mut coefficients = polynomial(&values, half, now.t - middle);
-    if sum(now, tones) == 0.0 {
-        // A sine that starts from zero does, to the last bit.
+    // A sine that passes through zero where a piece begins, as near as times are told apart, does so to the last bit.
+    let rounding = |tone: &Tone| f64::EPSILON * tone.amplitude.abs() * (1.0 + TAU * tone.frequency.abs() * now.t);
+    if sum(now, tones).abs() <= tones.iter().map(rounding).sum() {
         coefficients[0] = 0.0;
     }
     Part { end, coefficients }
@@ -123,7 +124,7 @@ impl Chirp {
             a * (theta + s * (omega + beta * s)).sin()
         });
         let mut coefficients = polynomial(&values, half, now.t - middle);
-        if self.value(now) == 0.0 {
+        if self.value(now).abs() <= f64::EPSILON * a.abs() * (1.0 + (omega.abs() + TAU * from.abs()) * now.t) {
             coefficients[0] = 0.0;
         }
         Part { end, coefficients }

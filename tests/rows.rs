@@ -1,0 +1,89 @@
+//! The rows of a run: when they are, that the last is at the end, and that no zero has a sign.
+
+mod common;
+
+use common::{experiment, table4};
+use taut::case::{Case, Experiment, TEMPLATE};
+use taut::measure::measure;
+use taut::signal::Signal;
+use taut::solve::{Ending, Method, Solver, simulate};
+use taut::trajectory::Trajectory;
+
+fn every(every: f64, until: f64) -> Experiment {
+    Experiment { every, ..experiment(Signal::Pulse { value: 5.0, duration: 0.95, at: 0.0 }, until) }
+}
+
+fn column<'a>(trajectory: &'a Trajectory, name: &str) -> &'a [f64] {
+    trajectory.get(name).unwrap()
+}
+
+/// A run of 1 s with a row every 0.3 s ended at 0.9 s without a word, here before the pulse was over.
+#[test]
+fn the_last_row_is_at_the_end_whatever_the_interval() {
+    let stage = table4();
+    let table3 = Solver::Table3 { step: 1e-4, method: Method::RungeKutta4 };
+    for (solver, near) in [(Solver::Exact, 1e-11), (Solver::GENERAL, 1e-8), (table3, 1e-11)] {
+        let (odd, even) = (every(0.3, 1.0), every(1e-2, 1.0));
+        let (rows, fine) = (simulate(&stage, &odd, solver).unwrap(), simulate(&stage, &even, solver).unwrap());
+        assert_eq!(rows.outcome.ending, Ending::Complete);
+        assert_eq!(column(&rows.trajectory, "time"), [0.0, 0.3, 0.6, 0.9, 1.0], "{solver:?}");
+        assert_eq!((odd.samples(), rows.outcome.cost.samples), (5, 5));
+        for name in ["cart_position", "cart_speed", "drive_angle", "motor_current", "voltage"] {
+            for (row, place) in [(1, 30), (3, 90), (4, 100)] {
+                let (a, b) = (column(&rows.trajectory, name)[row], column(&fine.trajectory, name)[place]);
+                assert!((a - b).abs() <= near * b.abs().max(1e-3), "{solver:?} {name} in row {row}: {a} and {b}");
+            }
+        }
+        assert_eq!(rows.outcome.events.len(), fine.outcome.events.len());
+    }
+}
+
+/// A recorder's clock makes no shorter beat: the log ends with the last whole one.
+#[test]
+fn a_log_keeps_to_whole_beats() {
+    let changes = ["experiment.0.every=0.3 s", "experiment.0.until=1 s"];
+    let case = Case::from_text_with("axis.toml", TEMPLATE, &changes).unwrap();
+    for jitter in [0.0, 1e-3] {
+        let measurement = taut::stage::Measurement { jitter, ..case.measurement.clone().unwrap_or_default() };
+        let log = measure(&case.stage, &measurement, &case.experiments[0], Solver::Exact).unwrap().trajectory;
+        assert_eq!(column(&log, "time"), [0.0, 0.3, 0.6, 0.9]);
+        assert!(column(&log, "drive_angle").iter().all(|angle| angle.is_finite()));
+    }
+}
+
+/// Times were k·until/n: 0.0029999999999999996 s in a log of 0.3 s at 1 ms, and 95 of 301 like it.
+#[test]
+fn times_read_as_they_were_written() {
+    for (interval, until, digits) in [(1e-3, 0.301, 3), (2e-3, 0.3, 3), (0.3, 3.0, 1), (3.7e-4, 0.37, 5)] {
+        let run = simulate(&table4(), &every(interval, until), Solver::Exact).unwrap();
+        for time in column(&run.trajectory, "time") {
+            let shown = time.to_string();
+            let decimals = shown.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+            assert!(decimals <= digits, "{shown}");
+        }
+    }
+    let thirds = simulate(&table4(), &every(1.0 / 3.0, 2.0), Solver::Exact).unwrap();
+    let time = column(&thirds.trajectory, "time");
+    assert_eq!((time.len(), time[3], time[6]), (7, 1.0, 2.0));
+}
+
+/// The first row of a sine had -1.03e-14 V, and files had -0.
+#[test]
+fn what_is_zero_is_written_as_zero() {
+    let mut stage = table4();
+    stage.encoder = Some(taut::stage::Encoder { at: taut::stage::EncoderPlace::DrivePulley, lines: 512.0 });
+    for amplitude in [5.0, -5.0] {
+        let sine = Signal::Sine { amplitude, frequency: 5.0, phase: 0.0, offset: 0.0 };
+        for solver in [Solver::Exact, Solver::GENERAL] {
+            let run = simulate(&stage, &experiment(sine.clone(), 0.5), solver).unwrap();
+            let voltage = column(&run.trajectory, "voltage");
+            for row in [0, 100, 200, 300, 400, 500] {
+                assert_eq!(voltage[row], 0.0, "{solver:?} {row}");
+            }
+            for column in &run.trajectory.columns {
+                let negative = column.values.iter().position(|v| *v == 0.0 && v.is_sign_negative());
+                assert_eq!(negative, None, "{solver:?} {}", column.name);
+            }
+        }
+    }
+}
