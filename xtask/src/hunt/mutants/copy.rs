@@ -141,9 +141,9 @@ impl Tree {
 
     fn cargo(&self, words: &[&str]) -> Command {
         let mut command = cargo(words);
-        // With the packages that are built already.
+        // A folder of its own: cargo would take what it builds here for the repository's.
         command.args(["--package", "taut", "--features", FEATURES, "--message-format=json"]).current_dir(&self.root);
-        command.env("CARGO_TARGET_DIR", "../..").stderr(Stdio::null());
+        command.env("CARGO_TARGET_DIR", "../target").stderr(Stdio::null());
         command
     }
 
