@@ -53,7 +53,16 @@ pub fn run(args: &Args) -> Outcome {
     let fit = fit(&case, &plan, Some(&is_stopped), &mut |cost| {
         progress.show(cost, begin);
         if is_stopped() { Flow::Stop } else { Flow::Continue }
-    })?;
+    });
+    let fit = match (fit, interrupt.signal()) {
+        // Simulations that were ended early say that the model does not get through the logs.
+        (Err(_), Some(signal)) => {
+            progress.clear();
+            terminal::show_error(&"interrupted before the search began; nothing was written");
+            return Ok(Status::Interrupted(signal));
+        }
+        (fit, _) => fit?,
+    };
     let shown = args.out.is_some() && !args.no_report && !is_stopped();
     progress.say("profiles of the parameters; Ctrl-C leaves out the rest", begin);
     let profiles = if shown { profiles(&case, &plan, &fit, Some(&is_stopped))? } else { Vec::new() };
