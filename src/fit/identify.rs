@@ -67,6 +67,10 @@ impl Identifiability {
         }
         let rows = problem.counted().max(1) as f64;
         let sensitivity = (0..globals).map(|j| own.column(j).norm() / rows.sqrt()).collect();
+        // Of a simulation that was ended early there are no numbers, and the decomposition would panic.
+        if own.iter().any(|entry| !entry.is_finite()) {
+            return None;
+        }
         let svd = SVD::try_new(own, false, true, 1e-15, MOST_SWEEPS)?;
         let v = svd.v_t.as_ref()?.transpose();
         let singular: Vec<f64> = svd.singular_values.iter().copied().collect();

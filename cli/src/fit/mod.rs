@@ -65,10 +65,17 @@ pub fn run(args: &Args) -> Outcome {
     };
     let shown = args.out.is_some() && !args.no_report && !is_stopped();
     progress.say("profiles of the parameters; Ctrl-C leaves out the rest", begin);
-    let profiles = if shown { profiles(&case, &plan, &fit, Some(&is_stopped))? } else { Vec::new() };
+    let profiles = match shown.then(|| profiles(&case, &plan, &fit, Some(&is_stopped))) {
+        Some(Err(_)) if is_stopped() => Vec::new(),
+        Some(profiles) => profiles?,
+        None => Vec::new(),
+    };
     progress.clear();
     let drawn = match args.posterior && !is_stopped() {
-        true => Some(posterior::draw(args, &case, &plan, &fit, &interrupt)?).filter(|drawn| drawn.count() > 0),
+        true => match posterior::draw(args, &case, &plan, &fit, &interrupt) {
+            Err(_) if is_stopped() => None,
+            drawn => Some(drawn?).filter(|drawn| drawn.count() > 0),
+        },
         false => None,
     };
     if args.posterior && drawn.is_none() {
