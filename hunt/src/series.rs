@@ -147,7 +147,7 @@ impl Rates {
     }
 }
 
-/// A Taylor series of the state: z(t + s h) = Σ terms[k] sᵏ.
+/// A Taylor series of the state: z(t + s h) = Σ termsₖ sᵏ.
 pub struct Series {
     /// Its terms.
     pub terms: [State; ORDER + 1],
