@@ -280,7 +280,7 @@ impl Pair<'_> {
 
 /// The changes of bodies in a run of taut.
 fn body_events(run: &Solution) -> Vec<Event> {
-    let motion = |status: taut::plant::Status| match status.code() {
+    let motion = |status: taut::mechanism::Status| match status.code() {
         -1 => Motion::Backward,
         0 => Motion::Stuck,
         1 => Motion::Forward,
@@ -290,7 +290,7 @@ fn body_events(run: &Solution) -> Vec<Event> {
     of_bodies
         .map(|(event, body)| Event {
             time: event.time,
-            body: body.index(),
+            body,
             from: motion(event.from),
             to: motion(event.to),
         })

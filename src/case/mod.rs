@@ -29,7 +29,7 @@ use crate::chance::hash;
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::log::Log;
-use crate::plant::{Plant, State};
+use crate::mechanism::{Mechanism, State};
 use crate::signal::Signal;
 use crate::stage::{AmplifierMode, Measurement, Stage};
 use crate::trajectory::Grid;
@@ -125,20 +125,15 @@ pub struct Initial {
 }
 
 impl Initial {
-    /// The state vector that it stands for.
-    pub fn state(&self, plant: &Plant) -> State {
-        [
-            self.drive_angle,
-            self.drive_speed,
-            self.cart_position,
-            self.cart_speed,
-            self.idler_angle,
-            self.idler_speed,
-            if plant.has_current_state() { self.motor_current } else { 0.0 },
-            // The rotor in the middle of its play.
-            self.drive_angle,
-            self.drive_speed,
-        ]
+    /// The state that it stands for.
+    pub fn state(&self, mechanism: &Mechanism) -> State {
+        let mut state = State::default();
+        let has_current = mechanism.drives.iter().any(|drive| drive.has_current_state());
+        // The rotor in the middle of its play.
+        state.position[..4].copy_from_slice(&[self.drive_angle, self.cart_position, self.idler_angle, self.drive_angle]);
+        state.speed[..4].copy_from_slice(&[self.drive_speed, self.cart_speed, self.idler_speed, self.drive_speed]);
+        state.current[0] = if has_current { self.motor_current } else { 0.0 };
+        state
     }
 }
 
@@ -435,7 +430,7 @@ fn check_name(field: &Field) -> Result<()> {
 fn initial(table: &Table, stage: &Stage) -> Result<Initial> {
     table.check_keys(&[], &[])?;
     if let Some(current) = table.optional("motor_current")
-        && !Plant::new(stage).has_current_state()
+        && !stage.mechanism().drives.iter().any(|drive| drive.has_current_state())
     {
         return Err(current.fail("this current would have no effect").next(
             "it needs motor.inductance above zero in voltage mode, or amplifier.bandwidth in current mode; or leave it out",
