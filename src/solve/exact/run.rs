@@ -89,6 +89,8 @@ where
                     self.core.resolve();
                     self.jumped();
                 }
+                // Paused in the midst of an interval: it is taken up where it was left.
+                None if self.core.asks => self.ask_receiver(),
                 None if !self.goes() => {}
                 None if self.row < row => self.go_to(self.row + 1),
                 None => self.core.offset = offset,
@@ -101,17 +103,14 @@ where
         self.core.count_from(self.grid.time(row));
     }
 
-    /// Whether to go on; asks the receiver now and then.
-    fn goes(&mut self) -> bool {
-        if self.core.asks {
-            self.core.asks = false;
-            self.recorder.ask();
-            if self.recorder.flow == Flow::Continue {
-                // Paused in the midst of an interval: it is taken up where it was left.
-                return self.core.trouble.is_none();
-            }
-        }
+    /// Asks the receiver whether to go on.
+    fn ask_receiver(&mut self) {
+        self.core.asks = false;
+        self.recorder.ask();
         self.heed();
+    }
+
+    fn goes(&self) -> bool {
         self.core.trouble.is_none()
     }
 
