@@ -481,6 +481,29 @@ const INITIAL: &[Parameter] = &[
 ];
 
 #[rustfmt::skip]
+const BRIDGE: &[Parameter] = &[
+    row("bridge.mass", "m", "kg", Required, POSITIVE, "0.838 kg", "Mass of the bridge without the cart; of the cart with its load."),
+    row("bridge.travel.min", "", "m", Required, ANY, "-0.2 m", "Least position."),
+    row("bridge.travel.max", "", "m", Required, ANY, "0.2 m", "Greatest position; above `min`."),
+    row("bridge.travel.stop_stiffness", "k_s", "N/m", Words("no stops: a run ends there"), POSITIVE, "20 kN/m", "Stiffness of the end stops."),
+    row("bridge.travel.stop_damping", "c_s", "N s/m", Value(0.0), NOT_NEGATIVE, "50 N s/m", "Their damping."),
+];
+
+#[rustfmt::skip]
+const GANTRY_INITIAL: &[Parameter] = &[
+    row("gantry.initial.bridge_position", "x", "m", Value(0.0), ANY, "0 mm", "Position of the bridge at time zero."),
+    row("gantry.initial.bridge_speed", "x′", "m/s", Value(0.0), ANY, "0 m/s", "Its speed."),
+    row("gantry.initial.cart_position", "y", "m", Value(0.0), ANY, "0 mm", "Position of the cart on the bridge."),
+    row("gantry.initial.cart_speed", "y′", "m/s", Value(0.0), ANY, "0 m/s", "Its speed."),
+    row("gantry.initial.left_angle", "φ₁", "rad", Words("without strain of the belt"), ANY, "0 rad", "Angle of the left drive pulley (A)."),
+    row("gantry.initial.left_speed", "φ₁′", "rad/s", Words("without strain of the belt"), ANY, "0 rad/s", "Its speed."),
+    row("gantry.initial.left_current", "i₁", "A", Value(0.0), ANY, "0 A", "Current of the left motor; only where it does not follow at once."),
+    row("gantry.initial.right_angle", "φ₂", "rad", Words("without strain of the belt"), ANY, "0 rad", "Angle of the right drive pulley (B)."),
+    row("gantry.initial.right_speed", "φ₂′", "rad/s", Words("without strain of the belt"), ANY, "0 rad/s", "Its speed."),
+    row("gantry.initial.right_current", "i₂", "A", Value(0.0), ANY, "0 A", "Current of the right motor; only where it does not follow at once."),
+];
+
+#[rustfmt::skip]
 const INPUTS: &[Parameter] = &[
     row("input.step", "", INPUT, Required, ANY, "5 V", "Height of the step."),
     row("input.step.at", "", "s", Value(0.0), TIME, "0 s", "When it comes."),
@@ -672,6 +695,29 @@ const SECTIONS: &[(&str, &[&[Parameter]])] = &[
             ALONG,
         ],
     ),
+    (
+        "bridge",
+        &[
+            BRIDGE,
+            &friction!(
+                "bridge",
+                "b",
+                "F_c",
+                "F_b",
+                "N s/m",
+                "N",
+                "15 N s/m",
+                "1 N",
+                "1.5 N",
+                "m/s",
+                "0.01 m/s",
+                "s^2/m^2",
+                "1e4 s^2/m^2",
+                "N/m",
+                "100 kN/m"
+            ),
+        ],
+    ),
     ("belt", &[BELT]),
     ("travel", &[TRAVEL]),
     ("encoder", &[ENCODER]),
@@ -689,6 +735,7 @@ const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     ),
     ("experiment", &[EXPERIMENT]),
     ("experiment.initial", &[INITIAL]),
+    ("gantry.initial", &[GANTRY_INITIAL]),
     ("experiment.log", &[LOG]),
     ("input", &[INPUTS]),
     ("controller", &[CONTROLLER]),

@@ -1,6 +1,7 @@
 //! What the machine is: motor, amplifier, pulleys, belt, cart, encoder, recorder. Everything in SI units.
 
 pub mod axis;
+pub mod gantry;
 
 use crate::friction::{Along, Friction};
 pub use crate::mechanism::{Amplifier, AmplifierMode, GearPlay, Motor};

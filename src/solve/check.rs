@@ -2,6 +2,7 @@
 //!
 //! The case reader checks what is in a file, and says on which line; here it is what a program built by itself.
 
+use super::Course;
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::{Friction, Law};
@@ -236,9 +237,24 @@ fn too_fast(what: &str, rate: f64) -> Error {
         .allowed(format!("{:e} s and longer", 1.0 / FASTEST))
 }
 
-/// Refuses a run that has no rows, or no state to begin with.
-pub(super) fn experiment(mechanism: &Mechanism, experiment: &Experiment) -> Result<()> {
-    let &Experiment { until, every, ref initial, .. } = experiment;
+/// Refuses a run of a mechanism that has no rows, no input for each drive, or no state to begin with.
+pub(super) fn course(mechanism: &Mechanism, course: &Course) -> Result<()> {
+    times(course.until, course.every)?;
+    if course.inputs.len() != mechanism.drives.len() {
+        return Err(Error::new(format!("{} inputs cannot be", course.inputs.len()))
+            .allowed(format!("one for each drive: {}", mechanism.drives.len())));
+    }
+    let start = &course.start;
+    match start.position.iter().chain(&start.speed).chain(&start.current).find(|value| !value.is_finite()) {
+        Some(value) => {
+            Err(Error::new(format!("the state at the start cannot be {value}")).allowed("any finite number"))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Refuses a run that has no rows.
+fn times(until: f64, every: f64) -> Result<()> {
     if !(until.is_finite() && every.is_finite() && until > 0.0 && every > 0.0) {
         return Err(Error::new(format!("a run of {until:e} s with a row every {every:e} s cannot be"))
             .allowed("a length and an interval above zero"));
@@ -247,6 +263,13 @@ pub(super) fn experiment(mechanism: &Mechanism, experiment: &Experiment) -> Resu
         return Err(Error::new(format!("a row every {every:e} s makes more than {MOST_ROWS:e} rows"))
             .next("choose a longer interval"));
     }
+    Ok(())
+}
+
+/// Refuses a run that has no rows, or no state to begin with.
+pub(super) fn experiment(mechanism: &Mechanism, experiment: &Experiment) -> Result<()> {
+    let &Experiment { until, every, ref initial, .. } = experiment;
+    times(until, every)?;
     let state = [
         initial.drive_angle,
         initial.drive_speed,

@@ -22,7 +22,7 @@ pub use estimate::ErrorEstimate;
 pub use inputs::Pieces;
 use observe::Output;
 pub use observe::{Curve, Gap, Observe, Polynomial, QUANTITIES, Reading, TERMS, reading};
-pub use run::Run;
+pub use run::{Course, Run};
 
 use crate::case::Experiment;
 use crate::error::{Error, Result};
@@ -383,6 +383,20 @@ fn run(stage: &Stage, experiment: &Experiment, solver: Solver, output: Output) -
         return table3::run(stage, &mechanism, experiment, step, method, output);
     }
     Ok(go(&mechanism, experiment, solver, exact::Known::default(), output)?.0)
+}
+
+/// Runs a mechanism along its inputs, and hands rows to `sink` and all that is between them to `observer`: what [`stream_observed`] does,
+/// for a machine that is no axis.
+pub fn stream_mechanism(
+    mechanism: &Mechanism,
+    course: &Course,
+    solver: Solver,
+    (detail, observer): (Detail, Option<&mut dyn Observe>),
+    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+) -> Result<Outcome> {
+    let observer = observer.map(|observer| -> &mut dyn Observe { observer });
+    let run = Run::of_mechanism(mechanism, course, solver, (detail, observer), sink)?;
+    Ok(run.along(&course.inputs).0)
 }
 
 /// Runs an experiment that was checked along its own input.

@@ -20,6 +20,19 @@ pub(super) struct Start {
     pub(super) every: f64,
 }
 
+/// What is done with a mechanism in one run.
+#[derive(Debug, Clone)]
+pub struct Course {
+    /// What is fed into each drive's amplifier.
+    pub inputs: Vec<Signal>,
+    /// The state at time zero.
+    pub start: State,
+    /// End of the run, s.
+    pub until: f64,
+    /// Output interval, s.
+    pub every: f64,
+}
+
 /// A run of one of the solvers.
 pub(super) trait Running {
     /// Takes up new inputs, now.
@@ -141,6 +154,21 @@ impl<'a> Run<'a> {
             }
         };
         Ok(Self { running, end })
+    }
+
+    /// A run of a mechanism that is no stage of an axis. Errors: what the solver does not take.
+    pub fn of_mechanism(
+        mechanism: &Mechanism,
+        course: &Course,
+        solver: Solver,
+        (detail, observer): (Detail, Option<&'a mut dyn Observe>),
+        sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
+    ) -> Result<Self> {
+        check::course(mechanism, course)?;
+        let start = Start { state: course.start, until: course.until, every: course.every };
+        let straight = course.inputs.iter().all(|input| input.degree() <= 1);
+        let output = Output { detail, sink, observer };
+        Self::of(&Arc::new(mechanism.clone()), &start, (solver, straight), Known::default(), output)
     }
 
     /// Takes up new inputs, from now on.
