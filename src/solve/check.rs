@@ -6,7 +6,7 @@ use super::Course;
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::{Friction, Law};
-use crate::mechanism::{AmplifierMode, Mechanism, SpringLaw};
+use crate::mechanism::{AmplifierMode, Mechanism, SpringLaw, State};
 use crate::stage::axis::{CART, DRIVE, LABELS};
 use crate::stage::{BeltModel, Stage};
 use std::f64::consts::PI;
@@ -244,7 +244,11 @@ pub(super) fn course(mechanism: &Mechanism, course: &Course) -> Result<()> {
         return Err(Error::new(format!("{} inputs cannot be", course.inputs.len()))
             .allowed(format!("one for each drive: {}", mechanism.drives.len())));
     }
-    let start = &course.start;
+    state(&course.start)
+}
+
+/// Refuses a state that is none.
+pub(super) fn state(start: &State) -> Result<()> {
     match start.position.iter().chain(&start.speed).chain(&start.current).find(|value| !value.is_finite()) {
         Some(value) => {
             Err(Error::new(format!("the state at the start cannot be {value}")).allowed("any finite number"))

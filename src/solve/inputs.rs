@@ -36,6 +36,25 @@ impl Pieces {
         pieces
     }
 
+    /// The same from `time` on: powers count from there.
+    pub fn since(&self, time: f64) -> Self {
+        let by = time - self.start;
+        Self { start: time, end: self.end, coefficients: self.coefficients.map(|c| Self::shifted(&c, by)) }
+    }
+
+    /// Coefficients in powers of (τ − `by`) of Σ c_k τᵏ: Horner's rule, again and again.
+    pub(super) fn shifted(coefficients: &[f64; DEGREE + 1], by: f64) -> [f64; DEGREE + 1] {
+        let mut shifted = *coefficients;
+        if by != 0.0 {
+            for i in 0..DEGREE {
+                for k in (i..DEGREE).rev() {
+                    shifted[k] += by * shifted[k + 1];
+                }
+            }
+        }
+        shifted
+    }
+
     /// The highest power of time in any of them.
     pub fn degree(&self) -> usize {
         self.pieces().map(|piece| piece.degree()).max().unwrap_or(0)

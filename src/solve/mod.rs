@@ -7,6 +7,7 @@ mod estimate;
 mod exact;
 mod general;
 mod inputs;
+mod machine;
 mod observe;
 mod pace;
 mod propagator;
@@ -21,6 +22,7 @@ pub use choice::{Choice, Kind};
 pub use estimate::ErrorEstimate;
 pub use inputs::Pieces;
 use observe::Output;
+pub use machine::Machine;
 pub use observe::{Curve, Gap, Observe, Polynomial, QUANTITIES, Reading, TERMS, reading};
 pub use run::{Course, Run};
 

@@ -18,6 +18,7 @@ use super::inputs::Pieces;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
 use super::propagator::SERIES_ORDER;
 use super::roots;
+use super::record::Extra;
 use super::rounding::Rounding;
 use super::{Cost, Ending, Event, PositionError};
 use crate::mechanism::{Cause, DRIVES, Form, Mechanism, Mode, State};
@@ -223,6 +224,149 @@ impl<const R: usize, const C: usize> Core<R, C> {
         self.rounding.bound(steps, self.time(), origin)
     }
 
+    /// The mechanism, its ways counted from where it began.
+    pub(super) fn mechanism(&self) -> &Mechanism {
+        &self.mechanism
+    }
+
+    /// What a row shows beyond the linear equations: nothing.
+    pub(super) fn extra(&self) -> Extra {
+        Extra::default()
+    }
+
+    /// Takes up new inputs, and what they bring about at once.
+    pub(super) fn take_input(&mut self, pieces: &Pieces) {
+        self.set_input(pieces);
+        self.resolve();
+    }
+
+    /// Bounds how fast the inputs change until `until`.
+    pub(super) fn bound_input(&mut self, pieces: &Pieces, until: f64) {
+        let rest = pieces.since(self.time());
+        for drive in 0..self.space.layout.inputs {
+            let length = until - self.time();
+            (self.input_rate[drive], self.input_curvature[drive]) = change_rates(&rest.coefficients[drive], length);
+        }
+    }
+
+    /// Goes on to `until` and adds the events on the way to `events`.
+    pub(super) fn go_to(&mut self, until: f64, events: &mut Vec<Event>) -> Result<(), Ending> {
+        self.end = until;
+        (self.questions, self.pace) = (0, Pace::default());
+        self.count_from(self.time());
+        let length = until - self.base;
+        // What a sum of decimal times may be off by; no part of the interval, which may be long.
+        let near = (8.0 * f64::EPSILON * until.abs()).min(1e-9 * self.h);
+        while length - self.offset > near && self.trouble.is_none() {
+            self.check();
+            // Halves, quarters and eighths of the interval, for which there are matrices, are hit to the last bit.
+            let (left, eighth) = (length - self.offset, 0.125 * self.h);
+            let snapped = (left / eighth).round() * eighth;
+            let left = if (left - snapped).abs() <= near { snapped } else { left };
+            let matrices = Arc::clone(&self.matrices);
+            let y = matrices.rate(&self.z);
+            let safe = match left >= self.h {
+                true => self.safe_intervals((left / self.h) as u64, &y),
+                false => 0,
+            };
+            if safe > 0 {
+                let step = matrices.step(0);
+                (0..safe).for_each(|_| step.advance(&mut self.z));
+                self.cost.steps += safe;
+                self.move_on(safe as f64 * self.h);
+                continue;
+            }
+            if let Some(cause) = self.advance(left.min(self.h)) {
+                self.change(cause);
+                self.resolve();
+            } else if left <= self.h && !self.asks && self.trouble.is_none() {
+                break;
+            }
+            self.asks = false;
+        }
+        self.check();
+        let inner = self.inner();
+        self.rounding.see(&self.space.layout, &self.mechanism, &inner);
+        self.handed_on += self.events.len();
+        events.append(&mut self.events);
+        match self.trouble {
+            Some(ending) => Err(ending),
+            None => {
+                self.count_from(until.max(self.base));
+                Ok(())
+            }
+        }
+    }
+
+    /// The same with room for `R2` moving places: for inputs that bend.
+    pub(super) fn smooth<const R2: usize, const C2: usize>(self) -> Core<R2, C2> {
+        let space = Arc::new(Space::new(&self.mechanism, true));
+        let mut z = [0.0; C2];
+        z[..space.layout.states].copy_from_slice(&self.z[..space.layout.states]);
+        for drive in 0..space.layout.inputs {
+            for k in 0..=self.space.highest {
+                z[space.chain::<R2>(drive, k)] = self.z[self.space.chain::<R>(drive, k)];
+            }
+        }
+        z[C2 - 1] = 1.0;
+        let mut known = Vec::new();
+        let (matrices, _) = ModeMatrices::of(&mut known, &self.mechanism, &space, &self.mode, self.h);
+        let Self {
+            mechanism,
+            coordinates,
+            h,
+            mode,
+            fresh,
+            tolerance,
+            at_edge,
+            input_rate,
+            input_curvature,
+            base,
+            offset,
+            events,
+            handed_on,
+            since_change,
+            changes,
+            cost,
+            rounding,
+            questions,
+            pace,
+            end,
+            asks,
+            trouble,
+            ..
+        } = self;
+        Core {
+            mechanism,
+            space,
+            coordinates,
+            h,
+            z,
+            mode,
+            matrices,
+            known,
+            shared: 0,
+            fresh,
+            tolerance,
+            at_edge,
+            input_rate,
+            input_curvature,
+            base,
+            offset,
+            events,
+            handed_on,
+            since_change,
+            changes,
+            cost,
+            rounding,
+            questions,
+            pace,
+            end,
+            asks,
+            trouble,
+        }
+    }
+
     /// Takes up new inputs.
     pub(super) fn set_input(&mut self, pieces: &Pieces) {
         self.cost.pieces += 1;
@@ -242,26 +386,14 @@ impl<const R: usize, const C: usize> Core<R, C> {
             (self.input_rate[drive], self.input_curvature[drive]) = (0.0, 0.0);
             return;
         }
-        let length = if length.is_finite() { length } else { 0.0 };
-        let (mut factorial, mut rate, mut curvature) = (1.0, 0.0, 0.0);
-        let (mut power1, mut power2) = (1.0, 1.0);
-        for (k, &c) in coefficients.iter().enumerate() {
-            let order = k as f64;
-            if k >= 1 {
-                factorial *= order;
-                rate += order * c.abs() * power1;
-                power1 *= length;
-            }
-            if k >= 2 {
-                curvature += order * (order - 1.0) * c.abs() * power2;
-                power2 *= length;
-            }
-            if k <= highest {
-                // u⁽ᵏ⁾ = k! c_k
-                self.z[self.space.chain::<R>(drive, k)] = c * factorial;
-            }
+        let mut factorial = 1.0;
+        for (k, &c) in coefficients.iter().enumerate().take(highest + 1) {
+            factorial *= k.max(1) as f64;
+            // u⁽ᵏ⁾ = k! c_k
+            self.z[self.space.chain::<R>(drive, k)] = c * factorial;
         }
-        (self.input_rate[drive], self.input_curvature[drive]) = (rate, curvature);
+        let length = if length.is_finite() { length } else { 0.0 };
+        (self.input_rate[drive], self.input_curvature[drive]) = change_rates(coefficients, length);
     }
 
     /// Notices a state that is no number any more.
@@ -494,6 +626,24 @@ impl<const R: usize, const C: usize> Core<R, C> {
     pub(super) fn value(&self, form: &Form) -> f64 {
         self.space.layout.value(form, &self.inner(), &self.input())
     }
+}
+
+/// Bounds of |u̇| and |ü| of Σ c_k τᵏ for τ up to `length`.
+fn change_rates(coefficients: &[f64], length: f64) -> (f64, f64) {
+    let (mut rate, mut curvature) = (0.0, 0.0);
+    let (mut power1, mut power2) = (1.0, 1.0);
+    for (k, c) in coefficients.iter().enumerate() {
+        let order = k as f64;
+        if k >= 1 {
+            rate += order * c.abs() * power1;
+            power1 *= length;
+        }
+        if k >= 2 {
+            curvature += order * (order - 1.0) * c.abs() * power2;
+            power2 *= length;
+        }
+    }
+    (rate, curvature)
 }
 
 /// Matrices computed so far.

@@ -14,6 +14,7 @@ mod stretch;
 use super::coordinates::Coordinates;
 use super::inputs::Pieces;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
+use super::record::Extra;
 use super::{Cost, Ending, Event};
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
@@ -107,6 +108,17 @@ trait Witness {
 
     /// Whether to go on.
     fn ask(&mut self) -> bool;
+}
+
+/// Nobody looks, and it goes on.
+struct Nobody;
+
+impl Witness for Nobody {
+    fn see(&mut self, _: &mut Core, _: &Field, _: (f64, f64, f64), _: &Vector, _: &dyn Fn(f64) -> Vector) {}
+
+    fn ask(&mut self) -> bool {
+        true
+    }
 }
 
 /// A guard that fell.
@@ -211,6 +223,38 @@ impl Core {
             self.change(hit.cause);
             self.resolve();
         }
+    }
+
+    /// The mechanism, its ways counted from where it began.
+    pub(super) fn mechanism(&self) -> &Mechanism {
+        &self.model.mechanism
+    }
+
+    /// What a row shows beyond the linear equations.
+    pub(super) fn extra(&self) -> Extra {
+        let inner = self.model.inner(&self.y);
+        self.model.extra(&self.mode, &inner, &self.model.layout.stretches(&inner), &self.y).0
+    }
+
+    /// Takes up new inputs, and what they bring about at once.
+    pub(super) fn take_input(&mut self, pieces: &Pieces) {
+        self.take_up(Stretch::of(*pieces, f64::INFINITY), false);
+    }
+
+    /// Steps are as short as the inputs need by themselves.
+    pub(super) fn bound_input(&mut self, _: &Pieces, _: f64) {}
+
+    /// Goes on to `until` and adds the events on the way to `events`.
+    pub(super) fn go_to(&mut self, until: f64, events: &mut Vec<Event>) -> std::result::Result<(), Ending> {
+        self.end = until;
+        self.pace = Pace::since(self.cost.steps, self.time());
+        self.stretch.end = until;
+        if self.trouble.is_none() && self.tau < self.stretch.length() {
+            self.reach(&mut Nobody);
+        }
+        self.handed_on += self.events.len();
+        events.append(&mut self.events);
+        self.trouble.map_or(Ok(()), Err)
     }
 
     /// The state in angles and positions.
