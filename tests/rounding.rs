@@ -303,7 +303,12 @@ fn what_the_hunt_found_stays_found() {
             if moved(&exact) != moved(&general)
                 || first(&exact).is_some_and(|t| t < 1e-12) != first(&general).is_some_and(|t| t < 1e-12)
             {
-                faults.push(format!("{name}: {} begins at {:?} and {:?}", LABELS[body].name, first(&exact), first(&general)));
+                faults.push(format!(
+                    "{name}: {} begins at {:?} and {:?}",
+                    LABELS[body].name,
+                    first(&exact),
+                    first(&general)
+                ));
             }
         }
     }

@@ -83,7 +83,11 @@ fn same(a: &[Event], b: &[Event], tolerance: f64) -> Result<(), TestCaseError> {
 
 fn shares() -> impl Strategy<Value = Vec<f64>> {
     // Whole intervals, halves, and anything.
-    let share = prop_oneof![(1..200_u32).prop_map(|k| f64::from(k) / 200.0), (1..800_u32).prop_map(|k| f64::from(k) / 800.0), 0.0..1.0_f64];
+    let share = prop_oneof![
+        (1..200_u32).prop_map(|k| f64::from(k) / 200.0),
+        (1..800_u32).prop_map(|k| f64::from(k) / 800.0),
+        0.0..1.0_f64
+    ];
     prop::collection::vec(share, 1..40)
 }
 

@@ -80,10 +80,9 @@ pub(super) fn kind(root: &Table) -> Result<Option<Routing>> {
 pub(super) fn no_axis(root: &Table, routing: Routing) -> Error {
     let field = root.optional("kind").unwrap_or_else(|| root.field.clone());
     let what = format!("this needs a single axis, and the case describes a gantry ({})", routing.name());
-    field
-        .fail(what)
-        .allowed("kind = \"axis\", or no kind at all")
-        .next("`taut simulate`, `taut modes` and `taut sweep` take gantries; control, fit and tuning of them are yet to come")
+    field.fail(what).allowed("kind = \"axis\", or no kind at all").next(
+        "`taut simulate`, `taut modes` and `taut sweep` take gantries; control, fit and tuning of them are yet to come",
+    )
 }
 
 impl GantryCase {
@@ -236,8 +235,7 @@ fn belts(table: &Table, routing: Routing) -> Result<Belts> {
     let count = labels.len();
     let per_span = format!("{count} values: {}", labels.join(", "));
     let pretension = table.number_if_given("pretension")?;
-    let damping =
-        table.optional("damping").map_or(Ok(vec![0.0; count]), |field| field.numbers(count, &per_span))?;
+    let damping = table.optional("damping").map_or(Ok(vec![0.0; count]), |field| field.numbers(count, &per_span))?;
     let follows = table.optional("follows_cart").map_or(Ok(false), |field| field.truth())?;
     let make = ["modulus", "section", "spans"];
     if let Some(stiffness) = table.optional("stiffness") {
@@ -261,8 +259,7 @@ fn belts(table: &Table, routing: Routing) -> Result<Belts> {
     let modulus = stage::modulus(&table.required("modulus", "for example modulus = \"8.335 GPa\"")?)?;
     let section = stage::section(&table.required("section", "for example section = \"5.5626 mm^2\"")?)?;
     let spans = vec!["\"0.5 m\""; count].join(", ");
-    let lengths =
-        table.required("spans", &format!("for example spans = [{spans}]"))?.numbers(count, &per_span)?;
+    let lengths = table.required("spans", &format!("for example spans = [{spans}]"))?.numbers(count, &per_span)?;
     let rigidity = modulus * section;
     // k = A E / l                                                                  (11)
     let stiffness: Vec<f64> = lengths.iter().map(|length| rigidity / length).collect();
@@ -301,7 +298,10 @@ fn experiment(field: &Field, gantry: &Gantry, folder: &Folder) -> Result<GantryE
     let sides = ["left", "right"];
     if let Some(key) = inputs.keys().find(|key| !sides.contains(key)) {
         let field = inputs.optional(key).unwrap_or_else(|| inputs.field.clone());
-        return Err(field.fail(format!("a gantry has two inputs, and `{key}` is none of them")).allowed("left, right").next(such_as));
+        return Err(field
+            .fail(format!("a gantry has two inputs, and `{key}` is none of them"))
+            .allowed("left, right")
+            .next(such_as));
     }
     let signal = |side: usize| match inputs.optional(sides[side]) {
         None => Ok(Signal::Step { value: 0.0, at: 0.0 }),

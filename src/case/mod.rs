@@ -132,7 +132,12 @@ impl Initial {
         let mut state = State::default();
         let has_current = mechanism.drives.iter().any(|drive| drive.has_current_state());
         // The rotor in the middle of its play.
-        state.position[..4].copy_from_slice(&[self.drive_angle, self.cart_position, self.idler_angle, self.drive_angle]);
+        state.position[..4].copy_from_slice(&[
+            self.drive_angle,
+            self.cart_position,
+            self.idler_angle,
+            self.drive_angle,
+        ]);
         state.speed[..4].copy_from_slice(&[self.drive_speed, self.cart_speed, self.idler_speed, self.drive_speed]);
         state.current[0] = if has_current { self.motor_current } else { 0.0 };
         state

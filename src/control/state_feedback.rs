@@ -2,14 +2,14 @@
 
 use super::compensation::{Compensation, Rigid};
 use super::model::Linear;
+use super::model::Quantity;
 use super::riccati;
 use super::sampled::Sensor;
 use crate::design::{Design, StateFeedback};
 use crate::error::Result;
-use super::model::Quantity;
-use crate::stage::axis::{CART, IDLER};
 use crate::signal::profile::Reference;
 use crate::stage::Stage;
+use crate::stage::axis::{CART, IDLER};
 use nalgebra::{DMatrix, DVector};
 
 /// A linear-quadratic regulator on the states that a Kalman filter estimates, both for the sampled axis with its delay.

@@ -27,7 +27,8 @@ pub fn modes(analysis: &Analysis) -> Value {
             })
         })
         .collect();
-    let stuck: Vec<&str> = operation.held.iter().zip(LABELS).filter(|(held, _)| **held).map(|(_, label)| label.key).collect();
+    let stuck: Vec<&str> =
+        operation.held.iter().zip(LABELS).filter(|(held, _)| **held).map(|(_, label)| label.key).collect();
     json!({
         "title": analysis.case.title,
         "version": env!("CARGO_PKG_VERSION"),

@@ -287,7 +287,12 @@ impl Metrics {
     pub fn of(metrics: &metrics::Metrics, mode: AmplifierMode) -> Self {
         let count = |body: usize| {
             let count = metrics.events[body];
-            CountTold { body: axis::LABELS[body].key, stops: count.stops, starts: count.starts, reversals: count.reversals }
+            CountTold {
+                body: axis::LABELS[body].key,
+                stops: count.stops,
+                starts: count.starts,
+                reversals: count.reversals,
+            }
         };
         Self {
             end_time_s: metrics.end,

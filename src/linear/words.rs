@@ -2,8 +2,8 @@
 
 use super::Operation;
 use crate::friction::Law;
-use crate::number::engineering_ascii;
 use crate::mechanism::Mechanism;
+use crate::number::engineering_ascii;
 use crate::stage::axis::{BODIES, CART};
 use crate::stage::{BeltModel, Stage};
 

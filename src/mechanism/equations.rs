@@ -87,9 +87,7 @@ impl Mechanism {
         };
         match (0..self.drives.len()).find(is_behind) {
             None => 1.0,
-            Some(drive) => {
-                1.0 / self.gear_factor(drive, forward, self.is_gear_torque_positive(drive, spring, mode))
-            }
+            Some(drive) => 1.0 / self.gear_factor(drive, forward, self.is_gear_torque_positive(drive, spring, mode)),
         }
     }
 

@@ -75,7 +75,8 @@ impl Layout {
             let size: f64 = row.iter().map(|arm| arm.abs()).sum();
             let (mut left, mut weight) = (row, [0.0; BODIES]);
             // What is left of the row when the lengths taken so far are subtracted, weight by weight.
-            while let Some((body, by)) = (0..bodies).find_map(|b| taken[b].filter(|_| left[b] != 0.0).map(|by| (b, by))) {
+            while let Some((body, by)) = (0..bodies).find_map(|b| taken[b].filter(|_| left[b] != 0.0).map(|by| (b, by)))
+            {
                 let factor = left[body] / by[body];
                 weight[body] += factor;
                 for (left, by) in left.iter_mut().zip(by) {

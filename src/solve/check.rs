@@ -226,7 +226,10 @@ fn one_law_each(stage: &Stage) -> Result<()> {
                 "in this model of the belt the {} moves as one with others, whose friction laws cannot be added up",
                 LABELS[leader].name
             ))
-            .allowed(format!("such a law for the {} alone, or Coulomb friction for all of them", LABELS[leader].name)));
+            .allowed(format!(
+                "such a law for the {} alone, or Coulomb friction for all of them",
+                LABELS[leader].name
+            )));
         }
     }
     Ok(())

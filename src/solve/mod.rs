@@ -21,8 +21,8 @@ pub use crate::trajectory::Grid;
 pub use choice::{Choice, Kind};
 pub use estimate::ErrorEstimate;
 pub use inputs::Pieces;
-use observe::Output;
 pub use machine::Machine;
+use observe::Output;
 pub use observe::{Curve, Gap, Observe, Polynomial, QUANTITIES, Reading, TERMS, reading};
 pub use run::{Course, Run};
 

@@ -78,11 +78,7 @@ struct Source {
 }
 
 impl<'a> Recorder<'a> {
-    pub(crate) fn new(
-        mechanism: &Arc<Mechanism>,
-        grid: Grid,
-        Output { detail, sink, observer }: Output<'a>,
-    ) -> Self {
+    pub(crate) fn new(mechanism: &Arc<Mechanism>, grid: Grid, Output { detail, sink, observer }: Output<'a>) -> Self {
         let shown = |heading: &&Heading| detail == Detail::Full || heading.lean;
         let columns: Vec<Heading> = mechanism.columns.iter().filter(shown).cloned().collect();
         let empty = |heading: &Heading| Column {

@@ -10,10 +10,10 @@ use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::Motion;
 use crate::mechanism::{DRIVES, Form, Layout, Mechanism, Mode, State};
+use crate::signal::Piece;
 use crate::stage::Stage;
 use crate::stage::axis::BODIES;
 use std::sync::Arc;
-use crate::signal::Piece;
 
 /// Half-width of Table 3's band of "zero" speed, rad/s for the pulleys and m/s for the cart.
 const BAND: f64 = 0.01;
@@ -213,7 +213,12 @@ impl<'a> Model<'a> {
 
 /// `state` + `h` Σ weight · rate.
 fn moved(state: &State, h: f64, rates: &[(f64, &State)]) -> State {
-    fn add<const N: usize>(values: &[f64; N], h: f64, rates: &[(f64, &State)], of: fn(&State) -> &[f64; N]) -> [f64; N] {
+    fn add<const N: usize>(
+        values: &[f64; N],
+        h: f64,
+        rates: &[(f64, &State)],
+        of: fn(&State) -> &[f64; N],
+    ) -> [f64; N] {
         std::array::from_fn(|j| values[j] + h * rates.iter().map(|(weight, rate)| weight * of(rate)[j]).sum::<f64>())
     }
     State {

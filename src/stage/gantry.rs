@@ -17,7 +17,9 @@
 use super::{Encoder, EncoderPlace, Pulley, Travel};
 use crate::error::{Error, Result};
 use crate::friction::{Friction, Law};
-use crate::mechanism::{Amplifier, Body, Drive, Follows, Heading, Kind, Label, Mechanism, Motor, Shown, Spring, SpringLaw};
+use crate::mechanism::{
+    Amplifier, Body, Drive, Follows, Heading, Kind, Label, Mechanism, Motor, Shown, Spring, SpringLaw,
+};
 
 /// Number of the left drive pulley (A) among the bodies.
 pub const LEFT: usize = 0;
@@ -196,9 +198,12 @@ impl Gantry {
             for (x, y) in [across.min, across.max].into_iter().flat_map(|x| [(x, along.min), (x, along.max)]) {
                 for (length, label) in self.lengths(x, y).into_iter().flatten().zip(self.routing.spans()) {
                     if length <= 0.0 {
-                        return Err(Error::new(format!("with the bridge at {x} m and the cart at {y} m the {} has no length left", label.name))
-                            .allowed("a travel that leaves something of every span")
-                            .next("make the travel shorter, or the spans longer"));
+                        return Err(Error::new(format!(
+                            "with the bridge at {x} m and the cart at {y} m the {} has no length left",
+                            label.name
+                        ))
+                        .allowed("a travel that leaves something of every span")
+                        .next("make the travel shorter, or the spans longer"));
                     }
                 }
             }
@@ -319,7 +324,12 @@ impl Gantry {
             add(format!("{}_force", label.key), "N", Shown::Force(span, 1.0), true);
         }
         for (body, label) in LABELS.into_iter().enumerate() {
-            add(format!("{}_friction", label.key), mechanism.bodies[body].kind.units()[2], Shown::Friction(body), false);
+            add(
+                format!("{}_friction", label.key),
+                mechanism.bodies[body].kind.units()[2],
+                Shown::Friction(body),
+                false,
+            );
         }
         for (body, label) in LABELS.into_iter().enumerate() {
             add(format!("{}_state", label.key), "", Shown::Motion(body), true);
@@ -359,7 +369,12 @@ impl Gantry {
         }
         for (body, label) in LABELS.into_iter().enumerate() {
             if matches!(mechanism.friction(body).law, Law::LuGre { .. }) {
-                add(format!("{}_bristle", label.key), mechanism.bodies[body].kind.units()[0], Shown::Bristle(body), false);
+                add(
+                    format!("{}_bristle", label.key),
+                    mechanism.bodies[body].kind.units()[0],
+                    Shown::Bristle(body),
+                    false,
+                );
             }
         }
         columns

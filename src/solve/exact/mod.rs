@@ -17,8 +17,8 @@ use super::coordinates::Coordinates;
 use super::inputs::Pieces;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
 use super::propagator::SERIES_ORDER;
-use super::roots;
 use super::record::Extra;
+use super::roots;
 use super::rounding::Rounding;
 use super::{Cost, Ending, Event, PositionError};
 use crate::mechanism::{Cause, DRIVES, Form, Mechanism, Mode, State};
@@ -490,7 +490,9 @@ impl<const R: usize, const C: usize> Core<R, C> {
                 self.move_on(length);
                 None
             }
-            Bound::Unsure if level < law.finest => self.cross_interval(law, level + 1).or_else(|| self.cross_interval(law, level + 1)),
+            Bound::Unsure if level < law.finest => {
+                self.cross_interval(law, level + 1).or_else(|| self.cross_interval(law, level + 1))
+            }
             Bound::Unsure => self.advance_by_series(law, length),
         }
     }
@@ -524,8 +526,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
         let y = law.rate(&self.z);
         let grow = law.growth_over(length);
         let (size, push) = (law.size(&y), law.push(&self.input_rate) * length);
-        let steepness =
-            |guard: &Watch<C>| grow * law.steepness(guard, size, push) + guard.at_once(&self.input_rate);
+        let steepness = |guard: &Watch<C>| grow * law.steepness(guard, size, push) + guard.at_once(&self.input_rate);
         let undecided = |g: f64, steepness: f64| !(g > steepness * length || (g >= 0.0 && steepness == 0.0));
         if !law.guards.iter().any(|guard| undecided(self.standing(guard), steepness(guard))) {
             return Bound::Safe(None);

@@ -18,7 +18,9 @@ use super::record::Extra;
 use super::{Cost, Ending, Event};
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
-use crate::mechanism::{AmplifierMode, Cause, DRIVES, Kind, Layout, Limit, Mechanism, Mode, Part, State, Status, Switch};
+use crate::mechanism::{
+    AmplifierMode, Cause, DRIVES, Kind, Layout, Limit, Mechanism, Mode, Part, State, Status, Switch,
+};
 use crate::mechanism::{Form, What};
 use fall::NODES;
 use ivp::dense::StepInterpolant;

@@ -2,7 +2,9 @@
 
 use super::stretch::Stretch;
 use crate::friction::{Law, Motion};
-use crate::mechanism::{BODIES, Cause, DRIVES, Equations, Form, Layout, Mechanism, Mode, ROUNDING, SPRINGS, State, Switch};
+use crate::mechanism::{
+    BODIES, Cause, DRIVES, Equations, Form, Layout, Mechanism, Mode, ROUNDING, SPRINGS, State, Switch,
+};
 use crate::solve::record::Extra;
 use ivp::prelude::FirstOrderSystem;
 use std::cell::Cell;
@@ -124,7 +126,8 @@ impl Model {
     #[inline(always)]
     fn loads(&self, beyond: &[f64; SPRINGS]) -> [f64; BODIES] {
         let mut loads = [0.0; BODIES];
-        for (spring, force) in self.mechanism.springs.iter().zip(beyond).filter(|(spring, _)| spring.follows.is_some()) {
+        for (spring, force) in self.mechanism.springs.iter().zip(beyond).filter(|(spring, _)| spring.follows.is_some())
+        {
             for &(body, arm) in &spring.arms {
                 loads[self.mechanism.leader(body)] -= self.mechanism.ratio(body) * arm * force;
             }
@@ -166,7 +169,13 @@ impl Model {
 
     /// What the laws and the belt add to the linear equations, and how the bristles move.
     #[inline(always)]
-    pub(super) fn extra(&self, mode: &Mode, inner: &State, stretch: &[f64; SPRINGS], y: &[f64]) -> (Extra, [f64; BODIES]) {
+    pub(super) fn extra(
+        &self,
+        mode: &Mode,
+        inner: &State,
+        stretch: &[f64; SPRINGS],
+        y: &[f64],
+    ) -> (Extra, [f64; BODIES]) {
         let mut rates = [0.0; BODIES];
         if !self.adds {
             return (Extra::default(), rates);
@@ -288,7 +297,13 @@ impl<'a> Field<'a> {
                         -sign * part.motor.rotor_inertia * part.motor.gear_ratio * change
                     }
                     // A tension that follows the bodies.
-                    Cause::Switch(Switch::Span(spring, to)) => if to { beyond[spring] } else { -beyond[spring] },
+                    Cause::Switch(Switch::Span(spring, to)) => {
+                        if to {
+                            beyond[spring]
+                        } else {
+                            -beyond[spring]
+                        }
+                    }
                     // Neither laws nor spans that follow bear on these.
                     Cause::Switch(_) | Cause::Leave(_) => 0.0,
                 };
