@@ -288,12 +288,7 @@ fn body_events(run: &Solution) -> Vec<Event> {
     };
     let of_bodies = run.outcome.events.iter().filter_map(|event| Some((event, event.body()?)));
     of_bodies
-        .map(|(event, body)| Event {
-            time: event.time,
-            body,
-            from: motion(event.from),
-            to: motion(event.to),
-        })
+        .map(|(event, body)| Event { time: event.time, body, from: motion(event.from), to: motion(event.to) })
         .collect()
 }
 

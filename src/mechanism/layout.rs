@@ -103,6 +103,7 @@ impl Layout {
             weights.push(weight);
         }
         for (spring, weight) in weights.iter().enumerate() {
+            assert!(weight.iter().filter(|weight| **weight != 0.0).count() <= 2, "a length of two coordinates at most");
             layout.terms.extend((0..bodies).filter(|&b| weight[b] != 0.0).map(|b| (spring, b, weight[b])));
         }
         layout

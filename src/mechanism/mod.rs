@@ -21,11 +21,13 @@ pub use drive::{Amplifier, AmplifierMode, GearPlay, Motor};
 pub use equations::Equations;
 pub use form::Form;
 pub(crate) use form::ROUNDING;
-pub(crate) use layout::Layout;
+pub(crate) use layout::{Layout, Replaced};
 pub use mode::{Cause, Contact, DriveMode, Guard, Limit, Mode, Part, Status, Switch, What};
 pub use power::Power;
 
 use crate::friction::{Along, Friction};
+use std::borrow::Cow;
+use std::sync::Arc;
 
 /// Room for bodies.
 pub const BODIES: usize = 6;
@@ -241,7 +243,7 @@ pub enum Shown {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Heading {
     /// Its name.
-    pub name: String,
+    pub name: Cow<'static, str>,
     /// Its unit.
     pub unit: &'static str,
     /// What stands in it.
@@ -365,9 +367,9 @@ impl Mechanism {
         rate
     }
 
-    /// The state of rest at the origin, each rotor in the middle of its play.
-    pub fn at_rest(&self) -> State {
-        State::default()
+    /// The same as [`Mechanism::seen_from`], itself where that is where it counts from already.
+    pub(crate) fn seen_by(self: &Arc<Self>, layout: &Layout, start: &State) -> Arc<Self> {
+        if layout.origin(start) == self.origin { Arc::clone(self) } else { Arc::new(self.seen_from(layout, start)) }
     }
 
     /// The same with ways counted from where `start` is: ends and bounds move there, before anything is multiplied with them.

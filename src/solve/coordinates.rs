@@ -5,7 +5,8 @@
 //! ```
 
 use crate::friction::Motion;
-use crate::mechanism::{BODIES, Layout, Mode, State};
+use crate::mechanism::{BODIES, Layout, Mode, Replaced, State};
+use std::ops::Range;
 
 /// Parts of the last place by which positions at the start may contradict each other and still mean a belt without strain.
 const LAST_PLACES: f64 = 4.0;
@@ -46,6 +47,11 @@ impl Coordinates {
         (Self { start: *start, origin, strain, held: [None; BODIES] }, inner)
     }
 
+    /// The same where angles are as in `state`, whatever lengths say.
+    pub(crate) fn at(&self, state: &State) -> Self {
+        Self { held: state.position.map(Some), ..self.clone() }
+    }
+
     /// Where ways are counted from.
     pub(crate) fn origin(&self) -> &[f64; BODIES] {
         &self.origin
@@ -78,6 +84,24 @@ impl Coordinates {
             };
         }
         state
+    }
+
+    /// The ways of a body whose place a length takes, in these rows: `own` has that length, `others` has coordinates, and ways of those
+    /// that are placed already.
+    pub(crate) fn place(&self, replaced: &Replaced, own: &mut [f64], others: &[Vec<f64>; BODIES], rows: Range<usize>) {
+        let body = replaced.body;
+        let own = &mut own[rows.clone()];
+        if let Some(angle) = self.held[body] {
+            own.fill(angle);
+            return;
+        }
+        let begin = if replaced.on_replaced { 0.0 } else { self.strain[body] };
+        own.iter_mut().for_each(|length| *length -= begin);
+        for &(other, arm) in &replaced.others {
+            own.iter_mut().zip(&others[other][rows.clone()]).for_each(|(length, way)| *length -= arm * way);
+        }
+        let start = if replaced.on_replaced { 0.0 } else { self.start.position[body] };
+        own.iter_mut().for_each(|change| *change = start + *change / replaced.own);
     }
 
     /// Remembers the angles of pulleys that have come to rest in `mode`, and forgets those of pulleys that move.

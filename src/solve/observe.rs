@@ -1,8 +1,7 @@
 //! A run seen without rows: what an [`Observe`]r is shown of the motion between events, changes of the input and rows.
 
-use super::propagator::Matrix;
 use super::{Detail, Flow};
-use crate::mechanism::{BODIES, DRIVES, Form, Layout, Mechanism, Mode, SPRINGS, Shown, State};
+use crate::mechanism::{BODIES, DRIVES, Form, Layout, Mechanism, Mode, Shown, State};
 use crate::trajectory::Trajectory;
 
 /// Number of quantities in a [`Reading`].
@@ -270,25 +269,10 @@ pub trait Observe {
 #[derive(Debug, Clone)]
 pub(super) struct Readout {
     pub(super) forms: [Form; QUANTITIES],
-    /// By coordinate, speed and current of the solvers, by input, and for one: what each adds to every quantity.
-    matrix: Matrix<QUANTITIES, ENTRIES>,
-    /// What stands in the entries.
-    entries: Vec<Entry>,
     /// Where a way is read off that is counted from its origin: the quantity, the body, its factor.
     ways: Vec<(usize, usize, f64)>,
     /// Limits of voltages and currents: what they hold is not beyond them by one bit.
     limits: Vec<(usize, f64)>,
-}
-
-/// Most entries that readings are made of: axes have up to four bodies, gantries six.
-const ENTRIES: usize = SPRINGS + BODIES + 2 * DRIVES + 1;
-
-#[derive(Debug, Clone, Copy)]
-enum Entry {
-    Stretch(usize),
-    Speed(usize),
-    Current(usize),
-    Input(usize),
 }
 
 impl Readout {
@@ -322,63 +306,31 @@ impl Readout {
                 _ => Form::ZERO,
             };
         }
-        let mut matrix = Matrix::zero();
-        let mut entries = Vec::new();
-        let all = (0..mechanism.springs.len()).map(Entry::Stretch);
-        let all = all.chain((0..mechanism.bodies.len()).map(Entry::Speed));
-        let drives = 0..mechanism.drives.len();
-        for entry in all.chain(drives.clone().map(Entry::Current)).chain(drives.map(Entry::Input)) {
-            let of = |form: &Form| match entry {
-                Entry::Stretch(spring) => form.stretch[spring],
-                Entry::Speed(body) => form.speed[body],
-                Entry::Current(drive) => form.current[drive],
-                Entry::Input(drive) => form.input[drive],
-            };
-            if forms.iter().any(|form| of(form) != 0.0) {
-                for (q, form) in forms.iter().enumerate() {
-                    matrix.set(q, entries.len(), of(form));
-                }
-                entries.push(entry);
-            }
-        }
-        for (q, form) in forms.iter().enumerate() {
-            matrix.set(q, entries.len(), form.constant);
-        }
-        Self { forms, matrix, entries, ways, limits }
+        Self { forms, ways, limits }
     }
 
-    /// What is read in a state in the solver's coordinates, whose ways are counted from `origin`, under `input`; with `one` = 0 the same
-    /// of a change of state and input.
+    /// The values of the forms, with ways from their origin and limits as they are.
     #[inline]
+    pub(super) fn placed(&self, mut reading: Reading, origin: &[f64; BODIES]) -> Reading {
+        for &(q, body, factor) in &self.ways {
+            reading[q] += origin[body] * factor;
+        }
+        for &(q, limit) in &self.limits {
+            reading[q] = reading[q].clamp(-limit, limit);
+        }
+        reading
+    }
+
+    /// What is read in a state in the solver's coordinates, whose ways are counted from `origin`, under `input`.
     pub(super) fn read(
         &self,
         layout: &Layout,
         inner: &State,
         origin: &[f64; BODIES],
         input: &[f64; DRIVES],
-        one: f64,
     ) -> Reading {
         let stretch = layout.stretches(inner);
-        let mut entries = [0.0; ENTRIES];
-        for (value, entry) in entries.iter_mut().zip(&self.entries) {
-            *value = match *entry {
-                Entry::Stretch(spring) => stretch[spring],
-                Entry::Speed(body) => inner.speed[body],
-                Entry::Current(drive) => inner.current[drive],
-                Entry::Input(drive) => input[drive],
-            };
-        }
-        entries[self.entries.len()] = one;
-        let mut reading = self.matrix.times_first(&entries, self.entries.len() + 1);
-        if one != 0.0 {
-            for &(q, body, factor) in &self.ways {
-                reading[q] += origin[body] * factor;
-            }
-            for &(q, limit) in &self.limits {
-                reading[q] = reading[q].clamp(-limit, limit);
-            }
-        }
-        reading
+        self.placed(self.forms.each_ref().map(|form| form.value_at(&stretch, inner, input)), origin)
     }
 }
 

@@ -24,33 +24,30 @@ pub(crate) struct Extra {
     pub(crate) bristle: [f64; BODIES],
 }
 
-/// A row as the solver has it.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Row {
-    /// In angles and positions.
-    pub(crate) state: State,
-    /// Lengths of the springs, as accurate as the solver has them.
-    pub(crate) stretch: [f64; SPRINGS],
-    pub(crate) input: [f64; DRIVES],
-}
-
-impl Row {
-    /// A state in the solver's coordinates.
-    #[inline]
-    pub(crate) fn new(layout: &Layout, coordinates: &Coordinates, inner: &State, input: [f64; DRIVES]) -> Self {
-        Self { state: coordinates.state(layout, inner), stretch: layout.stretches(inner), input }
-    }
+/// Rows in one mode.
+#[derive(Clone)]
+struct Segment {
+    /// The first of them, in the block.
+    start: usize,
+    mode: Mode,
+    /// What angles follow from.
+    coordinates: Coordinates,
 }
 
 /// Collects rows of states and hands them on as blocks of columns.
 pub(crate) struct Recorder<'a> {
     mechanism: Arc<Mechanism>,
+    layout: Layout,
     grid: Grid,
     pub(crate) detail: Detail,
-    /// The columns that are put out.
-    columns: Vec<Heading>,
-    raw: Vec<Row>,
-    modes: Vec<Mode>,
+    /// States in the solver's coordinates, each with the inputs behind it, row after row.
+    raw: Vec<f64>,
+    /// How many numbers a row has, and how many rows there are.
+    stride: usize,
+    count: usize,
+    segments: Vec<Segment>,
+    /// Which mode the last one is of.
+    taken: Option<u64>,
     /// One for each row, or none at all where the linear equations say everything.
     extra: Vec<Extra>,
     source: Source,
@@ -67,6 +64,7 @@ pub(crate) struct Recorder<'a> {
 /// What columns are made of.
 #[derive(Default)]
 struct Source {
+    position: [Vec<f64>; BODIES],
     stretch: [Vec<f64>; SPRINGS],
     speed: [Vec<f64>; BODIES],
     armature: [Vec<f64>; DRIVES],
@@ -78,21 +76,28 @@ struct Source {
 }
 
 impl<'a> Recorder<'a> {
-    pub(crate) fn new(mechanism: &Arc<Mechanism>, grid: Grid, Output { detail, sink, observer }: Output<'a>) -> Self {
-        let shown = |heading: &&Heading| detail == Detail::Full || heading.lean;
-        let columns: Vec<Heading> = mechanism.columns.iter().filter(shown).cloned().collect();
+    pub(crate) fn new(
+        mechanism: &Arc<Mechanism>,
+        layout: &Layout,
+        grid: Grid,
+        Output { detail, sink, observer }: Output<'a>,
+    ) -> Self {
+        let shown = |heading: &&Heading| is_shown(heading, detail);
         let empty = |heading: &Heading| Column {
             values: Vec::with_capacity(BLOCK),
-            ..Column::new(heading.name.clone(), heading.unit)
+            ..Column::new(heading.name.as_ref(), heading.unit)
         };
         Self {
             mechanism: Arc::clone(mechanism),
+            layout: layout.clone(),
             grid,
             detail,
-            block: Trajectory { columns: columns.iter().map(empty).collect() },
-            columns,
-            raw: Vec::with_capacity(BLOCK),
-            modes: Vec::with_capacity(BLOCK),
+            block: Trajectory { columns: mechanism.columns.iter().filter(shown).map(empty).collect() },
+            raw: vec![0.0; if detail == Detail::None { 0 } else { BLOCK * (layout.states + layout.inputs) }],
+            stride: layout.states + layout.inputs,
+            count: 0,
+            segments: Vec::new(),
+            taken: None,
             extra: Vec::new(),
             source: Source::default(),
             sink,
@@ -104,29 +109,50 @@ impl<'a> Recorder<'a> {
 
     /// Rows received so far: the number of the next one.
     pub(crate) fn next_row(&self) -> u64 {
-        self.rows + self.raw.len() as u64
+        self.rows + self.count as u64
     }
 
-    /// Adds the next row.
+    /// Rows from here on are in this mode; `taken` tells one from another.
     #[inline]
-    pub(crate) fn push(&mut self, row: Row, mode: &Mode) {
+    pub(crate) fn segment(&mut self, taken: u64, coordinates: &Coordinates, mode: &Mode) {
+        if self.detail != Detail::None && self.taken != Some(taken) {
+            self.taken = Some(taken);
+            let (start, mode, coordinates) = (self.count, *mode, coordinates.clone());
+            self.segments.push(Segment { start, mode, coordinates });
+        }
+    }
+
+    /// Adds the next row: a state in the solver's coordinates, in the places of the layout, and inputs.
+    #[inline]
+    pub(crate) fn push(&mut self, state: &[f64], input: &[f64; DRIVES]) {
         if self.detail == Detail::None {
             self.rows += 1;
             return;
         }
-        self.raw.push(row);
-        self.modes.push(*mode);
-        if self.raw.len() == BLOCK {
+        let row = &mut self.raw[self.count * self.stride..][..self.stride];
+        let (own, inputs) = row.split_at_mut(self.layout.states);
+        own.iter_mut().zip(state).for_each(|(own, state)| *own = *state);
+        inputs.iter_mut().zip(input).for_each(|(own, input)| *own = *input);
+        self.count += 1;
+        if self.count == BLOCK {
             self.hand_on();
         }
     }
 
-    /// Adds the next row with what its state does not tell.
-    pub(crate) fn push_with(&mut self, row: Row, mode: &Mode, extra: Extra) {
+    /// The same of a whole state.
+    pub(crate) fn push_state(&mut self, inner: &State, input: &[f64; DRIVES], extra: Option<Extra>) {
         if self.detail != Detail::None {
-            self.extra.push(extra);
+            self.extra.extend(extra);
         }
-        self.push(row, mode);
+        let mut state = [0.0; 2 * BODIES + DRIVES];
+        for body in 0..self.layout.bodies() {
+            state[self.layout.coordinate[body]] = inner.position[body];
+            state[self.layout.speed[body]] = inner.speed[body];
+        }
+        for drive in 0..self.layout.inputs {
+            state[self.layout.current[drive]] = inner.current[drive];
+        }
+        self.push(&state, input);
     }
 
     /// Counts so many rows that nobody is to see.
@@ -136,7 +162,7 @@ impl<'a> Recorder<'a> {
 
     /// Hands on what there is, be it nothing, to hear whether to go on.
     pub(crate) fn ask(&mut self) {
-        if !self.raw.is_empty() {
+        if self.count > 0 {
             self.hand_on();
         } else if self.flow == Flow::Continue {
             self.block.columns.iter_mut().for_each(|column| column.values.clear());
@@ -146,37 +172,52 @@ impl<'a> Recorder<'a> {
 
     /// Hands on what is left.
     pub(crate) fn finish(&mut self) {
-        if !self.raw.is_empty() {
+        if self.count > 0 {
             self.hand_on();
         }
     }
 
     fn hand_on(&mut self) {
         self.fill();
-        self.rows += self.raw.len() as u64;
+        self.rows += self.count as u64;
         if self.flow == Flow::Continue {
             self.flow = (self.sink)(&self.block);
         }
-        self.raw.clear();
-        self.modes.clear();
+        self.count = 0;
+        // What comes next is in the mode of the last.
+        self.segments.drain(..self.segments.len().saturating_sub(1));
+        self.segments.iter_mut().for_each(|segment| segment.start = 0);
         self.extra.clear();
     }
 
     /// Computes every column of the block from the states, column by column so that the loops become vector instructions.
     fn fill(&mut self) {
         let mechanism = &*self.mechanism;
-        let (raw, modes, extra) = (&self.raw[..], &self.modes[..], &self.extra[..]);
+        let rows = Rows {
+            layout: &self.layout,
+            raw: &self.raw[..self.count * self.stride],
+            stride: self.stride,
+            count: self.count,
+        };
+        let ends = self.segments.iter().skip(1).map(|segment| segment.start).chain([self.count]);
+        let segments: Vec<(Range<usize>, &Segment)> =
+            self.segments.iter().zip(ends).map(|(segment, end)| (segment.start..end, segment)).collect();
         // Amplifiers, gears, belt and stops: rows in the same state of all of them follow one formula.
-        let mut alike: Vec<(Range<usize>, &Mode)> = Vec::new();
-        for rows in modes.chunk_by(same_elements) {
-            let start = alike.last().map_or(0, |(range, _)| range.end);
-            alike.push((start..start + rows.len(), &rows[0]));
+        let mut alike: Vec<(Range<usize>, &Mode)> = Vec::with_capacity(segments.len());
+        for (range, segment) in &segments {
+            match alike.last_mut() {
+                Some((last, mode)) if same_elements(mode, &segment.mode) => last.end = range.end,
+                _ => alike.push((range.clone(), &segment.mode)),
+            }
         }
-        self.source.take(mechanism, raw, extra, &alike);
+        let extra = &self.extra[..];
+        self.source.take(mechanism, &rows, extra, &segments, &alike);
         let (source, grid, first) = (&mut self.source, self.grid, self.rows);
-        for (heading, column) in self.columns.iter().zip(&mut self.block.columns) {
-            column.values.resize(raw.len(), 0.0);
-            let out = &mut column.values[..raw.len()];
+        let detail = self.detail;
+        let headings = mechanism.columns.iter().filter(|heading| is_shown(heading, detail));
+        for (heading, column) in headings.zip(&mut self.block.columns) {
+            column.values.resize(rows.count, 0.0);
+            let out = &mut column.values[..rows.count];
             // −0 + 0 is 0.
             match heading.shown {
                 Shown::Time => put(out, |j| grid.time(first + j as u64)),
@@ -189,26 +230,44 @@ impl<'a> Recorder<'a> {
                     clamp(out, mechanism.drives[drive].amplifier.voltage_limit);
                 }
                 Shown::Current(drive) => out.copy_from_slice(&source.current[drive]),
-                Shown::Position(body, factor) => put(out, |j| raw[j].state.position[body] * factor + 0.0),
-                Shown::Speed(body, factor) => put(out, |j| raw[j].state.speed[body] * factor + 0.0),
+                Shown::Position(body, factor) => {
+                    out.iter_mut().zip(&source.position[body]).for_each(|(out, way)| *out = way * factor + 0.0)
+                }
+                Shown::Speed(body, factor) => {
+                    out.iter_mut().zip(&source.speed[body]).for_each(|(out, speed)| *out = speed * factor + 0.0)
+                }
                 Shown::Stretch(spring) => out.copy_from_slice(&source.stretch[spring]),
                 Shown::Force(spring, factor) => {
                     out.iter_mut().zip(&source.force[spring]).for_each(|(out, force)| *out = force * factor);
                 }
-                Shown::Friction(body) => source.friction(mechanism, body, modes, extra, out),
-                Shown::Motion(body) => put(out, |j| f64::from(modes[j].motion[body].code())),
+                Shown::Friction(body) => source.friction(mechanism, body, &segments, extra, out),
+                Shown::Motion(body) => {
+                    for (range, segment) in &segments {
+                        out[range.clone()].fill(f64::from(segment.mode.motion[body].code()));
+                    }
+                }
                 Shown::Contact(spring) => {
                     let what = match mechanism.springs[spring].law {
                         SpringLaw::Tension { .. } => What::Span(spring),
                         _ => What::Gap(spring),
                     };
-                    put(out, |j| f64::from(modes[j].status(what).code()));
+                    for (range, mode) in &alike {
+                        out[range.clone()].fill(f64::from(mode.status(what).code()));
+                    }
                 }
-                Shown::Counts(body, counts) => put(out, |j| (raw[j].state.position[body] * counts).round() + 0.0),
+                Shown::Counts(body, counts) => {
+                    let way = &source.position[body];
+                    put(out, |j| (way[j] * counts).round() + 0.0);
+                }
                 Shown::Bristle(body) => put(out, |j| extra.get(j).map_or(0.0, |extra| extra.bristle[body])),
             }
         }
     }
+}
+
+/// Whether a column is put out.
+fn is_shown(heading: &Heading, detail: Detail) -> bool {
+    detail == Detail::Full || heading.lean
 }
 
 fn same_elements(a: &Mode, b: &Mode) -> bool {
@@ -216,26 +275,70 @@ fn same_elements(a: &Mode, b: &Mode) -> bool {
     a.slack == b.slack && a.contact == b.contact && a.drive.iter().map(limits).eq(b.drive.iter().map(limits))
 }
 
+/// Rows as they were pushed.
+struct Rows<'r> {
+    layout: &'r Layout,
+    raw: &'r [f64],
+    stride: usize,
+    count: usize,
+}
+
+impl Rows<'_> {
+    /// Puts what stands at a place of each row into a column.
+    fn column(&self, place: usize, out: &mut Vec<f64>) {
+        out.resize(self.count, 0.0);
+        // −0 + 0 is 0.
+        out.iter_mut().zip(self.raw.chunks_exact(self.stride)).for_each(|(out, row)| *out = row[place] + 0.0);
+    }
+}
+
 impl Source {
     /// Takes what the rows show of themselves, and the forces and currents that follow.
-    fn take(&mut self, mechanism: &Mechanism, raw: &[Row], extra: &[Extra], alike: &[(Range<usize>, &Mode)]) {
-        let rows = raw.len();
-        for spring in 0..mechanism.springs.len() {
-            self.stretch[spring].resize(rows, 0.0);
-            put(&mut self.stretch[spring], |j| raw[j].stretch[spring]);
-        }
+    fn take(
+        &mut self,
+        mechanism: &Mechanism,
+        rows: &Rows,
+        extra: &[Extra],
+        segments: &[(Range<usize>, &Segment)],
+        alike: &[(Range<usize>, &Mode)],
+    ) {
+        let layout = rows.layout;
         for body in 0..mechanism.bodies.len() {
-            self.speed[body].resize(rows, 0.0);
-            put(&mut self.speed[body], |j| raw[j].state.speed[body] + 0.0);
+            rows.column(layout.coordinate[body], &mut self.position[body]);
+            rows.column(layout.speed[body], &mut self.speed[body]);
         }
-        for (index, drive) in mechanism.drives.iter().enumerate() {
-            self.input[index].resize(rows, 0.0);
-            put(&mut self.input[index], |j| raw[j].input[index] + 0.0);
-            self.armature[index].resize(rows, 0.0);
-            if drive.has_current_state() {
-                put(&mut self.armature[index], |j| raw[j].state.current[index]);
+        for spring in 0..mechanism.springs.len() {
+            let out = &mut self.stretch[spring];
+            out.clear();
+            out.resize(rows.count, 0.0);
+            for (body, weight) in layout.weights(spring) {
+                out.iter_mut().zip(&self.position[body]).for_each(|(out, way)| *out += weight * way);
             }
         }
+        // From coordinates to ways, where they differ.
+        for replaced in &layout.replaced {
+            let mut own = std::mem::take(&mut self.position[replaced.body]);
+            for (range, segment) in segments {
+                segment.coordinates.place(replaced, &mut own, &self.position, range.clone());
+            }
+            self.position[replaced.body] = own;
+        }
+        if let Some((_, segment)) = segments.first() {
+            for (body, position) in self.position.iter_mut().enumerate().take(mechanism.bodies.len()) {
+                let origin = segment.coordinates.origin()[body];
+                if origin != 0.0 {
+                    position.iter_mut().for_each(|way| *way += origin);
+                }
+            }
+        }
+        for (index, drive) in mechanism.drives.iter().enumerate() {
+            rows.column(layout.states + index, &mut self.input[index]);
+            match drive.has_current_state() {
+                true => rows.column(layout.current[index], &mut self.armature[index]),
+                false => self.armature[index].resize(rows.count, 0.0),
+            }
+        }
+        let rows = rows.count;
         for index in 0..mechanism.springs.len() {
             let mut force = std::mem::take(&mut self.force[index]);
             force.resize(rows, 0.0);
@@ -283,19 +386,23 @@ impl Source {
     }
 
     /// Friction on a body: what its law gives while it slides, what holds it while it is stuck.
-    fn friction(&mut self, mechanism: &Mechanism, body: usize, modes: &[Mode], extra: &[Extra], out: &mut [f64]) {
-        let mut start = 0;
-        for same in modes.chunk_by(|a, b| a.motion[body] == b.motion[body]) {
-            let (motion, rows) = (same[0].motion[body], start..start + same.len());
-            let out = &mut out[rows.clone()];
+    fn friction(
+        &mut self,
+        mechanism: &Mechanism,
+        body: usize,
+        segments: &[(Range<usize>, &Segment)],
+        extra: &[Extra],
+        out: &mut [f64],
+    ) {
+        for (rows, segment) in segments {
+            let (motion, out) = (segment.mode.motion[body], &mut out[rows.clone()]);
             if motion == Motion::Stuck && mechanism.leader(body) == body {
-                self.load(mechanism, body, rows);
+                self.load(mechanism, body, rows.clone());
                 put(out, |j| mechanism.friction_value(body, motion, 0.0, self.load[j]) + 0.0);
             } else {
-                let speed = &self.speed[body][start..];
+                let speed = &self.speed[body][rows.clone()];
                 put(out, |j| mechanism.friction_value(body, motion, speed[j], (0.0, 0.0)) + 0.0);
             }
-            start += same.len();
         }
         for (value, extra) in out.iter_mut().zip(extra) {
             *value += extra.friction[body];

@@ -13,14 +13,16 @@
 //! model's own answer is as uncertain, for parameters that differ in their last bit.
 
 use super::PositionError;
-use crate::mechanism::{Body, Layout, Mechanism, State};
+use crate::mechanism::{Body, Layout, Mechanism};
 
 /// c: units in the last place of one step. The largest that independent solutions of random stages have shown is below one.
 const UNITS: f64 = 8.0;
 
 /// What the bound needs to know of a run so far.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Rounding {
+    /// Where speeds and ways stand in the solver's state, with what they are at the belt.
+    places: Vec<[(usize, f64); 2]>,
     /// Φ, rad, up to `since`.
     phase: f64,
     since: f64,
@@ -31,13 +33,23 @@ pub(super) struct Rounding {
 }
 
 impl Rounding {
-    /// Takes a state in the solver's coordinates.
-    #[inline]
-    pub(super) fn see(&mut self, layout: &Layout, mechanism: &Mechanism, inner: &State) {
-        for (body, part) in mechanism.bodies.iter().enumerate().filter(|(_, part)| !part.is_rotor) {
-            self.speed = self.speed.max(part.kind.lever() * inner.speed[body].abs());
+    /// Of a machine.
+    pub(super) fn new(layout: &Layout, mechanism: &Mechanism) -> Self {
+        let place = |(body, part): (usize, &Body)| {
+            // A length of the belt is what it is.
             let lever = if layout.is_replaced(body) { 1.0 } else { part.kind.lever() };
-            self.way = self.way.max(lever * inner.position[body].abs());
+            [(layout.speed[body], part.kind.lever()), (layout.coordinate[body], lever)]
+        };
+        let bodies = mechanism.bodies.iter().enumerate().filter(|(_, part)| !part.is_rotor);
+        Self { places: bodies.map(place).collect(), ..Self::default() }
+    }
+
+    /// Takes a state of the solver.
+    #[inline]
+    pub(super) fn see(&mut self, z: &[f64]) {
+        for &[(speed, lever), (way, length)] in &self.places {
+            self.speed = self.speed.max(lever * z[speed].abs());
+            self.way = self.way.max(length * z[way].abs());
         }
     }
 

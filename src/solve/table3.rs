@@ -3,8 +3,9 @@
 //! Kept to reproduce the paper and to show what it does: any speed inside a band of ±0.01 is frozen rather than brought
 //! to rest, so the stage creeps after it has stopped, by an amount that depends on the step.
 
+use super::coordinates::Coordinates;
 use super::observe::{Gap, Output, QUANTITIES, Reading, Readout};
-use super::record::{Recorder, Row};
+use super::record::Recorder;
 use super::{Cost, Ending, Flow, Grid, Method, Outcome};
 use crate::case::Experiment;
 use crate::error::{Error, Result};
@@ -41,7 +42,8 @@ pub(crate) fn run(
     }
     let mut state = experiment.initial.state(mechanism);
     let layout = Layout::new(mechanism);
-    let mut recorder = Recorder::new(mechanism, grid, output.within());
+    let coordinates = Coordinates::new(&layout, &State::default()).0;
+    let mut recorder = Recorder::new(mechanism, &layout, grid, output.within());
     let readout = Readout::new(mechanism, &Mode::of([]));
     let mut cost = Cost { modes: 1, ..Cost::default() };
     let mut ending = Ending::Complete;
@@ -54,8 +56,9 @@ pub(crate) fn run(
         }
         let input = experiment.input.value(time);
         let motion = model.motion(&state, input);
-        let inner = inner_of(&layout, mechanism, &state);
-        recorder.push(Row { state, stretch: layout.stretches(&inner), input: [input, 0.0] }, &Mode::of(motion));
+        // A row shows the state itself: angles of its own, held as they are.
+        recorder.segment(row, &coordinates.at(&state), &Mode::of(motion));
+        recorder.push_state(&inner_of(&layout, mechanism, &state), &[input, 0.0], None);
         if recorder.flow == Flow::Stop {
             ending = Ending::Interrupted { time };
             break;
@@ -69,7 +72,7 @@ pub(crate) fn run(
         };
         let read = |state: &State, input: f64| {
             let inner = inner_of(&layout, mechanism, state);
-            readout.read(&layout, &inner, &mechanism.origin, &[input, 0.0], 1.0)
+            readout.read(&layout, &inner, &mechanism.origin, &[input, 0.0])
         };
         let mut before = read(&state, input);
         show(time, 0.0, &before, &before);

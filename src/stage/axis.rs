@@ -192,7 +192,8 @@ impl Stage {
 
     fn columns(&self, mechanism: &Mechanism) -> Vec<Heading> {
         let mut columns = Vec::new();
-        let mut add = |name: &str, unit, shown, lean| columns.push(Heading { name: name.into(), unit, shown, lean });
+        let mut add =
+            |name: &'static str, unit, shown, lean| columns.push(Heading { name: name.into(), unit, shown, lean });
         add("time", "s", Shown::Time, true);
         add("voltage", "V", Shown::Voltage(0), true);
         const WAYS: [[&str; 2]; BODIES] =

@@ -305,7 +305,7 @@ impl Gantry {
 
     fn columns(&self, mechanism: &Mechanism) -> Vec<Heading> {
         let mut columns = Vec::new();
-        let mut add = |name: String, unit, shown, lean| columns.push(Heading { name, unit, shown, lean });
+        let mut add = |name: String, unit, shown, lean| columns.push(Heading { name: name.into(), unit, shown, lean });
         let sides = ["left", "right"];
         add("time".into(), "s", Shown::Time, true);
         for (drive, side) in sides.into_iter().enumerate() {

@@ -40,9 +40,7 @@ fn body(stage: &Stage, mechanism: &Mechanism, body: usize) -> BodyEquation {
     let State { position, speed, .. } = form.on_state(mechanism);
     // What the coefficients of φ₁, x, φ₃ and φ̇₁ are called.
     let (gains, unit, torque) = match body {
-        DRIVE => {
-            (["r² (k₁ + k₃)", "r k₁", "r² k₃", "K_t K_e/R"], ["N m/rad", "N", "N m/rad", "N m s"], true)
-        }
+        DRIVE => (["r² (k₁ + k₃)", "r k₁", "r² k₃", "K_t K_e/R"], ["N m/rad", "N", "N m/rad", "N m s"], true),
         CART => (["r k₁", "k₁ + k₂", "r k₂", ""], ["N/rad", "N/m", "N/rad", ""], false),
         _ => (["r² k₃", "r k₂", "r² (k₂ + k₃)", ""], ["N m/rad", "N", "N m/rad", ""], true),
     };

@@ -184,6 +184,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
         let (mechanism, space) = (&self.mechanism, &self.space);
         let (matrices, is_new) = ModeMatrices::of(&mut self.known, mechanism, space, &self.mode, self.h);
         self.matrices = matrices;
+        self.taken += 1;
         let inner = self.inner();
         self.coordinates.hold(&self.space.layout, &self.mode, &inner);
         self.cost.modes += u64::from(is_new);

@@ -49,6 +49,23 @@ impl Space {
         inner
     }
 
+    /// A form as a row of weights on it.
+    fn row<const R: usize, const C: usize>(&self, form: &Form) -> [f64; C] {
+        let layout = &self.layout;
+        let mut row = [0.0; C];
+        let on = layout.on_coordinates(form);
+        for body in 0..layout.bodies() {
+            row[layout.coordinate[body]] = on.position[body];
+            row[layout.speed[body]] = on.speed[body];
+        }
+        for drive in 0..layout.inputs {
+            row[layout.current[drive]] = on.current[drive];
+            row[self.chain::<R>(drive, 0)] = form.input[drive];
+        }
+        row[C - 1] = form.constant;
+        row
+    }
+
     /// The inputs in it.
     #[inline]
     pub(in crate::solve) fn input<const R: usize>(&self, z: &[f64]) -> [f64; DRIVES] {
@@ -153,6 +170,9 @@ impl<const C: usize> Watch<C> {
     }
 }
 
+/// Coordinates that a length is made of, at most: bodies, less those that stand in others' places.
+const MOST_TERMS: usize = 2;
+
 /// The equations of one mode, ż = A z, and what follows from them.
 pub(in crate::solve) struct ModeMatrices<const R: usize, const C: usize> {
     pub(super) mode: Mode,
@@ -174,8 +194,8 @@ pub(in crate::solve) struct ModeMatrices<const R: usize, const C: usize> {
     stiffness: [f64; SPRINGS],
     /// Inertias, by the places of the speeds that move.
     kinetic: Vec<(usize, f64)>,
-    /// Stiffnesses, and what the lengths are in terms of the coordinates: places and weights.
-    elastic: Vec<(f64, Vec<(usize, f64)>)>,
+    /// Stiffnesses, and what the lengths are in terms of the coordinates: places and weights, those that are not there of no weight.
+    elastic: Vec<(f64, [(usize, f64); MOST_TERMS])>,
     /// Weight of each (di/dt)² in 2V, by the places of the currents.
     magnetic: Vec<(usize, f64)>,
     /// The same by the drives.
@@ -183,7 +203,7 @@ pub(in crate::solve) struct ModeMatrices<const R: usize, const C: usize> {
     /// Whether a current moves anything, and the motion that current.
     coupled: bool,
     /// What an observer is shown.
-    shown: OnceLock<Box<Shown>>,
+    shown: OnceLock<Box<Shown<C>>>,
 }
 
 impl<const R: usize, const C: usize> ModeMatrices<R, C> {
@@ -225,20 +245,7 @@ impl<const R: usize, const C: usize> ModeMatrices<R, C> {
         equations.guards.iter_mut().map(|guard| &mut guard.form).for_each(without_stuck);
         equations.acceleration.iter_mut().for_each(without_stuck);
 
-        let row_of = |form: &Form| {
-            let mut row = [0.0; C];
-            let on = layout.on_coordinates(form);
-            for body in 0..layout.bodies() {
-                row[layout.coordinate[body]] = on.position[body];
-                row[layout.speed[body]] = on.speed[body];
-            }
-            for drive in 0..layout.inputs {
-                row[layout.current[drive]] = on.current[drive];
-                row[space.chain::<R>(drive, 0)] = form.input[drive];
-            }
-            row[C - 1] = form.constant;
-            row
-        };
+        let row_of = |form: &Form| space.row::<R, C>(form);
         let mut rate = Matrix::zero();
         let put = |rate: &mut Matrix<R, C>, row: usize, form: &Form| {
             for (column, value) in row_of(form).into_iter().enumerate() {
@@ -360,8 +367,11 @@ impl<const R: usize, const C: usize> ModeMatrices<R, C> {
             elastic: (0..mechanism.springs.len())
                 .filter(|&spring| stiffness[spring] > 0.0 && !at_rest[spring])
                 .map(|spring| {
-                    let at = |(body, weight): (usize, f64)| (layout.coordinate[body], weight);
-                    (stiffness[spring], layout.weights(spring).map(at).collect())
+                    let mut terms = [(0, 0.0); MOST_TERMS];
+                    for (term, (body, weight)) in terms.iter_mut().zip(layout.weights(spring)) {
+                        *term = (layout.coordinate[body], weight);
+                    }
+                    (stiffness[spring], terms)
                 })
                 .collect(),
             magnetic: moving(magnetic)

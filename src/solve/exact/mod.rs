@@ -134,6 +134,8 @@ pub(super) struct Core<const R: usize, const C: usize> {
     pub(super) events: Vec<Event>,
     /// How many events were handed on before those.
     handed_on: usize,
+    /// How many modes have been taken up.
+    taken: u64,
     /// Time since the last mode change, s, and how many there have been there.
     since_change: f64,
     changes: usize,
@@ -181,6 +183,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
         coordinates.hold(layout, &mode, &inner);
         let shared = propagators(&known);
         let (matrices, is_new) = ModeMatrices::of(&mut known, &mechanism, &space, &mode, h);
+        let rounding = Rounding::new(&space.layout, &mechanism);
         Self {
             mechanism,
             space,
@@ -200,10 +203,11 @@ impl<const R: usize, const C: usize> Core<R, C> {
             offset: 0.0,
             events: Vec::new(),
             handed_on: 0,
+            taken: 0,
             since_change: f64::INFINITY,
             changes: 0,
             cost: Cost { modes: u64::from(is_new), ..Cost::default() },
-            rounding: Rounding::default(),
+            rounding,
             questions: 0,
             pace: Pace::default(),
             end,
@@ -285,8 +289,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
             self.asks = false;
         }
         self.check();
-        let inner = self.inner();
-        self.rounding.see(&self.space.layout, &self.mechanism, &inner);
+        self.rounding.see(&self.z);
         self.handed_on += self.events.len();
         events.append(&mut self.events);
         match self.trouble {
@@ -325,6 +328,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
             offset,
             events,
             handed_on,
+            taken,
             since_change,
             changes,
             cost,
@@ -355,6 +359,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
             offset,
             events,
             handed_on,
+            taken,
             since_change,
             changes,
             cost,
@@ -396,9 +401,15 @@ impl<const R: usize, const C: usize> Core<R, C> {
         (self.input_rate[drive], self.input_curvature[drive]) = change_rates(coefficients, length);
     }
 
+    /// Whether the state is made of numbers.
+    #[inline]
+    fn is_finite(&self) -> bool {
+        self.z.iter().sum::<f64>().is_finite()
+    }
+
     /// Notices a state that is no number any more.
     fn check(&mut self) {
-        if !self.z.iter().sum::<f64>().is_finite() {
+        if !self.is_finite() {
             self.trouble = Some(Ending::Diverged { time: self.time() });
         }
     }

@@ -5,7 +5,7 @@ use super::{Core, Known, Room, Space};
 use crate::mechanism::{Mechanism, State};
 use crate::solve::inputs::Pieces;
 use crate::solve::observe::Output;
-use crate::solve::record::{Recorder, Row};
+use crate::solve::record::Recorder;
 use crate::solve::run::{Running, Start};
 use crate::solve::{Detail, Ending, Flow, Grid, Outcome};
 use std::sync::Arc;
@@ -37,9 +37,9 @@ where
         output: Output<'a>,
     ) -> Self {
         let grid = Grid::new(start.every, start.until);
-        let seen = Arc::new(mechanism.seen_from(&space.layout, &start.state));
+        let seen = mechanism.seen_by(&space.layout, &start.state);
         let list = std::mem::take(known.list());
-        let recorder = Recorder::new(&seen, grid, output);
+        let recorder = Recorder::new(&seen, &space.layout, grid, output);
         let core = Core::new(seen, Arc::new(space), &start.state, (grid.interval(), grid.end()), list);
         Self { core, grid, row: 0, recorder, watching: Watching::new(), known }
     }
@@ -115,21 +115,27 @@ where
     }
 
     /// Ends where the receiver wants no more.
+    #[inline]
     fn heed(&mut self) {
         if self.recorder.flow == Flow::Stop && self.core.trouble.is_none() {
-            self.core.trouble = Some(Ending::Interrupted { time: self.core.time() });
+            self.core.trouble = Some(Ending::Interrupted { time: self.time() });
         }
+    }
+
+    fn time(&self) -> f64 {
+        self.grid.time(self.row) + self.core.offset
     }
 
     /// Puts out the present row, once, and looks whether all is well.
     fn put_out(&mut self) {
-        self.core.check();
+        if !self.core.is_finite() {
+            self.core.trouble = Some(Ending::Diverged { time: self.time() });
+        }
         if self.recorder.next_row() == self.row && self.core.trouble.is_none() {
             let core = &mut self.core;
-            let inner = core.inner();
-            core.rounding.see(&core.space.layout, &core.mechanism, &inner);
-            let row = Row::new(&core.space.layout, &core.coordinates, &inner, core.input());
-            self.recorder.push(row, &core.mode);
+            core.rounding.see(&core.z);
+            self.recorder.segment(core.taken, &core.coordinates, &core.mode);
+            self.recorder.push(&core.z, &core.space.input::<R>(&core.z));
         }
         self.heed();
     }
@@ -161,6 +167,7 @@ where
             if j > 0 {
                 self.put_out();
                 if self.core.trouble.is_some() {
+                    self.go_to(self.row);
                     return true;
                 }
             }
@@ -169,7 +176,7 @@ where
                 Some(bow) => {
                     let mut end = self.core.z;
                     step.advance(&mut end);
-                    closer += usize::from(self.move_shown(&law, self.core.base, h, end, bow));
+                    closer += usize::from(self.move_shown(&law, self.grid.time(self.row), h, end, bow));
                     if closer == OFTEN {
                         // What swings has died down since.
                         closer = 0;
@@ -178,8 +185,9 @@ where
                 }
                 None => step.advance(&mut self.core.z),
             }
-            self.go_to(self.row + 1);
+            self.row += 1;
         }
+        self.go_to(self.row);
         self.core.cost.steps += if resting { 0 } else { safe };
         true
     }

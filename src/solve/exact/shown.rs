@@ -2,7 +2,7 @@
 
 use super::matrices::Shown;
 use super::{Known, ModeMatrices, Room, Run};
-use crate::mechanism::{BODIES, Cause};
+use crate::mechanism::Cause;
 use crate::solve::observe::{Curve, Gap, QUANTITIES, Reading};
 use std::sync::Arc;
 
@@ -67,7 +67,7 @@ where
         let (time, state, mode) = (self.core.time(), self.core.state(), self.core.mode);
         if self.is_observed() {
             let law = Arc::clone(&self.core.matrices);
-            let shown = law.shown(&self.core.mechanism);
+            let shown = law.shown(&self.core.mechanism, &self.core.space);
             self.show(shown, time, 0.0, &self.core.z.clone(), &[0.0; QUANTITIES]);
         }
         if let Some(observer) = &mut self.recorder.observer {
@@ -81,12 +81,12 @@ where
     }
 
     fn bow_from(&self, law: &ModeMatrices<R, C>, z: &[f64; C], interval: f64, whole: f64) -> Reading {
-        let shown = law.shown(&self.core.mechanism);
+        let shown = law.shown(&self.core.mechanism, &self.core.space);
         law.bow(shown, &law.rate(z), (&self.core.input_rate, &self.core.input_curvature), (interval, whole))
     }
 
     /// Shows the interval of `length` that began at `begin` and has led to `end`; says whether the observer wants to see closer.
-    fn show(&mut self, shown: &Shown, begin: f64, length: f64, end: &[f64; C], bow: &Reading) -> bool {
+    fn show(&mut self, shown: &Shown<C>, begin: f64, length: f64, end: &[f64; C], bow: &Reading) -> bool {
         let to = self.read(shown, end);
         let from = match self.watching.now {
             Some(from) => from,
@@ -114,7 +114,7 @@ where
         bow: &Reading,
     ) -> bool {
         let start = self.core.z;
-        let closer = self.show(law.shown(&self.core.mechanism), begin, length, &end, bow);
+        let closer = self.show(law.shown(&self.core.mechanism, &self.core.space), begin, length, &end, bow);
         if closer {
             self.show_closer(law, start, begin, length);
         }
@@ -203,7 +203,7 @@ where
     /// What is to be seen of `z`.
     fn sight(&self, law: &ModeMatrices<R, C>, z: &[f64; C]) -> Sight<R, C> {
         let rate = law.rate(z);
-        let value = self.read(law.shown(&self.core.mechanism), z);
+        let value = self.read(law.shown(&self.core.mechanism, &self.core.space), z);
         Sight { z: *z, rate, value, slope: self.rates(law, &rate) }
     }
 
@@ -211,9 +211,7 @@ where
     fn rates(&self, law: &ModeMatrices<R, C>, rate: &[f64; R]) -> Reading {
         let mut wide = [0.0; C];
         wide[..R].copy_from_slice(rate);
-        let core = &self.core;
-        let readout = &law.shown(&core.mechanism).readout;
-        readout.read(&core.space.layout, &core.space.inner(&wide), &[0.0; BODIES], &core.space.input::<R>(&wide), 0.0)
+        law.shown(&self.core.mechanism, &self.core.space).change(&wide)
     }
 
     /// The curve between two sights.
@@ -236,10 +234,8 @@ where
     }
 
     /// What is read in `z`.
-    fn read(&self, shown: &Shown, z: &[f64; C]) -> Reading {
-        let core = &self.core;
-        let (inner, input) = (core.space.inner(z), core.space.input::<R>(z));
-        shown.readout.read(&core.space.layout, &inner, core.coordinates.origin(), &input, 1.0)
+    fn read(&self, shown: &Shown<C>, z: &[f64; C]) -> Reading {
+        shown.read(z, self.core.coordinates.origin())
     }
 
     /// The same as [`Core::advance`], and shows the way to whoever observes.

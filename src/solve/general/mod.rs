@@ -99,6 +99,8 @@ pub(super) struct Core {
     /// How many events were handed on before those.
     handed_on: usize,
     modes: Vec<Mode>,
+    /// How many modes have been taken up.
+    taken: u64,
     pub(super) cost: Cost,
     pub(super) trouble: Option<Ending>,
 }
@@ -195,6 +197,7 @@ impl Core {
             events: Vec::new(),
             handed_on: 0,
             modes: vec![mode],
+            taken: 0,
             cost: Cost::default(),
             trouble: None,
         }
@@ -234,8 +237,7 @@ impl Core {
 
     /// What a row shows beyond the linear equations.
     pub(super) fn extra(&self) -> Extra {
-        let inner = self.model.inner(&self.y);
-        self.model.extra(&self.mode, &inner, &self.model.layout.stretches(&inner), &self.y).0
+        self.model.extra(&self.mode, &self.y)
     }
 
     /// Takes up new inputs, and what they bring about at once.
@@ -314,11 +316,11 @@ impl Core {
 
     /// What a body at zero speed does under its present load.
     fn decide(&self, body: usize, input: &[f64; DRIVES]) -> Motion {
-        let (model, state) = (&*self.model, self.model.inner(&self.y));
-        let (mode, noise) = (&self.mode, model.noise(body, &self.mode, &state, input));
-        if model.load(body, true, mode, &state, input) > model.breakaway(body, true, &state) + noise {
+        let (model, state) = (&*self.model, &self.y);
+        let (mode, noise) = (&self.mode, model.noise(body, &self.mode, state, input));
+        if model.load(body, true, mode, state, input) > model.breakaway(body, true, state) + noise {
             Motion::Forward
-        } else if model.load(body, false, mode, &state, input) < -model.breakaway(body, false, &state) - noise {
+        } else if model.load(body, false, mode, state, input) < -model.breakaway(body, false, state) - noise {
             Motion::Backward
         } else {
             Motion::Stuck
@@ -363,11 +365,10 @@ impl Core {
             Cause::BreakForward(body) => (body, Motion::Forward),
             Cause::BreakBackward(body) => (body, Motion::Backward),
         };
-        let state = self.model.inner(&self.y);
         let from = self.mode.motion[body];
         let side = if to == Motion::Stuck { from } else { to };
         let forward = side != Motion::Backward;
-        let load = self.model.load(body, forward, &self.mode, &state, input);
+        let load = self.model.load(body, forward, &self.mode, &self.y, input);
         for (cause, tolerance) in self.tolerances_at_rest(body, input) {
             self.slack[cause.kind()] = if again { 10.0 } else { 1.0 } * tolerance;
         }
@@ -382,10 +383,9 @@ impl Core {
 
     /// By how much the load on a body at rest may pass its breakaway on either side before it counts: what rounding may do to it.
     fn tolerances_at_rest(&self, body: usize, input: &[f64; DRIVES]) -> [(Cause, f64); 2] {
-        let inner = self.model.inner(&self.y);
-        let noise = 2.0 * self.model.noise(body, &self.mode, &inner, input);
+        let noise = 2.0 * self.model.noise(body, &self.mode, &self.y, input);
         [(Cause::BreakForward(body), true), (Cause::BreakBackward(body), false)]
-            .map(|(cause, forward)| (cause, noise.max(1e-12 * self.model.breakaway(body, forward, &inner))))
+            .map(|(cause, forward)| (cause, noise.max(1e-12 * self.model.breakaway(body, forward, &self.y))))
     }
 
     /// Whether a body stops where the tolerance decides: what still slows it down is less than the formula may be off by.
@@ -430,6 +430,7 @@ impl Core {
     }
 
     fn enter(&mut self) {
+        self.taken += 1;
         self.coordinates.hold(&self.model.layout, &self.mode, &self.model.inner(&self.y));
         if !self.modes.contains(&self.mode) {
             self.modes.push(self.mode);

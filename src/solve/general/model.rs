@@ -19,6 +19,18 @@ pub(super) type Vector = [f64; MOST];
 /// Most conditions watched at once: two for each body, one for each gear, two for each limit and for each spring.
 pub(super) const MOST_GUARDS: usize = 2 * BODIES + 5 * DRIVES + 2 * SPRINGS;
 
+/// Room for what a linear form is made of: the integrated quantities, the inputs, and a one.
+pub(super) const WIDE: usize = MOST + DRIVES + 1;
+
+/// A spring that follows the bodies.
+struct Following {
+    spring: usize,
+    /// Its length from the integrated quantities: places and weights.
+    terms: Vec<(usize, f64)>,
+    /// By how much its force acts on each body that moves by itself.
+    arms: Vec<(usize, f64)>,
+}
+
 /// A machine made ready for the integrator.
 pub(super) struct Model {
     pub(super) mechanism: Arc<Mechanism>,
@@ -33,6 +45,19 @@ pub(super) struct Model {
     pub(super) bristle: [Option<usize>; BODIES],
     /// Whether anything is added to the linear equations at all.
     pub(super) adds: bool,
+    /// Bodies whose friction is not that of the linear equations.
+    curved: Vec<usize>,
+    following: Vec<Following>,
+}
+
+/// What is added to the linear equations.
+#[derive(Clone, Copy, Default)]
+struct Added {
+    /// Forces and torques on each body that moves by itself: of springs that follow, less friction beyond b v ± F_c.
+    load: [f64; BODIES],
+    friction: [f64; BODIES],
+    /// Rates of the bristles.
+    bristle: [f64; BODIES],
 }
 
 impl Model {
@@ -54,7 +79,53 @@ impl Model {
             *place = matches!(mechanism.friction(body).law, Law::LuGre { .. }).then(|| room(1));
         }
         let adds = !mechanism.is_piecewise_linear();
-        Self { mechanism, layout, place, current, size, bristle, adds }
+        let is_curved =
+            |&b: &usize| !mechanism.friction(b).is_piecewise_linear() || mechanism.bodies[b].along.is_some();
+        let curved = mechanism.leaders().filter(is_curved).collect();
+        let follows = |&spring: &usize| mechanism.springs[spring].follows.is_some();
+        let following = (0..mechanism.springs.len()).filter(follows).map(|spring| {
+            let arms = mechanism.leading_arms(spring).into_iter().enumerate();
+            Following {
+                spring,
+                terms: layout.weights(spring).map(|(body, weight)| (place[body], weight)).collect(),
+                arms: arms.filter(|(_, arm)| *arm != 0.0).collect(),
+            }
+        });
+        let following = following.collect();
+        Self { mechanism, layout, place, current, size, bristle, adds, curved, following }
+    }
+
+    /// Coefficients of a form on the integrated quantities, the inputs, and a one.
+    fn row(&self, form: &Form) -> [f64; WIDE] {
+        let mut row = [0.0; WIDE];
+        let on = self.layout.on_coordinates(form);
+        for body in 0..self.mechanism.bodies.len() {
+            (row[self.coordinate(body)], row[self.speed(body)]) = (on.position[body], on.speed[body]);
+        }
+        for (place, current) in self.current.iter().zip(on.current) {
+            if let Some(place) = place {
+                row[*place] = current;
+            }
+        }
+        for (drive, input) in form.input.iter().enumerate().take(self.mechanism.drives.len()) {
+            row[self.size + drive] = *input;
+        }
+        row[self.width() - 1] = form.constant;
+        row
+    }
+
+    /// How many coefficients a form has.
+    fn width(&self) -> usize {
+        self.size + self.mechanism.drives.len() + 1
+    }
+
+    /// The value of a row of coefficients.
+    #[inline(always)]
+    fn value_of(&self, row: &[f64; WIDE], y: &[f64], input: &[f64; DRIVES]) -> f64 {
+        let (on_y, rest) = row.split_at(self.size);
+        let sum = on_y.iter().zip(y).fold(0.0, |sum, (coefficient, value)| sum + coefficient * value);
+        let drives = self.mechanism.drives.len();
+        rest[..drives].iter().zip(input).fold(sum + rest[drives], |sum, (c, input)| sum + c * input)
     }
 
     /// Place of a body's coordinate.
@@ -102,114 +173,103 @@ impl Model {
 
     /// By how much a body's dry friction is multiplied where it is.
     #[inline(always)]
-    fn factor(&self, body: usize, inner: &State) -> f64 {
+    fn factor(&self, body: usize, y: &[f64]) -> f64 {
         match &self.mechanism.bodies[body].along {
-            Some(along) => along.factor(self.mechanism.origin[body] + inner.position[body]),
+            Some(along) => along.factor(self.mechanism.origin[body] + y[self.coordinate(body)]),
             None => 1.0,
         }
     }
 
-    /// What the springs' forces are beyond k s + c ṡ with the stiffness at the origin, taut or not: (k(q) − k) s.
-    #[inline(always)]
-    fn beyond(&self, inner: &State, stretch: &[f64; SPRINGS]) -> [f64; SPRINGS] {
-        let mut beyond = [0.0; SPRINGS];
-        for (index, spring) in self.mechanism.springs.iter().enumerate() {
-            if let Some(follows) = &spring.follows {
-                let stiffness = follows.stiffness(|body| self.mechanism.origin[body] + inner.position[body]);
-                beyond[index] = (stiffness - spring.stiffness) * stretch[index];
-            }
-        }
-        beyond
+    /// What the force of a spring is beyond k s + c ṡ with the stiffness at the origin, taut or not: (k(q) − k) s.
+    #[inline]
+    fn beyond(&self, following: &Following, y: &[f64]) -> f64 {
+        let spring = &self.mechanism.springs[following.spring];
+        let Some(follows) = &spring.follows else { return 0.0 };
+        let stiffness = follows.stiffness(|body| self.mechanism.origin[body] + y[self.coordinate(body)]);
+        let length: f64 = following.terms.iter().map(|&(place, weight)| weight * y[place]).sum();
+        (stiffness - spring.stiffness) * length
     }
 
-    /// What they put on each body that moves by itself: −Aᵀ f.
+    /// What the springs that follow put on each body that moves by itself, −Aᵀ f; a slack one nothing.
     #[inline(always)]
-    fn loads(&self, beyond: &[f64; SPRINGS]) -> [f64; BODIES] {
+    fn loads(&self, mode: &Mode, y: &[f64]) -> [f64; BODIES] {
         let mut loads = [0.0; BODIES];
-        for (spring, force) in self.mechanism.springs.iter().zip(beyond).filter(|(spring, _)| spring.follows.is_some())
-        {
-            for &(body, arm) in &spring.arms {
-                loads[self.mechanism.leader(body)] -= self.mechanism.ratio(body) * arm * force;
-            }
+        for following in self.following.iter().filter(|following| !mode.slack[following.spring]) {
+            let force = self.beyond(following, y);
+            following.arms.iter().for_each(|&(body, arm)| loads[body] -= arm * force);
         }
         loads
     }
 
     /// All forces on a body but its friction, for a body that goes, or is about to go, forward or backward.
-    pub(super) fn load(&self, body: usize, forward: bool, mode: &Mode, inner: &State, input: &[f64; DRIVES]) -> f64 {
+    pub(super) fn load(&self, body: usize, forward: bool, mode: &Mode, y: &[f64], input: &[f64; DRIVES]) -> f64 {
+        let inner = self.inner(y);
         let mut settled = *mode;
         for drive in 0..self.mechanism.drives.len() {
             let torque = self.mechanism.torque_at_rest(drive, mode);
-            settled.drive[drive].torque_positive = self.value(&torque, inner, input) >= 0.0;
+            settled.drive[drive].torque_positive = self.value(&torque, &inner, input) >= 0.0;
         }
-        let beyond = self.carried(mode, self.beyond(inner, &self.layout.stretches(inner)));
-        self.value(&self.mechanism.load(body, forward, &settled), inner, input) + self.loads(&beyond)[body]
-    }
-
-    /// The same where a slack spring carries nothing.
-    #[inline(always)]
-    fn carried(&self, mode: &Mode, mut beyond: [f64; SPRINGS]) -> [f64; SPRINGS] {
-        for (beyond, slack) in beyond.iter_mut().zip(mode.slack) {
-            if slack {
-                *beyond = 0.0;
-            }
-        }
-        beyond
+        self.value(&self.mechanism.load(body, forward, &settled), &inner, input) + self.loads(mode, y)[body]
     }
 
     /// What rounding may have done to it.
-    pub(super) fn noise(&self, body: usize, mode: &Mode, inner: &State, input: &[f64; DRIVES]) -> f64 {
-        self.mechanism.load(body, true, mode).noise(&self.layout, inner, input)
+    pub(super) fn noise(&self, body: usize, mode: &Mode, y: &[f64], input: &[f64; DRIVES]) -> f64 {
+        self.mechanism.load(body, true, mode).noise(&self.layout, &self.inner(y), input)
     }
 
     /// What a body at rest holds this way, where it is.
-    pub(super) fn breakaway(&self, body: usize, forward: bool, inner: &State) -> f64 {
-        self.factor(body, inner) * self.mechanism.friction(body).breakaway(forward)
+    #[inline]
+    pub(super) fn breakaway(&self, body: usize, forward: bool, y: &[f64]) -> f64 {
+        self.factor(body, y) * self.mechanism.friction(body).breakaway(forward)
     }
 
     /// What the laws and the belt add to the linear equations, and how the bristles move.
     #[inline(always)]
-    pub(super) fn extra(
-        &self,
-        mode: &Mode,
-        inner: &State,
-        stretch: &[f64; SPRINGS],
-        y: &[f64],
-    ) -> (Extra, [f64; BODIES]) {
-        let mut rates = [0.0; BODIES];
-        if !self.adds {
-            return (Extra::default(), rates);
-        }
-        let mut extra = Extra { force: self.carried(mode, self.beyond(inner, stretch)), ..Extra::default() };
-        for body in self.mechanism.leaders() {
+    fn added(&self, mode: &Mode, y: &[f64]) -> Added {
+        let mut added = Added { load: self.loads(mode, y), ..Added::default() };
+        for &body in &self.curved {
             let friction = self.mechanism.friction(body);
-            let v = inner.speed[body];
-            extra.friction[body] = match (mode.motion[body], friction.law) {
+            let v = y[self.speed(body)];
+            added.friction[body] = match (mode.motion[body], friction.law) {
                 (Motion::Stuck, _) => 0.0,
                 // In the equations there is b v ± F_c; here what the law differs by.
-                (Motion::Forward, _) => self.factor(body, inner) * friction.dry(true, v) - friction.forward.coulomb,
-                (Motion::Backward, _) => friction.backward.coulomb - self.factor(body, inner) * friction.dry(false, -v),
+                (Motion::Forward, _) => self.factor(body, y) * friction.dry(true, v) - friction.forward.coulomb,
+                (Motion::Backward, _) => friction.backward.coulomb - self.factor(body, y) * friction.dry(false, -v),
                 // In the equations there is b v.
                 (Motion::Free, Law::Coulomb | Law::Stribeck { .. }) => 0.0,
                 (Motion::Free, law) => {
                     let forward = v >= 0.0;
-                    let dry = self.factor(body, inner) * friction.dry(forward, v.abs());
+                    let dry = self.factor(body, y) * friction.dry(forward, v.abs());
                     let viscous = (friction.side(forward).viscous - friction.forward.viscous) * v;
                     match (law, self.bristle[body]) {
                         (Law::LuGre { stiffness, damping, .. }, Some(place)) => {
                             let z = y[place];
                             // ż = v − σ₀ |v| z / g(v)
-                            rates[body] = v - stiffness * v.abs() * z / dry;
-                            extra.bristle[body] = z;
+                            added.bristle[body] = v - stiffness * v.abs() * z / dry;
                             // σ₀ z + σ₁ ż
-                            stiffness * z + damping * rates[body] + viscous
+                            stiffness * z + damping * added.bristle[body] + viscous
                         }
                         _ => dry.copysign(v) + viscous,
                     }
                 }
             };
         }
-        (extra, rates)
+        added
+    }
+
+    /// The same as a row shows it.
+    pub(super) fn extra(&self, mode: &Mode, y: &[f64]) -> Extra {
+        let mut extra = Extra::default();
+        if self.adds {
+            extra.friction = self.added(mode, y).friction;
+            for following in self.following.iter().filter(|following| !mode.slack[following.spring]) {
+                extra.force[following.spring] = self.beyond(following, y);
+            }
+            for (bristle, place) in extra.bristle.iter_mut().zip(self.bristle) {
+                *bristle = place.map_or(0.0, |place| y[place]);
+            }
+        }
+        extra
     }
 }
 
@@ -218,8 +278,10 @@ pub(super) struct Field<'a> {
     model: &'a Model,
     mode: Mode,
     equations: Equations,
-    /// Rates of the coordinates.
-    ways: [Form; BODIES],
+    /// Rates of the quantities that move, by the linear equations: places and coefficients.
+    rates: Vec<(usize, [f64; WIDE])>,
+    /// The conditions, by the linear equations.
+    guards: Vec<[f64; WIDE]>,
     /// Inertia that moves with each body, per unit of its leader's way.
     mass: [f64; BODIES],
     pub(super) stretch: &'a Stretch,
@@ -230,17 +292,25 @@ impl<'a> Field<'a> {
     pub(super) fn new(model: &'a Model, mode: &Mode, stretch: &'a Stretch) -> Self {
         let mechanism = &*model.mechanism;
         let equations = mechanism.equations(*mode);
-        let (mut mass, mut ways) = ([1.0; BODIES], [Form::ZERO; BODIES]);
+        let (mut mass, mut rates) = ([1.0; BODIES], Vec::with_capacity(model.size));
         for body in 0..mechanism.bodies.len() {
             mass[body] = mechanism.mass(mechanism.leader(body), &equations.inertia);
-            ways[body] = model.layout.rate(mechanism, body);
-            for (speed, motion) in ways[body].speed.iter_mut().zip(mode.motion) {
+            if mode.motion[body] != Motion::Stuck {
+                rates.push((model.speed(body), model.row(&equations.acceleration[body])));
+            }
+            let mut way = model.layout.rate(mechanism, body);
+            for (speed, motion) in way.speed.iter_mut().zip(mode.motion) {
                 if motion == Motion::Stuck {
                     *speed = 0.0;
                 }
             }
+            rates.push((model.coordinate(body), model.row(&way)));
         }
-        Self { model, mode: *mode, equations, ways, mass, stretch, evaluations: Cell::new(0) }
+        for (place, rate) in model.current.iter().zip(&equations.current_rate) {
+            rates.extend(place.map(|place| (place, model.row(rate))));
+        }
+        let guards = equations.guards.iter().map(|guard| model.row(&guard.form)).collect();
+        Self { model, mode: *mode, equations, rates, guards, mass, stretch, evaluations: Cell::new(0) }
     }
 
     pub(super) fn evaluations(&self) -> u64 {
@@ -266,47 +336,51 @@ impl<'a> Field<'a> {
     /// The values that must not become negative, in the order of [`Field::watches`].
     pub(super) fn guards(&self, tau: f64, y: &[f64]) -> [f64; MOST_GUARDS] {
         let model = self.model;
-        let (mechanism, inner, input) = (&*model.mechanism, model.inner(y), self.input(tau));
-        let stretch = model.layout.stretches(&inner);
-        let (extra, _) = model.extra(&self.mode, &inner, &stretch, y);
-        let (load, beyond) = (model.loads(&extra.force), model.beyond(&inner, &stretch));
+        let mechanism = &*model.mechanism;
+        let input = self.input(tau);
         let mut values = [0.0; MOST_GUARDS];
+        for (value, row) in values.iter_mut().zip(&self.guards) {
+            *value = model.value_of(row, y, &input);
+        }
+        if !model.adds {
+            return values;
+        }
+        let own = |cause: &Cause| !matches!(cause, Cause::Stop(_) | Cause::Leave(_));
+        if !self.equations.guards.iter().any(|guard| own(&guard.cause)) {
+            return values;
+        }
+        let added = model.added(&self.mode, y);
         for (value, guard) in values.iter_mut().zip(&self.equations.guards) {
-            *value = guard.form.value_at(&stretch, &inner, &input)
-                + match guard.cause {
-                    Cause::Stop(_) => 0.0,
-                    // a(x) F_b − (load + what the belt adds)
-                    Cause::BreakForward(body) => {
-                        model.breakaway(body, true, &inner) - mechanism.friction(body).forward.breakaway - load[body]
-                    }
-                    Cause::BreakBackward(body) => {
-                        model.breakaway(body, false, &inner) - mechanism.friction(body).backward.breakaway + load[body]
-                    }
-                    Cause::GearTorque(drive) => {
-                        let part = &mechanism.drives[drive];
-                        let sign = if self.mode.drive[drive].torque_positive { 1.0 } else { -1.0 };
-                        let change = match self.mode.motion[part.pulley] {
-                            _ if part.has_rotor() => 0.0,
-                            Motion::Stuck => 0.0,
-                            _ => {
-                                let leader = mechanism.leader(part.pulley);
-                                let added = load[leader] - extra.friction[leader];
-                                mechanism.ratio(part.pulley) * added / self.mass[part.pulley]
-                            }
-                        };
-                        -sign * part.motor.rotor_inertia * part.motor.gear_ratio * change
-                    }
-                    // A tension that follows the bodies.
-                    Cause::Switch(Switch::Span(spring, to)) => {
-                        if to {
-                            beyond[spring]
-                        } else {
-                            -beyond[spring]
+            *value += match guard.cause {
+                // a(x) F_b − (load + what the belt adds)
+                Cause::BreakForward(body) => {
+                    model.breakaway(body, true, y) - mechanism.friction(body).forward.breakaway - added.load[body]
+                }
+                Cause::BreakBackward(body) => {
+                    model.breakaway(body, false, y) - mechanism.friction(body).backward.breakaway + added.load[body]
+                }
+                Cause::GearTorque(drive) if !mechanism.drives[drive].has_rotor() => {
+                    let part = &mechanism.drives[drive];
+                    let sign = if self.mode.drive[drive].torque_positive { 1.0 } else { -1.0 };
+                    let change = match self.mode.motion[part.pulley] {
+                        Motion::Stuck => 0.0,
+                        _ => {
+                            let leader = mechanism.leader(part.pulley);
+                            let added = added.load[leader] - added.friction[leader];
+                            mechanism.ratio(part.pulley) * added / self.mass[part.pulley]
                         }
-                    }
-                    // Neither laws nor spans that follow bear on these.
-                    Cause::Switch(_) | Cause::Leave(_) => 0.0,
-                };
+                    };
+                    -sign * part.motor.rotor_inertia * part.motor.gear_ratio * change
+                }
+                // A tension that follows the bodies.
+                Cause::Switch(Switch::Span(spring, slack)) => {
+                    let own = model.following.iter().find(|following| following.spring == spring);
+                    let beyond = own.map_or(0.0, |own| model.beyond(own, y));
+                    if slack { beyond } else { -beyond }
+                }
+                // Neither laws nor spans that follow bear on these.
+                Cause::Stop(_) | Cause::GearTorque(_) | Cause::Switch(_) | Cause::Leave(_) => 0.0,
+            };
         }
         values
     }
@@ -316,32 +390,24 @@ impl FirstOrderSystem for Field<'_> {
     fn derivative(&self, tau: f64, y: &[f64], rate: &mut [f64]) {
         self.evaluations.set(self.evaluations.get() + 1);
         let model = self.model;
-        let (mechanism, inner, input) = (&*model.mechanism, model.inner(y), self.input(tau));
-        let stretch = model.layout.stretches(&inner);
-        let (extra, bristles) = model.extra(&self.mode, &inner, &stretch, y);
-        let load = model.loads(&extra.force);
-        let value = |form: &Form| form.value_at(&stretch, &inner, &input);
-        for body in 0..mechanism.bodies.len() {
-            rate[model.speed(body)] = match self.mode.motion[body] {
-                Motion::Stuck => 0.0,
-                // J φ̈ = what is linear + what the belt adds − what the law adds
-                _ => {
-                    let leader = mechanism.leader(body);
-                    let added = (load[leader] - extra.friction[leader]) / self.mass[body];
-                    value(&self.equations.acceleration[body]) + mechanism.ratio(body) * added
-                }
-            };
-            rate[model.coordinate(body)] = match model.layout.is_replaced(body) {
-                true => value(&self.ways[body]),
-                false => inner.speed[body],
-            };
-            if let Some(place) = model.bristle[body] {
-                rate[place] = bristles[body];
-            }
+        let input = self.input(tau);
+        rate.fill(0.0);
+        for (place, row) in &self.rates {
+            rate[*place] = model.value_of(row, y, &input);
         }
-        for (place, form) in model.current.iter().zip(&self.equations.current_rate) {
-            if let Some(place) = place {
-                rate[*place] = value(form);
+        if model.adds {
+            let mechanism = &*model.mechanism;
+            let added = model.added(&self.mode, y);
+            for body in (0..mechanism.bodies.len()).filter(|&body| self.mode.motion[body] != Motion::Stuck) {
+                // J φ̈ = what is linear + what the belt adds − what the law adds
+                let leader = mechanism.leader(body);
+                let change = (added.load[leader] - added.friction[leader]) / self.mass[body];
+                rate[model.speed(body)] += mechanism.ratio(body) * change;
+            }
+            for (place, bristle) in model.bristle.iter().zip(added.bristle) {
+                if let Some(place) = place {
+                    rate[*place] = bristle;
+                }
             }
         }
         if !rate.iter().sum::<f64>().is_finite() {

@@ -8,7 +8,7 @@ use crate::mechanism::{Layout, Mechanism, State};
 use crate::signal::Signal;
 use crate::solve::inputs::Pieces;
 use crate::solve::observe::Output;
-use crate::solve::record::{Recorder, Row};
+use crate::solve::record::Recorder;
 use crate::solve::run::{Running, Start};
 use crate::solve::{Ending, Flow, Grid, Outcome};
 
@@ -37,7 +37,7 @@ impl<'a> Run<'a> {
     ) -> Self {
         let grid = Grid::new(start.every, start.until);
         let core = Core::new(mechanism, Layout::new(mechanism), &start.state, (tolerance, fastest, grid.end()));
-        let recorder = Recorder::new(&core.model.mechanism, grid, output);
+        let recorder = Recorder::new(&core.model.mechanism, &core.model.layout, grid, output);
         Self { core, rows: Rows { grid, recorder, shown: None }, has_input: false }
     }
 
@@ -110,14 +110,9 @@ impl Rows<'_> {
     /// Puts out the row that is at `tau`.
     fn put_out(&mut self, core: &Core, field: &Field, tau: f64, y: &Vector) {
         let model = &core.model;
-        let inner = model.inner(y);
-        let row = Row::new(&model.layout, &core.coordinates, &inner, field.input(tau));
-        if model.adds {
-            let (extra, _) = model.extra(&core.mode, &inner, &row.stretch, y);
-            self.recorder.push_with(row, &core.mode, extra);
-        } else {
-            self.recorder.push(row, &core.mode);
-        }
+        self.recorder.segment(core.taken, &core.coordinates, &core.mode);
+        let extra = model.adds.then(|| model.extra(&core.mode, y));
+        self.recorder.push_state(&model.inner(y), &field.input(tau), extra);
     }
 }
 

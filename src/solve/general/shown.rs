@@ -76,9 +76,9 @@ impl Rows<'_> {
 fn read(readout: &Readout, model: &Model, mode: &Mode, y: &Vector, input: &[f64; DRIVES]) -> Reading {
     let inner = model.inner(y);
     let mechanism = &model.mechanism;
-    let mut values = readout.read(&model.layout, &inner, &mechanism.origin, input, 1.0);
+    let mut values = readout.read(&model.layout, &inner, &mechanism.origin, input);
     if model.adds {
-        let (extra, _) = model.extra(mode, &inner, &model.layout.stretches(&inner), y);
+        let extra = model.extra(mode, y);
         for (value, shown) in values.iter_mut().zip(&mechanism.readings) {
             if let Quantity::Force(spring, factor) = *shown {
                 *value += factor * extra.force[spring];

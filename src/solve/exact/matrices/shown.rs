@@ -1,13 +1,16 @@
 //! What an observer is shown of a mode: readings, and how far they can be off straight lines.
 
-use super::{ModeMatrices, Size};
+use super::{ModeMatrices, Size, Space};
 use crate::friction::Motion;
 use crate::mechanism::{BODIES, DRIVES, Mechanism};
 use crate::solve::observe::{QUANTITIES, Reading, Readout};
+use crate::solve::propagator::Matrix;
 
 /// Readings of one mode, and the norms of their forms.
-pub(in crate::solve) struct Shown {
+pub(in crate::solve) struct Shown<const C: usize> {
     pub(in crate::solve) readout: Readout,
+    /// What each place of z adds to each reading.
+    matrix: Matrix<QUANTITIES, C>,
     /// The norm dual to the energy, of what springs hold, speeds and current.
     dual: [Size; QUANTITIES],
     /// √(mechanical² + magnetic²) of those.
@@ -18,9 +21,15 @@ pub(in crate::solve) struct Shown {
     input: [Reading; DRIVES],
 }
 
-impl Shown {
-    fn new<const R: usize, const C: usize>(law: &ModeMatrices<R, C>, mechanism: &Mechanism) -> Self {
+impl<const C: usize> Shown<C> {
+    fn new<const R: usize>(law: &ModeMatrices<R, C>, mechanism: &Mechanism, space: &Space) -> Self {
         let readout = Readout::new(mechanism, &law.mode);
+        let mut matrix = Matrix::zero();
+        for (q, form) in readout.forms.iter().enumerate() {
+            for (place, weight) in space.row::<R, C>(form).into_iter().enumerate() {
+                matrix.set(q, place, weight);
+            }
+        }
         let stuck = law.mode.motion.map(|motion| motion == Motion::Stuck);
         let (mut dual, mut unsprung) = ([Size::ZERO; QUANTITIES], [0.0; QUANTITIES]);
         for (q, form) in readout.forms.iter().enumerate() {
@@ -49,21 +58,33 @@ impl Shown {
         }
         let input = std::array::from_fn(|drive| readout.forms.map(|form| form.input[drive].abs()));
         let whole = dual.map(|dual| dual.mechanical.hypot(dual.magnetic));
-        Self { readout, dual, whole, unsprung, input }
+        Self { readout, matrix, dual, whole, unsprung, input }
+    }
+
+    /// What is read in z, ways being counted from `origin`.
+    #[inline]
+    pub(in crate::solve) fn read(&self, z: &[f64; C], origin: &[f64; BODIES]) -> Reading {
+        self.readout.placed(self.matrix.rate(z), origin)
+    }
+
+    /// The same of a change of z.
+    #[inline]
+    pub(in crate::solve) fn change(&self, change: &[f64; C]) -> Reading {
+        self.matrix.rate(change)
     }
 }
 
 impl<const R: usize, const C: usize> ModeMatrices<R, C> {
     /// What an observer is shown, made ready when it is first wanted.
-    pub(in crate::solve) fn shown(&self, mechanism: &Mechanism) -> &Shown {
-        self.shown.get_or_init(|| Box::new(Shown::new(self, mechanism)))
+    pub(in crate::solve) fn shown(&self, mechanism: &Mechanism, space: &Space) -> &Shown<C> {
+        self.shown.get_or_init(|| Box::new(Shown::new(self, mechanism, space)))
     }
 
     /// By how much readings can be off a straight line over any `interval` within the next `length`, `y` being ż now: with bounds of |u̇| and
     /// |ü| of each input, |q̈| interval²/8.
     pub(in crate::solve) fn bow(
         &self,
-        shown: &Shown,
+        shown: &Shown<C>,
         y: &[f64; R],
         (rate, curvature): (&[f64; DRIVES], &[f64; DRIVES]),
         (interval, length): (f64, f64),
