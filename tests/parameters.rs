@@ -365,6 +365,36 @@ fn everything_of_the_papers_machine() {
     assert_eq!(kinds, names);
 }
 
+/// A stage that a program built by itself has to keep the ranges of the case file.
+#[test]
+fn numbers_out_of_their_ranges_are_refused_by_their_keys() {
+    for (name, text) in cases() {
+        let stage = read(&name, &text, &[]).stage;
+        parameter::check(&stage).unwrap();
+        for (key, _) in values(&stage) {
+            let row = named(&key).unwrap();
+            if matches!(row.field, Field::Form(..)) {
+                continue;
+            }
+            let free = Free::new(&stage, &key, &[], &[]).unwrap();
+            for value in [row.range.low - 1.0, 2.0 * row.range.high.max(1.0), f64::NAN, f64::INFINITY] {
+                let mut other = stage.clone();
+                free.set(&mut other, value);
+                // A breakaway is raised to Coulomb friction.
+                let raised = (key.contains(".static") || key.ends_with(".force")) && (value.is_nan() || value < 0.0);
+                match parameter::check(&other) {
+                    Ok(()) => assert!(raised, "{key} = {value}"),
+                    Err(error) => assert!(error.what.starts_with(&key) && error.allowed.is_some(), "{error}"),
+                }
+            }
+        }
+    }
+    let mut stage = Case::from_text("axis.toml", taut::case::TEMPLATE).unwrap().stage;
+    stage.motor.resistance = -1.0;
+    let error = parameter::check(&stage).unwrap_err().to_string();
+    assert_eq!(error, "motor.resistance cannot be -1 ohm\n  allowed: from 1e-15 ohm to 1e15 ohm");
+}
+
 /// `--set` and `Case::value` reach what a free parameter's key names.
 #[test]
 fn a_point_is_set_by_the_name_of_its_part() {

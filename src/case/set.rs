@@ -70,21 +70,16 @@ impl<'a> Change<'a> {
     fn apply(&self, root: &mut Item) -> Result<()> {
         let mut item = root;
         let Some((last, path)) = self.key.split_last() else { return Ok(()) };
-        for (depth, step) in path.iter().enumerate() {
-            if let Item::Value(list @ Value::Array(_)) = item {
-                let element = self.element(list, depth)?;
-                replace(element, self.value.clone());
-                return Ok(());
-            }
-            item = self.step(item, step, depth)?;
+        let mut depth = 0;
+        while depth < path.len() && !item.is_array() {
+            item = self.step(item, &path[depth], depth)?;
+            depth += 1;
         }
         let fresh = matches!(item, Item::Table(_));
         match item {
-            Item::Value(Value::Array(list)) => {
-                let length = list.len();
-                let slot = last.parse::<usize>().ok().and_then(|i| list.get_mut(i));
-                let Some(slot) = slot else { return Err(self.no_element(last, length)) };
-                replace(slot, self.value.clone());
+            Item::Value(list @ Value::Array(_)) => {
+                let element = self.element(list, depth)?;
+                replace(element, self.value.clone());
             }
             other => {
                 let Some(table) = other.as_table_like_mut() else {

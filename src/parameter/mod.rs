@@ -300,7 +300,7 @@ pub fn at_pulley(stage: &Stage, key: &str) -> f64 {
 /// Refuses a machine with a number out of its range.
 pub fn check(stage: &Stage) -> Result<()> {
     for row in all() {
-        let Some(accessor) = row.field.accessor() else { continue };
+        let Field::Machine(accessor) = row.field else { continue };
         for index in 0..(accessor.count)(stage) {
             if let Some(value) = (accessor.get)(stage, index).filter(|value| !row.range.contains(*value)) {
                 let name = free::element_key(row, index);
