@@ -46,10 +46,8 @@ pub(super) fn stage(stage: &Stage) -> Result<()> {
             return Err(Error::new("a gear that gives way has no efficiency of its own").allowed("an efficiency of 1"));
         }
     }
-    if let Some(travel) = stage.travel {
-        if travel.min >= travel.max {
-            return Err(Error::new("the travel ends before it begins").allowed("max above min"));
-        }
+    if stage.travel.is_some_and(|travel| travel.min >= travel.max) {
+        return Err(Error::new("the travel ends before it begins").allowed("max above min"));
     }
     if stage.cart.along.as_ref().is_some_and(|along| !along.grows()) {
         return Err(Error::new("the positions of cart.friction.along do not grow").allowed("each above the one before"));
