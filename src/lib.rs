@@ -44,7 +44,7 @@
 //! - [`friction`], [`stage`]: what the machine is.
 //! - [`parameter`]: the one table of everything a case file can say; numbers of a machine that are free.
 //! - [`signal`]: what is fed into it, and the references of its moves. [`design`]: what a controller is, in data.
-//! - [`plant`]: its equations of motion, mode by mode.
+//! - [`mechanism`]: a machine as bodies, springs and drives, and its equations of motion, mode by mode.
 //! - [`log`]: measured columns in. [`case`]: the case file in.
 //! - [`solve`]: the motion. [`measure`]: what a recorder makes of it. [`metrics`]: what it shows. [`reduction`]: how far a reduced model
 //!   is from the elastic one.
@@ -74,10 +74,10 @@ pub mod json;
 pub mod linear;
 pub mod log;
 pub mod measure;
+pub mod mechanism;
 pub mod metrics;
 pub mod number;
 pub mod parameter;
-pub mod plant;
 #[cfg(feature = "posterior")]
 pub mod posterior;
 pub mod quantity;

@@ -7,9 +7,10 @@
 
 use crate::case::Experiment;
 use crate::friction::Motion;
-use crate::plant::{Mode, State, place};
+use crate::mechanism::{AmplifierMode, Mode, State};
 use crate::solve::{Curve, Event, Gap, Observe, reading};
-use crate::stage::{AmplifierMode, Stage};
+use crate::stage::Stage;
+use crate::stage::axis::{BODIES, CART, DRIVE, ROTOR};
 
 /// Share of the run that a stretch of constant input has to last before a steady speed is sought in it.
 const SHORTEST: f64 = 0.02;
@@ -134,6 +135,8 @@ const NEWS: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub struct Meter {
     stage: Stage,
+    /// The body that the motor's shaft turns with.
+    shaft: usize,
     peaks: [Peak; PEAKS],
     seen: Metrics,
     plateau: Option<Plateau>,
@@ -153,6 +156,7 @@ impl Meter {
     pub(crate) fn with(stage: &Stage, held: Option<Held>) -> Self {
         Self {
             stage: stage.clone(),
+            shaft: if stage.motor.gear_play.is_some() { ROTOR } else { DRIVE },
             peaks: [Peak::default(); PEAKS],
             seen: Metrics::default(),
             plateau: held.map(Plateau::new),
@@ -174,7 +178,7 @@ impl Meter {
         metrics.steady_speed = self.plateau.and_then(|plateau| plateau.steady_speed(&self.stage));
         for event in events {
             let Some(body) = event.body() else { continue };
-            let count = &mut metrics.events[body.index()];
+            let count = &mut metrics.events[body];
             if event.to == Motion::Stuck {
                 count.stops += 1;
             } else if event.from == Motion::Stuck {
@@ -216,7 +220,7 @@ impl Observe for Meter {
         if let Some(rotor) = &mut self.rotor {
             closer |= rotor.pass(gap);
         }
-        self.moved |= gap.length > 0.0 && gap.mode.motion.iter().any(|motion| *motion != Motion::Stuck);
+        self.moved |= gap.length > 0.0 && gap.mode.motion[..BODIES].iter().any(|motion| *motion != Motion::Stuck);
         closer && gap.length > 0.0
     }
 
@@ -244,15 +248,14 @@ impl Observe for Meter {
     fn end(&mut self, time: f64, state: &State, mode: &Mode) {
         let seen = &mut self.seen;
         seen.end = time;
-        seen.final_drive_angle = state[place::DRIVE_ANGLE];
-        seen.final_drive_travel = self.stage.pulley_radius * state[place::DRIVE_ANGLE];
-        seen.final_cart_position = state[place::CART_POSITION];
-        seen.final_cart_speed = state[place::CART_SPEED];
-        seen.final_rotor_speed = state[place::ROTOR_SPEED];
-        let speeds = [place::DRIVE_SPEED, place::CART_SPEED, place::IDLER_SPEED].map(|place| state[place]);
-        seen.bodies_rest = mode.motion == [Motion::Stuck; 3] && speeds == [0.0; 3];
+        seen.final_drive_angle = state.position[DRIVE];
+        seen.final_drive_travel = self.stage.pulley_radius * state.position[DRIVE];
+        seen.final_cart_position = state.position[CART];
+        seen.final_cart_speed = state.speed[CART];
+        seen.final_rotor_speed = state.speed[self.shaft];
+        seen.bodies_rest = mode.motion[..BODIES] == [Motion::Stuck; BODIES] && state.speed[..BODIES] == [0.0; BODIES];
         if let Some(rotor) = &mut self.rotor {
-            rotor.rests = state[place::ROTOR_SPEED].abs() <= RESTING * rotor.fastest;
+            rotor.rests = state.speed[self.shaft].abs() <= RESTING * rotor.fastest;
         }
     }
 }

@@ -156,7 +156,7 @@ fn compare(text: &str) -> usize {
             .outcome
             .events
             .iter()
-            .map(|e| (e.body().unwrap().index() as i64 + 1, i64::from(e.from.code()), i64::from(e.to.code())))
+            .map(|e| (e.body().unwrap() as i64 + 1, i64::from(e.from.code()), i64::from(e.to.code())))
             .collect();
         let theirs = case["events"].as_array().unwrap();
         let want: Vec<_> =

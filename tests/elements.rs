@@ -7,7 +7,6 @@
 
 use serde_json::Value;
 use taut::case::Case;
-use taut::plant::Part;
 use taut::solve::{Ending, Event, Solver, simulate};
 
 /// How far each kind of column may be off: name, key of the authorities' own uncertainty, tolerance.
@@ -134,9 +133,8 @@ fn friction_curves_and_spans_that_follow_the_cart() {
 #[test]
 fn every_part_has_its_turn() {
     let file: Value = serde_json::from_str(include_str!("authorities/elements.json")).unwrap();
-    let parts = [Part::Span(0), Part::Span(1), Part::Span(2), Part::Voltage, Part::Current, Part::Gear, Part::Stop];
-    for part in parts {
-        let has = |case: &Value| case["events"].as_array().unwrap().iter().any(|event| event[1] == part.key());
-        assert!(file["cases"].as_array().unwrap().iter().any(has), "{}", part.name());
+    for part in ["span_1", "span_2", "span_3", "voltage", "current", "gear", "stop"] {
+        let has = |case: &Value| case["events"].as_array().unwrap().iter().any(|event| event[1] == part);
+        assert!(file["cases"].as_array().unwrap().iter().any(has), "{part}");
     }
 }

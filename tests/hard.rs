@@ -9,9 +9,9 @@ use proptest::prelude::*;
 use std::time::Instant;
 use taut::case::{Experiment, Initial};
 use taut::friction::{Friction, Motion, Side};
-use taut::plant::Body;
 use taut::signal::{Hold, Signal, Slot};
 use taut::solve::{Ending, Flow, Solution, Solver, simulate, stream};
+use taut::stage::axis::{BODIES, CART, DRIVE};
 use taut::stage::{Amplifier, AmplifierMode, Stage};
 use taut::trajectory::Trajectory;
 
@@ -141,23 +141,23 @@ fn beside_each_breakaway() {
     let r = all.pulley_radius;
     let [k1, k2, k3] = all.belt.stiffness;
     for factor in [0.98, 1.0 - 1e-9, 1.0, 1.0 + 1e-9, 1.02] {
-        for body in Body::ALL {
+        for body in 0..BODIES {
             let mut stage = all.clone();
             // Only this one may leave.
             for (j, law) in friction(&mut stage).into_iter().enumerate() {
-                if j != body.index() {
+                if j != body {
                     *law = Friction::with_breakaway(law.forward.viscous, law.forward.coulomb, 1e3);
                 }
             }
             let mut experiment = experiment(Signal::Step { value: 0.0, at: 0.0 }, 0.02);
             match body {
-                Body::DrivePulley => {
+                DRIVE => {
                     experiment.input = Signal::Step { value: factor * voltage_of(&all, 0.015), at: 0.0 };
                 }
                 // −(k₁ + k₂) x = F
-                Body::Cart => experiment.initial.cart_position = -factor * 0.2 / (k1 + k2),
+                CART => experiment.initial.cart_position = -factor * 0.2 / (k1 + k2),
                 // −r² (k₂ + k₃) φ₃ = τ
-                Body::IdlerPulley => experiment.initial.idler_angle = -factor * 0.015 / (r * r * (k2 + k3)),
+                _ => experiment.initial.idler_angle = -factor * 0.015 / (r * r * (k2 + k3)),
             }
             let solution = complete(&stage, &experiment);
             let first = solution.outcome.events.first();
@@ -233,9 +233,11 @@ fn no_friction_at_all() {
         let momentum = (get("drive_speed") + get("idler_speed")) * j / r + get("cart_speed") * m;
         // A stiffness times a position of 0.5 m, rounded: a force of 1e-11 N, for 10 s.
         assert!((momentum - 10.0 * j / r).abs() < 1e-7 * 10.0 * j / r, "{momentum}");
-        let plant = taut::plant::Plant::new(&stage);
-        let state = std::array::from_fn(|k| if k < 6 { get(STATES[k]) } else { 0.0 });
-        let energy = plant.energy(&state);
+        let mut state = taut::mechanism::State::default();
+        for body in 0..BODIES {
+            (state.position[body], state.speed[body]) = (get(STATES[2 * body]), get(STATES[2 * body + 1]));
+        }
+        let energy = stage.mechanism().energy(&state);
         assert!((energy - 50.0 * j).abs() < 1e-7 * 50.0 * j, "{energy}");
     }
 }
@@ -419,7 +421,7 @@ fn grazing() {
         complete(&table4(), &experiment(Signal::Table { points }, 0.6))
     };
     let stops = |solution: &Solution| {
-        solution.outcome.events.iter().any(|e| e.body() == Some(Body::DrivePulley) && e.time > 0.25 && e.time < 0.3)
+        solution.outcome.events.iter().any(|e| e.body() == Some(DRIVE) && e.time > 0.25 && e.time < 0.3)
     };
     let (mut low, mut high) = (0.0, 5.0);
     assert!(stops(&solve(low)) && !stops(&solve(high)));

@@ -6,9 +6,9 @@ use common::random::{self, Dry};
 use proptest::prelude::*;
 use taut::case::{Case, Experiment, Initial};
 use taut::friction::Motion;
-use taut::plant::Body;
 use taut::signal::Signal;
 use taut::solve::{Ending, Event, Solution, Solver, simulate};
+use taut::stage::axis::{CART, DRIVE};
 use taut::stage::{AmplifierMode, BeltModel, Stage};
 
 const SOLVERS: [Solver; 2] = [Solver::Exact, Solver::General { tolerance: 1e-11 }];
@@ -55,7 +55,7 @@ fn run(stage: &Stage, input: &Signal, until: f64, solver: Solver) -> Solution {
     simulate(stage, &experiment, solver).unwrap()
 }
 
-fn of_bodies(events: &[Event]) -> Vec<(Body, Motion, Motion)> {
+fn of_bodies(events: &[Event]) -> Vec<(usize, Motion, Motion)> {
     let motions = [Motion::Backward, Motion::Stuck, Motion::Forward, Motion::Free];
     let motion = |code: i8| motions.into_iter().find(|motion| motion.code() == code).unwrap();
     events.iter().filter_map(|e| Some((e.body()?, motion(e.from.code()), motion(e.to.code())))).collect()
@@ -82,7 +82,7 @@ fn a_body_broke_away_with_a_voltage_that_the_amplifier_cannot_give() {
             // An elastic belt gives way to the pulley until the cart holds it.
             let most = if changes == elastic { 1e-4 } else { 0.0 };
             assert!(moved <= most, "{changes:?}, {solver:?}: the cart moves {moved} m");
-            let cart = of_bodies(&solution.outcome.events).into_iter().filter(|(body, ..)| *body == Body::Cart);
+            let cart = of_bodies(&solution.outcome.events).into_iter().filter(|(body, ..)| *body == CART);
             assert_eq!(cart.count(), 0, "{changes:?}, {solver:?}: {:?}", solution.outcome.events);
         }
     }
@@ -105,7 +105,7 @@ fn a_span_that_is_slack_at_time_zero_moved_bodies() {
     let case = clipped(&changes);
     for solver in SOLVERS {
         let solution = simulate(&case.stage, &case.experiments[0], solver).unwrap();
-        let at_once = |e: &&Event| e.time == 0.0 && e.body() == Some(Body::Cart);
+        let at_once = |e: &&Event| e.time == 0.0 && e.body() == Some(CART);
         let cart = solution.outcome.events.iter().find(at_once);
         assert!(cart.is_none(), "{solver:?}: {cart:?}");
     }
@@ -166,7 +166,7 @@ proptest! {
             let (mut events, mut wanted) = (of_bodies(&a.outcome.events), of_bodies(&b.outcome.events));
             if solver != Solver::Exact {
                 // Which of two bodies that start within its tolerance is first is chance.
-                [&mut events, &mut wanted].into_iter().for_each(|list| list.sort_by_key(|(body, ..)| body.index()));
+                [&mut events, &mut wanted].into_iter().for_each(|list| list.sort_by_key(|(body, ..)| *body));
             }
             // So is which way a flank that touches within it pushes first a pulley that nothing holds.
             if solver == Solver::Exact || !random::rattles(&stage) {
@@ -198,9 +198,9 @@ proptest! {
                     continue;
                 }
                 let friction = match body {
-                    Body::DrivePulley => stage.drive_pulley.friction,
-                    Body::Cart => stage.cart.friction,
-                    Body::IdlerPulley => stage.idler_pulley.friction,
+                    DRIVE => stage.drive_pulley.friction,
+                    CART => stage.cart.friction,
+                    _ => stage.idler_pulley.friction,
                 };
                 let holds = friction.breakaway(forward);
                 let load = if forward { event.load } else { -event.load };

@@ -6,9 +6,10 @@ use common::random::{self, Dry};
 use proptest::prelude::*;
 use taut::case::{Experiment, Initial};
 use taut::friction::Motion;
-use taut::plant::{Body, Contact, Limit, Mode, Plant, State};
+use taut::mechanism::{Contact, Limit, Mode, Power, State};
 use taut::signal::Signal;
 use taut::solve::{Ending, Solution, Solver, simulate};
+use taut::stage::axis::{LABELS, SPANS};
 use taut::stage::{AmplifierMode, Stage};
 use taut::trajectory::Trajectory;
 
@@ -24,17 +25,11 @@ fn run(stage: &Stage, input: &Signal, until: f64, every: f64) -> Solution {
 
 fn state(trajectory: &Trajectory, row: usize) -> State {
     let get = |name: &str| trajectory.get(name).unwrap()[row];
-    [
-        get("drive_angle"),
-        get("drive_speed"),
-        get("cart_position"),
-        get("cart_speed"),
-        get("idler_angle"),
-        get("idler_speed"),
-        get("motor_current"),
-        get("drive_angle"),
-        get("drive_speed"),
-    ]
+    let mut state = State::default();
+    state.position[..3].copy_from_slice(&[get("drive_angle"), get("cart_position"), get("idler_angle")]);
+    state.speed[..3].copy_from_slice(&[get("drive_speed"), get("cart_speed"), get("idler_speed")]);
+    state.current[0] = get("motor_current");
+    state
 }
 
 fn motion(code: f64) -> Motion {
@@ -64,7 +59,7 @@ proptest! {
     /// the powers along the computed motion, so that it is the motion that is tested.
     #[test]
     fn power_is_balanced(stage in random::stage(Dry::Any), input in random::input()) {
-        let plant = Plant::new(&stage);
+        let mechanism = stage.mechanism();
         // Boole's rule over eight samples; the fastest swing of these stages is resolved many times over.
         let motor = &stage.motor;
         let kn2 = motor.torque_constant * motor.back_emf_constant * motor.gear_ratio.powi(2);
@@ -82,17 +77,17 @@ proptest! {
             AmplifierMode::Current => trajectory.get("motor_current").unwrap()[row] / gain,
         };
         let power = |row: usize| {
-            let codes = Body::ALL.map(|b| trajectory.get(&format!("{}_state", b.key())).unwrap()[row]);
-            let mode = |positive| Mode { gear_torque_positive: positive, ..Mode::of(codes.map(motion)) };
+            let codes = LABELS.map(|b| trajectory.get(&format!("{}_state", b.key)).unwrap()[row]);
+            let mode = |positive| Mode::of(codes.map(motion)).with_torque(positive);
             let state = state(trajectory, row);
             // The sign of the gear's torque is the one that is consistent with itself.
-            let both = [true, false].map(|positive| plant.power(mode(positive), &state, input_at(row)));
-            let loss = |p: &taut::plant::Power| p.gear;
+            let both = [true, false].map(|positive| mechanism.power(mode(positive), &state, &[input_at(row), 0.0]));
+            let loss = |p: &Power| p.gear;
             let power = if loss(&both[0]) >= 0.0 { both[0] } else { both[1] };
             prop_assert!(power.imbalance().abs() <= 1e-9 * power.scale().max(1e-12), "{power:?}");
             prop_assert!(power.gear >= -1e-12 * power.scale(), "the gear adds power: {power:?}");
             prop_assert!(power.friction.iter().all(|&f| f >= 0.0), "friction adds power: {power:?}");
-            prop_assert!(power.belt >= 0.0 && power.copper >= 0.0);
+            prop_assert!(power.spring.iter().all(|&s| s >= 0.0) && power.copper >= 0.0);
             Ok((power.stored, power.scale()))
         };
         let disturbed = |from: f64, to: f64| {
@@ -101,7 +96,7 @@ proptest! {
         for first in (0..trajectory.len() - 9).step_by(160) {
             let last = first + 8;
             let seam = input.piece(time[first]).end;
-            if disturbed(time[first], time[last]) || plant.gear_loses() || seam < time[last] + every {
+            if disturbed(time[first], time[last]) || (stage.motor.gear_efficiency < 1.0) || seam < time[last] + every {
                 continue;
             }
             let mut integral = 0.0;
@@ -112,8 +107,8 @@ proptest! {
                 integral += weight * stored * every * 2.0 / 45.0;
                 scale = scale.max(size);
             }
-            let change = plant.energy(&state(trajectory, last)) - plant.energy(&state(trajectory, first));
-            let energy = plant.energy(&state(trajectory, last));
+            let change = mechanism.energy(&state(trajectory, last)) - mechanism.energy(&state(trajectory, first));
+            let energy = mechanism.energy(&state(trajectory, last));
             prop_assert!(
                 (change - integral).abs() <= 1e-9 * (scale * 8.0 * every) + 1e-13 * energy,
                 "energy changed by {change:e}, the powers say {integral:e}, of {energy:e} (scale {:e})", scale * 8.0 * every
@@ -125,18 +120,14 @@ proptest! {
     /// slack or apart carries nothing.
     #[test]
     fn every_element_keeps_the_balance(stage in random::equipped(Dry::Any), input in random::input()) {
-        let plant = Plant::new(&stage);
+        let mechanism = stage.mechanism();
         let solution = run(&stage, &input, 0.2, 1e-3);
         let trajectory = &solution.trajectory;
-        let names = ["drive_angle", "drive_speed", "cart_position", "cart_speed", "idler_angle", "idler_speed", "motor_current"];
         for row in 0..trajectory.len() {
             let at = |name: &str| trajectory.get(name).map(|values| values[row]);
-            let mut state: State = [0.0; 9];
-            for (place, name) in names.iter().enumerate() {
-                state[place] = at(name).unwrap();
-            }
-            state[7] = at("rotor_angle").unwrap_or(state[0]);
-            state[8] = at("rotor_speed").unwrap_or(state[1]);
+            let mut state = state(trajectory, row);
+            state.position[3] = at("rotor_angle").unwrap_or(0.0);
+            state.speed[3] = at("rotor_speed").unwrap_or(0.0);
             let (voltage, current) = (at("voltage").unwrap(), at("motor_current").unwrap());
             let limit = |value: f64, limit: Option<f64>| match limit {
                 Some(limit) if value >= limit => Limit::High,
@@ -155,15 +146,15 @@ proptest! {
                 AmplifierMode::Voltage => (commanded(amplifier.voltage_limit), limit(current, amplifier.current_limit)),
                 AmplifierMode::Current => (limit(voltage, amplifier.voltage_limit), commanded(amplifier.current_limit)),
             };
-            let mode = Mode {
-                slack: [1, 2, 3].map(|span| at(&format!("span{span}_slack")) == Some(1.0)),
-                gear: side(at("gear_state").unwrap_or(0.0)),
-                stop: side(-at("stop_force").unwrap_or(0.0)),
-                voltage: voltage_mode,
-                current: current_mode,
-                gear_torque_positive: true,
-                motion: Body::ALL.map(|b| motion(at(&format!("{}_state", b.key())).unwrap())),
-            };
+            let mut mode = Mode::of(LABELS.map(|b| motion(at(&format!("{}_state", b.key)).unwrap())));
+            for (span, slack) in mode.slack.iter_mut().enumerate().take(SPANS) {
+                *slack = at(&format!("span{}_slack", span + 1)) == Some(1.0);
+            }
+            if stage.motor.gear_play.is_some() {
+                mode.contact[SPANS] = side(at("gear_state").unwrap_or(0.0));
+            }
+            mode.contact[mechanism.springs.len() - 1] = side(-at("stop_force").unwrap_or(0.0));
+            (mode.drive[0].voltage, mode.drive[0].current) = (voltage_mode, current_mode);
             prop_assert!(amplifier.voltage_limit.is_none_or(|limit| voltage.abs() <= limit), "{voltage:e} V");
             prop_assert!(amplifier.current_limit.is_none_or(|limit| {
                 amplifier.bandwidth.is_some() && amplifier.mode == AmplifierMode::Current || current.abs() <= limit
@@ -185,13 +176,12 @@ proptest! {
                 prop_assert!(torque == 0.0);
             }
             let both = [true, false]
-                .map(|positive| plant.power(Mode { gear_torque_positive: positive, ..mode }, &state, command / amplifier.gain));
+                .map(|positive| mechanism.power(mode.with_torque(positive), &state, &[command / amplifier.gain, 0.0]));
             let power = if both[0].gear >= 0.0 { both[0] } else { both[1] };
             // What a spring at its very end stores is known to the rounding of where it is.
             prop_assert!(power.imbalance().abs() <= 1e-8 * power.scale().max(1e-6), "row {row}: {power:?}\n{mode:?}");
             prop_assert!(power.gear >= -1e-9 * power.scale().max(1e-9), "the gear adds power: {power:?}");
-            prop_assert!(power.belt >= -1e-9 * power.scale().max(1e-9), "the belt adds power: {power:?}");
-            prop_assert!(power.stop >= -1e-9 * power.scale().max(1e-9), "the stops add power: {power:?}");
+            prop_assert!(power.spring.iter().all(|&s| s >= -1e-9 * power.scale().max(1e-9)), "springs add power: {power:?}");
             prop_assert!(power.friction.iter().all(|&f| f >= -1e-12 * power.scale()), "friction adds power: {power:?}");
         }
     }
@@ -293,7 +283,7 @@ proptest! {
         // A motor whose two constants differ is no passive machine.
         let mut stage = stage;
         stage.motor.back_emf_constant = stage.motor.torque_constant;
-        let plant = Plant::new(&stage);
+        let mechanism = stage.mechanism();
         let initial = Initial {
             drive_speed: speeds[0],
             cart_speed: speeds[1],
@@ -304,10 +294,10 @@ proptest! {
         let experiment =
             Experiment { name: "law".into(), input: Signal::Step { value: 0.0, at: 0.0 }, until: 0.3, every: 1e-3, initial, log: None };
         let solution = simulate(&stage, &experiment, Solver::Exact).unwrap();
-        let first = plant.energy(&state(&solution.trajectory, 0));
+        let first = mechanism.energy(&state(&solution.trajectory, 0));
         let mut before = f64::INFINITY;
         for row in 0..solution.trajectory.len() {
-            let energy = plant.energy(&state(&solution.trajectory, row));
+            let energy = mechanism.energy(&state(&solution.trajectory, row));
             prop_assert!(energy <= before + 1e-12 * first, "row {row}: {before:e} J, then {energy:e} J");
             before = energy;
         }

@@ -43,7 +43,7 @@ fn compare(case: &str, stage: Stage, input: Signal) {
         println!("{case}: {name} differs by at most {worst:.2e}");
         assert!(worst <= tolerance, "{case}: {name} differs by {worst:e}");
     }
-    let modes = |e: &taut::solve::Event| (e.body().unwrap().index() + 1, e.from.code(), e.to.code());
+    let modes = |e: &taut::solve::Event| (e.body().unwrap() + 1, e.from.code(), e.to.code());
     let got_modes: Vec<_> = got.outcome.events.iter().map(modes).collect();
     let want_modes: Vec<_> = events.iter().map(|e| (e[1] as usize, e[2] as i8, e[3] as i8)).collect();
     assert_eq!(got_modes, want_modes, "{case}");

@@ -280,7 +280,7 @@ impl Pair<'_> {
 
 /// The changes of bodies in a run of taut.
 fn body_events(run: &Solution) -> Vec<Event> {
-    let motion = |status: taut::plant::Status| match status.code() {
+    let motion = |status: taut::mechanism::Status| match status.code() {
         -1 => Motion::Backward,
         0 => Motion::Stuck,
         1 => Motion::Forward,
@@ -288,12 +288,7 @@ fn body_events(run: &Solution) -> Vec<Event> {
     };
     let of_bodies = run.outcome.events.iter().filter_map(|event| Some((event, event.body()?)));
     of_bodies
-        .map(|(event, body)| Event {
-            time: event.time,
-            body: body.index(),
-            from: motion(event.from),
-            to: motion(event.to),
-        })
+        .map(|(event, body)| Event { time: event.time, body, from: motion(event.from), to: motion(event.to) })
         .collect()
 }
 

@@ -1,7 +1,7 @@
 //! A hunt for wrong answers of taut.
 //!
 //! Random stages over wide ranges, drawn by seed, are run by taut and by an independent solver, which shares no code
-//! with taut's plant, solvers and
+//! with taut's mechanism, solvers and
 //! friction: it takes a stage as data and writes its own equations, in numbers of about 106 bits. `docs/trust.md` says
 //! what is compared.
 

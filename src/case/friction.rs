@@ -20,7 +20,7 @@ pub(super) fn friction(body: &Table) -> Result<Friction> {
     let breakaway_backward = table.number_if_given("static_backward")?.or(breakaway);
 
     // At rest a body holds at least what it resists with in motion.
-    let unit = if body.field.section == "cart" { "N" } else { "N m" };
+    let unit = if body.field.section.ends_with("pulley") { "N m" } else { "N" };
     let at_least = |key: &str, breakaway: Option<f64>, allowed: &str, coulomb: f64| match breakaway {
         Some(value) if value < coulomb => {
             let field = table.optional(key).unwrap_or_else(|| table.field.clone());
@@ -98,7 +98,7 @@ fn stribeck(table: &Table, law: &Table, friction: Friction) -> Result<Friction> 
         (Some(decay), None) => velocity_of_decay(decay.number()?),
         (None, Some(velocity)) => velocity.number()?,
         (None, None) => {
-            let example = if table.field.section.starts_with("cart") { "0.01 m/s" } else { "0.5 rad/s" };
+            let example = if table.field.section.contains("pulley") { "0.5 rad/s" } else { "0.01 m/s" };
             return Err(law.missing("velocity", &format!("for example velocity = \"{example}\", or decay")));
         }
     };

@@ -5,6 +5,7 @@ mod chosen;
 mod controller;
 mod fit;
 mod friction;
+mod gantry;
 mod get;
 mod input;
 mod log;
@@ -19,6 +20,7 @@ mod tree;
 mod tune;
 
 pub use fit::{Nuisances, Plan, Prior, Scope, matches};
+pub use gantry::{GantryCase, GantryExperiment, Opened};
 pub use get::Given;
 pub use motion::Move;
 pub use sweep::{Kinds, Origin, Sampling, Sweeping, Variation};
@@ -29,7 +31,7 @@ use crate::chance::hash;
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::log::Log;
-use crate::plant::{Plant, State};
+use crate::mechanism::{Mechanism, State};
 use crate::signal::Signal;
 use crate::stage::{AmplifierMode, Measurement, Stage};
 use crate::trajectory::Grid;
@@ -125,20 +127,20 @@ pub struct Initial {
 }
 
 impl Initial {
-    /// The state vector that it stands for.
-    pub fn state(&self, plant: &Plant) -> State {
-        [
+    /// The state that it stands for.
+    pub fn state(&self, mechanism: &Mechanism) -> State {
+        let mut state = State::default();
+        let has_current = mechanism.drives.iter().any(|drive| drive.has_current_state());
+        // The rotor in the middle of its play.
+        state.position[..4].copy_from_slice(&[
             self.drive_angle,
-            self.drive_speed,
             self.cart_position,
-            self.cart_speed,
             self.idler_angle,
-            self.idler_speed,
-            if plant.has_current_state() { self.motor_current } else { 0.0 },
-            // The rotor in the middle of its play.
             self.drive_angle,
-            self.drive_speed,
-        ]
+        ]);
+        state.speed[..4].copy_from_slice(&[self.drive_speed, self.cart_speed, self.idler_speed, self.drive_speed]);
+        state.current[0] = if has_current { self.motor_current } else { 0.0 };
+        state
     }
 }
 
@@ -151,19 +153,7 @@ impl Case {
     /// Reads a case file with changes, each as `KEY=VALUE`.
     pub fn read_with(path: impl AsRef<Path>, changes: &[&str]) -> Result<Self> {
         let path = path.as_ref();
-        let fail = |what: String| Error::new(what).in_file(path);
-        let bytes = read_bytes(path).map_err(|e| {
-            let error = fail(format!("this case file cannot be read: {}", told(&e)));
-            match e.kind() {
-                std::io::ErrorKind::NotFound => error.next("check the path, or write a new case with `taut init`"),
-                _ => error,
-            }
-        })?;
-        let text = String::from_utf8(bytes).map_err(|e| {
-            fail(format!("this is not a text file: byte {} is not UTF-8", e.utf8_error().valid_up_to() + 1))
-                .next("give the path of a case file in TOML, saved as UTF-8")
-        })?;
-        Self::from_text_with(path, &text, changes)
+        Self::from_text_with(path, &read_text(path)?, changes)
     }
 
     /// Reads a case from text; `name` stands in messages, and paths in the text are relative to its folder.
@@ -204,6 +194,7 @@ impl Case {
         }
         let tables = [
             "title",
+            "kind",
             "motor",
             "amplifier",
             "drive_pulley",
@@ -222,14 +213,14 @@ impl Case {
             "uncertainty",
             "sweep",
         ];
+        if let Some(routing) = gantry::kind(&root)? {
+            return Err(gantry::no_axis(&root, routing));
+        }
         root.check_keys(&tables, &[])?;
 
-        let title = match root.optional("title") {
-            Some(field) => field.text()?.to_string(),
-            None => name.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
-        };
+        let title = title(&root, name)?;
         let stage = stage::stage(&root)?;
-        let folder = Folder { path: name.parent().unwrap_or(Path::new("")), read: RefCell::default() };
+        let folder = Folder::of(name);
         let controller = controller::controller(&root, &stage)?;
         let moves = motion::moves(&root, &stage, controller.as_ref())?;
         // A case of moves needs no experiments.
@@ -249,8 +240,7 @@ impl Case {
             folder: &folder,
         };
         let sweep = sweep::sweeping(&root, &context)?;
-        let mut files = folder.read.into_inner();
-        files.sort_by_key(|file| file.place.start);
+        let files = folder.files();
         let text = source.text.clone();
         Ok(Self { title, stage, measurement, experiments, controller, moves, fit, tune, known, sweep, text, files })
     }
@@ -266,6 +256,30 @@ impl Case {
         }
         text + &self.text[end..]
     }
+}
+
+/// What the file says it is; its name where it does not say.
+fn title(root: &Table, name: &Path) -> Result<String> {
+    match root.optional("title") {
+        Some(field) => Ok(field.text()?.to_string()),
+        None => Ok(name.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()),
+    }
+}
+
+/// The text of a case file.
+fn read_text(path: &Path) -> Result<String> {
+    let fail = |what: String| Error::new(what).in_file(path);
+    let bytes = read_bytes(path).map_err(|e| {
+        let error = fail(format!("this case file cannot be read: {}", told(&e)));
+        match e.kind() {
+            std::io::ErrorKind::NotFound => error.next("check the path, or write a new case with `taut init`"),
+            _ => error,
+        }
+    })?;
+    String::from_utf8(bytes).map_err(|e| {
+        fail(format!("this is not a text file: byte {} is not UTF-8", e.utf8_error().valid_up_to() + 1))
+            .next("give the path of a case file in TOML, saved as UTF-8")
+    })
 }
 
 /// The content of a file, up to a little more than a case may have: what is too long is told with the rest.
@@ -314,7 +328,22 @@ struct Folder<'a> {
     read: RefCell<Vec<InputFile>>,
 }
 
-fn experiments(root: &Table, stage: &Stage, folder: &Folder) -> Result<Vec<Experiment>> {
+impl<'a> Folder<'a> {
+    /// That of the case file `name`.
+    fn of(name: &'a Path) -> Self {
+        Self { path: name.parent().unwrap_or(Path::new("")), read: RefCell::default() }
+    }
+
+    /// The files that were read, in the text's order.
+    fn files(self) -> Vec<InputFile> {
+        let mut files = self.read.into_inner();
+        files.sort_by_key(|file| file.place.start);
+        files
+    }
+}
+
+/// The tables of the experiments.
+fn listed<'a>(root: &Table<'a>) -> Result<Vec<Field<'a>>> {
     let such_as = "[[experiment]] with name, input, until and every";
     let field = root.required("experiment", such_as)?;
     if field.is_table() {
@@ -326,24 +355,32 @@ fn experiments(root: &Table, stage: &Stage, folder: &Folder) -> Result<Vec<Exper
     if list.is_empty() {
         return Err(field.fail("the list is empty").next(format!("add {such_as}")));
     }
+    Ok(list)
+}
+
+fn experiments(root: &Table, stage: &Stage, folder: &Folder) -> Result<Vec<Experiment>> {
+    let list = listed(root)?;
     let mut experiments: Vec<Experiment> = Vec::new();
-    let mut files: HashMap<String, usize> = HashMap::new();
+    let mut files = HashMap::new();
     for field in list {
         for experiment in experiment(&field.clone().named("experiment"), stage, folder)? {
-            let file = experiment.file_name();
-            if let Some(other) = files.insert(file.clone(), experiments.len()).and_then(|i| experiments.get(i)) {
-                let (name, other) = (&experiment.name, &other.name);
-                let what = match name == other {
-                    true => format!("\"{name}\" is the name of two experiments"),
-                    false => format!("\"{other}\" and \"{name}\" would both be written to {file}.csv"),
-                };
-                let field = field.table()?.required("name", "a name")?;
-                return Err(field.fail(what).next("give each experiment a name of its own"));
-            }
+            unique(&field, &experiment.name, &mut files)?;
             experiments.push(experiment);
         }
     }
     Ok(experiments)
+}
+
+/// Refuses a name that another experiment has, or that leads to the same files; `files` are those so far and whose they are.
+fn unique(field: &Field, name: &str, files: &mut HashMap<String, String>) -> Result<()> {
+    let file = file_name(name);
+    let Some(other) = files.insert(file.clone(), name.to_string()) else { return Ok(()) };
+    let what = match name == other {
+        true => format!("\"{name}\" is the name of two experiments"),
+        false => format!("\"{other}\" and \"{name}\" would both be written to {file}.csv"),
+    };
+    let field = field.table()?.required("name", "a name")?;
+    Err(field.fail(what).next("give each experiment a name of its own"))
 }
 
 /// The experiment of a table; several, if its log is split into runs.
@@ -435,7 +472,7 @@ fn check_name(field: &Field) -> Result<()> {
 fn initial(table: &Table, stage: &Stage) -> Result<Initial> {
     table.check_keys(&[], &[])?;
     if let Some(current) = table.optional("motor_current")
-        && !Plant::new(stage).has_current_state()
+        && !stage.mechanism().drives.iter().any(|drive| drive.has_current_state())
     {
         return Err(current.fail("this current would have no effect").next(
             "it needs motor.inductance above zero in voltage mode, or amplifier.bandwidth in current mode; or leave it out",

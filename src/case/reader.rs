@@ -169,22 +169,25 @@ impl<'a> Field<'a> {
         Ok(list)
     }
 
-    /// Three numbers, one for each span.
+    /// Three numbers, one for each span of an axis.
     pub fn three(&self) -> Result<[f64; 3]> {
         let per_span = "three values: drive pulley to cart, cart to idler pulley, and the way back";
+        let mut values = [0.0; 3];
+        values.copy_from_slice(&self.numbers(3, per_span)?);
+        Ok(values)
+    }
+
+    /// So many numbers, one for each span.
+    pub fn numbers(&self, count: usize, per_span: &str) -> Result<Vec<f64>> {
         let Kind::List(nodes) = &self.node.kind else {
             return Err(self
                 .fail(format!("{} stands where a list is wanted", self.node.kind.word()))
                 .allowed(per_span));
         };
-        if nodes.len() != 3 {
+        if nodes.len() != count {
             return Err(self.fail(format!("the list has {} values", nodes.len())).allowed(per_span));
         }
-        let mut values = [0.0; 3];
-        for (value, field) in values.iter_mut().zip(self.list()?) {
-            *value = field.number()?;
-        }
-        Ok(values)
+        self.list()?.iter().map(Field::number).collect()
     }
 
     pub fn is_table(&self) -> bool {
@@ -197,7 +200,7 @@ impl<'a> Field<'a> {
 
     pub fn table(&self) -> Result<Table<'a>> {
         match &self.node.kind {
-            Kind::Table(entries) => Ok(Table { field: self.clone(), entries }),
+            Kind::Table(entries) => Ok(Table { field: self.clone(), entries, base: None }),
             Kind::Tables(_) => Err(self
                 .fail("there can be only one of these")
                 .next(format!("write [{}] with single brackets", self.path))),
@@ -216,9 +219,17 @@ impl<'a> Field<'a> {
 pub(super) struct Table<'a> {
     pub field: Field<'a>,
     entries: &'a [Entry],
+    /// What holds for keys that are not in it.
+    base: Option<Box<Table<'a>>>,
 }
 
 impl<'a> Table<'a> {
+    /// The same, with what `base` says where it says nothing itself.
+    pub fn over(mut self, base: Option<Table<'a>>) -> Self {
+        self.base = base.map(Box::new);
+        self
+    }
+
     fn child(&self, entry: &'a Entry) -> Field<'a> {
         let join = |before: &str| match before {
             "" => entry.key.clone(),
@@ -274,7 +285,8 @@ impl<'a> Table<'a> {
     }
 
     pub fn optional(&self, key: &str) -> Option<Field<'a>> {
-        self.entries.iter().find(|e| e.key == key).map(|e| self.child(e))
+        let own = self.entries.iter().find(|e| e.key == key).map(|e| self.child(e));
+        own.or_else(|| self.base.as_ref()?.optional(key))
     }
 
     /// The value of `key`; `example` is what to add if it is missing.

@@ -39,7 +39,7 @@ pub(super) fn stage(root: &Table) -> Result<Stage> {
     })
 }
 
-fn motor(table: &Table) -> Result<Motor> {
+pub(super) fn motor(table: &Table) -> Result<Motor> {
     table.check_keys(&[], &[])?;
     Ok(Motor {
         torque_constant: table.number("torque_constant")?,
@@ -82,7 +82,7 @@ fn gear_play(table: &Table) -> Result<Option<GearPlay>> {
     }))
 }
 
-fn travel(table: &Table) -> Result<Travel> {
+pub(super) fn travel(table: &Table) -> Result<Travel> {
     table.check_keys(&[], &[])?;
     let (min, max) = (table.number("min")?, table.number("max")?);
     if min >= max
@@ -100,7 +100,7 @@ fn travel(table: &Table) -> Result<Travel> {
     }
 }
 
-fn amplifier(table: Option<&Table>, motor: &Table) -> Result<Amplifier> {
+pub(super) fn amplifier(table: Option<&Table>, motor: &Table) -> Result<Amplifier> {
     let Some(table) = table else {
         return Ok(Amplifier::ideal(AmplifierMode::Voltage, 1.0));
     };
@@ -136,7 +136,7 @@ fn amplifier(table: Option<&Table>, motor: &Table) -> Result<Amplifier> {
 }
 
 /// `radius`, or `teeth` and `pitch`.
-fn radius(table: &Table) -> Result<f64> {
+pub(super) fn radius(table: &Table) -> Result<f64> {
     let [radius, teeth, pitch] = ["radius", "teeth", "pitch"].map(|key| table.optional(key));
     match (radius, teeth, pitch) {
         (Some(radius), None, None) => radius.number(),
@@ -152,7 +152,7 @@ fn radius(table: &Table) -> Result<f64> {
     }
 }
 
-fn pulley(table: &Table) -> Result<Pulley> {
+pub(super) fn pulley(table: &Table) -> Result<Pulley> {
     let inertia = match table.optional("inertia") {
         Some(field) if field.is_table() => {
             let shape = field.table()?;
@@ -254,7 +254,7 @@ fn spans_left(follows: &Field, make: &BeltMake, travel: Option<&Table>) -> Resul
 }
 
 /// One modulus, or the parts of a composite.
-fn modulus(field: &Field) -> Result<f64> {
+pub(super) fn modulus(field: &Field) -> Result<f64> {
     const ROUNDING: f64 = 1e-6;
     if !field.is_list() {
         return field.number();
@@ -276,7 +276,7 @@ fn modulus(field: &Field) -> Result<f64> {
 }
 
 /// One cross-section, or that of a toothed belt.
-fn section(field: &Field) -> Result<f64> {
+pub(super) fn section(field: &Field) -> Result<f64> {
     if !field.is_table() {
         return field.number();
     }

@@ -1,8 +1,8 @@
 //! The axis as a sampled linear system, for observers and regulators: everything slides, dry friction apart.
 
 use super::measures_cart;
-use crate::friction::Motion;
-use crate::plant::{Body, Contact, Form, Mode, Plant, ROTOR, place};
+use crate::mechanism::{BODIES, Contact, Form, Mode, State};
+use crate::stage::axis::{CART, DRIVE, SPANS};
 use crate::stage::{EncoderPlace, Stage};
 use nalgebra::{DMatrix, DVector, RowDVector};
 
@@ -21,74 +21,82 @@ pub struct Linear {
     pub cart: RowDVector<f64>,
     /// Its speed, m/s.
     pub cart_speed: RowDVector<f64>,
-    /// What each state is, as places of the whole state.
-    pub states: Vec<usize>,
+    /// What each state is.
+    pub states: Vec<Quantity>,
+}
+
+/// A quantity that is a state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Way of a body.
+    Position(usize),
+    /// Speed of a body.
+    Speed(usize),
+    /// Current of the motor.
+    Current,
+}
+
+impl Quantity {
+    fn of(self, row: &State) -> f64 {
+        match self {
+            Quantity::Position(body) => row.position[body],
+            Quantity::Speed(body) => row.speed[body],
+            Quantity::Current => row.current[0],
+        }
+    }
 }
 
 impl Linear {
     /// That of `stage`.
     pub fn of(stage: &Stage) -> Self {
-        let plant = Plant::new(stage);
+        let mechanism = stage.mechanism();
         let r = stage.pulley_radius;
-        let mode = Mode {
+        let mut mode = Mode::of([]);
+        if mechanism.drives[0].has_rotor() {
             // Flanks of a gear with play touch.
-            gear: if plant.has_rotor() { Contact::High } else { Contact::Apart },
-            ..Mode::of([Motion::Free; 3])
-        };
-        let equations = plant.equations(mode);
-        let mut states: Vec<usize> = plant.leaders().flat_map(|b| [b.speed_place() - 1, b.speed_place()]).collect();
-        if plant.has_current_state() {
-            states.push(place::CURRENT);
+            mode.contact[SPANS] = Contact::High;
         }
-        if plant.has_rotor() {
-            states.extend([place::ROTOR_ANGLE, place::ROTOR_SPEED]);
+        let equations = mechanism.equations(mode);
+        let pair = |body: usize| [Quantity::Position(body), Quantity::Speed(body)];
+        let (held, rotors): (Vec<_>, Vec<_>) = mechanism.leaders().partition(|&body| !mechanism.bodies[body].is_rotor);
+        let mut states: Vec<Quantity> = held.into_iter().flat_map(pair).collect();
+        if mechanism.drives[0].has_current_state() {
+            states.push(Quantity::Current);
         }
-        // The whole state from these: what follows goes with its leader, a rotor without play with its pulley.
+        states.extend(rotors.into_iter().flat_map(pair));
         let n = states.len();
-        let mut whole = DMatrix::zeros(place::COUNT, n);
-        for (j, &state) in states.iter().enumerate() {
-            whole[(state, j)] = 1.0;
-        }
-        for body in Body::ALL {
-            let leader = plant.leader(body);
-            if leader != body {
-                for offset in [0, 1] {
-                    let from = states.iter().position(|&s| s == leader.speed_place() - offset);
-                    if let Some(j) = from {
-                        whole[(body.speed_place() - offset, j)] = plant.ratio(body);
-                    }
-                }
+        // A form of the whole state as one of these: what follows goes with its leader.
+        let row = |whole: &State| {
+            let mut led = State { position: [0.0; BODIES], speed: [0.0; BODIES], ..*whole };
+            for body in 0..mechanism.bodies.len() {
+                let (leader, ratio) = mechanism.bodies[body].leader;
+                led.position[leader] += ratio * whole.position[body];
+                led.speed[leader] += ratio * whole.speed[body];
             }
-        }
-        if !plant.has_rotor() {
-            for j in 0..n {
-                whole[(place::ROTOR_ANGLE, j)] = whole[(place::DRIVE_ANGLE, j)];
-                whole[(place::ROTOR_SPEED, j)] = whole[(place::DRIVE_SPEED, j)];
-            }
-        }
-        let row = |form: &Form| RowDVector::from_row_slice(&form.on_state(r)) * &whole;
+            RowDVector::from_fn(n, |_, j| states[j].of(&led))
+        };
+        let of_form = |form: &Form| row(&form.on_state(&mechanism));
         let (mut a, mut b, mut e) = (DMatrix::zeros(n, n), DVector::zeros(n), DVector::zeros(n));
         for (i, &state) in states.iter().enumerate() {
             let form = match state {
-                place::CURRENT => equations.current_rate,
-                place::ROTOR_ANGLE => Form::speed(ROTOR),
-                place::ROTOR_SPEED => equations.acceleration[ROTOR],
-                place if place % 2 == 0 => Form::speed(place / 2),
-                place => equations.acceleration[place / 2],
+                Quantity::Current => equations.current_rate[0],
+                Quantity::Position(body) => Form::speed(body),
+                Quantity::Speed(body) => equations.acceleration[body],
             };
-            a.set_row(i, &row(&form));
-            b[i] = form.input;
-            if state == place::CART_SPEED {
+            a.set_row(i, &of_form(&form));
+            b[i] = form.input[0];
+            if state == Quantity::Speed(CART) {
                 e[i] = 1.0 / stage.cart.mass;
             }
         }
-        let at = |place: usize| whole.row(place).into_owned();
+        let at = |body: usize| row(&unit(body));
         let measured = match stage.encoder.map(|encoder| encoder.at) {
-            _ if measures_cart(stage) => at(place::CART_POSITION),
-            Some(EncoderPlace::DrivePulley) => at(place::DRIVE_ANGLE) * r,
-            _ => at(place::ROTOR_ANGLE) * r,
+            _ if measures_cart(stage) => at(CART),
+            Some(EncoderPlace::DrivePulley) => at(DRIVE) * r,
+            _ => at(mechanism.drives[0].shaft) * r,
         };
-        Self { a, b, e, measured, cart: at(place::CART_POSITION), cart_speed: at(place::CART_SPEED), states }
+        let cart_speed = of_form(&Form::speed(CART));
+        Self { a, b, e, measured, cart: at(CART), cart_speed, states }
     }
 
     /// What happens in `time` (s) with inputs held: e^{A t} and ∫ e^{A s} ds [B E].
@@ -101,6 +109,13 @@ impl Linear {
         let done = exponential(&(whole * time));
         (done.view((0, 0), (n, n)).into_owned(), done.view((0, n), (n, 2)).into_owned())
     }
+}
+
+/// The way of a body as a form of the whole state.
+fn unit(body: usize) -> State {
+    let mut state = State::default();
+    state.position[body] = 1.0;
+    state
 }
 
 /// e^X by a Taylor series of X/2^k and squaring of e^X − I.

@@ -5,12 +5,13 @@ use super::standard::Standard;
 use crate::case::{Experiment, Initial};
 use crate::design::Design;
 use crate::error::{Error, Result};
+use crate::mechanism::{Limit, Mode, State};
 use crate::metrics::{Meter, Metrics, Peak};
-use crate::plant::{Limit, Mode, State, place};
 use crate::signal::Signal;
 use crate::signal::profile::Profile;
 use crate::solve::{self, Curve, Detail, Flow, Gap, Observe, Polynomial, Solver, TERMS, reading};
 use crate::stage::Stage;
+use crate::stage::axis::{CART, DRIVE};
 use crate::trajectory::{Column, Trajectory};
 
 /// A difference over time.
@@ -102,10 +103,11 @@ pub(crate) fn tracking(setup: &Setup) -> Result<(solve::Ending, Deviation)> {
     let experiment = at_rest(setup.stage, &profile, setup.until, timing.every.min(setup.until));
     let mut sampled = Sampled::new(setup.stage, &mut controller, timing, &profile, false);
     let mut tracker = Tracker { profile: &profile, squares: 0.0, error: Deviation::default() };
-    let (detail, solver) = (Detail::None, setup.solver);
     let sink = &mut |_: &Trajectory| Flow::Continue;
-    let outcome =
-        solve::stream_decided_observed(setup.stage, &experiment, &mut sampled, solver, detail, &mut tracker, sink)?;
+    let observer = Some(&mut tracker as &mut dyn Observe);
+    let mut run = solve::Run::new(setup.stage, &experiment, setup.solver, Detail::None, observer, sink)?;
+    sampled.drive(&mut run, experiment.until);
+    let outcome = run.finish();
     Ok((outcome.ending, Deviation { rms: (tracker.squares / setup.until).sqrt(), ..tracker.error }))
 }
 
@@ -216,7 +218,9 @@ fn run(
     controller.reset();
     let mut sampled = Sampled::new(stage, controller, *timing, profile, keep).until(rows.until);
     let mut gauge = Gauge::new(stage, &experiment, profile, rows.window);
-    let outcome = solve::stream_decided_observed(stage, &experiment, &mut sampled, solver, detail, &mut gauge, sink)?;
+    let mut run = solve::Run::new(stage, &experiment, solver, detail, Some(&mut gauge), sink)?;
+    sampled.drive(&mut run, experiment.until);
+    let outcome = run.finish();
     let (mut figures, metrics) = gauge.finish(&outcome.events);
     figures.limited = sampled.held_back;
     figures.restlessness = sampled.turns as f64 / metrics.end.max(f64::MIN_POSITIVE);
@@ -237,7 +241,10 @@ pub(crate) fn follow(
 ) -> Result<solve::Outcome> {
     let mut controller = Standard::new(design, model)?;
     let mut sampled = Sampled::new(stage, &mut controller, Loop::of(design), profile, false).exactly();
-    solve::stream_decided(&Stage { encoder: None, ..stage.clone() }, experiment, &mut sampled, solver, sink)
+    let stage = Stage { encoder: None, ..stage.clone() };
+    let mut run = solve::Run::new(&stage, experiment, solver, Detail::Full, None, sink)?;
+    sampled.drive(&mut run, experiment.until);
+    Ok(run.finish())
 }
 
 /// Gathers the figures of a move that it observes.
@@ -363,7 +370,8 @@ impl<'a> Gauge<'a> {
 impl Observe for Gauge<'_> {
     fn pass(&mut self, gap: &Gap) -> bool {
         self.meter.pass(gap);
-        self.saturated = gap.mode.voltage != Limit::Inside || gap.mode.current != Limit::Inside;
+        let drive = &gap.mode.drive[0];
+        self.saturated = drive.voltage != Limit::Inside || drive.current != Limit::Inside;
         for (peak, q) in [(&mut self.seen.voltage.0, reading::VOLTAGE), (&mut self.seen.current.0, reading::CURRENT)] {
             for (value, time) in [(gap.from[q], gap.begin), (gap.to[q], gap.begin + gap.length)] {
                 if value.abs() > peak.value.abs() {
@@ -394,8 +402,8 @@ impl Observe for Gauge<'_> {
         self.meter.end(time, state, mode);
         let y = self.profile.at(time).position;
         self.end = time;
-        self.seen.cart.last = state[place::CART_POSITION] - y;
-        self.seen.following.last = self.radius * state[place::DRIVE_ANGLE] - y;
+        self.seen.cart.last = state.position[CART] - y;
+        self.seen.following.last = self.radius * state.position[DRIVE] - y;
     }
 }
 

@@ -1,7 +1,6 @@
 //! The frequencies at which a stage vibrates, along its travel, from its masses and springs.
 
 use crate::error::{Error, Result};
-use crate::plant::arms;
 use crate::stage::{AmplifierMode, BeltModel, Stage};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::f64::consts::PI;
@@ -112,10 +111,11 @@ fn matrices(stage: &Stage, drive: Drive, position: f64) -> (DMatrix<f64>, DMatri
         let [k1, k2] = make.stiffness_at(position);
         stiffness = [k1, k2, stiffness[2]];
     }
-    let arms = arms(stage.pulley_radius);
+    let mechanism = stage.mechanism();
+    let arm = |span: usize, body: usize| mechanism.stretch_rate(span).speed[body];
     // Σ k dᵀ d over the spans' stretches d
     let sum = |values: [f64; 3]| {
-        DMatrix::from_fn(3, 3, |i, j| (0..3).map(|s| values[s] * arms[s][i] * arms[s][j]).sum::<f64>())
+        DMatrix::from_fn(3, 3, |i, j| (0..3).map(|s| values[s] * arm(s, i) * arm(s, j)).sum::<f64>())
     };
     let rotor = n * n * motor.rotor_inertia;
     let masses = [stage.drive_pulley.inertia + rotor, stage.cart.mass, stage.idler_pulley.inertia];

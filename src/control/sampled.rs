@@ -1,10 +1,11 @@
 //! The loop closed: samples, counts, delay and limit between a controller and the axis.
 
 use crate::error::{Error, Result};
-use crate::plant::{State, place};
+use crate::mechanism::State;
 use crate::quantity::rounded;
 use crate::signal::profile::{Profile, Reference};
-use crate::solve::Decide;
+use crate::solve::{Pieces, Run};
+use crate::stage::axis::{CART, DRIVE};
 use crate::stage::{Encoder, EncoderPlace, Stage};
 use crate::trajectory::Interval;
 use std::collections::VecDeque;
@@ -178,8 +179,22 @@ impl Sampled<'_> {
     }
 }
 
-impl Decide for Sampled<'_> {
-    fn decide(&mut self, _: f64, state: &State, current: f64) -> (f64, f64) {
+impl Sampled<'_> {
+    /// Drives a run to its end, `until`, s: the input is held from one decision to the next.
+    pub(super) fn drive(&mut self, run: &mut Run, until: f64) {
+        let mut time = 0.0;
+        loop {
+            let (input, end) = self.decide(&run.state(), run.current(0));
+            run.set_input(&Pieces::held(&[input], time, end));
+            if time >= until || !run.advance(end.min(until)) {
+                return;
+            }
+            time = end.min(until);
+        }
+    }
+
+    /// The input from now on and until when it is held, s, told the state and the motor's current, A, just before.
+    fn decide(&mut self, state: &State, current: f64) -> (f64, f64) {
         let Loop { every, lead, limit, .. } = self.timing;
         let time = self.clock.times(self.k);
         if self.halfway {
@@ -222,7 +237,7 @@ impl Decide for Sampled<'_> {
 /// The encoder as a controller reads it, m along the belt; exact where the stage has none.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sensor {
-    place: usize,
+    body: usize,
     /// m per unit of what it watches.
     length: f64,
     /// Counts per unit of that.
@@ -233,16 +248,16 @@ impl Sensor {
     pub(super) fn new(stage: &Stage) -> Self {
         let counts = stage.encoder.map(|encoder: Encoder| encoder.counts_per_unit(stage.motor.gear_ratio));
         let r = stage.pulley_radius;
-        let (place, length) = match stage.encoder.map(|encoder| encoder.at) {
-            Some(EncoderPlace::Cart) => (place::CART_POSITION, 1.0),
-            Some(EncoderPlace::DrivePulley) => (place::DRIVE_ANGLE, r),
-            Some(EncoderPlace::Motor) | None => (place::ROTOR_ANGLE, r),
+        let (body, length) = match stage.encoder.map(|encoder| encoder.at) {
+            Some(EncoderPlace::Cart) => (CART, 1.0),
+            Some(EncoderPlace::DrivePulley) => (DRIVE, r),
+            Some(EncoderPlace::Motor) | None => (stage.mechanism().drives[0].shaft, r),
         };
-        Self { place, length, counts }
+        Self { body, length, counts }
     }
 
     pub(super) fn read(&self, state: &State) -> f64 {
-        let value = state[self.place];
+        let value = state.position[self.body];
         self.length * self.counts.map_or(value, |counts| (value * counts).round() / counts)
     }
 

@@ -2,13 +2,14 @@
 
 use super::compensation::{Compensation, Rigid};
 use super::model::Linear;
+use super::model::Quantity;
 use super::riccati;
 use super::sampled::Sensor;
 use crate::design::{Design, StateFeedback};
 use crate::error::Result;
-use crate::plant::place;
 use crate::signal::profile::Reference;
 use crate::stage::Stage;
+use crate::stage::axis::{CART, IDLER};
 use nalgebra::{DMatrix, DVector};
 
 /// A linear-quadratic regulator on the states that a Kalman filter estimates, both for the sampled axis with its delay.
@@ -16,7 +17,7 @@ use nalgebra::{DMatrix, DVector};
 pub struct StateFeedbackState {
     every: f64,
     radius: f64,
-    states: Vec<usize>,
+    states: Vec<Quantity>,
     phi: DMatrix<f64>,
     /// Effect over a sample of the command that takes over within it, and of the one before.
     now: DVector<f64>,
@@ -190,13 +191,14 @@ impl StateFeedbackState {
         let current = needed.force[0] / compensation.rigid.force_per_ampere;
         for (wanted, &state) in self.wanted.iter_mut().zip(&self.states) {
             *wanted = match state {
-                place::DRIVE_ANGLE | place::ROTOR_ANGLE => needed.drive.position / r,
-                place::DRIVE_SPEED | place::ROTOR_SPEED => needed.drive.speed / r,
-                place::CART_POSITION => reference.position,
-                place::CART_SPEED => reference.speed,
-                place::IDLER_ANGLE => needed.idler[0] / r,
-                place::IDLER_SPEED => needed.idler[1] / r,
-                _ => current,
+                Quantity::Position(CART) => reference.position,
+                Quantity::Speed(CART) => reference.speed,
+                Quantity::Position(IDLER) => needed.idler[0] / r,
+                Quantity::Speed(IDLER) => needed.idler[1] / r,
+                // The drive pulley, and a rotor behind it.
+                Quantity::Position(_) => needed.drive.position / r,
+                Quantity::Speed(_) => needed.drive.speed / r,
+                Quantity::Current => current,
             };
         }
         if !self.started {
@@ -204,9 +206,9 @@ impl StateFeedbackState {
             // At rest where it is measured.
             for (x, &state) in self.estimate.iter_mut().zip(&self.states) {
                 *x = match state {
-                    place::CART_POSITION => position,
-                    place::DRIVE_ANGLE | place::IDLER_ANGLE | place::ROTOR_ANGLE => position / r,
-                    _ => 0.0,
+                    Quantity::Position(CART) => position,
+                    Quantity::Position(_) => position / r,
+                    Quantity::Speed(_) | Quantity::Current => 0.0,
                 };
             }
         }

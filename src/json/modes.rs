@@ -2,7 +2,7 @@
 
 use super::number;
 use crate::linear::{Analysis, Discrete, Place, Root, Transfer, Variable};
-use crate::plant::Body;
+use crate::stage::axis::LABELS;
 use nalgebra::{Complex, DMatrix, DVector};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
@@ -27,7 +27,8 @@ pub fn modes(analysis: &Analysis) -> Value {
             })
         })
         .collect();
-    let stuck: Vec<&str> = Body::ALL.into_iter().filter(|body| operation.held[body.index()]).map(Body::key).collect();
+    let stuck: Vec<&str> =
+        operation.held.iter().zip(LABELS).filter(|(held, _)| **held).map(|(_, label)| label.key).collect();
     json!({
         "title": analysis.case.title,
         "version": env!("CARGO_PKG_VERSION"),

@@ -2,10 +2,9 @@
 
 use crate::case::{Case, Experiment};
 use crate::metrics::{self, Peak, SteadySpeed};
-use crate::plant::Body;
 use crate::reduction::Reduction;
 use crate::solve::{self, Method, Outcome, Solver};
-use crate::stage::{AmplifierMode, Stage};
+use crate::stage::{AmplifierMode, Stage, axis};
 use serde::Serialize;
 
 /// Events listed; the rest is in the events' own file.
@@ -286,9 +285,14 @@ impl ExperimentFigures {
 impl Metrics {
     /// As seen by a meter on a stage whose amplifier works in this way.
     pub fn of(metrics: &metrics::Metrics, mode: AmplifierMode) -> Self {
-        let count = |body: Body| {
-            let count = metrics.events[body.index()];
-            CountTold { body: body.key(), stops: count.stops, starts: count.starts, reversals: count.reversals }
+        let count = |body: usize| {
+            let count = metrics.events[body];
+            CountTold {
+                body: axis::LABELS[body].key,
+                stops: count.stops,
+                starts: count.starts,
+                reversals: count.reversals,
+            }
         };
         Self {
             end_time_s: metrics.end,
@@ -306,7 +310,7 @@ impl Metrics {
             final_drive_travel_minus_cart_m: metrics.final_drive_travel - metrics.final_cart_position,
             stop_time_s: metrics.stop_time,
             settled: metrics.settled,
-            event_counts: Body::ALL.map(count),
+            event_counts: std::array::from_fn(count),
         }
     }
 }
@@ -348,6 +352,6 @@ impl Event {
 }
 
 /// The unit of an event's load: a force at the cart, a torque at a pulley.
-pub fn load_unit(body: Body) -> &'static str {
-    if body == Body::Cart { "N" } else { "N m" }
+pub fn load_unit(body: usize) -> &'static str {
+    if body == axis::CART { "N" } else { "N m" }
 }

@@ -2,15 +2,35 @@
 
 use super::model::Variable;
 use crate::friction::Law;
-use crate::plant::{Body, Form, Plant, ROTOR, SPEEDS, STRETCHES, arms};
-use crate::stage::BeltModel;
+use crate::mechanism::{Form, Mechanism};
+use crate::stage::axis::{BODIES, CART, DRIVE, ROTOR};
+use crate::stage::{BeltModel, Stage};
 use nalgebra::{DMatrix, DVector};
+
+/// Speeds: of the three bodies, and of the rotor.
+pub(super) const SPEEDS: usize = 4;
+/// Lengths: of the three spans, the gear's twist, and where the cart is.
+const STRETCHES: usize = 5;
+/// The gear's twist among the lengths.
+const TWIST: usize = 3;
+
+/// What each length is, as coefficients of φ₁, x, φ₃ and φ_r.
+fn arms(r: f64) -> [[f64; SPEEDS]; STRETCHES] {
+    [[r, -1.0, 0.0, 0.0], [0.0, 1.0, -r, 0.0], [-r, 0.0, r, 0.0], [-1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]]
+}
+
+/// Whether the rotor is an inertia of its own.
+pub(super) fn has_rotor(mechanism: &Mechanism) -> bool {
+    mechanism.drives[0].has_rotor()
+}
 
 /// States, and what is made of them.
 pub(super) struct Frame {
     pub(super) variables: Vec<Variable>,
-    /// Coefficients of the states in the stretches of [`Form::stretch`].
+    /// Coefficients of the states in the lengths.
     stretch: [DVector<f64>; STRETCHES],
+    /// Which of the lengths each spring of the mechanism has.
+    of_spring: Vec<usize>,
     /// In φ̇₁, ẋ, φ̇₃, φ̇_r.
     speed: [DVector<f64>; SPEEDS],
     /// In φ₁, x, φ₃, φ_r.
@@ -55,42 +75,42 @@ const BRISTLES: [Variable; 3] = [
 ];
 
 impl Frame {
-    /// Angles and speeds as in [`crate::plant::place`], of what moves by itself.
-    pub(super) fn outer(plant: &Plant, held: [bool; 3], speed: f64) -> Self {
+    /// Angles and speeds, body by body, of what moves by itself.
+    pub(super) fn outer(stage: &Stage, plant: &Mechanism, held: [bool; 3], speed: f64) -> Self {
         let moving: Vec<usize> = moving(plant, held);
         let mut kinds: Vec<Kind> = Vec::new();
         for &j in moving.iter().filter(|&&j| j != ROTOR) {
             kinds.extend([Kind::Angle(j), Kind::Speed(j)]);
         }
-        kinds.extend(plant.has_current_state().then_some(Kind::Current));
+        kinds.extend(plant.drives[0].has_current_state().then_some(Kind::Current));
         if moving.contains(&ROTOR) {
             kinds.extend([Kind::Angle(ROTOR), Kind::Speed(ROTOR)]);
         }
         kinds.extend(bristles(plant, held, speed));
-        Self::new(plant, kinds, false)
+        Self::new(stage, plant, kinds, false)
     }
 
     /// The cart's position and stretches, so that what does not depend on where the axis is has coefficients that are exactly zero. The
     /// outer frame where a body is held: then positions are stretches.
-    pub(super) fn inner(plant: &Plant, held: [bool; 3], speed: f64) -> Self {
+    pub(super) fn inner(stage: &Stage, plant: &Mechanism, held: [bool; 3], speed: f64) -> Self {
         if held.contains(&true) {
-            return Self::outer(plant, held, speed);
+            return Self::outer(stage, plant, held, speed);
         }
         let mut kinds = vec![Kind::Angle(1)];
-        kinds.extend(match plant.stage().belt.model {
+        kinds.extend(match stage.belt.model {
             BeltModel::Elastic => vec![Kind::Stretch(0), Kind::Stretch(1)],
             BeltModel::TwoMass => vec![Kind::Stretch(0)],
             BeltModel::Rigid => Vec::new(),
         });
-        kinds.extend(plant.has_rotor().then_some(Kind::Stretch(3)));
+        kinds.extend(has_rotor(plant).then_some(Kind::Stretch(TWIST)));
         kinds.extend(moving(plant, held).into_iter().map(Kind::Speed));
-        kinds.extend(plant.has_current_state().then_some(Kind::Current));
+        kinds.extend(plant.drives[0].has_current_state().then_some(Kind::Current));
         kinds.extend(bristles(plant, held, speed));
-        Self::new(plant, kinds, true)
+        Self::new(stage, plant, kinds, true)
     }
 
-    fn new(plant: &Plant, kinds: Vec<Kind>, relative: bool) -> Self {
-        let r = plant.stage().pulley_radius;
+    fn new(stage: &Stage, plant: &Mechanism, kinds: Vec<Kind>, relative: bool) -> Self {
+        let r = stage.pulley_radius;
         let n = kinds.len();
         let place = |kind: Kind| kinds.iter().position(|k| *k == kind);
         let unit = |kind: Kind, factor: f64| {
@@ -101,10 +121,9 @@ impl Frame {
             row
         };
         // What moves with another body goes its way times a ratio; the rotor of a stiff gear goes with the drive pulley.
-        let led = |kind: fn(usize) -> Kind, j: usize| match Body::ALL.get(j) {
-            Some(&body) => unit(kind(plant.leader(body).index()), plant.ratio(body)),
-            None if plant.has_rotor() => unit(kind(ROTOR), 1.0),
-            None => unit(kind(plant.leader(Body::DrivePulley).index()), plant.ratio(Body::DrivePulley)),
+        let led = |kind: fn(usize) -> Kind, j: usize| match j {
+            ROTOR if !has_rotor(plant) => unit(kind(plant.leader(DRIVE)), plant.ratio(DRIVE)),
+            body => unit(kind(plant.leader(body)), plant.ratio(body)),
         };
         let speed: [DVector<f64>; SPEEDS] = std::array::from_fn(|j| led(Kind::Speed, j));
         let arms = arms(r);
@@ -113,10 +132,10 @@ impl Frame {
         };
         let (angle, stretch): ([DVector<f64>; SPEEDS], [DVector<f64>; STRETCHES]);
         if relative {
-            let x = unit(Kind::Angle(1), 1.0);
-            let (d1, twist) = (unit(Kind::Stretch(0), 1.0), unit(Kind::Stretch(3), 1.0));
+            let x = unit(Kind::Angle(CART), 1.0);
+            let (d1, twist) = (unit(Kind::Stretch(0), 1.0), unit(Kind::Stretch(TWIST), 1.0));
             // x − r φ₃; with both pulleys as one it is x − r φ₁
-            let d2 = match plant.stage().belt.model {
+            let d2 = match stage.belt.model {
                 BeltModel::Elastic => unit(Kind::Stretch(1), 1.0),
                 _ => -d1.clone(),
             };
@@ -152,6 +171,10 @@ impl Frame {
             current_place: place(Kind::Current),
             bristle_place: std::array::from_fn(|j| place(Kind::Bristle(j))),
             stretch,
+            of_spring: match has_rotor(plant) {
+                true => vec![0, 1, 2, TWIST, STRETCHES - 1],
+                false => vec![0, 1, 2, STRETCHES - 1],
+            },
             speed,
             angle,
             ways,
@@ -162,15 +185,16 @@ impl Frame {
     /// Coefficients of the states in a form, and that of the input.
     pub(super) fn row(&self, form: &Form) -> (DVector<f64>, f64) {
         let mut row = DVector::zeros(self.variables.len());
-        for (part, factor) in self.stretch.iter().zip(form.stretch).chain(self.speed.iter().zip(form.speed)) {
+        let stretches = self.of_spring.iter().map(|&own| &self.stretch[own]).zip(form.stretch);
+        for (part, factor) in stretches.chain(self.speed.iter().zip(form.speed)) {
             if factor != 0.0 {
                 row += part * factor;
             }
         }
         if let Some(place) = self.current_place {
-            row[place] += form.current;
+            row[place] += form.current[0];
         }
-        (row, form.input)
+        (row, form.input[0])
     }
 
     /// This frame's states from those of another.
@@ -193,19 +217,17 @@ impl Frame {
 }
 
 /// Bodies that move by themselves, and the rotor, if it does.
-fn moving(plant: &Plant, held: [bool; 3]) -> Vec<usize> {
-    let leaders = plant.leaders().map(Body::index).filter(|&j| !held[j]);
-    leaders.chain(plant.has_rotor().then_some(ROTOR)).collect()
+fn moving(plant: &Mechanism, held: [bool; 3]) -> Vec<usize> {
+    plant.leaders().filter(|&j| j == ROTOR || !held[j]).collect()
 }
 
 /// Bristles that are states.
-fn bristles(plant: &Plant, held: [bool; 3], speed: f64) -> Vec<Kind> {
+fn bristles(plant: &Mechanism, held: [bool; 3], speed: f64) -> Vec<Kind> {
     let forward = speed >= 0.0;
-    let r = plant.stage().pulley_radius;
-    let has = |body: &Body| {
+    let has = |body: &usize| {
         let friction = plant.friction(*body);
-        let v = if *body == Body::Cart { speed.abs() } else { speed.abs() / r };
-        matches!(friction.law, Law::LuGre { .. }) && friction.dry(forward, v) > 0.0 && !held[body.index()]
+        let v = speed.abs() / plant.bodies[*body].kind.lever();
+        matches!(friction.law, Law::LuGre { .. }) && friction.dry(forward, v) > 0.0 && !held[*body]
     };
-    plant.leaders().filter(has).map(|body| Kind::Bristle(body.index())).collect()
+    plant.leaders().filter(|&body| body < BODIES).filter(has).map(Kind::Bristle).collect()
 }

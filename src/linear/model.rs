@@ -1,10 +1,11 @@
 //! The equations of a stage, linearised about steady sliding, as matrices.
 
-use super::frame::Frame;
+use super::frame::{Frame, has_rotor};
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
-use crate::plant::{Body, Contact, Form, Mode, Plant, ROTOR};
-use crate::stage::{AmplifierMode, BeltModel, Stage};
+use crate::mechanism::{AmplifierMode, Contact, Form, Mechanism, Mode, SPRINGS};
+use crate::stage::axis::{BODIES, ROTOR, SPANS};
+use crate::stage::{BeltModel, Stage};
 use nalgebra::{DMatrix, DVector};
 
 /// About what a stage is linearised.
@@ -89,12 +90,13 @@ impl StateSpace {
     /// ```
     pub fn of(stage: &Stage, operation: Operation) -> Result<Self> {
         let stage = placed(stage, operation.position)?;
-        let plant = Plant::new(&stage);
-        let held = Body::ALL.map(|body| plant.followers(plant.leader(body)).any(|b| operation.held[b.index()]));
-        let frame = Frame::outer(&plant, held, operation.speed);
-        let inner = Frame::inner(&plant, held, operation.speed);
+        let plant = stage.mechanism();
+        let held =
+            std::array::from_fn(|body| plant.followers(plant.leader(body)).any(|b| b < BODIES && operation.held[b]));
+        let frame = Frame::outer(&stage, &plant, held, operation.speed);
+        let inner = Frame::inner(&stage, &plant, held, operation.speed);
         let mode = mode(&plant, held, operation.speed);
-        let equations = Linear { plant: &plant, operation, held, mode };
+        let equations = Linear { stage: &stage, plant: &plant, operation, held, mode };
         let (a, b) = equations.rates(&frame);
         let (inner_a, inner_b) = equations.rates(&inner);
         let (outputs, c, d) = equations.outputs(&frame);
@@ -144,21 +146,26 @@ fn placed(stage: &Stage, x: f64) -> Result<Stage> {
 }
 
 /// The mode of steady sliding.
-fn mode(plant: &Plant, held: [bool; 3], speed: f64) -> Mode {
+fn mode(plant: &Mechanism, held: [bool; 3], speed: f64) -> Mode {
     let forward = speed >= 0.0;
-    let motion = Body::ALL.map(|body| match (held[body.index()], plant.has_modes(body), forward) {
+    let motion = (0..BODIES).map(|body| match (held[body], plant.has_modes(body), forward) {
         (true, ..) => Motion::Stuck,
         (_, false, _) => Motion::Free,
         (_, _, true) => Motion::Forward,
         (_, _, false) => Motion::Backward,
     });
-    let gear = if forward { Contact::High } else { Contact::Low };
-    Mode { gear, gear_torque_positive: forward, ..Mode::of(motion) }
+    let mut mode = Mode { contact: [Contact::Apart; SPRINGS], ..Mode::of(motion) }.with_torque(forward);
+    if has_rotor(plant) {
+        // Between its end stops, on the driving flank of its gear.
+        mode.contact[SPANS] = if forward { Contact::High } else { Contact::Low };
+    }
+    mode
 }
 
 /// The equations to be written out in a frame.
 struct Linear<'a> {
-    plant: &'a Plant,
+    stage: &'a Stage,
+    plant: &'a Mechanism,
     operation: Operation,
     held: [bool; 3],
     mode: Mode,
@@ -175,19 +182,18 @@ impl Linear<'_> {
             a.row_mut(*place).copy_from(&rate.transpose());
         }
         if let Some(place) = frame.current_place {
-            let (row, input) = frame.row(&equations.current_rate);
+            let (row, input) = frame.row(&equations.current_rate[0]);
             a.row_mut(place).copy_from(&row.transpose());
             b[place] = input;
         }
-        for body in plant.leaders().filter(|body| !self.held[body.index()]) {
-            let Some(place) = frame.speed_place[body.index()] else { continue };
-            let (mut row, input) = frame.row(&equations.acceleration[body.index()]);
-            let of = |b: Body| plant.ratio(b).powi(2) * equations.inertia[b.index()];
-            let mass: f64 = plant.followers(body).map(of).sum();
+        for body in plant.leaders().filter(|&body| body < BODIES && !self.held[body]) {
+            let Some(place) = frame.speed_place[body] else { continue };
+            let (mut row, input) = frame.row(&equations.acceleration[body]);
+            let mass = plant.mass(body, &equations.inertia);
             // M v̇ = what is linear − what friction adds to it
             let (on_speed, on_bristle) = self.friction(body);
             row[place] -= on_speed / mass;
-            if let Some(bristle) = frame.bristle_place[body.index()] {
+            if let Some(bristle) = frame.bristle_place[body] {
                 row[bristle] -= on_bristle / mass;
                 let [on_speed, on_bristle] = self.bristle(body);
                 (a[(bristle, place)], a[(bristle, bristle)]) = (on_speed, on_bristle);
@@ -204,25 +210,21 @@ impl Linear<'_> {
     }
 
     /// Speed of a body, in its own unit.
-    fn speed(&self, body: Body) -> f64 {
-        let r = self.plant.stage().pulley_radius;
-        if body == Body::Cart { self.operation.speed } else { self.operation.speed / r }
+    fn speed(&self, body: usize) -> f64 {
+        self.operation.speed / self.plant.bodies[body].kind.lever()
     }
 
     /// By what the dry friction of a body is multiplied where the cart is.
-    fn factor(&self, body: Body) -> f64 {
-        match &self.plant.stage().cart.along {
-            Some(along) if body == Body::Cart => along.factor(self.operation.position),
-            _ => 1.0,
-        }
+    fn factor(&self, body: usize) -> f64 {
+        self.plant.bodies[body].along.as_ref().map_or(1.0, |along| along.factor(self.operation.position))
     }
 
     /// ∂F_f/∂v beyond the viscous friction that stands in the equations, and ∂F_f/∂z of a bristle.
-    fn friction(&self, body: Body) -> (f64, f64) {
+    fn friction(&self, body: usize) -> (f64, f64) {
         let friction = self.plant.friction(body);
         let v = self.speed(body);
         let side = friction.side(v >= 0.0);
-        let viscous = match self.mode.motion[body.index()] {
+        let viscous = match self.mode.motion[body] {
             Motion::Backward => friction.backward.viscous,
             _ => friction.forward.viscous,
         };
@@ -238,7 +240,7 @@ impl Linear<'_> {
     }
 
     /// ∂ż/∂v and ∂ż/∂z of the bristles of a body.
-    fn bristle(&self, body: Body) -> [f64; 2] {
+    fn bristle(&self, body: usize) -> [f64; 2] {
         let friction = self.plant.friction(body);
         let Law::LuGre { stiffness, .. } = friction.law else { return [0.0; 2] };
         let v = self.speed(body);
@@ -258,37 +260,36 @@ impl Linear<'_> {
         let plant = self.plant;
         let mut all: Vec<(Variable, DVector<f64>, f64)> = Vec::new();
         let mut add = |name, unit, (row, input)| all.push((Variable { name, unit }, row, input));
-        const BODIES: [[(&str, &str); 2]; 3] = [
+        const NAMES: [[(&str, &str); 2]; 3] = [
             [("drive_angle", "rad"), ("drive_speed", "rad/s")],
             [("cart_position", "m"), ("cart_speed", "m/s")],
             [("idler_angle", "rad"), ("idler_speed", "rad/s")],
         ];
-        let moving = |body: &Body| !self.held[body.index()];
-        for body in Body::ALL.into_iter().filter(moving) {
-            let [(angle, unit), _] = BODIES[body.index()];
-            add(angle, unit, (frame.angle[body.index()].clone(), 0.0));
+        let moving = |body: &usize| !self.held[*body];
+        for body in (0..BODIES).filter(moving) {
+            let [(angle, unit), _] = NAMES[body];
+            add(angle, unit, (frame.angle[body].clone(), 0.0));
         }
-        if plant.has_rotor() {
+        if has_rotor(plant) {
             add("rotor_angle", "rad", (frame.angle[ROTOR].clone(), 0.0));
         }
-        for body in Body::ALL.into_iter().filter(moving) {
-            let [_, (speed, unit)] = BODIES[body.index()];
-            add(speed, unit, frame.row(&Form::speed(body.index())));
+        for body in (0..BODIES).filter(moving) {
+            let [_, (speed, unit)] = NAMES[body];
+            add(speed, unit, frame.row(&Form::speed(body)));
         }
-        if plant.has_rotor() {
+        if has_rotor(plant) {
             add("rotor_speed", "rad/s", frame.row(&Form::speed(ROTOR)));
         }
-        if plant.stage().belt.model != BeltModel::Rigid {
-            for (name, force) in
-                ["span1_force", "span2_force", "span3_force"].into_iter().zip(plant.span_forces(&self.mode))
-            {
-                add(name, "N", frame.row(&force));
+        if self.stage.belt.model != BeltModel::Rigid {
+            for (span, name) in ["span1_force", "span2_force", "span3_force"].into_iter().enumerate() {
+                let alike = self.stage.span_alike(span).unwrap_or(span);
+                add(name, "N", frame.row(&plant.spring_force(alike, &self.mode)));
             }
         }
-        if plant.has_rotor() {
-            add("gear_torque", "N m", frame.row(&plant.gear_torque(&self.mode)));
+        if has_rotor(plant) {
+            add("gear_torque", "N m", frame.row(&plant.spring_force(SPANS, &self.mode)));
         }
-        add("motor_current", "A", frame.row(&plant.current(&self.mode)));
+        add("motor_current", "A", frame.row(&plant.current(0, &self.mode)));
         let c = DMatrix::from_fn(all.len(), frame.variables.len(), |i, j| all[i].1[j]);
         let d = DVector::from_fn(all.len(), |i, _| all[i].2);
         (all.into_iter().map(|(variable, ..)| variable).collect(), c, d)

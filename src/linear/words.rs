@@ -2,23 +2,24 @@
 
 use super::Operation;
 use crate::friction::Law;
+use crate::mechanism::Mechanism;
 use crate::number::engineering_ascii;
-use crate::plant::{Body, Plant};
+use crate::stage::axis::{BODIES, CART};
 use crate::stage::{BeltModel, Stage};
 
 /// What was linearised, and what was taken for granted: a sentence for each part that makes the stage more than a linear system.
 pub fn assumptions(stage: &Stage, operation: Operation) -> Vec<String> {
-    let plant = Plant::new(stage);
-    let held = |body: Body| operation.held[body.index()] || operation.held[plant.leader(body).index()];
-    let moving: Vec<Body> = plant.leaders().filter(|body| !held(*body)).collect();
+    let plant = stage.mechanism();
+    let held = |body: usize| operation.held[body] || operation.held[plant.leader(body)];
+    let moving: Vec<usize> = leaders(&plant).filter(|body| !held(*body)).collect();
     let mut words = Vec::new();
-    let stopped: Vec<&str> = Body::ALL.into_iter().filter(|b| held(*b)).map(Body::name).collect();
+    let stopped: Vec<&str> = (0..BODIES).filter(|b| held(*b)).map(|b| plant.bodies[b].label.name).collect();
     if !stopped.is_empty() {
         words.push(format!("held where it is: {}", stopped.join(", ")));
     }
     words.extend(sliding(&plant, operation, &moving));
     words.extend(curves(&plant, operation, &moving));
-    if stage.cart.along.is_some() && moving.contains(&plant.leader(Body::Cart)) {
+    if stage.cart.along.is_some() && moving.contains(&plant.leader(CART)) {
         let at = engineering_ascii(operation.position, "m", 4);
         words.push(format!("friction that changes along the travel is taken as it is at x = {at}, and not followed"));
     }
@@ -32,7 +33,7 @@ pub fn assumptions(stage: &Stage, operation: Operation) -> Vec<String> {
             "the gear is taken with its driving flank in contact; within its play of {width} the motor moves nothing but its rotor"
         ));
     }
-    if plant.gear_loses() {
+    if plant.drives[0].loses() {
         words
             .push("the gear is taken as driven by the motor: it passes on its efficiency's share of the torque".into());
     }
@@ -55,15 +56,21 @@ pub fn assumptions(stage: &Stage, operation: Operation) -> Vec<String> {
 
 /// Whether dry friction can hold a body that moves in this model at rest.
 pub fn sticks(stage: &Stage, operation: Operation) -> bool {
-    let plant = Plant::new(stage);
-    plant.leaders().any(|body| !operation.held[body.index()] && plant.friction(body).breakaway(true) > 0.0)
+    let plant = stage.mechanism();
+    leaders(&plant).any(|body| !operation.held[body] && plant.friction(body).breakaway(true) > 0.0)
 }
 
-fn sliding(plant: &Plant, operation: Operation, moving: &[Body]) -> Option<String> {
-    let breakaway = |body: &Body| {
+/// Bodies that move by themselves, rotors apart.
+fn leaders(mechanism: &Mechanism) -> impl Iterator<Item = usize> + '_ {
+    mechanism.leaders().filter(|&body| !mechanism.bodies[body].is_rotor)
+}
+
+fn sliding(plant: &Mechanism, operation: Operation, moving: &[usize]) -> Option<String> {
+    let breakaway = |body: &usize| {
         let most = plant.friction(*body).breakaway(operation.speed >= 0.0);
-        let unit = if *body == Body::Cart { "N" } else { "N m" };
-        (most > 0.0).then(|| format!("{} up to {}", body.name(), engineering_ascii(most, unit, 4)))
+        let [_, _, unit] = plant.bodies[*body].kind.units();
+        let name = plant.bodies[*body].label.name;
+        (most > 0.0).then(|| format!("{name} up to {}", engineering_ascii(most, unit, 4)))
     };
     let way = if operation.speed >= 0.0 { "forward" } else { "backward" };
     let holds: Vec<String> = moving.iter().filter_map(breakaway).collect();
@@ -93,15 +100,12 @@ fn sliding(plant: &Plant, operation: Operation, moving: &[Body]) -> Option<Strin
     })
 }
 
-fn curves(plant: &Plant, operation: Operation, moving: &[Body]) -> Vec<String> {
-    let r = plant.stage().pulley_radius;
-    let of = |body: &Body| {
+fn curves(plant: &Mechanism, operation: Operation, moving: &[usize]) -> Vec<String> {
+    let of = |body: &usize| {
         let friction = plant.friction(*body);
-        let (speed, unit) = match body {
-            Body::Cart => (operation.speed, "N s/m"),
-            _ => (operation.speed / r, "N m s/rad"),
-        };
-        let name = body.name();
+        let part = &plant.bodies[*body];
+        let speed = operation.speed / part.kind.lever();
+        let (name, unit) = (part.label.name, if *body == CART { "N s/m" } else { "N m s/rad" });
         match friction.law {
             Law::Coulomb => None,
             Law::LuGre { .. } if operation.speed == 0.0 => {

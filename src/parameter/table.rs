@@ -52,6 +52,16 @@ impl Parameter {
     }
 }
 
+/// Rows of a machine whose numbers cannot be free yet: a gantry's.
+const fn elsewhere<const N: usize>(mut rows: [Parameter; N]) -> [Parameter; N] {
+    let mut i = 0;
+    while i < N {
+        rows[i] = Parameter { field: Field::Elsewhere, off: Off::No, part: None, ..rows[i] };
+        i += 1;
+    }
+    rows
+}
+
 use Arm::{Gear, One, Radius};
 use Fallback::{Required, Value, Words};
 
@@ -68,13 +78,13 @@ const UP_TO_ONE: Range = Range { above: true, ..Range::new(0.0, 1.0) };
 
 /// Friction of one body: the rows with that body's key, symbols, units and examples.
 macro_rules! friction {
-    ($body:ident, $whose:literal, $arm:expr, $arm_of_slope:expr, $viscous:literal, $coulomb:literal, $static:literal, $slope:literal, $load:literal,
+    ($key:literal, $body:ident, $whose:literal, $arm:expr, $arm_of_slope:expr, $viscous:literal, $coulomb:literal, $static:literal, $slope:literal, $load:literal,
      $slope_example:literal, $load_example:literal, $static_example:literal,
      $velocity:literal, $velocity_example:literal, $decay:literal, $decay_example:literal,
      $stiffness:literal, $stiffness_example:literal) => {
         [
             row(
-                concat!(stringify!($body), ".friction.viscous"),
+                concat!($key, ".friction.viscous"),
                 $viscous,
                 $slope,
                 Value(0.0),
@@ -86,7 +96,7 @@ macro_rules! friction {
             .off(concat!($whose, " viscous friction"))
             .part(Sum::Viscous, $arm_of_slope),
             row(
-                concat!(stringify!($body), ".friction.coulomb"),
+                concat!($key, ".friction.coulomb"),
                 $coulomb,
                 $load,
                 Value(0.0),
@@ -101,7 +111,7 @@ macro_rules! friction {
             .off(concat!($whose, " dry friction"))
             .part(Sum::Coulomb, $arm),
             row(
-                concat!(stringify!($body), ".friction.static"),
+                concat!($key, ".friction.static"),
                 $static,
                 $load,
                 Words("as `coulomb`, on each side"),
@@ -114,9 +124,9 @@ macro_rules! friction {
                 |s, _, value| s.$body.friction.forward.breakaway = value,
             ))
             .off(concat!($whose, " dry friction"))
-            .follows(&[concat!(stringify!($body), ".friction.coulomb")]),
+            .follows(&[concat!($key, ".friction.coulomb")]),
             row(
-                concat!(stringify!($body), ".friction.viscous_backward"),
+                concat!($key, ".friction.viscous_backward"),
                 $viscous,
                 $slope,
                 Words("as `viscous`"),
@@ -126,10 +136,10 @@ macro_rules! friction {
             )
             .at(always!(|s| s.$body.friction.backward.viscous))
             .off(concat!($whose, " viscous friction"))
-            .follows(&[concat!(stringify!($body), ".friction.viscous")])
+            .follows(&[concat!($key, ".friction.viscous")])
             .part(Sum::Viscous, $arm_of_slope),
             row(
-                concat!(stringify!($body), ".friction.coulomb_backward"),
+                concat!($key, ".friction.coulomb_backward"),
                 $coulomb,
                 $load,
                 Words("as `coulomb`"),
@@ -142,10 +152,10 @@ macro_rules! friction {
                 |s, _, value| set_coulomb(&mut s.$body.friction, false, value),
             ))
             .off(concat!($whose, " dry friction"))
-            .follows(&[concat!(stringify!($body), ".friction.coulomb")])
+            .follows(&[concat!($key, ".friction.coulomb")])
             .part(Sum::Coulomb, $arm),
             row(
-                concat!(stringify!($body), ".friction.static_backward"),
+                concat!($key, ".friction.static_backward"),
                 $static,
                 $load,
                 Words("as `static`; without it as `coulomb_backward`"),
@@ -158,9 +168,9 @@ macro_rules! friction {
                 |s, _, value| s.$body.friction.backward.breakaway = value,
             ))
             .off(concat!($whose, " dry friction"))
-            .follows(&[concat!(stringify!($body), ".friction.static"), concat!(stringify!($body), ".friction.coulomb_backward")]),
+            .follows(&[concat!($key, ".friction.static"), concat!($key, ".friction.coulomb_backward")]),
             row(
-                concat!(stringify!($body), ".friction.stribeck.force"),
+                concat!($key, ".friction.stribeck.force"),
                 "F_s",
                 $load,
                 Required,
@@ -174,7 +184,7 @@ macro_rules! friction {
             ))
             .off(concat!($whose, " dry friction")),
             row(
-                concat!(stringify!($body), ".friction.stribeck.decay"),
+                concat!($key, ".friction.stribeck.decay"),
                 "F_τ",
                 $decay,
                 Words("from `velocity`"),
@@ -183,12 +193,12 @@ macro_rules! friction {
                 "How fast that excess is gone: e^(−F_τ v²), eq. (14); 1 / velocity².",
             )
             .at(Field::form(
-                concat!(stringify!($body), ".friction.stribeck.velocity"),
+                concat!($key, ".friction.stribeck.velocity"),
                 |s, _| stribeck_decay(&s.$body.friction),
                 |s, _, value| set_stribeck_decay(&mut s.$body.friction, value),
             )),
             row(
-                concat!(stringify!($body), ".friction.stribeck.velocity"),
+                concat!($key, ".friction.stribeck.velocity"),
                 "v_s",
                 $velocity,
                 Words("from `decay`"),
@@ -202,7 +212,7 @@ macro_rules! friction {
             ))
             .off(concat!($whose, " Stribeck velocity")),
             row(
-                concat!(stringify!($body), ".friction.smooth.breakaway_velocity"),
+                concat!($key, ".friction.smooth.breakaway_velocity"),
                 "v_b",
                 $velocity,
                 Required,
@@ -213,7 +223,7 @@ macro_rules! friction {
             .at(of_law!($body, Smooth, breakaway_velocity))
             .off(concat!($whose, " breakaway velocity")),
             row(
-                concat!(stringify!($body), ".friction.lugre.stiffness"),
+                concat!($key, ".friction.lugre.stiffness"),
                 "σ₀",
                 $stiffness,
                 Required,
@@ -224,7 +234,7 @@ macro_rules! friction {
             .at(of_law!($body, LuGre, stiffness))
             .off(concat!($whose, " bristles' stiffness")),
             row(
-                concat!(stringify!($body), ".friction.lugre.damping"),
+                concat!($key, ".friction.lugre.damping"),
                 "σ₁",
                 $slope,
                 Required,
@@ -235,7 +245,7 @@ macro_rules! friction {
             .at(of_law!($body, LuGre, damping))
             .off(concat!($whose, " bristles' damping")),
             row(
-                concat!(stringify!($body), ".friction.lugre.velocity"),
+                concat!($key, ".friction.lugre.velocity"),
                 "v_s",
                 $velocity,
                 Required,
@@ -493,6 +503,29 @@ const INITIAL: &[Parameter] = &[
 ];
 
 #[rustfmt::skip]
+const BRIDGE: &[Parameter] = &[
+    row("bridge.mass", "m", "kg", Required, POSITIVE, "0.838 kg", "Mass of the bridge without the cart; of the cart with its load."),
+    row("bridge.travel.min", "", "m", Required, ANY, "-0.2 m", "Least position."),
+    row("bridge.travel.max", "", "m", Required, ANY, "0.2 m", "Greatest position; above `min`."),
+    row("bridge.travel.stop_stiffness", "k_s", "N/m", Words("no stops: a run ends there"), POSITIVE, "20 kN/m", "Stiffness of the end stops."),
+    row("bridge.travel.stop_damping", "c_s", "N s/m", Value(0.0), NOT_NEGATIVE, "50 N s/m", "Their damping."),
+];
+
+#[rustfmt::skip]
+const GANTRY_INITIAL: &[Parameter] = &[
+    row("gantry.initial.bridge_position", "x", "m", Value(0.0), ANY, "0 mm", "Position of the bridge at time zero."),
+    row("gantry.initial.bridge_speed", "x′", "m/s", Value(0.0), ANY, "0 m/s", "Its speed."),
+    row("gantry.initial.cart_position", "y", "m", Value(0.0), ANY, "0 mm", "Position of the cart on the bridge."),
+    row("gantry.initial.cart_speed", "y′", "m/s", Value(0.0), ANY, "0 m/s", "Its speed."),
+    row("gantry.initial.left_angle", "φ₁", "rad", Words("without strain of the belt"), ANY, "0 rad", "Angle of the left drive pulley (A)."),
+    row("gantry.initial.left_speed", "φ₁′", "rad/s", Words("without strain of the belt"), ANY, "0 rad/s", "Its speed."),
+    row("gantry.initial.left_current", "i₁", "A", Value(0.0), ANY, "0 A", "Current of the left motor; only where it does not follow at once."),
+    row("gantry.initial.right_angle", "φ₂", "rad", Words("without strain of the belt"), ANY, "0 rad", "Angle of the right drive pulley (B)."),
+    row("gantry.initial.right_speed", "φ₂′", "rad/s", Words("without strain of the belt"), ANY, "0 rad/s", "Its speed."),
+    row("gantry.initial.right_current", "i₂", "A", Value(0.0), ANY, "0 A", "Current of the right motor; only where it does not follow at once."),
+];
+
+#[rustfmt::skip]
 const INPUTS: &[Parameter] = &[
     row("input.step", "", INPUT, Required, ANY, "5 V", "Height of the step."),
     row("input.step.at", "", "s", Value(0.0), TIME, "0 s", "When it comes."),
@@ -619,6 +652,7 @@ pub(super) const SECTIONS: &[(&str, &[&[Parameter]])] = &[
             RADIUS,
             &pulley!(drive_pulley, "J₁"),
             &friction!(
+                "drive_pulley",
                 drive_pulley,
                 "pulleys'",
                 One,
@@ -645,6 +679,7 @@ pub(super) const SECTIONS: &[(&str, &[&[Parameter]])] = &[
         &[
             &pulley!(idler_pulley, "J₂"),
             &friction!(
+                "idler_pulley",
                 idler_pulley,
                 "pulleys'",
                 One,
@@ -671,6 +706,7 @@ pub(super) const SECTIONS: &[(&str, &[&[Parameter]])] = &[
         &[
             CART,
             &friction!(
+                "cart",
                 cart,
                 "cart's",
                 Radius(1),
@@ -693,6 +729,33 @@ pub(super) const SECTIONS: &[(&str, &[&[Parameter]])] = &[
             ALONG,
         ],
     ),
+    (
+        "bridge",
+        &[
+            BRIDGE,
+            &elsewhere(friction!(
+                "bridge",
+                cart,
+                "bridge's",
+                Radius(1),
+                Radius(2),
+                "b",
+                "F_c",
+                "F_b",
+                "N s/m",
+                "N",
+                "15 N s/m",
+                "1 N",
+                "1.5 N",
+                "m/s",
+                "0.01 m/s",
+                "s^2/m^2",
+                "1e4 s^2/m^2",
+                "N/m",
+                "100 kN/m"
+            )),
+        ],
+    ),
     ("belt", &[BELT]),
     ("travel", &[TRAVEL]),
     ("encoder", &[ENCODER]),
@@ -710,6 +773,7 @@ pub(super) const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     ),
     ("experiment", &[EXPERIMENT]),
     ("experiment.initial", &[INITIAL]),
+    ("gantry.initial", &[GANTRY_INITIAL]),
     ("experiment.log", &[LOG]),
     ("input", &[INPUTS]),
     ("controller", &[CONTROLLER]),

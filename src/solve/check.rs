@@ -2,12 +2,14 @@
 //!
 //! The case reader checks what is in a file, and says on which line; here it is what a program built by itself.
 
+use super::Course;
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::{Friction, Law};
+use crate::mechanism::{AmplifierMode, Mechanism, SpringLaw, State};
 use crate::parameter;
-use crate::plant::{Body, Plant};
-use crate::stage::{AmplifierMode, BeltModel, Stage};
+use crate::stage::axis::{CART, DRIVE, LABELS};
+use crate::stage::{BeltModel, Stage};
 use std::f64::consts::PI;
 
 /// The range of anything that has to be above zero, as in a case file.
@@ -63,19 +65,19 @@ pub(super) fn stage(stage: &Stage) -> Result<()> {
         }
     }
 
-    for (body, law) in Body::ALL.into_iter().zip(laws) {
+    for (body, law) in laws.into_iter().enumerate() {
         match law.law {
             Law::Coulomb | Law::Stribeck { .. } | Law::Smooth { .. } => {}
             Law::LuGre { .. } => {
                 positive("Coulomb friction under bristles", &[law.forward.coulomb, law.backward.coulomb])?;
-                if let Some(along) = stage.cart.along.as_ref().filter(|_| body == Body::Cart) {
+                if let Some(along) = stage.cart.along.as_ref().filter(|_| body == CART) {
                     let factors: Vec<f64> = along.points().iter().map(|point| point[1]).collect();
                     positive("the factor of friction along the travel, under bristles,", &factors)?;
                 }
             }
         }
         let never_sticks = matches!(law.law, Law::Smooth { .. } | Law::LuGre { .. });
-        if body == Body::DrivePulley && never_sticks && motor.gear_efficiency < 1.0 {
+        if body == DRIVE && never_sticks && motor.gear_efficiency < 1.0 {
             return Err(Error::new(
                 "a gear that loses power, and a friction law that never sticks at the drive pulley",
             )
@@ -129,82 +131,82 @@ pub(super) fn stage(stage: &Stage) -> Result<()> {
 }
 
 /// Refuses what is not linear between its changes of mode.
-pub(super) fn piecewise_linear(stage: &Stage) -> Result<()> {
-    if stage.is_piecewise_linear() {
+pub(super) fn piecewise_linear(mechanism: &Mechanism) -> Result<()> {
+    let mut bodies = mechanism.bodies.iter();
+    let what = if let Some(body) = bodies.find(|body| !body.friction.is_piecewise_linear()) {
+        format!("the friction law of the {} is no straight line", body.label.name)
+    } else if let Some(body) = mechanism.bodies.iter().find(|body| body.along.is_some()) {
+        format!("the {}'s friction changes along the travel", body.label.name)
+    } else if mechanism.springs.iter().any(|spring| spring.follows.is_some()) {
+        "the belt's spans follow the cart".into()
+    } else {
         return Ok(());
-    }
-    let bent = [
-        (stage.drive_pulley.friction, "drive pulley"),
-        (stage.cart.friction, "cart"),
-        (stage.idler_pulley.friction, "idler pulley"),
-    ];
-    let what = match bent.iter().find(|(law, _)| !law.is_piecewise_linear()) {
-        Some((_, body)) => format!("the friction law of the {body} is no straight line"),
-        None if stage.cart.along.is_some() => "the cart's friction changes along the travel".into(),
-        None => "the belt's spans follow the cart".into(),
     };
     Err(Error::new(format!("{what}: this solver does not take it"))
         .next("leave --solver out, or write --solver general: it takes all of these"))
 }
 
-/// The fastest rate, 1/s, that is known beforehand: of the current, and of each body against all that holds or damps it.
-pub(super) fn fastest_rate(stage: &Stage) -> f64 {
-    let motor = &stage.motor;
-    let r2 = stage.pulley_radius * stage.pulley_radius;
-    let rigid = stage.belt.model == BeltModel::Rigid;
-    let [k1, k2, k3] = if rigid { [0.0; 3] } else { stage.belt.stiffness };
-    let [c1, c2, c3] = if rigid { [0.0; 3] } else { stage.belt.damping };
-    let bodies = [
-        (stage.drive_pulley.inertia, stage.drive_pulley.friction, (k1 + k3) * r2, (c1 + c3) * r2),
-        (stage.cart.mass, stage.cart.friction, k1 + k2, c1 + c2),
-        (stage.idler_pulley.inertia, stage.idler_pulley.friction, (k2 + k3) * r2, (c2 + c3) * r2),
-    ];
-    let emf = motor.torque_constant * motor.back_emf_constant * motor.gear_ratio.powi(2);
-    let shaft = match motor.gear_play {
-        Some(_) => motor.gear_ratio.powi(2) * motor.rotor_inertia,
-        None if rigid => stage.drive_pulley.inertia + stage.idler_pulley.inertia + r2 * stage.cart.mass,
-        None => stage.drive_pulley.inertia,
-    };
-    // Of the current by itself, and of current and motor with each other
-    let mut fastest: f64 = if motor.inductance > 0.0 {
-        f64::max(motor.resistance / motor.inductance, (emf.abs() / (motor.inductance * shaft)).sqrt())
-    } else {
-        emf.abs() / (motor.resistance * shaft)
-    };
-    fastest = fastest.max(2.0 * PI * stage.amplifier.bandwidth.unwrap_or(0.0));
-    if let Some(play) = motor.gear_play {
-        let light = (motor.gear_ratio.powi(2) * motor.rotor_inertia).min(stage.drive_pulley.inertia);
-        fastest = fastest.max((2.0 * play.stiffness / light).sqrt()).max(2.0 * play.damping / light);
+/// The fastest rate, 1/s, that is known beforehand: of the currents, and of each body against all that holds or damps it.
+pub(super) fn fastest_rate(mechanism: &Mechanism) -> f64 {
+    let mut fastest: f64 = 0.0;
+    for drive in &mechanism.drives {
+        let motor = &drive.motor;
+        let emf = motor.torque_constant * motor.back_emf_constant * motor.gear_ratio.powi(2);
+        let mass = |b: usize| mechanism.ratio(b).powi(2) * mechanism.bodies[b].inertia;
+        let leader = mechanism.leader(drive.shaft);
+        let moved: f64 = mechanism.followers(leader).map(mass).sum();
+        let shaft = moved / mechanism.ratio(drive.shaft).powi(2);
+        // Of the current by itself, and of current and motor with each other
+        fastest = fastest.max(if motor.inductance > 0.0 {
+            f64::max(motor.resistance / motor.inductance, (emf.abs() / (motor.inductance * shaft)).sqrt())
+        } else {
+            emf.abs() / (motor.resistance * shaft)
+        });
+        fastest = fastest.max(2.0 * PI * drive.amplifier.bandwidth.unwrap_or(0.0));
     }
-    if let Some(stop) = stage.travel.and_then(|travel| travel.stop) {
-        fastest = fastest.max((stop.stiffness / stage.cart.mass).sqrt()).max(stop.damping / stage.cart.mass);
-    }
-    for (inertia, friction, k, c) in bodies {
-        let (k, c) = match friction.law {
-            Law::Coulomb | Law::Stribeck { .. } => (k, c),
-            Law::Smooth { .. } => (k, c + friction.slope(0.0)),
-            Law::LuGre { stiffness, damping, .. } => (k + stiffness, c + damping),
+    for (index, body) in mechanism.bodies.iter().enumerate() {
+        let (mut stiffness, mut damping) = (0.0, 0.0);
+        for spring in &mechanism.springs {
+            // Stops and flanks by themselves: they are hardly ever touched together with the rest.
+            let alone = matches!(spring.law, SpringLaw::Gap { .. });
+            let arm: f64 = spring.arms.iter().filter(|(b, _)| *b == index).map(|(_, arm)| arm * arm).sum();
+            let (k, c) = (spring.stiffness * arm, spring.damping * arm);
+            if alone || body.is_rotor {
+                let two = if spring.arms.len() > 1 { 2.0 } else { 1.0 };
+                fastest = fastest.max((two * k / body.inertia).sqrt()).max(two * c / body.inertia);
+            } else {
+                (stiffness, damping) = (stiffness + k, damping + c);
+            }
+        }
+        let friction = &body.friction;
+        (stiffness, damping) = match friction.law {
+            Law::Coulomb | Law::Stribeck { .. } => (stiffness, damping),
+            Law::Smooth { .. } => (stiffness, damping + friction.slope(0.0)),
+            Law::LuGre { stiffness: bristle, damping: loss, .. } => (stiffness + bristle, damping + loss),
         };
         let viscous = friction.forward.viscous.max(friction.backward.viscous);
-        fastest = fastest.max((k / inertia).sqrt()).max((c + viscous) / inertia);
+        fastest = fastest.max((stiffness / body.inertia).sqrt()).max((damping + viscous) / body.inertia);
     }
     fastest
 }
 
 /// Where several bodies move as one, a law other than Coulomb's stands for all of them, at the one that leads.
 fn one_law_each(stage: &Stage) -> Result<()> {
-    let plant = Plant::new(stage);
+    let mechanism = stage.mechanism();
     let laws = [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction];
-    for leader in plant.leaders() {
-        let followers = || plant.followers(leader).filter(|&body| body != leader);
-        let plain = |body: Body| laws[body.index()].law == Law::Coulomb;
-        let none = |body: Body| laws[body.index()] == Friction::default();
+    for leader in mechanism.leaders().filter(|&body| !mechanism.bodies[body].is_rotor) {
+        let followers = || mechanism.followers(leader).filter(|&body| body != leader);
+        let plain = |body: usize| laws[body].law == Law::Coulomb;
+        let none = |body: usize| laws[body] == Friction::default();
         if !(followers().all(plain) && (plain(leader) || followers().all(none))) {
             return Err(Error::new(format!(
                 "in this model of the belt the {} moves as one with others, whose friction laws cannot be added up",
-                leader.name()
+                LABELS[leader].name
             ))
-            .allowed(format!("such a law for the {} alone, or Coulomb friction for all of them", leader.name())));
+            .allowed(format!(
+                "such a law for the {} alone, or Coulomb friction for all of them",
+                LABELS[leader].name
+            )));
         }
     }
     Ok(())
@@ -215,9 +217,28 @@ fn too_fast(what: &str, rate: f64) -> Error {
         .allowed(format!("{:e} s and longer", 1.0 / FASTEST))
 }
 
-/// Refuses a run that has no rows, or no state to begin with.
-pub(super) fn experiment(plant: &Plant, experiment: &Experiment) -> Result<()> {
-    let &Experiment { until, every, ref initial, .. } = experiment;
+/// Refuses a run of a mechanism that has no rows, no input for each drive, or no state to begin with.
+pub(super) fn course(mechanism: &Mechanism, course: &Course) -> Result<()> {
+    times(course.until, course.every)?;
+    if course.inputs.len() != mechanism.drives.len() {
+        return Err(Error::new(format!("{} inputs cannot be", course.inputs.len()))
+            .allowed(format!("one for each drive: {}", mechanism.drives.len())));
+    }
+    state(&course.start)
+}
+
+/// Refuses a state that is none.
+pub(super) fn state(start: &State) -> Result<()> {
+    match start.position.iter().chain(&start.speed).chain(&start.current).find(|value| !value.is_finite()) {
+        Some(value) => {
+            Err(Error::new(format!("the state at the start cannot be {value}")).allowed("any finite number"))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Refuses a run that has no rows.
+fn times(until: f64, every: f64) -> Result<()> {
     if !(until.is_finite() && every.is_finite() && until > 0.0 && every > 0.0) {
         return Err(Error::new(format!("a run of {until:e} s with a row every {every:e} s cannot be"))
             .allowed("a length and an interval above zero"));
@@ -226,6 +247,13 @@ pub(super) fn experiment(plant: &Plant, experiment: &Experiment) -> Result<()> {
         return Err(Error::new(format!("a row every {every:e} s makes more than {MOST_ROWS:e} rows"))
             .next("choose a longer interval"));
     }
+    Ok(())
+}
+
+/// Refuses a run that has no rows, or no state to begin with.
+pub(super) fn experiment(mechanism: &Mechanism, experiment: &Experiment) -> Result<()> {
+    let &Experiment { until, every, ref initial, .. } = experiment;
+    times(until, every)?;
     let state = [
         initial.drive_angle,
         initial.drive_speed,
@@ -239,16 +267,15 @@ pub(super) fn experiment(plant: &Plant, experiment: &Experiment) -> Result<()> {
         return Err(Error::new(format!("the state at the start cannot be {value}")).allowed("any finite number"));
     }
     // What moves as one begins as one.
-    let state = initial.state(plant);
-    for body in Body::ALL {
-        let (own, leader) = (body.speed_place(), plant.leader(body).speed_place());
-        for (own, leader) in [(state[own - 1], state[leader - 1]), (state[own], state[leader])] {
-            let wanted = plant.ratio(body) * leader;
+    let state = initial.state(mechanism);
+    for body in 0..mechanism.bodies.len() {
+        let leader = mechanism.leader(body);
+        for values in [&state.position, &state.speed] {
+            let (own, wanted) = (values[body], mechanism.ratio(body) * values[leader]);
             if (own - wanted).abs() > 1e-9 * wanted.abs() {
                 return Err(Error::new(format!(
                     "in this model of the belt {} and {} move as one, and do not begin so: {own} instead of {wanted}",
-                    body.name(),
-                    plant.leader(body).name()
+                    mechanism.bodies[body].label.name, mechanism.bodies[leader].label.name
                 ))
                 .allowed("positions and speeds at the start that fit: x = r φ₁ = r φ₃"));
             }

@@ -6,27 +6,32 @@ mod coordinates;
 mod estimate;
 mod exact;
 mod general;
-mod law;
+mod inputs;
+mod machine;
 mod observe;
 mod pace;
 mod propagator;
 mod record;
 mod roots;
 mod rounding;
+mod run;
 mod table3;
 
 pub use crate::trajectory::Grid;
 pub use choice::{Choice, Kind};
 pub use estimate::ErrorEstimate;
+pub use inputs::Pieces;
+pub use machine::Machine;
 use observe::Output;
 pub use observe::{Curve, Gap, Observe, Polynomial, QUANTITIES, Reading, TERMS, reading};
+pub use run::{Course, Run};
 
 use crate::case::Experiment;
 use crate::error::{Error, Result};
-use crate::plant::{Body, Part, Plant, State, Status};
-use crate::signal::{DEGREE, Piece, Signal};
+use crate::mechanism::{Mechanism, Part, Status, What};
 use crate::stage::Stage;
 use crate::trajectory::Trajectory;
+use std::sync::Arc;
 
 /// How the equations are solved.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -86,10 +91,10 @@ pub struct Event {
 }
 
 impl Event {
-    /// The body, if it is one.
-    pub fn body(&self) -> Option<Body> {
-        match self.part {
-            Part::Body(body) => Some(body),
+    /// The number of the body, if it is one.
+    pub fn body(&self) -> Option<usize> {
+        match self.part.what {
+            What::Body(body) => Some(body),
             _ => None,
         }
     }
@@ -233,13 +238,6 @@ pub enum Flow {
     Stop,
 }
 
-/// Decides the input while a run goes on: a sampled controller, or anything else that answers the motion.
-pub trait Decide {
-    /// The input from `time` (s) on, and until when it is held (s, after `time`), told the state and the motor current (A) just
-    /// before. It is asked first at time zero, then whenever what it said has ended.
-    fn decide(&mut self, time: f64, state: &State, current: f64) -> (f64, f64);
-}
-
 /// Which columns a run puts out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Detail {
@@ -256,20 +254,20 @@ pub enum Detail {
 /// sooner.
 #[derive(Default)]
 pub struct Bench {
-    plant: Option<Plant>,
-    laws: exact::Laws,
+    mounted: Option<(Stage, Arc<Mechanism>)>,
+    known: exact::Known,
 }
 
 impl Bench {
     /// Takes up a stage, unless it is there already. Errors: what makes no sense as a machine.
     pub fn mount(&mut self, stage: &Stage) -> Result<()> {
-        if self.plant.as_ref().is_some_and(|plant| plant.stage() == stage) {
+        if self.mounted.as_ref().is_some_and(|(mounted, _)| mounted == stage) {
             return Ok(());
         }
-        self.laws.clear();
-        self.plant = None;
+        self.known.clear();
+        self.mounted = None;
         check::stage(stage)?;
-        self.plant = Some(Plant::new(stage));
+        self.mounted = Some((stage.clone(), Arc::new(stage.mechanism())));
         Ok(())
     }
 
@@ -280,48 +278,27 @@ impl Bench {
         detail: Detail,
         sink: &mut dyn FnMut(&Trajectory) -> Flow,
     ) -> Result<Outcome> {
-        let Some(plant) = &self.plant else { return Err(nothing_mounted()) };
-        check::experiment(plant, experiment)?;
-        let output = Output { detail, sink, observer: None };
-        let source = Source::Signal(&experiment.input);
-        run_with(plant, experiment, source, Solver::of(plant.stage()), &mut self.laws, output)
+        self.go(experiment, Output { detail, sink, observer: None })
     }
 
     /// The same for an observer alone: no rows are made.
     pub fn observe(&mut self, experiment: &Experiment, observer: &mut dyn Observe) -> Result<Outcome> {
-        let Some(plant) = &self.plant else { return Err(nothing_mounted()) };
-        check::experiment(plant, experiment)?;
-        let output = Output { detail: Detail::None, sink: &mut |_| Flow::Continue, observer: Some(observer) };
-        let source = Source::Signal(&experiment.input);
-        run_with(plant, experiment, source, Solver::of(plant.stage()), &mut self.laws, output)
+        let sink = &mut |_: &Trajectory| Flow::Continue;
+        self.go(experiment, Output { detail: Detail::None, sink, observer: Some(observer) })
+    }
+
+    fn go(&mut self, experiment: &Experiment, output: Output) -> Result<Outcome> {
+        let Some((stage, mechanism)) = &self.mounted else { return Err(nothing_mounted()) };
+        check::experiment(mechanism, experiment)?;
+        let known = std::mem::take(&mut self.known);
+        let (outcome, known) = go(mechanism, experiment, Solver::of(stage), known, output)?;
+        self.known = known;
+        Ok(outcome)
     }
 }
 
 fn nothing_mounted() -> Error {
     Error::new("there is no stage to run").next("take one up with Bench::mount")
-}
-
-/// Where the input comes from.
-enum Source<'a> {
-    Signal(&'a Signal),
-    Decided(&'a mut dyn Decide),
-}
-
-impl Source<'_> {
-    /// The highest power of time in any piece.
-    fn degree(&self) -> usize {
-        match self {
-            Source::Signal(signal) => signal.degree(),
-            Source::Decided(_) => 0,
-        }
-    }
-}
-
-/// A piece on which the input is held; one that would not end after it begins has no end.
-fn held(value: f64, start: f64, end: f64) -> Piece {
-    let mut coefficients = [0.0; DEGREE + 1];
-    coefficients[0] = value;
-    Piece { start, end: if end > start { end } else { f64::INFINITY }, coefficients }
 }
 
 /// Runs `experiment` on `stage` and keeps everything in memory.
@@ -373,8 +350,7 @@ pub fn stream(
     solver: Solver,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<Outcome> {
-    let plant = checked(stage, experiment, solver)?;
-    run(&plant, experiment, Source::Signal(&experiment.input), solver, Detail::Full, None, sink)
+    run(stage, experiment, solver, Output { detail: Detail::Full, sink, observer: None })
 }
 
 /// The same, with an observer that sees what is between the rows, too: a [`crate::metrics::Meter`], or one's own.
@@ -397,100 +373,51 @@ pub fn stream_observed(
     observer: &mut dyn Observe,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<Outcome> {
-    let plant = checked(stage, experiment, solver)?;
-    run(&plant, experiment, Source::Signal(&experiment.input), solver, Detail::Full, Some(observer), sink)
+    run(stage, experiment, solver, Output { detail: Detail::Full, sink, observer: Some(observer) })
 }
 
-/// The same with an input that is decided as the run goes on; that of `experiment` counts for nothing.
-///
-/// ```
-/// use taut::case::{Case, TEMPLATE};
-/// use taut::plant::{State, place};
-/// use taut::solve::{Decide, Ending, Flow, Solver, stream_decided};
-///
-/// /// Full voltage until the cart has gone far enough, looked at every millisecond.
-/// struct Switch;
-/// impl Decide for Switch {
-///     fn decide(&mut self, time: f64, state: &State, _: f64) -> (f64, f64) {
-///         (if state[place::CART_POSITION] < 0.05 { 10.0 } else { 0.0 }, time + 1e-3)
-///     }
-/// }
-/// let case = Case::from_text("axis.toml", TEMPLATE)?;
-/// let mut last = 0.0;
-/// let outcome = stream_decided(&case.stage, &case.experiments[0], &mut Switch, Solver::Exact, &mut |rows| {
-///     last = rows.get("cart_position").unwrap().last().copied().unwrap();
-///     Flow::Continue
-/// })?;
-/// assert!(outcome.ending == Ending::Complete && last > 0.05 && last < 0.08);
-/// # Ok::<(), taut::Error>(())
-/// ```
-pub fn stream_decided(
-    stage: &Stage,
-    experiment: &Experiment,
-    decide: &mut dyn Decide,
-    solver: Solver,
-    sink: &mut dyn FnMut(&Trajectory) -> Flow,
-) -> Result<Outcome> {
-    let plant = checked(stage, experiment, solver)?;
-    run(&plant, experiment, Source::Decided(decide), solver, Detail::Full, None, sink)
-}
-
-/// The same with an observer, and columns as `detail` has them.
-pub fn stream_decided_observed(
-    stage: &Stage,
-    experiment: &Experiment,
-    decide: &mut dyn Decide,
-    solver: Solver,
-    detail: Detail,
-    observer: &mut dyn Observe,
-    sink: &mut dyn FnMut(&Trajectory) -> Flow,
-) -> Result<Outcome> {
-    let plant = checked(stage, experiment, solver)?;
-    run(&plant, experiment, Source::Decided(decide), solver, detail, Some(observer), sink)
-}
-
-/// The equations of what makes sense as a run.
-fn checked(stage: &Stage, experiment: &Experiment, solver: Solver) -> Result<Plant> {
+fn run(stage: &Stage, experiment: &Experiment, solver: Solver, output: Output) -> Result<Outcome> {
     check::stage(stage)?;
-    let plant = Plant::new(stage);
-    check::experiment(&plant, experiment)?;
-    if !matches!(solver, Solver::General { .. }) {
-        check::piecewise_linear(stage)?;
+    let mechanism = Arc::new(stage.mechanism());
+    check::experiment(&mechanism, experiment)?;
+    if let Solver::Table3 { step, method } = solver {
+        check::piecewise_linear(&mechanism)?;
+        return table3::run(stage, &mechanism, experiment, step, method, output);
     }
-    Ok(plant)
+    Ok(go(&mechanism, experiment, solver, exact::Known::default(), output)?.0)
 }
 
-fn run(
-    plant: &Plant,
-    experiment: &Experiment,
-    source: Source,
+/// Runs a mechanism along its inputs, and hands rows to `sink` and all that is between them to `observer`: what [`stream_observed`] does,
+/// for a machine that is no axis.
+pub fn stream_mechanism(
+    mechanism: &Mechanism,
+    course: &Course,
     solver: Solver,
-    detail: Detail,
-    observer: Option<&mut dyn Observe>,
+    (detail, observer): (Detail, Option<&mut dyn Observe>),
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<Outcome> {
-    let output = match observer {
-        Some(observer) => Output { detail, sink, observer: Some(observer) },
-        None => Output { detail, sink, observer: None },
-    };
-    run_with(plant, experiment, source, solver, &mut exact::Laws::default(), output)
+    let observer = observer.map(|observer| -> &mut dyn Observe { observer });
+    let run = Run::of_mechanism(mechanism, course, solver, (detail, observer), sink)?;
+    Ok(run.along(&course.inputs).0)
 }
 
-fn run_with(
-    plant: &Plant,
+/// Runs an experiment that was checked along its own input.
+fn go(
+    mechanism: &Arc<Mechanism>,
     experiment: &Experiment,
-    source: Source,
     solver: Solver,
-    laws: &mut exact::Laws,
+    known: exact::Known,
     output: Output,
-) -> Result<Outcome> {
-    match (solver, source) {
-        (Solver::General { tolerance }, source) => general::run(plant, experiment, source, tolerance, output),
-        (Solver::Exact, source) => Ok(exact::run(plant, experiment, source, laws, output)),
-        (Solver::Table3 { step, method }, Source::Signal(_)) => table3::run(plant, experiment, step, method, output),
-        (Solver::Table3 { .. }, Source::Decided(_)) => {
-            Err(Error::new("the paper's Table 3 has a fixed step and no sampled input")
-                .next("take the exact solver, or the general one"))
-        }
+) -> Result<(Outcome, exact::Known)> {
+    // Smooth inputs carry their derivatives along.
+    let straight = experiment.input.degree() <= 1;
+    let start = experiment.start(mechanism);
+    let run = Run::of(mechanism, &start, (solver, straight), known, output)?;
+    Ok(run.along(std::slice::from_ref(&experiment.input)))
+}
+
+impl Experiment {
+    fn start(&self, mechanism: &Mechanism) -> run::Start {
+        run::Start { state: self.initial.state(mechanism), until: self.until, every: self.every }
     }
 }

@@ -1,18 +1,17 @@
 //! A run seen without rows: what an [`Observe`]r is shown of the motion between events, changes of the input and rows.
 
-use super::coordinates::stretches;
 use super::propagator::Matrix;
 use super::{Detail, Flow};
-use crate::plant::{Body, Form, Mode, Plant, SPEEDS, STRETCHES, State, arms, place};
+use crate::mechanism::{BODIES, DRIVES, Form, Layout, Mechanism, Mode, SPRINGS, Shown, State};
 use crate::trajectory::Trajectory;
 
 /// Number of quantities in a [`Reading`].
 pub const QUANTITIES: usize = 12;
 
-/// What is read off a run at one instant, in the order of [`reading`]. SI units.
+/// What is read off a run at one instant, in the order of [`Mechanism::readings`], which of an axis is that of [`reading`]. SI units.
 pub type Reading = [f64; QUANTITIES];
 
-/// Places in a [`Reading`].
+/// Places in a [`Reading`] of an axis.
 pub mod reading {
     /// ẋ, m/s.
     pub const CART_SPEED: usize = 0;
@@ -267,77 +266,120 @@ pub trait Observe {
     fn end(&mut self, time: f64, state: &State, mode: &Mode);
 }
 
-/// Number of entries of a form: stretches, speeds, current, input, one.
-const ENTRIES: usize = STRETCHES + SPEEDS + 3;
-
-/// What a stage shows in one mode: readings as linear forms.
+/// What a machine shows in one mode: readings as linear forms.
 #[derive(Debug, Clone)]
 pub(super) struct Readout {
     pub(super) forms: [Form; QUANTITIES],
-    /// By entry of a form (stretches, speeds, current, input, one): what each adds to every quantity.
+    /// By coordinate, speed and current of the solvers, by input, and for one: what each adds to every quantity.
     matrix: Matrix<QUANTITIES, ENTRIES>,
-    /// Limits of voltage and current: what they hold is not beyond them by one bit.
-    limits: [f64; 2],
+    /// What stands in the entries.
+    entries: Vec<Entry>,
+    /// Where a way is read off that is counted from its origin: the quantity, the body, its factor.
+    ways: Vec<(usize, usize, f64)>,
+    /// Limits of voltages and currents: what they hold is not beyond them by one bit.
+    limits: Vec<(usize, f64)>,
+}
+
+/// Most entries that readings are made of: axes have up to four bodies, gantries six.
+const ENTRIES: usize = SPRINGS + BODIES + 2 * DRIVES + 1;
+
+#[derive(Debug, Clone, Copy)]
+enum Entry {
+    Stretch(usize),
+    Speed(usize),
+    Current(usize),
+    Input(usize),
 }
 
 impl Readout {
-    pub(super) fn new(plant: &Plant, mode: &Mode) -> Self {
-        let (stage, r) = (plant.stage(), plant.stage().pulley_radius);
+    pub(super) fn new(mechanism: &Mechanism, mode: &Mode) -> Self {
         let mut forms = [Form::ZERO; QUANTITIES];
-        forms[reading::CART_SPEED] = Form::speed(1);
-        forms[reading::DRIVE_SPEED] = Form::speed(0) * r;
-        for (span, force) in plant.span_forces(mode).into_iter().enumerate() {
-            // Between bodies that move as one nothing stretches.
-            let apart = leading_arms(plant, span).iter().any(|arm| arm.abs() > 1e-12 * (1.0 + r));
-            forms[reading::STRETCH + span] = if apart { Form::stretch(span) } else { Form::ZERO };
-            forms[reading::FORCE + span] = force;
+        let (mut ways, mut limits) = (Vec::new(), Vec::new());
+        for (q, shown) in mechanism.readings.iter().enumerate().take(QUANTITIES) {
+            forms[q] = match *shown {
+                Shown::Speed(body, factor) => Form::speed(body) * factor,
+                Shown::Position(body, factor) => {
+                    ways.push((q, body, factor));
+                    let alone = |arms: &[(usize, f64)]| arms == [(body, 1.0)];
+                    match mechanism.springs.iter().position(|spring| alone(&spring.arms)) {
+                        Some(spring) => Form::stretch(spring) * factor,
+                        None => Form::ZERO,
+                    }
+                }
+                // Between bodies that move as one nothing stretches.
+                Shown::Stretch(spring) if mechanism.leading_arms(spring) == [0.0; BODIES] => Form::ZERO,
+                Shown::Stretch(spring) => Form::stretch(spring),
+                Shown::Force(spring, factor) => mechanism.spring_force(spring, mode) * factor,
+                Shown::Current(drive) => {
+                    limits.extend(mechanism.drives[drive].amplifier.current_limit.map(|limit| (q, limit)));
+                    mechanism.current(drive, mode)
+                }
+                Shown::Voltage(drive) => {
+                    limits.extend(mechanism.drives[drive].amplifier.voltage_limit.map(|limit| (q, limit)));
+                    mechanism.voltage(drive, mode)
+                }
+                Shown::Input(drive) => Form::input(drive),
+                _ => Form::ZERO,
+            };
         }
-        forms[reading::CURRENT] = plant.current(mode);
-        forms[reading::ROTOR_SPEED] = Form::speed(if plant.has_rotor() { crate::plant::ROTOR } else { 0 });
-        forms[reading::VOLTAGE] = plant.voltage(mode);
-        forms[reading::CART_POSITION] = Form::stretch(crate::plant::POSITION);
         let mut matrix = Matrix::zero();
-        for (q, form) in forms.iter().enumerate() {
-            let entries = form.stretch.iter().chain(&form.speed).chain([&form.current, &form.input, &form.constant]);
-            for (column, entry) in entries.into_iter().enumerate() {
-                matrix.set(q, column, *entry);
+        let mut entries = Vec::new();
+        let all = (0..mechanism.springs.len()).map(Entry::Stretch);
+        let all = all.chain((0..mechanism.bodies.len()).map(Entry::Speed));
+        let drives = 0..mechanism.drives.len();
+        for entry in all.chain(drives.clone().map(Entry::Current)).chain(drives.map(Entry::Input)) {
+            let of = |form: &Form| match entry {
+                Entry::Stretch(spring) => form.stretch[spring],
+                Entry::Speed(body) => form.speed[body],
+                Entry::Current(drive) => form.current[drive],
+                Entry::Input(drive) => form.input[drive],
+            };
+            if forms.iter().any(|form| of(form) != 0.0) {
+                for (q, form) in forms.iter().enumerate() {
+                    matrix.set(q, entries.len(), of(form));
+                }
+                entries.push(entry);
             }
         }
-        let limit = |limit: Option<f64>| limit.unwrap_or(f64::INFINITY);
-        let limits = [limit(stage.amplifier.voltage_limit), limit(stage.amplifier.current_limit)];
-        Self { forms, matrix, limits }
+        for (q, form) in forms.iter().enumerate() {
+            matrix.set(q, entries.len(), form.constant);
+        }
+        Self { forms, matrix, entries, ways, limits }
     }
 
-    /// What is read in a state in the solver's coordinates, whose positions are counted from `origin`, under `input`.
+    /// What is read in a state in the solver's coordinates, whose ways are counted from `origin`, under `input`; with `one` = 0 the same
+    /// of a change of state and input.
     #[inline]
-    pub(super) fn read(&self, inner: &State, origin: f64, input: f64) -> Reading {
-        let mut reading = self.sum(inner, input, 1.0);
-        reading[reading::CART_POSITION] += origin;
-        let [voltage, current] = self.limits;
-        reading[reading::VOLTAGE] = reading[reading::VOLTAGE].clamp(-voltage, voltage);
-        reading[reading::CURRENT] = reading[reading::CURRENT].clamp(-current, current);
+    pub(super) fn read(
+        &self,
+        layout: &Layout,
+        inner: &State,
+        origin: &[f64; BODIES],
+        input: &[f64; DRIVES],
+        one: f64,
+    ) -> Reading {
+        let stretch = layout.stretches(inner);
+        let mut entries = [0.0; ENTRIES];
+        for (value, entry) in entries.iter_mut().zip(&self.entries) {
+            *value = match *entry {
+                Entry::Stretch(spring) => stretch[spring],
+                Entry::Speed(body) => inner.speed[body],
+                Entry::Current(drive) => inner.current[drive],
+                Entry::Input(drive) => input[drive],
+            };
+        }
+        entries[self.entries.len()] = one;
+        let mut reading = self.matrix.times_first(&entries, self.entries.len() + 1);
+        if one != 0.0 {
+            for &(q, body, factor) in &self.ways {
+                reading[q] += origin[body] * factor;
+            }
+            for &(q, limit) in &self.limits {
+                reading[q] = reading[q].clamp(-limit, limit);
+            }
+        }
         reading
     }
-
-    /// The same of a change of state and input.
-    #[inline]
-    pub(super) fn change(&self, inner: &State, input: f64) -> Reading {
-        self.sum(inner, input, 0.0)
-    }
-
-    #[inline(always)]
-    fn sum(&self, inner: &State, input: f64, one: f64) -> Reading {
-        let [d1, d2, d3, twist, way] = stretches(inner);
-        let speeds = [place::DRIVE_SPEED, place::CART_SPEED, place::IDLER_SPEED, place::ROTOR_SPEED].map(|j| inner[j]);
-        let [w1, v, w3, rotor] = speeds;
-        self.matrix.rate(&[d1, d2, d3, twist, way, w1, v, w3, rotor, inner[place::CURRENT], input, one])
-    }
-}
-
-/// By how much a span stretches per way of each body that leads others: its arms, those of followers put on their leader.
-pub(super) fn leading_arms(plant: &Plant, span: usize) -> [f64; 3] {
-    let arms = arms(plant.stage().pulley_radius)[span];
-    Body::ALL.map(|body| plant.followers(body).map(|follower| plant.ratio(follower) * arms[follower.index()]).sum())
 }
 
 /// Where a run goes: blocks of rows to a receiver, and all that is between them to an observer.

@@ -17,6 +17,11 @@ pub(super) struct Pace {
 }
 
 impl Pace {
+    /// From so many steps at this time on.
+    pub(super) fn since(steps: u64, time: f64) -> Self {
+        Self { steps, time }
+    }
+
     /// The word for a run that at its pace since the last look would need more than [`MOST_STEPS`] steps.
     pub(super) fn too_stiff(&mut self, steps: u64, time: f64, end: f64) -> Option<Ending> {
         if steps - self.steps < STEPS_BEFORE_FORECAST {

@@ -114,6 +114,18 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         sum
     }
 
+    /// The product with a vector of which only the first `columns` are not zero.
+    #[inline]
+    pub(crate) fn times_first(&self, z: &[f64; C], columns: usize) -> [f64; R] {
+        let mut sum = [0.0; R];
+        for (column, &factor) in self.column.iter().zip(z).take(columns) {
+            for (s, c) in sum.iter_mut().zip(column) {
+                *s += c * factor;
+            }
+        }
+        sum
+    }
+
     /// z ← z + P z.
     #[inline(always)]
     pub(crate) fn advance(&self, z: &mut [f64; C]) {

@@ -1,12 +1,14 @@
 //! From states to the columns that a user sees, block by block.
 
-use super::coordinates::{Coordinates, stretches};
+use super::coordinates::Coordinates;
 use super::observe::{Observe, Output};
 use super::{Detail, Flow, Grid};
-use crate::friction::{Law, Motion};
-use crate::plant::{Body, Form, Mode, Part, Plant, SPEEDS, STRETCHES, State, place};
-use crate::stage::{AmplifierMode, BeltModel, EncoderPlace};
+use crate::friction::Motion;
+use crate::mechanism::{BODIES, DRIVES, DriveMode, Form, Heading, Layout, Mechanism, Mode, SPRINGS, Shown, SpringLaw};
+use crate::mechanism::{State, What};
 use crate::trajectory::{Column, Trajectory};
+use std::ops::Range;
+use std::sync::Arc;
 
 /// Rows handed on at a time; small enough to stay in the processor's cache.
 const BLOCK: usize = 256;
@@ -15,11 +17,11 @@ const BLOCK: usize = 256;
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Extra {
     /// Friction beyond b v ± F_c, N or N m.
-    pub(crate) friction: [f64; 3],
-    /// Forces of spans 1 and 2 beyond those with the stiffness at x = 0, N.
-    pub(crate) span: [f64; 2],
+    pub(crate) friction: [f64; BODIES],
+    /// Forces of springs beyond those with the stiffness at the origin, N.
+    pub(crate) force: [f64; SPRINGS],
     /// Deflection of the bristles, m or rad.
-    pub(crate) bristle: [f64; 3],
+    pub(crate) bristle: [f64; BODIES],
 }
 
 /// A row as the solver has it.
@@ -27,31 +29,31 @@ pub(crate) struct Extra {
 pub(crate) struct Row {
     /// In angles and positions.
     pub(crate) state: State,
-    /// r φ₁ − x, x − r φ₃ (m), φ_r − φ₁ (rad) and x − x₀ (m), as accurate as the solver has them.
-    pub(crate) stretch: [f64; 4],
-    pub(crate) input: f64,
+    /// Lengths of the springs, as accurate as the solver has them.
+    pub(crate) stretch: [f64; SPRINGS],
+    pub(crate) input: [f64; DRIVES],
 }
 
 impl Row {
     /// A state in the solver's coordinates.
     #[inline]
-    pub(crate) fn new(coordinates: &Coordinates, inner: &State, input: f64) -> Self {
-        let [d1, d2, _, twist, way] = stretches(inner);
-        Self { state: coordinates.state(inner), stretch: [d1, d2, twist, way], input }
+    pub(crate) fn new(layout: &Layout, coordinates: &Coordinates, inner: &State, input: [f64; DRIVES]) -> Self {
+        Self { state: coordinates.state(layout, inner), stretch: layout.stretches(inner), input }
     }
 }
 
 /// Collects rows of states and hands them on as blocks of columns.
 pub(crate) struct Recorder<'a> {
-    plant: &'a Plant,
+    mechanism: Arc<Mechanism>,
     grid: Grid,
     pub(crate) detail: Detail,
+    /// The columns that are put out.
+    columns: Vec<Heading>,
     raw: Vec<Row>,
     modes: Vec<Mode>,
     /// One for each row, or none at all where the linear equations say everything.
     extra: Vec<Extra>,
-    /// Columns that are only needed on the way: stretches, rotor, current and input, gear torque and force of the stops.
-    scratch: [Vec<f64>; 10],
+    source: Source,
     block: Trajectory,
     sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
     /// Whoever sees what is between the rows, too.
@@ -62,17 +64,37 @@ pub(crate) struct Recorder<'a> {
     pub(crate) flow: Flow,
 }
 
+/// What columns are made of.
+#[derive(Default)]
+struct Source {
+    stretch: [Vec<f64>; SPRINGS],
+    speed: [Vec<f64>; BODIES],
+    armature: [Vec<f64>; DRIVES],
+    input: [Vec<f64>; DRIVES],
+    /// Forces of the springs and currents of the drives, which follow from those.
+    force: [Vec<f64>; SPRINGS],
+    current: [Vec<f64>; DRIVES],
+    load: Vec<(f64, f64)>,
+}
+
 impl<'a> Recorder<'a> {
-    pub(crate) fn new(plant: &'a Plant, grid: Grid, Output { detail, sink, observer }: Output<'a>) -> Self {
+    pub(crate) fn new(mechanism: &Arc<Mechanism>, grid: Grid, Output { detail, sink, observer }: Output<'a>) -> Self {
+        let shown = |heading: &&Heading| detail == Detail::Full || heading.lean;
+        let columns: Vec<Heading> = mechanism.columns.iter().filter(shown).cloned().collect();
+        let empty = |heading: &Heading| Column {
+            values: Vec::with_capacity(BLOCK),
+            ..Column::new(heading.name.clone(), heading.unit)
+        };
         Self {
-            plant,
+            mechanism: Arc::clone(mechanism),
             grid,
             detail,
+            block: Trajectory { columns: columns.iter().map(empty).collect() },
+            columns,
             raw: Vec::with_capacity(BLOCK),
             modes: Vec::with_capacity(BLOCK),
             extra: Vec::new(),
-            scratch: Default::default(),
-            block: Trajectory { columns: headings(plant, detail) },
+            source: Source::default(),
             sink,
             observer,
             rows: 0,
@@ -87,20 +109,20 @@ impl<'a> Recorder<'a> {
 
     /// Adds the next row.
     #[inline]
-    pub(crate) fn push(&mut self, row: Row, mode: Mode) {
+    pub(crate) fn push(&mut self, row: Row, mode: &Mode) {
         if self.detail == Detail::None {
             self.rows += 1;
             return;
         }
         self.raw.push(row);
-        self.modes.push(mode);
+        self.modes.push(*mode);
         if self.raw.len() == BLOCK {
             self.hand_on();
         }
     }
 
     /// Adds the next row with what its state does not tell.
-    pub(crate) fn push_with(&mut self, row: Row, mode: Mode, extra: Extra) {
+    pub(crate) fn push_with(&mut self, row: Row, mode: &Mode, extra: Extra) {
         if self.detail != Detail::None {
             self.extra.push(extra);
         }
@@ -142,190 +164,100 @@ impl<'a> Recorder<'a> {
 
     /// Computes every column of the block from the states, column by column so that the loops become vector instructions.
     fn fill(&mut self) {
-        let plant = self.plant;
-        let stage = plant.stage();
-        let (raw, modes, extras) = (&self.raw, &self.modes, &self.extra);
-        let rows = raw.len();
-        let mut columns = self.block.columns.iter_mut().map(|column| &mut column.values);
-        let mut next = || {
-            let values = columns.next().expect("one column for each heading");
-            values.resize(rows, 0.0);
-            &mut values[..rows]
-        };
-        let first = self.rows;
-        put(next(), |j| self.grid.time(first + j as u64));
-        let voltage = next();
-        let (p1, w1, x, v, p3, w3) = (next(), next(), next(), next(), next(), next());
-        for (j, row) in raw.iter().enumerate() {
-            let [phi1, omega1, position, speed, phi3, omega3, ..] = row.state;
+        let mechanism = &*self.mechanism;
+        let (raw, modes, extra) = (&self.raw[..], &self.modes[..], &self.extra[..]);
+        // Amplifiers, gears, belt and stops: rows in the same state of all of them follow one formula.
+        let mut alike: Vec<(Range<usize>, &Mode)> = Vec::new();
+        for rows in modes.chunk_by(same_elements) {
+            let start = alike.last().map_or(0, |(range, _)| range.end);
+            alike.push((start..start + rows.len(), &rows[0]));
+        }
+        self.source.take(mechanism, raw, extra, &alike);
+        let (source, grid, first) = (&mut self.source, self.grid, self.rows);
+        for (heading, column) in self.columns.iter().zip(&mut self.block.columns) {
+            column.values.resize(raw.len(), 0.0);
+            let out = &mut column.values[..raw.len()];
             // −0 + 0 is 0.
-            p1[j] = phi1 + 0.0;
-            w1[j] = omega1 + 0.0;
-            x[j] = position + 0.0;
-            v[j] = speed + 0.0;
-            p3[j] = phi3 + 0.0;
-            w3[j] = omega3 + 0.0;
-        }
-        let (w1, v, w3) = (&*w1, &*v, &*w3);
-        let r = stage.pulley_radius;
-        let [d1, d2, d3, twist, way, rotor, armature, input, torque, stop] = &mut self.scratch;
-        let sized = |column: &mut Vec<f64>| column.resize(rows, 0.0);
-        [&mut *d1, d2, d3, twist, way, rotor, armature, input, torque, stop].into_iter().for_each(sized);
-        put(d1, |j| raw[j].stretch[0]);
-        put(d2, |j| raw[j].stretch[1]);
-        put(d3, |j| -(raw[j].stretch[0] + raw[j].stretch[1]));
-        if stage.travel.is_some() {
-            put(way, |j| raw[j].stretch[3]);
-        }
-        put(input, |j| raw[j].input + 0.0);
-        if plant.has_current_state() {
-            put(armature, |j| raw[j].state[place::CURRENT]);
-        }
-        if plant.has_rotor() {
-            put(twist, |j| raw[j].stretch[2]);
-            put(rotor, |j| raw[j].state[place::ROTOR_SPEED]);
-        }
-        let source = Source { stretch: [d1, d2, d3, twist, way], speed: [w1, v, w3, rotor], current: armature, input };
-        let (current, f1, f2, f3) = (next(), next(), next(), next());
-        let alike = |same: fn(&Mode, &Mode) -> bool| {
-            modes.chunk_by(same).scan(0, |start, rows| {
-                *start += rows.len();
-                Some((*start - rows.len()..*start, &rows[0]))
-            })
-        };
-        // Amplifier, gear, belt and stops: rows in the same state of all of them follow one formula.
-        let elements =
-            |a: &Mode, b: &Mode| Mode { motion: b.motion, gear_torque_positive: b.gear_torque_positive, ..*a } == *b;
-        for (rows, mode) in alike(elements) {
-            source.put(&mut voltage[rows.clone()], rows.start, &plant.voltage(mode));
-            source.put(&mut current[rows.clone()], rows.start, &plant.current(mode));
-            for (force, form) in [&mut *f1, &mut *f2, &mut *f3].into_iter().zip(plant.span_forces(mode)) {
-                source.put(&mut force[rows.clone()], rows.start, &form);
-            }
-        }
-        for (j, extra) in extras.iter().enumerate() {
-            f1[j] += extra.span[0];
-            f2[j] += extra.span[1];
-        }
-        // What a limit holds is not beyond it by one bit.
-        for (column, limit) in
-            [(&mut *voltage, stage.amplifier.voltage_limit), (&mut *current, stage.amplifier.current_limit)]
-        {
-            if let Some(limit) = limit {
-                column.iter_mut().for_each(|value| *value = value.clamp(-limit, limit));
-            }
-        }
-        if self.detail != Detail::Full {
-            for body in 0..3 {
-                put(next(), |j| f64::from(modes[j].motion[body].code()));
-            }
-            if shows_input(plant) {
-                next().copy_from_slice(input);
-            }
-            return;
-        }
-        let (current, f1, f2, f3) = (&*current, &*f1, &*f2, &*f3);
-        for (column, there, form) in [
-            (&mut *torque, plant.has_rotor(), Plant::gear_torque as fn(&Plant, &Mode) -> Form),
-            (&mut *stop, stage.travel.is_some(), Plant::stop_force),
-        ] {
-            if there {
-                for (rows, mode) in alike(elements) {
-                    source.put(&mut column[rows.clone()], rows.start, &form(plant, mode));
-                }
-            }
-        }
-        let (torque, stop) = (&*torque, &*stop);
-
-        let constant = stage.cart.constant_force();
-        // What acts on each body beside friction, the least and the most of it: the inner brackets of (16)-(18)
-        let own = |body: Body, j: usize| match body {
-            Body::DrivePulley => {
-                let pull = r * f3[j] - r * f1[j];
-                let (least, most) =
-                    if plant.has_rotor() { (torque[j], torque[j]) } else { plant.holding_torque(current[j]) };
-                (least + pull, most + pull)
-            }
-            Body::Cart => {
-                let load = f1[j] - f2[j] + (constant + stop[j]);
-                (load, load)
-            }
-            Body::IdlerPulley => {
-                let load = r * f2[j] - r * f3[j];
-                (load, load)
-            }
-        };
-        let alone = stage.belt.model == BeltModel::Elastic;
-        for body in Body::ALL {
-            let friction = next();
-            let speed = source.speed[body.index()];
-            let mut start = 0;
-            for same in modes.chunk_by(|a, b| a.motion[body.index()] == b.motion[body.index()]) {
-                let motion = same[0].motion[body.index()];
-                let out = &mut friction[start..start + same.len()];
-                match motion {
-                    Motion::Stuck if alone => {
-                        put(out, |j| plant.friction_value(body, motion, 0.0, own(body, start + j)) + 0.0);
+            match heading.shown {
+                Shown::Time => put(out, |j| grid.time(first + j as u64)),
+                Shown::Input(drive) => out.copy_from_slice(&source.input[drive]),
+                Shown::Voltage(drive) => {
+                    for (rows, mode) in &alike {
+                        source.put(&mut out[rows.clone()], rows.start, &mechanism.voltage(drive, mode));
                     }
-                    Motion::Stuck => put(out, |j| {
-                        let sum = |(least, most): (f64, f64), follower| {
-                            let (load, ratio) = (own(follower, start + j), plant.ratio(follower));
-                            (least + ratio * load.0, most + ratio * load.1)
-                        };
-                        plant.friction_value(body, motion, 0.0, plant.followers(body).fold((0.0, 0.0), sum)) + 0.0
-                    }),
-                    _ => put(out, |j| plant.friction_value(body, motion, speed[start + j], (0.0, 0.0)) + 0.0),
+                    // What a limit holds is not beyond it by one bit.
+                    clamp(out, mechanism.drives[drive].amplifier.voltage_limit);
                 }
-                start += same.len();
+                Shown::Current(drive) => out.copy_from_slice(&source.current[drive]),
+                Shown::Position(body, factor) => put(out, |j| raw[j].state.position[body] * factor + 0.0),
+                Shown::Speed(body, factor) => put(out, |j| raw[j].state.speed[body] * factor + 0.0),
+                Shown::Stretch(spring) => out.copy_from_slice(&source.stretch[spring]),
+                Shown::Force(spring, factor) => {
+                    out.iter_mut().zip(&source.force[spring]).for_each(|(out, force)| *out = force * factor);
+                }
+                Shown::Friction(body) => source.friction(mechanism, body, modes, extra, out),
+                Shown::Motion(body) => put(out, |j| f64::from(modes[j].motion[body].code())),
+                Shown::Contact(spring) => {
+                    let what = match mechanism.springs[spring].law {
+                        SpringLaw::Tension { .. } => What::Span(spring),
+                        _ => What::Gap(spring),
+                    };
+                    put(out, |j| f64::from(modes[j].status(what).code()));
+                }
+                Shown::Counts(body, counts) => put(out, |j| (raw[j].state.position[body] * counts).round() + 0.0),
+                Shown::Bristle(body) => put(out, |j| extra.get(j).map_or(0.0, |extra| extra.bristle[body])),
             }
-            for (value, extra) in friction.iter_mut().zip(extras) {
-                *value += extra.friction[body.index()];
-            }
-        }
-        for body in 0..3 {
-            put(next(), |j| f64::from(modes[j].motion[body].code()));
-        }
-        if shows_input(plant) {
-            next().copy_from_slice(input);
-        }
-        if plant.has_rotor() {
-            put(next(), |j| raw[j].state[place::ROTOR_ANGLE] + 0.0);
-            next().copy_from_slice(rotor);
-            next().copy_from_slice(torque);
-            put(next(), |j| f64::from(modes[j].gear.code()));
-        }
-        if stage.belt.pretension.is_some() {
-            for span in 0..3 {
-                put(next(), |j| f64::from(modes[j].status(Part::Span(span)).code()));
-            }
-        }
-        if shows_stop(plant) {
-            next().copy_from_slice(stop);
-        }
-        if let Some(encoder) = stage.encoder {
-            let place = match encoder.at {
-                EncoderPlace::Motor => place::ROTOR_ANGLE,
-                EncoderPlace::DrivePulley => place::DRIVE_ANGLE,
-                EncoderPlace::Cart => place::CART_POSITION,
-            };
-            let counts = encoder.counts_per_unit(stage.motor.gear_ratio);
-            put(next(), |j| (raw[j].state[place] * counts).round() + 0.0);
-        }
-        for body in bristles(plant) {
-            put(next(), |j| extras[j].bristle[body.index()]);
         }
     }
 }
 
-/// What forms are made of, row by row.
-struct Source<'a> {
-    stretch: [&'a [f64]; STRETCHES],
-    speed: [&'a [f64]; SPEEDS],
-    current: &'a [f64],
-    input: &'a [f64],
+fn same_elements(a: &Mode, b: &Mode) -> bool {
+    let limits = |drive: &DriveMode| (drive.voltage, drive.current);
+    a.slack == b.slack && a.contact == b.contact && a.drive.iter().map(limits).eq(b.drive.iter().map(limits))
 }
 
-impl Source<'_> {
+impl Source {
+    /// Takes what the rows show of themselves, and the forces and currents that follow.
+    fn take(&mut self, mechanism: &Mechanism, raw: &[Row], extra: &[Extra], alike: &[(Range<usize>, &Mode)]) {
+        let rows = raw.len();
+        for spring in 0..mechanism.springs.len() {
+            self.stretch[spring].resize(rows, 0.0);
+            put(&mut self.stretch[spring], |j| raw[j].stretch[spring]);
+        }
+        for body in 0..mechanism.bodies.len() {
+            self.speed[body].resize(rows, 0.0);
+            put(&mut self.speed[body], |j| raw[j].state.speed[body] + 0.0);
+        }
+        for (index, drive) in mechanism.drives.iter().enumerate() {
+            self.input[index].resize(rows, 0.0);
+            put(&mut self.input[index], |j| raw[j].input[index] + 0.0);
+            self.armature[index].resize(rows, 0.0);
+            if drive.has_current_state() {
+                put(&mut self.armature[index], |j| raw[j].state.current[index]);
+            }
+        }
+        for index in 0..mechanism.springs.len() {
+            let mut force = std::mem::take(&mut self.force[index]);
+            force.resize(rows, 0.0);
+            for (rows, mode) in alike {
+                self.put(&mut force[rows.clone()], rows.start, &mechanism.spring_force(index, mode));
+            }
+            for (force, extra) in force.iter_mut().zip(extra) {
+                *force += extra.force[index];
+            }
+            self.force[index] = force;
+        }
+        for index in 0..mechanism.drives.len() {
+            let mut current = std::mem::take(&mut self.current[index]);
+            current.resize(rows, 0.0);
+            for (rows, mode) in alike {
+                self.put(&mut current[rows.clone()], rows.start, &mechanism.current(index, mode));
+            }
+            clamp(&mut current, mechanism.drives[index].amplifier.current_limit);
+            self.current[index] = current;
+        }
+    }
+
     /// The values of a form in the rows from `start` on.
     fn put(&self, out: &mut [f64], start: usize, form: &Form) {
         let mut first = true;
@@ -343,11 +275,67 @@ impl Source<'_> {
         };
         self.stretch.iter().zip(form.stretch).for_each(|(column, factor)| add(factor, column));
         self.speed.iter().zip(form.speed).for_each(|(column, factor)| add(factor, column));
-        add(form.current, self.current);
-        add(form.input, self.input);
+        self.armature.iter().zip(form.current).for_each(|(column, factor)| add(factor, column));
+        self.input.iter().zip(form.input).for_each(|(column, factor)| add(factor, column));
         if first {
             out.fill(form.constant);
         }
+    }
+
+    /// Friction on a body: what its law gives while it slides, what holds it while it is stuck.
+    fn friction(&mut self, mechanism: &Mechanism, body: usize, modes: &[Mode], extra: &[Extra], out: &mut [f64]) {
+        let mut start = 0;
+        for same in modes.chunk_by(|a, b| a.motion[body] == b.motion[body]) {
+            let (motion, rows) = (same[0].motion[body], start..start + same.len());
+            let out = &mut out[rows.clone()];
+            if motion == Motion::Stuck && mechanism.leader(body) == body {
+                self.load(mechanism, body, rows);
+                put(out, |j| mechanism.friction_value(body, motion, 0.0, self.load[j]) + 0.0);
+            } else {
+                let speed = &self.speed[body][start..];
+                put(out, |j| mechanism.friction_value(body, motion, speed[j], (0.0, 0.0)) + 0.0);
+            }
+            start += same.len();
+        }
+        for (value, extra) in out.iter_mut().zip(extra) {
+            *value += extra.friction[body];
+        }
+    }
+
+    /// What acts on a body at rest beside friction, the least and the most of it: the inner brackets of (16)-(18).
+    fn load(&mut self, mechanism: &Mechanism, leader: usize, rows: Range<usize>) {
+        self.load.clear();
+        self.load.resize(rows.len(), (0.0, 0.0));
+        for body in mechanism.followers(leader) {
+            let ratio = mechanism.ratio(body);
+            for (index, drive) in mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.shaft == body) {
+                let current = &self.current[index][rows.clone()];
+                for (load, current) in self.load.iter_mut().zip(current) {
+                    let torque = drive.motor.gear_ratio * drive.motor.torque_constant * current;
+                    let (least, most) = match drive.has_rotor() {
+                        true => (torque, torque),
+                        false => mechanism.holding_torque(index, *current),
+                    };
+                    *load = (load.0 + ratio * least, load.1 + ratio * most);
+                }
+            }
+            for (spring, part) in mechanism.springs.iter().enumerate().rev() {
+                for &(_, arm) in part.arms.iter().filter(|(other, _)| *other == body) {
+                    let arm = ratio * arm;
+                    for (load, force) in self.load.iter_mut().zip(&self.force[spring][rows.clone()]) {
+                        *load = (load.0 - arm * force, load.1 - arm * force);
+                    }
+                }
+            }
+            let constant = ratio * mechanism.bodies[body].force;
+            self.load.iter_mut().for_each(|load| *load = (load.0 + constant, load.1 + constant));
+        }
+    }
+}
+
+fn clamp(column: &mut [f64], limit: Option<f64>) {
+    if let Some(limit) = limit {
+        column.iter_mut().for_each(|value| *value = value.clamp(-limit, limit));
     }
 }
 
@@ -355,80 +343,4 @@ impl Source<'_> {
 #[inline(always)]
 fn put(column: &mut [f64], value: impl Fn(usize) -> f64) {
     column.iter_mut().enumerate().for_each(|(j, entry)| *entry = value(j));
-}
-
-/// Whether the amplifier's input differs from the column of voltages and is worth a column of its own.
-fn shows_input(plant: &Plant) -> bool {
-    let amplifier = &plant.stage().amplifier;
-    amplifier.gain != 1.0
-        || amplifier.mode == AmplifierMode::Current
-        || amplifier.voltage_limit.is_some()
-        || amplifier.current_limit.is_some()
-}
-
-/// Whether there are end stops to show the force of.
-fn shows_stop(plant: &Plant) -> bool {
-    plant.stage().travel.is_some_and(|travel| travel.stop.is_some())
-}
-
-/// The bodies whose friction is that of bristles.
-fn bristles(plant: &Plant) -> impl Iterator<Item = Body> {
-    Body::ALL.into_iter().filter(|body| matches!(plant.friction(*body).law, Law::LuGre { .. }))
-}
-
-/// The columns of a run on this stage, without rows.
-fn headings(plant: &Plant, detail: Detail) -> Vec<Column> {
-    let full = detail == Detail::Full;
-    let mut columns: Vec<Column> = [
-        ("time", "s"),
-        ("voltage", "V"),
-        ("drive_angle", "rad"),
-        ("drive_speed", "rad/s"),
-        ("cart_position", "m"),
-        ("cart_speed", "m/s"),
-        ("idler_angle", "rad"),
-        ("idler_speed", "rad/s"),
-        ("motor_current", "A"),
-        ("span1_force", "N"),
-        ("span2_force", "N"),
-        ("span3_force", "N"),
-        ("drive_friction", "N m"),
-        ("cart_friction", "N"),
-        ("idler_friction", "N m"),
-        ("drive_state", ""),
-        ("cart_state", ""),
-        ("idler_state", ""),
-    ]
-    .into_iter()
-    .filter(|(name, _)| full || !name.ends_with("_friction"))
-    .map(|(name, unit)| Column { values: Vec::with_capacity(BLOCK), ..Column::new(name, unit) })
-    .collect();
-    if shows_input(plant) {
-        let unit = if plant.stage().amplifier.mode == AmplifierMode::Current { "A" } else { "V" };
-        columns.push(Column::new("input", unit));
-    }
-    if !full {
-        return columns;
-    }
-    if plant.has_rotor() {
-        for (name, unit) in
-            [("rotor_angle", "rad"), ("rotor_speed", "rad/s"), ("gear_torque", "N m"), ("gear_state", "")]
-        {
-            columns.push(Column::new(name, unit));
-        }
-    }
-    if plant.stage().belt.pretension.is_some() {
-        columns.extend(["span1_slack", "span2_slack", "span3_slack"].map(|name| Column::new(name, "")));
-    }
-    if shows_stop(plant) {
-        columns.push(Column::new("stop_force", "N"));
-    }
-    if plant.stage().encoder.is_some() {
-        columns.push(Column::new("encoder_count", ""));
-    }
-    for body in bristles(plant) {
-        let unit = if body == Body::Cart { "m" } else { "rad" };
-        columns.push(Column::new(format!("{}_bristle", body.key()), unit));
-    }
-    columns
 }

@@ -13,7 +13,7 @@
 //! model's own answer is as uncertain, for parameters that differ in their last bit.
 
 use super::PositionError;
-use crate::plant::{Body, State, place};
+use crate::mechanism::{Body, Layout, Mechanism, State};
 
 /// c: units in the last place of one step. The largest that independent solutions of random stages have shown is below one.
 const UNITS: f64 = 8.0;
@@ -33,19 +33,17 @@ pub(super) struct Rounding {
 impl Rounding {
     /// Takes a state in the solver's coordinates.
     #[inline]
-    pub(super) fn see(&mut self, r: f64, inner: &State) {
-        let pulleys = f64::max(inner[place::DRIVE_SPEED].abs(), inner[place::IDLER_SPEED].abs());
-        self.speed = self.speed.max(r * pulleys).max(inner[place::CART_SPEED].abs());
-        let pulleys = f64::max(inner[place::DRIVE_ANGLE].abs(), inner[place::IDLER_ANGLE].abs());
-        self.way = self.way.max(inner[place::CART_POSITION].abs()).max(pulleys);
+    pub(super) fn see(&mut self, layout: &Layout, mechanism: &Mechanism, inner: &State) {
+        for (body, part) in mechanism.bodies.iter().enumerate().filter(|(_, part)| !part.is_rotor) {
+            self.speed = self.speed.max(part.kind.lever() * inner.speed[body].abs());
+            let lever = if layout.is_replaced(body) { 1.0 } else { part.kind.lever() };
+            self.way = self.way.max(lever * inner.position[body].abs());
+        }
     }
 
     /// Largest speed that a body can have had in a row so far, m/s or rad/s.
-    pub(super) fn largest_speed(&self, body: Body, r: f64) -> f64 {
-        match body {
-            Body::Cart => self.speed,
-            Body::DrivePulley | Body::IdlerPulley => self.speed / r,
-        }
+    pub(super) fn largest_speed(&self, body: &Body) -> f64 {
+        self.speed / body.kind.lever()
     }
 
     /// The fastest swing has been this fast, rad/s, until `time`.

@@ -9,8 +9,11 @@ use super::{Cost, Ending, Flow, Grid, Method, Outcome};
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::Motion;
-use crate::plant::{Body, Form, Mode, Plant, SPEEDS, State, place, stretches};
+use crate::mechanism::{DRIVES, Form, Layout, Mechanism, Mode, State};
 use crate::signal::Piece;
+use crate::stage::Stage;
+use crate::stage::axis::BODIES;
+use std::sync::Arc;
 
 /// Half-width of Table 3's band of "zero" speed, rad/s for the pulleys and m/s for the cart.
 const BAND: f64 = 0.01;
@@ -20,13 +23,14 @@ const BOUND: f64 = 1e9;
 
 /// Runs the experiment with steps of `step` or a little less, so that they fill the output interval.
 pub(crate) fn run(
-    plant: &Plant,
+    stage: &Stage,
+    mechanism: &Arc<Mechanism>,
     experiment: &Experiment,
     step: f64,
     method: Method,
     output: Output,
 ) -> Result<Outcome> {
-    let model = Model::new(plant)?;
+    let model = Model::new(stage, mechanism)?;
     let grid = Grid::new(experiment.every, experiment.until);
     let steps = |interval: f64| (interval / step - 1e-9).ceil().max(1.0);
     let substeps = steps(grid.interval());
@@ -35,22 +39,23 @@ pub(crate) fn run(
             .allowed("a step above zero, such as 1e-4 s")
             .next("choose a larger step"));
     }
-    let mut state = experiment.initial.state(plant);
-    let mut recorder = Recorder::new(plant, grid, output.within());
-    let readout = Readout::new(plant, &Mode::of([Motion::Free; 3]));
+    let mut state = experiment.initial.state(mechanism);
+    let layout = Layout::new(mechanism);
+    let mut recorder = Recorder::new(mechanism, grid, output.within());
+    let readout = Readout::new(mechanism, &Mode::of([]));
     let mut cost = Cost { modes: 1, ..Cost::default() };
     let mut ending = Ending::Complete;
     for row in 0..=grid.intervals() {
         let time = grid.time(row);
         // What is no number fails the comparison too.
-        if row > 0 && !state.iter().all(|value| value.abs() <= BOUND) {
+        if row > 0 && !values(&state).all(|value| value.abs() <= BOUND) {
             ending = Ending::Diverged { time };
             break;
         }
         let input = experiment.input.value(time);
         let motion = model.motion(&state, input);
-        let [d1, d2, ..] = stretches(plant.stage().pulley_radius, &state);
-        recorder.push(Row { state, stretch: [d1, d2, 0.0, state[place::CART_POSITION]], input }, Mode::of(motion));
+        let inner = inner_of(&layout, mechanism, &state);
+        recorder.push(Row { state, stretch: layout.stretches(&inner), input: [input, 0.0] }, &Mode::of(motion));
         if recorder.flow == Flow::Stop {
             ending = Ending::Interrupted { time };
             break;
@@ -62,7 +67,10 @@ pub(crate) fn run(
                 observer.pass(&Gap { begin, length, from, to, bow: &[0.0; QUANTITIES], mode: &mode });
             }
         };
-        let read = |state: &State, input: f64| readout.read(&inner_of(plant, state), 0.0, input);
+        let read = |state: &State, input: f64| {
+            let inner = inner_of(&layout, mechanism, state);
+            readout.read(&layout, &inner, &mechanism.origin, &[input, 0.0], 1.0)
+        };
         let mut before = read(&state, input);
         show(time, 0.0, &before, &before);
         if row == grid.intervals() {
@@ -98,28 +106,34 @@ pub(crate) fn run(
     Ok(Outcome { events: Vec::new(), ending, cost, error: None })
 }
 
-/// A state with stretches in the places of angles, as readings are made from.
-fn inner_of(plant: &Plant, state: &State) -> State {
-    let [d1, d2, _, twist, _] = stretches(plant.stage().pulley_radius, state);
+/// A state with lengths in the places of angles, as readings are made from.
+fn inner_of(layout: &Layout, mechanism: &Mechanism, state: &State) -> State {
     let mut inner = *state;
-    inner[place::DRIVE_ANGLE] = d1;
-    inner[place::IDLER_ANGLE] = d2;
-    inner[place::ROTOR_ANGLE] = twist;
+    for replaced in &layout.replaced {
+        let others: f64 = replaced.others.iter().map(|&(other, arm)| arm * state.position[other]).sum();
+        inner.position[replaced.body] = replaced.own * state.position[replaced.body] + others;
+    }
+    debug_assert!(mechanism.bodies.len() == BODIES);
     inner
+}
+
+/// All that a state is made of.
+fn values(state: &State) -> impl Iterator<Item = f64> + '_ {
+    state.position.iter().chain(&state.speed).chain(&state.current).copied()
 }
 
 /// The equations (16)-(18) with Table 3 for the friction.
 struct Model<'a> {
-    plant: &'a Plant,
+    mechanism: &'a Mechanism,
     load: [Form; 3],
     current_rate: Form,
-    inertia: [f64; SPEEDS],
+    inertia: [f64; 3],
     viscous: [f64; 3],
     coulomb: [f64; 3],
 }
 
 impl<'a> Model<'a> {
-    fn new(plant: &'a Plant) -> Result<Self> {
+    fn new(stage: &Stage, mechanism: &'a Mechanism) -> Result<Self> {
         let unfit = |what: String| {
             Error::new(what)
                 .allowed("one viscous and one Coulomb value for each body, and a gear without losses")
@@ -127,30 +141,30 @@ impl<'a> Model<'a> {
         };
         let mut viscous = [0.0; 3];
         let mut coulomb = [0.0; 3];
-        for body in Body::ALL {
-            let law = plant.friction(body);
+        for body in 0..BODIES {
+            let law = mechanism.friction(body);
             if law.forward != law.backward || law.forward.breakaway != law.forward.coulomb {
                 return Err(unfit(format!(
                     "the paper's Table 3 does not know the friction of the {}: it has directions or a breakaway of its own",
-                    body.name()
+                    mechanism.bodies[body].label.name
                 )));
             }
-            viscous[body.index()] = law.forward.viscous;
-            coulomb[body.index()] = law.forward.coulomb;
+            viscous[body] = law.forward.viscous;
+            coulomb[body] = law.forward.coulomb;
         }
-        if plant.gear_loses() {
+        if stage.motor.gear_efficiency < 1.0 {
             return Err(unfit("the paper's Table 3 does not know a gear efficiency below 1".into()));
         }
-        if let Some(part) = plant.stage().beyond_the_paper() {
+        if let Some(part) = stage.beyond_the_paper() {
             return Err(unfit(format!("the paper's Table 3 does not know {part}")));
         }
-        let free = Mode::of([Motion::Free; 3]);
-        let equations = plant.equations(free);
+        let free = Mode::of([]);
+        let equations = mechanism.equations(free);
         Ok(Self {
-            plant,
-            load: Body::ALL.map(|body| plant.load(body, true, &free)),
-            current_rate: equations.current_rate,
-            inertia: equations.inertia,
+            mechanism,
+            load: std::array::from_fn(|body| mechanism.load(body, true, &free)),
+            current_rate: equations.current_rate[0],
+            inertia: std::array::from_fn(|body| equations.inertia[body]),
             viscous,
             coulomb,
         })
@@ -168,25 +182,22 @@ impl<'a> Model<'a> {
     }
 
     fn rate(&self, input: f64, state: &State) -> State {
-        let mut rate = [0.0; place::COUNT];
-        for body in 0..3 {
-            let speed = state[2 * body + 1];
-            let computed = self.load[body].value(self.plant, state, input);
-            rate[2 * body] = speed;
+        let input = [input; DRIVES];
+        let mut rate = State { position: state.speed, ..State::default() };
+        for body in 0..BODIES {
+            let computed = self.load[body].value(self.mechanism, state, &input);
             // J φ̈ = TauComputed − Tauf                                          (16)-(18)
-            rate[2 * body + 1] = (computed - self.friction(body, speed, computed)) / self.inertia[body];
+            rate.speed[body] = (computed - self.friction(body, state.speed[body], computed)) / self.inertia[body];
         }
-        rate[place::CURRENT] = self.current_rate.value(self.plant, state, input);
-        // The rotor turns with the drive pulley.
-        (rate[place::ROTOR_ANGLE], rate[place::ROTOR_SPEED]) = (rate[place::DRIVE_ANGLE], rate[place::DRIVE_SPEED]);
+        rate.current[0] = self.current_rate.value(self.mechanism, state, &input);
         rate
     }
 
     /// What the function makes of each body: frozen, or sliding with the sign of its speed.
     fn motion(&self, state: &State, input: f64) -> [Motion; 3] {
         std::array::from_fn(|body| {
-            let speed = state[2 * body + 1];
-            let computed = self.load[body].value(self.plant, state, input);
+            let speed = state.speed[body];
+            let computed = self.load[body].value(self.mechanism, state, &[input; DRIVES]);
             if self.coulomb[body] == 0.0 {
                 Motion::Free
             } else if (-BAND..=BAND).contains(&speed) && computed.abs() <= self.coulomb[body] || speed == 0.0 {
@@ -202,7 +213,19 @@ impl<'a> Model<'a> {
 
 /// `state` + `h` Σ weight · rate.
 fn moved(state: &State, h: f64, rates: &[(f64, &State)]) -> State {
-    std::array::from_fn(|j| state[j] + h * rates.iter().map(|(weight, rate)| weight * rate[j]).sum::<f64>())
+    fn add<const N: usize>(
+        values: &[f64; N],
+        h: f64,
+        rates: &[(f64, &State)],
+        of: fn(&State) -> &[f64; N],
+    ) -> [f64; N] {
+        std::array::from_fn(|j| values[j] + h * rates.iter().map(|(weight, rate)| weight * of(rate)[j]).sum::<f64>())
+    }
+    State {
+        position: add(&state.position, h, rates, |rate| &rate.position),
+        speed: add(&state.speed, h, rates, |rate| &rate.speed),
+        current: add(&state.current, h, rates, |rate| &rate.current),
+    }
 }
 
 /// One step.

@@ -1,28 +1,28 @@
 //! Figures 18 and 19: block diagrams whose coefficients are read from the equations that run.
 
-use taut::friction::Motion;
+use taut::mechanism::{Form, Mechanism, Mode, State};
 use taut::number::engineering;
-use taut::plant::{Body, Form, Mode, Plant, place};
 use taut::report::diagram::Sign;
 use taut::report::{BodyEquation, FrictionTerm, Inertia, MotorEquation, Term, axis_diagram, body_diagram};
 use taut::stage::Stage;
+use taut::stage::axis::{CART, DRIVE, IDLER};
 
 /// Figure 18: the drive pulley, eq. (16).
 pub fn drive_pulley(stage: &Stage) -> String {
-    body_diagram(&body(&Plant::new(stage), Body::DrivePulley))
+    body_diagram(&body(stage, &stage.mechanism(), DRIVE))
 }
 
 /// Figure 19: the whole.
 pub fn whole(stage: &Stage) -> String {
-    let plant = Plant::new(stage);
-    let [drive, cart, idler] = Body::ALL.map(|b| body(&plant, b));
-    let load = plant.load(Body::DrivePulley, true, &Mode::of([Motion::Free; 3]));
+    let mechanism = stage.mechanism();
+    let [drive, cart, idler] = [DRIVE, CART, IDLER].map(|b| body(stage, &mechanism, b));
+    let load = mechanism.load(DRIVE, true, &Mode::of([]));
     let motor = MotorEquation {
         input: "V_in".into(),
         torque: "τ_M".into(),
         lines: vec![
             "τ_M = (K_t/R) (V_in − K_e φ̇₁)".into(),
-            format!("K_t/R = {}", engineering(load.input, "N m/V", 4)),
+            format!("K_t/R = {}", engineering(load.input[0], "N m/V", 4)),
             format!("K_t K_e/R = {}", engineering(-load.speed[0], "N m s", 4)),
         ],
         feedback: "φ̇₁".into(),
@@ -30,43 +30,34 @@ pub fn whole(stage: &Stage) -> String {
     axis_diagram(&motor, [&drive, &cart, &idler])
 }
 
-/// The inputs of every sum: symbol, its place in the state.
-const INPUTS: [(&str, usize); 6] = [
-    ("x₁ = φ₁", place::DRIVE_ANGLE),
-    ("x₃ = x", place::CART_POSITION),
-    ("x₅ = φ₃", place::IDLER_ANGLE),
-    ("x₂ = φ̇₁", place::DRIVE_SPEED),
-    ("x₄ = ẋ", place::CART_SPEED),
-    ("x₆ = φ̇₃", place::IDLER_SPEED),
-];
+/// The inputs of every sum: symbols of ways and speeds, in the order of the bodies.
+const WAYS: [&str; 3] = ["x₁ = φ₁", "x₃ = x", "x₅ = φ₃"];
+const SPEEDS: [&str; 3] = ["x₂ = φ̇₁", "x₄ = ẋ", "x₆ = φ̇₃"];
 
 /// Eq. (16), (17) or (18), with symbols beside the coefficients of the form that the solver uses.
-fn body(plant: &Plant, body: Body) -> BodyEquation {
-    let stage = plant.stage();
-    let form: Form = plant.load(body, true, &Mode::of([Motion::Free; 3]));
-    let row = form.on_state(stage.pulley_radius);
+fn body(stage: &Stage, mechanism: &Mechanism, body: usize) -> BodyEquation {
+    let form: Form = mechanism.load(body, true, &Mode::of([]));
+    let State { position, speed, .. } = form.on_state(mechanism);
     // What the coefficients of φ₁, x, φ₃ and φ̇₁ are called.
     let (gains, unit, torque) = match body {
-        Body::DrivePulley => {
-            (["r² (k₁ + k₃)", "r k₁", "r² k₃", "K_t K_e/R"], ["N m/rad", "N", "N m/rad", "N m s"], true)
-        }
-        Body::Cart => (["r k₁", "k₁ + k₂", "r k₂", ""], ["N/rad", "N/m", "N/rad", ""], false),
-        Body::IdlerPulley => (["r² k₃", "r k₂", "r² (k₂ + k₃)", ""], ["N m/rad", "N", "N m/rad", ""], true),
+        DRIVE => (["r² (k₁ + k₃)", "r k₁", "r² k₃", "K_t K_e/R"], ["N m/rad", "N", "N m/rad", "N m s"], true),
+        CART => (["r k₁", "k₁ + k₂", "r k₂", ""], ["N/rad", "N/m", "N/rad", ""], false),
+        _ => (["r² k₃", "r k₂", "r² (k₂ + k₃)", ""], ["N m/rad", "N", "N m/rad", ""], true),
     };
-    let mut terms: Vec<Term> = INPUTS
-        .iter()
+    let inputs = WAYS.iter().zip(position).chain(SPEEDS.iter().zip(speed));
+    let mut terms: Vec<Term> = inputs
         .enumerate()
-        .map(|(i, (symbol, place))| {
-            term(symbol, gains.get(i).copied().unwrap_or(""), row[*place], unit.get(i).copied().unwrap_or(""))
+        .map(|(i, (symbol, value))| {
+            term(symbol, gains.get(i).copied().unwrap_or(""), value, unit.get(i).copied().unwrap_or(""))
         })
         .collect();
-    terms.push(term("V_in", "K_t/R", form.input, "N m/V"));
+    terms.push(term("V_in", "K_t/R", form.input[0], "N m/V"));
     terms.retain(|t| t.value != 0.0);
-    let law = plant.friction(body).forward;
+    let law = mechanism.friction(body).forward;
     let (index, symbols, inertia) = match body {
-        Body::DrivePulley => ("1", ["φ̈₁", "φ̇₁", "φ₁"], ("J₁", stage.drive_pulley.inertia)),
-        Body::Cart => ("", ["ẍ", "ẋ", "x"], ("M", stage.cart.mass)),
-        Body::IdlerPulley => ("2", ["φ̈₃", "φ̇₃", "φ₃"], ("J₂", stage.idler_pulley.inertia)),
+        DRIVE => ("1", ["φ̈₁", "φ̇₁", "φ₁"], ("J₁", stage.drive_pulley.inertia)),
+        CART => ("", ["ẍ", "ẋ", "x"], ("M", stage.cart.mass)),
+        _ => ("2", ["φ̈₃", "φ̇₃", "φ₃"], ("J₂", stage.idler_pulley.inertia)),
     };
     let parameters = if torque {
         vec![
@@ -79,7 +70,7 @@ fn body(plant: &Plant, body: Body) -> BodyEquation {
             format!("F_c = {}", engineering(law.coulomb, "N", 4)),
         ]
     };
-    let mut name = body.name().to_string();
+    let mut name = mechanism.bodies[body].label.name.to_string();
     name[..1].make_ascii_uppercase();
     BodyEquation {
         name,

@@ -2,8 +2,7 @@
 
 use super::model::{PULSE, UNTIL};
 use nalgebra::{Complex, SMatrix, SVector, linalg::Schur};
-use taut::friction::Motion;
-use taut::plant::{Mode, Plant};
+use taut::mechanism::Mode;
 use taut::stage::Stage;
 
 /// A of eq. (5), with the state of eq. (6).
@@ -11,18 +10,19 @@ pub type Matrix = SMatrix<f64, 6, 6>;
 
 /// A and b of the equations that run, without dry friction: φ₁, φ₁′, x, x′, φ₃, φ₃′.
 pub fn matrices(stage: &Stage) -> (Matrix, SVector<f64, 6>) {
-    let plant = Plant::new(stage);
-    let equations = plant.equations(Mode::of([Motion::Free; 3]));
+    let mechanism = stage.mechanism();
+    let equations = mechanism.equations(Mode::of([]));
     let mut a = Matrix::zeros();
     let mut b = SVector::<f64, 6>::zeros();
     for body in 0..3 {
         let row = 2 * body + 1;
         let form = equations.acceleration[body];
-        for (column, value) in form.on_state(stage.pulley_radius).into_iter().take(6).enumerate() {
-            a[(row, column)] = value;
+        let state = form.on_state(&mechanism);
+        for other in 0..3 {
+            (a[(row, 2 * other)], a[(row, 2 * other + 1)]) = (state.position[other], state.speed[other]);
         }
         a[(row - 1, row)] = 1.0;
-        b[row] = form.input;
+        b[row] = form.input[0];
     }
     (a, b)
 }

@@ -7,9 +7,9 @@ use crate::terminal::bold;
 use std::fmt::Write;
 use std::time::Duration;
 use taut::case::Case;
+use taut::mechanism::Part;
 use taut::metrics::{Balance, Metrics, largest};
 use taut::number;
-use taut::plant::Part;
 use taut::reduction::Reduction;
 use taut::solve::{Ending, Method, PositionError, Solver};
 use taut::stage::BeltModel;
@@ -238,7 +238,7 @@ fn events(run: &Run, solver: Solver) -> String {
             None => counts.push((event.part, 1)),
         }
     }
-    counts.sort_by_key(|(part, _)| part.order());
+    counts.sort_by_key(|(part, _)| part.what);
     let each: Vec<String> = counts.iter().map(|(part, count)| format!("{} {count}", part.name())).collect();
     let by_rounding = match events.iter().filter(|event| event.by_rounding).count() {
         0 => String::new(),

@@ -1,10 +1,10 @@
 //! What an observer is shown of a run: every interval, and closer where something may happen within.
 
-use super::Run;
-use crate::plant::State;
-use crate::solve::law::{Law, Shown, chain};
+use super::matrices::Shown;
+use super::{Known, ModeMatrices, Room, Run};
+use crate::mechanism::{BODIES, Cause};
 use crate::solve::observe::{Curve, Gap, QUANTITIES, Reading};
-use std::rc::Rc;
+use std::sync::Arc;
 
 /// What a curve may be off in the middle, as a share of the largest value seen of that quantity.
 const OFF: f64 = 1e-9;
@@ -48,7 +48,10 @@ impl Watching {
     }
 }
 
-impl<const R: usize, const C: usize> Run<'_, R, C> {
+impl<const R: usize, const C: usize> Run<'_, R, C>
+where
+    Known: Room<R, C>,
+{
     /// Whether somebody observes.
     pub(super) fn is_observed(&self) -> bool {
         self.recorder.observer.is_some()
@@ -61,11 +64,11 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
 
     /// The run has ended.
     pub(super) fn end_shown(&mut self) {
-        let (time, state, mode) = (self.time(), self.state(), self.mode);
+        let (time, state, mode) = (self.core.time(), self.core.state(), self.core.mode);
         if self.is_observed() {
-            let law = Rc::clone(&self.law);
-            let shown = law.shown(self.plant);
-            self.show(shown, time, 0.0, &self.z.clone(), &[0.0; QUANTITIES]);
+            let law = Arc::clone(&self.core.matrices);
+            let shown = law.shown(&self.core.mechanism);
+            self.show(shown, time, 0.0, &self.core.z.clone(), &[0.0; QUANTITIES]);
         }
         if let Some(observer) = &mut self.recorder.observer {
             observer.end(time, &state, &mode);
@@ -73,22 +76,21 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
     }
 
     /// How far readings can be off a straight line over intervals of this length, within `whole` from now on.
-    pub(super) fn bow(&self, law: &Law<R, C>, interval: f64, whole: f64) -> Reading {
-        self.bow_from(law, &self.z, interval, whole)
+    pub(super) fn bow(&self, law: &ModeMatrices<R, C>, interval: f64, whole: f64) -> Reading {
+        self.bow_from(law, &self.core.z, interval, whole)
     }
 
-    fn bow_from(&self, law: &Law<R, C>, z: &[f64; C], interval: f64, whole: f64) -> Reading {
-        let shown = law.shown(self.plant);
-        law.bow(shown, &law.rate(z), (self.input_rate, self.input_curvature), (interval, whole))
+    fn bow_from(&self, law: &ModeMatrices<R, C>, z: &[f64; C], interval: f64, whole: f64) -> Reading {
+        let shown = law.shown(&self.core.mechanism);
+        law.bow(shown, &law.rate(z), (&self.core.input_rate, &self.core.input_curvature), (interval, whole))
     }
 
     /// Shows the interval of `length` that began at `begin` and has led to `end`; says whether the observer wants to see closer.
     fn show(&mut self, shown: &Shown, begin: f64, length: f64, end: &[f64; C], bow: &Reading) -> bool {
-        let origin = self.coordinates.origin();
-        let to = shown.readout.read(&self.inner_of(end), origin, end[chain::<R>(0)]);
+        let to = self.read(shown, end);
         let from = match self.watching.now {
             Some(from) => from,
-            None => shown.readout.read(&self.inner(), origin, self.input()),
+            None => self.read(shown, &self.core.z),
         };
         self.watching.now = Some(to);
         self.ask(begin, length, &from, &to, bow)
@@ -98,30 +100,30 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
         for (scale, to) in self.watching.scale.iter_mut().zip(to) {
             *scale = scale.max(to.abs());
         }
-        let gap = Gap { begin, length, from, to, bow, mode: &self.mode };
+        let gap = Gap { begin, length, from, to, bow, mode: &self.core.mode };
         self.recorder.observer.as_mut().is_some_and(|observer| observer.pass(&gap))
     }
 
     /// Moves on to `end`, `length` from now, in the present mode, and shows the way there; says whether it was looked at closer.
     pub(super) fn move_shown(
         &mut self,
-        law: &Law<R, C>,
+        law: &ModeMatrices<R, C>,
         begin: f64,
         length: f64,
         end: [f64; C],
         bow: &Reading,
     ) -> bool {
-        let start = self.z;
-        let closer = self.show(law.shown(self.plant), begin, length, &end, bow);
+        let start = self.core.z;
+        let closer = self.show(law.shown(&self.core.mechanism), begin, length, &end, bow);
         if closer {
             self.show_closer(law, start, begin, length);
         }
-        self.z = end;
+        self.core.z = end;
         closer
     }
 
     /// Shows a way of any length that begins at `z`, in parts that there are matrices for and a rest that a series tells.
-    fn show_closer(&mut self, law: &Law<R, C>, mut z: [f64; C], mut begin: f64, mut length: f64) {
+    fn show_closer(&mut self, law: &ModeMatrices<R, C>, mut z: [f64; C], mut begin: f64, mut length: f64) {
         for level in 0..=law.finest {
             // What a sum of times is off by makes no difference here.
             while length >= law.length(level) * (1.0 - SAME) {
@@ -139,7 +141,7 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
     }
 
     /// Shows an interval of h/2^level from `z` on in parts so short that cubics tell where there is something to see; returns its end.
-    fn show_level(&mut self, law: &Law<R, C>, z: [f64; C], begin: f64, level: usize) -> [f64; C] {
+    fn show_level(&mut self, law: &ModeMatrices<R, C>, z: [f64; C], begin: f64, level: usize) -> [f64; C] {
         let fine = self.watching.level.saturating_sub(1).clamp(level, law.finest);
         let (parts, length) = (1_u64 << (fine - level).min(60), law.length(fine));
         let mut from = self.sight(law, &z);
@@ -168,7 +170,7 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
     }
 
     /// Shows an interval of h/2^level as a curve, or two halves of it where that is not right.
-    fn show_curve(&mut self, law: &Law<R, C>, from: &Sight<R, C>, to: &Sight<R, C>, begin: f64, level: usize) {
+    fn show_curve(&mut self, law: &ModeMatrices<R, C>, from: &Sight<R, C>, to: &Sight<R, C>, begin: f64, level: usize) {
         self.watching.curves += 1;
         let length = law.length(level);
         let curve = self.curve(law, from, to, begin, length);
@@ -199,22 +201,23 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
     }
 
     /// What is to be seen of `z`.
-    fn sight(&self, law: &Law<R, C>, z: &[f64; C]) -> Sight<R, C> {
-        let readout = &law.shown(self.plant).readout;
+    fn sight(&self, law: &ModeMatrices<R, C>, z: &[f64; C]) -> Sight<R, C> {
         let rate = law.rate(z);
-        let value = readout.read(&self.inner_of(z), self.coordinates.origin(), z[chain::<R>(0)]);
+        let value = self.read(law.shown(&self.core.mechanism), z);
         Sight { z: *z, rate, value, slope: self.rates(law, &rate) }
     }
 
     /// Rates of what is read, `rate` being that of z.
-    fn rates(&self, law: &Law<R, C>, rate: &[f64; R]) -> Reading {
+    fn rates(&self, law: &ModeMatrices<R, C>, rate: &[f64; R]) -> Reading {
         let mut wide = [0.0; C];
         wide[..R].copy_from_slice(rate);
-        law.shown(self.plant).readout.change(&self.inner_of(&wide), wide[chain::<R>(0)])
+        let core = &self.core;
+        let readout = &law.shown(&core.mechanism).readout;
+        readout.read(&core.space.layout, &core.space.inner(&wide), &[0.0; BODIES], &core.space.input::<R>(&wide), 0.0)
     }
 
     /// The curve between two sights.
-    fn curve(&self, law: &Law<R, C>, from: &Sight<R, C>, to: &Sight<R, C>, begin: f64, length: f64) -> Curve {
+    fn curve(&self, law: &ModeMatrices<R, C>, from: &Sight<R, C>, to: &Sight<R, C>, begin: f64, length: f64) -> Curve {
         let terms = |sight: &Sight<R, C>| {
             let second = law.rate_of_rate(&sight.rate);
             let third = law.rate_of_rate(&second);
@@ -232,8 +235,25 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
         }
     }
 
-    /// The state in the solver's coordinates that `z` stands for.
-    fn inner_of(&self, z: &[f64; C]) -> State {
-        super::inner_of::<R, C>(self.plant, z)
+    /// What is read in `z`.
+    fn read(&self, shown: &Shown, z: &[f64; C]) -> Reading {
+        let core = &self.core;
+        let (inner, input) = (core.space.inner(z), core.space.input::<R>(z));
+        shown.readout.read(&core.space.layout, &inner, core.coordinates.origin(), &input, 1.0)
+    }
+
+    /// The same as [`Core::advance`], and shows the way to whoever observes.
+    pub(super) fn advance_shown(&mut self, distance: f64) -> Option<Cause> {
+        if !self.is_observed() {
+            return self.core.advance(distance);
+        }
+        let core = &mut self.core;
+        let (law, before, begin, offset) = (Arc::clone(&core.matrices), core.z, core.time(), core.offset);
+        let cause = core.advance(distance);
+        let (after, length) = (core.z, core.offset - offset);
+        core.z = before;
+        let bow = self.bow(&law, length, length);
+        self.move_shown(&law, begin, length, after, &bow);
+        cause
     }
 }

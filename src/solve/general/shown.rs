@@ -1,11 +1,11 @@
 //! What an observer is shown of a run: each step of the formula as the polynomial that it is.
 
+use super::Core;
 use super::fall::{NODES, through};
 use super::model::{Field, Model, Vector};
-use super::stretch::Stretch;
-use super::{Observer, Run};
-use crate::plant::{Mode, Plant};
-use crate::solve::observe::{Curve, Gap, QUANTITIES, Reading, Readout, reading};
+use super::run::Rows;
+use crate::mechanism::{DRIVES, Mechanism, Mode, Shown as Quantity};
+use crate::solve::observe::{Curve, Gap, QUANTITIES, Reading, Readout};
 
 /// What is read off in a mode, for the mode that was entered last.
 pub(super) struct Shown {
@@ -14,33 +14,40 @@ pub(super) struct Shown {
 }
 
 impl Shown {
-    fn of<'s>(known: &'s mut Option<Self>, plant: &Plant, mode: Mode) -> &'s Readout {
-        let fits = known.as_ref().is_some_and(|known| known.mode == mode);
+    fn of<'s>(known: &'s mut Option<Self>, mechanism: &Mechanism, mode: &Mode) -> &'s Readout {
+        let fits = known.as_ref().is_some_and(|known| known.mode == *mode);
         if !fits {
             *known = None;
         }
-        &known.get_or_insert_with(|| Self { mode, readout: Readout::new(plant, &mode) }).readout
+        &known.get_or_insert_with(|| Self { mode: *mode, readout: Readout::new(mechanism, mode) }).readout
     }
 }
 
-impl Observer<'_, '_> {
+impl Rows<'_> {
     /// Shows the step from `from` to `until`.
-    pub(super) fn show(&mut self, from: f64, until: f64, begin: &Vector, at: &impl Fn(f64) -> Vector) {
-        if self.run.recorder.observer.is_none() {
+    pub(super) fn show(
+        &mut self,
+        core: &Core,
+        field: &Field,
+        (from, until): (f64, f64),
+        begin: &Vector,
+        at: &dyn Fn(f64) -> Vector,
+    ) {
+        if self.recorder.observer.is_none() {
             return;
         }
-        let (model, mode, field) = (self.run.model, self.run.mode, self.field);
-        let readout = Shown::of(&mut self.run.shown, model.plant, mode);
+        let (model, mode) = (&*core.model, &core.mode);
+        let readout = Shown::of(&mut self.shown, &model.mechanism, mode);
         let mut nodes = [[0.0; QUANTITIES]; NODES];
         for (node, values) in nodes.iter_mut().enumerate() {
             let tau = from + (until - from) * node as f64 / (NODES - 1) as f64;
             let y = if node == 0 { *begin } else { at(tau) };
-            *values = read(readout, model, &mode, &y, field.input(tau));
+            *values = read(readout, model, mode, &y, &field.input(tau));
         }
         let (begin, length) = (field.stretch.begin + from, until - from);
         let bow = [f64::INFINITY; QUANTITIES];
-        let gap = Gap { begin, length, from: &nodes[0], to: &nodes[NODES - 1], bow: &bow, mode: &mode };
-        let Some(observer) = &mut self.run.recorder.observer else { return };
+        let gap = Gap { begin, length, from: &nodes[0], to: &nodes[NODES - 1], bow: &bow, mode };
+        let Some(observer) = &mut self.recorder.observer else { return };
         if observer.pass(&gap) && length > 0.0 {
             let mut terms = [[0.0; QUANTITIES]; NODES];
             for q in 0..QUANTITIES {
@@ -51,29 +58,32 @@ impl Observer<'_, '_> {
             observer.see(&Curve { begin, length, terms });
         }
     }
-}
 
-impl Run<'_> {
     /// The run has ended.
-    pub(super) fn end_shown(&mut self, stretch: &Stretch) {
-        let (model, mode) = (self.model, self.mode);
-        let state = self.coordinates.state(&model.inner(&self.y));
-        let time = stretch.begin + self.tau;
+    pub(super) fn end_shown(&mut self, core: &Core) {
+        let (model, mode) = (&*core.model, &core.mode);
+        let (state, time) = (core.state(), core.time());
         let Some(observer) = &mut self.recorder.observer else { return };
-        let field = Field::new(model, mode, stretch);
-        let now = read(Shown::of(&mut self.shown, model.plant, mode), model, &mode, &self.y, field.input(self.tau));
+        let readout = Shown::of(&mut self.shown, &model.mechanism, mode);
+        let now = read(readout, model, mode, &core.y, &core.input());
         let bow = [0.0; QUANTITIES];
-        observer.pass(&Gap { begin: time, length: 0.0, from: &now, to: &now, bow: &bow, mode: &mode });
-        observer.end(time, &state, &mode);
+        observer.pass(&Gap { begin: time, length: 0.0, from: &now, to: &now, bow: &bow, mode });
+        observer.end(time, &state, mode);
     }
 }
 
-/// What is read, with what a belt whose spans follow the cart adds.
-fn read(readout: &Readout, model: &Model, mode: &Mode, y: &Vector, input: f64) -> Reading {
+/// What is read, with what springs that follow the bodies add.
+fn read(readout: &Readout, model: &Model, mode: &Mode, y: &Vector, input: &[f64; DRIVES]) -> Reading {
     let inner = model.inner(y);
-    let span = model.extra(&mode.motion, &inner, y).0.span;
-    let mut values = readout.read(&inner, model.origin, input);
-    values[reading::FORCE] += span[0];
-    values[reading::FORCE + 1] += span[1];
+    let mechanism = &model.mechanism;
+    let mut values = readout.read(&model.layout, &inner, &mechanism.origin, input, 1.0);
+    if model.adds {
+        let (extra, _) = model.extra(mode, &inner, &model.layout.stretches(&inner), y);
+        for (value, shown) in values.iter_mut().zip(&mechanism.readings) {
+            if let Quantity::Force(spring, factor) = *shown {
+                *value += factor * extra.force[spring];
+            }
+        }
+    }
     values
 }

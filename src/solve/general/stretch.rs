@@ -1,29 +1,32 @@
-//! Stretches of the input without an edge: what can be integrated in one go.
+//! Stretches of the inputs without an edge: what can be integrated in one go.
 
+use crate::mechanism::DRIVES;
 use crate::signal::{Piece, Signal};
+use crate::solve::inputs::Pieces;
 
-/// Pieces of the input in one stretch, at most.
+/// Pieces of the inputs in one stretch, at most.
 const MOST_PIECES: usize = 64;
 
 /// Pieces that join so smoothly that a formula of order eight does not notice the seams.
+#[derive(Debug, Clone)]
 pub(super) struct Stretch {
     /// Where it begins, s.
     pub(super) begin: f64,
     /// Where it ends, s.
     pub(super) end: f64,
     /// The pieces, and where each begins, counted from the beginning of the stretch.
-    parts: Vec<(f64, Piece)>,
+    parts: Vec<(f64, Pieces)>,
 }
 
 impl Stretch {
     /// The stretch that begins at `begin`, up to `end` at most.
-    pub(super) fn new(signal: &Signal, begin: f64, end: f64) -> Self {
-        let first = signal.piece(begin);
+    pub(super) fn new(signals: &[Signal], begin: f64, end: f64) -> Self {
+        let first = Pieces::of(signals, begin);
         let mut parts = vec![(0.0, first)];
         let (mut stop, mut last) = (first.end, first);
         while stop < end && parts.len() < MOST_PIECES {
-            let next = signal.piece(stop);
-            if !joins_smoothly(&last, &next) {
+            let next = Pieces::of(signals, stop);
+            if !last.pieces().zip(next.pieces()).all(|(last, next)| joins_smoothly(&last, &next)) {
                 break;
             }
             parts.push((stop - begin, next));
@@ -33,8 +36,8 @@ impl Stretch {
     }
 
     /// One piece, up to `end` at most.
-    pub(super) fn of(piece: Piece, end: f64) -> Self {
-        Self { begin: piece.start, end: piece.end.min(end), parts: vec![(0.0, piece)] }
+    pub(super) fn of(pieces: Pieces, end: f64) -> Self {
+        Self { begin: pieces.start, end: pieces.end.min(end), parts: vec![(0.0, pieces)] }
     }
 
     pub(super) fn pieces(&self) -> usize {
@@ -45,16 +48,15 @@ impl Stretch {
         self.end - self.begin
     }
 
-    /// The input at `tau` after the beginning.
+    /// The inputs at `tau` after the beginning.
     #[inline]
-    pub(super) fn input(&self, tau: f64) -> f64 {
+    pub(super) fn input(&self, tau: f64) -> [f64; DRIVES] {
         let index = match self.parts.len() {
             1 => 0,
             _ => self.parts.partition_point(|(begin, _)| *begin <= tau).max(1) - 1,
         };
-        let (begin, piece) = &self.parts[index];
-        let tau = tau - begin;
-        piece.coefficients.iter().rev().fold(0.0, |sum, c| sum * tau + c)
+        let (begin, pieces) = &self.parts[index];
+        pieces.values(tau - begin)
     }
 
     /// Longest step over which the input is told by eight of its values.
@@ -65,10 +67,10 @@ impl Stretch {
         }
     }
 
-    /// Whether the input does not jump from the stretch before to this one.
+    /// Whether no input jumps from the stretch before to this one.
     pub(super) fn continues(&self, before: &Stretch) -> bool {
-        let (was, is) = (before.input(before.length()), self.input(0.0));
-        (is - was).abs() <= 1e-9 * was.abs().max(is.abs())
+        let goes_on = |(was, is): (f64, f64)| (is - was).abs() <= 1e-9 * was.abs().max(is.abs());
+        before.input(before.length()).into_iter().zip(self.input(0.0)).all(goes_on)
     }
 }
 
@@ -97,17 +99,17 @@ mod tests {
     #[test]
     fn a_sine_has_no_edges_and_a_triangle_has() {
         let sine = Signal::Sine { amplitude: 2.0, frequency: 10.0, phase: 0.3, offset: 1.0 };
-        let stretch = Stretch::new(&sine, 0.0, 1.0);
+        let stretch = Stretch::new(std::slice::from_ref(&sine), 0.0, 1.0);
         assert_eq!(stretch.pieces(), MOST_PIECES);
         for k in 0..100 {
             let t = stretch.length() * k as f64 / 99.0;
-            assert!((stretch.input(t) - sine.value(t)).abs() < 1e-12, "{t}");
+            assert!((stretch.input(t)[0] - sine.value(t)).abs() < 1e-12, "{t}");
         }
         let triangle = Signal::Triangle { amplitude: 2.0, frequency: 10.0 };
-        assert_eq!(Stretch::new(&triangle, 0.0, 1.0).pieces(), 1);
+        assert_eq!(Stretch::new(&[triangle], 0.0, 1.0).pieces(), 1);
         let pulse = Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 };
-        let first = Stretch::new(&pulse, 0.0, 1.0);
+        let first = Stretch::new(std::slice::from_ref(&pulse), 0.0, 1.0);
         assert_eq!((first.pieces(), first.end), (1, 0.25));
-        assert!(!Stretch::new(&pulse, 0.25, 1.0).continues(&first));
+        assert!(!Stretch::new(&[pulse], 0.25, 1.0).continues(&first));
     }
 }

@@ -1,9 +1,9 @@
 //! What an observer is shown of a mode: readings, and how far they can be off straight lines.
 
-use super::{Law, Size};
+use super::{ModeMatrices, Size};
 use crate::friction::Motion;
-use crate::plant::{Body, Plant, SPEEDS};
-use crate::solve::observe::{QUANTITIES, Reading, Readout, leading_arms};
+use crate::mechanism::{BODIES, DRIVES, Mechanism};
+use crate::solve::observe::{QUANTITIES, Reading, Readout};
 
 /// Readings of one mode, and the norms of their forms.
 pub(in crate::solve) struct Shown {
@@ -14,72 +14,66 @@ pub(in crate::solve) struct Shown {
     whole: Reading,
     /// The same for the stretches that no spring holds, per unit of √(2V) of ż: these move as the masses do.
     unsprung: Reading,
-    /// Coefficients of the input.
-    input: Reading,
+    /// Magnitudes of the coefficients of the inputs.
+    input: [Reading; DRIVES],
 }
 
 impl Shown {
-    fn new<const R: usize, const C: usize>(law: &Law<R, C>, plant: &Plant) -> Self {
-        let readout = Readout::new(plant, &law.mode);
+    fn new<const R: usize, const C: usize>(law: &ModeMatrices<R, C>, mechanism: &Mechanism) -> Self {
+        let readout = Readout::new(mechanism, &law.mode);
         let stuck = law.mode.motion.map(|motion| motion == Motion::Stuck);
-        let at_rest = [stuck[0] && stuck[1], stuck[1] && stuck[2], stuck[2] && stuck[0]];
-        let mass = |leader: Body| -> f64 {
-            plant.followers(leader).map(|b| plant.ratio(b).powi(2) * law.inertia[b.index()]).sum()
-        };
         let (mut dual, mut unsprung) = ([Size::ZERO; QUANTITIES], [0.0; QUANTITIES]);
         for (q, form) in readout.forms.iter().enumerate() {
             let mut held = 0.0;
-            for (span, at_rest) in at_rest.into_iter().enumerate() {
-                let factor = form.stretch[span];
-                if factor == 0.0 || at_rest {
+            for (index, spring) in mechanism.springs.iter().enumerate() {
+                let factor = form.stretch[index];
+                if factor == 0.0 || spring.arms.iter().all(|&(body, _)| stuck[body]) {
                     continue;
                 }
-                if law.stiffness[span] > 0.0 {
-                    held += factor * factor / law.stiffness[span];
+                if law.stiffness[index] > 0.0 {
+                    held += factor * factor / law.stiffness[index];
                 } else {
-                    let arms = leading_arms(plant, span);
-                    let free = |body: &Body| arms[body.index()] != 0.0 && !stuck[body.index()];
-                    let light: f64 =
-                        Body::ALL.iter().filter(|b| free(b)).map(|b| arms[b.index()].powi(2) / mass(*b)).sum();
+                    let arms = mechanism.leading_arms(index);
+                    let free = (0..BODIES).filter(|&body| arms[body] != 0.0 && !stuck[body]);
+                    let light: f64 = free.map(|b| arms[b].powi(2) / mechanism.mass(b, &law.inertia)).sum();
                     unsprung[q] += factor.abs() * light.sqrt();
                 }
             }
-            if form.stretch[crate::plant::POSITION] != 0.0 && !stuck[1] {
-                unsprung[q] += form.stretch[crate::plant::POSITION].abs() / law.inertia[1].sqrt();
-            }
-            for i in (0..SPEEDS).filter(|&i| form.speed[i] != 0.0 && !(i < 3 && stuck[i])) {
+            for i in (0..BODIES).filter(|&i| form.speed[i] != 0.0 && !stuck[i]) {
                 held += form.speed[i] * form.speed[i] / law.inertia[i];
             }
-            let magnetic = if form.current == 0.0 { 0.0 } else { form.current.abs() / law.magnetic.sqrt() };
+            let weight = |drive: usize| law.weight_of_current[drive];
+            let currents = (0..DRIVES).filter(|&drive| form.current[drive] != 0.0);
+            let magnetic = currents.fold(0.0, |sum: f64, drive| sum.hypot(form.current[drive] / weight(drive).sqrt()));
             dual[q] = Size { mechanical: held.sqrt(), magnetic };
         }
-        let input = readout.forms.map(|form| form.input.abs());
+        let input = std::array::from_fn(|drive| readout.forms.map(|form| form.input[drive].abs()));
         let whole = dual.map(|dual| dual.mechanical.hypot(dual.magnetic));
         Self { readout, dual, whole, unsprung, input }
     }
 }
 
-impl<const R: usize, const C: usize> Law<R, C> {
+impl<const R: usize, const C: usize> ModeMatrices<R, C> {
     /// What an observer is shown, made ready when it is first wanted.
-    pub(in crate::solve) fn shown(&self, plant: &Plant) -> &Shown {
-        self.shown.get_or_init(|| Box::new(Shown::new(self, plant)))
+    pub(in crate::solve) fn shown(&self, mechanism: &Mechanism) -> &Shown {
+        self.shown.get_or_init(|| Box::new(Shown::new(self, mechanism)))
     }
 
     /// By how much readings can be off a straight line over any `interval` within the next `length`, `y` being ż now: with bounds of |u̇| and
-    /// |ü|, |q̈| interval²/8.
+    /// |ü| of each input, |q̈| interval²/8.
     pub(in crate::solve) fn bow(
         &self,
         shown: &Shown,
         y: &[f64; R],
-        (rate, curvature): (f64, f64),
+        (rate, curvature): (&[f64; DRIVES], &[f64; DRIVES]),
         (interval, length): (f64, f64),
     ) -> Reading {
         let grow = self.growth_over(length);
         let (first, second) = (self.size(y), self.size(&self.rate_of_rate(y)));
         let whole = |size: Size| (size.mechanical * size.mechanical + size.magnetic * size.magnetic).sqrt();
-        let (first, push) = (whole(first) + self.forcing * rate * length, self.forcing * curvature * length);
+        let (first, push) = (whole(first) + self.push(rate) * length, self.push(curvature) * length);
         // As `steepness` has it.
-        let (mechanical, magnetic) = match (self.coupled, self.magnetic > 0.0) {
+        let (mechanical, magnetic) = match (self.coupled, !self.magnetic.is_empty()) {
             (true, _) => (whole(second) + push, 0.0),
             (false, true) => (second.mechanical, second.magnetic + push),
             (false, false) => (second.mechanical + push, 0.0),
@@ -90,7 +84,8 @@ impl<const R: usize, const C: usize> Law<R, C> {
                 true => shown.whole[q] * mechanical,
                 false => shown.dual[q].mechanical * mechanical + shown.dual[q].magnetic * magnetic,
             };
-            eighth * (grow * (springs + shown.unsprung[q] * first) + shown.input[q] * curvature)
+            let at_once: f64 = shown.input.iter().zip(curvature).map(|(input, curvature)| input[q] * curvature).sum();
+            eighth * (grow * (springs + shown.unsprung[q] * first) + at_once)
         })
     }
 }

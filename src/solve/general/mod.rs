@@ -7,25 +7,29 @@
 
 mod fall;
 mod model;
+mod run;
 mod shown;
 mod stretch;
 
 use super::coordinates::Coordinates;
-use super::observe::Output;
+use super::inputs::Pieces;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
-use super::record::{Recorder, Row};
-use super::{Cost, Ending, Event, Flow, Grid, Outcome, Source, check, held};
-use crate::case::Experiment;
+use super::record::Extra;
+use super::{Cost, Ending, Event};
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
-use crate::plant::{Body, Cause, Limit, Mode, Part, Plant, State, Status, Switch, place};
-use crate::stage::AmplifierMode;
+use crate::mechanism::{
+    AmplifierMode, Cause, DRIVES, Kind, Layout, Limit, Mechanism, Mode, Part, State, Status, Switch,
+};
+use crate::mechanism::{Form, What};
 use fall::NODES;
 use ivp::dense::StepInterpolant;
 use ivp::methods::{DOP853, Tolerance};
 use ivp::prelude::FirstOrderSystem;
 use ivp::solout::{ControlFlag, SolOut};
 use model::{Field, MOST, Model, Vector};
+pub(super) use run::Run;
+use std::sync::Arc;
 use stretch::Stretch;
 
 /// Events allowed at once, and per simulated second: more is an accumulation, not a machine.
@@ -41,21 +45,14 @@ const TURNS_AT_ONCE: usize = 20;
 /// Most steps of a run, by what is known beforehand of its fastest rate.
 const MOST_STEPS: f64 = 1e10;
 
-/// Runs the experiment; `tolerance` is the error allowed in each step, relative and, of small quantities, absolute.
-pub(super) fn run(
-    plant: &Plant,
-    experiment: &Experiment,
-    source: Source,
-    tolerance: f64,
-    output: Output,
-) -> Result<Outcome> {
+/// Refuses a tolerance that is none, and a run of more steps than anybody waits for.
+pub(super) fn check(fastest: f64, until: f64, tolerance: f64) -> Result<()> {
     if !(1e-14..=1e-2).contains(&tolerance) {
         return Err(Error::new(format!("a tolerance of {tolerance:e} is of no use"))
             .allowed("from 1e-14 to 0.01")
             .next("take 1e-9, the default"));
     }
-    let fastest = check::fastest_rate(plant.stage());
-    let steps = fastest * experiment.until / REACH;
+    let steps = fastest * until / REACH;
     if steps > MOST_STEPS {
         return Err(Error::new(format!(
             "the general solver would need some {steps:.0e} steps: something here changes within {:.0e} s",
@@ -64,13 +61,7 @@ pub(super) fn run(
         .allowed(format!("up to {MOST_STEPS:e} steps"))
         .next("leave out the inductance, the damping or the friction that is as fast as that, or shorten the run"));
     }
-    let start = experiment.initial.state(plant);
-    let (coordinates, inner) = Coordinates::new(plant, &start);
-    let plant = &*plant.seen_from(coordinates.origin());
-    let model = Model::new(plant, coordinates.origin());
-    let mode = plant.first_mode(&start);
-    let start = (coordinates, inner, mode);
-    Ok(Run::new(&model, start, experiment, tolerance, FIRST / fastest, output.within()).finish(source))
+    Ok(())
 }
 
 /// h·|λ| up to which the formula is stable.
@@ -79,36 +70,57 @@ const REACH: f64 = 6.0;
 /// h·|λ| of the first step after an event or an edge.
 const FIRST: f64 = 0.3;
 
-/// A run under way.
-struct Run<'a> {
-    model: &'a Model<'a>,
-    coordinates: Coordinates,
-    grid: Grid,
-    recorder: Recorder<'a>,
+/// A machine under way: its state, its mode, and what is needed to go on. A clone of it goes on in the same way.
+#[derive(Clone)]
+pub(super) struct Core {
+    model: Arc<Model>,
+    pub(super) coordinates: Coordinates,
     solver: DOP853,
     /// The step to begin with after an event or an edge, s.
     first_step: f64,
     relative: f64,
     absolute: Vector,
     y: Vector,
-    mode: Mode,
-    /// Where the run stands, counted from the beginning of the present stretch, s.
+    pub(super) mode: Mode,
+    stretch: Stretch,
+    /// Where it stands, counted from the beginning of the stretch, s.
     tau: f64,
     /// By how much the load on a stuck body may pass its limit before it counts, and for a moment after it has changed what any
     /// other part is watched by.
     slack: [f64; Cause::KINDS],
-    /// The same for a gear's torque.
-    torque_slack: f64,
-    /// The largest torque that the gear has carried, N m at the motor's shaft.
-    torque: f64,
+    /// The same for a gear's torque, and the largest torque that it has carried, N m at the motor's shaft.
+    torque_slack: [f64; DRIVES],
+    torque: [f64; DRIVES],
     changed_at: f64,
     changes: usize,
     pace: Pace,
-    events: Vec<Event>,
+    end: f64,
+    pub(super) events: Vec<Event>,
+    /// How many events were handed on before those.
+    handed_on: usize,
     modes: Vec<Mode>,
-    shown: Option<shown::Shown>,
-    cost: Cost,
-    trouble: Option<Ending>,
+    pub(super) cost: Cost,
+    pub(super) trouble: Option<Ending>,
+}
+
+/// Whoever is told of each step: of what is integrated, from where to where, and the states within.
+trait Witness {
+    /// Sees the way from the state `begin` at `from` to `until`, of a step that went to `to`.
+    fn see(&mut self, core: &mut Core, field: &Field, way: (f64, f64, f64), begin: &Vector, at: &dyn Fn(f64) -> Vector);
+
+    /// Whether to go on.
+    fn ask(&mut self) -> bool;
+}
+
+/// Nobody looks, and it goes on.
+struct Nobody;
+
+impl Witness for Nobody {
+    fn see(&mut self, _: &mut Core, _: &Field, _: (f64, f64, f64), _: &Vector, _: &dyn Fn(f64) -> Vector) {}
+
+    fn ask(&mut self) -> bool {
+        true
+    }
 }
 
 /// A guard that fell.
@@ -118,44 +130,47 @@ struct Hit {
     cause: Cause,
 }
 
-impl<'a> Run<'a> {
-    fn new(
-        model: &'a Model<'a>,
-        (mut coordinates, start, mode): (Coordinates, State, Mode),
-        experiment: &Experiment,
-        tolerance: f64,
-        first_step: f64,
-        output: Output<'a>,
+impl Core {
+    /// That of a machine in `start`; `tolerance` is the error allowed in each step, relative and, of small quantities, absolute;
+    /// `fastest` is its fastest rate, 1/s, and `end` how far it is to go.
+    pub(super) fn new(
+        mechanism: &Mechanism,
+        layout: Layout,
+        start: &State,
+        (tolerance, fastest, end): (f64, f64, f64),
     ) -> Self {
-        let plant = model.plant;
-        let grid = Grid::new(experiment.every, experiment.until);
-        coordinates.hold(&mode, &start);
-        let mut y = [0.0; MOST];
-        y[..place::CURRENT].copy_from_slice(&start[..place::CURRENT]);
-        if let Some(current) = model.current {
-            y[current] = start[place::CURRENT];
-        }
-        if let Some(rotor) = model.rotor {
-            y[rotor..rotor + 2].copy_from_slice(&start[place::ROTOR_ANGLE..=place::ROTOR_SPEED]);
+        let (mut coordinates, inner) = Coordinates::new(&layout, start);
+        let seen = Arc::new(mechanism.seen_from(&layout, start));
+        let mode = seen.first_mode(start);
+        coordinates.hold(&layout, &mode, &inner);
+        let model = Model::new(seen, layout);
+        let mechanism = &*model.mechanism;
+        let mut y = model.vector(&inner);
+        for (current, drive) in model.current.iter().zip(&mechanism.drives) {
+            if let (Some(place), false) = (current, drive.has_current_state()) {
+                y[*place] = 0.0;
+            }
         }
         // An angle of 1 rad is as much as r at the belt.
-        let r = plant.stage().pulley_radius;
+        let turning = mechanism.bodies.iter().filter(|body| matches!(body.kind, Kind::Rotary { .. }));
+        let r = turning.map(|body| body.kind.lever()).fold(f64::INFINITY, f64::min);
+        let r = if r.is_finite() { r } else { 1.0 };
         let mut absolute = [tolerance; MOST];
-        for place in [place::DRIVE_ANGLE, place::CART_POSITION, place::CART_SPEED, place::IDLER_ANGLE] {
-            absolute[place] *= r;
-        }
-        for body in Body::ALL {
-            let friction = plant.friction(body);
-            if let (Some(place), Law::LuGre { stiffness, .. }) = (model.bristle[body.index()], friction.law) {
+        for (body, part) in mechanism.bodies.iter().enumerate().filter(|(_, part)| !part.is_rotor) {
+            absolute[model.coordinate(body)] *= r;
+            if part.kind == Kind::Linear {
+                absolute[model.speed(body)] *= r;
+            }
+            let friction = mechanism.friction(body);
+            if let (Some(place), Law::LuGre { stiffness, .. }) = (model.bristle[body], friction.law) {
                 // Bristles bend by F_b/σ₀ at most.
                 absolute[place] = tolerance * friction.forward.breakaway.max(friction.backward.breakaway) / stiffness;
             }
         }
+        let first_step = FIRST / fastest;
         Self {
-            model,
+            model: Arc::new(model),
             coordinates,
-            grid,
-            recorder: Recorder::new(plant, grid, output),
             // It is stopped from outside: by its observer.
             solver: DOP853 {
                 max_steps: usize::MAX - 1,
@@ -168,91 +183,101 @@ impl<'a> Run<'a> {
             absolute,
             y,
             mode,
+            stretch: Stretch::of(Pieces::held(&[], 0.0, 0.0), f64::INFINITY),
             tau: 0.0,
             slack: [0.0; Cause::KINDS],
-            torque_slack: 0.0,
-            torque: 0.0,
+            torque_slack: [0.0; DRIVES],
+            torque: [0.0; DRIVES],
             changed_at: f64::NEG_INFINITY,
             changes: 0,
             pace: Pace::default(),
+            end,
             events: Vec::new(),
+            handed_on: 0,
             modes: vec![mode],
-            shown: None,
             cost: Cost::default(),
             trouble: None,
         }
     }
 
-    /// The recipe: from edge to edge of the input, event by event, to the end.
-    fn finish(mut self, mut source: Source) -> Outcome {
-        let end = self.grid.end();
-        let mut time = 0.0;
-        let mut stretch = self.stretch(&mut source, time, 0.0);
-        loop {
-            self.cost.pieces += stretch.pieces() as u64;
-            self.tau = 0.0;
-            self.resolve(&stretch);
-            if self.trouble.is_none() && time >= end {
-                let field = Field::new(self.model, self.mode, &stretch);
-                let y = self.y;
-                self.put_out(&field, 0.0, &y);
-            }
-            if self.trouble.is_some() || time >= end {
-                break;
-            }
-            self.reach(&stretch);
-            time = stretch.begin + self.tau;
-            if self.trouble.is_some() {
-                break;
-            }
-            time = stretch.end;
-            let next = self.stretch(&mut source, time, stretch.input(stretch.length()));
-            if !next.continues(&stretch) {
-                self.solver.first_step = Some(self.first_step);
-            }
-            stretch = next;
-        }
-        self.end_shown(&stretch);
-        self.recorder.finish();
-        self.cost.samples = self.recorder.rows;
-        self.cost.modes = self.modes.len() as u64;
-        let ending = match (self.trouble, self.recorder.flow) {
-            (Some(trouble), _) => trouble,
-            (None, Flow::Stop) => Ending::Interrupted { time },
-            (None, Flow::Continue) => Ending::Complete,
-        };
-        Outcome { events: self.events, ending, cost: self.cost, error: None }
+    pub(super) fn time(&self) -> f64 {
+        self.stretch.begin + self.tau
     }
 
-    /// What the input does from `time` on, having been `before`.
-    fn stretch(&self, source: &mut Source, time: f64, before: f64) -> Stretch {
-        let end = self.grid.end();
-        match source {
-            Source::Signal(signal) => Stretch::new(signal, time, end),
-            Source::Decided(decide) => {
-                let inner = self.model.inner(&self.y);
-                let current = self.model.value(&self.model.plant.current(&self.mode), &inner, before);
-                let (value, until) = decide.decide(time, &self.coordinates.state(&inner), current);
-                Stretch::of(held(value, time, until), end)
-            }
+    /// Takes up a new stretch of the inputs.
+    fn take_up(&mut self, stretch: Stretch, continues: bool) {
+        self.cost.pieces += stretch.pieces() as u64;
+        if !continues {
+            self.solver.first_step = Some(self.first_step);
         }
+        (self.stretch, self.tau) = (stretch, 0.0);
+        self.resolve();
     }
 
     /// Advances to the end of the stretch, event by event.
-    fn reach(&mut self, stretch: &Stretch) {
-        while self.tau < stretch.length() && self.trouble.is_none() {
-            let Some(hit) = self.integrate(stretch) else { continue };
+    fn reach(&mut self, witness: &mut dyn Witness) {
+        while self.tau < self.stretch.length() && self.trouble.is_none() {
+            let stretch = self.stretch.clone();
+            let Some(hit) = self.integrate(&stretch, witness) else { continue };
             self.y = hit.y;
             self.tau = hit.tau;
             self.solver.first_step = Some(self.first_step);
-            self.change(hit.cause, stretch);
-            self.resolve(stretch);
+            self.change(hit.cause);
+            self.resolve();
         }
     }
 
+    /// The mechanism, its ways counted from where it began.
+    pub(super) fn mechanism(&self) -> &Mechanism {
+        &self.model.mechanism
+    }
+
+    /// What a row shows beyond the linear equations.
+    pub(super) fn extra(&self) -> Extra {
+        let inner = self.model.inner(&self.y);
+        self.model.extra(&self.mode, &inner, &self.model.layout.stretches(&inner), &self.y).0
+    }
+
+    /// Takes up new inputs, and what they bring about at once.
+    pub(super) fn take_input(&mut self, pieces: &Pieces) {
+        self.take_up(Stretch::of(*pieces, f64::INFINITY), false);
+    }
+
+    /// Steps are as short as the inputs need by themselves.
+    pub(super) fn bound_input(&mut self, _: &Pieces, _: f64) {}
+
+    /// Goes on to `until` and adds the events on the way to `events`.
+    pub(super) fn go_to(&mut self, until: f64, events: &mut Vec<Event>) -> std::result::Result<(), Ending> {
+        self.end = until;
+        self.pace = Pace::since(self.cost.steps, self.time());
+        self.stretch.end = until;
+        if self.trouble.is_none() && self.tau < self.stretch.length() {
+            self.reach(&mut Nobody);
+        }
+        self.handed_on += self.events.len();
+        events.append(&mut self.events);
+        self.trouble.map_or(Ok(()), Err)
+    }
+
+    /// The state in angles and positions.
+    pub(super) fn state(&self) -> State {
+        self.coordinates.state(&self.model.layout, &self.model.inner(&self.y))
+    }
+
+    /// The inputs now.
+    pub(super) fn input(&self) -> [f64; DRIVES] {
+        self.stretch.input(self.tau)
+    }
+
+    /// The value of a form now, by the linear equations.
+    pub(super) fn value(&self, form: &Form) -> f64 {
+        self.model.value(form, &self.model.inner(&self.y), &self.input())
+    }
+
     /// Integrates to the end of the stretch, or to the first guard that falls.
-    fn integrate(&mut self, stretch: &Stretch) -> Option<Hit> {
-        let field = Field::new(self.model, self.mode, stretch);
+    fn integrate(&mut self, stretch: &Stretch, witness: &mut dyn Witness) -> Option<Hit> {
+        let model = Arc::clone(&self.model);
+        let field = Field::new(&model, &self.mode, stretch);
         let length = stretch.length();
         if length - self.tau <= 64.0 * f64::EPSILON * length {
             // What is left is no step, but rounding.
@@ -263,7 +288,7 @@ impl<'a> Run<'a> {
         solver.first_step = solver.first_step.map(|step| step.min(length - self.tau));
         let (relative, absolute, y) = (self.relative(), self.absolute(), self.y);
         let (from, size) = (self.tau, self.model.size);
-        let mut observer = Observer { watches: field.watches(), run: self, field: &field, hit: None };
+        let mut observer = Observer { watches: field.watches(), run: self, field: &field, witness, hit: None };
         let result = solver.solve(&field, from, &y[..size], length, relative, absolute, Some(&mut observer));
         let hit = observer.hit;
         self.cost.evaluations += field.evaluations();
@@ -287,21 +312,9 @@ impl<'a> Run<'a> {
         Tolerance::Vector(self.absolute[..self.model.size].to_vec())
     }
 
-    /// Puts out the row that is at `tau`.
-    fn put_out(&mut self, field: &Field, tau: f64, y: &Vector) {
-        let inner = self.model.inner(y);
-        let row = Row::new(&self.coordinates, &inner, field.input(tau));
-        if self.model.adds {
-            let (extra, _) = self.model.extra(&self.mode.motion, &inner, y);
-            self.recorder.push_with(row, self.mode, extra);
-        } else {
-            self.recorder.push(row, self.mode);
-        }
-    }
-
     /// What a body at zero speed does under its present load.
-    fn decide(&self, body: Body, input: f64) -> Motion {
-        let (model, state) = (self.model, self.model.inner(&self.y));
+    fn decide(&self, body: usize, input: &[f64; DRIVES]) -> Motion {
+        let (model, state) = (&*self.model, self.model.inner(&self.y));
         let (mode, noise) = (&self.mode, model.noise(body, &self.mode, &state, input));
         if model.load(body, true, mode, &state, input) > model.breakaway(body, true, &state) + noise {
             Motion::Forward
@@ -313,8 +326,8 @@ impl<'a> Run<'a> {
     }
 
     /// Goes into the mode that follows when `cause` ends the present one.
-    fn change(&mut self, cause: Cause, stretch: &Stretch) {
-        let time = stretch.begin + self.tau;
+    fn change(&mut self, cause: Cause) {
+        let time = self.time();
         let at_once = time - self.changed_at <= 1e-15 + 4.0 * f64::EPSILON * time;
         self.changes = if at_once { self.changes + 1 } else { 0 };
         self.changed_at = time;
@@ -322,51 +335,53 @@ impl<'a> Run<'a> {
             self.trouble = Some(Ending::TooManyEvents { time });
         }
         let again = self.changes > TURNS_AT_ONCE;
-        let input = stretch.input(self.tau);
-        let by_rounding = self.is_by_tolerance(cause, stretch);
+        let input = &self.input();
+        let by_rounding = self.is_by_tolerance(cause);
         let (body, to) = match cause {
-            Cause::GearTorque => {
-                self.mode.gear_torque_positive = !self.mode.gear_torque_positive;
+            Cause::GearTorque(drive) => {
+                let positive = &mut self.mode.drive[drive].torque_positive;
+                *positive = !*positive;
                 // Where rounding calls it negative either way it is zero.
-                self.torque_slack = if again { f64::INFINITY } else { self.relative * self.torque };
+                self.torque_slack[drive] = if again { f64::INFINITY } else { self.relative * self.torque[drive] };
                 self.enter();
                 return;
             }
             Cause::Switch(switch) => {
-                self.switch(switch, stretch);
+                self.switch(switch);
                 return;
             }
-            Cause::LeaveTravel => {
+            Cause::Leave(_) => {
                 self.trouble = Some(Ending::LeftTravel { time });
                 return;
             }
             Cause::Stop(body) => {
-                for follower in self.model.plant.followers(body) {
-                    self.y[follower.speed_place()] = 0.0;
+                for follower in self.model.mechanism.followers(body) {
+                    self.y[self.model.speed(follower)] = 0.0;
                 }
                 (body, if again { Motion::Stuck } else { self.decide(body, input) })
             }
             Cause::BreakForward(body) => (body, Motion::Forward),
             Cause::BreakBackward(body) => (body, Motion::Backward),
         };
-        let (index, state) = (body.index(), self.model.inner(&self.y));
-        let from = self.mode.motion[index];
+        let state = self.model.inner(&self.y);
+        let from = self.mode.motion[body];
         let side = if to == Motion::Stuck { from } else { to };
         let forward = side != Motion::Backward;
         let load = self.model.load(body, forward, &self.mode, &state, input);
         for (cause, tolerance) in self.tolerances_at_rest(body, input) {
             self.slack[cause.kind()] = if again { 10.0 } else { 1.0 } * tolerance;
         }
-        for follower in self.model.plant.followers(body) {
-            self.mode.motion[follower.index()] = to;
+        for follower in self.model.mechanism.followers(body) {
+            self.mode.motion[follower] = to;
         }
-        let (part, from, to) = (Part::Body(body), Status::Motion(from), Status::Motion(to));
+        let part = Part::of(&self.model.mechanism, What::Body(body));
+        let (from, to) = (Status::Motion(from), Status::Motion(to));
         Event { time, part, from, to, load, by_rounding }.note(&mut self.events);
         self.enter();
     }
 
     /// By how much the load on a body at rest may pass its breakaway on either side before it counts: what rounding may do to it.
-    fn tolerances_at_rest(&self, body: Body, input: f64) -> [(Cause, f64); 2] {
+    fn tolerances_at_rest(&self, body: usize, input: &[f64; DRIVES]) -> [(Cause, f64); 2] {
         let inner = self.model.inner(&self.y);
         let noise = 2.0 * self.model.noise(body, &self.mode, &inner, input);
         [(Cause::BreakForward(body), true), (Cause::BreakBackward(body), false)]
@@ -374,34 +389,35 @@ impl<'a> Run<'a> {
     }
 
     /// Whether a body stops where the tolerance decides: what still slows it down is less than the formula may be off by.
-    fn is_by_tolerance(&self, cause: Cause, stretch: &Stretch) -> bool {
+    fn is_by_tolerance(&self, cause: Cause) -> bool {
         let Cause::Stop(body) = cause else { return false };
-        let field = Field::new(self.model, self.mode, stretch);
+        let field = Field::new(&self.model, &self.mode, &self.stretch);
         let mut rate = [0.0; MOST];
         field.derivative(self.tau, &self.y, &mut rate[..self.model.size]);
-        let place = body.speed_place();
+        let place = self.model.speed(body);
         // Within the time in which the fastest of it changes.
         rate[place].abs() * self.first_step / FIRST <= self.absolute[place]
     }
 
     /// Lets a part other than a body do something else.
-    fn switch(&mut self, switch: Switch, stretch: &Stretch) {
-        let time = stretch.begin + self.tau;
-        let from = self.mode.status(switch.part());
+    fn switch(&mut self, switch: Switch) {
+        let (time, what) = (self.time(), switch.what());
+        let from = self.mode.status(what);
         self.mode.switch(switch);
-        let to = self.mode.status(switch.part());
-        Event { time, part: switch.part(), from, to, load: 0.0, by_rounding: false }.note(&mut self.events);
-        let amplifier = &self.model.plant.stage().amplifier;
-        if let (Switch::Current(side), Some(place), AmplifierMode::Voltage) =
-            (switch, self.model.current, amplifier.mode)
-            && side != Limit::Inside
-        {
-            // It stands at its limit, to the last bit.
-            self.y[place] = side.sign() * amplifier.current_limit.unwrap_or(0.0);
+        let (part, to) = (Part::of(&self.model.mechanism, what), self.mode.status(what));
+        Event { time, part, from, to, load: 0.0, by_rounding: false }.note(&mut self.events);
+        if let Switch::Current(drive, side) = switch {
+            let amplifier = &self.model.mechanism.drives[drive].amplifier;
+            if let (Some(place), AmplifierMode::Voltage) = (self.model.current[drive], amplifier.mode)
+                && side != Limit::Inside
+            {
+                // It stands at its limit, to the last bit.
+                self.y[place] = side.sign() * amplifier.current_limit.unwrap_or(0.0);
+            }
         }
         self.enter();
         // What has just become a condition on this part is zero but for what the integrator may be off by.
-        let field = Field::new(self.model, self.mode, stretch);
+        let field = Field::new(&self.model, &self.mode, &self.stretch);
         let guards = field.guards(self.tau, &self.y);
         for (index, cause) in field.watches().into_iter().enumerate() {
             if cause.is_of_same_part(Cause::Switch(switch)) {
@@ -414,44 +430,44 @@ impl<'a> Run<'a> {
     }
 
     fn enter(&mut self) {
-        self.coordinates.hold(&self.mode, &self.model.inner(&self.y));
+        self.coordinates.hold(&self.model.layout, &self.mode, &self.model.inner(&self.y));
         if !self.modes.contains(&self.mode) {
             self.modes.push(self.mode);
         }
     }
 
     /// Changes modes, without time passing, until every load that is held can be.
-    fn resolve(&mut self, stretch: &Stretch) {
-        let time = stretch.begin + self.tau;
+    fn resolve(&mut self) {
+        let time = self.time();
         if self.tau == 0.0 {
             // After an edge of the input too, a load that passes a breakaway by rounding alone does not break it.
-            let plant = self.model.plant;
-            for body in plant.leaders().filter(|body| self.mode.motion[body.index()] == Motion::Stuck) {
-                for (cause, tolerance) in self.tolerances_at_rest(body, stretch.input(0.0)) {
+            let (model, input) = (Arc::clone(&self.model), self.input());
+            for body in model.mechanism.leaders().filter(|body| self.mode.motion[*body] == Motion::Stuck) {
+                for (cause, tolerance) in self.tolerances_at_rest(body, &input) {
                     let own = &mut self.slack[cause.kind()];
                     *own = own.max(tolerance);
                 }
             }
         }
         for _ in 0..CHANGES_AT_ONCE {
-            let field = Field::new(self.model, self.mode, stretch);
+            let field = Field::new(&self.model, &self.mode, &self.stretch);
             let guards = field.guards(self.tau, &self.y);
             let falls = |&(cause, value): &(Cause, f64)| match cause {
                 // A speed tells by itself, over the next step.
                 Cause::Stop(_) => false,
-                Cause::GearTorque => value < -self.torque_slack,
+                Cause::GearTorque(drive) => value < -self.torque_slack[drive],
                 cause => value < -self.slack[cause.kind()],
             };
             let fallen = field.watches().into_iter().zip(guards).filter(falls).min_by_key(|(cause, _)| cause.rank());
             match fallen {
                 Some((cause, _)) => {
-                    self.change(cause, stretch);
+                    self.change(cause);
                     if self.trouble.is_some() {
                         return;
                     }
                 }
                 None => {
-                    if self.events.len() as f64 > EVENTS_AT_LEAST + EVENTS_PER_SECOND * time {
+                    if (self.handed_on + self.events.len()) as f64 > EVENTS_AT_LEAST + EVENTS_PER_SECOND * time {
                         self.trouble = Some(Ending::TooManyEvents { time });
                     }
                     return;
@@ -462,15 +478,16 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Looks at every step: finds the guard that falls first, and puts out the rows until there.
-struct Observer<'r, 'a> {
-    run: &'r mut Run<'a>,
+/// Looks at every step: finds the guard that falls first, and shows the way until there.
+struct Observer<'r> {
+    run: &'r mut Core,
     field: &'r Field<'r>,
+    witness: &'r mut dyn Witness,
     watches: Vec<Cause>,
     hit: Option<Hit>,
 }
 
-impl SolOut for Observer<'_, '_> {
+impl SolOut for Observer<'_> {
     fn solout(&mut self, from: f64, to: &mut f64, y: &mut [f64], dense: Option<&StepInterpolant<'_>>) -> ControlFlag {
         let (to, Some(dense)) = (*to, dense) else { return ControlFlag::Continue };
         let size = y.len();
@@ -480,11 +497,11 @@ impl SolOut for Observer<'_, '_> {
             self.run.trouble = Some(Ending::Diverged { time: self.field.stretch.begin + from });
             return ControlFlag::Interrupt;
         }
-        self.run.cost.steps += 1;
-        if self.run.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS) {
-            self.run.recorder.ask();
-            self.run.trouble =
-                self.run.pace.too_stiff(self.run.cost.steps, self.field.stretch.begin + to, self.run.grid.end());
+        let run = &mut *self.run;
+        run.cost.steps += 1;
+        let time = self.field.stretch.begin + to;
+        if run.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS) {
+            run.trouble = run.pace.too_stiff(run.cost.steps, time, run.end);
         }
         let begin = self.run.y;
         let at = |tau: f64| {
@@ -494,22 +511,10 @@ impl SolOut for Observer<'_, '_> {
         };
         self.hit = self.first_fall(from, to, &begin, &end, &at);
         let until = self.hit.as_ref().map_or(to, |hit| hit.tau);
-        self.show(from, until, &begin, &at);
-        // A row on an edge or an event shows what comes after it.
-        let stretch = self.field.stretch;
-        let near = (8.0 * f64::EPSILON * stretch.end).min(1e-9 * self.run.grid.interval());
-        let until = if until >= stretch.length() { stretch.length() - near } else { until };
-        loop {
-            let row = self.run.recorder.next_row();
-            let tau = self.run.grid.time(row) - stretch.begin;
-            if row > self.run.grid.intervals() || tau >= until {
-                break;
-            }
-            let y = if tau <= from { begin } else { at(tau) };
-            self.run.put_out(self.field, tau, &y);
-        }
-        if self.run.recorder.flow == Flow::Stop {
-            self.run.trouble = Some(Ending::Interrupted { time: stretch.begin + to });
+        self.witness.see(self.run, self.field, (from, until, to), &begin, &at);
+        let asks = self.run.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS);
+        if (asks || self.run.trouble.is_some()) && !self.witness.ask() && self.run.trouble.is_none() {
+            self.run.trouble = Some(Ending::Interrupted { time });
         }
         self.run.y = end;
         self.run.tau = to;
@@ -517,7 +522,7 @@ impl SolOut for Observer<'_, '_> {
     }
 }
 
-impl Observer<'_, '_> {
+impl Observer<'_> {
     /// The first guard to fall between `from` and `to`, and the state there.
     fn first_fall(
         &mut self,
@@ -543,19 +548,21 @@ impl Observer<'_, '_> {
                 values[node] = guard;
             }
         }
-        if let Some(gear) = self.watches.iter().position(|watch| *watch == Cause::GearTorque) {
-            let run = &mut self.run;
-            run.torque = values[gear].iter().fold(run.torque, |most, value| most.max(value.abs()));
-            // What was told by nothing but rounding is told by the step.
-            run.torque_slack = run.relative * run.torque;
+        for (values, watch) in values.iter().zip(&self.watches) {
+            if let Cause::GearTorque(drive) = *watch {
+                let run = &mut self.run;
+                run.torque[drive] = values.iter().fold(run.torque[drive], |most, value| most.max(value.abs()));
+                // What was told by nothing but rounding is told by the step.
+                run.torque_slack[drive] = run.relative * run.torque[drive];
+            }
         }
         let mut first: Option<(f64, f64, usize, f64)> = None;
         for (index, watch) in self.watches.iter().enumerate() {
             let run = &self.run;
             let slack = match *watch {
                 // What the integrator may be off by is no stop, least of all where a body has just begun to slide.
-                Cause::Stop(body) => run.absolute[body.speed_place()],
-                Cause::GearTorque => run.torque_slack,
+                Cause::Stop(body) => run.absolute[run.model.speed(body)],
+                Cause::GearTorque(drive) => run.torque_slack[drive],
                 cause => run.slack[cause.kind()],
             };
             if let Some((s, slope)) = fall::first_fall(&values[index].map(|value| value + slack))

@@ -1,0 +1,254 @@
+//! What works piece by piece beside the bodies: amplifiers with limits, springs that only pull or only push. Each is linear in each of
+//! its states; the conditions that lead from one to the other are linear forms.
+
+use super::{AmplifierMode, Cause, Contact, Drive, Form, Guard, Limit, Mechanism, Mode, SPRINGS, SpringLaw, Switch};
+use std::f64::consts::PI;
+
+impl Mechanism {
+    // --- motor and amplifier ----------------------------------------------------------------------------------------
+
+    /// Back-EMF K_e n φ̇, of the drive pulley or of the rotor if it turns by itself.
+    fn back_emf(&self, drive: usize) -> Form {
+        let Drive { motor, shaft, .. } = &self.drives[drive];
+        Form::speed(*shaft) * (motor.back_emf_constant * motor.gear_ratio)
+    }
+
+    /// What the input commands: gain·u, V or A, before any limit.
+    fn command(&self, drive: usize) -> Form {
+        Form::input(drive) * self.drives[drive].amplifier.gain
+    }
+
+    /// What the input commands after the limit on it.
+    fn commanded(&self, drive: usize, mode: &Mode) -> Form {
+        let (amplifier, now) = (&self.drives[drive].amplifier, &mode.drive[drive]);
+        let (limit, bound) = match amplifier.mode {
+            AmplifierMode::Voltage => (now.voltage, amplifier.voltage_limit),
+            AmplifierMode::Current => (now.current, amplifier.current_limit),
+        };
+        match (limit, bound) {
+            (Limit::Inside, _) | (_, None) => self.command(drive),
+            (side, Some(bound)) => Form::constant(side.sign() * bound),
+        }
+    }
+
+    /// Armature current, A.
+    pub fn current(&self, drive: usize, mode: &Mode) -> Form {
+        let Drive { motor, amplifier, .. } = &self.drives[drive];
+        if self.drives[drive].has_current_state() {
+            return Form::current(drive);
+        }
+        // i = (v − K_e n φ̇) / R                                                    in (4)
+        let at = |voltage: Form| (voltage - self.back_emf(drive)) * (1.0 / motor.resistance);
+        match (amplifier.mode, mode.drive[drive].voltage, mode.drive[drive].current) {
+            (AmplifierMode::Voltage, _, Limit::Inside) => at(self.commanded(drive, mode)),
+            (AmplifierMode::Voltage, _, side) => Form::constant(side.sign() * amplifier.current_limit.unwrap_or(0.0)),
+            (AmplifierMode::Current, Limit::Inside, _) => self.commanded(drive, mode),
+            (AmplifierMode::Current, side, _) => {
+                at(Form::constant(side.sign() * amplifier.voltage_limit.unwrap_or(0.0)))
+            }
+        }
+    }
+
+    /// What is left to drive the current through the inductance at the terminal voltage `voltage`: v − R i − K_e n φ̇.
+    fn left_for_inductance(&self, drive: usize, voltage: Form) -> Form {
+        voltage - Form::current(drive) * self.drives[drive].motor.resistance - self.back_emf(drive)
+    }
+
+    /// di/dt of a current loop that is not limited by voltage: 2π f_b (i_ref − i).
+    fn loop_rate(&self, drive: usize, mode: &Mode) -> Form {
+        let bandwidth = self.drives[drive].amplifier.bandwidth.unwrap_or(0.0);
+        (self.commanded(drive, mode) - Form::current(drive)) * (2.0 * PI * bandwidth)
+    }
+
+    /// di/dt, A/s; zero where the current is no state.
+    pub(super) fn current_rate(&self, drive: usize, mode: &Mode) -> Form {
+        let Drive { motor, amplifier, .. } = &self.drives[drive];
+        if !self.drives[drive].has_current_state() {
+            return Form::ZERO;
+        }
+        match (amplifier.mode, mode.drive[drive].voltage, mode.drive[drive].current) {
+            // L di/dt = v − R i − K_e n φ̇
+            (AmplifierMode::Voltage, _, Limit::Inside) => {
+                self.left_for_inductance(drive, self.commanded(drive, mode)) * (1.0 / motor.inductance)
+            }
+            // At its limit the current stands.
+            (AmplifierMode::Voltage, ..) => Form::ZERO,
+            (AmplifierMode::Current, Limit::Inside, _) => self.loop_rate(drive, mode),
+            (AmplifierMode::Current, side, _) => {
+                let most = Form::constant(side.sign() * amplifier.voltage_limit.unwrap_or(0.0));
+                self.left_for_inductance(drive, most) * (1.0 / motor.inductance)
+            }
+        }
+    }
+
+    /// Voltage at the motor's terminals, V: R i + L di/dt + K_e n φ̇, or what the amplifier puts there.
+    pub fn voltage(&self, drive: usize, mode: &Mode) -> Form {
+        let Drive { motor, amplifier, .. } = &self.drives[drive];
+        let now = &mode.drive[drive];
+        let follows = || {
+            self.current(drive, mode) * motor.resistance
+                + self.current_rate(drive, mode) * motor.inductance
+                + self.back_emf(drive)
+        };
+        match (amplifier.mode, now.voltage, now.current) {
+            (AmplifierMode::Voltage, _, Limit::Inside) => self.commanded(drive, mode),
+            (AmplifierMode::Current, Limit::Low | Limit::High, _) => {
+                Form::constant(now.voltage.sign() * amplifier.voltage_limit.unwrap_or(0.0))
+            }
+            _ => follows(),
+        }
+    }
+
+    // --- springs ----------------------------------------------------------------------------------------------------
+
+    /// Force of a spring in `mode`, N or N m: f = k s + c ṡ of one that pushes and pulls. One that only pulls carries T₀ more than
+    /// that, and nothing where it is slack: f = −T₀. One that only pushes has passed the side that it touches: f = k (s − s_side) + c ṡ.
+    pub fn spring_force(&self, spring: usize, mode: &Mode) -> Form {
+        let part = &self.springs[spring];
+        let whole = || Form::stretch(spring) * part.stiffness + self.stretch_rate(spring) * part.damping;
+        match part.law {
+            SpringLaw::TwoSided => whole(),
+            SpringLaw::Tension { pretension } if mode.slack[spring] => Form::constant(-pretension),
+            SpringLaw::Tension { .. } => whole(),
+            SpringLaw::Gap { low, high } => {
+                let [(_, high), (_, low)] = self.sides(spring, [high, low]);
+                match mode.contact[spring] {
+                    Contact::High => high,
+                    Contact::Low => -low,
+                    _ => Form::ZERO,
+                }
+            }
+            SpringLaw::Bounds { .. } | SpringLaw::None => Form::ZERO,
+        }
+    }
+
+    /// How far a spring's length is beyond each of `[high, low]`, and what the flank there then pushes with.
+    fn sides(&self, spring: usize, [high, low]: [f64; 2]) -> [(Form, Form); 2] {
+        let (length, rate) = (Form::stretch(spring), self.stretch_rate(spring));
+        let (k, c) = (self.springs[spring].stiffness, self.springs[spring].damping);
+        let side = |beyond: Form, rate: Form| (beyond, beyond * k + rate * c);
+        [side(length - Form::constant(high), rate), side(Form::constant(low) - length, -rate)]
+    }
+
+    /// Stiffness that stores energy in `mode`.
+    pub(super) fn stiffness_in(&self, mode: &Mode) -> [f64; SPRINGS] {
+        let mut stiffness = [0.0; SPRINGS];
+        for (index, spring) in self.springs.iter().enumerate() {
+            let carries = match spring.law {
+                SpringLaw::TwoSided => true,
+                SpringLaw::Tension { .. } => !mode.slack[index],
+                SpringLaw::Gap { .. } => mode.contact[index].code() != 0,
+                SpringLaw::Bounds { .. } | SpringLaw::None => false,
+            };
+            stiffness[index] = if carries { spring.stiffness } else { 0.0 };
+        }
+        stiffness
+    }
+
+    // --- what ends a state ------------------------------------------------------------------------------------------
+
+    /// The conditions under which limits and springs stay as they are in `mode`.
+    pub(super) fn watch_elements(&self, mode: &Mode, guards: &mut Vec<Guard>) {
+        let mut watch = |form: Form, cause: Cause| guards.push(Guard { form, cause });
+        for drive in 0..self.drives.len() {
+            let mut switch = |form: Form, switch: Switch| watch(form, Cause::Switch(switch));
+            self.watch_limits(drive, mode, &mut switch);
+        }
+        for (index, spring) in self.springs.iter().enumerate() {
+            match spring.law {
+                SpringLaw::Tension { pretension } => {
+                    // Tension T₀ + k s + c ṡ: it only pulls.
+                    let taut = Form::stretch(index) * spring.stiffness + self.stretch_rate(index) * spring.damping;
+                    let tension = taut + Form::constant(pretension);
+                    let slack = mode.slack[index];
+                    watch(if slack { -tension } else { tension }, Cause::Switch(Switch::Span(index, !slack)));
+                }
+                SpringLaw::Gap { low, high } => {
+                    let sides = self.sides(index, [high, low]);
+                    let mut switch = |form: Form, to| watch(form, Cause::Switch(Switch::Gap(index, to)));
+                    watch_contact(mode.contact[index], &sides, spring.damping > 0.0, &mut switch);
+                }
+                SpringLaw::Bounds { low, high } => {
+                    for (beyond, _) in self.sides(index, [high, low]) {
+                        watch(-beyond, Cause::Leave(index));
+                    }
+                }
+                SpringLaw::TwoSided | SpringLaw::None => {}
+            }
+        }
+    }
+
+    fn watch_limits(&self, drive: usize, mode: &Mode, watch: &mut impl FnMut(Form, Switch)) {
+        let (amplifier, now) = (&self.drives[drive].amplifier, &mode.drive[drive]);
+        let (voltage, current) = (|to| Switch::Voltage(drive, to), |to| Switch::Current(drive, to));
+        match amplifier.mode {
+            AmplifierMode::Voltage => {
+                if let Some(bound) = amplifier.voltage_limit {
+                    watch_limit(now.voltage, self.command(drive), bound, voltage, watch);
+                }
+                match amplifier.current_limit {
+                    Some(bound) if self.drives[drive].has_current_state() => match now.current {
+                        Limit::Inside => watch_limit(Limit::Inside, Form::current(drive), bound, current, watch),
+                        // At the limit, the current stands as long as the voltage would drive it further.
+                        side => watch(
+                            self.left_for_inductance(drive, self.commanded(drive, mode)) * side.sign(),
+                            current(Limit::Inside),
+                        ),
+                    },
+                    Some(bound) => {
+                        let mut inside = *mode;
+                        inside.drive[drive].current = Limit::Inside;
+                        watch_limit(now.current, self.current(drive, &inside), bound, current, watch);
+                    }
+                    None => {}
+                }
+            }
+            AmplifierMode::Current => {
+                if let Some(bound) = amplifier.current_limit {
+                    watch_limit(now.current, self.command(drive), bound, current, watch);
+                }
+                if let Some(bound) = amplifier.voltage_limit {
+                    // R i + L di/dt + K_e n φ̇, as it would be without the limit
+                    let mut inside = *mode;
+                    inside.drive[drive].voltage = Limit::Inside;
+                    watch_limit(now.voltage, self.voltage(drive, &inside), bound, voltage, watch);
+                }
+            }
+        }
+    }
+}
+
+fn watch_limit(
+    now: Limit,
+    unlimited: Form,
+    bound: f64,
+    switch: impl Fn(Limit) -> Switch,
+    watch: &mut impl FnMut(Form, Switch),
+) {
+    let bound = Form::constant(bound);
+    match now {
+        Limit::Inside => {
+            watch(bound - unlimited, switch(Limit::High));
+            watch(bound + unlimited, switch(Limit::Low));
+        }
+        Limit::High => watch(unlimited - bound, switch(Limit::Inside)),
+        Limit::Low => watch(-unlimited - bound, switch(Limit::Inside)),
+    }
+}
+
+fn watch_contact(now: Contact, &[high, low]: &[(Form, Form); 2], damped: bool, watch: &mut impl FnMut(Form, Contact)) {
+    let ((beyond, push), carries, loose) = match now {
+        Contact::Apart => {
+            watch(-high.0, Contact::High);
+            watch(-low.0, Contact::Low);
+            return;
+        }
+        Contact::High | Contact::HighLoose => (high, Contact::High, Contact::HighLoose),
+        Contact::Low | Contact::LowLoose => (low, Contact::Low, Contact::LowLoose),
+    };
+    watch(beyond, Contact::Apart);
+    if damped {
+        // A flank only pushes: pulled away faster than it can follow, it carries nothing.
+        if now == carries { watch(push, loose) } else { watch(-push, carries) }
+    }
+}

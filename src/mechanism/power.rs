@@ -1,0 +1,155 @@
+//! Where the power goes.
+
+use super::{AmplifierMode, BODIES, DRIVES, Limit, Mechanism, Mode, SPRINGS, SpringLaw, State};
+
+/// Power at one instant, W. What comes in goes into heat or is stored: `input` + `load` = losses + `stored`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Power {
+    /// Electrical power at the motors' terminals, v i.
+    pub input: f64,
+    /// Power of constant forces on bodies.
+    pub load: f64,
+    /// Copper loss R i².
+    pub copper: f64,
+    /// Loss in the gears' efficiency.
+    pub gear: f64,
+    /// Loss in motors whose torque and back-EMF constant differ: (K_e − K_t) n i φ̇; zero for a real motor.
+    pub conversion: f64,
+    /// Friction loss of each body.
+    pub friction: [f64; BODIES],
+    /// Loss in each spring's damping.
+    pub spring: [f64; SPRINGS],
+    /// Rate of change of kinetic, elastic and magnetic energy.
+    pub stored: f64,
+}
+
+impl Power {
+    /// What is left over; zero but for rounding.
+    pub fn imbalance(&self) -> f64 {
+        self.input + self.load
+            - self.copper
+            - self.gear
+            - self.conversion
+            - self.friction.iter().sum::<f64>()
+            - self.spring.iter().sum::<f64>()
+            - self.stored
+    }
+
+    /// The largest of the powers involved, to measure the imbalance against.
+    pub fn scale(&self) -> f64 {
+        [self.input, self.load, self.copper, self.gear, self.conversion, self.stored]
+            .iter()
+            .chain(&self.friction)
+            .chain(&self.spring)
+            .fold(0.0, |largest: f64, power| largest.max(power.abs()))
+    }
+}
+
+/// What a spring is strained by.
+#[derive(Debug, Clone, Copy, Default)]
+struct Strain {
+    /// What its force follows.
+    way: f64,
+    /// What its energy follows: nothing where one that is not straight yet is pulled tight against its damping.
+    strain: f64,
+    rate: f64,
+}
+
+impl Mechanism {
+    /// Inertia with the whole of what is geared to it, n² J_r of a rotor.
+    fn whole_inertia(&self, body: usize) -> f64 {
+        let rotors = self.drives.iter().filter(|drive| !drive.has_rotor() && drive.pulley == body);
+        self.bodies[body].inertia
+            + rotors.map(|drive| drive.motor.gear_ratio.powi(2) * drive.motor.rotor_inertia).sum::<f64>()
+    }
+
+    /// Energy stored at `state`, J: ½ Σ J q̇² + ½ L i², and what the springs hold.
+    ///
+    /// A spring that pushes and pulls holds ½ k s², one that only pulls t²/2k, t being its tension without damping, and nothing if
+    /// slack; one that only pushes what it is pressed.
+    pub fn energy(&self, state: &State) -> f64 {
+        let kinetic: f64 =
+            (0..self.bodies.len()).map(|body| self.whole_inertia(body) * state.speed[body].powi(2)).sum();
+        let elastic: f64 =
+            (0..self.springs.len()).map(|j| self.springs[j].stiffness * self.strain(j, state).strain.powi(2)).sum();
+        let magnetic: f64 = (self.drives.iter().zip(state.current))
+            .filter(|(drive, _)| drive.has_current_state())
+            .map(|(drive, current)| drive.motor.inductance * current.powi(2))
+            .sum();
+        0.5 * (kinetic + elastic + magnetic)
+    }
+
+    /// What a spring is strained by, counted from where it begins to push or pull.
+    fn strain(&self, spring: usize, state: &State) -> Strain {
+        let part = &self.springs[spring];
+        let sum = |values: &[f64; BODIES]| part.arms.iter().map(|&(body, arm)| arm * values[body]).sum::<f64>();
+        let (length, rate) = (sum(&state.position), sum(&state.speed));
+        let (way, strain) = match part.law {
+            SpringLaw::TwoSided => (length, length),
+            SpringLaw::Tension { pretension } => {
+                let way = length + pretension / part.stiffness;
+                (way, way.max(0.0))
+            }
+            SpringLaw::Gap { low, high } => {
+                let beyond = (length - high).max(0.0) + (length - low).min(0.0);
+                (beyond, beyond)
+            }
+            SpringLaw::Bounds { .. } | SpringLaw::None => (0.0, 0.0),
+        };
+        Strain { way, strain, rate }
+    }
+
+    /// The power balance at `state` under `input` in `mode`.
+    pub fn power(&self, mode: Mode, state: &State, input: &[f64; DRIVES]) -> Power {
+        let equations = self.equations(mode);
+        let acceleration = equations.acceleration.map(|form| form.value(self, state, input));
+        let stiffness = self.stiffness_in(&mode);
+        let mut power = Power::default();
+        for (body, part) in self.bodies.iter().enumerate() {
+            let speed = state.speed[body];
+            power.load += part.force * speed;
+            power.friction[body] = speed * self.friction_value(body, mode.motion[body], speed, (0.0, 0.0));
+            power.stored += self.whole_inertia(body) * speed * acceleration[body];
+        }
+        for (index, spring) in self.springs.iter().enumerate() {
+            // Whatever a spring takes up and does not keep is lost in its damper; so is all that one holds that lets go early.
+            let s = self.strain(index, state);
+            let kept = spring.stiffness * s.strain;
+            let force = if stiffness[index] > 0.0 { spring.stiffness * s.way + spring.damping * s.rate } else { 0.0 };
+            power.stored += kept * s.rate;
+            power.spring[index] = (force - kept) * s.rate;
+        }
+        for (index, drive) in self.drives.iter().enumerate() {
+            let motor = &drive.motor;
+            let n = motor.gear_ratio;
+            let i = self.current(index, &mode).value(self, state, input);
+            let di = equations.current_rate[index].value(self, state, input);
+            let shaft = state.speed[drive.shaft];
+            let voltage = match (drive.amplifier.mode, mode.drive[index].current) {
+                (AmplifierMode::Current, _) | (_, Limit::Low | Limit::High) => {
+                    motor.resistance * i + motor.inductance * di + motor.back_emf_constant * n * shaft
+                }
+                (AmplifierMode::Voltage, Limit::Inside) => self.voltage(index, &mode).value(self, state, input),
+            };
+            power.input += voltage * i;
+            power.copper += motor.resistance * i * i;
+            power.conversion += (motor.back_emf_constant - motor.torque_constant) * n * i * shaft;
+            power.stored += motor.inductance * i * di;
+            power.gear += match self.gear_spring(index) {
+                None => {
+                    // T = K_t i − J_r n φ̈₁ goes into the gear at n φ̇₁, e n T comes out at φ̇₁.
+                    let torque = motor.torque_constant * i - motor.rotor_inertia * n * acceleration[drive.pulley];
+                    let e = self.gear_factor(index, shaft > 0.0, mode.drive[index].torque_positive);
+                    (1.0 - e) * n * torque * shaft
+                }
+                Some(spring) => {
+                    // T/e goes into the gear at φ̇_r, T comes out.
+                    let torque = self.spring_force(spring, &mode).value(self, state, input);
+                    let positive = self.is_gear_torque_positive(index, spring, &mode);
+                    (1.0 / self.gear_factor(index, shaft > 0.0, positive) - 1.0) * torque * shaft
+                }
+            };
+        }
+        power
+    }
+}

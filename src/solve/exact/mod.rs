@@ -1,0 +1,653 @@
+//! The exact solver: modes and matrix exponentials.
+//!
+//! Within a mode the stage is linear and a step is a product with e^{A h}. A mode may be left only when one of its guards
+//! becomes negative, so the solver moves in the largest steps on which no guard can, by a bound that holds for
+//! certain, and looks closer (halves the step, and at last expands the state into a Taylor series) only where the bound does not decide.
+//!
+//! The bound. y = ż obeys ẏ = A y + b u̇, and friction, resistance and damping only take energy away, so its energy
+//! V(y) = ½ Σ m a² + ½ Σ k (Δv)² + ½ w L (di/dt)² can only grow by the input's rate: √(2V)(τ) ≤ √(2V)(0) + |b|·|u̇|·τ. A guard
+//! g = w·z therefore changes no faster than |w|·√(2V), |w| being the norm dual to V; and likewise its slope, with ẏ.
+
+mod change;
+mod matrices;
+mod run;
+mod shown;
+
+use super::coordinates::Coordinates;
+use super::inputs::Pieces;
+use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
+use super::propagator::SERIES_ORDER;
+use super::record::Extra;
+use super::roots;
+use super::rounding::Rounding;
+use super::{Cost, Ending, Event, PositionError};
+use crate::mechanism::{Cause, DRIVES, Form, Mechanism, Mode, State};
+pub(super) use matrices::Space;
+use matrices::{ModeMatrices, Size, Watch};
+pub(super) use run::Run;
+use std::sync::Arc;
+
+/// For so small a part of the series' reach a speed that has left zero is still told by its series alone.
+const SOON: f64 = 1e-6;
+
+/// The modes that were made ready, by the room that their vectors need: what runs of one machine can share.
+#[derive(Default, Clone)]
+pub(super) struct Known {
+    straight: Vec<Arc<ModeMatrices<8, 10>>>,
+    rotor: Vec<Arc<ModeMatrices<12, 14>>>,
+    smooth: Vec<Arc<ModeMatrices<16, 18>>>,
+    two: Vec<Arc<ModeMatrices<16, 19>>>,
+    two_smooth: Vec<Arc<ModeMatrices<28, 31>>>,
+}
+
+impl Known {
+    /// Forgets all of them: another machine.
+    pub(super) fn clear(&mut self) {
+        *self = Self::default();
+    }
+}
+
+/// Kernels for vectors of `R` moving places and `C` in all: which of the lists is theirs.
+pub(super) trait Room<const R: usize, const C: usize> {
+    fn list(&mut self) -> &mut Vec<Arc<ModeMatrices<R, C>>>;
+}
+
+macro_rules! room {
+    ($($list:ident: $rows:literal, $columns:literal;)*) => {
+        $(impl Room<$rows, $columns> for Known {
+            fn list(&mut self) -> &mut Vec<Arc<ModeMatrices<$rows, $columns>>> {
+                &mut self.$list
+            }
+        })*
+    };
+}
+room! {
+    straight: 8, 10;
+    rotor: 12, 14;
+    smooth: 16, 18;
+    two: 16, 19;
+    two_smooth: 28, 31;
+}
+
+/// The kernel for a machine: the smallest that has room for its vector.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kernel {
+    /// One drive, three bodies, straight inputs: eight moving quantities.
+    Straight,
+    /// The same with a rotor of its own.
+    Rotor,
+    /// One drive and smooth inputs, which carry their derivatives along.
+    Smooth,
+    /// Two drives.
+    Two,
+    /// Two drives and smooth inputs.
+    TwoSmooth,
+}
+
+impl Kernel {
+    /// That of a machine whose inputs are smooth, or straight.
+    pub(super) fn of(space: &Space) -> Self {
+        let fits = |rows: usize, columns: usize| {
+            let (moving, constant) = space.size();
+            moving <= rows && rows + constant == columns
+        };
+        match () {
+            () if fits(8, 10) => Self::Straight,
+            () if fits(12, 14) => Self::Rotor,
+            () if fits(16, 18) => Self::Smooth,
+            () if fits(16, 19) => Self::Two,
+            () => Self::TwoSmooth,
+        }
+    }
+}
+
+/// A machine under way: its state, its mode, and what is needed to go on. A clone of it goes on in the same way.
+#[derive(Clone)]
+pub(super) struct Core<const R: usize, const C: usize> {
+    pub(super) mechanism: Arc<Mechanism>,
+    pub(super) space: Arc<Space>,
+    pub(super) coordinates: Coordinates,
+    /// The interval whose halves there are matrices for, s.
+    h: f64,
+    /// State in the solver's coordinates, inputs and their derivatives, and a one.
+    z: [f64; C],
+    pub(super) mode: Mode,
+    matrices: Arc<ModeMatrices<R, C>>,
+    known: Vec<Arc<ModeMatrices<R, C>>>,
+    /// Matrices that were there before.
+    shared: u64,
+    /// How many leading Taylor coefficients of a sliding body's speed are zero by definition, because it starts from rest:
+    /// 1 where it is accelerated, 2 where the load has only just reached its friction. The same for all else that is watched.
+    fresh: [u8; Cause::KINDS],
+    /// By how much the load on a stuck body may pass its breakaway before it counts: what rounding can do to the load.
+    /// Without it a body that comes to rest just at its limit would chatter on the last bit. The same for all else that is
+    /// watched where it is zero but for rounding, and would count as wrong in either state.
+    tolerance: [f64; Cause::KINDS],
+    /// Whether the input has changed, and what rounding does to the loads on stuck bodies is to be looked at anew.
+    at_edge: bool,
+    /// Bounds of |u̇| and |ü| on the present pieces.
+    input_rate: [f64; DRIVES],
+    input_curvature: [f64; DRIVES],
+    /// Where it stands: so far behind `base`, s.
+    base: f64,
+    offset: f64,
+    pub(super) events: Vec<Event>,
+    /// How many events were handed on before those.
+    handed_on: usize,
+    /// Time since the last mode change, s, and how many there have been there.
+    since_change: f64,
+    changes: usize,
+    pub(super) cost: Cost,
+    rounding: Rounding,
+    /// Intervals crossed or halved, how fast the run gets on by them, and to where it is to go.
+    questions: u64,
+    pace: Pace,
+    end: f64,
+    /// Whether somebody is to be asked whether to go on.
+    pub(super) asks: bool,
+    pub(super) trouble: Option<Ending>,
+}
+
+/// What a bound tells of an interval.
+enum Bound<const C: usize> {
+    /// No guard falls; here is the end, if it was computed.
+    Safe(Option<[f64; C]>),
+    /// Look closer.
+    Unsure,
+}
+
+impl<const R: usize, const C: usize> Core<R, C> {
+    /// That of a machine at rest in its mode in `start`. `known` are modes made ready for intervals of any length; `end` is how far it
+    /// is to go, to tell whether it gets there.
+    pub(super) fn new(
+        mechanism: Arc<Mechanism>,
+        space: Arc<Space>,
+        start: &State,
+        (h, end): (f64, f64),
+        mut known: Vec<Arc<ModeMatrices<R, C>>>,
+    ) -> Self {
+        let layout = &space.layout;
+        let (mut coordinates, inner) = Coordinates::new(layout, start);
+        let mut z = [0.0; C];
+        for body in 0..layout.bodies() {
+            (z[layout.coordinate[body]], z[layout.speed[body]]) = (inner.position[body], inner.speed[body]);
+        }
+        for (index, drive) in mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.has_current_state()) {
+            debug_assert!(drive.has_current_state());
+            z[layout.current[index]] = inner.current[index];
+        }
+        z[C - 1] = 1.0;
+        let mode = mechanism.first_mode(start);
+        coordinates.hold(layout, &mode, &inner);
+        let shared = propagators(&known);
+        let (matrices, is_new) = ModeMatrices::of(&mut known, &mechanism, &space, &mode, h);
+        Self {
+            mechanism,
+            space,
+            coordinates,
+            h,
+            z,
+            mode,
+            matrices,
+            known,
+            shared,
+            fresh: [0; Cause::KINDS],
+            tolerance: [0.0; Cause::KINDS],
+            at_edge: true,
+            input_rate: [0.0; DRIVES],
+            input_curvature: [0.0; DRIVES],
+            base: 0.0,
+            offset: 0.0,
+            events: Vec::new(),
+            handed_on: 0,
+            since_change: f64::INFINITY,
+            changes: 0,
+            cost: Cost { modes: u64::from(is_new), ..Cost::default() },
+            rounding: Rounding::default(),
+            questions: 0,
+            pace: Pace::default(),
+            end,
+            asks: false,
+            trouble: None,
+        }
+    }
+
+    pub(super) fn time(&self) -> f64 {
+        self.base + self.offset
+    }
+
+    /// The bound of what rounding has done so far.
+    pub(super) fn error(&mut self) -> PositionError {
+        self.rounding.swing(self.matrices.swing, self.time());
+        let steps = self.cost.steps + self.cost.series;
+        let origin = self.coordinates.origin().iter().fold(0.0, |most: f64, origin| most.max(origin.abs()));
+        self.rounding.bound(steps, self.time(), origin)
+    }
+
+    /// The mechanism, its ways counted from where it began.
+    pub(super) fn mechanism(&self) -> &Mechanism {
+        &self.mechanism
+    }
+
+    /// What a row shows beyond the linear equations: nothing.
+    pub(super) fn extra(&self) -> Extra {
+        Extra::default()
+    }
+
+    /// Takes up new inputs, and what they bring about at once.
+    pub(super) fn take_input(&mut self, pieces: &Pieces) {
+        self.set_input(pieces);
+        self.resolve();
+    }
+
+    /// Bounds how fast the inputs change until `until`.
+    pub(super) fn bound_input(&mut self, pieces: &Pieces, until: f64) {
+        let rest = pieces.since(self.time());
+        for drive in 0..self.space.layout.inputs {
+            let length = until - self.time();
+            (self.input_rate[drive], self.input_curvature[drive]) = change_rates(&rest.coefficients[drive], length);
+        }
+    }
+
+    /// Goes on to `until` and adds the events on the way to `events`.
+    pub(super) fn go_to(&mut self, until: f64, events: &mut Vec<Event>) -> Result<(), Ending> {
+        self.end = until;
+        (self.questions, self.pace) = (0, Pace::default());
+        self.count_from(self.time());
+        let length = until - self.base;
+        // What a sum of decimal times may be off by; no part of the interval, which may be long.
+        let near = (8.0 * f64::EPSILON * until.abs()).min(1e-9 * self.h);
+        while length - self.offset > near && self.trouble.is_none() {
+            self.check();
+            // Halves, quarters and eighths of the interval, for which there are matrices, are hit to the last bit.
+            let (left, eighth) = (length - self.offset, 0.125 * self.h);
+            let snapped = (left / eighth).round() * eighth;
+            let left = if (left - snapped).abs() <= near { snapped } else { left };
+            let matrices = Arc::clone(&self.matrices);
+            let y = matrices.rate(&self.z);
+            let safe = match left >= self.h {
+                true => self.safe_intervals((left / self.h) as u64, &y),
+                false => 0,
+            };
+            if safe > 0 {
+                let step = matrices.step(0);
+                (0..safe).for_each(|_| step.advance(&mut self.z));
+                self.cost.steps += safe;
+                self.move_on(safe as f64 * self.h);
+                continue;
+            }
+            if let Some(cause) = self.advance(left.min(self.h)) {
+                self.change(cause);
+                self.resolve();
+            } else if left <= self.h && !self.asks && self.trouble.is_none() {
+                break;
+            }
+            self.asks = false;
+        }
+        self.check();
+        let inner = self.inner();
+        self.rounding.see(&self.space.layout, &self.mechanism, &inner);
+        self.handed_on += self.events.len();
+        events.append(&mut self.events);
+        match self.trouble {
+            Some(ending) => Err(ending),
+            None => {
+                self.count_from(until.max(self.base));
+                Ok(())
+            }
+        }
+    }
+
+    /// The same with room for `R2` moving places: for inputs that bend.
+    pub(super) fn smooth<const R2: usize, const C2: usize>(self) -> Core<R2, C2> {
+        let space = Arc::new(Space::new(&self.mechanism, true));
+        let mut z = [0.0; C2];
+        z[..space.layout.states].copy_from_slice(&self.z[..space.layout.states]);
+        for drive in 0..space.layout.inputs {
+            for k in 0..=self.space.highest {
+                z[space.chain::<R2>(drive, k)] = self.z[self.space.chain::<R>(drive, k)];
+            }
+        }
+        z[C2 - 1] = 1.0;
+        let mut known = Vec::new();
+        let (matrices, _) = ModeMatrices::of(&mut known, &self.mechanism, &space, &self.mode, self.h);
+        let Self {
+            mechanism,
+            coordinates,
+            h,
+            mode,
+            fresh,
+            tolerance,
+            at_edge,
+            input_rate,
+            input_curvature,
+            base,
+            offset,
+            events,
+            handed_on,
+            since_change,
+            changes,
+            cost,
+            rounding,
+            questions,
+            pace,
+            end,
+            asks,
+            trouble,
+            ..
+        } = self;
+        Core {
+            mechanism,
+            space,
+            coordinates,
+            h,
+            z,
+            mode,
+            matrices,
+            known,
+            shared: 0,
+            fresh,
+            tolerance,
+            at_edge,
+            input_rate,
+            input_curvature,
+            base,
+            offset,
+            events,
+            handed_on,
+            since_change,
+            changes,
+            cost,
+            rounding,
+            questions,
+            pace,
+            end,
+            asks,
+            trouble,
+        }
+    }
+
+    /// Takes up new inputs.
+    pub(super) fn set_input(&mut self, pieces: &Pieces) {
+        self.cost.pieces += 1;
+        self.fresh = [0; Cause::KINDS];
+        self.at_edge = true;
+        for drive in 0..self.space.layout.inputs {
+            self.take_up(drive, &pieces.coefficients[drive], pieces.end - pieces.start);
+        }
+    }
+
+    /// Puts an input's value and derivatives where the state has them.
+    fn take_up(&mut self, drive: usize, coefficients: &[f64], length: f64) {
+        let highest = self.space.highest;
+        if coefficients[1..].iter().all(|&c| c == 0.0) {
+            (0..=highest).for_each(|k| self.z[self.space.chain::<R>(drive, k)] = 0.0);
+            self.z[self.space.chain::<R>(drive, 0)] = coefficients[0];
+            (self.input_rate[drive], self.input_curvature[drive]) = (0.0, 0.0);
+            return;
+        }
+        let mut factorial = 1.0;
+        for (k, &c) in coefficients.iter().enumerate().take(highest + 1) {
+            factorial *= k.max(1) as f64;
+            // u⁽ᵏ⁾ = k! c_k
+            self.z[self.space.chain::<R>(drive, k)] = c * factorial;
+        }
+        let length = if length.is_finite() { length } else { 0.0 };
+        (self.input_rate[drive], self.input_curvature[drive]) = change_rates(coefficients, length);
+    }
+
+    /// Notices a state that is no number any more.
+    fn check(&mut self) {
+        if !self.z.iter().sum::<f64>().is_finite() {
+            self.trouble = Some(Ending::Diverged { time: self.time() });
+        }
+    }
+
+    /// Counts from `base`, where it is, on.
+    fn count_from(&mut self, base: f64) {
+        (self.base, self.offset) = (base, 0.0);
+    }
+
+    /// How many whole intervals, up to `most`, no guard can fall on.
+    fn safe_intervals(&mut self, most: u64, y: &[f64; R]) -> u64 {
+        let law = Arc::clone(&self.matrices);
+        if law.guards.is_empty() {
+            return most;
+        }
+        self.cost.looks += 1;
+        let size = law.size(y);
+        let push = law.push(&self.input_rate) * 0.5;
+        let mut time = f64::INFINITY;
+        for guard in &law.guards {
+            // g(τ) ≥ g − (|w| √2V + |w_u| |u̇|) τ − |w| |b| |u̇| τ²/2
+            let g = self.standing(guard);
+            let grow = law.growth_factor();
+            let slope = grow * law.steepness(guard, size, 0.0) + guard.at_once(&self.input_rate);
+            let bend = grow * law.steepness(guard, Size::ZERO, push);
+            let moves = slope > 0.0 || bend > 0.0;
+            if g < 0.0 || (g == 0.0 && moves) || self.fresh_order(guard.cause) > 0 {
+                time = 0.0;
+            } else if moves {
+                time = f64::min(time, 2.0 * g / (slope + (slope * slope + 4.0 * bend * g).sqrt()));
+            }
+        }
+        time = time.min(law.growth_time());
+        // A float that is too large becomes the largest integer.
+        most.min((time / self.h * 0.999) as u64)
+    }
+
+    /// Value of a guard, with what rounding alone may have made negative forgiven.
+    fn standing(&self, guard: &Watch<C>) -> f64 {
+        guard.standing(&self.z)
+            + match guard.cause {
+                Cause::Stop(_) => 0.0,
+                cause => self.tolerance[cause.kind()],
+            }
+    }
+
+    fn fresh_order(&self, cause: Cause) -> usize {
+        match cause {
+            Cause::BreakForward(_) | Cause::BreakBackward(_) => 0,
+            cause => usize::from(self.fresh[cause.kind()]),
+        }
+    }
+
+    /// Advances by `distance`, at most an interval; stops at the first guard that falls and says why.
+    pub(super) fn advance(&mut self, mut distance: f64) -> Option<Cause> {
+        let law = Arc::clone(&self.matrices);
+        if self.fresh != [0; Cause::KINDS] && distance > 0.0 {
+            // A speed that starts from zero is told apart from one that falls to zero by its series.
+            let first = distance.min(law.reach());
+            if let Some(cause) = self.advance_by_series(&law, first) {
+                return Some(cause);
+            }
+            distance -= first;
+        }
+        for level in 0..=law.finest {
+            while distance >= law.length(level) && self.goes() {
+                if let Some(cause) = self.cross_interval(&law, level) {
+                    return Some(cause);
+                }
+                distance -= law.length(level);
+            }
+        }
+        if distance > 0.0 && self.goes() { self.advance_by_series(&law, distance) } else { None }
+    }
+
+    /// Crosses an interval of h/2^level.
+    fn cross_interval(&mut self, law: &ModeMatrices<R, C>, level: usize) -> Option<Cause> {
+        if !self.goes_on() {
+            return None;
+        }
+        let length = law.length(level);
+        match self.bound(law, length, Some(level)) {
+            Bound::Safe(end) => {
+                match end {
+                    Some(end) => self.z = end,
+                    None => law.step(level).advance(&mut self.z),
+                }
+                self.cost.steps += 1;
+                self.move_on(length);
+                None
+            }
+            Bound::Unsure if level < law.finest => {
+                self.cross_interval(law, level + 1).or_else(|| self.cross_interval(law, level + 1))
+            }
+            Bound::Unsure => self.advance_by_series(law, length),
+        }
+    }
+
+    /// Whether nothing stands against going on.
+    fn goes(&self) -> bool {
+        self.trouble.is_none() && !self.asks
+    }
+
+    /// Wants to be asked now and then whether to go on, and looks whether this leads anywhere; false if not.
+    fn goes_on(&mut self) -> bool {
+        self.questions += 1;
+        if self.questions.is_multiple_of(STEPS_BETWEEN_QUESTIONS) && self.trouble.is_none() {
+            self.asks = true;
+            self.trouble = self.pace.too_stiff(self.questions, self.time(), self.end);
+        }
+        self.goes()
+    }
+
+    fn move_on(&mut self, by: f64) {
+        self.offset += by;
+        self.since_change += by;
+    }
+
+    /// Decides, if it can, that no guard falls within `length`.
+    fn bound(&mut self, law: &ModeMatrices<R, C>, length: f64, level: Option<usize>) -> Bound<C> {
+        if law.guards.is_empty() {
+            return Bound::Safe(None);
+        }
+        self.cost.looks += 1;
+        let y = law.rate(&self.z);
+        let grow = law.growth_over(length);
+        let (size, push) = (law.size(&y), law.push(&self.input_rate) * length);
+        let steepness = |guard: &Watch<C>| grow * law.steepness(guard, size, push) + guard.at_once(&self.input_rate);
+        let undecided = |g: f64, steepness: f64| !(g > steepness * length || (g >= 0.0 && steepness == 0.0));
+        if !law.guards.iter().any(|guard| undecided(self.standing(guard), steepness(guard))) {
+            return Bound::Safe(None);
+        }
+
+        let second = law.rate_of_rate(&y);
+        let (size, push) = (law.size(&second), law.push(&self.input_curvature) * length);
+        let mut falling = false;
+        for guard in &law.guards {
+            let g = self.standing(guard);
+            if !undecided(g, steepness(guard)) {
+                continue;
+            }
+            let slope = guard.slope(&y);
+            let bend = grow * law.steepness(guard, size, push) + guard.at_once(&self.input_curvature);
+            // g(τ) ≥ g + ġ τ − |g̈| τ²/2
+            let stays = g >= 0.0 && g + slope.min(0.0) * length - 0.5 * bend * length * length > 0.0;
+            let rises = g >= 0.0 && slope > bend * length;
+            let falls = g > 0.0 && slope < -bend * length;
+            match (stays || rises, falls) {
+                (true, _) => {}
+                (false, true) => falling = true,
+                (false, false) => return Bound::Unsure,
+            }
+        }
+        let Some(level) = level.filter(|_| falling) else { return Bound::Safe(None) };
+        // What falls all the way has not fallen through if it is still positive at the end.
+        let mut end = self.z;
+        law.step(level).advance(&mut end);
+        if law.guards.iter().all(|guard| guard.value(&end) > 0.0) { Bound::Safe(Some(end)) } else { Bound::Unsure }
+    }
+
+    /// Advances by a `distance` within the reach of the Taylor series, to the first guard that falls.
+    fn advance_by_series(&mut self, law: &ModeMatrices<R, C>, distance: f64) -> Option<Cause> {
+        self.cost.series += 1;
+        let series = law.series(&self.z, distance);
+        let mut sizes = None;
+        let mut first: Option<(f64, Cause)> = None;
+        // Term 1 of the series is ż · distance: most guards are too far away to fall, as in `bound`.
+        let change = std::array::from_fn(|j| series[1][j]);
+        let (size, push) = (law.size(&change), law.push(&self.input_rate) * distance * distance);
+        let grow = law.growth_over(distance);
+        for guard in &law.guards {
+            let fall = grow * law.steepness(guard, size, push) + guard.at_once(&self.input_rate) * distance;
+            if self.standing(guard) > fall {
+                continue;
+            }
+            let mut coefficients: [f64; SERIES_ORDER + 1] = std::array::from_fn(|k| guard.value(&series[k]));
+            coefficients[0] = self.standing(guard);
+            let mut order = self.fresh_order(guard.cause);
+            if order > 0 || coefficients[0] == 0.0 {
+                let sizes = sizes.get_or_insert_with(|| law.sizes(&self.z, distance));
+                order = guard.first_term(&coefficients, sizes, order.max(1));
+            }
+            let sooner = |s: f64| {
+                first.is_none_or(|(earliest, cause)| {
+                    s < earliest || (s == earliest && guard.cause.rank() < cause.rank())
+                })
+            };
+            if let Some(s) = roots::first_fall(&coefficients[order..])
+                && sooner(s)
+            {
+                first = Some((s, guard.cause));
+            }
+        }
+        let s = first.map_or(1.0, |(s, _)| s);
+        for j in 0..R {
+            let change = series[1..].iter().rev().fold(0.0, |sum, term| (sum + term[j]) * s);
+            self.z[j] += change;
+        }
+        self.move_on(s * distance);
+        if s * distance > SOON * law.reach() {
+            self.fresh = [0; Cause::KINDS];
+        }
+        first.map(|(_, cause)| cause)
+    }
+
+    /// The state in the solver's coordinates.
+    fn inner(&self) -> State {
+        self.space.inner(&self.z)
+    }
+
+    /// The state in angles and positions.
+    pub(super) fn state(&self) -> State {
+        self.coordinates.state(&self.space.layout, &self.inner())
+    }
+
+    pub(super) fn input(&self) -> [f64; DRIVES] {
+        self.space.input::<R>(&self.z)
+    }
+
+    /// What rounding may have done to the value of a form.
+    fn noise(&self, form: &Form) -> f64 {
+        form.noise(&self.space.layout, &self.inner(), &self.input())
+    }
+
+    /// The value of a form now.
+    pub(super) fn value(&self, form: &Form) -> f64 {
+        self.space.layout.value(form, &self.inner(), &self.input())
+    }
+}
+
+/// Bounds of |u̇| and |ü| of Σ c_k τᵏ for τ up to `length`.
+fn change_rates(coefficients: &[f64], length: f64) -> (f64, f64) {
+    let (mut rate, mut curvature) = (0.0, 0.0);
+    let (mut power1, mut power2) = (1.0, 1.0);
+    for (k, c) in coefficients.iter().enumerate() {
+        let order = k as f64;
+        if k >= 1 {
+            rate += order * c.abs() * power1;
+            power1 *= length;
+        }
+        if k >= 2 {
+            curvature += order * (order - 1.0) * c.abs() * power2;
+            power2 *= length;
+        }
+    }
+    (rate, curvature)
+}
+
+/// Matrices computed so far.
+fn propagators<const R: usize, const C: usize>(known: &[Arc<ModeMatrices<R, C>>]) -> u64 {
+    known.iter().map(|matrices| matrices.propagators()).sum()
+}

@@ -1,0 +1,239 @@
+//! A run: a machine, and a recorder of its rows.
+
+use super::shown::Watching;
+use super::{Core, Known, Room, Space};
+use crate::mechanism::{Mechanism, State};
+use crate::solve::inputs::Pieces;
+use crate::solve::observe::Output;
+use crate::solve::record::{Recorder, Row};
+use crate::solve::run::{Running, Start};
+use crate::solve::{Detail, Ending, Flow, Grid, Outcome};
+use std::sync::Arc;
+
+/// Intervals looked at closer after which a bound is made anew.
+const OFTEN: usize = 8;
+
+/// A run under way.
+pub(in crate::solve) struct Run<'a, const R: usize, const C: usize> {
+    pub(super) core: Core<R, C>,
+    grid: Grid,
+    /// The row where it stands, or that it has passed last.
+    row: u64,
+    pub(super) recorder: Recorder<'a>,
+    pub(super) watching: Watching,
+    known: Known,
+}
+
+impl<'a, const R: usize, const C: usize> Run<'a, R, C>
+where
+    Known: Room<R, C>,
+{
+    /// A run that begins in `start`.
+    pub(in crate::solve) fn new(
+        mechanism: &Arc<Mechanism>,
+        space: Space,
+        start: &Start,
+        mut known: Known,
+        output: Output<'a>,
+    ) -> Self {
+        let grid = Grid::new(start.every, start.until);
+        let seen = Arc::new(mechanism.seen_from(&space.layout, &start.state));
+        let list = std::mem::take(known.list());
+        let recorder = Recorder::new(&seen, grid, output);
+        let core = Core::new(seen, Arc::new(space), &start.state, (grid.interval(), grid.end()), list);
+        Self { core, grid, row: 0, recorder, watching: Watching::new(), known }
+    }
+
+    /// The row at or before `time` and how far behind it; next to a row means on it.
+    fn locate(&self, time: f64) -> (u64, f64) {
+        let (last, h) = (self.grid.even(), self.grid.interval());
+        let mut row = ((time / h) as u64).min(last);
+        while row > 0 && self.grid.time(row) > time {
+            row -= 1;
+        }
+        while row < last && self.grid.time(row + 1) <= time {
+            row += 1;
+        }
+        let offset = time - self.grid.time(row);
+        // What a sum of decimal times may be off by; no part of the interval, which may be long.
+        let near = (8.0 * f64::EPSILON * time).min(1e-9 * h);
+        // The last interval may be shorter: what is left of the run behind the last row at this distance.
+        let length = if row < last { h } else { self.grid.rest() };
+        match (row < last, length - offset <= near) {
+            _ if offset <= near => (row, 0.0),
+            (true, true) => (row + 1, 0.0),
+            (false, true) => (row, length),
+            (_, false) => {
+                // Halves, quarters and eighths of the interval, for which there are matrices, are hit to the last bit.
+                let eighth = 0.125 * h;
+                let snapped = (offset / eighth).round() * eighth;
+                (row, if (offset - snapped).abs() <= near { snapped } else { offset })
+            }
+        }
+    }
+
+    /// Advances to `offset` behind row `row`, event by event.
+    fn reach(&mut self, row: u64, offset: f64) {
+        while (self.row < row || (self.row == row && self.core.offset < offset)) && self.goes() {
+            self.core.check();
+            if self.core.offset == 0.0 {
+                self.put_out();
+                if self.row < row && self.goes() && self.take_safe_intervals(row - self.row) {
+                    continue;
+                }
+            }
+            let ahead = if self.row < row { self.grid.interval() } else { offset };
+            match self.advance_shown(ahead - self.core.offset) {
+                Some(cause) => {
+                    self.core.change(cause);
+                    self.core.resolve();
+                    self.jumped();
+                }
+                // Paused in the midst of an interval: it is taken up where it was left.
+                None if self.core.asks => self.ask_receiver(),
+                None if !self.goes() => {}
+                None if self.row < row => self.go_to(self.row + 1),
+                None => self.core.offset = offset,
+            }
+        }
+    }
+
+    fn go_to(&mut self, row: u64) {
+        self.row = row;
+        self.core.count_from(self.grid.time(row));
+    }
+
+    /// Asks the receiver whether to go on.
+    fn ask_receiver(&mut self) {
+        self.core.asks = false;
+        self.recorder.ask();
+        self.heed();
+    }
+
+    fn goes(&self) -> bool {
+        self.core.trouble.is_none()
+    }
+
+    /// Ends where the receiver wants no more.
+    fn heed(&mut self) {
+        if self.recorder.flow == Flow::Stop && self.core.trouble.is_none() {
+            self.core.trouble = Some(Ending::Interrupted { time: self.core.time() });
+        }
+    }
+
+    /// Puts out the present row, once, and looks whether all is well.
+    fn put_out(&mut self) {
+        self.core.check();
+        if self.recorder.next_row() == self.row && self.core.trouble.is_none() {
+            let core = &mut self.core;
+            let inner = core.inner();
+            core.rounding.see(&core.space.layout, &core.mechanism, &inner);
+            let row = Row::new(&core.space.layout, &core.coordinates, &inner, core.input());
+            self.recorder.push(row, &core.mode);
+        }
+        self.heed();
+    }
+
+    /// Moves as many whole intervals, up to `most`, as no guard can fall on; false if not even one.
+    fn take_safe_intervals(&mut self, most: u64) -> bool {
+        let law = Arc::clone(&self.core.matrices);
+        let y = law.rate(&self.core.z);
+        let safe = self.core.safe_intervals(most, &y);
+        if safe == 0 {
+            return false;
+        }
+        let h = self.grid.interval();
+        let resting = y.iter().all(|&rate| rate == 0.0);
+        let mut bow = self.is_observed().then(|| self.bow(&law, h, safe as f64 * h));
+        if let (true, Some(bow)) = (resting, &bow) {
+            let (begin, z) = (self.core.time(), self.core.z);
+            self.move_shown(&law, begin, safe as f64 * h, z, bow);
+        }
+        self.core.since_change += safe as f64 * h;
+        if resting && self.recorder.detail == Detail::None {
+            self.recorder.skip(safe - 1);
+            self.go_to(self.row + safe);
+            return true;
+        }
+        let step = law.step(0);
+        let mut closer = 0;
+        for j in 0..safe {
+            if j > 0 {
+                self.put_out();
+                if self.core.trouble.is_some() {
+                    return true;
+                }
+            }
+            match &mut bow {
+                _ if resting => {}
+                Some(bow) => {
+                    let mut end = self.core.z;
+                    step.advance(&mut end);
+                    closer += usize::from(self.move_shown(&law, self.core.base, h, end, bow));
+                    if closer == OFTEN {
+                        // What swings has died down since.
+                        closer = 0;
+                        *bow = self.bow(&law, h, (safe - j) as f64 * h);
+                    }
+                }
+                None => step.advance(&mut self.core.z),
+            }
+            self.go_to(self.row + 1);
+        }
+        self.core.cost.steps += if resting { 0 } else { safe };
+        true
+    }
+}
+
+impl<const R: usize, const C: usize> Running for Run<'_, R, C>
+where
+    Known: Room<R, C>,
+{
+    fn set_input(&mut self, pieces: &Pieces) {
+        self.core.set_input(pieces);
+        self.core.resolve();
+        self.jumped();
+    }
+
+    fn advance(&mut self, until: f64) -> bool {
+        let end = self.grid.end();
+        if self.core.trouble.is_none() {
+            let (row, offset) = self.locate(until.min(end));
+            self.reach(row, offset);
+        }
+        self.core.trouble.is_none()
+    }
+
+    fn state(&self) -> State {
+        self.core.state()
+    }
+
+    fn current(&self, drive: usize) -> f64 {
+        self.core.value(&self.core.mechanism.current(drive, &self.core.mode))
+    }
+
+    fn finish(&mut self) -> Outcome {
+        if self.core.trouble.is_none() {
+            // Behind a last, shorter interval it stands at the last row, too.
+            self.go_to(self.grid.intervals());
+            self.put_out();
+        }
+        self.end_shown();
+        self.recorder.finish();
+        self.core.cost.samples = self.recorder.rows;
+        let ending = match (self.core.trouble, self.recorder.flow) {
+            (Some(trouble), _) => trouble,
+            (None, Flow::Stop) => Ending::Interrupted { time: self.core.time() },
+            (None, Flow::Continue) => Ending::Complete,
+        };
+        let core = &mut self.core;
+        core.cost.propagators = super::propagators(&core.known) - core.shared;
+        let error = Some(core.error());
+        Outcome { events: std::mem::take(&mut core.events), ending, cost: std::mem::take(&mut core.cost), error }
+    }
+
+    fn known(&mut self) -> Known {
+        *self.known.list() = std::mem::take(&mut self.core.known);
+        std::mem::take(&mut self.known)
+    }
+}

@@ -1,0 +1,211 @@
+//! Runs: a machine and a recorder, stepped by whoever decides its inputs.
+
+use super::exact::{self, Kernel, Known};
+use super::inputs::Pieces;
+use super::observe::{Observe, Output};
+use super::{Detail, Flow, Outcome, Solver, check, general};
+use crate::case::Experiment;
+use crate::error::{Error, Result};
+use crate::mechanism::{Mechanism, State};
+use crate::signal::Signal;
+use crate::stage::Stage;
+use crate::trajectory::Trajectory;
+use std::sync::Arc;
+
+/// Where a run begins, when it ends, and when there are rows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Start {
+    pub(super) state: State,
+    pub(super) until: f64,
+    pub(super) every: f64,
+}
+
+/// What is done with a mechanism in one run.
+#[derive(Debug, Clone)]
+pub struct Course {
+    /// What is fed into each drive's amplifier.
+    pub inputs: Vec<Signal>,
+    /// The state at time zero.
+    pub start: State,
+    /// End of the run, s.
+    pub until: f64,
+    /// Output interval, s.
+    pub every: f64,
+}
+
+/// A run of one of the solvers.
+pub(super) trait Running {
+    /// Takes up new inputs, now.
+    fn set_input(&mut self, pieces: &Pieces);
+
+    /// Takes up what these signals do from `time`, which is now, on, and says until when that is.
+    fn set_signals(&mut self, signals: &[Signal], time: f64) -> f64 {
+        let pieces = Pieces::of(signals, time);
+        self.set_input(&pieces);
+        pieces.end
+    }
+
+    /// Goes on to `until`, or to the end of the run; false if it ends before.
+    fn advance(&mut self, until: f64) -> bool;
+
+    fn state(&self) -> State;
+
+    fn current(&self, drive: usize) -> f64;
+
+    /// Puts out the last row, if nothing has ended the run before.
+    fn finish(&mut self) -> Outcome;
+
+    /// The modes that it has made ready.
+    fn known(&mut self) -> Known {
+        Known::default()
+    }
+}
+
+/// A run whose inputs are set from outside: a sampled controller's, or those of anything else that answers the motion.
+///
+/// ```
+/// use taut::case::{Case, TEMPLATE};
+/// use taut::solve::{Detail, Ending, Flow, Pieces, Run, Solver};
+/// use taut::stage::axis::CART;
+///
+/// // Full voltage until the cart has gone far enough, looked at every millisecond.
+/// let case = Case::from_text("axis.toml", TEMPLATE)?;
+/// let experiment = &case.experiments[0];
+/// let mut last = 0.0;
+/// let mut sink = |rows: &taut::trajectory::Trajectory| {
+///     last = rows.get("cart_position").unwrap().last().copied().unwrap();
+///     Flow::Continue
+/// };
+/// let mut run = Run::new(&case.stage, experiment, Solver::Exact, Detail::Full, None, &mut sink)?;
+/// let mut time = 0.0;
+/// while time < experiment.until {
+///     let voltage = if run.state().position[CART] < 0.05 { 10.0 } else { 0.0 };
+///     let until = time + 1e-3;
+///     run.set_input(&Pieces::held(&[voltage], time, until));
+///     if !run.advance(until) {
+///         break;
+///     }
+///     time = until;
+/// }
+/// let outcome = run.finish();
+/// assert!(outcome.ending == Ending::Complete && last > 0.05 && last < 0.08);
+/// # Ok::<(), taut::Error>(())
+/// ```
+pub struct Run<'a> {
+    running: Box<dyn Running + 'a>,
+    end: f64,
+}
+
+impl<'a> Run<'a> {
+    /// A run of `experiment` on `stage`; the experiment's own input counts for nothing. Rows go to `sink` in blocks, all that is
+    /// between them to `observer`. Not for the paper's Table 3.
+    pub fn new(
+        stage: &Stage,
+        experiment: &Experiment,
+        solver: Solver,
+        detail: Detail,
+        observer: Option<&'a mut dyn Observe>,
+        sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
+    ) -> Result<Self> {
+        check::stage(stage)?;
+        let mechanism = Arc::new(stage.mechanism());
+        check::experiment(&mechanism, experiment)?;
+        let start = experiment.start(&mechanism);
+        Self::of(&mechanism, &start, (solver, true), Known::default(), Output { detail, sink, observer })
+    }
+
+    /// The same of a mechanism that was checked, with inputs that are smooth or not.
+    pub(super) fn of(
+        mechanism: &Arc<Mechanism>,
+        start: &Start,
+        (solver, straight): (Solver, bool),
+        known: Known,
+        output: Output<'a>,
+    ) -> Result<Self> {
+        let end = start.until;
+        let running: Box<dyn Running + 'a> = match solver {
+            Solver::Exact => {
+                check::piecewise_linear(mechanism)?;
+                let space = exact::Space::new(mechanism, !straight);
+                match Kernel::of(&space) {
+                    Kernel::Straight => {
+                        Box::new(exact::Run::<8, 10>::new(mechanism, space, start, known, output.within()))
+                    }
+                    Kernel::Rotor => {
+                        Box::new(exact::Run::<12, 14>::new(mechanism, space, start, known, output.within()))
+                    }
+                    Kernel::Smooth => {
+                        Box::new(exact::Run::<16, 18>::new(mechanism, space, start, known, output.within()))
+                    }
+                    Kernel::Two => Box::new(exact::Run::<16, 19>::new(mechanism, space, start, known, output.within())),
+                    Kernel::TwoSmooth => {
+                        Box::new(exact::Run::<28, 31>::new(mechanism, space, start, known, output.within()))
+                    }
+                }
+            }
+            Solver::General { tolerance } => {
+                let fastest = check::fastest_rate(mechanism);
+                general::check(fastest, start.until, tolerance)?;
+                Box::new(general::Run::new(mechanism, start, (tolerance, fastest), output.within()))
+            }
+            Solver::Table3 { .. } => {
+                return Err(Error::new("the paper's Table 3 has a fixed step and no sampled input")
+                    .next("take the exact solver, or the general one"));
+            }
+        };
+        Ok(Self { running, end })
+    }
+
+    /// A run of a mechanism that is no stage of an axis. Errors: what the solver does not take.
+    pub fn of_mechanism(
+        mechanism: &Mechanism,
+        course: &Course,
+        solver: Solver,
+        (detail, observer): (Detail, Option<&'a mut dyn Observe>),
+        sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
+    ) -> Result<Self> {
+        check::course(mechanism, course)?;
+        let start = Start { state: course.start, until: course.until, every: course.every };
+        let straight = course.inputs.iter().all(|input| input.degree() <= 1);
+        let output = Output { detail, sink, observer };
+        Self::of(&Arc::new(mechanism.clone()), &start, (solver, straight), Known::default(), output)
+    }
+
+    /// Takes up new inputs, from now on.
+    pub fn set_input(&mut self, pieces: &Pieces) {
+        self.running.set_input(pieces);
+    }
+
+    /// Goes on to `until`, s, or to the end of the run; false if something ended it before.
+    pub fn advance(&mut self, until: f64) -> bool {
+        self.running.advance(until)
+    }
+
+    /// The state now, in angles and positions.
+    pub fn state(&self) -> State {
+        self.running.state()
+    }
+
+    /// The current of a drive's motor now, A.
+    pub fn current(&self, drive: usize) -> f64 {
+        self.running.current(drive)
+    }
+
+    /// Ends the run where it stands, with its last row if it has come that far.
+    pub fn finish(mut self) -> Outcome {
+        self.running.finish()
+    }
+
+    /// Runs to the end along these signals.
+    pub(super) fn along(mut self, signals: &[Signal]) -> (Outcome, Known) {
+        let mut time = 0.0;
+        loop {
+            let until = self.running.set_signals(signals, time);
+            if time >= self.end || !self.running.advance(until) {
+                break;
+            }
+            time = until.min(self.end);
+        }
+        (self.running.finish(), self.running.known())
+    }
+}
