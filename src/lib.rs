@@ -40,9 +40,9 @@
 //! - [`error`]: what is wrong, where, what is allowed, what to do next.
 //! - [`files`]: files that appear whole or not at all. [`number`]: numbers written for people.
 //! - [`quantity`]: `"19.4 mm"` becomes 0.0194, with the dimension checked. Everywhere else numbers are in SI units.
-//! - [`parameter`]: the one table of everything a case file can say.
 //! - [`trajectory`]: columns with units, and their files.
-//! - [`friction`], [`stage`]: what the machine is. [`knob`]: its numbers by their keys.
+//! - [`friction`], [`stage`]: what the machine is.
+//! - [`parameter`]: the one table of everything a case file can say; numbers of a machine that are free.
 //! - [`signal`]: what is fed into it, and the references of its moves. [`design`]: what a controller is, in data.
 //! - [`mechanism`]: a machine as bodies, springs and drives, and its equations of motion, mode by mode.
 //! - [`log`]: measured columns in. [`case`]: the case file in.
@@ -71,7 +71,6 @@ pub mod fit;
 pub mod friction;
 #[cfg(feature = "json")]
 pub mod json;
-pub mod knob;
 pub mod linear;
 pub mod log;
 pub mod measure;

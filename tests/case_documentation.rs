@@ -3,18 +3,19 @@
 use std::fs;
 use std::path::Path;
 use taut::case::Case;
-use taut::parameter::{markdown, sections};
+use taut::parameter::{free_markdown, markdown, sections};
 
 #[test]
 fn the_reference_holds_the_tables_of_the_program() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/case-file.md");
     let text = fs::read_to_string(&path).unwrap();
     let mut updated = text.clone();
-    for section in sections() {
+    let tables = sections().map(|section| (section, markdown(section)));
+    for (section, table) in tables.chain([("free", free_markdown())]) {
         let (begin, end) = (format!("<!-- parameters: {section} -->\n"), "<!-- end -->");
         let from = updated.find(&begin).unwrap_or_else(|| panic!("no table of {section}")) + begin.len();
         let to = from + updated[from..].find(end).expect("an end");
-        updated.replace_range(from..to, &markdown(section));
+        updated.replace_range(from..to, &table);
     }
     if std::env::var_os("UPDATE_EXPECT").is_some() {
         fs::write(&path, &updated).unwrap();

@@ -11,8 +11,8 @@ use taut::case::{Case, Plan, TEMPLATE};
 use taut::control::{Loop, Rows, Standard, stream};
 use taut::design;
 use taut::fit::least_squares::{Bounds, Ending, Options, Residuals, minimise};
-use taut::fit::{Fit, check, fit, inverse_of_square, profiles};
-use taut::knob::Knob;
+use taut::fit::{Estimate, Fit, check, fit, inverse_of_square, profiles};
+use taut::parameter::{Free, values};
 use taut::signal::profile::{Leg, Limits, Profile};
 use taut::solve::{Flow, Solver, simulate};
 use taut::trajectory::Trajectory;
@@ -157,6 +157,63 @@ fn a_machine_is_found_again() {
     assert!((again.stage.cart.mass - found.estimates[2].value).abs() < 1e-12, "{text}");
 }
 
+/// Whatever was fitted, and however the file has it: the file that is written is the machine that was found.
+#[test]
+fn what_is_written_is_the_machine_that_was_found() {
+    const TEXT: &str = r#"
+motor = { torque_constant = "23 mN m/A", back_emf_constant = "23 mV s/rad", resistance = "0.71 ohm" }
+drive_pulley = { teeth = 60, pitch = "2.03 mm", inertia = "6.3e-5 kg m^2", friction = { coulomb = "15 mN m", stribeck = { force = "5 mN m", decay = "4 s^2/rad^2" } } }
+travel = { min = "-0.2 m", max = "0.2 m", stop_stiffness = "20 kN/m" }
+
+[idler_pulley] # remark
+inertia  = { outer_diameter = "38.3 mm", bore_diameter = "6.35 mm", width = "12.7 mm", density = "2.7 g/cm^3" }
+friction = { viscous = 0.001, viscous_backward = 0.001, coulomb = "15 mN m", static = "15 mN m" }
+
+[cart]
+mass     = "0.362 kg"
+friction = { coulomb = "0.2 N", static = "0.3 N", lugre = { stiffness = "100 kN/m", damping = "190 N s/m", velocity = "10 mm/s" }, along = [["-0.1 m", 1], ["0 m", 1.5], ["0.1 m", 1]] }
+
+[belt]
+BELT
+
+[[experiment]]
+name  = "pulse"
+input = { pulse = "5 V", for = "0.25 s" }
+until = "1 s"
+every = "1 ms"
+"#;
+    let plain = recorded(&[], 1, 1e-4);
+    let mut found = fit(&plain, &plan(&["cart.mass"]), None, &mut |_| Flow::Continue).unwrap();
+    let estimate = found.estimates.remove(0);
+    for belt in [
+        "stiffness = [\"132 kN/m\", \"132 kN/m\", \"58 kN/m\"]",
+        "modulus = [{ share = 0.5, modulus = \"6 GPa\" }, { share = 0.5, modulus = \"10 GPa\" }]\n\
+         section = { plain = \"5.5 mm^2\", toothed = \"10.4 mm^2\", toothed_share = 0.5 }\n\
+         spans = [\"0.35 m\", \"0.35 m\", \"0.8 m\"]\ndamping = [1, 1, 2]",
+    ] {
+        let case = Case::from_text("axis.toml", &TEXT.replace("BELT", belt)).unwrap_or_else(|error| panic!("{error}"));
+        let whole = ["belt.stiffness", "belt.damping", "belt.spans", "cart.friction.along.factor"];
+        let keys = values(&case.stage).into_iter().map(|(key, _)| key).chain(whole.map(str::to_string));
+        for key in keys {
+            let Ok(free) = Free::new(&case.stage, &key, &[], &[]) else { continue };
+            let value = if free.start == 0.0 { 0.01 } else { 0.99 * free.start };
+            found.stage = case.stage.clone();
+            free.set(&mut found.stage, value);
+            let sets = free.keys.iter().map(|(key, factor)| (key.clone(), factor * value)).collect();
+            found.estimates = vec![Estimate { name: key.clone(), value, sets, ..estimate.clone() }];
+            let text = found.case_text(&case, "axis.toml".as_ref()).unwrap_or_else(|error| panic!("{key}: {error}"));
+            let written = Case::from_text("fitted.toml", &text).unwrap_or_else(|error| panic!("{key}: {error}"));
+            for ((name, wanted), (_, own)) in values(&found.stage).into_iter().zip(values(&written.stage)) {
+                assert!(
+                    (own - wanted).abs() <= 1e-12 * wanted.abs(),
+                    "{key}: {name} is {own} and not {wanted}\n{text}"
+                );
+            }
+            assert!(text.contains("[idler_pulley] # remark"));
+        }
+    }
+}
+
 #[test]
 fn the_profile_of_what_is_well_known_is_that_of_a_linear_model() {
     let case = recorded(&[], 1, 1e-3);
@@ -182,18 +239,18 @@ fn bounds_hold_for_all_that_is_tied() {
     let stage = Case::from_text("axis.toml", TEMPLATE).unwrap().stage;
     let keys = ["drive_pulley.friction.viscous", "cart.friction.viscous"];
     let ratio = stage.cart.friction.forward.viscous / stage.drive_pulley.friction.forward.viscous;
-    let knob = |bounds: &[(&str, [f64; 2])]| {
+    let parameter = |bounds: &[(&str, [f64; 2])]| {
         let bounds: Vec<(String, [f64; 2])> = bounds.iter().map(|(key, ends)| (key.to_string(), *ends)).collect();
-        Knob::tied(&stage, &keys, &keys, &bounds)
+        Free::new(&stage, &keys.join(" = "), &[], &bounds)
     };
     let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-12, "{a} {b}");
-    let second = knob(&[(keys[1], [10.0, 30.0])]).unwrap();
+    let second = parameter(&[(keys[1], [10.0, 30.0])]).unwrap();
     near(second.low, 10.0 / ratio);
     near(second.high, 30.0 / ratio);
-    let both = knob(&[(keys[0], [0.001, 0.002]), (keys[1], [18.0, 100.0])]).unwrap();
+    let both = parameter(&[(keys[0], [0.001, 0.002]), (keys[1], [18.0, 100.0])]).unwrap();
     near(both.low, 18.0 / ratio);
     near(both.high, 0.002);
-    assert!(knob(&[(keys[1], [30.0, 40.0])]).is_err());
+    assert!(parameter(&[(keys[1], [30.0, 40.0])]).is_err());
 }
 
 /// A log that a controller made is met with the input as logged, and with the controller following its reference again.

@@ -422,7 +422,7 @@ fn plans_that_exclude_themselves_are_told() {
         case.and_then(|case| Sweep::new(&case)).unwrap_err().to_string()
     };
     let both = ["sweep.runs=9", "sweep.vary.\"belt.stiffness\"=20 %", "sweep.vary.\"belt.stiffness.0\"=20 %"];
-    assert!(told(&both).contains("turn the same number"));
+    assert!(told(&both).contains("set the same number"));
     assert!(told(&["sweep.runs=9", "sweep.vary.\"cart.load\"=20 %"]).contains("`cart.load` is 0"));
     assert!(told(&["sweep.runs=9", "sweep.vary.\"cart.mass\"=values(1 kg, 0 kg)"]).contains("above zero"));
     let narrow = "sweep.vary.\"cart.mass\"={ normal = [\"1 kg\", \"1 g\"], within = [\"2 kg\", \"3 kg\"] }";

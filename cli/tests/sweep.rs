@@ -199,7 +199,7 @@ fn mistakes_on_the_command_line_are_told() {
         (vec!["--runs", "20000", "--vary", "all=20%", "--out", "t.csv", "--trajectories"], "would fill the disk"),
         (vec!["--runs", "10", "--vary", "all=20%", "--trajectories"], "--out"),
         (vec!["--runs", "10", "--vary", "all=20%", "--threads", "0"], "a whole number from 1"),
-        (vec!["--runs", "10", "--vary", "cart.mass=20%", "--vary", "total.inertia=20%"], "turn the same number"),
+        (vec!["--runs", "10", "--vary", "cart.mass=20%", "--vary", "total.inertia=20%"], "set the same number"),
         (
             vec!["--indices", "--design", "grid", "--vary", "cart.mass=values(1 kg)"],
             "sensitivity indices cannot be had",

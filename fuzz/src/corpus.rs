@@ -370,9 +370,10 @@ pub fn draws() -> Vec<Seed> {
     let case = fitted();
     let Some(plan) = &case.fit else { unreachable!("the case has a fit") };
     let problem = fit::Problem::new(case, plan).unwrap_or_else(|error| panic!("{error}"));
-    let knobs = &problem.knobs;
-    let headings: Vec<String> = knobs.iter().map(|knob| Column::new(knob.name.clone(), knob.unit).heading()).collect();
-    let middle: Vec<f64> = knobs.iter().map(|knob| knob.start).collect();
+    let parameters = &problem.parameters;
+    let headings: Vec<String> =
+        parameters.iter().map(|parameter| Column::new(parameter.name.clone(), parameter.unit).heading()).collect();
+    let middle: Vec<f64> = parameters.iter().map(|parameter| parameter.start).collect();
     let mut text = format!("chain,draw,{}\n", headings.join(","));
     for k in 0..30 {
         let row: Vec<String> = middle.iter().map(|x| (x * (1.0 + 0.01 * f64::from(k))).to_string()).collect();

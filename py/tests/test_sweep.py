@@ -129,3 +129,16 @@ def test_a_killed_worker_costs_no_row(case, cluster):
         assert np.array_equal(local[name].view(np.uint64), theirs.view(np.uint64)), name
     # As one table, in tasks of a size that is tried.
     same(local, taut.sweep(case, runs, vary=VARY, seed=5, client=cluster))
+
+
+def test_numbers_of_laws_and_lists_are_free(case):
+    law = "cart.friction.lugre"
+    other = case.changed({law: {"stiffness": "100 kN/m", "damping": "190 N s/m", "velocity": "10 mm/s"}})
+    vary = {f"{law}.stiffness": [5e4, 2e5], "belt.stiffness.1": "10 %"}
+    table = other.changed({"experiment.0.until": "2 ms"}).sweep(4, vary=vary, seed=1)
+    assert set(table[f"{law}.stiffness"]) <= {5e4, 2e5} and table.units[f"{law}.stiffness"] == "N/m"
+    with pytest.raises(taut.Error, match="has no value in this case"):
+        case.sweep(4, vary={f"{law}.stiffness": "20 %"})
+    with pytest.raises(taut.Error, match="has no value in this case"):
+        case.changed({"fit.free": [f"{law}.stiffness"]})
+    assert other.changed({"fit.free": [f"{law}.stiffness"]})["fit.free"] == [f"{law}.stiffness"]

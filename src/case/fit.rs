@@ -4,9 +4,10 @@ use super::Experiment;
 use super::reader::{Field, Table, nearest};
 use super::tree::Kind;
 use crate::error::Result;
-use crate::parameter::{self, INPUT, Parameter, Range};
+use crate::parameter::{self, Free, INPUT, Parameter, Range};
+use crate::stage::Stage;
 
-/// What a fit may turn, and how it is done.
+/// What a fit may change, and how it is done.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// Parameters by themselves.
@@ -84,6 +85,14 @@ pub enum Prior {
     },
 }
 
+impl Plan {
+    /// What is searched for: keys, those of a tie joined by ` = `, and sums.
+    pub fn names(&self) -> impl Iterator<Item = String> {
+        let tied = self.tied.iter().map(|keys| keys.join(" = "));
+        self.free.iter().cloned().chain(tied).chain(self.lumped.iter().cloned())
+    }
+}
+
 impl Prior {
     /// The logarithm of its density at `p`, but for a constant, and the derivative of that.
     pub fn log(self, p: f64) -> (f64, f64) {
@@ -130,7 +139,7 @@ pub enum Scope {
     Shared,
 }
 
-pub(super) fn plan(root: &Table, experiments: &[Experiment]) -> Result<Option<Plan>> {
+pub(super) fn plan(root: &Table, stage: &Stage, experiments: &[Experiment]) -> Result<Option<Plan>> {
     let Some(field) = root.optional("fit") else { return Ok(None) };
     let table = field.table()?;
     let known = ["free", "tied", "lumped", "bounds", "priors", "nuisance", "loss", "held_out", "loop"];
@@ -155,6 +164,12 @@ pub(super) fn plan(root: &Table, experiments: &[Experiment]) -> Result<Option<Pl
             return Err(field.fail(format!("`{key}` stands in it twice")).next("name each parameter once"));
         }
         seen.push(key);
+    }
+    for list in ["free", "lumped", "tied"] {
+        for field in table.optional(list).map_or(Ok(Vec::new()), |field| field.list())? {
+            let name = if list == "tied" { words(&field)?.join(" = ") } else { field.text()?.to_string() };
+            self::free(&field, &name, stage)?;
+        }
     }
     let held_out = table.optional("held_out").map_or(Ok(Vec::new()), |field| words(&field))?;
     for name in &held_out {
@@ -215,6 +230,15 @@ fn closed(field: &Field, table: &Table, root: &Table, experiments: &[Experiment]
             .next("leave `delay` and `input_offset` out of `nuisance`; controller.delay is the delay of the loop"));
     }
     Ok(())
+}
+
+/// Refuses a name that is no parameter of this machine.
+pub(super) fn free(field: &Field, name: &str, stage: &Stage) -> Result<()> {
+    Free::new(stage, name, &[], &[]).map(|_| ()).map_err(|error| {
+        let mut told = field.fail(error.what);
+        (told.allowed, told.next) = (error.allowed, error.next);
+        told
+    })
 }
 
 /// Whether a name is meant by a pattern: the name itself, or its beginning and a `*`.
@@ -292,15 +316,14 @@ fn row_of(key: &str) -> Option<Parameter> {
         "delay" => "s",
         "input_offset" => INPUT,
         "input_gain" => "",
-        _ => return parameter::find(key).or_else(|| parameter::find(key.rsplit_once('.')?.0)).copied(),
+        _ => return parameter::named(key).copied(),
     };
     let example = match key {
         "delay" => "2 ms",
         "input_offset" => "0.1 V",
         _ => "1",
     };
-    let default = parameter::Fallback::Required;
-    Some(Parameter { key: "", symbol: "", unit, default, range: Range::ANY, sentence: "", example })
+    Some(Parameter::unwritten(unit, Range::ANY, example))
 }
 
 fn priors(table: &Table, names: &[&str], nuisance: Nuisances) -> Result<Vec<(String, Prior)>> {

@@ -179,15 +179,7 @@ impl<'a> Sources<'a> {
 }
 
 /// A factor or an offset.
-const NUMBER: Parameter = Parameter {
-    key: "",
-    symbol: "",
-    unit: "",
-    default: crate::parameter::Fallback::Required,
-    range: crate::parameter::Range::ANY,
-    sentence: "",
-    example: "",
-};
+const NUMBER: Parameter = Parameter::unwritten("", crate::parameter::Range::ANY, "");
 
 /// How a value of that unit may be written.
 fn example(unit: &str) -> &'static str {

@@ -229,7 +229,7 @@ impl Case {
             _ => experiments(&root, &stage, &folder)?,
         };
         let measurement = measurement::measurement(&root, &stage, &experiments)?;
-        let fit = fit::plan(&root, &experiments)?;
+        let fit = fit::plan(&root, &stage, &experiments)?;
         let tune = tune::tuning(&root, controller.as_ref(), &moves)?;
         let known = tune::known(&root)?;
         let context = sweep::Context {

@@ -2,6 +2,7 @@
 
 use super::tree::{Entry, Kind, Node, Override, Source, equals};
 use crate::error::{Error, Place, Result};
+use crate::parameter;
 use std::path::Path;
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Key, Table, Value};
 
@@ -69,16 +70,16 @@ impl<'a> Change<'a> {
     fn apply(&self, root: &mut Item) -> Result<()> {
         let mut item = root;
         let Some((last, path)) = self.key.split_last() else { return Ok(()) };
-        for (depth, step) in path.iter().enumerate() {
-            item = self.step(item, step, depth)?;
+        let mut depth = 0;
+        while depth < path.len() && !item.is_array() {
+            item = self.step(item, &path[depth], depth)?;
+            depth += 1;
         }
         let fresh = matches!(item, Item::Table(_));
         match item {
-            Item::Value(Value::Array(list)) => {
-                let length = list.len();
-                let slot = last.parse::<usize>().ok().and_then(|i| list.get_mut(i));
-                let Some(slot) = slot else { return Err(self.no_element(last, length)) };
-                replace(slot, self.value.clone());
+            Item::Value(list @ Value::Array(_)) => {
+                let element = self.element(list, depth)?;
+                replace(element, self.value.clone());
             }
             other => {
                 let Some(table) = other.as_table_like_mut() else {
@@ -106,9 +107,6 @@ impl<'a> Change<'a> {
             let Some(index) = index_of(tables, step) else { return Err(self.no_element(step, length)) };
             return item.get_mut(index).ok_or_else(|| self.no_element(step, length));
         }
-        if item.is_array() {
-            return Err(self.fail(format!("`{step}` lies inside a list; set the whole list instead")));
-        }
         let Some(table) = item.as_table_like_mut() else {
             return Err(self.fail(format!("`{step}` cannot be reached: what stands before it is no table")));
         };
@@ -120,6 +118,25 @@ impl<'a> Change<'a> {
             table.insert(step, new);
         }
         table.get_mut(step).ok_or_else(|| self.fail(format!("`{step}` cannot be made")))
+    }
+
+    /// What the key names within `list`, which stands `depth` steps down: the number of an element, and of a point its part.
+    fn element<'v>(&self, list: &'v mut Value, depth: usize) -> Result<&'v mut Value> {
+        let mut value = list;
+        for (place, step) in self.key.iter().enumerate().skip(depth) {
+            value = match value {
+                Value::Array(list) => {
+                    let length = list.len();
+                    let element = place_in_list(step, &self.key[..place]).and_then(|place| list.get_mut(place));
+                    element.ok_or_else(|| self.no_element(step, length))?
+                }
+                Value::InlineTable(table) => table.get_mut(step).ok_or_else(|| {
+                    self.fail(format!("`{step}` does not stand there yet; set what stands before it"))
+                })?,
+                _ => return Err(self.fail(format!("`{step}` cannot be reached: what stands before it is no table"))),
+            };
+        }
+        Ok(value)
     }
 
     fn no_element(&self, step: &str, length: usize) -> Error {
@@ -144,12 +161,28 @@ fn index_of(tables: &ArrayOfTables, step: &str) -> Option<usize> {
     }
 }
 
+/// A key without places in lists.
+fn section(key: &[String]) -> String {
+    let names = key.iter().filter(|step| step.parse::<usize>().is_err());
+    names.map(String::as_str).collect::<Vec<_>>().join(".")
+}
+
+/// The place of `step` in the list that `before` leads to: its number, or in a point the place of the part that the table of
+/// parameters gives this name.
+fn place_in_list(step: &str, before: &[String]) -> Option<usize> {
+    if let Ok(place) = step.parse() {
+        return Some(place);
+    }
+    before.last()?.parse::<usize>().ok()?;
+    parameter::names_in(&section(before)).iter().position(|name| *name == step)
+}
+
 /// Where the value of `key` stands in the changed text, its key included.
 fn find(tree: &Node, key: &[String]) -> Option<std::ops::Range<usize>> {
     let mut node = tree;
     let mut range = node.span.clone();
-    for step in key {
-        let (next, entry) = child(node, step)?;
+    for (place, step) in key.iter().enumerate() {
+        let (next, entry) = child(node, step, &key[..place])?;
         node = next;
         range = match entry {
             Some(entry) => entry.key_span.start..node.span.end.max(entry.key_span.end),
@@ -162,19 +195,25 @@ fn find(tree: &Node, key: &[String]) -> Option<std::ops::Range<usize>> {
 /// The value of `key`, and the key without places in lists.
 pub(super) fn node<'n>(tree: &'n Node, key: &[String]) -> Option<(&'n Node, String)> {
     let (mut node, mut section) = (tree, String::new());
-    for step in key {
-        let (next, entry) = child(node, step)?;
-        node = next;
-        if let Some(entry) = entry {
+    for (place, step) in key.iter().enumerate() {
+        let (next, entry) = child(node, step, &key[..place])?;
+        // A name leads through a table, or is that of a part of a point.
+        let name = match (entry, &node.kind) {
+            (Some(entry), _) => Some(entry.key.as_str()),
+            (None, Kind::List(_)) if step.parse::<usize>().is_err() => Some(step.as_str()),
+            (None, _) => None,
+        };
+        if let Some(name) = name {
             let dot = if section.is_empty() { "" } else { "." };
-            section = format!("{section}{dot}{}", entry.key);
+            section = format!("{section}{dot}{name}");
         }
+        node = next;
     }
     Some((node, section))
 }
 
-/// The entry of a table, or the element of a list by its number or its name.
-fn child<'n>(node: &'n Node, step: &str) -> Option<(&'n Node, Option<&'n Entry>)> {
+/// The entry of a table, or the element of a list by its number or its name; `before` leads to what stands there.
+fn child<'n>(node: &'n Node, step: &str, before: &[String]) -> Option<(&'n Node, Option<&'n Entry>)> {
     match &node.kind {
         Kind::Table(entries) => {
             let entry = entries.iter().find(|e| e.key == step)?;
@@ -189,7 +228,7 @@ fn child<'n>(node: &'n Node, step: &str) -> Option<(&'n Node, Option<&'n Entry>)
             };
             let node = match step.parse::<usize>() {
                 Ok(index) => nodes.get(index)?,
-                Err(_) => nodes.iter().find(by_name)?,
+                Err(_) => nodes.iter().find(by_name).or_else(|| nodes.get(place_in_list(step, before)?))?,
             };
             Some((node, None))
         }

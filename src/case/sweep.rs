@@ -1,11 +1,10 @@
 //! The table of the sweep: what is varied, how, and in how many runs.
 
-use super::fit::{pair, plain, prior_of};
+use super::fit::{free, pair, plain, prior_of};
 use super::reader::{Field, Table};
 use super::tree::{Entry, Kind, Node};
 use super::{Experiment, Folder, InputFile, Known, Plan, Prior};
-use crate::error::{Error, Result};
-use crate::knob::{GROUPS, Knob, parameter_of};
+use crate::error::Result;
 use crate::parameter::{self, Parameter, Range};
 use crate::stage::Stage;
 use std::path::PathBuf;
@@ -233,7 +232,7 @@ fn variation(field: &Field, key: &str, design: Sampling, stage: &Stage) -> Resul
             .allowed("values = [...], grid = [from, to, count] or factors = [...]")
             .next("or take design = \"sobol\""));
     }
-    let number = |field: &Field| match parameter_of(first) {
+    let number = |field: &Field| match parameter::named(first) {
         Some(row) => field.number_of(row),
         None => plain(field, "a number in SI units"),
     };
@@ -273,31 +272,15 @@ fn variation(field: &Field, key: &str, design: Sampling, stage: &Stage) -> Resul
     Ok(Variation { kind, within })
 }
 
-const fn unwritten(range: Range, example: &'static str) -> Parameter {
-    Parameter { key: "", symbol: "", unit: "", default: parameter::Fallback::Required, range, sentence: "", example }
-}
-
-const SHARE: Parameter = unwritten(Range { above: true, below: true, ..Range::new(0.0, 1.0) }, "20 %");
-const FACTOR: Parameter = unwritten(Range::new(1e-6, 1e6), "2");
-const COUNT: Parameter = unwritten(Range::whole(2.0, MOST_VALUES as f64), "11");
+const SHARE: Parameter = Parameter::unwritten("", Range { above: true, below: true, ..Range::new(0.0, 1.0) }, "20 %");
+const FACTOR: Parameter = Parameter::unwritten("", Range::new(1e-6, 1e6), "2");
+const COUNT: Parameter = Parameter::unwritten("", Range::whole(2.0, MOST_VALUES as f64), "11");
 
 /// Refuses names that are no parameter of this machine.
 fn check_key(field: &Field, key: &str, stage: &Stage) -> Result<()> {
-    let told = |error: Error| {
-        let mut told = field.fail(error.what);
-        (told.allowed, told.next) = (error.allowed, error.next);
-        told
-    };
     match key {
         "all" => Ok(()),
-        _ if key.starts_with("total.") => match GROUPS.contains(&key) {
-            true => Knob::lumped(stage, key, &Vec::new()).map(|_| ()).map_err(told),
-            false => Err(field.fail(format!("there is no group `{key}`")).allowed(GROUPS.join(", "))),
-        },
-        _ => {
-            let keys: Vec<&str> = key.split(" = ").collect();
-            Knob::tied(stage, &keys, &keys, &Vec::new()).map(|_| ()).map_err(told)
-        }
+        _ => free(field, key, stage),
     }
 }
 

@@ -29,6 +29,6 @@ mod welch;
 pub use outcome::{Deviation, Figures, MoveRun, Rows, Setup, close, closed_loop, stream};
 pub(crate) use outcome::{follow, tracking};
 pub use sampled::{Controller, Loop, Sample, Seen, measures_cart};
-pub use spread::{Change, PARAMETERS, Worst, spread, worst};
+pub use spread::{Worst, spread, worst};
 pub use standard::Standard;
 pub use welch::power_spectral_density;

@@ -4,55 +4,21 @@ use super::{Loop, Rows, Standard, stream};
 use crate::case::Move;
 use crate::design::Design;
 use crate::error::{Error, Result};
+use crate::parameter::{Free, kinds};
 use crate::solve::{Ending, Flow, Solver};
 use crate::stage::Stage;
 use crate::trajectory::Trajectory;
 
-/// Multiplies a parameter of a stage by a factor.
-pub type Change = fn(&mut Stage, f64);
-
-/// What can be wrong, one at a time, with its name.
-pub const PARAMETERS: [(&str, Change); 14] = [
-    ("torque constant", |s, f| s.motor.torque_constant *= f),
-    ("back-EMF constant", |s, f| s.motor.back_emf_constant *= f),
-    ("resistance", |s, f| s.motor.resistance *= f),
-    ("inductance", |s, f| s.motor.inductance *= f),
-    ("rotor inertia", |s, f| s.motor.rotor_inertia *= f),
-    ("drive pulley's inertia", |s, f| s.drive_pulley.inertia *= f),
-    ("idler pulley's inertia", |s, f| s.idler_pulley.inertia *= f),
-    ("mass", |s, f| s.cart.mass *= f),
-    ("cart's viscous friction", |s, f| viscous(&mut s.cart.friction, f)),
-    ("cart's dry friction", |s, f| dry(&mut s.cart.friction, f)),
-    ("pulleys' viscous friction", |s, f| {
-        viscous(&mut s.drive_pulley.friction, f);
-        viscous(&mut s.idler_pulley.friction, f);
-    }),
-    ("pulleys' dry friction", |s, f| {
-        dry(&mut s.drive_pulley.friction, f);
-        dry(&mut s.idler_pulley.friction, f);
-    }),
-    ("belt's stiffness", |s, f| {
-        s.belt.stiffness = s.belt.stiffness.map(|k| k * f);
-        if let Some(make) = &mut s.belt.make {
-            make.modulus *= f;
-        }
-    }),
-    ("belt's damping", |s, f| s.belt.damping = s.belt.damping.map(|c| c * f)),
-];
-
-/// `stage` with one parameter at a time, those above zero, times 1 + `share` and times 1 − `share`, and what was changed.
+/// `stage` with one thing at a time that may be off, and all that is tied to it by nature, times 1 + `share` and times 1 − `share`;
+/// and what that is.
 pub fn spread(stage: &Stage, share: f64) -> Vec<(String, Stage)> {
-    let mut axes = Vec::new();
-    for (name, change) in PARAMETERS {
-        for (word, factor) in [("more", 1.0 + share), ("less", 1.0 - share)] {
-            let mut other = stage.clone();
-            change(&mut other, factor);
-            if other != *stage {
-                axes.push((format!("{name} {} % {word}", crate::quantity::rounded(100.0 * share)), other));
-            }
-        }
-    }
-    axes
+    let axis = |kind: &Free, word: &str, factor: f64| {
+        let mut other = stage.clone();
+        kind.set(&mut other, factor);
+        (format!("{} {} % {word}", kind.name, crate::quantity::rounded(100.0 * share)), other)
+    };
+    let both = |kind: &Free| [axis(kind, "more", 1.0 + share), axis(kind, "less", 1.0 - share)];
+    kinds(stage).iter().flat_map(both).collect()
 }
 
 /// The worst of axes whose parameters are off.
@@ -108,16 +74,4 @@ pub fn worst(
         worst.last = worst.last.max(run.figures.final_cart_error.abs());
     }
     Ok(Some(worst))
-}
-
-fn viscous(friction: &mut crate::friction::Friction, factor: f64) {
-    friction.forward.viscous *= factor;
-    friction.backward.viscous *= factor;
-}
-
-fn dry(friction: &mut crate::friction::Friction, factor: f64) {
-    for side in [&mut friction.forward, &mut friction.backward] {
-        side.coulomb *= factor;
-        side.breakaway *= factor;
-    }
 }

@@ -266,7 +266,7 @@ fn rows_of(problem: &Problem, idea: &Idea, x: &[f64], noise: &[(Quantity, f64)])
     let here = answer(x)?;
     let mut rows = DMatrix::zeros(here.len(), x.len());
     let mut moved = x.to_vec();
-    for j in 0..problem.knobs.len() {
+    for j in 0..problem.parameters.len() {
         let step = Step::new(x, &bounds, j, &Differences::Central);
         moved[j] = step.first;
         let first = answer(&moved)?;

@@ -1,34 +1,32 @@
 //! The machines that draws from a posterior stand for.
 
-use super::problem::knobs;
+use super::problem::parameters;
 use crate::case::{Case, Plan};
 use crate::error::{Error, Result};
-use crate::knob::{Breakaways, Knob};
 use crate::log::read_columns;
+use crate::parameter::{self, Free};
 use crate::stage::Stage;
 use crate::trajectory::Column;
 use std::path::Path;
 
-/// The machine of `case` with each row of a file of draws: a column for everything that `plan` turns, such as `cart.mass_kg`.
+/// The machine of `case` with each row of a file of draws: a column for everything that `plan` searches for, such as `cart.mass_kg`.
 ///
 /// What is no number of the machine, a log's delay say, is passed over. Errors: a column that is not there, values that are missing.
 pub fn machines(case: &Case, plan: &Plan, file: &Path) -> Result<Vec<Stage>> {
-    let (knobs, columns, breakaways) = drawn(case, plan, file)?;
+    let (parameters, columns) = drawn(case, plan, &[], file)?;
     let machine = |row: usize| {
         let mut stage = case.stage.clone();
-        for (knob, column) in knobs.iter().zip(&columns) {
-            knob.set(&mut stage, column[row]);
-        }
-        breakaways.follow(&mut stage);
+        parameter::set(&mut stage, parameters.iter().zip(columns.iter().map(|column| column[row])));
         stage
     };
     Ok((0..columns.first().map_or(0, Vec::len)).map(machine).collect())
 }
 
-/// The draws themselves: what is turned, its values by draw, and which breakaways go along.
-pub fn drawn(case: &Case, plan: &Plan, file: &Path) -> Result<(Vec<Knob>, Vec<Vec<f64>>, Breakaways)> {
-    let (knobs, breakaways) = knobs(&case.stage, plan)?;
-    let headings: Vec<String> = knobs.iter().map(|knob| Column::new(knob.name.clone(), knob.unit).heading()).collect();
+/// The draws themselves: what is free, and its values by draw. Keys that are set by others do not go along with any of it.
+pub fn drawn(case: &Case, plan: &Plan, others: &[&str], file: &Path) -> Result<(Vec<Free>, Vec<Vec<f64>>)> {
+    let parameters = parameters(&case.stage, plan, others)?;
+    let headings: Vec<String> =
+        parameters.iter().map(|parameter| Column::new(parameter.name.clone(), parameter.unit).heading()).collect();
     let names: Vec<&str> = headings.iter().map(String::as_str).collect();
     let columns = read_columns(file, &names)?;
     if columns.first().is_none_or(Vec::is_empty) {
@@ -37,15 +35,15 @@ pub fn drawn(case: &Case, plan: &Plan, file: &Path) -> Result<(Vec<Knob>, Vec<Ve
             .next("write them with `taut fit --posterior`"));
     }
     // The first wrong draw is told, whichever column it stands in.
-    let wrong = knobs.iter().zip(&columns).zip(&names).filter_map(|((knob, column), heading)| {
-        let row = column.iter().position(|value| !(knob.low..=knob.high).contains(value))?;
-        Some((row, knob, column[row], heading))
+    let wrong = parameters.iter().zip(&columns).zip(&names).filter_map(|((parameter, column), heading)| {
+        let row = column.iter().position(|value| !(parameter.low..=parameter.high).contains(value))?;
+        Some((row, parameter, column[row], heading))
     });
-    if let Some((row, knob, value, heading)) = wrong.min_by_key(|(row, ..)| *row) {
+    if let Some((row, parameter, value, heading)) = wrong.min_by_key(|(row, ..)| *row) {
         return Err(Error::new(format!("draw {} of {heading} is {value}, outside its bounds", row + 1))
             .in_file(file)
-            .allowed(format!("from {} to {}", knob.low, knob.high))
+            .allowed(format!("from {} to {}", parameter.low, parameter.high))
             .next("use the draws of this case's own fit"));
     }
-    Ok((knobs, columns, breakaways))
+    Ok((parameters, columns))
 }

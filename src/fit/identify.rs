@@ -6,7 +6,7 @@
 //! [`SHOWS`], it is not determined.
 
 use super::problem::Problem;
-use crate::knob::{at_pulley, parameter_of, value_of};
+use crate::parameter::{Arm, Free, Sum, named, value};
 use nalgebra::{DMatrix, SVD};
 
 /// Relative standard error from which on a combination counts as not determined.
@@ -27,7 +27,7 @@ const MOST_SWEEPS: usize = 10_000;
 /// What the logs say of the parameters.
 #[derive(Debug, Clone)]
 pub struct Identifiability {
-    /// Names of the parameters, knobs first, then what is shared.
+    /// Names of the free parameters, those of the machine first, then what is shared.
     pub names: Vec<String>,
     /// Root mean square of each parameter's column: by how many standard deviations a change by 100 % moves a value.
     pub sensitivity: Vec<f64>,
@@ -60,7 +60,7 @@ impl Identifiability {
     pub fn new(problem: &Problem, jacobian: &DMatrix<f64>, x: &[f64], deviation: f64) -> Option<Self> {
         let globals = problem.globals();
         let mut own = projected(jacobian, globals)?;
-        let mut names: Vec<String> = problem.knobs.iter().map(|knob| knob.name.clone()).collect();
+        let mut names: Vec<String> = problem.parameters.iter().map(|parameter| parameter.name.clone()).collect();
         names.extend(problem.shared.iter().map(|extra| extra.what.name().to_string()));
         for (j, &x) in x.iter().enumerate().take(globals) {
             own.column_mut(j).scale_mut(problem.whole(j, x) / deviation.max(f64::MIN_POSITIVE));
@@ -138,8 +138,8 @@ impl Identifiability {
                 _ => format!("{} do not show in these logs", listed(&names)),
             };
         }
-        let knobs = members.iter().all(|&j| j < problem.knobs.len());
-        if determined == 1 && knobs {
+        let parameters = members.iter().all(|&j| j < problem.parameters.len());
+        if determined == 1 && parameters {
             // The direction that is left, by powers of what is not hidden.
             let m = members.len();
             let mut left = DMatrix::from_fn(m, m, |a, b| f64::from(a == b) - hidden(members[a], members[b]));
@@ -161,8 +161,8 @@ impl Identifiability {
                     left[(a, best)] / (problem.slope(j, value) * problem.whole(j, x[j]))
                 })
                 .collect();
-            let knobs: Vec<&super::Knob> = members.iter().map(|&j| &problem.knobs[j]).collect();
-            if let Some(sum) = sum_of(&stage, &knobs, &weights) {
+            let parameters: Vec<&Free> = members.iter().map(|&j| &problem.parameters[j]).collect();
+            if let Some(sum) = sum_of(&stage, &parameters, &weights) {
                 return format!("of {} only {sum} is determined", listed(&names));
             }
         }
@@ -201,12 +201,13 @@ impl Identifiability {
         if group.determined == 1 && names.len() > 1 {
             let quoted: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
             choices.push(format!("tie them: tied = [[{}]]", quoted.join(", ")));
-            for (term, lump) in
-                [("viscous", "total.viscous"), ("coulomb", "total.coulomb"), ("inertia", "total.inertia")]
-            {
-                let fits = |name: &&str| name.contains(term) || (term == "inertia" && *name == "cart.mass");
-                if names.iter().all(fits) && !problem.knobs.iter().any(|knob| knob.name == lump) {
-                    choices.push(format!("lump them: lumped = [\"{lump}\"]"));
+            let members = || group.members.iter().map(|&j| problem.parameters.get(j));
+            for sum in [Sum::Viscous, Sum::Coulomb, Sum::Inertia] {
+                let fits = |free: Option<&Free>| {
+                    free.is_some_and(|free| free.keys.iter().all(|(key, _)| sum_with(key) == Some(sum)))
+                };
+                if members().all(fits) && !problem.parameters.iter().any(|free| free.name == sum.name()) {
+                    choices.push(format!("lump them: lumped = [\"{}\"]", sum.name()));
                 }
             }
         }
@@ -231,33 +232,29 @@ fn projected(jacobian: &DMatrix<f64>, n: usize) -> Option<DMatrix<f64>> {
     Some(r.view((all - n, all - n), (n, n)).into_owned())
 }
 
+/// The sum over the bodies that a key is part of.
+fn sum_with(key: &str) -> Option<Sum> {
+    named(key)?.part.map(|(sum, _)| sum).filter(|sum| *sum != Sum::Stiffness)
+}
+
 /// A sum over the bodies that these weights are, in symbols and numbers.
-fn sum_of(stage: &crate::stage::Stage, knobs: &[&super::Knob], weights: &[f64]) -> Option<String> {
-    // Each knob's parameters must be parts of one sum.
-    let kinds = ["viscous", "coulomb", "inertia"];
-    let kind =
-        |key: &str| kinds.iter().position(|kind| key.contains(kind) || (*kind == "inertia" && key == "cart.mass"));
-    let kind_of = kind(&knobs.first()?.keys.first()?.0)?;
+fn sum_of(stage: &crate::stage::Stage, parameters: &[&Free], weights: &[f64]) -> Option<String> {
+    // Each one's keys must be parts of one sum.
+    let sum = sum_with(&parameters.first()?.keys.first()?.0)?;
     let mut parts = Vec::new();
-    let mut value = 0.0;
+    let mut total = 0.0;
     let mut scale = None;
-    for (knob, weight) in knobs.iter().zip(weights) {
+    let arm_and_symbol = |key: &str| -> Option<(Arm, &'static str)> {
+        let row = named(key)?;
+        row.part.filter(|(own, _)| *own == sum).map(|(_, arm)| (arm, row.symbol))
+    };
+    for (free, weight) in parameters.iter().zip(weights) {
         let mut own = 0.0;
-        for (key, factor) in &knob.keys {
-            if kind(key)? != kind_of {
-                return None;
-            }
-            let arm = at_pulley(stage, key);
-            own += factor * arm;
-            let symbol = parameter_of(key).map_or("", |row| row.symbol);
-            parts.push(match key.as_str() {
-                "cart.mass" => format!("r² {symbol}"),
-                _ if key.starts_with("cart.friction.viscous") => format!("r² {symbol}"),
-                _ if key.starts_with("cart.friction") => format!("r {symbol}"),
-                "motor.rotor_inertia" => format!("n² {symbol}"),
-                _ => symbol.to_string(),
-            });
-            value += arm * value_of(stage, key)?;
+        for (key, factor) in &free.keys {
+            let (arm, symbol) = arm_and_symbol(key)?;
+            own += factor * arm.of(stage);
+            parts.push(arm.times(symbol));
+            total += arm.of(stage) * value(stage, key)?;
         }
         // All weights are the same number of times the arms, within a tenth: the belt gives way a little.
         let ratio = weight / own;
@@ -266,34 +263,31 @@ fn sum_of(stage: &crate::stage::Stage, knobs: &[&super::Knob], weights: &[f64]) 
         }
     }
     // What is not searched for and adds to it.
-    let turned = |key: &str| knobs.iter().any(|knob| knob.keys.iter().any(|(own, _)| own == key));
-    let others: &[&str] = match kind_of {
-        0 => &["drive_pulley.friction.viscous", "cart.friction.viscous", "idler_pulley.friction.viscous"],
-        1 => &["drive_pulley.friction.coulomb", "cart.friction.coulomb", "idler_pulley.friction.coulomb"],
-        _ => &["motor.rotor_inertia", "drive_pulley.inertia", "cart.mass", "idler_pulley.inertia"],
-    };
-    for key in others.iter().filter(|key| !turned(key)) {
-        let own = at_pulley(stage, key) * value_of(stage, key).unwrap_or(0.0);
+    let is_free = |key: &str| parameters.iter().any(|free| free.keys.iter().any(|(own, _)| own == key));
+    for row in sum.parts(true).filter(|row| !is_free(row.key)) {
+        let (arm, symbol) = arm_and_symbol(row.key)?;
+        let own = arm.of(stage) * value(stage, row.key).unwrap_or(0.0);
         if own != 0.0 {
-            value += own;
-            let symbol = parameter_of(key).map_or("", |row| row.symbol);
-            let arm = match *key {
-                "cart.mass" | "cart.friction.viscous" => "r² ",
-                "cart.friction.coulomb" => "r ",
-                "motor.rotor_inertia" => "n² ",
-                _ => "",
-            };
-            parts.push(format!("{arm}{symbol}"));
+            total += own;
+            parts.push(arm.times(symbol));
         }
     }
     let motor = &stage.motor;
-    if kind_of == 0 && stage.amplifier.mode == crate::stage::AmplifierMode::Voltage && motor.back_emf_constant != 0.0 {
+    if sum == Sum::Viscous
+        && stage.amplifier.mode == crate::stage::AmplifierMode::Voltage
+        && motor.back_emf_constant != 0.0
+    {
         let n2 = motor.gear_ratio * motor.gear_ratio;
-        value += n2 * motor.torque_constant * motor.back_emf_constant / motor.resistance;
+        total += n2 * motor.torque_constant * motor.back_emf_constant / motor.resistance;
         parts.push(if n2 == 1.0 { "K_t K_e/R".into() } else { "n² K_t K_e/R".into() });
     }
-    let unit = ["N m s", "N m", "kg m²"][kind_of];
-    Some(format!("{} is: {} {unit}", parts.join(" + "), crate::quantity::rounded(value)).replace(" is: ", " = "))
+    let unit = match sum {
+        Sum::Viscous => "N m s",
+        Sum::Coulomb => "N m",
+        Sum::Inertia => "kg m²",
+        Sum::Stiffness => "N/m",
+    };
+    Some(format!("{} = {} {unit}", parts.join(" + "), crate::quantity::rounded(total)))
 }
 
 fn listed(names: &[&str]) -> String {

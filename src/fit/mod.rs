@@ -17,7 +17,6 @@ mod regression;
 mod run;
 mod uncertainty;
 
-pub use crate::knob::{GROUPS, Knob};
 pub use check::{Check, Proposal, check};
 pub use drawn::{drawn, machines};
 pub use identify::{Group, Identifiability, LIMIT};
@@ -30,10 +29,11 @@ pub use regression::{Balance, regression};
 pub use run::{Extra, Nuisance, Run, Seen};
 pub use uncertainty::{Covariance, inverse_of_square, student};
 
-use crate::case::{Case, Plan};
+use crate::case::{Case, Given, Plan};
 use crate::chance;
 use crate::error::{Error, Result};
 use crate::log::Quantity;
+use crate::parameter::{self, Field, Parameter, named, values};
 use crate::solve::{Bench, Flow};
 use crate::stage::Stage;
 use least_squares::{Minimum, Options, Residuals, minimise};
@@ -57,7 +57,7 @@ const TRIAL_ITERATIONS: usize = 12;
 pub struct Fit {
     /// The machine with the estimates.
     pub stage: Stage,
-    /// The estimates: knobs, then what all logs share.
+    /// The estimates: free parameters, then what all logs share.
     pub estimates: Vec<Estimate>,
     /// Correlations of the estimates, row by row; NaN where one is at a bound.
     pub correlation: Vec<Vec<f64>>,
@@ -257,43 +257,46 @@ pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f
 }
 
 impl Fit {
+    /// What is to be changed in the text so that `key` is `value`.
+    fn changes(&self, case: &Case, key: &str, value: f64) -> Vec<String> {
+        let Some(row) = named(key) else { return Vec::new() };
+        let own: Vec<(String, f64)> = values(&self.stage)
+            .into_iter()
+            .filter(|(element, _)| named(element).is_some_and(|other| other.key == row.key))
+            .collect();
+        let is_element = row.key != key;
+        let (listed, given) = (own.len() > 1 || is_element, matches!(case.value(row.key), Ok(Given::List(_))));
+        match key.starts_with("belt.") {
+            // All spans at once, or one of a list that is not there.
+            true if listed && !(is_element && given) => {
+                let spans: Vec<String> = own.iter().map(|(_, value)| value.to_string()).collect();
+                vec![format!("{}=[{}]", row.key, spans.join(", "))]
+            }
+            _ if listed && !is_element => own.iter().map(|(element, value)| format!("{element}={value}")).collect(),
+            _ => vec![format!("{key}={value}")],
+        }
+    }
+
     /// The text of the case with the estimates in place of what they were, and a table of how well they are known. Paths in
     /// it are those of `case`; `name` stands in messages.
     pub fn case_text(&self, case: &Case, name: &Path) -> Result<String> {
-        let mut changes = Vec::new();
-        let mut bodies: Vec<&str> = Vec::new();
-        for (key, value) in self.estimates.iter().flat_map(|estimate| &estimate.sets) {
-            let list = |values: [f64; 3]| format!("[{}, {}, {}]", values[0], values[1], values[2]);
-            changes.push(match key.as_str() {
-                "belt.stiffness" => format!("belt.stiffness={}", list(self.stage.belt.stiffness)),
-                "belt.damping" => format!("belt.damping={}", list(self.stage.belt.damping)),
-                _ => format!("{key}={value}"),
-            });
-            if let Some((body, _)) = key.split_once(".friction.")
-                && !bodies.contains(&body)
-            {
-                bodies.push(body);
-            }
-        }
+        let sets = || self.estimates.iter().flat_map(|estimate| &estimate.sets);
+        let text = without_other_forms(&case.text, sets().map(|(key, _)| key.as_str()));
+        let mut changes: Vec<String> = sets().flat_map(|(key, value)| self.changes(case, key, *value)).collect();
         let read = |changes: &[String]| {
             let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-            Case::from_text_with(name, &case.text, &changes)
+            Case::from_text_with(name, &text, &changes)
         };
         let same = |read: &Result<Case>| read.as_ref().is_ok_and(|read| alike(&read.stage, &self.stage));
         let mut fitted = read(&changes);
         if !same(&fitted) {
             // The other direction, or the breakaway, stands in the text and went with what was fitted.
-            for body in bodies {
-                let law = match body {
-                    "cart" => self.stage.cart.friction,
-                    "drive_pulley" => self.stage.drive_pulley.friction,
-                    _ => self.stage.idler_pulley.friction,
-                };
-                let at = format!("{body}.friction");
-                changes.push(format!("{at}.viscous_backward={}", law.backward.viscous));
-                changes.push(format!("{at}.coulomb_backward={}", law.backward.coulomb));
-                changes.push(format!("{at}.static={}", law.forward.breakaway));
-                changes.push(format!("{at}.static_backward={}", law.backward.breakaway));
+            let is_fitted = |body: &str| sets().any(|(key, _)| key.starts_with(&format!("{body}.friction.")));
+            for (key, value) in values(&self.stage) {
+                let went_along = named(&key).is_some_and(|row| !row.follows.is_empty());
+                if went_along && key.split_once(".friction.").is_some_and(|(body, _)| is_fitted(body)) {
+                    changes.push(format!("{key}={value}"));
+                }
             }
             fitted = read(&changes);
         }
@@ -334,17 +337,35 @@ impl Fit {
     }
 }
 
+/// The text without what says the same as these keys in another form: teeth and pitch beside a radius that was fitted.
+fn without_other_forms<'a>(text: &str, keys: impl Iterator<Item = &'a str>) -> String {
+    let Ok(mut document) = text.parse::<toml_edit::DocumentMut>() else { return text.to_string() };
+    let fitted: Vec<&str> = keys.filter_map(|key| Some(named(key)?.key)).collect();
+    let says = |row: &Parameter, key: &str| match row.field {
+        Field::PartOf(whole) => whole == key && !row.key.starts_with(&format!("{key}.")),
+        Field::Form(of, _) => of == key,
+        Field::Machine(_) | Field::Elsewhere => false,
+    };
+    let mut changed = false;
+    for key in fitted {
+        let same = |row: &&Parameter| says(row, key) || named(key).is_some_and(|own| says(own, row.key));
+        for row in parameter::all().filter(same) {
+            let Some((path, last)) = row.key.rsplit_once('.') else { continue };
+            let mut steps = path.split('.');
+            let table = steps.try_fold(document.as_item_mut(), |item, step| item.get_mut(step));
+            if let Some(table) = table.and_then(toml_edit::Item::as_table_like_mut) {
+                changed |= table.remove(last).is_some();
+            }
+        }
+    }
+    if changed { document.to_string() } else { text.to_string() }
+}
+
 /// Whether two machines are the same but for rounding in text.
 fn alike(a: &Stage, b: &Stage) -> bool {
     let near = |a: f64, b: f64| a == b || (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
-    let sides = |stage: &Stage| {
-        [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction]
-            .into_iter()
-            .flat_map(|law| [law.forward, law.backward])
-            .flat_map(|side| [side.viscous, side.coulomb, side.breakaway])
-            .collect::<Vec<f64>>()
-    };
-    sides(a).into_iter().zip(sides(b)).all(|(a, b)| near(a, b))
+    let (a, b) = (values(a), values(b));
+    a.len() == b.len() && a.iter().zip(&b).all(|((key, a), (other, b))| key == other && near(*a, *b))
 }
 
 /// The first weight of an output that counts.
@@ -409,7 +430,7 @@ fn elsewhere(problem: &Problem, random: &mut Pcg64) -> Vec<f64> {
     let bounds = problem.bounds();
     for (j, x) in x.iter_mut().enumerate().take(problem.globals()) {
         let share = chance::uniform(random);
-        let (low, high) = if j >= problem.knobs.len() {
+        let (low, high) = if j >= problem.parameters.len() {
             (bounds.low[j], bounds.high[j].min(10.0))
         } else if problem.is_log(j) {
             (*x - std::f64::consts::LN_10, *x + std::f64::consts::LN_10)
@@ -487,10 +508,10 @@ fn result(problem: &Problem, best: &Minimum, noise: Vec<(Quantity, f64)>, starts
         None
     };
     let mut estimates = Vec::new();
-    for (j, knob) in problem.knobs.iter().enumerate() {
+    for (j, parameter) in problem.parameters.iter().enumerate() {
         let (x, value) = (best.x[j], problem.value(j, best.x[j]));
         let error = if best.at_bound[j] { None } else { error(j) };
-        let end = |x: f64| problem.value(j, x).clamp(knob.low, knob.high);
+        let end = |x: f64| problem.value(j, x).clamp(parameter.low, parameter.high);
         let interval = match error {
             Some(e) if e.is_finite() => Some([end(x - t * e), end(x + t * e)]),
             Some(_) => Some([f64::NEG_INFINITY, f64::INFINITY]),
@@ -502,19 +523,19 @@ fn result(problem: &Problem, best: &Minimum, noise: Vec<(Quantity, f64)>, starts
             }),
         };
         estimates.push(Estimate {
-            name: knob.name.clone(),
-            unit: knob.unit,
-            start: knob.start,
+            name: parameter.name.clone(),
+            unit: parameter.unit,
+            start: parameter.start,
             value,
             error: error.map(|e| e * problem.slope(j, value)),
             interval,
-            bounds: [knob.low, knob.high],
+            bounds: [parameter.low, parameter.high],
             at_bound: best.at_bound[j],
-            sets: knob.keys.iter().map(|(key, factor)| (key.clone(), factor * value)).collect(),
+            sets: parameter.keys.iter().map(|(key, factor)| (key.clone(), factor * value)).collect(),
         });
     }
     for (i, extra) in problem.shared.iter().enumerate() {
-        let j = problem.knobs.len() + i;
+        let j = problem.parameters.len() + i;
         let value = extra.start + extra.unit * best.x[j];
         let error = if best.at_bound[j] { None } else { error(j).map(|e| e * extra.unit) };
         let unit = match extra.what {

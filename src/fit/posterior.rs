@@ -29,7 +29,7 @@ const DIVERGING: f64 = 0.01;
 /// What was drawn, and whether to believe it.
 #[derive(Debug, Clone)]
 pub struct Posterior {
-    /// What was drawn: knobs, what all logs share, then what each log has of its own.
+    /// What was drawn: parameters, what all logs share, then what each log has of its own.
     pub variables: Vec<Credible>,
     /// How many of them stand among the estimates of the fit, in its order.
     pub globals: usize,
@@ -216,11 +216,11 @@ fn scales<'a>(problem: &'a Problem<'a>) -> Vec<Scale<'a>> {
         _ => "",
     };
     let mut scales = Vec::new();
-    for (j, knob) in problem.knobs.iter().enumerate() {
+    for (j, parameter) in problem.parameters.iter().enumerate() {
         scales.push(Scale {
-            name: knob.name.clone(),
-            unit: knob.unit,
-            known_as: knob.keys.iter().cloned().chain([(knob.name.clone(), 1.0)]).collect(),
+            name: parameter.name.clone(),
+            unit: parameter.unit,
+            known_as: parameter.keys.iter().cloned().chain([(parameter.name.clone(), 1.0)]).collect(),
             value: Box::new(move |x| problem.value(j, x)),
             variable: Box::new(move |value| problem.variable(j, value)),
             slope: Box::new(move |value| problem.slope(j, value)),

@@ -4,8 +4,8 @@ use super::least_squares::{Bounds, Differences, Residuals, Step};
 use super::run::{Extra, Nuisance, Run, Seen, Setting, is_position, rounding_at_rest};
 use crate::case::{Case, Nuisances, Plan, Scope, matches};
 use crate::error::{Error, Result};
-use crate::knob::{Breakaways, Knob};
 use crate::log::Quantity;
+use crate::parameter::{self, Free};
 use crate::solve::Bench;
 use crate::stage::{AmplifierMode, Stage};
 use nalgebra::DMatrix;
@@ -18,8 +18,8 @@ pub(super) const ROUNDING: f64 = 1e-10;
 pub struct Problem<'a> {
     /// The machine as the case has it.
     pub stage: Stage,
-    /// What is turned of it.
-    pub knobs: Vec<Knob>,
+    /// What is searched for of it.
+    pub parameters: Vec<Free>,
     /// What holds for all logs and is no number of the machine.
     pub shared: Vec<Extra>,
     /// The logs that are fitted.
@@ -30,7 +30,6 @@ pub struct Problem<'a> {
     pub simulations: u64,
     units: Vec<Scale>,
     typical: Vec<f64>,
-    breakaways: Breakaways,
     /// Whether to end the work.
     stop: Option<Stop<'a>>,
 }
@@ -49,7 +48,7 @@ impl Noise {
 /// What says that it is enough: Ctrl-C, say.
 pub type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
 
-/// How a variable of the search becomes the value of a knob.
+/// How a variable of the search becomes the value of a free parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Scale {
     /// p = start · eˣ
@@ -86,7 +85,7 @@ impl<'a> Problem<'a> {
     /// What `plan` asks of the logs of `case`.
     pub fn new(case: &Case, plan: &Plan) -> Result<Self> {
         let stage = case.stage.clone();
-        let (knobs, breakaways) = knobs(&stage, plan)?;
+        let parameters = parameters(&stage, plan, &[])?;
         let mut runs = Vec::new();
         let mut held_out = Vec::new();
         for experiment in &case.experiments {
@@ -108,11 +107,10 @@ impl<'a> Problem<'a> {
             ));
         }
         let mut problem = Self {
-            breakaways,
-            units: knobs.iter().map(|knob| scale(&stage, knob, &runs)).collect(),
-            typical: knobs.iter().map(|knob| typical(&stage, knob, &runs)).collect(),
+            units: parameters.iter().map(|parameter| scale(&stage, parameter, &runs)).collect(),
+            typical: parameters.iter().map(|parameter| typical(&stage, parameter, &runs)).collect(),
             stage,
-            knobs,
+            parameters,
             shared: Vec::new(),
             runs,
             held_out,
@@ -288,14 +286,14 @@ impl<'a> Problem<'a> {
         all
     }
 
-    /// Number of variables: knobs, what is shared, and the extras of each run.
+    /// Number of variables: free parameters, what is shared, and the extras of each run.
     pub fn variables(&self) -> usize {
         self.globals() + self.runs.iter().map(|run| variable_extras(run).count()).sum::<usize>()
     }
 
     /// Number of those that concern all runs.
     pub fn globals(&self) -> usize {
-        self.knobs.len() + self.shared.len()
+        self.parameters.len() + self.shared.len()
     }
 
     /// Number of values that count.
@@ -311,17 +309,17 @@ impl<'a> Problem<'a> {
     /// Where the case starts.
     pub fn start(&self) -> Vec<f64> {
         let mut x: Vec<f64> =
-            self.knobs.iter().zip(&self.units).map(|(knob, unit)| unit.variable(knob.start)).collect();
+            self.parameters.iter().zip(&self.units).map(|(parameter, unit)| unit.variable(parameter.start)).collect();
         x.resize(self.variables(), 0.0);
         x
     }
 
     /// The box of the variables.
     pub fn bounds(&self) -> Bounds {
-        let knobs = self.knobs.iter().zip(&self.units);
+        let parameters = self.parameters.iter().zip(&self.units);
         let mut bounds = Bounds {
-            low: knobs.clone().map(|(knob, unit)| unit.variable(knob.low)).collect(),
-            high: knobs.map(|(knob, unit)| unit.variable(knob.high)).collect(),
+            low: parameters.clone().map(|(parameter, unit)| unit.variable(parameter.low)).collect(),
+            high: parameters.map(|(parameter, unit)| unit.variable(parameter.high)).collect(),
         };
         let own = self.runs.iter().flat_map(variable_extras);
         for extra in self.shared.iter().chain(own) {
@@ -331,17 +329,17 @@ impl<'a> Problem<'a> {
         bounds
     }
 
-    /// The value of knob `j` for its variable.
+    /// The value of parameter `j` for its variable.
     pub fn value(&self, j: usize, x: f64) -> f64 {
         self.units[j].value(x)
     }
 
-    /// The variable of knob `j` for its value.
+    /// The variable of parameter `j` for its value.
     pub fn variable(&self, j: usize, value: f64) -> f64 {
         self.units[j].variable(value)
     }
 
-    /// dp/dx of knob `j`.
+    /// dp/dx of parameter `j`.
     pub fn slope(&self, j: usize, value: f64) -> f64 {
         self.units[j].slope(value)
     }
@@ -354,7 +352,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Whether knob `j` is searched for on a logarithmic scale.
+    /// Whether parameter `j` is searched for on a logarithmic scale.
     pub fn is_log(&self, j: usize) -> bool {
         matches!(self.units[j], Scale::Log(_))
     }
@@ -362,10 +360,8 @@ impl<'a> Problem<'a> {
     /// The machine with these values.
     pub fn stage_at(&self, x: &[f64]) -> Stage {
         let mut stage = self.stage.clone();
-        for (j, knob) in self.knobs.iter().enumerate() {
-            knob.set(&mut stage, self.units[j].value(x[j]));
-        }
-        self.breakaways.follow(&mut stage);
+        let units = self.units.iter().zip(x);
+        parameter::set(&mut stage, self.parameters.iter().zip(units.map(|(unit, x)| unit.value(*x))));
         stage
     }
 
@@ -391,7 +387,7 @@ impl<'a> Problem<'a> {
 
     /// Values of what is shared.
     pub fn shared_values(&self, x: &[f64]) -> Vec<f64> {
-        let first = self.knobs.len();
+        let first = self.parameters.len();
         self.shared.iter().enumerate().map(|(i, extra)| extra.start + extra.unit * x[first + i]).collect()
     }
 
@@ -423,24 +419,16 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// What `plan` turns of a machine, and which breakaways follow.
-pub fn knobs(stage: &Stage, plan: &Plan) -> Result<(Vec<Knob>, Breakaways)> {
-    let all: Vec<&str> = plan.free.iter().chain(plan.tied.iter().flatten()).map(String::as_str).collect();
-    let mut knobs = Vec::new();
-    for key in &plan.free {
-        knobs.push(Knob::free(stage, key, &all, &plan.bounds)?);
-    }
-    for keys in &plan.tied {
-        let keys: Vec<&str> = keys.iter().map(String::as_str).collect();
-        knobs.push(Knob::tied(stage, &keys, &all, &plan.bounds)?);
-    }
-    for name in &plan.lumped {
-        knobs.push(Knob::lumped(stage, name, &plan.bounds)?);
-    }
-    if knobs.is_empty() {
+/// What `plan` searches for of a machine of which `others` are set, too.
+pub fn parameters(stage: &Stage, plan: &Plan, others: &[&str]) -> Result<Vec<Free>> {
+    let own = plan.free.iter().chain(plan.tied.iter().flatten()).map(String::as_str);
+    let all: Vec<&str> = own.chain(others.iter().copied()).collect();
+    let parameters =
+        plan.names().map(|name| Free::new(stage, &name, &all, &plan.bounds)).collect::<Result<Vec<_>>>()?;
+    if parameters.is_empty() {
         return Err(Error::new("nothing is searched for").next("add free = [\"cart.mass\"] to [fit]"));
     }
-    Ok((knobs, Breakaways::of(stage, &all)))
+    Ok(parameters)
 }
 
 /// Whether it matters where the cart is, and not only how far it goes.
@@ -476,19 +464,19 @@ fn slope_at_start(run: &Run, r: f64) -> f64 {
     if seen.quantity == Quantity::CartPosition { slope } else { slope * r }
 }
 
-/// The scale on which a knob is searched for.
-fn scale(stage: &Stage, knob: &Knob, runs: &[Run]) -> Scale {
-    if knob.logarithmic() && knob.start > 0.0 {
-        Scale::Log(knob.start)
-    } else if knob.start != 0.0 {
-        Scale::Linear(knob.start.abs())
+/// The scale on which a parameter is searched for.
+fn scale(stage: &Stage, parameter: &Free, runs: &[Run]) -> Scale {
+    if parameter.logarithmic() && parameter.start > 0.0 {
+        Scale::Log(parameter.start)
+    } else if parameter.start != 0.0 {
+        Scale::Linear(parameter.start.abs())
     } else {
-        Scale::Linear(typical(stage, knob, runs))
+        Scale::Linear(typical(stage, parameter, runs))
     }
 }
 
 /// What is much of a quantity that may be zero: of friction a tenth of what the motor gives at the greatest input.
-fn typical(stage: &Stage, knob: &Knob, runs: &[Run]) -> f64 {
+fn typical(stage: &Stage, parameter: &Free, runs: &[Run]) -> f64 {
     let most = runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
     let motor = &stage.motor;
     let per_unit = match stage.amplifier.mode {
@@ -507,14 +495,14 @@ fn typical(stage: &Stage, knob: &Knob, runs: &[Run]) -> f64 {
         })
         .fold(0.0, f64::max)
         .max(1e-3);
-    let unit = match knob.unit {
+    let unit = match parameter.unit {
         "N m" => torque,
         "N" => torque / r,
         "N m s/rad" => torque / speed,
         "N s/m" => torque / (speed * r * r),
         "rad" => 0.01,
         "H" => 1e-3 * motor.resistance,
-        _ if knob.high.is_finite() && knob.high < 1e14 => 0.1 * knob.high.abs().max(knob.low.abs()),
+        _ if parameter.high.is_finite() && parameter.high < 1e14 => 0.1 * parameter.high.abs().max(parameter.low.abs()),
         _ => 1.0,
     };
     if unit > 0.0 && unit.is_finite() { unit } else { 1.0 }

@@ -65,7 +65,7 @@ pub fn profiles(case: &Case, plan: &Plan, fit: &Fit, stop: Option<Stop>) -> Resu
     let most = FEWEST_SIMULATIONS.max(WORK * fit.work.simulations);
     let mut profiles = Vec::new();
     let Some(bottom) = Bottom::new(&mut problem, plan, fit) else { return Ok(profiles) };
-    for j in 0..problem.knobs.len().min(MOST) {
+    for j in 0..problem.parameters.len().min(MOST) {
         if problem.simulations > most || problem.is_stopped() {
             break;
         }

@@ -10,8 +10,8 @@
 
 use super::problem::Problem;
 use super::run::{Run, is_position};
-use crate::knob::{Knob, at_pulley, value_of};
 use crate::log::Quantity;
+use crate::parameter::{Free, Sum, at_pulley, value};
 use crate::stage::{AmplifierMode, Stage};
 use nalgebra::{DMatrix, DVector};
 
@@ -153,54 +153,31 @@ fn derived(values: &[f64], width: f64, h: f64) -> Option<Vec<[f64; 2]>> {
 }
 
 impl Balance {
-    /// The values of the knobs that make the machine's totals those of the balance, where that is a machine of its kind.
+    /// The values of the free parameters that make the machine's totals those of the balance, where that is a machine of its kind.
     pub fn guess(&self, problem: &Problem) -> Vec<f64> {
-        let mut values: Vec<f64> = problem.knobs.iter().map(|knob| knob.start).collect();
-        let sums: [(&[&str], f64); 5] = [
-            (&["motor.rotor_inertia", "drive_pulley.inertia", "cart.mass", "idler_pulley.inertia"], self.inertia),
-            (
-                &["drive_pulley.friction.viscous", "cart.friction.viscous", "idler_pulley.friction.viscous"],
-                self.viscous,
-            ),
-            (
-                &["drive_pulley.friction.coulomb", "cart.friction.coulomb", "idler_pulley.friction.coulomb"],
-                self.coulomb,
-            ),
-            (
-                &[
-                    "drive_pulley.friction.viscous_backward",
-                    "cart.friction.viscous_backward",
-                    "idler_pulley.friction.viscous_backward",
-                ],
-                self.viscous,
-            ),
-            (
-                &[
-                    "drive_pulley.friction.coulomb_backward",
-                    "cart.friction.coulomb_backward",
-                    "idler_pulley.friction.coulomb_backward",
-                ],
-                self.coulomb,
-            ),
-        ];
+        let mut values: Vec<f64> = problem.parameters.iter().map(|parameter| parameter.start).collect();
+        let totals = [(Sum::Inertia, self.inertia), (Sum::Viscous, self.viscous), (Sum::Coulomb, self.coulomb)];
         let stage = &problem.stage;
-        for (keys, wanted) in sums {
-            let own = |knob: &Knob| knob.keys.iter().all(|(key, _)| keys.contains(&key.as_str()));
-            let part = |knob: &Knob| -> f64 {
-                knob.keys.iter().map(|(key, factor)| factor * knob.start * at_pulley(stage, key)).sum()
+        for ((sum, wanted), forward) in totals.into_iter().flat_map(|total| [(total, true), (total, false)]) {
+            let keys: Vec<&str> = sum.parts(forward).map(|row| row.key).collect();
+            let own = |free: &Free| free.keys.iter().all(|(key, _)| keys.contains(&key.as_str()));
+            let part = |free: &Free| -> f64 {
+                free.keys.iter().map(|(key, factor)| factor * free.start * at_pulley(stage, key)).sum()
             };
-            let total: f64 = keys.iter().map(|key| value_of(stage, key).unwrap_or(0.0) * at_pulley(stage, key)).sum();
-            let turned: f64 = problem.knobs.iter().filter(|knob| own(knob)).map(part).sum();
-            let factor = (wanted - (total - turned)) / turned;
-            if turned > 0.0 && factor > 0.02 && factor < 50.0 {
-                for (value, knob) in values.iter_mut().zip(&problem.knobs).filter(|(_, knob)| own(knob)) {
-                    *value = (knob.start * factor).clamp(knob.low, knob.high);
+            let total: f64 = keys.iter().map(|key| value(stage, key).unwrap_or(0.0) * at_pulley(stage, key)).sum();
+            let searched: f64 = problem.parameters.iter().filter(|free| own(free)).map(part).sum();
+            let factor = (wanted - (total - searched)) / searched;
+            if searched > 0.0 && factor > 0.02 && factor < 50.0 {
+                for (value, free) in values.iter_mut().zip(&problem.parameters).filter(|(_, free)| own(free)) {
+                    *value = (free.start * factor).clamp(free.low, free.high);
                 }
             }
         }
-        for (value, knob) in values.iter_mut().zip(&problem.knobs).filter(|(_, knob)| knob.name == "cart.load") {
+        for (value, parameter) in
+            values.iter_mut().zip(&problem.parameters).filter(|(_, parameter)| parameter.name == "cart.load")
+        {
             let other = stage.cart.constant_force() - stage.cart.load;
-            *value = (-self.load / stage.pulley_radius - other).clamp(knob.low, knob.high);
+            *value = (-self.load / stage.pulley_radius - other).clamp(parameter.low, parameter.high);
         }
         values
     }

@@ -11,8 +11,20 @@ impl Along {
     /// From points (x in m, factor), x growing from point to point; `None` where they do not grow, or there are none.
     pub fn new(points: Vec<[f64; 2]>) -> Option<Self> {
         let good = |p: &[f64; 2]| p[0].is_finite() && p[1].is_finite() && p[1] >= 0.0;
-        let grow = points.windows(2).all(|pair| pair[0][0] < pair[1][0]);
-        (!points.is_empty() && grow && points.iter().all(good)).then_some(Self { points })
+        let along = Self { points };
+        (!along.points.is_empty() && along.grows() && along.points.iter().all(good)).then_some(along)
+    }
+
+    /// Whether x grows from point to point, as it must.
+    pub(crate) fn grows(&self) -> bool {
+        self.points.windows(2).all(|pair| pair[0][0] < pair[1][0])
+    }
+
+    /// Sets the position (`part` 0) or the factor (1) of a point. What it makes is checked with the stage.
+    pub(crate) fn set(&mut self, point: usize, part: usize, value: f64) {
+        if let Some(number) = self.points.get_mut(point).and_then(|point| point.get_mut(part)) {
+            *number = value;
+        }
     }
 
     /// The points.

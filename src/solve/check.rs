@@ -7,6 +7,7 @@ use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::{Friction, Law};
 use crate::mechanism::{AmplifierMode, Mechanism, SpringLaw, State};
+use crate::parameter;
 use crate::stage::axis::{CART, DRIVE, LABELS};
 use crate::stage::{BeltModel, Stage};
 use std::f64::consts::PI;
@@ -28,70 +29,46 @@ pub(super) fn stage(stage: &Stage) -> Result<()> {
     let bodies = [stage.drive_pulley.inertia, stage.cart.mass, stage.idler_pulley.inertia];
     let laws = [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction];
 
-    // `Err` for whatever `good` does not hold of; a value that is no number is never good.
-    let all =
-        |what: &str, values: &[f64], good: fn(f64) -> bool, allowed: &str| match values.iter().find(|v| !good(**v)) {
-            Some(value) => Err(Error::new(format!("{what} cannot be {value:e}")).allowed(allowed)),
+    parameter::check(stage)?;
+    // `Err` for whatever is not above zero; a value that is no number is never.
+    let positive =
+        |what: &str, values: &[f64]| match values.iter().find(|value| !(LEAST..=MOST).contains(*value)) {
+            Some(value) => Err(Error::new(format!("{what} cannot be {value:e}"))
+                .allowed("above zero: from 1e-15 to 1e15, in SI units")),
             None => Ok(()),
         };
-    let positive = |what, values: &[f64]| {
-        all(what, values, |v| (LEAST..=MOST).contains(&v), "above zero: from 1e-15 to 1e15, in SI units")
-    };
-    let not_negative =
-        |what, values: &[f64]| all(what, values, |v| (0.0..=MOST).contains(&v), "from 0 to 1e15, in SI units");
-    let finite = |what, values: &[f64]| all(what, values, |v| v.abs() <= MOST, "from -1e15 to 1e15, in SI units");
-
-    positive("a mass or inertia", &bodies)?;
     let rigid = stage.belt.model == BeltModel::Rigid;
     if !rigid {
         positive("the stiffness of a span", &stage.belt.stiffness)?;
     }
-    positive("the pulleys' radius", &[r])?;
-    positive("the armature's resistance", &[motor.resistance])?;
-    positive("the gear ratio", &[motor.gear_ratio])?;
-    all("the gear's efficiency", &[motor.gear_efficiency], |v| (LEAST..=1.0).contains(&v), "above 0, up to 1")?;
-    not_negative("the damping of a span", &stage.belt.damping)?;
-    not_negative("an inductance or the rotor's inertia", &[motor.inductance, motor.rotor_inertia])?;
-    finite("a motor constant", &[motor.torque_constant, motor.back_emf_constant])?;
-    finite("the amplifier's gain", &[stage.amplifier.gain])?;
-    finite("a load or an inclination", &[stage.cart.load, stage.cart.inclination])?;
     let amplifier = &stage.amplifier;
-    for limit in [amplifier.voltage_limit, amplifier.current_limit, amplifier.bandwidth, stage.belt.pretension] {
-        positive("a limit, a bandwidth or a pretension", &limit.map_or([1.0], |limit| [limit]))?;
-    }
-    if let Some(play) = motor.gear_play {
-        positive("the gear's stiffness or the rotor's inertia", &[play.stiffness, motor.rotor_inertia])?;
-        not_negative("the gear's backlash or damping", &[play.backlash, play.damping])?;
+    if motor.gear_play.is_some() {
+        positive("the inertia of a rotor that turns by itself", &[motor.rotor_inertia])?;
         if motor.gear_efficiency != 1.0 {
             return Err(Error::new("a gear that gives way has no efficiency of its own").allowed("an efficiency of 1"));
         }
     }
-    if let Some(travel) = stage.travel {
-        finite("an end of the travel", &[travel.min, travel.max])?;
-        if travel.min >= travel.max {
-            return Err(Error::new("the travel ends before it begins").allowed("max above min"));
-        }
-        if let Some(stop) = travel.stop {
-            positive("the stiffness of an end stop", &[stop.stiffness])?;
-            not_negative("the damping of an end stop", &[stop.damping])?;
-        }
+    if stage.travel.is_some_and(|travel| travel.min >= travel.max) {
+        return Err(Error::new("the travel ends before it begins").allowed("max above min"));
+    }
+    if stage.cart.along.as_ref().is_some_and(|along| !along.grows()) {
+        return Err(Error::new("the positions of cart.friction.along do not grow").allowed("each above the one before"));
     }
     for side in laws.iter().flat_map(|law| [law.forward, law.backward]) {
-        not_negative("friction", &[side.viscous, side.coulomb, side.breakaway])?;
         if side.breakaway < side.coulomb {
             let what = format!("the breakaway cannot be {}, below Coulomb friction", side.breakaway);
             return Err(Error::new(what).allowed(format!("at least {}", side.coulomb)));
+        }
+        if !(0.0..=MOST).contains(&side.breakaway) {
+            return Err(Error::new(format!("the breakaway cannot be {}", side.breakaway))
+                .allowed("from 0 to 1e15, in SI units"));
         }
     }
 
     for (body, law) in laws.into_iter().enumerate() {
         match law.law {
-            Law::Coulomb => {}
-            Law::Stribeck { velocity, .. } => positive("a Stribeck velocity", &[velocity])?,
-            Law::Smooth { breakaway_velocity } => positive("a breakaway velocity", &[breakaway_velocity])?,
-            Law::LuGre { stiffness, damping, velocity } => {
-                positive("a Stribeck velocity, or the bristles' stiffness", &[velocity, stiffness])?;
-                not_negative("the bristles' damping", &[damping])?;
+            Law::Coulomb | Law::Stribeck { .. } | Law::Smooth { .. } => {}
+            Law::LuGre { .. } => {
                 positive("Coulomb friction under bristles", &[law.forward.coulomb, law.backward.coulomb])?;
                 if let Some(along) = stage.cart.along.as_ref().filter(|_| body == CART) {
                     let factors: Vec<f64> = along.points().iter().map(|point| point[1]).collect();

@@ -37,8 +37,8 @@ use crate::case::{Experiment, Move, Sampling};
 use crate::control::{self, MoveRun, Setup};
 use crate::design::Design;
 use crate::error::{Error, Result};
-use crate::knob::{Breakaways, Knob};
 use crate::metrics::{Held, Meter};
+use crate::parameter::{self, Free};
 use crate::solve::{self, Bench, Ending, Flow, Solver};
 use crate::stage::Stage;
 use crate::trajectory::{Column, Trajectory};
@@ -94,8 +94,8 @@ impl Status {
 /// What varies: a number of the machine, and what its value is made from.
 #[derive(Debug, Clone)]
 pub struct Parameter {
-    /// What is turned.
-    pub knob: Knob,
+    /// What is free.
+    pub free: Free,
     /// What values it takes.
     pub distribution: Distribution,
 }
@@ -103,10 +103,9 @@ pub struct Parameter {
 /// The draws of a posterior.
 #[derive(Debug, Clone)]
 struct Draws {
-    knobs: Vec<Knob>,
-    /// By knob and draw.
+    free: Vec<Free>,
+    /// By parameter and draw.
     columns: Vec<Vec<f64>>,
-    breakaways: Breakaways,
 }
 
 /// Many runs of a case.
@@ -117,7 +116,6 @@ pub struct Sweep {
     moves: Vec<Move>,
     controller: Option<Design>,
     parameters: Vec<Parameter>,
-    breakaways: Breakaways,
     draws: Option<Arc<Draws>>,
     points: Points,
     sampling: Sampling,
@@ -171,7 +169,7 @@ impl Sweep {
 
     /// Number of columns before the first experiment's: `run` and the parameters.
     pub fn inputs(&self) -> usize {
-        1 + self.draws.as_ref().map_or(0, |draws| draws.knobs.len()) + self.parameters.len()
+        1 + self.draws.as_ref().map_or(0, |draws| draws.free.len()) + self.parameters.len()
     }
 
     /// The parameters of `count` runs from run `first` on: the first columns of [`Sweep::rows`]. Runs beyond the last are left out.
@@ -190,7 +188,7 @@ impl Sweep {
         let mut values = Vec::with_capacity(self.inputs());
         self.put_values(run, &mut values);
         let mut stage = self.stage.clone();
-        self.turn(&mut stage, run, &values);
+        self.set(&mut stage, run, &values);
         stage
     }
 
@@ -208,7 +206,7 @@ impl Sweep {
             }
             self.put_values(run, &mut values);
             stage.clone_from(&self.stage);
-            self.turn(&mut stage, run, &values);
+            self.set(&mut stage, run, &values);
             let machine = bench.mount(&stage);
             for (experiment, held) in self.experiments.iter().zip(&held) {
                 let mut meter = Meter::with(&stage, *held);
@@ -257,22 +255,15 @@ impl Sweep {
         self.points.put(run, &self.parameters, values);
     }
 
-    /// Turns everything to its value in this run.
-    fn turn(&self, stage: &mut Stage, run: u64, values: &[f64]) {
-        let mut rest = &values[1..];
-        if let Some(draws) = &self.draws {
-            for (knob, value) in draws.knobs.iter().zip(rest) {
-                knob.set(stage, *value);
-            }
-            draws.breakaways.follow(stage);
-            rest = &rest[draws.knobs.len()..];
-        }
-        for (place, (parameter, value)) in self.parameters.iter().zip(rest).enumerate() {
-            if self.points.turns(run, place) {
-                parameter.knob.set(stage, *value);
-            }
-        }
-        self.breakaways.follow(stage);
+    /// Sets everything to its value in this run.
+    fn set(&self, stage: &mut Stage, run: u64, values: &[f64]) {
+        let drawn = self.draws.iter().flat_map(|draws| &draws.free);
+        let varied = self.parameters.iter().enumerate();
+        let free = drawn
+            .map(|free| (free, true))
+            .chain(varied.map(|(place, parameter)| (&parameter.free, self.points.varies(run, place))));
+        let set = free.zip(&values[1..]).filter(|((_, set), _)| *set);
+        parameter::set(stage, set.map(|((free, _), value)| (free, *value)));
     }
 
     /// Refuses a case whose own machine cannot be run.
@@ -320,9 +311,9 @@ fn headings(
     experiments: &[Experiment],
     moves: &[Move],
 ) -> Vec<Column> {
-    let knobs = draws.iter().flat_map(|draws| &draws.knobs).chain(parameters.iter().map(|parameter| &parameter.knob));
+    let free = draws.iter().flat_map(|draws| &draws.free).chain(parameters.iter().map(|parameter| &parameter.free));
     let mut columns = vec![Column::new("run", "")];
-    columns.extend(knobs.map(|knob| Column::new(knob.name.clone(), knob.unit)));
+    columns.extend(free.map(|free| Column::new(free.name.clone(), free.unit)));
     for experiment in experiments {
         put_headings(&experiment.file_name(), OF_EXPERIMENT, &mut columns);
     }

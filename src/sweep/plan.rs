@@ -6,7 +6,7 @@ use super::{DIMENSIONS, Distribution, Draws, Parameter, Sweep, headings};
 use crate::case::{Case, Kinds, Origin, Prior, Sampling, Sweeping, Variation};
 use crate::error::{Error, Result};
 use crate::fit;
-use crate::knob::{Breakaways, Knob, all_keys, parameter_of};
+use crate::parameter::{Free, every, named};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -23,22 +23,19 @@ impl Sweep {
         };
         let stage = case.stage.clone();
         let draws = match &plan.from {
-            Some(Origin::Posterior(file)) => Some(Arc::new(draws(case, file)?)),
+            Some(Origin::Posterior(file)) => Some(Arc::new(draws(case, plan, file)?)),
             _ => None,
         };
         let chosen = chosen(case, plan, draws.as_deref())?;
         let mut parameters = Vec::new();
         let mut changes = Vec::new();
-        for (place, (knob, variation)) in chosen.into_iter().enumerate() {
+        for (place, (free, variation)) in chosen.into_iter().enumerate() {
             if plan.design == Sampling::OneAtATime {
-                changes.extend(around(&knob, &variation).into_iter().map(|value| (place, value)));
+                changes.extend(around(&free, &variation).into_iter().map(|value| (place, value)));
             }
-            let distribution = distribution(&knob, &variation, plan.design)?;
-            parameters.push(Parameter { knob, distribution });
+            let distribution = distribution(&free, &variation, plan.design)?;
+            parameters.push(Parameter { free, distribution });
         }
-        let knobs = parameters.iter().map(|p: &Parameter| &p.knob).chain(draws.iter().flat_map(|draws| &draws.knobs));
-        let keys: Vec<&str> = knobs.flat_map(|knob| &knob.keys).map(|(key, _)| key.as_str()).collect();
-        let breakaways = Breakaways::of(&stage, &keys);
         let dimensions = if plan.indices { 2 * parameters.len() } else { parameters.len() };
         if plan.design == Sampling::Sobol && dimensions > DIMENSIONS {
             return Err(Error::new(format!("{} parameters need {dimensions} dimensions", parameters.len()))
@@ -76,7 +73,6 @@ impl Sweep {
             moves: case.moves.clone(),
             controller: case.controller.clone(),
             parameters,
-            breakaways,
             draws,
             points,
             sampling: plan.design,
@@ -89,33 +85,34 @@ impl Sweep {
     }
 }
 
-/// What is varied by itself, with its knob.
-fn chosen(case: &Case, plan: &Sweeping, draws: Option<&Draws>) -> Result<Vec<(Knob, Variation)>> {
+/// The keys that the plan names.
+fn keys(plan: &Sweeping) -> impl Iterator<Item = &str> {
+    plan.vary.iter().flat_map(|(name, _)| name.split(" = "))
+}
+
+/// What is varied by itself, and how.
+fn chosen(case: &Case, plan: &Sweeping, draws: Option<&Draws>) -> Result<Vec<(Free, Variation)>> {
     let stage = &case.stage;
-    let named: Vec<&str> = plan.vary.iter().flat_map(|(name, _)| name.split(" = ")).collect();
-    let knob = |name: &str| match name.starts_with("total.") {
-        true => Knob::lumped(stage, name, &Vec::new()),
-        false => Knob::tied(stage, &name.split(" = ").collect::<Vec<_>>(), &named, &Vec::new()),
-    };
-    let mut chosen: Vec<(Knob, Variation)> = Vec::new();
+    let drawn = draws.iter().flat_map(|draws| &draws.free).flat_map(|free| &free.keys).map(|(key, _)| key.as_str());
+    let known = case.known.iter().filter(|_| plan.from == Some(Origin::Uncertainty));
+    let all: Vec<&str> = keys(plan).chain(drawn).chain(known.flat_map(|known| known.name.split(" = "))).collect();
+    let free = |name: &str| Free::new(stage, name, &all, &[]);
+    let mut chosen: Vec<(Free, Variation)> = Vec::new();
     for (name, variation) in plan.vary.iter().filter(|(name, _)| name != "all") {
-        let knob = knob(name)?;
-        let others = chosen.iter().map(|(other, _)| other).chain(draws.iter().flat_map(|draws| &draws.knobs));
-        if let Some(other) = others.into_iter().find(|other| other.overlaps(&knob))
+        let free = free(name)?;
+        let others = chosen.iter().map(|(other, _)| other).chain(draws.iter().flat_map(|draws| &draws.free));
+        if let Some(other) = others.into_iter().find(|other| other.overlaps(&free))
             && plan.design != Sampling::OneAtATime
         {
-            return Err(Error::new(format!(
-                "`{}` and `{}` turn the same number of the machine",
-                other.name, knob.name
-            ))
-            .next("leave one of them out of [sweep.vary]"));
+            return Err(Error::new(format!("`{}` and `{}` set the same number of the machine", other.name, free.name))
+                .next("leave one of them out of [sweep.vary]"));
         }
-        chosen.push((knob, variation.clone()));
+        chosen.push((free, variation.clone()));
     }
     if plan.from == Some(Origin::Uncertainty) {
         for known in case.known.iter().filter(|known| known.name.contains('.')) {
-            let knob = knob(&known.name)?;
-            if chosen.iter().any(|(other, _)| other.overlaps(&knob)) {
+            let free = free(&known.name)?;
+            if chosen.iter().any(|(other, _)| other.overlaps(&free)) {
                 continue;
             }
             let Some(deviation) = known.error else {
@@ -125,16 +122,16 @@ fn chosen(case: &Case, plan: &Sweeping, draws: Option<&Draws>) -> Result<Vec<(Kn
                 ))
                 .next(format!("say in [sweep.vary] how \"{}\" varies", known.name)));
             };
-            let prior = Prior::Normal { mean: knob.start, deviation };
-            chosen.push((knob, Variation { kind: Kinds::Drawn(prior), within: None }));
+            let prior = Prior::Normal { mean: free.start, deviation };
+            chosen.push((free, Variation { kind: Kinds::Drawn(prior), within: None }));
         }
     }
     if let Some((_, variation)) = plan.vary.iter().find(|(name, _)| name == "all") {
-        for key in all_keys(stage) {
-            let knob = knob(&key)?;
-            let others = chosen.iter().map(|(other, _)| other).chain(draws.iter().flat_map(|draws| &draws.knobs));
-            if !others.into_iter().any(|other| other.overlaps(&knob)) {
-                chosen.push((knob, variation.clone()));
+        for key in every(stage) {
+            let free = free(&key)?;
+            let others = chosen.iter().map(|(other, _)| other).chain(draws.iter().flat_map(|draws| &draws.free));
+            if !others.into_iter().any(|other| other.overlaps(&free)) {
+                chosen.push((free, variation.clone()));
             }
         }
     }
@@ -142,28 +139,28 @@ fn chosen(case: &Case, plan: &Sweeping, draws: Option<&Draws>) -> Result<Vec<(Kn
 }
 
 /// What a parameter may be: the range in the table of parameters, and what the plan says.
-fn allowed(knob: &Knob, variation: &Variation) -> [f64; 2] {
-    let row = knob.keys.first().and_then(|(key, _)| parameter_of(key)).filter(|_| !knob.name.starts_with("total."));
+fn allowed(free: &Free, variation: &Variation) -> [f64; 2] {
+    let row = free.keys.first().and_then(|(key, _)| named(key)).filter(|_| !free.name.starts_with("total."));
     let [low, high] = row.map_or([0.0, f64::MAX], |row| [row.range.low, row.range.high]);
     let [least, most] = variation.within.unwrap_or([low, high]);
     [low.max(least), high.min(most)]
 }
 
-fn distribution(knob: &Knob, variation: &Variation, design: Sampling) -> Result<Distribution> {
-    let start = knob.start;
-    let within = allowed(knob, variation);
+fn distribution(free: &Free, variation: &Variation, design: Sampling) -> Result<Distribution> {
+    let start = free.start;
+    let within = allowed(free, variation);
     let inside = |values: Vec<f64>| match values.iter().find(|value| !(within[0]..=within[1]).contains(*value)) {
         None => Ok(Distribution::Values(values)),
-        Some(value) => Err(Error::new(format!("`{}` cannot become {value} {}", knob.name, knob.unit))
-            .allowed(format!("from {} to {} {}", within[0], within[1], knob.unit))),
+        Some(value) => Err(Error::new(format!("`{}` cannot become {value} {}", free.name, free.unit))
+            .allowed(format!("from {} to {} {}", within[0], within[1], free.unit))),
     };
     let nothing = || {
-        Error::new(format!("`{}` is 0, of which a share or a multiple is nothing", knob.name))
+        Error::new(format!("`{}` is 0, of which a share or a multiple is nothing", free.name))
             .next("give it values: uniform(least, most), say, or values(a, b)")
     };
     let prior = match &variation.kind {
         // One at a time takes its values from the ends.
-        _ if design == Sampling::OneAtATime => return inside(around(knob, variation)),
+        _ if design == Sampling::OneAtATime => return inside(around(free, variation)),
         Kinds::Values(values) => return inside(values.clone()),
         Kinds::Factors(_) | Kinds::Share(_) if start == 0.0 => return Err(nothing()),
         Kinds::Factors(factors) => return inside(factors.iter().map(|factor| factor * start).collect()),
@@ -174,14 +171,14 @@ fn distribution(knob: &Knob, variation: &Variation, design: Sampling) -> Result<
         Kinds::Drawn(prior) => *prior,
     };
     Distribution::drawn(prior, within).ok_or_else(|| {
-        Error::new(format!("next to nothing of what `{}` is drawn from is allowed", knob.name))
-            .allowed(format!("from {} to {} {}", within[0], within[1], knob.unit))
+        Error::new(format!("next to nothing of what `{}` is drawn from is allowed", free.name))
+            .allowed(format!("from {} to {} {}", within[0], within[1], free.unit))
     })
 }
 
 /// The values that a parameter has one at a time.
-fn around(knob: &Knob, variation: &Variation) -> Vec<f64> {
-    let start = knob.start;
+fn around(free: &Free, variation: &Variation) -> Vec<f64> {
+    let start = free.start;
     match &variation.kind {
         Kinds::Values(values) => values.clone(),
         Kinds::Factors(factors) => factors.iter().map(|factor| factor * start).collect(),
@@ -190,10 +187,10 @@ fn around(knob: &Knob, variation: &Variation) -> Vec<f64> {
     }
 }
 
-fn draws(case: &Case, file: &Path) -> Result<Draws> {
+fn draws(case: &Case, plan: &Sweeping, file: &Path) -> Result<Draws> {
     let Some(fit) = &case.fit else {
         return Err(Error::new("draws of a posterior belong to the parameters of a table [fit], which is missing"));
     };
-    let (knobs, columns, breakaways) = fit::drawn(case, fit, file)?;
-    Ok(Draws { knobs, columns, breakaways })
+    let (free, columns) = fit::drawn(case, fit, &keys(plan).collect::<Vec<_>>(), file)?;
+    Ok(Draws { free, columns })
 }

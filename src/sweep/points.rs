@@ -97,7 +97,7 @@ impl Points {
             }
             Kind::OneAtATime(changes) => {
                 let begin = values.len();
-                values.extend(parameters.iter().map(|parameter| parameter.knob.start));
+                values.extend(parameters.iter().map(|parameter| parameter.free.start));
                 if let Some((place, value)) = run.checked_sub(1).and_then(|change| changes.get(change as usize)) {
                     values[begin + place] = *value;
                 }
@@ -105,8 +105,8 @@ impl Points {
         }
     }
 
-    /// Whether a run turns parameter `place`; one at a time leaves the others exactly as they are.
-    pub fn turns(&self, run: u64, place: usize) -> bool {
+    /// Whether a run sets parameter `place`; one at a time leaves the others exactly as they are.
+    pub fn varies(&self, run: u64, place: usize) -> bool {
         match &self.kind {
             Kind::OneAtATime(changes) => {
                 run.checked_sub(1).and_then(|change| changes.get(change as usize)).is_some_and(|(p, _)| *p == place)

@@ -4,12 +4,11 @@ use super::margins::{Margins, Plant};
 use crate::case::{Case, Tuning};
 use crate::chance::uniform;
 use crate::control::feedback::Feedback;
-use crate::control::{Change, PARAMETERS};
 use crate::design::Design;
 use crate::error::Result;
-use crate::fit::Knob;
 use crate::linear::places;
 use crate::number::engineering;
+use crate::parameter::{self, Free, kinds};
 use crate::stage::Stage;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
@@ -31,41 +30,18 @@ type Step = Box<dyn Fn(&Corner) -> Corner>;
 pub struct Unknown {
     /// Its name.
     pub name: String,
-    /// The least and the most: factors, or values in SI units.
+    /// The least and the most: factors of a spread, values in SI units of a fit.
     pub low: f64,
     /// The most.
     pub high: f64,
-    what: What,
-}
-
-#[derive(Debug, Clone)]
-enum What {
-    Factor(Change),
-    Value(Box<Knob>),
+    free: Free,
 }
 
 impl Unknown {
-    /// Puts it into `stage`: −1 for its least, 1 for its most, 0 for what it is taken for.
-    pub fn set(&self, stage: &mut Stage, off: f64) {
-        if off == 0.0 {
-            return;
-        }
+    /// Its value: `low` for −1, `high` for 1, what it is taken for at 0.
+    fn value(&self, off: f64) -> f64 {
         let end = if off < 0.0 { self.low } else { self.high };
-        match &self.what {
-            What::Factor(change) => change(stage, 1.0 + off.abs() * (end - 1.0)),
-            What::Value(knob) => knob.set(stage, knob.start + off.abs() * (end - knob.start)),
-        }
-    }
-
-    fn words(&self, off: f64) -> String {
-        let end = if off < 0.0 { self.low } else { self.high };
-        match &self.what {
-            What::Factor(_) => format!("{} {:+.0} %", self.name, 100.0 * off.abs() * (end - 1.0)),
-            What::Value(knob) => {
-                let value = knob.start + off.abs() * (end - knob.start);
-                format!("{} {}", self.name, engineering(value, knob.unit, 4))
-            }
-        }
+        self.free.start + off.abs() * (end - self.free.start)
     }
 }
 
@@ -114,35 +90,21 @@ impl Family {
                 let mut unknowns = Vec::new();
                 // What is fitted along with a log has no key.
                 for known in case.known.iter().filter(|known| known.name.contains('.')) {
-                    let tied: Vec<&str> = known.name.split(" = ").collect();
-                    let knob = match known.name.starts_with("total.") {
-                        true => Knob::lumped(&stage, &known.name, &Vec::new())?,
-                        false => Knob::tied(&stage, &tied, &keys, &Vec::new())?,
-                    };
+                    let free = Free::new(&stage, &known.name, &keys, &[])?;
                     // What the fit knows nothing of is off by a share.
                     let [low, high] = known
                         .interval
-                        .unwrap_or([knob.start * (1.0 - SPREAD), knob.start * (1.0 + SPREAD)])
-                        .map(|end| if knob.start > 0.0 { end.max(1e-3 * knob.start) } else { end });
-                    unknowns.push(Unknown { name: known.name.clone(), low, high, what: What::Value(Box::new(knob)) });
+                        .unwrap_or([free.start * (1.0 - SPREAD), free.start * (1.0 + SPREAD)])
+                        .map(|end| if free.start > 0.0 { end.max(1e-3 * free.start) } else { end });
+                    unknowns.push(Unknown { name: known.name.clone(), low, high, free });
                 }
                 (unknowns, Source::Fit)
             }
             given => {
                 let share = given.unwrap_or(SPREAD);
-                let matters = |change: &Change| {
-                    let mut other = stage.clone();
-                    change(&mut other, 1.0 + share);
-                    other != stage
-                };
-                let unknown = |(name, change): (&str, Change)| Unknown {
-                    name: name.to_string(),
-                    low: 1.0 - share,
-                    high: 1.0 + share,
-                    what: What::Factor(change),
-                };
-                let unknowns = PARAMETERS.into_iter().filter(|(_, change)| matters(change)).map(unknown).collect();
-                (unknowns, Source::Spread(share))
+                let (low, high) = (1.0 - share, 1.0 + share);
+                let unknown = |free: Free| Unknown { name: free.name.clone(), low, high, free };
+                (kinds(&stage).into_iter().map(unknown).collect(), Source::Spread(share))
             }
         };
         Ok(Self { places: along(case, tuning.places), loads: tuning.loads.clone(), stage, unknowns, source })
@@ -172,9 +134,8 @@ impl Family {
     /// The machine at a corner.
     pub fn stage_at(&self, corner: &Corner) -> Stage {
         let mut stage = self.stage.clone();
-        for (unknown, &off) in self.unknowns.iter().zip(&corner.off) {
-            unknown.set(&mut stage, off);
-        }
+        let off = self.unknowns.iter().zip(&corner.off).filter(|(_, off)| **off != 0.0);
+        parameter::set(&mut stage, off.map(|(unknown, &off)| (&unknown.free, unknown.value(off))));
         stage.cart.mass += corner.load;
         stage
     }
@@ -200,7 +161,11 @@ impl Family {
 
     /// The corner in words: what is off, the load, the place.
     pub fn words(&self, corner: &Corner) -> String {
-        let off = |(unknown, &off): (&Unknown, &f64)| (off != 0.0).then(|| unknown.words(off));
+        let words = |unknown: &Unknown, off: f64| match self.source {
+            Source::Fit => format!("{} {}", unknown.name, engineering(unknown.value(off), unknown.free.unit, 4)),
+            Source::Spread(_) => format!("{} {:+.0} %", unknown.name, 100.0 * (unknown.value(off) - 1.0)),
+        };
+        let off = |(unknown, &off): (&Unknown, &f64)| (off != 0.0).then(|| words(unknown, off));
         let mut words: Vec<String> = self.unknowns.iter().zip(&corner.off).filter_map(off).collect();
         if self.loads.len() > 1 {
             words.push(format!("load {}", engineering(corner.load, "kg", 4)));

@@ -17,7 +17,7 @@ pub struct Gain {
     pub unit: &'static str,
     /// Its value.
     pub value: f64,
-    /// Whether a search turns it; a current loop's gains follow from its placement alone.
+    /// Whether a search changes it; a current loop's gains follow from its placement alone.
     pub searched: bool,
 }
 
@@ -33,13 +33,13 @@ pub fn gains(design: &Design, stage: &Stage) -> Vec<Gain> {
         value: *value,
         searched,
     };
-    slots(&mut copy).into_iter().map(gain).filter(|gain| gain.value != 0.0).collect()
+    fields(&mut copy).into_iter().map(gain).filter(|gain| gain.value != 0.0).collect()
 }
 
 /// The design with its searched gains multiplied, in the order of [`gains`], by e to these powers.
 pub fn scaled(design: &Design, powers: &[f64]) -> Design {
     let mut other = design.clone();
-    let searched = slots(&mut other).into_iter().filter(|(_, value, searched)| **value != 0.0 && *searched);
+    let searched = fields(&mut other).into_iter().filter(|(_, value, searched)| **value != 0.0 && *searched);
     for ((_, value, _), power) in searched.zip(powers) {
         *value *= power.exp();
     }
@@ -59,7 +59,7 @@ pub fn softer(design: &Design, stage: &Stage, soft: f64) -> Design {
 /// The design with gains of four digits, as they are written.
 pub fn rounded(design: &Design) -> Design {
     let mut other = design.clone();
-    for (_, value, _) in slots(&mut other) {
+    for (_, value, _) in fields(&mut other) {
         if *value != 0.0 && value.is_finite() {
             let decimals = DIGITS - 1 - value.abs().log10().floor() as i32;
             // Through text, so that it is the number that will be read.
@@ -72,7 +72,7 @@ pub fn rounded(design: &Design) -> Design {
     other
 }
 
-fn slots(design: &mut Design) -> Vec<(&'static str, &mut f64, bool)> {
+fn fields(design: &mut Design) -> Vec<(&'static str, &mut f64, bool)> {
     match &mut design.structure {
         Structure::Pid(pid) => vec![
             ("controller.pid.proportional", &mut pid.proportional, true),

@@ -1,138 +1,11 @@
-//! The one table of parameters: every number a case file can hold, with its symbol, unit, default, range and meaning.
-//!
-//! Reading, documentation and everything else that has to know a parameter derive from it.
+//! The rows: every number that a case file can hold.
 
-use crate::quantity::{rounded, shortest};
-use std::fmt::Write;
-
-/// One number of the case file.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Parameter {
-    /// Where it stands: `cart.mass`. An experiment's own number is left out: `experiment.until`.
-    pub key: &'static str,
-    /// Its symbol in the equations; empty where it has none.
-    pub symbol: &'static str,
-    /// Its SI unit; empty for a pure number, [`INPUT`] for what the amplifier takes.
-    pub unit: &'static str,
-    /// What holds when it is not given.
-    pub default: Fallback,
-    /// The values it may take, in SI.
-    pub range: Range,
-    /// What it is.
-    pub sentence: &'static str,
-    /// How it is typically written.
-    pub example: &'static str,
-}
-
-/// The unit of what is fed into the amplifier: V in voltage mode, A in current mode.
-pub const INPUT: &str = "V or A";
-
-/// The unit that a parameter has where the amplifier takes `input` (V or A): its own, or the one of two that fits, the first in volts.
-pub fn unit_for(unit: &'static str, input: &str) -> &'static str {
-    match unit.split_once(" or ") {
-        Some((volts, amperes)) => {
-            if input == "A" {
-                amperes
-            } else {
-                volts
-            }
-        }
-        None => unit,
-    }
-}
-
-/// What holds for a parameter that is not given.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Fallback {
-    /// It has to be given, at least where its table is.
-    Required,
-    /// This value, in SI.
-    Value(f64),
-    /// What the words say, mostly the value of another parameter.
-    Words(&'static str),
-}
-
-/// The values that make sense.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Range {
-    /// The least value.
-    pub low: f64,
-    /// The greatest value.
-    pub high: f64,
-    /// Whether `low` itself is excluded.
-    pub above: bool,
-    /// Whether `high` itself is excluded.
-    pub below: bool,
-    /// Whether only whole numbers will do.
-    pub whole: bool,
-}
-
-impl Range {
-    pub(crate) const fn new(low: f64, high: f64) -> Self {
-        Self { low, high, above: false, below: false, whole: false }
-    }
-
-    /// Above zero, and within what a computer can tell apart.
-    const POSITIVE: Self = Self::new(1e-15, 1e15);
-    /// Zero or above.
-    const NOT_NEGATIVE: Self = Self::new(0.0, 1e15);
-    /// Of either sign.
-    pub(crate) const ANY: Self = Self::new(-1e15, 1e15);
-
-    pub(crate) const fn whole(low: f64, high: f64) -> Self {
-        Self { whole: true, ..Self::new(low, high) }
-    }
-
-    /// Whether `value` lies in it.
-    pub fn contains(&self, value: f64) -> bool {
-        let low = if self.above { value > self.low } else { value >= self.low };
-        let high = if self.below { value < self.high } else { value <= self.high };
-        low && high && (!self.whole || value.fract() == 0.0)
-    }
-
-    /// Whether it goes as far as a seed may.
-    fn is_seed(&self) -> bool {
-        self.whole && self.high == i64::MAX as f64
-    }
-
-    /// In words, with the unit: `from 0 to 1`, `above zero: from 1e-15 kg to 1e15 kg`.
-    pub fn describe(&self, unit: &str) -> String {
-        let with_unit = |v: f64| match unit {
-            "" => rounded(v),
-            _ => format!("{} {unit}", rounded(v)),
-        };
-        if self.is_seed() {
-            return format!("a whole number from 0 to {}", i64::MAX);
-        }
-        let (low, high) = (with_unit(self.low), with_unit(self.high));
-        let whole = if self.whole { "a whole number " } else { "" };
-        match (self.above, self.below) {
-            (false, false) => format!("{whole}from {low} to {high}"),
-            (true, false) => format!("{whole}above {low}, up to {high}"),
-            (false, true) => format!("{whole}from {low}, below {high}"),
-            (true, true) => format!("{whole}above {low} and below {high}"),
-        }
-    }
-
-    /// As short as a table wants it: `> 0`, `≥ 0`, `0 … 1`.
-    fn short(&self) -> String {
-        const FAR: f64 = 1e8;
-        let text = match (self.low, self.high) {
-            (low, high) if low <= -FAR && high >= FAR => "any".to_string(),
-            (low, high) if high >= FAR && low > 0.0 && low < 1e-9 => "> 0".to_string(),
-            (low, _) if self.is_seed() => format!("{} … {}", shortest(low), i64::MAX),
-            (low, high) if high >= FAR => format!("≥ {}", shortest(low)),
-            (low, high) => format!(
-                "{}{} … {}{}",
-                if self.above { "> " } else { "" },
-                shortest(low),
-                if self.below { "< " } else { "" },
-                shortest(high)
-            ),
-        };
-        if self.whole { format!("whole, {text}") } else { text }
-    }
-}
+use super::field::{
+    always, breakaway, make, of_law, of_point, optional, part, set_coulomb, set_of_point, set_stribeck_decay,
+    set_stribeck_force, set_stribeck_velocity, stiffness, stribeck_decay, stribeck_force, stribeck_velocity,
+};
+use super::{Arm, Fallback, Field, INPUT, Off, Parameter, Range, Sum};
+use crate::friction::Law;
 
 const fn row(
     key: &'static str,
@@ -143,9 +16,53 @@ const fn row(
     example: &'static str,
     sentence: &'static str,
 ) -> Parameter {
-    Parameter { key, symbol, unit, default, range, sentence, example }
+    let (field, off) = (Field::Elsewhere, Off::No);
+    Parameter { key, symbol, unit, default, range, sentence, example, field, off, follows: &[], part: None }
 }
 
+impl Parameter {
+    /// A number that stands in no table of its own.
+    pub(crate) const fn unwritten(unit: &'static str, range: Range, example: &'static str) -> Self {
+        row("", "", unit, Fallback::Required, range, example, "")
+    }
+
+    /// It sits there in a machine.
+    const fn at(self, field: Field) -> Self {
+        Self { field, ..self }
+    }
+
+    /// It may be off, with all others of that name.
+    const fn off(self, with: &'static str) -> Self {
+        Self { off: Off::With(with), ..self }
+    }
+
+    /// It may be off by itself, and only where everything is varied.
+    const fn alone(self) -> Self {
+        Self { off: Off::Alone, ..self }
+    }
+
+    /// It goes with the first of these that has the same value.
+    const fn follows(self, keys: &'static [&'static str]) -> Self {
+        Self { follows: keys, ..self }
+    }
+
+    /// It is part of that sum, with that arm.
+    const fn part(self, sum: Sum, arm: Arm) -> Self {
+        Self { part: Some((sum, arm)), ..self }
+    }
+}
+
+/// Rows of a machine whose numbers cannot be free yet: a gantry's.
+const fn elsewhere<const N: usize>(mut rows: [Parameter; N]) -> [Parameter; N] {
+    let mut i = 0;
+    while i < N {
+        rows[i] = Parameter { field: Field::Elsewhere, off: Off::No, part: None, ..rows[i] };
+        i += 1;
+    }
+    rows
+}
+
+use Arm::{Gear, One, Radius};
 use Fallback::{Required, Value, Words};
 
 const ANY: Range = Range::ANY;
@@ -161,173 +78,235 @@ const UP_TO_ONE: Range = Range { above: true, ..Range::new(0.0, 1.0) };
 
 /// Friction of one body: the rows with that body's key, symbols, units and examples.
 macro_rules! friction {
-    ($body:literal, $viscous:literal, $coulomb:literal, $static:literal, $slope:literal, $load:literal,
+    ($key:literal, $body:ident, $whose:literal, $arm:expr, $arm_of_slope:expr, $viscous:literal, $coulomb:literal, $static:literal, $slope:literal, $load:literal,
      $slope_example:literal, $load_example:literal, $static_example:literal,
      $velocity:literal, $velocity_example:literal, $decay:literal, $decay_example:literal,
      $stiffness:literal, $stiffness_example:literal) => {
         [
             row(
-                concat!($body, ".friction.viscous"),
+                concat!($key, ".friction.viscous"),
                 $viscous,
                 $slope,
                 Value(0.0),
                 NOT_NEGATIVE,
                 $slope_example,
                 "Viscous friction: resistance per speed.",
-            ),
+            )
+            .at(always!(|s| s.$body.friction.forward.viscous))
+            .off(concat!($whose, " viscous friction"))
+            .part(Sum::Viscous, $arm_of_slope),
             row(
-                concat!($body, ".friction.coulomb"),
+                concat!($key, ".friction.coulomb"),
                 $coulomb,
                 $load,
                 Value(0.0),
                 NOT_NEGATIVE,
                 $load_example,
                 "Coulomb friction: what resists at any speed.",
-            ),
+            )
+            .at(Field::number(
+                |s, _| Some(s.$body.friction.forward.coulomb),
+                |s, _, value| set_coulomb(&mut s.$body.friction, true, value),
+            ))
+            .off(concat!($whose, " dry friction"))
+            .part(Sum::Coulomb, $arm),
             row(
-                concat!($body, ".friction.static"),
+                concat!($key, ".friction.static"),
                 $static,
                 $load,
                 Words("as `coulomb`, on each side"),
                 NOT_NEGATIVE,
                 $static_example,
                 "Breakaway: what it holds at rest before it slides; at least `coulomb`.",
-            ),
+            )
+            .at(Field::number(
+                |s, _| breakaway(&s.$body.friction, true),
+                |s, _, value| s.$body.friction.forward.breakaway = value,
+            ))
+            .off(concat!($whose, " dry friction"))
+            .follows(&[concat!($key, ".friction.coulomb")]),
             row(
-                concat!($body, ".friction.viscous_backward"),
+                concat!($key, ".friction.viscous_backward"),
                 $viscous,
                 $slope,
                 Words("as `viscous`"),
                 NOT_NEGATIVE,
                 $slope_example,
                 "Viscous friction in the negative direction.",
-            ),
+            )
+            .at(always!(|s| s.$body.friction.backward.viscous))
+            .off(concat!($whose, " viscous friction"))
+            .follows(&[concat!($key, ".friction.viscous")])
+            .part(Sum::Viscous, $arm_of_slope),
             row(
-                concat!($body, ".friction.coulomb_backward"),
+                concat!($key, ".friction.coulomb_backward"),
                 $coulomb,
                 $load,
                 Words("as `coulomb`"),
                 NOT_NEGATIVE,
                 $load_example,
                 "Coulomb friction in the negative direction.",
-            ),
+            )
+            .at(Field::number(
+                |s, _| Some(s.$body.friction.backward.coulomb),
+                |s, _, value| set_coulomb(&mut s.$body.friction, false, value),
+            ))
+            .off(concat!($whose, " dry friction"))
+            .follows(&[concat!($key, ".friction.coulomb")])
+            .part(Sum::Coulomb, $arm),
             row(
-                concat!($body, ".friction.static_backward"),
+                concat!($key, ".friction.static_backward"),
                 $static,
                 $load,
                 Words("as `static`; without it as `coulomb_backward`"),
                 NOT_NEGATIVE,
                 $static_example,
                 "Breakaway in the negative direction; at least `coulomb_backward`.",
-            ),
+            )
+            .at(Field::number(
+                |s, _| breakaway(&s.$body.friction, false),
+                |s, _, value| s.$body.friction.backward.breakaway = value,
+            ))
+            .off(concat!($whose, " dry friction"))
+            .follows(&[concat!($key, ".friction.static"), concat!($key, ".friction.coulomb_backward")]),
             row(
-                concat!($body, ".friction.stribeck.force"),
+                concat!($key, ".friction.stribeck.force"),
                 "F_s",
                 $load,
                 Required,
                 NOT_NEGATIVE,
                 $load_example,
                 "By how much the breakaway exceeds `coulomb`, on each side, eq. (14); instead of `static`.",
-            ),
+            )
+            .at(Field::number(
+                |s, _| stribeck_force(&s.$body.friction),
+                |s, _, value| set_stribeck_force(&mut s.$body.friction, value),
+            ))
+            .off(concat!($whose, " dry friction")),
             row(
-                concat!($body, ".friction.stribeck.decay"),
+                concat!($key, ".friction.stribeck.decay"),
                 "F_τ",
                 $decay,
                 Words("from `velocity`"),
                 POSITIVE,
                 $decay_example,
                 "How fast that excess is gone: e^(−F_τ v²), eq. (14); 1 / velocity².",
-            ),
+            )
+            .at(Field::form(
+                concat!($key, ".friction.stribeck.velocity"),
+                |s, _| stribeck_decay(&s.$body.friction),
+                |s, _, value| set_stribeck_decay(&mut s.$body.friction, value),
+            )),
             row(
-                concat!($body, ".friction.stribeck.velocity"),
+                concat!($key, ".friction.stribeck.velocity"),
                 "v_s",
                 $velocity,
                 Words("from `decay`"),
                 POSITIVE,
                 $velocity_example,
                 "Speed at which 1/e of it is left. With `shape = \"exponential\"` it goes as e^(−v/v_s), else as e^(−(v/v_s)²).",
-            ),
+            )
+            .at(Field::number(
+                |s, _| stribeck_velocity(&s.$body.friction),
+                |s, _, value| set_stribeck_velocity(&mut s.$body.friction, value),
+            ))
+            .off(concat!($whose, " Stribeck velocity")),
             row(
-                concat!($body, ".friction.smooth.breakaway_velocity"),
+                concat!($key, ".friction.smooth.breakaway_velocity"),
                 "v_b",
                 $velocity,
                 Required,
                 POSITIVE,
                 $velocity_example,
                 "Speed at which a smooth law peaks, near `static`; it never sticks (Simscape's law).",
-            ),
+            )
+            .at(of_law!($body, Smooth, breakaway_velocity))
+            .off(concat!($whose, " breakaway velocity")),
             row(
-                concat!($body, ".friction.lugre.stiffness"),
+                concat!($key, ".friction.lugre.stiffness"),
                 "σ₀",
                 $stiffness,
                 Required,
                 POSITIVE,
                 $stiffness_example,
                 "Stiffness of the bristles, which hold where others stick.",
-            ),
+            )
+            .at(of_law!($body, LuGre, stiffness))
+            .off(concat!($whose, " bristles' stiffness")),
             row(
-                concat!($body, ".friction.lugre.damping"),
+                concat!($key, ".friction.lugre.damping"),
                 "σ₁",
                 $slope,
                 Required,
                 NOT_NEGATIVE,
                 $slope_example,
                 "Damping of the bristles.",
-            ),
+            )
+            .at(of_law!($body, LuGre, damping))
+            .off(concat!($whose, " bristles' damping")),
             row(
-                concat!($body, ".friction.lugre.velocity"),
+                concat!($key, ".friction.lugre.velocity"),
                 "v_s",
                 $velocity,
                 Required,
                 POSITIVE,
                 $velocity_example,
                 "Stribeck velocity of the way from `static` to `coulomb`.",
-            ),
+            )
+            .at(of_law!($body, LuGre, velocity))
+            .off(concat!($whose, " Stribeck velocity")),
         ]
     };
 }
 
 /// Inertia of one pulley: given, or from its geometry.
 macro_rules! pulley {
-    ($body:literal, $inertia:literal) => {
+    ($body:ident, $inertia:literal) => {
         [
             row(
-                concat!($body, ".inertia"),
+                concat!(stringify!($body), ".inertia"),
                 $inertia,
                 "kg m^2",
                 Required,
                 POSITIVE,
                 "6.3e-5 kg m^2",
                 "Moment of inertia about its axis; or a table with the four rows below.",
-            ),
+            )
+            .at(always!(|s| s.$body.inertia))
+            .off("pulleys' inertia")
+            .part(Sum::Inertia, One),
             row(
-                concat!($body, ".inertia.outer_diameter"),
+                concat!(stringify!($body), ".inertia.outer_diameter"),
                 "d_o",
                 "m",
                 Required,
                 POSITIVE,
                 "38.3 mm",
                 "Outer diameter of the hollow cylinder that stands for the pulley.",
-            ),
+            )
+            .at(Field::PartOf(concat!(stringify!($body), ".inertia"))),
             row(
-                concat!($body, ".inertia.bore_diameter"),
+                concat!(stringify!($body), ".inertia.bore_diameter"),
                 "d_i",
                 "m",
                 Value(0.0),
                 NOT_NEGATIVE,
                 "6.35 mm",
                 "Diameter of its bore; smaller than the outer one.",
-            ),
-            row(concat!($body, ".inertia.width"), "w", "m", Required, POSITIVE, "12.7 mm", "Its width."),
+            )
+            .at(Field::PartOf(concat!(stringify!($body), ".inertia"))),
+            row(concat!(stringify!($body), ".inertia.width"), "w", "m", Required, POSITIVE, "12.7 mm", "Its width.")
+                .at(Field::PartOf(concat!(stringify!($body), ".inertia"))),
             row(
-                concat!($body, ".inertia.density"),
+                concat!(stringify!($body), ".inertia.density"),
                 "ρ",
                 "kg/m^3",
                 Required,
                 POSITIVE,
                 "2.7 g/cm^3",
                 "Density of its material.",
-            ),
+            )
+            .at(Field::PartOf(concat!(stringify!($body), ".inertia"))),
         ]
     };
 }
@@ -369,75 +348,118 @@ macro_rules! channel {
 
 #[rustfmt::skip]
 const MOTOR: &[Parameter] = &[
-    row("motor.torque_constant", "K_t", "N m/A", Required, NOT_NEGATIVE, "23 mN m/A", "Torque per ampere, at the motor's own shaft."),
-    row("motor.back_emf_constant", "K_e", "V s/rad", Required, NOT_NEGATIVE, "23 mV s/rad", "Voltage per speed, at the motor's own shaft."),
-    row("motor.resistance", "R", "ohm", Required, POSITIVE, "0.71 ohm", "Resistance of the armature."),
-    row("motor.inductance", "L", "H", Value(0.0), NOT_NEGATIVE, "0.66 mH", "Inductance of the armature; with 0 the current follows the voltage at once."),
-    row("motor.rotor_inertia", "J_r", "kg m^2", Value(0.0), NOT_NEGATIVE, "4.2e-6 kg m^2", "Inertia of the rotor, at the motor's own shaft."),
-    row("motor.gear_ratio", "n", "", Value(1.0), Range::new(1e-6, 1e6), "5.9", "Motor turns per turn of the drive pulley."),
-    row("motor.gear_efficiency", "η", "", Value(1.0), UP_TO_ONE, "0.73", "The part of the power that passes the gear, whichever side drives."),
-    row("motor.backlash", "2α", "rad", Value(0.0), Range { below: true, ..Range::new(0.0, 6.3) }, "0.5 deg", "Play of the gear: by how much the drive pulley can turn while the rotor stands. Needs `gear_stiffness`."),
-    row("motor.gear_stiffness", "k_g", "N m/rad", Words("stiff"), POSITIVE, "300 N m/rad", "Stiffness of the gear between rotor and drive pulley, at the pulley; makes the rotor an inertia of its own."),
-    row("motor.gear_damping", "c_g", "N m s/rad", Value(0.0), NOT_NEGATIVE, "0.01 N m s", "Damping of the gear where its flanks touch, at the pulley."),
+    row("motor.torque_constant", "K_t", "N m/A", Required, NOT_NEGATIVE, "23 mN m/A", "Torque per ampere, at the motor's own shaft.")
+        .at(always!(|s| s.motor.torque_constant)).off("motor constants"),
+    row("motor.back_emf_constant", "K_e", "V s/rad", Required, NOT_NEGATIVE, "23 mV s/rad", "Voltage per speed, at the motor's own shaft.")
+        .at(always!(|s| s.motor.back_emf_constant)).off("motor constants"),
+    row("motor.resistance", "R", "ohm", Required, POSITIVE, "0.71 ohm", "Resistance of the armature.")
+        .at(always!(|s| s.motor.resistance)).off("resistance"),
+    row("motor.inductance", "L", "H", Value(0.0), NOT_NEGATIVE, "0.66 mH", "Inductance of the armature; with 0 the current follows the voltage at once.")
+        .at(always!(|s| s.motor.inductance)).off("inductance"),
+    row("motor.rotor_inertia", "J_r", "kg m^2", Value(0.0), NOT_NEGATIVE, "4.2e-6 kg m^2", "Inertia of the rotor, at the motor's own shaft.")
+        .at(always!(|s| s.motor.rotor_inertia)).off("rotor inertia").part(Sum::Inertia, Gear(2)),
+    row("motor.gear_ratio", "n", "", Value(1.0), Range::new(1e-6, 1e6), "5.9", "Motor turns per turn of the drive pulley.")
+        .at(always!(|s| s.motor.gear_ratio)),
+    row("motor.gear_efficiency", "η", "", Value(1.0), UP_TO_ONE, "0.73", "The part of the power that passes the gear, whichever side drives.")
+        .at(Field::number(
+            |s, _| s.motor.gear_play.is_none().then_some(s.motor.gear_efficiency),
+            |s, _, value| s.motor.gear_efficiency = value,
+        )),
+    row("motor.backlash", "2α", "rad", Value(0.0), Range { below: true, ..Range::new(0.0, 6.3) }, "0.5 deg", "Play of the gear: by how much the drive pulley can turn while the rotor stands. Needs `gear_stiffness`.")
+        .at(part!(|s| s.motor.gear_play, &mut s.motor.gear_play => backlash)).off("gear's backlash"),
+    row("motor.gear_stiffness", "k_g", "N m/rad", Words("stiff"), POSITIVE, "300 N m/rad", "Stiffness of the gear between rotor and drive pulley, at the pulley; makes the rotor an inertia of its own.")
+        .at(part!(|s| s.motor.gear_play, &mut s.motor.gear_play => stiffness)).off("gear's stiffness"),
+    row("motor.gear_damping", "c_g", "N m s/rad", Value(0.0), NOT_NEGATIVE, "0.01 N m s", "Damping of the gear where its flanks touch, at the pulley.")
+        .at(part!(|s| s.motor.gear_play, &mut s.motor.gear_play => damping)).off("gear's damping"),
 ];
 
 #[rustfmt::skip]
 const AMPLIFIER: &[Parameter] = &[
-    row("amplifier.gain", "", "", Value(1.0), ANY, "1", "Output, V or A, per unit of input; negative where the wires are swapped."),
-    row("amplifier.voltage_limit", "V_max", "V", Words("none"), POSITIVE, "24 V", "Largest voltage at the motor's terminals, either way."),
-    row("amplifier.current_limit", "I_max", "A", Words("none"), POSITIVE, "12 A", "Largest current, either way."),
-    row("amplifier.bandwidth", "f_b", "Hz", Words("none: the current follows at once"), FREQUENCY, "1 kHz", "Bandwidth of the current loop, first order; only in current mode."),
+    row("amplifier.gain", "", "", Value(1.0), ANY, "1", "Output, V or A, per unit of input; negative where the wires are swapped.")
+        .at(always!(|s| s.amplifier.gain)),
+    row("amplifier.voltage_limit", "V_max", "V", Words("none"), POSITIVE, "24 V", "Largest voltage at the motor's terminals, either way.")
+        .at(optional!(|s| s.amplifier.voltage_limit)),
+    row("amplifier.current_limit", "I_max", "A", Words("none"), POSITIVE, "12 A", "Largest current, either way.")
+        .at(optional!(|s| s.amplifier.current_limit)),
+    row("amplifier.bandwidth", "f_b", "Hz", Words("none: the current follows at once"), FREQUENCY, "1 kHz", "Bandwidth of the current loop, first order; only in current mode.")
+        .at(optional!(|s| s.amplifier.bandwidth)).off("current loop's bandwidth"),
 ];
 
 #[rustfmt::skip]
 const RADIUS: &[Parameter] = &[
-    row("drive_pulley.radius", "r", "m", Words("from `teeth` and `pitch`"), POSITIVE, "19.4 mm", "Pitch radius, the same for both pulleys."),
-    row("drive_pulley.teeth", "z", "", Words("not used with `radius`"), Range::whole(1.0, 1e6), "60", "Number of teeth or grooves; instead of `radius`, with `pitch`."),
-    row("drive_pulley.pitch", "p", "m", Words("not used with `radius`"), POSITIVE, "2.03 mm", "Distance from tooth to tooth along the belt."),
+    row("drive_pulley.radius", "r", "m", Words("from `teeth` and `pitch`"), POSITIVE, "19.4 mm", "Pitch radius, the same for both pulleys.")
+        .at(always!(|s| s.pulley_radius)).alone(),
+    row("drive_pulley.teeth", "z", "", Words("not used with `radius`"), Range::whole(1.0, 1e6), "60", "Number of teeth or grooves; instead of `radius`, with `pitch`.")
+        .at(Field::PartOf("drive_pulley.radius")),
+    row("drive_pulley.pitch", "p", "m", Words("not used with `radius`"), POSITIVE, "2.03 mm", "Distance from tooth to tooth along the belt.")
+        .at(Field::PartOf("drive_pulley.radius")),
 ];
 
 #[rustfmt::skip]
 const CART: &[Parameter] = &[
-    row("cart.mass", "M", "kg", Required, POSITIVE, "0.362 kg", "Mass of the cart with its load."),
-    row("cart.load", "F_L", "N", Value(0.0), ANY, "-3 N", "Constant force on the cart, positive towards larger x."),
-    row("cart.inclination", "θ", "rad", Value(0.0), Range::new(-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2), "10 deg", "Inclination of the axis, positive if the cart climbs towards larger x; adds −M g sin θ to the load."),
+    row("cart.mass", "M", "kg", Required, POSITIVE, "0.362 kg", "Mass of the cart with its load.")
+        .at(always!(|s| s.cart.mass)).off("mass").part(Sum::Inertia, Radius(2)),
+    row("cart.load", "F_L", "N", Value(0.0), ANY, "-3 N", "Constant force on the cart, positive towards larger x.")
+        .at(always!(|s| s.cart.load)).off("load"),
+    row("cart.inclination", "θ", "rad", Value(0.0), Range::new(-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2), "10 deg", "Inclination of the axis, positive if the cart climbs towards larger x; adds −M g sin θ to the load.")
+        .at(always!(|s| s.cart.inclination)),
 ];
 
 #[rustfmt::skip]
 const BELT: &[Parameter] = &[
     row("belt.stiffness", "k₁ k₂ k₃", "N/m", Words("from `modulus`, `section` and `spans`"), POSITIVE, "132.76 kN/m",
-        "Stiffness of each span: drive pulley to cart, cart to idler pulley, and the way back. Three values in a list."),
+        "Stiffness of each span: drive pulley to cart, cart to idler pulley, and the way back. Three values in a list.")
+        .at(Field::spans(|s, span| stiffness(&s.belt, span), |s, span, value| s.belt.stiffness[span] = value))
+        .off("belt's stiffness").part(Sum::Stiffness, One),
     row("belt.modulus", "E", "Pa", Words("not used with `stiffness`"), POSITIVE, "8.335 GPa",
-        "Modulus of elasticity, eq. (11); or a list of parts, each `{ share, modulus }`, for a composite."),
-    row("belt.modulus.share", "", "", Required, UP_TO_ONE, "1/3", "Share of the section that is of this material; all shares add up to 1."),
-    row("belt.modulus.modulus", "E", "Pa", Required, POSITIVE, "50 GPa", "Modulus of this material."),
+        "Modulus of elasticity, eq. (11); or a list of parts, each `{ share, modulus }`, for a composite.")
+        .at(make!(number, |make, _| make.modulus)).off("belt's stiffness"),
+    row("belt.modulus.share", "", "", Required, UP_TO_ONE, "1/3", "Share of the section that is of this material; all shares add up to 1.")
+        .at(Field::PartOf("belt.modulus")),
+    row("belt.modulus.modulus", "E", "Pa", Required, POSITIVE, "50 GPa", "Modulus of this material.")
+        .at(Field::PartOf("belt.modulus")),
     row("belt.section", "A", "m^2", Words("not used with `stiffness`"), POSITIVE, "5.5626 mm^2",
-        "Cross-section that carries the load; or `{ plain, toothed, toothed_share }` for a toothed belt, eq. (12)."),
-    row("belt.section.plain", "A_nt", "m^2", Required, POSITIVE, "5.5626 mm^2", "Cross-section between the teeth."),
-    row("belt.section.toothed", "A_t", "m^2", Required, POSITIVE, "10.4 mm^2", "Cross-section at a tooth."),
-    row("belt.section.toothed_share", "", "", Required, Range::new(0.0, 1.0), "0.5", "Share of the belt's length that has the cross-section `toothed`."),
-    row("belt.spans", "l₁ l₂ l₃", "m", Words("not used with `stiffness`"), POSITIVE, "0.34925 m", "Length of each span. Three values in a list."),
-    row("belt.damping", "c₁ c₂ c₃", "N s/m", Value(0.0), NOT_NEGATIVE, "0 N s/m", "Damping of each span, parallel to its stiffness. Three values in a list."),
-    row("belt.pretension", "T₀", "N", Words("none: spans can push"), POSITIVE, "50 N", "Tension of every span at rest; a span whose tension is used up goes slack and carries nothing."),
+        "Cross-section that carries the load; or `{ plain, toothed, toothed_share }` for a toothed belt, eq. (12).")
+        .at(make!(number, |make, _| make.section)),
+    row("belt.section.plain", "A_nt", "m^2", Required, POSITIVE, "5.5626 mm^2", "Cross-section between the teeth.")
+        .at(Field::PartOf("belt.section")),
+    row("belt.section.toothed", "A_t", "m^2", Required, POSITIVE, "10.4 mm^2", "Cross-section at a tooth.")
+        .at(Field::PartOf("belt.section")),
+    row("belt.section.toothed_share", "", "", Required, Range::new(0.0, 1.0), "0.5", "Share of the belt's length that has the cross-section `toothed`.")
+        .at(Field::PartOf("belt.section")),
+    row("belt.spans", "l₁ l₂ l₃", "m", Words("not used with `stiffness`"), POSITIVE, "0.34925 m", "Length of each span. Three values in a list.")
+        .at(make!(spans, |make, span| make.spans[span])),
+    row("belt.damping", "c₁ c₂ c₃", "N s/m", Value(0.0), NOT_NEGATIVE, "0 N s/m", "Damping of each span, parallel to its stiffness. Three values in a list.")
+        .at(Field::spans(|s, span| Some(s.belt.damping[span]), |s, span, value| s.belt.damping[span] = value))
+        .off("belt's damping"),
+    row("belt.pretension", "T₀", "N", Words("none: spans can push"), POSITIVE, "50 N", "Tension of every span at rest; a span whose tension is used up goes slack and carries nothing.")
+        .at(optional!(|s| s.belt.pretension)).off("belt's pretension"),
 ];
 
 #[rustfmt::skip]
 const TRAVEL: &[Parameter] = &[
-    row("travel.min", "x_min", "m", Required, ANY, "-0.2 m", "Least position of the cart."),
-    row("travel.max", "x_max", "m", Required, ANY, "0.3 m", "Greatest position of the cart; above `min`."),
-    row("travel.stop_stiffness", "k_s", "N/m", Words("no stops: a run ends there"), POSITIVE, "20 kN/m", "Stiffness of the end stops."),
-    row("travel.stop_damping", "c_s", "N s/m", Value(0.0), NOT_NEGATIVE, "50 N s/m", "Their damping."),
+    row("travel.min", "x_min", "m", Required, ANY, "-0.2 m", "Least position of the cart.")
+        .at(part!(|s| s.travel, &mut s.travel => min)),
+    row("travel.max", "x_max", "m", Required, ANY, "0.3 m", "Greatest position of the cart; above `min`.")
+        .at(part!(|s| s.travel, &mut s.travel => max)),
+    row("travel.stop_stiffness", "k_s", "N/m", Words("no stops: a run ends there"), POSITIVE, "20 kN/m", "Stiffness of the end stops.")
+        .at(part!(|s| s.travel.and_then(|travel| travel.stop), s.travel.as_mut().and_then(|travel| travel.stop.as_mut()) => stiffness)),
+    row("travel.stop_damping", "c_s", "N s/m", Value(0.0), NOT_NEGATIVE, "50 N s/m", "Their damping.")
+        .at(part!(|s| s.travel.and_then(|travel| travel.stop), s.travel.as_mut().and_then(|travel| travel.stop.as_mut()) => damping)),
 ];
 
 #[rustfmt::skip]
 const ALONG: &[Parameter] = &[
-    row("cart.friction.along.position", "x", "m", Required, ANY, "0.1 m", "First number of each point of `along`: where along the travel, growing from point to point."),
-    row("cart.friction.along.factor", "", "", Required, NOT_NEGATIVE, "1.5", "Second number: what Coulomb friction, breakaway and `stribeck.force` are multiplied by there; straight lines between points."),
+    row("cart.friction.along.position", "x", "m", Required, ANY, "0.1 m", "First number of each point of `along`: where along the travel, growing from point to point.")
+        .at(Field::points(|s, point| of_point(s, point, 0), |s, point, value| set_of_point(s, point, 0, value))),
+    row("cart.friction.along.factor", "", "", Required, NOT_NEGATIVE, "1.5", "Second number: what Coulomb friction, breakaway and `stribeck.force` are multiplied by there; straight lines between points.")
+        .at(Field::points(|s, point| of_point(s, point, 1), |s, point, value| set_of_point(s, point, 1, value))),
 ];
 
 #[rustfmt::skip]
 const ENCODER: &[Parameter] = &[
-    row("encoder.lines", "", "", Required, POSITIVE, "512", "Lines per turn, or at the cart per metre; in quadrature each gives four counts."),
+    row("encoder.lines", "", "", Required, POSITIVE, "512", "Lines per turn, or at the cart per metre; in quadrature each gives four counts.")
+        .at(part!(|s| s.encoder, &mut s.encoder => lines)),
 ];
 
 #[rustfmt::skip]
@@ -621,16 +643,20 @@ const MOVE: &[Parameter] = &[
 ];
 
 /// Titles of the sections, in the order of the case file, with the key prefix of their rows.
-const SECTIONS: &[(&str, &[&[Parameter]])] = &[
+pub(super) const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     ("motor", &[MOTOR]),
     ("amplifier", &[AMPLIFIER]),
     (
         "drive_pulley",
         &[
             RADIUS,
-            &pulley!("drive_pulley", "J₁"),
+            &pulley!(drive_pulley, "J₁"),
             &friction!(
                 "drive_pulley",
+                drive_pulley,
+                "pulleys'",
+                One,
+                One,
                 "B₁",
                 "τ_c1",
                 "τ_b1",
@@ -651,9 +677,13 @@ const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     (
         "idler_pulley",
         &[
-            &pulley!("idler_pulley", "J₂"),
+            &pulley!(idler_pulley, "J₂"),
             &friction!(
                 "idler_pulley",
+                idler_pulley,
+                "pulleys'",
+                One,
+                One,
                 "B₂",
                 "τ_c2",
                 "τ_b2",
@@ -677,6 +707,10 @@ const SECTIONS: &[(&str, &[&[Parameter]])] = &[
             CART,
             &friction!(
                 "cart",
+                cart,
+                "cart's",
+                Radius(1),
+                Radius(2),
                 "b",
                 "F_c",
                 "F_b",
@@ -699,8 +733,12 @@ const SECTIONS: &[(&str, &[&[Parameter]])] = &[
         "bridge",
         &[
             BRIDGE,
-            &friction!(
+            &elsewhere(friction!(
                 "bridge",
+                cart,
+                "bridge's",
+                Radius(1),
+                Radius(2),
                 "b",
                 "F_c",
                 "F_b",
@@ -715,7 +753,7 @@ const SECTIONS: &[(&str, &[&[Parameter]])] = &[
                 "1e4 s^2/m^2",
                 "N/m",
                 "100 kN/m"
-            ),
+            )),
         ],
     ),
     ("belt", &[BELT]),
@@ -744,84 +782,3 @@ const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     ("fit", &[FIT]),
     ("sweep", &[SWEEP]),
 ];
-
-/// All parameters, in the order of the case file.
-pub fn all() -> impl Iterator<Item = &'static Parameter> {
-    SECTIONS.iter().flat_map(|(_, groups)| groups.iter().flat_map(|rows| rows.iter()))
-}
-
-/// The parameter with this key.
-pub fn find(key: &str) -> Option<&'static Parameter> {
-    all().find(|p| p.key == key)
-}
-
-/// The names that follow directly after `section` in the keys: for `cart` these are `mass` and `friction`.
-pub fn names_in(section: &str) -> Vec<&'static str> {
-    let mut names = Vec::new();
-    for parameter in all() {
-        let rest = parameter.key.strip_prefix(section).and_then(|rest| rest.strip_prefix('.'));
-        if let Some(name) = rest.and_then(|rest| rest.split('.').next())
-            && !names.contains(&name)
-        {
-            names.push(name);
-        }
-    }
-    names
-}
-
-/// The sections of the table, each of which [`markdown`] renders.
-pub fn sections() -> impl Iterator<Item = &'static str> {
-    SECTIONS.iter().map(|(name, _)| *name)
-}
-
-/// The parameters of a section as a Markdown table.
-pub fn markdown(section: &str) -> String {
-    let mut text = String::from(
-        "| key | symbol | SI unit | default | range | example | meaning |\n|---|---|---|---|---|---|---|\n",
-    );
-    let rows = SECTIONS.iter().filter(|(name, _)| *name == section).flat_map(|(_, groups)| groups.iter());
-    for p in rows.flat_map(|rows| rows.iter()) {
-        let key =
-            p.key.strip_prefix("input.").or_else(|| p.key.strip_prefix(section).map(|k| &k[1..])).unwrap_or(p.key);
-        let default = match p.default {
-            Fallback::Required => "required".to_string(),
-            Fallback::Value(value) => shortest(value),
-            Fallback::Words(words) => words.to_string(),
-        };
-        let unit = if p.unit.is_empty() { "–" } else { p.unit };
-        let symbol = if p.symbol.is_empty() { "–" } else { p.symbol };
-        let _ = writeln!(
-            text,
-            "| `{key}` | {symbol} | {unit} | {default} | {} | {} | {} |",
-            p.range.short(),
-            p.example,
-            p.sentence
-        );
-    }
-    text
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::quantity;
-
-    #[test]
-    fn examples_and_defaults_lie_in_their_ranges() {
-        for p in all() {
-            let unit = unit_for(p.unit, "V");
-            let example = quantity::read(p.example, unit).unwrap_or_else(|e| panic!("{}: {e}", p.key));
-            assert!(p.range.contains(example), "{}", p.key);
-            if let Fallback::Value(value) = p.default {
-                assert!(p.range.contains(value), "{}", p.key);
-            }
-        }
-    }
-
-    #[test]
-    fn no_key_stands_twice() {
-        for p in all() {
-            assert_eq!(all().filter(|q| q.key == p.key).count(), 1, "{}", p.key);
-        }
-    }
-}

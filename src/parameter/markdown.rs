@@ -1,0 +1,71 @@
+//! The table as text for the documents.
+
+use super::field::List;
+use super::free::element_key;
+use super::table::SECTIONS;
+use super::{Fallback, Field, Off, Parameter, all};
+use crate::quantity::shortest;
+use std::fmt::Write;
+
+/// The parameters of a section as a Markdown table.
+pub fn markdown(section: &str) -> String {
+    let mut text = String::from(
+        "| key | symbol | SI unit | default | range | example | meaning |\n|---|---|---|---|---|---|---|\n",
+    );
+    let rows = SECTIONS.iter().filter(|(name, _)| *name == section).flat_map(|(_, groups)| groups.iter());
+    for p in rows.flat_map(|rows| rows.iter()) {
+        let key =
+            p.key.strip_prefix("input.").or_else(|| p.key.strip_prefix(section).map(|k| &k[1..])).unwrap_or(p.key);
+        let default = match p.default {
+            Fallback::Required => "required".to_string(),
+            Fallback::Value(value) => shortest(value),
+            Fallback::Words(words) => words.to_string(),
+        };
+        let unit = if p.unit.is_empty() { "–" } else { p.unit };
+        let symbol = if p.symbol.is_empty() { "–" } else { p.symbol };
+        let _ = writeln!(
+            text,
+            "| `{key}` | {symbol} | {unit} | {default} | {} | {} | {} |",
+            p.range.short(),
+            p.example,
+            p.sentence
+        );
+    }
+    text
+}
+
+/// The parameters that can be free, as a Markdown table.
+pub fn free_markdown() -> String {
+    let mut text = String::from("| key | `--vary all` | off together with | goes along with |\n|---|---|---|---|\n");
+    for row in all() {
+        let Some(accessor) = row.field.accessor() else { continue };
+        let all = match row.off {
+            Off::No => "–",
+            Off::Alone | Off::With(_) => "yes",
+        };
+        let kind = match row.off {
+            Off::With(kind) => kind,
+            Off::No | Off::Alone => "–",
+        };
+        let along = match (row.field, row.follows) {
+            (Field::Form(of, _), _) => format!("is another form of `{}`", last(of)),
+            (_, []) => "–".to_string(),
+            (_, keys) => keys.iter().map(|key| format!("`{}`", last(key))).collect::<Vec<_>>().join(", "),
+        };
+        let _ = writeln!(text, "| {} | {all} | {kind} | {along} |", keys(row, accessor.list));
+    }
+    text
+}
+
+fn last(key: &str) -> &str {
+    key.rsplit_once(".friction.").map_or(key, |(_, name)| name)
+}
+
+/// A key, and those of its elements.
+fn keys(row: &Parameter, list: List) -> String {
+    match list {
+        List::None => format!("`{}`", row.key),
+        List::Numbers => format!("`{}`, `{}` to `.2`", row.key, element_key(row, 0)),
+        List::Points => format!("`{}`, `{}` and so on", row.key, element_key(row, 0)),
+    }
+}
