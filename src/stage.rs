@@ -34,7 +34,9 @@ impl Stage {
     /// Whether its equations are linear but for stick, slip and other changes of mode: what the exact solver takes.
     pub fn is_piecewise_linear(&self) -> bool {
         let laws = [self.drive_pulley.friction, self.cart.friction, self.idler_pulley.friction];
-        laws.iter().all(Friction::is_piecewise_linear) && self.cart.along.is_none() && !self.belt.follows_cart
+        // A belt that does not stretch does so at any length.
+        let follows = self.belt.follows_cart && self.belt.model != BeltModel::Rigid;
+        laws.iter().all(Friction::is_piecewise_linear) && self.cart.along.is_none() && !follows
     }
 
     /// The first part of it that the paper's equations do not have, in words.

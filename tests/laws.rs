@@ -9,7 +9,7 @@ use taut::friction::Motion;
 use taut::mechanism::{Contact, Limit, Mode, Power, State};
 use taut::signal::Signal;
 use taut::solve::{Ending, Solution, Solver, simulate};
-use taut::stage::axis::{LABELS, SPANS};
+use taut::stage::axis::{LABELS, ROTOR, SPANS};
 use taut::stage::{AmplifierMode, Stage};
 use taut::trajectory::Trajectory;
 
@@ -152,6 +152,10 @@ proptest! {
             }
             if stage.motor.gear_play.is_some() {
                 mode.contact[SPANS] = side(at("gear_state").unwrap_or(0.0));
+                // A gear with losses holds a rotor that does not turn.
+                if stage.motor.gear_efficiency < 1.0 {
+                    mode.motion[ROTOR] = motion(state.speed[ROTOR].partial_cmp(&0.0).map_or(0.0, |way| f64::from(way as i8)));
+                }
             }
             mode.contact[mechanism.springs.len() - 1] = side(-at("stop_force").unwrap_or(0.0));
             (mode.drive[0].voltage, mode.drive[0].current) = (voltage_mode, current_mode);

@@ -68,13 +68,6 @@ fn gear_play(table: &Table) -> Result<Option<GearPlay>> {
             .fail("a rotor that turns by itself needs an inertia")
             .next("add for example rotor_inertia = \"4.2e-6 kg m^2\""));
     }
-    if let Some(efficiency) = table.optional("gear_efficiency")
-        && efficiency.number()? != 1.0
-    {
-        return Err(efficiency
-            .fail("a gear that gives way has no efficiency of its own")
-            .next("leave gear_efficiency out, and give the loss as gear_damping or as friction of the drive pulley"));
-    }
     Ok(Some(GearPlay {
         backlash: table.number("backlash")?,
         stiffness: stiffness.number()?,
@@ -186,14 +179,6 @@ fn belt(table: &Table, travel: Option<&Table>) -> Result<Belt> {
     }
     let follows_cart = table.optional("follows_cart").map_or(Ok(false), |field| field.truth())?;
     let follows = table.optional("follows_cart").filter(|_| follows_cart);
-    if let Some(field) = &follows {
-        let clash = [("pretension", pretension.is_some()), ("model", model != BeltModel::Elastic)];
-        if let Some((key, _)) = clash.into_iter().find(|(_, there)| *there) {
-            return Err(field
-                .fail(format!("spans that follow the cart do not go together with `{key}` yet"))
-                .next(format!("leave one of the two out: belt.follows_cart or belt.{key}")));
-        }
-    }
     let given = |stiffness| Belt { stiffness, damping: [0.0; 3], make: None, pretension, follows_cart: false, model };
     let make = ["modulus", "section", "spans"];
     let damping = table.optional("damping").map_or(Ok([0.0; 3]), |field| field.three())?;

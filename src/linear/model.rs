@@ -158,6 +158,9 @@ fn mode(plant: &Mechanism, held: [bool; 3], speed: f64) -> Mode {
     if has_rotor(plant) {
         // Between its end stops, on the driving flank of its gear.
         mode.contact[SPANS] = if forward { Contact::High } else { Contact::Low };
+        if plant.has_modes(ROTOR) {
+            mode.motion[ROTOR] = if forward { Motion::Forward } else { Motion::Backward };
+        }
     }
     mode
 }

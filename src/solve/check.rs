@@ -44,9 +44,6 @@ pub(super) fn stage(stage: &Stage) -> Result<()> {
     let amplifier = &stage.amplifier;
     if motor.gear_play.is_some() {
         positive("the inertia of a rotor that turns by itself", &[motor.rotor_inertia])?;
-        if motor.gear_efficiency != 1.0 {
-            return Err(Error::new("a gear that gives way has no efficiency of its own").allowed("an efficiency of 1"));
-        }
     }
     if stage.travel.is_some_and(|travel| travel.min >= travel.max) {
         return Err(Error::new("the travel ends before it begins").allowed("max above min"));
@@ -90,9 +87,6 @@ pub(super) fn stage(stage: &Stage) -> Result<()> {
         one_law_each(stage)?;
     }
     if stage.belt.follows_cart {
-        if reduced || stage.belt.pretension.is_some() {
-            return Err(Error::new("spans that follow the cart do not go together with pretension or a reduced model"));
-        }
         let (Some(make), Some(travel)) = (stage.belt.make, stage.travel) else {
             return Err(Error::new("spans that follow the cart need modulus, section, spans and a travel"));
         };

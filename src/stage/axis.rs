@@ -143,9 +143,15 @@ impl Stage {
         }
     }
 
-    /// How a span's length follows the cart: l₁ − x, l₂ + x; the drive pulley is at the positive end.
+    /// How a span's length follows the cart: l₁ − x, l₂ + x; the drive pulley is at the positive end. Spans 2 and 3 in series are one of
+    /// their lengths together; their damping stays as it is at x = 0.
     fn follows(&self, index: usize) -> Option<Follows> {
-        let make = self.belt.make.filter(|_| self.belt.follows_cart)?;
+        let mut make = self.belt.make.filter(|_| self.belt.follows_cart)?;
+        match self.belt.model {
+            BeltModel::Elastic => {}
+            BeltModel::TwoMass => make.spans[1] += make.spans[2],
+            BeltModel::Rigid => return None,
+        }
         let arm = [-1.0, 1.0, 0.0][index];
         let follows =
             Follows { rigidity: make.section * make.modulus, length: make.spans[index], arms: vec![(CART, arm)] };

@@ -130,7 +130,6 @@ pub fn equipped(dry: Dry) -> impl Strategy<Value = Stage> {
         }
         if let Some((backlash, stiffness, damping, rotor)) = gear {
             stage.motor.gear_play = Some(GearPlay { backlash, stiffness, damping });
-            stage.motor.gear_efficiency = 1.0;
             stage.motor.rotor_inertia = rotor;
         }
         stage.travel = stops.map(|(end, stiffness, damping)| Travel {

@@ -107,7 +107,10 @@ impl<const R: usize, const C: usize> Core<R, C> {
         for side in [Cause::BreakForward(body), Cause::BreakBackward(body)] {
             self.tolerance[side.kind()] = tolerance;
         }
-        self.note(What::Body(body), Status::Motion(from), load, by_rounding);
+        // That the gear holds a rotor is nobody's stick.
+        if !self.mechanism.bodies[body].is_rotor {
+            self.note(What::Body(body), Status::Motion(from), load, by_rounding);
+        }
         self.take_up_mode();
     }
 

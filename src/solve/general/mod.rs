@@ -375,9 +375,12 @@ impl Core {
         for follower in self.model.mechanism.followers(body) {
             self.mode.motion[follower] = to;
         }
-        let part = Part::of(&self.model.mechanism, What::Body(body));
-        let (from, to) = (Status::Motion(from), Status::Motion(to));
-        Event { time, part, from, to, load, by_rounding }.note(&mut self.events);
+        // That the gear holds a rotor is nobody's stick.
+        if !self.model.mechanism.bodies[body].is_rotor {
+            let part = Part::of(&self.model.mechanism, What::Body(body));
+            let (from, to) = (Status::Motion(from), Status::Motion(to));
+            Event { time, part, from, to, load, by_rounding }.note(&mut self.events);
+        }
         self.enter();
     }
 
