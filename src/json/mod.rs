@@ -4,6 +4,7 @@
 
 mod check;
 mod fit;
+mod gantry;
 mod modes;
 mod moves;
 #[cfg(feature = "posterior")]
@@ -12,6 +13,7 @@ mod simulation;
 
 pub use check::check;
 pub use fit::fit;
+pub use gantry::{GantrySimulated, GantrySimulation};
 pub use modes::modes;
 pub use moves::{Moved, moves};
 #[cfg(feature = "posterior")]
