@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 use taut::case::GantryCase;
+use taut::linear::{GantryAnalysis, Natural, Root};
 use taut::metrics::{GantryMeter, GantryMetrics, Peak};
 use taut::solve::{Course, Detail, Ending, ErrorEstimate, Event, Flow, Solver, stream_mechanism};
 use taut::trajectory::Trajectory;
@@ -196,4 +197,125 @@ fn the_error_of_the_general_solver_is_estimated() {
         }
     }
     assert!(off <= error.value && error.value < 1e3 * off && error.way > 0.05, "{off} m, estimated {error:?}");
+}
+
+#[test]
+fn elastic_modes_are_those_of_the_authority() {
+    let file = cases();
+    let told = file["frequencies"].as_array().unwrap();
+    assert_eq!(told.len(), 23);
+    for told in told {
+        let case = GantryCase::from_text_with("gantry.toml", told["case"].as_str().unwrap(), &[]).unwrap();
+        let analysis = GantryAnalysis::of(&case).unwrap();
+        let (name, modes) = (told["name"].as_str().unwrap(), &analysis.modes);
+        let want: Vec<f64> = told["elastic_Hz"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
+        assert_eq!((modes.rigid.len(), modes.elastic.len()), (2, want.len()), "{name}");
+        for (mode, want) in modes.elastic.iter().zip(want) {
+            assert!((mode.hertz() / want - 1.0).abs() < 1e-9, "{name}: {} Hz instead of {want} Hz", mode.hertz());
+            assert!((mode.energy.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        }
+    }
+}
+
+/// The machines of a note on the two kinds, to twelve digits.
+#[test]
+fn the_machines_of_the_note() {
+    let case = |kind: &str, stiffness: &str| {
+        let text = format!(
+            r#"
+            kind = "{kind}"
+            motor = {{ torque_constant = 0.05, back_emf_constant = 0.05, resistance = 1 }}
+            drive_pulley = {{ radius = "19.4 mm", inertia = "6.3e-5 kg m^2" }}
+            bridge = {{ mass = "0.838 kg" }}
+            cart = {{ mass = "0.362 kg" }}
+            belt = {{ stiffness = {stiffness} }}
+            experiment = [{{ name = "run", input = {{}}, until = 1, every = 1e-3 }}]
+            "#
+        );
+        GantryCase::from_text_with("gantry.toml", &text, &[]).unwrap()
+    };
+    for (kind, stiffness, hertz) in [
+        ("h-frame", "[132.76e3, 132.76e3, 58.885e3]", [196.643946994, 220.198687165]),
+        ("h-frame", "[100e3, 200e3, 80e3]", [193.499561135, 257.381999764]),
+        ("core-xy", "[150e3, 90e3, 140e3, 95e3]", [214.360612188, 263.042776685]),
+    ] {
+        let case = case(kind, stiffness);
+        let analysis = GantryAnalysis::of(&case).unwrap();
+        for (mode, want) in analysis.modes.elastic.iter().zip(hertz) {
+            assert!((mode.hertz() - want).abs() < 1e-9, "{kind}: {} Hz", mode.hertz());
+        }
+        // r φ₁ and r φ₂ of bridge and cart alone, as the pulleys turn without strain.
+        for (mode, [x, y]) in analysis.modes.rigid.iter().zip([[1.0, 0.0], [0.0, 1.0]]) {
+            let want = [case.gantry.angles(x, y), [x, y]].concat();
+            assert!(mode.shape.iter().zip(&want).all(|(a, b)| (a - b).abs() < 1e-9), "{:?}", mode.shape);
+        }
+    }
+}
+
+/// A swing dies out as its pole says.
+#[test]
+fn a_swing_of_a_gantry_dies_out_with_its_damping_ratio() {
+    let text = r#"
+        kind = "core-xy"
+        motor = { torque_constant = 0.05, back_emf_constant = 0.05, resistance = 1, gear_ratio = 2 }
+        drive_pulley = { radius = "19.4 mm", inertia = "6.3e-5 kg m^2", friction = { viscous = 1e-3 } }
+        bridge = { mass = "0.838 kg", friction = { viscous = 12 } }
+        cart = { mass = "0.362 kg", friction = { viscous = 8 } }
+        belt = { stiffness = [150e3, 90e3, 140e3, 95e3], damping = [3, 4, 5, 6] }
+        experiment = [{ name = "run", input = {}, until = 0.05, every = 1e-5 }]
+    "#;
+    let mut case = GantryCase::from_text_with("gantry.toml", text, &[]).unwrap();
+    let modes = Natural::of(&case.gantry.mechanism(), &[0.0; 6]).unwrap();
+    let last = modes.elastic.last().unwrap();
+    let Some(Root::Pair { frequency, damping }) = last.damped else { panic!("{modes:?}") };
+    assert!((frequency / last.frequency - 1.0).abs() < 0.05 && damping > 0.01 && damping < 0.5);
+    // Begun in the shape of that mode, which damping mixes a little with the others.
+    let r = case.gantry.pulley_radius;
+    for (body, shape) in last.shape.iter().enumerate() {
+        case.experiments[0].initial.position[body] = 1e-4 * shape / if body < 2 { r } else { 1.0 };
+    }
+    let rows = run(&case, Solver::Exact).rows;
+    let energy = |row: usize| {
+        let at = |name: &str| rows.get(name).unwrap()[row];
+        let [x, y] = case.gantry.place([at("left_angle"), at("right_angle")]);
+        (x - at("bridge_position")).hypot(y - at("cart_position"))
+    };
+    // The largest strain in each of the first two periods.
+    let period = 2.0 * std::f64::consts::PI / (frequency * (1.0 - damping * damping).sqrt());
+    let rows_of = (period / 1e-5).round() as usize;
+    let most = |from: usize| (from..from + rows_of).map(energy).fold(0.0, f64::max);
+    let want = (-damping * frequency * period).exp();
+    let have = most(rows_of) / most(0);
+    assert!((have / want).ln().abs() < 0.25 * want.ln().abs(), "{have} instead of {want}");
+}
+
+#[test]
+fn resonances_follow_bridge_and_cart() {
+    for name in ["h-frame", "core-xy"] {
+        let case = GantryCase::read_with(format!("stages/{name}/follows.toml"), &[]).unwrap();
+        let analysis = GantryAnalysis::of(&case).unwrap();
+        let map = analysis.map.unwrap();
+        let middle = (map.bridge.len() / 2, map.cart.len() / 2);
+        assert!(map.bridge[middle.0].abs() < 1e-15 && map.cart[middle.1].abs() < 1e-15);
+        for (mode, hertz) in analysis.modes.elastic.iter().zip(&map.hertz) {
+            assert!((hertz[middle.0][middle.1] / mode.hertz() - 1.0).abs() < 1e-12);
+            // Left and right are alike here: a machine seen in a mirror.
+            for row in hertz {
+                for (a, b) in row.iter().zip(row.iter().rev()) {
+                    assert!((a / b - 1.0).abs() < 1e-9, "{name}: {a} {b}");
+                }
+            }
+        }
+        let [(least, _), (most, _)] = map.range(0);
+        assert!(most > 1.01 * least, "{name}: {least} to {most}");
+        // One place by itself: the stiffnesses written down.
+        let (i, j) = (3, 20);
+        let lengths = case.gantry.lengths(map.bridge[i], map.cart[j]).unwrap();
+        let mut there = case.gantry.clone();
+        let (rigidity, _) = there.belts.follows.take().unwrap();
+        there.belts.stiffness = lengths.iter().map(|length| rigidity / length).collect();
+        for (hertz, want) in map.hertz.iter().zip(Natural::frequencies(&there.mechanism(), &[0.0; 6]).unwrap()) {
+            assert!((hertz[i][j] / want - 1.0).abs() < 1e-12);
+        }
+    }
 }
