@@ -5,6 +5,12 @@
 //! between rows, on both sides of every event and jump of the input: what it reports does not depend on the output interval but for
 //! rounding. Of the paper's Table 3 it sees the steps.
 
+mod gantry;
+mod watch;
+
+pub use gantry::{GantryMeter, GantryMetrics};
+pub use watch::{Sum, Watch, Watched};
+
 use crate::case::Experiment;
 use crate::friction::Motion;
 use crate::mechanism::{AmplifierMode, Mode, State};
@@ -114,6 +120,17 @@ impl EventCount {
     pub fn total(&self) -> u64 {
         self.stops + self.starts + self.reversals
     }
+
+    /// Counts an event of the body.
+    fn add(&mut self, event: &Event) {
+        if event.to == Motion::Stuck {
+            self.stops += 1;
+        } else if event.from == Motion::Stuck {
+            self.starts += 1;
+        } else {
+            self.reversals += 1;
+        }
+    }
 }
 
 impl Peak {
@@ -161,7 +178,7 @@ impl Meter {
             seen: Metrics::default(),
             plateau: held.map(Plateau::new),
             moved: false,
-            rotor: stage.motor.gear_play.map(|_| Rotor::default()),
+            rotor: stage.motor.gear_play.map(|_| Rotor::new(reading::ROTOR_SPEED)),
         }
     }
 
@@ -177,14 +194,8 @@ impl Meter {
         metrics.peak_encoder_error = metrics.peak_stretch[0];
         metrics.steady_speed = self.plateau.and_then(|plateau| plateau.steady_speed(&self.stage));
         for event in events {
-            let Some(body) = event.body() else { continue };
-            let count = &mut metrics.events[body];
-            if event.to == Motion::Stuck {
-                count.stops += 1;
-            } else if event.from == Motion::Stuck {
-                count.starts += 1;
-            } else {
-                count.reversals += 1;
+            if let Some(body) = event.body() {
+                metrics.events[body].add(event);
             }
         }
         metrics.rotor_rests = self.rotor.is_none_or(|rotor| rotor.rests);
@@ -255,14 +266,16 @@ impl Observe for Meter {
         seen.final_rotor_speed = state.speed[self.shaft];
         seen.bodies_rest = mode.motion[..BODIES] == [Motion::Stuck; BODIES] && state.speed[..BODIES] == [0.0; BODIES];
         if let Some(rotor) = &mut self.rotor {
-            rotor.rests = state.speed[self.shaft].abs() <= RESTING * rotor.fastest;
+            rotor.end(state.speed[self.shaft]);
         }
     }
 }
 
 /// A rotor that is an inertia of its own: nothing holds it, so it comes to rest as what swings does, by and by.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Rotor {
+    /// Its speed's number among the readings.
+    reading: usize,
     /// Its largest speed so far, rad/s.
     fastest: f64,
     /// When it last turned faster than a share [`RESTING`] of that, s.
@@ -271,8 +284,16 @@ struct Rotor {
 }
 
 impl Rotor {
+    fn new(reading: usize) -> Self {
+        Self { reading, fastest: 0.0, turned: 0.0, rests: false }
+    }
+
+    fn end(&mut self, speed: f64) {
+        self.rests = speed.abs() <= RESTING * self.fastest;
+    }
+
     fn pass(&mut self, gap: &Gap) -> bool {
-        let (q, end) = (reading::ROTOR_SPEED, gap.begin + gap.length);
+        let (q, end) = (self.reading, gap.begin + gap.length);
         let (from, to) = (gap.from[q].abs(), gap.to[q].abs());
         self.fastest = self.fastest.max(from).max(to);
         let slow = RESTING * self.fastest;
@@ -286,7 +307,7 @@ impl Rotor {
     }
 
     fn see(&mut self, curve: &Curve) {
-        let speed = curve.of(reading::ROTOR_SPEED);
+        let speed = curve.of(self.reading);
         self.fastest = self.fastest.max(speed.largest(0.0, 1.0).1.abs());
         let slow = RESTING * self.fastest;
         let shifted = |by: f64| {

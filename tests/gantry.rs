@@ -1,31 +1,16 @@
 //! Gantries against independent solvers (`authorities/gantry.py`), and laws that hold for any of them.
 
-mod common;
-
-use proptest::prelude::*;
 use serde_json::Value;
-use taut::case::{GantryCase, GantryExperiment};
-use taut::friction::Friction;
-use taut::mechanism::{Amplifier, AmplifierMode, Motor, State};
-use taut::signal::Signal;
-use taut::solve::{Course, Detail, Ending, Event, Flow, Solver, stream_mechanism};
-use taut::stage::Pulley;
-use taut::stage::gantry::{Belts, Gantry, Routing, Slide};
+use taut::case::GantryCase;
+use taut::linear::{GantryAnalysis, Natural, Root};
+use taut::metrics::{GantryMeter, GantryMetrics, Peak};
+use taut::solve::{Course, Detail, Ending, ErrorEstimate, Event, Flow, Solver, stream_mechanism};
 use taut::trajectory::Trajectory;
 
 /// What a run of the first experiment of a case gives.
 struct Run {
     rows: Trajectory,
     events: Vec<Event>,
-}
-
-fn course(experiment: &GantryExperiment) -> Course {
-    Course {
-        inputs: experiment.inputs.to_vec(),
-        start: experiment.initial,
-        until: experiment.until,
-        every: experiment.every,
-    }
 }
 
 fn run(case: &GantryCase, solver: Solver) -> Run {
@@ -38,7 +23,7 @@ fn run(case: &GantryCase, solver: Solver) -> Run {
         rows.append(block);
         Flow::Continue
     };
-    let course = course(&case.experiments[0]);
+    let course = Course::of(&case.experiments[0]);
     let outcome = stream_mechanism(&mechanism, &course, solver, (Detail::Full, None), sink).unwrap();
     assert_eq!(outcome.ending, Ending::Complete);
     Run { rows, events: outcome.events }
@@ -113,250 +98,224 @@ fn the_general_solver_agrees_with_the_authority() {
     compare(Solver::General { tolerance: 1e-12 }, (1e-9, 1e-7, 1e-7));
 }
 
-// --- laws -----------------------------------------------------------------------------------------------------------
-
-/// A motor without gear play, and its amplifier.
-fn motor() -> impl Strategy<Value = Motor> {
-    (0.01..0.1_f64, 0.3..3.0_f64, prop_oneof![Just(0.0), 1e-4..2e-3_f64], 0.0..1e-5_f64, 1.0..6.0_f64).prop_map(
-        |(constant, resistance, inductance, rotor_inertia, gear_ratio)| Motor {
-            torque_constant: constant,
-            back_emf_constant: constant,
-            resistance,
-            inductance,
-            rotor_inertia,
-            gear_ratio,
-            gear_efficiency: 1.0,
-            gear_play: None,
-        },
-    )
-}
-
-/// Friction of about this size, the same both ways.
-fn dry(viscous: f64, coulomb: f64) -> impl Strategy<Value = Friction> {
-    (0.0..viscous, 0.0..coulomb, 1.0..1.5_f64)
-        .prop_map(|(viscous, coulomb, over)| Friction::with_breakaway(viscous, coulomb, over * coulomb))
-}
-
-fn slide(mass: f64) -> impl Strategy<Value = Slide> {
-    (0.3 * mass..3.0 * mass, dry(30.0, 1.0)).prop_map(|(mass, friction)| Slide { mass, friction, travel: None })
-}
-
-/// Gantries with one motor for both drives.
-fn gantry() -> impl Strategy<Value = Gantry> {
-    let stiffness = || prop::collection::vec(2e4..3e5_f64, 4);
-    let damping = prop_oneof![Just(vec![0.0; 4]), prop::collection::vec(0.0..50.0_f64, 4)];
-    let pulley = (1e-5..2e-4_f64, dry(2e-3, 0.02)).prop_map(|(inertia, friction)| Pulley { inertia, friction });
-    (any::<bool>(), motor(), 0.005..0.03_f64, pulley, slide(0.8), slide(0.4), stiffness(), damping).prop_map(
-        |(core, motor, pulley_radius, drive_pulley, bridge, cart, mut stiffness, mut damping)| {
-            let routing = if core { Routing::CoreXy } else { Routing::HFrame };
-            stiffness.truncate(routing.spans().len());
-            damping.truncate(routing.spans().len());
-            Gantry {
-                routing,
-                motors: [motor; 2],
-                amplifiers: [Amplifier::ideal(AmplifierMode::Voltage, 1.0); 2],
-                pulley_radius,
-                drive_pulley,
-                bridge,
-                cart,
-                belts: Belts { stiffness, damping, pretension: None, follows: None },
-                encoder: None,
-            }
-        },
-    )
-}
-
-fn inputs() -> impl Strategy<Value = [Signal; 2]> {
-    let pulse = || {
-        (-12.0..12.0_f64, 0.02..0.1_f64, 0.0..0.05_f64).prop_map(|(value, duration, at)| Signal::Pulse {
-            value,
-            duration,
-            at,
-        })
-    };
-    (pulse(), pulse()).prop_map(|(left, right)| [left, right])
-}
-
-fn follow(gantry: &Gantry, inputs: &[Signal; 2]) -> Run {
-    let mechanism = gantry.mechanism();
-    let course = Course { inputs: inputs.to_vec(), start: State::default(), until: 0.15, every: 1e-3 };
+/// What a meter says of a run with a row every so many seconds, and the rows.
+fn metered(case: &GantryCase, solver: Solver, every: f64) -> (GantryMetrics, Trajectory) {
+    let course = Course { every, ..Course::of(&case.experiments[0]) };
+    let mut meter = GantryMeter::new(&case.gantry);
     let mut rows = Trajectory::default();
     let sink = &mut |block: &Trajectory| {
-        rows.columns.is_empty().then(|| rows = Trajectory::with_capacity(&block.columns, 256));
         rows.append(block);
         Flow::Continue
     };
-    let outcome = stream_mechanism(&mechanism, &course, Solver::Exact, (Detail::Full, None), sink).unwrap();
-    assert_eq!(outcome.ending, Ending::Complete);
-    Run { rows, events: outcome.events }
+    let outcome =
+        stream_mechanism(&case.gantry.mechanism(), &course, solver, (Detail::Full, Some(&mut meter)), sink).unwrap();
+    (meter.finish(&outcome.events), rows)
 }
 
-fn negative(signal: &Signal) -> Signal {
-    let Signal::Pulse { value, duration, at } = *signal else { unreachable!("only pulses are drawn") };
-    Signal::Pulse { value: -value, duration, at }
+/// All peaks of a run.
+fn peaks(metrics: &GantryMetrics) -> Vec<Peak> {
+    let pairs = [metrics.peak_speed, metrics.peak_error, metrics.peak_current];
+    pairs.concat().into_iter().chain(metrics.peak_force.iter().copied()).collect()
 }
 
-/// Every value of a column of one run is `factor` times that of a column of the other.
-fn proportional(a: (&Run, &str), b: (&Run, &str), factor: f64, tolerance: f64) -> Result<(), TestCaseError> {
-    let (a, b) = (a.0.rows.get(a.1).unwrap(), b.0.rows.get(b.1).unwrap());
-    prop_assert_eq!(a.len(), b.len());
-    for (row, (a, b)) in a.iter().zip(b).enumerate() {
-        prop_assert!((a - factor * b).abs() <= tolerance, "row {row}: {a} and {b}");
-    }
-    Ok(())
+/// The largest magnitudes in rows, in the same order.
+fn largest_rows(case: &GantryCase, rows: &Trajectory) -> Vec<f64> {
+    let get = |name: &str| rows.get(name).unwrap().to_vec();
+    let [left, right, x, y] = ["left_angle", "right_angle", "bridge_position", "cart_position"].map(get);
+    let places = left.iter().zip(&right).map(|(left, right)| case.gantry.place([*left, *right]));
+    let errors: Vec<[f64; 2]> = places.zip(x.iter().zip(&y)).map(|([xd, yd], (x, y))| [xd - x, yd - y]).collect();
+    let mut columns = vec![get("bridge_speed"), get("cart_speed")];
+    columns.extend([0, 1].map(|k| errors.iter().map(|error| error[k]).collect()));
+    columns.extend([get("left_current"), get("right_current")]);
+    columns.extend(case.gantry.routing.spans().iter().map(|span| get(&format!("{}_force", span.key))));
+    columns.iter().map(|column| column.iter().fold(0.0, |most: f64, v| most.max(v.abs()))).collect()
 }
 
-proptest! {
-    #![proptest_config(common::random::cases(200))]
-
-    /// A belt is closed: what one span gains the others lose; and a motion that keeps all lengths stores nothing.
-    #[test]
-    fn belts_are_closed(gantry in gantry(), x in -0.3..0.3_f64, y in -0.3..0.3_f64) {
-        let mechanism = gantry.mechanism();
-        let belts: &[&[usize]] = if gantry.routing == Routing::HFrame { &[&[0, 1, 2]] } else { &[&[0, 1], &[2, 3]] };
-        for belt in belts {
-            let mut sum = [0.0; 4];
-            for span in *belt {
-                mechanism.springs[*span].arms.iter().for_each(|(body, arm)| sum[*body] += arm);
-            }
-            prop_assert_eq!(sum, [0.0; 4]);
-        }
-        let [left, right] = gantry.angles(x, y);
-        let mut state = State::default();
-        state.position[..4].copy_from_slice(&[left, right, x, y]);
-        let stiffest = gantry.belts.stiffness.iter().fold(0.0, |most: f64, k| most.max(*k));
-        prop_assert!(mechanism.energy(&state) <= stiffest * (1e-15_f64).powi(2));
-        state.position[0] += 1e-3;
-        prop_assert!(mechanism.energy(&state) > 0.0);
-    }
-
-    /// What comes in goes into heat or is stored, in any state and mode.
-    #[test]
-    fn power_is_balanced(
-        gantry in gantry(), speeds in prop::collection::vec(-2.0..2.0_f64, 4), ways in prop::collection::vec(-1e-4..1e-4_f64, 4),
-        volts in prop::collection::vec(-12.0..12.0_f64, 2),
-    ) {
-        let mechanism = gantry.mechanism();
-        let mut state = State::default();
-        for body in 0..4 {
-            let lever = mechanism.bodies[body].kind.lever();
-            (state.position[body], state.speed[body]) = (ways[body] / lever, speeds[body] / lever);
-        }
-        for (current, drive) in state.current.iter_mut().zip(&mechanism.drives) {
-            *current = if drive.has_current_state() { 1.5 } else { 0.0 };
-        }
-        let power = mechanism.power(mechanism.first_mode(&state), &state, &[volts[0], volts[1]]);
-        prop_assert!(power.imbalance().abs() <= 1e-12 * power.scale(), "{power:?}");
-        prop_assert!(power.friction.iter().chain(&power.spring).all(|&loss| loss >= 0.0), "{power:?}");
-    }
-
-    /// u → −u turns the motion around, bit for bit.
-    #[test]
-    fn mirrored_inputs_mirror_the_motion(gantry in gantry(), inputs in inputs()) {
-        let (there, back) = (follow(&gantry, &inputs), follow(&gantry, &inputs.each_ref().map(negative)));
-        for column in ["left_angle", "right_angle", "bridge_position", "cart_position", "cart_speed"] {
-            proportional((&there, column), (&back, column), -1.0, 0.0)?;
-        }
-        prop_assert_eq!(there.events.len(), back.events.len());
-    }
-
-    /// Left and right are each other's mirror: with springs and inputs exchanged, y turns around and x does not.
-    #[test]
-    fn left_and_right_mirror_each_other(gantry in gantry(), inputs in inputs()) {
-        let mut mirrored = gantry.clone();
-        let order: &[usize] = if gantry.routing == Routing::HFrame { &[1, 0, 2] } else { &[2, 3, 0, 1] };
-        mirrored.belts.stiffness = order.iter().map(|span| gantry.belts.stiffness[*span]).collect();
-        mirrored.belts.damping = order.iter().map(|span| gantry.belts.damping[*span]).collect();
-        // r φ₁ = −x − y and r φ₂ = x − y: the pulleys of an H-frame turn against each other, those of CoreXY alike.
-        let sign = if gantry.routing == Routing::HFrame { -1.0 } else { 1.0 };
-        let [left, right] = &inputs;
-        let exchanged = match gantry.routing {
-            Routing::HFrame => [negative(right), negative(left)],
-            Routing::CoreXy => [right.clone(), left.clone()],
-        };
-        let (a, b) = (follow(&gantry, &inputs), follow(&mirrored, &exchanged));
-        proportional((&a, "bridge_position"), (&b, "bridge_position"), 1.0, 1e-12)?;
-        proportional((&a, "cart_position"), (&b, "cart_position"), -1.0, 1e-12)?;
-        proportional((&a, "left_angle"), (&b, "right_angle"), sign, 1e-10)?;
-    }
-
-    /// A machine with all its inertias, stiffnesses, frictions and torques ten times as large moves alike.
-    #[test]
-    fn scaled_machines_move_alike(gantry in gantry(), inputs in inputs()) {
-        let mut large = gantry.clone();
-        let scale = |value: &mut f64| *value *= 10.0;
-        for motor in &mut large.motors {
-            scale(&mut motor.torque_constant);
-            scale(&mut motor.rotor_inertia);
-        }
-        scale(&mut large.drive_pulley.inertia);
-        scale(&mut large.bridge.mass);
-        scale(&mut large.cart.mass);
-        large.belts.stiffness.iter_mut().chain(&mut large.belts.damping).for_each(scale);
-        for friction in [&mut large.drive_pulley.friction, &mut large.bridge.friction, &mut large.cart.friction] {
-            for side in [&mut friction.forward, &mut friction.backward] {
-                [&mut side.viscous, &mut side.coulomb, &mut side.breakaway].into_iter().for_each(scale);
-            }
-        }
-        let (a, b) = (follow(&gantry, &inputs), follow(&large, &inputs));
-        for column in ["bridge_position", "cart_position"] {
-            proportional((&a, column), (&b, column), 1.0, 1e-11)?;
-        }
-        prop_assert_eq!(a.events.len(), b.events.len());
-    }
-
-    /// x and y of an H-frame are coupled through k_l − k_r alone, where nothing sticks.
-    #[test]
-    fn equal_spans_do_not_couple(gantry in gantry(), volts in 1.0..12.0_f64) {
-        let mut gantry = Gantry { routing: Routing::HFrame, ..gantry };
-        gantry.belts.stiffness = vec![1e5, 1e5, 6e4];
-        gantry.belts.damping = vec![3.0, 3.0, 1.0];
-        for friction in [&mut gantry.drive_pulley.friction, &mut gantry.bridge.friction, &mut gantry.cart.friction] {
-            *friction = Friction::symmetric(friction.forward.viscous, 0.0);
-        }
-        let step = |value: f64| Signal::Pulse { value, duration: 0.1, at: 0.0 };
-        let across = follow(&gantry, &[step(-volts), step(volts)]);
-        proportional((&across, "cart_position"), (&across, "cart_position"), 0.0, 1e-12)?;
-        prop_assert!(across.rows.get("bridge_position").unwrap().last().unwrap().abs() > 1e-4);
-        let along = follow(&gantry, &[step(-volts), step(-volts)]);
-        proportional((&along, "bridge_position"), (&along, "bridge_position"), 0.0, 1e-12)?;
-    }
-}
-
-/// The exact solver and the general one agree where both can be asked; spans that follow the cart are taken by the general one.
 #[test]
-fn spans_that_follow_the_cart_are_as_stiff_as_they_are_long() {
-    let text = |belt: &str| {
-        format!(
-            "kind = \"h-frame\"\n\
-             motor = {{ torque_constant = 0.05, back_emf_constant = 0.05, resistance = 1 }}\n\
-             drive_pulley = {{ radius = 0.01, inertia = 2e-5 }}\n\
-             bridge = {{ mass = 0.8, friction = {{ coulomb = 0.5 }}, travel = {{ min = -0.2, max = 0.2 }} }}\n\
-             cart = {{ mass = 0.4, friction = {{ coulomb = 0.3 }}, travel = {{ min = -0.2, max = 0.2 }} }}\n\
-             belt = {{ {belt} }}\n\
-             [[experiment]]\nname = \"pulse\"\nuntil = 0.3\nevery = 1e-3\n\
-             input = {{ left = {{ pulse = -9, for = 0.1 }}, right = {{ pulse = 3, for = 0.1 }} }}\n\
-             initial = {{ bridge_position = 0.05 }}\n"
-        )
+fn peaks_are_of_the_motion_and_not_of_its_rows() {
+    let file = cases();
+    for told in file["cases"].as_array().unwrap().iter().take(24) {
+        let name = told["name"].as_str().unwrap();
+        let case = GantryCase::from_text_with("gantry.toml", told["case"].as_str().unwrap(), &[]).unwrap();
+        let (fine, rows) = metered(&case, Solver::Exact, 2e-5);
+        let (coarse, _) = metered(&case, Solver::Exact, 0.05);
+        let (general, _) = metered(&case, Solver::General { tolerance: 1e-11 }, 0.05);
+        for (k, row) in largest_rows(&case, &rows).into_iter().enumerate() {
+            let [fine, coarse, general] = [&fine, &coarse, &general].map(|metrics| peaks(metrics)[k].value.abs());
+            let near = |a: f64, b: f64, share: f64| (a - b).abs() <= share * a.max(b) + 1e-12;
+            assert!(fine >= row - 1e-12 && near(fine, row, 1e-2), "{name}: peak {k} is {fine}, of rows {row}");
+            assert!(near(fine, coarse, 1e-9), "{name}: peak {k}: {fine} and {coarse}");
+            assert!(near(fine, general, 1e-6), "{name}: peak {k}: {fine} and {general}");
+        }
+        assert_eq!((fine.stop_time.is_some(), fine.events), (coarse.stop_time.is_some(), coarse.events), "{name}");
+        let [x, y] = ["bridge_position", "cart_position"].map(|name| *rows.get(name).unwrap().last().unwrap());
+        assert_eq!(fine.final_position, [x, y], "{name}");
+    }
+}
+
+#[test]
+fn a_rotor_behind_a_gear_with_play_keeps_a_gantry_from_resting() {
+    let case = |play: &[&str]| {
+        let text = std::fs::read_to_string("stages/core-xy/core-xy.toml").unwrap();
+        GantryCase::from_text_with("core-xy.toml", &text, play).unwrap()
     };
-    let read = |belt: &str| GantryCase::from_text_with("frame.toml", &text(belt), &[]).unwrap();
-    let make = "modulus = \"8 GPa\", section = \"6 mm^2\", spans = [0.5, 0.6, 1.3]";
-    let (fixed, follows) = (read(make), read(&format!("{make}, follows_cart = true")));
-    assert!(fixed.gantry.mechanism().is_piecewise_linear() && !follows.gantry.mechanism().is_piecewise_linear());
-    let (exact, general) = (run(&fixed, Solver::Exact), run(&fixed, Solver::GENERAL));
-    let apart = |a: &Run, b: &Run, column: &str| {
-        let pairs = a.rows.get(column).unwrap().iter().zip(b.rows.get(column).unwrap());
-        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    let (stiff, _) = metered(&case(&[]), Solver::Exact, 1e-3);
+    assert!(stiff.settled && stiff.stop_time.unwrap() < 0.4, "{:?}", stiff.stop_time);
+    let play = ["motor.rotor_inertia=1e-5 kg m^2", "motor.gear_stiffness=300 N m/rad", "motor.backlash=0.5 deg"];
+    let (loose, _) = metered(&case(&play), Solver::Exact, 1e-3);
+    assert!(loose.bodies_rest && loose.stop_time.is_none_or(|time| time > stiff.stop_time.unwrap()));
+}
+
+#[test]
+fn the_error_of_the_general_solver_is_estimated() {
+    let text = std::fs::read_to_string("stages/h-frame/follows.toml").unwrap();
+    let case = GantryCase::from_text_with("follows.toml", &text, &[]).unwrap();
+    let mechanism = case.gantry.mechanism();
+    assert_eq!(Solver::of_mechanism(&mechanism), Solver::GENERAL);
+    let course = Course::of(&case.experiments[0]);
+    let go = |tolerance: f64, sink: &mut dyn FnMut(&Trajectory) -> Flow| {
+        stream_mechanism(&mechanism, &course, Solver::General { tolerance }, (Detail::Full, None), sink).unwrap()
     };
-    assert!(apart(&exact, &general, "cart_position") < 1e-9);
-    let following = run(&follows, Solver::GENERAL);
-    assert!(apart(&exact, &following, "cart_position") > 1e-7);
-    // k = E A / l, with l_left + x + y: the force per stretch in every row.
-    let [x, y, phi, force] =
-        ["bridge_position", "cart_position", "left_angle", "left_span_force"].map(|c| following.rows.get(c).unwrap());
-    for row in (0..x.len()).step_by(10) {
-        let stiffness = 8e9 * 6e-6 / (0.5 + x[row] + y[row]);
-        let stretch = 0.01 * phi[row] + x[row] + y[row];
-        assert!((force[row] - stiffness * stretch).abs() < 1e-8, "row {row}: {} {}", force[row], stiffness * stretch);
+    let mut fine = Trajectory::default();
+    go(1e-12, &mut |block| {
+        fine.append(block);
+        Flow::Continue
+    });
+    let (mut estimate, mut rows) = (ErrorEstimate::of_mechanism(&mechanism, &course), Trajectory::default());
+    let outcome = go(1e-7, &mut |block| {
+        estimate.take(block);
+        rows.append(block);
+        Flow::Continue
+    });
+    let error =
+        estimate.finish_mechanism(&mechanism, &course, 1e-7, &outcome, &mut || Flow::Continue).unwrap().unwrap();
+    let r = case.gantry.pulley_radius;
+    let mut off: f64 = 0.0;
+    for (column, lever) in [("left_angle", r), ("right_angle", r), ("bridge_position", 1.0), ("cart_position", 1.0)] {
+        for (a, b) in rows.get(column).unwrap().iter().zip(fine.get(column).unwrap()) {
+            off = off.max(lever * (a - b).abs());
+        }
+    }
+    assert!(off <= error.value && error.value < 1e3 * off && error.way > 0.05, "{off} m, estimated {error:?}");
+}
+
+#[test]
+fn elastic_modes_are_those_of_the_authority() {
+    let file = cases();
+    let told = file["frequencies"].as_array().unwrap();
+    assert_eq!(told.len(), 23);
+    for told in told {
+        let case = GantryCase::from_text_with("gantry.toml", told["case"].as_str().unwrap(), &[]).unwrap();
+        let analysis = GantryAnalysis::of(&case).unwrap();
+        let (name, modes) = (told["name"].as_str().unwrap(), &analysis.modes);
+        let want: Vec<f64> = told["elastic_Hz"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
+        assert_eq!((modes.rigid.len(), modes.elastic.len()), (2, want.len()), "{name}");
+        for (mode, want) in modes.elastic.iter().zip(want) {
+            assert!((mode.hertz() / want - 1.0).abs() < 1e-9, "{name}: {} Hz instead of {want} Hz", mode.hertz());
+            assert!((mode.energy.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        }
+    }
+}
+
+/// The machines of a note on the two kinds, to twelve digits.
+#[test]
+fn the_machines_of_the_note() {
+    let case = |kind: &str, stiffness: &str| {
+        let text = format!(
+            r#"
+            kind = "{kind}"
+            motor = {{ torque_constant = 0.05, back_emf_constant = 0.05, resistance = 1 }}
+            drive_pulley = {{ radius = "19.4 mm", inertia = "6.3e-5 kg m^2" }}
+            bridge = {{ mass = "0.838 kg" }}
+            cart = {{ mass = "0.362 kg" }}
+            belt = {{ stiffness = {stiffness} }}
+            experiment = [{{ name = "run", input = {{}}, until = 1, every = 1e-3 }}]
+            "#
+        );
+        GantryCase::from_text_with("gantry.toml", &text, &[]).unwrap()
+    };
+    for (kind, stiffness, hertz) in [
+        ("h-frame", "[132.76e3, 132.76e3, 58.885e3]", [196.643946994, 220.198687165]),
+        ("h-frame", "[100e3, 200e3, 80e3]", [193.499561135, 257.381999764]),
+        ("core-xy", "[150e3, 90e3, 140e3, 95e3]", [214.360612188, 263.042776685]),
+    ] {
+        let case = case(kind, stiffness);
+        let analysis = GantryAnalysis::of(&case).unwrap();
+        for (mode, want) in analysis.modes.elastic.iter().zip(hertz) {
+            assert!((mode.hertz() - want).abs() < 1e-9, "{kind}: {} Hz", mode.hertz());
+        }
+        // r φ₁ and r φ₂ of bridge and cart alone, as the pulleys turn without strain.
+        for (mode, [x, y]) in analysis.modes.rigid.iter().zip([[1.0, 0.0], [0.0, 1.0]]) {
+            let want = [case.gantry.angles(x, y), [x, y]].concat();
+            assert!(mode.shape.iter().zip(&want).all(|(a, b)| (a - b).abs() < 1e-9), "{:?}", mode.shape);
+        }
+    }
+}
+
+/// A swing dies out as its pole says.
+#[test]
+fn a_swing_of_a_gantry_dies_out_with_its_damping_ratio() {
+    let text = r#"
+        kind = "core-xy"
+        motor = { torque_constant = 0.05, back_emf_constant = 0.05, resistance = 1, gear_ratio = 2 }
+        drive_pulley = { radius = "19.4 mm", inertia = "6.3e-5 kg m^2", friction = { viscous = 1e-3 } }
+        bridge = { mass = "0.838 kg", friction = { viscous = 12 } }
+        cart = { mass = "0.362 kg", friction = { viscous = 8 } }
+        belt = { stiffness = [150e3, 90e3, 140e3, 95e3], damping = [3, 4, 5, 6] }
+        experiment = [{ name = "run", input = {}, until = 0.05, every = 1e-5 }]
+    "#;
+    let mut case = GantryCase::from_text_with("gantry.toml", text, &[]).unwrap();
+    let modes = Natural::of(&case.gantry.mechanism(), &[0.0; 6]).unwrap();
+    let last = modes.elastic.last().unwrap();
+    let Some(Root::Pair { frequency, damping }) = last.damped else { panic!("{modes:?}") };
+    assert!((frequency / last.frequency - 1.0).abs() < 0.05 && damping > 0.01 && damping < 0.5);
+    // Begun in the shape of that mode, which damping mixes a little with the others.
+    let r = case.gantry.pulley_radius;
+    for (body, shape) in last.shape.iter().enumerate() {
+        case.experiments[0].initial.position[body] = 1e-4 * shape / if body < 2 { r } else { 1.0 };
+    }
+    let rows = run(&case, Solver::Exact).rows;
+    let energy = |row: usize| {
+        let at = |name: &str| rows.get(name).unwrap()[row];
+        let [x, y] = case.gantry.place([at("left_angle"), at("right_angle")]);
+        (x - at("bridge_position")).hypot(y - at("cart_position"))
+    };
+    // The largest strain in each of the first two periods.
+    let period = 2.0 * std::f64::consts::PI / (frequency * (1.0 - damping * damping).sqrt());
+    let rows_of = (period / 1e-5).round() as usize;
+    let most = |from: usize| (from..from + rows_of).map(energy).fold(0.0, f64::max);
+    let want = (-damping * frequency * period).exp();
+    let have = most(rows_of) / most(0);
+    assert!((have / want).ln().abs() < 0.25 * want.ln().abs(), "{have} instead of {want}");
+}
+
+#[test]
+fn resonances_follow_bridge_and_cart() {
+    for name in ["h-frame", "core-xy"] {
+        let case = GantryCase::read_with(format!("stages/{name}/follows.toml"), &[]).unwrap();
+        let analysis = GantryAnalysis::of(&case).unwrap();
+        let map = analysis.map.unwrap();
+        let middle = (map.bridge.len() / 2, map.cart.len() / 2);
+        assert!(map.bridge[middle.0].abs() < 1e-15 && map.cart[middle.1].abs() < 1e-15);
+        for (mode, hertz) in analysis.modes.elastic.iter().zip(&map.hertz) {
+            assert!((hertz[middle.0][middle.1] / mode.hertz() - 1.0).abs() < 1e-12);
+            // Left and right are alike here: a machine seen in a mirror.
+            for row in hertz {
+                for (a, b) in row.iter().zip(row.iter().rev()) {
+                    assert!((a / b - 1.0).abs() < 1e-9, "{name}: {a} {b}");
+                }
+            }
+        }
+        let [(least, _), (most, _)] = map.range(0);
+        assert!(most > 1.01 * least, "{name}: {least} to {most}");
+        // One place by itself: the stiffnesses written down.
+        let (i, j) = (3, 20);
+        let lengths = case.gantry.lengths(map.bridge[i], map.cart[j]).unwrap();
+        let mut there = case.gantry.clone();
+        let (rigidity, _) = there.belts.follows.take().unwrap();
+        there.belts.stiffness = lengths.iter().map(|length| rigidity / length).collect();
+        for (hertz, want) in map.hertz.iter().zip(Natural::frequencies(&there.mechanism(), &[0.0; 6]).unwrap()) {
+            assert!((hertz[i][j] / want - 1.0).abs() < 1e-12);
+        }
     }
 }

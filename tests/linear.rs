@@ -10,7 +10,7 @@ use serde_json::Value;
 use std::f64::consts::PI;
 use taut::case::Case;
 use taut::friction::{Friction, Law, Shape};
-use taut::linear::{Hold, Operation, Range, Root, StateSpace, places, travel, undamped};
+use taut::linear::{Hold, Natural, Operation, Range, Root, StateSpace, places, travel, undamped};
 use taut::signal::Signal;
 use taut::solve::{Solver, simulate};
 use taut::stage::{Belt, BeltMake, BeltModel, Stage};
@@ -368,5 +368,31 @@ fn a_question_whose_numbers_are_none_is_refused() {
         (Question { to: Some(-1.0), ..usual }, "--to: -1.0 is of no use here\n  allowed: above zero, in Hz"),
     ] {
         assert_eq!(told(question), expected);
+    }
+}
+
+/// The modes of any mechanism, on an axis: its poles are those of the state space.
+#[test]
+fn natural_modes_have_the_poles_of_the_state_space() {
+    let stage = table4();
+    let natural = Natural::of(&stage.mechanism(), &[0.0; 6]).unwrap();
+    let system = StateSpace::of(&stage, Operation::default()).unwrap();
+    let mut want = Root::of(&system.poles().unwrap());
+    let mut have = natural.poles.clone();
+    let size = |root: &Root| match *root {
+        Root::Zero => 0.0,
+        Root::Real(s) => s.abs(),
+        Root::Pair { frequency, .. } => frequency,
+    };
+    want.sort_by(|a, b| size(a).total_cmp(&size(b)));
+    have.sort_by(|a, b| size(a).total_cmp(&size(b)));
+    assert_eq!(have.len(), want.len());
+    for (have, want) in have.iter().zip(&want) {
+        assert!((size(have) - size(want)).abs() <= 1e-9 * size(want), "{have:?} {want:?}");
+    }
+    let bare = StateSpace::of(&undamped(&stage), Operation::default()).unwrap().poles().unwrap();
+    let hertz: Vec<f64> = Root::of(&bare).into_iter().filter_map(Root::hertz).collect();
+    for (mode, want) in natural.elastic.iter().zip(hertz) {
+        assert!((mode.hertz() / want - 1.0).abs() < 1e-9);
     }
 }

@@ -534,6 +534,11 @@ pub enum Format {
 impl Simulate {
     /// The solver that is asked for, or else the one for this stage.
     pub fn solver(&self, stage: &Stage) -> taut::Result<Solver> {
+        self.choice().solver(stage)
+    }
+
+    /// What is asked for.
+    pub fn choice(&self) -> Choice {
         let kind = |name: SolverName| match name {
             SolverName::Exact => SolverKind::Exact,
             SolverName::General => SolverKind::General,
@@ -544,7 +549,7 @@ impl Simulate {
             MethodName::Dp5 => Method::DormandPrince5,
         };
         let (tolerance, step) = (self.tolerance, self.step);
-        Choice { solver: self.solver.map(kind), tolerance, step, method: self.method.map(method) }.solver(stage)
+        Choice { solver: self.solver.map(kind), tolerance, step, method: self.method.map(method) }
     }
 }
 

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::ffi::OsStr;
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
-use taut::case::Case;
+use taut::case::{Case, InputFile};
 use taut::files::{Batch, Inputs, MARKER, write_atomically};
 use taut::solve::Event;
 use taut::{Error, Result};
@@ -21,7 +21,12 @@ pub struct Folder {
 
 /// What a command reads: the case and the files that it names.
 pub fn inputs(path: &Path, case: &Case) -> Inputs {
-    Inputs::new(std::iter::once(path).chain(case.files.iter().map(|file| file.path.as_path())))
+    inputs_of(path, &case.files)
+}
+
+/// The same of a case that names these files.
+pub fn inputs_of(path: &Path, files: &[InputFile]) -> Inputs {
+    Inputs::new(std::iter::once(path).chain(files.iter().map(|file| file.path.as_path())))
 }
 
 impl Folder {
@@ -87,13 +92,19 @@ impl Folder {
 
     /// Copies the files that the case's inputs are read from into `inputs/`; returns the text that names them there.
     pub fn bring_inputs(&self, case: &Case) -> Result<String> {
-        let names = brought(case);
+        let names = self.bring(&case.files)?;
+        Ok(case.text_with(|file| names.get(&file.path).cloned().unwrap_or_default()))
+    }
+
+    /// Copies these files into `inputs/`; returns their names there.
+    pub fn bring(&self, files: &[InputFile]) -> Result<HashMap<PathBuf, String>> {
+        let names = brought_of(files);
         for (file, name) in &names {
             let bytes = std::fs::read(file).map_err(|e| Error::new(e.to_string()).in_file(file))?;
             self.make("inputs")?;
             write_atomically(self.path(name), bytes)?;
         }
-        Ok(case.text_with(|file| names.get(&file.path).cloned().unwrap_or_default()))
+        Ok(names)
     }
 
     /// Makes a folder in it.
@@ -105,8 +116,13 @@ impl Folder {
 
 /// The files of a case, and what they are called in a folder of results: as they are, with a number where that is taken.
 pub fn brought(case: &Case) -> HashMap<PathBuf, String> {
+    brought_of(&case.files)
+}
+
+/// The same of these files.
+pub fn brought_of(files: &[InputFile]) -> HashMap<PathBuf, String> {
     let mut names: HashMap<PathBuf, String> = HashMap::new();
-    for file in &case.files {
+    for file in files {
         if names.contains_key(&file.path) {
             continue;
         }

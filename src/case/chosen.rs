@@ -1,6 +1,6 @@
 //! What of a case is asked for by name, told by the names of the command line's options where it is not there.
 
-use super::{Case, Experiment, Move, Plan};
+use super::{Case, Experiment, GantryCase, GantryExperiment, Move, Plan};
 use crate::design::Design;
 use crate::error::{Error, Result};
 use std::path::Path;
@@ -13,14 +13,7 @@ impl Case {
                 .in_file(path)
                 .next("run its moves with `taut move`, or add an [[experiment]]"));
         }
-        let known = || self.experiments.iter().map(|e| e.name.as_str());
-        if let Some(name) = names.iter().find(|name| known().all(|other| other != **name)) {
-            return Err(Error::new(format!("there is no experiment \"{name}\""))
-                .in_file("--experiment")
-                .allowed(quoted(known()))
-                .next("name one of these, or leave --experiment out to run them all"));
-        }
-        Ok(self.experiments.iter().filter(|e| names.is_empty() || names.contains(&e.name)).collect())
+        experiments_named(&self.experiments, |experiment| &experiment.name, names)
     }
 
     /// The controller, and the moves of these names in the case's order; all if none is named. `path` is the case's own.
@@ -46,6 +39,24 @@ impl Case {
             )
         })
     }
+}
+
+impl GantryCase {
+    /// The experiments of these names, in the case's order; all if none is named.
+    pub fn experiments_named(&self, names: &[String]) -> Result<Vec<&GantryExperiment>> {
+        experiments_named(&self.experiments, |experiment| &experiment.name, names)
+    }
+}
+
+fn experiments_named<'a, E>(all: &'a [E], name: fn(&E) -> &String, names: &[String]) -> Result<Vec<&'a E>> {
+    let known = || all.iter().map(|experiment| name(experiment).as_str());
+    if let Some(name) = names.iter().find(|name| known().all(|other| other != **name)) {
+        return Err(Error::new(format!("there is no experiment \"{name}\""))
+            .in_file("--experiment")
+            .allowed(quoted(known()))
+            .next("name one of these, or leave --experiment out to run them all"));
+    }
+    Ok(all.iter().filter(|experiment| names.is_empty() || names.contains(name(experiment))).collect())
 }
 
 fn quoted<'a>(names: impl Iterator<Item = &'a str>) -> String {

@@ -158,6 +158,11 @@ impl GantryCase {
         let path = path.as_ref();
         Self::from_text_with(path, &super::read_text(path)?, changes)
     }
+
+    /// The text with other names for the files of its inputs; it is to lie where these names lead to them.
+    pub fn text_with(&self, name: impl Fn(&InputFile) -> String) -> String {
+        super::text_with(&self.text, &self.files, name)
+    }
 }
 
 impl GantryExperiment {

@@ -247,15 +247,19 @@ impl Case {
 
     /// The text with other names for the files of its inputs; it is to lie where these names lead to them.
     pub fn text_with(&self, name: impl Fn(&InputFile) -> String) -> String {
-        let mut text = String::with_capacity(self.text.len());
-        let mut end = 0;
-        for file in &self.files {
-            text.push_str(&self.text[end..file.place.start]);
-            text.push_str(&toml_edit::Value::from(name(file)).to_string());
-            end = file.place.end;
-        }
-        text + &self.text[end..]
+        text_with(&self.text, &self.files, name)
     }
+}
+
+fn text_with(whole: &str, files: &[InputFile], name: impl Fn(&InputFile) -> String) -> String {
+    let mut text = String::with_capacity(whole.len());
+    let mut end = 0;
+    for file in files {
+        text.push_str(&whole[end..file.place.start]);
+        text.push_str(&toml_edit::Value::from(name(file)).to_string());
+        end = file.place.end;
+    }
+    text + &whole[end..]
 }
 
 /// What the file says it is; its name where it does not say.

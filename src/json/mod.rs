@@ -4,6 +4,8 @@
 
 mod check;
 mod fit;
+mod gantry;
+mod gantry_modes;
 mod modes;
 mod moves;
 #[cfg(feature = "posterior")]
@@ -12,6 +14,8 @@ mod simulation;
 
 pub use check::check;
 pub use fit::fit;
+pub use gantry::{GantrySimulated, GantrySimulation};
+pub use gantry_modes::gantry_modes;
 pub use modes::modes;
 pub use moves::{Moved, moves};
 #[cfg(feature = "posterior")]

@@ -88,19 +88,35 @@ fn poles(transfer: &Transfer) -> Vec<Value> {
     transfer.poles.iter().map(one).collect()
 }
 
+/// A pole, or a pair of them.
+pub(super) fn root_told(root: Root) -> Value {
+    let time = number(root.time_constant());
+    match root {
+        Root::Zero => json!({ "integrator": true }),
+        Root::Real(s) => json!({ "re": s, "time_constant_s": time }),
+        Root::Pair { frequency, damping } => {
+            let mut told = pair(frequency, damping, root);
+            told["time_constant_s"] = time;
+            told
+        }
+    }
+}
+
+fn pair(frequency: f64, damping: f64, root: Root) -> Value {
+    json!({
+        "frequency_Hz": frequency / (2.0 * PI),
+        "damped_frequency_Hz": root.damped_hertz().map_or(Value::Null, number),
+        "damping_ratio": damping,
+    })
+}
+
 fn place(place: &Place) -> Value {
     let pairs = |roots: &[Root]| -> Vec<Value> {
-        roots
-            .iter()
-            .filter_map(|root| match root {
-                Root::Pair { frequency, damping } => Some(json!({
-                    "frequency_Hz": frequency / (2.0 * PI),
-                    "damped_frequency_Hz": root.damped_hertz().map_or(Value::Null, number),
-                    "damping_ratio": damping,
-                })),
-                _ => None,
-            })
-            .collect()
+        let told = |root: &Root| match *root {
+            Root::Pair { frequency, damping } => Some(pair(frequency, damping, *root)),
+            _ => None,
+        };
+        roots.iter().filter_map(told).collect()
     };
     json!({
         "position_m": place.position,

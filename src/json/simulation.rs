@@ -1,6 +1,7 @@
 //! A simulation: `taut simulate --json`, `summary.json`.
 
 use crate::case::{Case, Experiment};
+use crate::mechanism::Mechanism;
 use crate::metrics::{self, Peak, SteadySpeed};
 use crate::reduction::Reduction;
 use crate::solve::{self, Method, Outcome, Solver};
@@ -8,7 +9,7 @@ use crate::stage::{AmplifierMode, Stage, axis};
 use serde::Serialize;
 
 /// Events listed; the rest is in the events' own file.
-const MOST_EVENTS: usize = 10_000;
+pub(super) const MOST_EVENTS: usize = 10_000;
 
 /// What is told of one experiment that ran.
 #[derive(Debug, Clone, Copy)]
@@ -38,7 +39,7 @@ pub struct Simulation {
 }
 
 #[derive(Debug, Serialize)]
-struct SolverUsed {
+pub(super) struct SolverUsed {
     name: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     tolerance: Option<f64>,
@@ -97,7 +98,7 @@ pub struct Band {
 }
 
 #[derive(Debug, Serialize)]
-struct EndingTold {
+pub(super) struct EndingTold {
     word: &'static str,
     time_s: f64,
 }
@@ -144,7 +145,7 @@ struct ReductionTold {
 }
 
 #[derive(Debug, Serialize)]
-struct PeakTold {
+pub(super) struct PeakTold {
     value: f64,
     time_s: f64,
 }
@@ -162,7 +163,7 @@ struct SteadyTold {
 }
 
 #[derive(Debug, Serialize)]
-struct CountTold {
+pub(super) struct CountTold {
     body: &'static str,
     stops: u64,
     starts: u64,
@@ -182,7 +183,7 @@ pub struct Event {
 }
 
 #[derive(Debug, Serialize)]
-struct CostTold {
+pub(super) struct CostTold {
     samples: u64,
     input_pieces: u64,
     modes: u64,
@@ -207,7 +208,7 @@ impl Simulation {
 }
 
 impl SolverUsed {
-    fn of(solver: Solver) -> Self {
+    pub(super) fn of(solver: Solver) -> Self {
         match solver {
             Solver::Exact => Self { name: "exact", tolerance: None, step_s: None, method: None },
             Solver::General { tolerance } => {
@@ -245,12 +246,10 @@ impl StageFigures {
 impl ExperimentFigures {
     fn of(run: &Simulated, mode: AmplifierMode, solver: Solver) -> Self {
         let (metrics, outcome) = (run.metrics, run.outcome);
-        let (word, time_s) = super::ending(outcome.ending, metrics.end);
-        let cost = outcome.cost;
         Self {
             name: run.experiment.name.clone(),
             files: run.files.to_vec(),
-            ending: EndingTold { word, time_s },
+            ending: EndingTold::of(outcome, metrics.end),
             metrics: Metrics::of(metrics, mode),
             reduction: run.reduction.map(|reduction| ReductionTold {
                 cart: reduction.cart.into(),
@@ -261,39 +260,57 @@ impl ExperimentFigures {
             }),
             band: run.band,
             position_error_m: run.outcome.error.map(|error| error.value),
-            position_error_basis: match (solver, run.outcome.error) {
-                (_, None) => None,
-                (Solver::Exact, _) => Some("bound of rounding"),
-                _ => Some("a second run with ten times the tolerance"),
-            },
+            position_error_basis: error_basis(outcome, solver),
             events: outcome.events.iter().take(MOST_EVENTS).map(Event::of).collect(),
             events_not_listed: outcome.events.len().saturating_sub(MOST_EVENTS),
-            cost: CostTold {
-                samples: cost.samples,
-                input_pieces: cost.pieces,
-                modes: cost.modes,
-                propagators: cost.propagators,
-                steps: cost.steps,
-                looks: cost.looks,
-                series: cost.series,
-                evaluations: cost.evaluations,
-            },
+            cost: CostTold::of(outcome),
         }
+    }
+}
+
+impl EndingTold {
+    /// `end` is when it was, s, where nothing ended it early.
+    pub(super) fn of(outcome: &Outcome, end: f64) -> Self {
+        let (word, time_s) = super::ending(outcome.ending, end);
+        Self { word, time_s }
+    }
+}
+
+/// What the error of a run's positions was made with.
+pub(super) fn error_basis(outcome: &Outcome, solver: Solver) -> Option<&'static str> {
+    match (solver, outcome.error) {
+        (_, None) => None,
+        (Solver::Exact, _) => Some("bound of rounding"),
+        _ => Some("a second run with ten times the tolerance"),
+    }
+}
+
+impl CostTold {
+    pub(super) fn of(outcome: &Outcome) -> Self {
+        let cost = outcome.cost;
+        Self {
+            samples: cost.samples,
+            input_pieces: cost.pieces,
+            modes: cost.modes,
+            propagators: cost.propagators,
+            steps: cost.steps,
+            looks: cost.looks,
+            series: cost.series,
+            evaluations: cost.evaluations,
+        }
+    }
+}
+
+impl CountTold {
+    pub(super) fn of(body: &'static str, count: metrics::EventCount) -> Self {
+        Self { body, stops: count.stops, starts: count.starts, reversals: count.reversals }
     }
 }
 
 impl Metrics {
     /// As seen by a meter on a stage whose amplifier works in this way.
     pub fn of(metrics: &metrics::Metrics, mode: AmplifierMode) -> Self {
-        let count = |body: usize| {
-            let count = metrics.events[body];
-            CountTold {
-                body: axis::LABELS[body].key,
-                stops: count.stops,
-                starts: count.starts,
-                reversals: count.reversals,
-            }
-        };
+        let count = |body: usize| CountTold::of(axis::LABELS[body].key, metrics.events[body]);
         Self {
             end_time_s: metrics.end,
             final_drive_angle_rad: metrics.final_drive_angle,
@@ -337,15 +354,24 @@ impl SteadyTold {
 }
 
 impl Event {
-    /// As the solver found it.
+    /// As the solver found it on an axis.
     pub fn of(event: &solve::Event) -> Self {
+        Self::with(event, load_unit)
+    }
+
+    /// The same on any mechanism.
+    pub fn on(mechanism: &Mechanism, event: &solve::Event) -> Self {
+        Self::with(event, |body| mechanism.bodies[body].kind.units()[2])
+    }
+
+    fn with(event: &solve::Event, unit: impl Fn(usize) -> &'static str) -> Self {
         Self {
             time_s: event.time,
             part: event.part.key(),
             from: event.from.word(),
             to: event.to.word(),
             load: event.load,
-            load_unit: event.body().map_or("", load_unit),
+            load_unit: event.body().map_or("", unit),
             by_rounding: event.by_rounding,
         }
     }

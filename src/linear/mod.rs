@@ -4,6 +4,8 @@
 //! the solvers use. From there: [poles](StateSpace::poles), [zeros](StateSpace::zeros), [`Response`] over frequency, resonance
 //! and anti-resonance [along the travel](travel), and [`Discrete`] models for a sample time.
 //!
+//! [`Natural`] has rigid and elastic modes of any mechanism, and [`GantryAnalysis`] those of a gantry over its working area.
+//!
 //! Dry friction that does not change with speed drops out while everything slides; while a body sticks it does not move at all, and
 //! [`Operation::held`] says so.
 
@@ -11,7 +13,9 @@ mod analysis;
 mod discrete;
 mod eigen;
 mod frame;
+mod gantry;
 mod model;
+mod natural;
 mod response;
 mod travel;
 mod words;
@@ -19,7 +23,9 @@ mod zeros;
 
 pub use analysis::{Analysis, Question};
 pub use discrete::{Discrete, Hold};
+pub use gantry::{GantryAnalysis, ResonanceMap};
 pub use model::{Operation, StateSpace, Variable};
+pub use natural::{ElasticMode, Natural, RigidMode};
 pub use response::{Range, Response, Transfer};
 pub use travel::{Place, places, travel, undamped};
 pub use words::{assumptions, sticks};

@@ -61,7 +61,11 @@ pub fn stage_drawing(stage: &Stage) -> String {
 }
 
 /// The friction that there is, as lines: forward, and backward where it differs.
-fn friction(f: &Friction, [viscous, coulomb, breakaway]: [&str; 3], [viscous_unit, unit]: [&str; 2]) -> Vec<String> {
+pub(super) fn friction(
+    f: &Friction,
+    [viscous, coulomb, breakaway]: [&str; 3],
+    [viscous_unit, unit]: [&str; 2],
+) -> Vec<String> {
     let line = |symbol: &str, unit: &str, forward: f64, backward: f64| {
         (forward != 0.0 || backward != 0.0).then(|| {
             if forward == backward {

@@ -1,6 +1,7 @@
 //! A report: one HTML file that opens without a network, on a phone, in the dark and on paper.
 
 use super::figure::Figure;
+use super::plane::Plane;
 use super::svg::PALETTE;
 use super::{embed, plot};
 use crate::error::Result;
@@ -235,6 +236,18 @@ impl Page {
                 div.stage tabindex="0" { (PreEscaped(svg)) }
                 script type="application/json" { (PreEscaped(embed::json(figure))) }
                 @if !figure.caption.is_empty() { figcaption { (figure.caption) } }
+            }
+        });
+    }
+
+    /// A plane, with its title and caption.
+    pub fn plane(&mut self, plane: &Plane) {
+        let svg = strip_style(&plane.bare());
+        self.push(html! {
+            figure.drawing {
+                div.figtitle { span { (plane.title) } }
+                div.scroll { (PreEscaped(svg)) }
+                @if !plane.caption.is_empty() { figcaption { (plane.caption) } }
             }
         });
     }

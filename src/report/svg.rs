@@ -167,6 +167,20 @@ impl Svg {
         );
     }
 
+    /// A cell of a map, in a colour that light and dark share.
+    pub fn cell(&mut self, at: (f64, f64), size: (f64, f64), colour: &str) {
+        let [x, y, wide, high] = [at.0, at.1, size.0, size.1].map(n);
+        let _ = write!(
+            self.body,
+            "<rect x=\"{x}\" y=\"{y}\" width=\"{wide}\" height=\"{high}\" fill=\"{colour}\" shape-rendering=\"crispEdges\"/>"
+        );
+    }
+
+    /// A stroked path in such a colour.
+    pub fn stroke(&mut self, d: &str, colour: &str, width: f64) {
+        let _ = write!(self.body, "<path d=\"{d}\" stroke=\"{colour}\" stroke-width=\"{}\"/>", n(width));
+    }
+
     /// An arrow from `from` to `to`, its point at `to`.
     pub fn arrow(&mut self, from: (f64, f64), to: (f64, f64), paint: &Paint, width: f64) {
         let head = 5.0 + 1.6 * width;

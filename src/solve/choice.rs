@@ -2,6 +2,7 @@
 
 use super::{Method, Solver};
 use crate::error::{Error, Result};
+use crate::mechanism::Mechanism;
 use crate::stage::Stage;
 
 /// The name of a solver.
@@ -32,7 +33,24 @@ impl Choice {
     /// The solver that is asked for, or else the one for this stage. Options that do not go with it are told by the names of
     /// the command line.
     pub fn solver(&self, stage: &Stage) -> Result<Solver> {
-        let solver = match (self.solver, Solver::of(stage)) {
+        self.instead_of(Solver::of(stage))
+    }
+
+    /// The same for a machine that is no axis, which Table 3 does not know.
+    pub fn solver_of(&self, mechanism: &Mechanism) -> Result<Solver> {
+        let option = match (self.solver, self.step, self.method) {
+            (Some(Kind::Table3), _, _) => "--solver table3",
+            (_, Some(_), _) => "--step",
+            (_, _, Some(_)) => "--method",
+            _ => return self.instead_of(Solver::of_mechanism(mechanism)),
+        };
+        Err(Error::new("the paper's Table 3, with its fixed step, is of a single axis")
+            .in_file(option)
+            .next("leave it out: a gantry is solved exactly, or by --solver general"))
+    }
+
+    fn instead_of(&self, usual: Solver) -> Result<Solver> {
+        let solver = match (self.solver, usual) {
             (Some(Kind::Table3), _) => {
                 Solver::Table3 { step: self.step.unwrap_or(1e-4), method: self.method.unwrap_or_default() }
             }

@@ -1,8 +1,9 @@
 //! The error of a run of the general solver, by a second run with another tolerance.
 
-use super::{Flow, Outcome, PositionError, Solver, stream};
+use super::{Course, Detail, Flow, Outcome, PositionError, Solver, stream, stream_mechanism};
 use crate::case::Experiment;
 use crate::error::Result;
+use crate::mechanism::{Mechanism, Shown};
 use crate::stage::Stage;
 use crate::trajectory::Trajectory;
 
@@ -11,6 +12,9 @@ const MOST_ROWS: u64 = 1000;
 
 /// The tolerance of the second run, as a multiple of the first one's.
 const FACTOR: f64 = 10.0;
+
+/// Where rows go.
+type Sink<'a> = dyn FnMut(&Trajectory) -> Flow + 'a;
 
 /// Keeps some of a run's rows, and compares them with those of a second run.
 ///
@@ -34,27 +38,48 @@ const FACTOR: f64 = 10.0;
 /// ```
 #[derive(Debug, Clone)]
 pub struct ErrorEstimate {
-    radius: f64,
+    /// Columns of the ways that are compared, and what makes lengths at the belt of them.
+    ways: Vec<(String, f64)>,
+    every: f64,
+    until: f64,
     stride: u64,
     rows: u64,
-    /// Time, r φ₁, x and r φ₃ of each row kept.
-    kept: Vec<[f64; 4]>,
+    /// Time of each row kept.
+    times: Vec<f64>,
+    /// Its ways at the belt, one row after the other.
+    kept: Vec<f64>,
 }
 
 impl ErrorEstimate {
     /// For a run of this experiment on this stage.
     pub fn new(stage: &Stage, experiment: &Experiment) -> Self {
-        let intervals = (experiment.until / experiment.every).clamp(1.0, 1e15) as u64;
-        Self { radius: stage.pulley_radius, stride: intervals.div_ceil(MOST_ROWS).max(1), rows: 0, kept: Vec::new() }
+        let r = stage.pulley_radius;
+        let ways = [("drive_angle", r), ("cart_position", 1.0), ("idler_angle", r)];
+        Self::along(ways.map(|(name, lever)| (name.to_string(), lever)).to_vec(), experiment.every, experiment.until)
+    }
+
+    /// For a run of a mechanism that is no stage of an axis: of every body whose way is a column.
+    pub fn of_mechanism(mechanism: &Mechanism, course: &Course) -> Self {
+        let way = |heading: &crate::mechanism::Heading| match heading.shown {
+            Shown::Position(body, 1.0) => Some((heading.name.to_string(), mechanism.bodies[body].kind.lever())),
+            _ => None,
+        };
+        Self::along(mechanism.columns.iter().filter_map(way).collect(), course.every, course.until)
+    }
+
+    fn along(ways: Vec<(String, f64)>, every: f64, until: f64) -> Self {
+        let intervals = (until / every).clamp(1.0, 1e15) as u64;
+        let stride = intervals.div_ceil(MOST_ROWS).max(1);
+        Self { ways, every, until, stride, rows: 0, times: Vec::new(), kept: Vec::new() }
     }
 
     /// Takes the next rows of the run.
     pub fn take(&mut self, block: &Trajectory) {
-        let column = |name: &str| block.get(name).unwrap_or(&[]);
-        let [time, drive, cart, idler] = ["time", "drive_angle", "cart_position", "idler_angle"].map(column);
-        for (row, &time) in time.iter().enumerate() {
+        let columns = columns(&self.ways, block);
+        for (row, &time) in block.get("time").unwrap_or(&[]).iter().enumerate() {
             if (self.rows + row as u64).is_multiple_of(self.stride) {
-                self.kept.push([time, self.radius * drive[row], cart[row], self.radius * idler[row]]);
+                self.times.push(time);
+                self.kept.extend(columns.iter().map(|(values, lever)| lever * values[row]));
             }
         }
         self.rows += block.len() as u64;
@@ -70,24 +95,47 @@ impl ErrorEstimate {
         flow: &mut dyn FnMut() -> Flow,
     ) -> Result<Option<PositionError>> {
         let second = Experiment { every: experiment.every * self.stride as f64, ..experiment.clone() };
+        self.compare(outcome, flow, &mut |sink| stream(stage, &second, coarser(tolerance), sink).map(|_| ()))
+    }
+
+    /// The same of a run of a mechanism.
+    pub fn finish_mechanism(
+        self,
+        mechanism: &Mechanism,
+        course: &Course,
+        tolerance: f64,
+        outcome: &Outcome,
+        flow: &mut dyn FnMut() -> Flow,
+    ) -> Result<Option<PositionError>> {
+        let second = Course { every: course.every * self.stride as f64, ..course.clone() };
+        self.compare(outcome, flow, &mut |sink| {
+            stream_mechanism(mechanism, &second, coarser(tolerance), (Detail::Lean, None), sink).map(|_| ())
+        })
+    }
+
+    fn compare(
+        self,
+        outcome: &Outcome,
+        flow: &mut dyn FnMut() -> Flow,
+        again: &mut dyn FnMut(&mut Sink) -> Result<()>,
+    ) -> Result<Option<PositionError>> {
         // An early end is compared as far as it came.
-        let until = outcome.ending.time().unwrap_or(experiment.until);
-        let coarse = if FACTOR * tolerance <= 1e-2 { FACTOR * tolerance } else { tolerance / FACTOR };
+        let until = outcome.ending.time().unwrap_or(self.until);
         let (mut value, mut way): (f64, f64) = (0.0, 0.0);
         let (mut row, mut interrupted) = (0, false);
-        stream(stage, &second, Solver::General { tolerance: coarse }, &mut |block| {
-            let column = |name: &str| block.get(name).unwrap_or(&[]);
-            let [time, drive, cart, idler] = ["time", "drive_angle", "cart_position", "idler_angle"].map(column);
-            for (j, &time) in time.iter().enumerate() {
-                let Some(&[t, p1, x, p3]) = self.kept.get(row) else { return Flow::Stop };
+        let width = self.ways.len();
+        again(&mut |block| {
+            let columns = columns(&self.ways, block);
+            for (j, &time) in block.get("time").unwrap_or(&[]).iter().enumerate() {
+                let Some(&t) = self.times.get(row) else { return Flow::Stop };
+                let first = &self.kept[row * width..(row + 1) * width];
                 row += 1;
                 // The last row of the two may be at different times.
-                if (t - time).abs() > 1e-9 * experiment.every || t > until {
+                if (t - time).abs() > 1e-9 * self.every || t > until {
                     continue;
                 }
-                let there = [self.radius * drive[j], cart[j], self.radius * idler[j]];
-                for ((first, second), start) in [p1, x, p3].into_iter().zip(there).zip(&self.kept[0][1..]) {
-                    value = value.max((first - second).abs());
+                for ((first, (values, lever)), start) in first.iter().zip(&columns).zip(&self.kept) {
+                    value = value.max((first - lever * values[j]).abs());
                     way = way.max((first - start).abs());
                 }
             }
@@ -96,4 +144,14 @@ impl ErrorEstimate {
         })?;
         Ok((!interrupted).then_some(PositionError { value, way }))
     }
+}
+
+/// The columns of these ways, each with its lever.
+fn columns<'a>(ways: &[(String, f64)], block: &'a Trajectory) -> Vec<(&'a [f64], f64)> {
+    ways.iter().map(|(name, lever)| (block.get(name).unwrap_or(&[]), *lever)).collect()
+}
+
+fn coarser(tolerance: f64) -> Solver {
+    let coarse = if FACTOR * tolerance <= 1e-2 { FACTOR * tolerance } else { tolerance / FACTOR };
+    Solver::General { tolerance: coarse }
 }

@@ -61,6 +61,11 @@ impl Solver {
     pub fn of(stage: &Stage) -> Self {
         if stage.is_piecewise_linear() { Self::Exact } else { Self::GENERAL }
     }
+
+    /// The same for a mechanism.
+    pub fn of_mechanism(mechanism: &Mechanism) -> Self {
+        if mechanism.is_piecewise_linear() { Self::Exact } else { Self::GENERAL }
+    }
 }
 
 /// A fixed-step formula.

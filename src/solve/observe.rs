@@ -51,8 +51,14 @@ impl Gap<'_> {
     /// A bound of the magnitude of quantity `q` within.
     #[inline(always)]
     pub fn bound(&self, q: usize) -> f64 {
-        let (middle, half) = (0.5 * (self.from[q] + self.to[q]).abs(), 0.5 * (self.to[q] - self.from[q]).abs());
-        middle + rise(half, self.bow[q])
+        Self::bound_of(self.from[q], self.to[q], self.bow[q])
+    }
+
+    /// The same of what goes from `from` to `to` and can be off the straight line by `bow`.
+    #[inline(always)]
+    pub fn bound_of(from: f64, to: f64, bow: f64) -> f64 {
+        let (middle, half) = (0.5 * (from + to).abs(), 0.5 * (to - from).abs());
+        middle + rise(half, bow)
     }
 
     /// Bounds of the value of quantity `q` within, from below and above.
@@ -123,7 +129,7 @@ impl Curve {
 }
 
 /// Σ c_k sᵏ on 0..1.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Polynomial(pub [f64; TERMS]);
 
 /// C(7, k)
@@ -206,6 +212,11 @@ impl Polynomial {
     pub fn largest(&self, from: f64, to: f64) -> (f64, f64) {
         let (high, low) = (self.greatest(from, to), self.negative().greatest(from, to));
         if low.1 > high.1 { (low.0, -low.1) } else { high }
+    }
+
+    /// Adds another one, times `weight`.
+    pub fn add(&mut self, other: &Self, weight: f64) {
+        self.0.iter_mut().zip(other.0).for_each(|(own, other)| *own += weight * other);
     }
 
     /// The same with the other sign.

@@ -4,7 +4,7 @@ use super::exact::{self, Kernel, Known};
 use super::inputs::Pieces;
 use super::observe::{Observe, Output};
 use super::{Detail, Flow, Outcome, Solver, check, general};
-use crate::case::Experiment;
+use crate::case::{Experiment, GantryExperiment};
 use crate::error::{Error, Result};
 use crate::mechanism::{Mechanism, State};
 use crate::signal::Signal;
@@ -31,6 +31,14 @@ pub struct Course {
     pub until: f64,
     /// Output interval, s.
     pub every: f64,
+}
+
+impl Course {
+    /// What is done with a gantry in this experiment.
+    pub fn of(experiment: &GantryExperiment) -> Self {
+        let &GantryExperiment { ref inputs, until, every, initial, .. } = experiment;
+        Self { inputs: inputs.to_vec(), start: initial, until, every }
+    }
 }
 
 /// A run of one of the solvers.

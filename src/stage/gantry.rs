@@ -85,6 +85,16 @@ impl Routing {
         }
     }
 
+    /// What the drives say of bridge and cart minus what is, each as a sum of stretches of spans, (span, weight):
+    /// r (φ₂ − φ₁)/2 − x = −(s_left + s_right)/2 and −r (φ₁ + φ₂)/2 − y = (s_right − s_left)/2 of the H-frame,
+    /// r (φ_A ± φ_B)/2 − (x or y) = (s_A out ± s_B out)/2 of CoreXY.
+    pub fn drive_error(self) -> [[(usize, f64); 2]; 2] {
+        match self {
+            Routing::HFrame => [[(0, -0.5), (1, -0.5)], [(0, -0.5), (1, 0.5)]],
+            Routing::CoreXy => [[(0, 0.5), (2, 0.5)], [(0, 0.5), (2, -0.5)]],
+        }
+    }
+
     /// Rows of A for pulleys of radius `r`, and how the spans' lengths change with x and y.
     fn rows(self, r: f64) -> Vec<([f64; BODIES], [f64; 2])> {
         match self {
@@ -158,6 +168,15 @@ impl Gantry {
         match self.routing {
             Routing::HFrame => [-(x + y) / r, (x - y) / r],
             Routing::CoreXy => [(x + y) / r, (x - y) / r],
+        }
+    }
+
+    /// Where the angles of the drive pulleys say that bridge and cart are: the other direction of [`Gantry::angles`], m.
+    pub fn place(&self, [first, second]: [f64; 2]) -> [f64; 2] {
+        let half = 0.5 * self.pulley_radius;
+        match self.routing {
+            Routing::HFrame => [half * (second - first), -half * (first + second)],
+            Routing::CoreXy => [half * (first + second), half * (first - second)],
         }
     }
 
@@ -264,7 +283,7 @@ impl Gantry {
             springs.push(way(body, slide.travel));
         }
         let mut mechanism = Mechanism::new(bodies, springs, drives);
-        mechanism.readings = self.readings();
+        mechanism.readings = self.readings(&mechanism);
         mechanism.columns = self.columns(&mechanism);
         mechanism
     }
@@ -287,19 +306,14 @@ impl Gantry {
         rows.into_iter().enumerate().map(span).collect()
     }
 
-    /// Positions and speeds of bridge and cart, currents and voltages of both drives, forces of the spans.
-    fn readings(&self) -> Vec<Shown> {
-        let mut readings = vec![
-            Shown::Position(BRIDGE, 1.0),
-            Shown::Position(CART, 1.0),
-            Shown::Speed(BRIDGE, 1.0),
-            Shown::Speed(CART, 1.0),
-            Shown::Current(0),
-            Shown::Current(1),
-            Shown::Voltage(0),
-            Shown::Voltage(1),
-        ];
+    /// Speeds of bridge and cart, currents of both drives, forces of the spans, the stretches that tell what the drives do not see, and
+    /// the speeds of rotors that turn by themselves.
+    fn readings(&self, mechanism: &Mechanism) -> Vec<Shown> {
+        let mut readings =
+            vec![Shown::Speed(BRIDGE, 1.0), Shown::Speed(CART, 1.0), Shown::Current(0), Shown::Current(1)];
         readings.extend((0..self.routing.spans().len()).map(|span| Shown::Force(span, 1.0)));
+        readings.extend(self.routing.drive_error()[0].map(|(span, _)| Shown::Stretch(span)));
+        readings.extend((BODIES..mechanism.bodies.len()).map(|rotor| Shown::Speed(rotor, 1.0)));
         readings
     }
 

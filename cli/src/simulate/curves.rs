@@ -7,41 +7,41 @@ use taut::trajectory::Trajectory;
 /// Points that a curve keeps: more than a plot has pixels.
 const POINTS: usize = 3000;
 
-/// What a curve shows.
-#[derive(Debug, Clone, Copy)]
-enum Source {
-    /// A column as it is.
-    Column(&'static str),
-    /// An angle or its rate at the belt: r times it.
-    Arc(&'static str),
-    /// The stretch of a span: difference of two positions, angles at the belt.
-    Stretch(&'static str, &'static str),
-}
+/// A curve: its name, and the columns that it is a sum of, each with its weight.
+pub type Source = (String, Vec<(String, f64)>);
 
-/// Every curve that a report can show.
-const SOURCES: [(&str, Source); 21] = [
-    ("input", Source::Column("input")),
-    ("voltage", Source::Column("voltage")),
-    ("current", Source::Column("motor_current")),
-    ("drive", Source::Arc("drive_angle")),
-    ("cart", Source::Column("cart_position")),
-    ("idler", Source::Arc("idler_angle")),
-    ("drive speed", Source::Arc("drive_speed")),
-    ("cart speed", Source::Column("cart_speed")),
-    ("idler speed", Source::Arc("idler_speed")),
-    ("stretch 1", Source::Stretch("drive_angle", "cart_position")),
-    ("stretch 2", Source::Stretch("cart_position", "idler_angle")),
-    ("stretch 3", Source::Stretch("idler_angle", "drive_angle")),
-    ("force 1", Source::Column("span1_force")),
-    ("force 2", Source::Column("span2_force")),
-    ("force 3", Source::Column("span3_force")),
-    ("drive friction", Source::Column("drive_friction")),
-    ("cart friction", Source::Column("cart_friction")),
-    ("idler friction", Source::Column("idler_friction")),
-    ("drive state", Source::Column("drive_state")),
-    ("cart state", Source::Column("cart_state")),
-    ("idler state", Source::Column("idler_state")),
-];
+/// Every curve that the report of an axis can show.
+fn of_axis(r: f64) -> Vec<Source> {
+    let column = |name: &'static str, column: &'static str| (name, vec![(column, 1.0)]);
+    let arc = |name, angle: &'static str| (name, vec![(angle, r)]);
+    let at_belt = |column: &str| if column.ends_with("_angle") { r } else { 1.0 };
+    let stretch = |name, a: &'static str, b: &'static str| (name, vec![(a, at_belt(a)), (b, -at_belt(b))]);
+    let sources = [
+        column("input", "input"),
+        column("voltage", "voltage"),
+        column("current", "motor_current"),
+        arc("drive", "drive_angle"),
+        column("cart", "cart_position"),
+        arc("idler", "idler_angle"),
+        arc("drive speed", "drive_speed"),
+        column("cart speed", "cart_speed"),
+        arc("idler speed", "idler_speed"),
+        stretch("stretch 1", "drive_angle", "cart_position"),
+        stretch("stretch 2", "cart_position", "idler_angle"),
+        stretch("stretch 3", "idler_angle", "drive_angle"),
+        column("force 1", "span1_force"),
+        column("force 2", "span2_force"),
+        column("force 3", "span3_force"),
+        column("drive friction", "drive_friction"),
+        column("cart friction", "cart_friction"),
+        column("idler friction", "idler_friction"),
+        column("drive state", "drive_state"),
+        column("cart state", "cart_state"),
+        column("idler state", "idler_state"),
+    ];
+    let owned = |terms: Vec<(&str, f64)>| terms.into_iter().map(|(name, weight)| (name.to_string(), weight)).collect();
+    sources.into_iter().map(|(name, terms)| (name.to_string(), owned(terms))).collect()
+}
 
 /// What a log can show over the curves: the column, and whether it is an angle at the drive pulley, or its rate.
 const LOGGED: [(&str, bool); 6] = [
@@ -84,44 +84,89 @@ impl Samples {
 
 /// The curves of one run.
 pub struct Curves {
-    radius: f64,
+    sources: Vec<Source>,
     thinned: Vec<Decimator>,
     scratch: Vec<f64>,
 }
 
 impl Curves {
-    /// No points yet.
+    /// No points yet, of an axis.
     pub fn new(stage: &Stage) -> Self {
-        let thinned = SOURCES.iter().map(|_| Decimator::new(POINTS)).collect();
-        Self { radius: stage.pulley_radius, thinned, scratch: Vec::new() }
+        Self::of(of_axis(stage.pulley_radius))
+    }
+
+    /// The same of these curves.
+    pub fn of(sources: Vec<Source>) -> Self {
+        let thinned = sources.iter().map(|_| Decimator::new(POINTS)).collect();
+        Self { sources, thinned, scratch: Vec::new() }
     }
 
     /// Takes the next rows.
     pub fn take(&mut self, block: &Trajectory) {
-        let r = self.radius;
-        let time = block.get("time").unwrap_or(&[]);
         let column = |name: &str| block.get(name).unwrap_or(&[]);
-        let at_belt = |name: &str| if name.ends_with("_angle") { r } else { 1.0 };
-        for (&(_, source), thinned) in SOURCES.iter().zip(&mut self.thinned) {
-            self.scratch.clear();
-            match source {
-                Source::Column(name) => {
-                    thinned.push(time, column(name));
-                    continue;
+        let time = column("time");
+        for ((_, terms), thinned) in self.sources.iter().zip(&mut self.thinned) {
+            let sum = match &terms[..] {
+                [(name, 1.0)] => column(name),
+                [(first, weight), rest @ ..] => {
+                    self.scratch.clear();
+                    self.scratch.extend(column(first).iter().map(|value| weight * value));
+                    for (name, weight) in rest {
+                        self.scratch.iter_mut().zip(column(name)).for_each(|(sum, value)| *sum += weight * value);
+                    }
+                    &self.scratch
                 }
-                Source::Arc(name) => self.scratch.extend(column(name).iter().map(|angle| r * angle)),
-                Source::Stretch(a, b) => {
-                    let (fa, fb) = (at_belt(a), at_belt(b));
-                    self.scratch.extend(column(a).iter().zip(column(b)).map(|(a, b)| fa * a - fb * b));
-                }
-            }
-            thinned.push(time, &self.scratch);
+                [] => &[],
+            };
+            thinned.push(time, sum);
         }
     }
 
     /// Times and values of the curve called `name`; none if the run has no such quantity.
     pub fn get(&self, name: &str) -> Option<(Vec<f64>, Vec<f64>)> {
-        let place = SOURCES.iter().position(|(n, _)| *n == name)?;
+        let place = self.sources.iter().position(|(n, _)| n == name)?;
         Some(self.thinned[place].points()).filter(|(times, _)| !times.is_empty())
+    }
+}
+
+/// Where two columns go together, one over the other, thinned out by leaving out every second row as often as needed.
+pub struct Way {
+    columns: [String; 2],
+    stride: usize,
+    rows: usize,
+    points: Vec<[f64; 2]>,
+    last: [f64; 2],
+}
+
+impl Way {
+    /// No points yet.
+    pub fn new(columns: [&str; 2]) -> Self {
+        Self { columns: columns.map(str::to_string), stride: 1, rows: 0, points: Vec::new(), last: [0.0; 2] }
+    }
+
+    /// Takes the next rows.
+    pub fn take(&mut self, block: &Trajectory) {
+        let [a, b] = [0, 1].map(|k| block.get(&self.columns[k]).unwrap_or(&[]));
+        for (a, b) in a.iter().zip(b) {
+            self.last = [*a, *b];
+            if self.rows.is_multiple_of(self.stride) {
+                self.points.push(self.last);
+            }
+            self.rows += 1;
+            if self.points.len() > 2 * POINTS {
+                let mut keep = false;
+                self.points.retain(|_| {
+                    keep = !keep;
+                    keep
+                });
+                self.stride *= 2;
+            }
+        }
+    }
+
+    /// Values of both columns, the last row among them.
+    pub fn points(&self) -> (Vec<f64>, Vec<f64>) {
+        let last = Some(self.last).filter(|_| self.rows > 0);
+        self.points.iter().copied().chain(last).map(|[a, b]| (a, b)).unzip()
     }
 }

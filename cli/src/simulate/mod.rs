@@ -2,8 +2,10 @@
 
 mod band;
 mod curves;
+mod gantry;
 mod page;
 pub mod plots;
+mod rows;
 mod run;
 pub mod table;
 
@@ -13,30 +15,41 @@ use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
 use crate::terminal;
 use run::{Run, Setting};
-use taut::case::{Case, Experiment};
+use taut::case::{Case, Opened};
 use taut::files::write_atomically;
 use taut::json::{self, Simulation};
-use taut::solve::{Ending, Solver};
+use taut::solve::{self, Ending, Solver};
 use taut::stage::Stage;
 use taut::{Error, Result};
 
 /// Reads the case, simulates, measures, reports.
 pub fn run(args: &Simulate) -> Outcome {
     let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
-    let case = Case::read_with(&args.case, &changes)?;
+    match Opened::read_with(&args.case, &changes)? {
+        Opened::Axis(case) => axis(args, &case),
+        Opened::Gantry(case) => gantry::run(args, &case),
+    }
+}
+
+fn axis(args: &Simulate, case: &Case) -> Outcome {
     let solver = args.solver(&case.stage)?;
     let experiments = case.experiments_named(&args.case, &args.experiments)?;
     if args.as_measured {
-        measurable(&case, solver, args)?;
+        measurable(case, solver, args)?;
     }
-    let machines = machines(&case, args)?;
-    let mut inputs = folder::inputs(&args.case, &case);
+    let machines = machines(case, args)?;
+    let mut inputs = folder::inputs(&args.case, case);
     args.draws.iter().for_each(|file| inputs.add(file));
-    let create = |root| Folder::create(root, inputs, names(args, &case, &experiments));
+    let create = |root| {
+        Folder::create(
+            root,
+            inputs,
+            names(args, folder::brought(case).into_values(), experiments.iter().map(|one| one.file_name())),
+        )
+    };
     let folder = args.out.as_deref().map(create).transpose()?;
     let interrupt = Interrupt::listen();
-    let setting =
-        Setting { args, case: &case, solver, folder: folder.as_ref(), interrupt: &interrupt, machines: &machines };
+    let setting = Setting { args, case, solver, folder: folder.as_ref(), interrupt: &interrupt, machines: &machines };
 
     let mut runs = Vec::new();
     for experiment in experiments {
@@ -46,7 +59,7 @@ pub fn run(args: &Simulate) -> Outcome {
         }
     }
     let told: Vec<_> = runs.iter().map(Run::told).collect();
-    let summary = json::text(&Simulation::new(&case, solver, &told));
+    let summary = json::text(&Simulation::new(case, solver, &told));
     if let Some(folder) = &folder {
         write(folder, &setting, &summary, &runs).map_err(Failure::work)?;
         folder.place()?;
@@ -54,13 +67,19 @@ pub fn run(args: &Simulate) -> Outcome {
     if args.json {
         terminal::show(&summary);
     } else if !args.quiet {
-        terminal::show(&table::text(&case, solver, &runs, folder.as_ref()));
+        terminal::show(&table::text(case, solver, &runs, folder.as_ref()));
     }
-    Ok(status(&runs, solver, &interrupt))
+    let ended: Vec<Ended> = runs.iter().map(Run::ended).collect();
+    Ok(status(&ended, solver, &interrupt))
 }
 
-/// The files that will be written, but for plots.
-fn names(args: &Simulate, case: &Case, experiments: &[&Experiment]) -> Vec<String> {
+/// The files that will be written, but for plots: `brought` are those of the case's inputs, `experiments` the names of the runs' own.
+fn names(
+    args: &Simulate,
+    brought: impl Iterator<Item = String>,
+    experiments: impl Iterator<Item = String>,
+) -> Vec<String> {
+    let experiments: Vec<String> = experiments.collect();
     let endings = ["csv", "parquet", "events.csv", "measured.csv", "band.csv"];
     let endings = endings.iter().filter(|ending| match **ending {
         "csv" => args.format.contains(&Format::Csv),
@@ -70,10 +89,10 @@ fn names(args: &Simulate, case: &Case, experiments: &[&Experiment]) -> Vec<Strin
         "band.csv" => args.draws.is_some(),
         ending => ending == "events.csv",
     });
-    let tables = endings.flat_map(|ending| experiments.iter().map(move |one| format!("{}.{ending}", one.file_name())));
+    let tables = endings.flat_map(|ending| experiments.iter().map(move |one| format!("{one}.{ending}")));
     let report = (!args.no_report).then(|| "report.html".to_string());
     let common = ["summary.json", "case.toml"].map(str::to_string);
-    tables.chain(common).chain(report).chain(folder::brought(case).into_values()).collect()
+    tables.chain(common).chain(report).chain(brought).collect()
 }
 
 /// What belongs to all experiments: summary, case, report and plots.
@@ -120,22 +139,30 @@ fn measurable(case: &Case, solver: Solver, args: &Simulate) -> Result<()> {
     }
 }
 
+/// How a run ended.
+pub struct Ended<'a> {
+    name: &'a str,
+    outcome: &'a solve::Outcome,
+    /// Where it ended early: what is told of that.
+    early: Option<String>,
+}
+
 /// How it ended, and a word about every run that did not reach its end.
-fn status(runs: &[Run], solver: Solver, interrupt: &Interrupt) -> Status {
-    for run in runs {
-        if let Some(told) = table::early_end(&run.outcome.ending) {
-            let advice = match (run.outcome.ending, solver) {
+fn status(runs: &[Ended], solver: Solver, interrupt: &Interrupt) -> Status {
+    for Ended { name, outcome, early } in runs {
+        if let Some(told) = early {
+            let advice = match (outcome.ending, solver) {
                 (Ending::Diverged { .. }, Solver::Table3 { .. }) => "; a smaller --step may help",
                 (Ending::Diverged { .. }, Solver::General { .. }) => "; a smaller --tolerance may help",
                 _ => "",
             };
-            terminal::show_error(&format!("the run \"{}\" {told}{advice}", run.experiment.name));
+            terminal::show_error(&format!("the run \"{name}\" {told}{advice}"));
         }
-        if let Some(told) = table::hidden(run) {
+        if let Some(told) = table::hidden(name, outcome) {
             terminal::show_warning(&told);
         }
     }
-    let relied = |run: &Run| run.outcome.ending == Ending::Complete && table::hidden(run).is_none();
+    let relied = |run: &Ended| run.outcome.ending == Ending::Complete && table::hidden(run.name, run.outcome).is_none();
     match interrupt.signal() {
         Some(signal) => Status::Interrupted(signal),
         None if runs.iter().all(relied) => Status::Done,

@@ -7,31 +7,49 @@ use taut::case::Case;
 use taut::json::load_unit;
 use taut::number;
 use taut::report::{Callout, Cell, Page, Table, stage_drawing};
-use taut::solve::Solver;
+use taut::solve::{Event, Solver};
 
 /// Events shown; the rest is in the events' own file.
 const MOST_EVENTS: usize = 200;
 
 /// The page for these runs; `text` is the case that repeats them.
 pub fn page(case: &Case, text: &str, solver: Solver, runs: &[Run], figures: &[Vec<Named>]) -> Page {
-    let how = match solver {
-        Solver::Exact => "Solved exactly: modes and matrix exponentials, events located to rounding.",
-        Solver::General { .. } => "Solved with an adaptive formula of order eight between located events.",
-        Solver::Table3 { .. } => {
-            "Solved with the friction function of the paper's Table 3 and a fixed step: a reproduction, not exact."
-        }
-    };
-    let mut page = Page::new(case.title.clone()).subtitle(how);
+    let mut page = Page::new(case.title.clone()).subtitle(how(solver));
     page.section("The stage");
     page.drawing(&stage_drawing(&case.stage), "Symbols, values and positive directions.");
     for (run, figures) in runs.iter().zip(figures) {
         experiment(&mut page, run, figures, solver);
     }
+    repeated(&mut page, text);
+    page
+}
+
+/// How it was solved.
+pub fn how(solver: Solver) -> &'static str {
+    match solver {
+        Solver::Exact => "Solved exactly: modes and matrix exponentials, events located to rounding.",
+        Solver::General { .. } => "Solved with an adaptive formula of order eight between located events.",
+        Solver::Table3 { .. } => {
+            "Solved with the friction function of the paper's Table 3 and a fixed step: a reproduction, not exact."
+        }
+    }
+}
+
+/// The case, and the version that ran it.
+pub fn repeated(page: &mut Page, text: &str) {
     page.section("The case");
     page.prose("This text repeats the run.");
     page.embed("case.toml", text);
     page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
-    page
+}
+
+/// What was found, a row for each figure.
+pub fn figures_table(lines: Vec<(&'static str, String)>) -> Table {
+    let mut table = Table::new("").column("Quantity", "").column("Value", "");
+    for (name, value) in lines {
+        table.row([Cell::from(name), Cell::from(value.replace('-', "−"))]);
+    }
+    table
 }
 
 fn experiment(page: &mut Page, run: &Run, figures: &[Named], solver: Solver) {
@@ -39,19 +57,15 @@ fn experiment(page: &mut Page, run: &Run, figures: &[Named], solver: Solver) {
     if let Some(told) = early_end(&run.outcome.ending) {
         page.callout(Callout::Fails, "The whole run", format!("This run {told}."));
     }
-    let mut table = Table::new("").column("Quantity", "").column("Value", "");
-    for (name, value) in lines(run, solver) {
-        table.row([Cell::from(name), Cell::from(value.replace('-', "−"))]);
-    }
-    page.table(&table);
+    page.table(&figures_table(lines(run, solver)));
     for (_, figure) in figures {
         page.figure(figure);
     }
-    events(page, run);
+    events(page, &run.outcome.events, &run.experiment.file_name(), load_unit);
 }
 
-fn events(page: &mut Page, run: &Run) {
-    let events = &run.outcome.events;
+/// The events of an experiment of this file name; `unit` is that of the load on a body.
+pub fn events(page: &mut Page, events: &[Event], file: &str, unit: impl Fn(usize) -> &'static str) {
     if events.is_empty() {
         return;
     }
@@ -65,14 +79,13 @@ fn events(page: &mut Page, run: &Run) {
             Cell::from(event.from.word()),
             Cell::from(event.to.word()),
             match event.body() {
-                Some(body) => Cell::Number(number::engineering(event.load, load_unit(body), 4)),
+                Some(body) => Cell::Number(number::engineering(event.load, unit(body), 4)),
                 None => Cell::from(""),
             },
         ]);
     }
     page.table(&table);
     if events.len() > MOST_EVENTS {
-        let file = format!("{}.events.csv", run.experiment.file_name());
-        page.prose(format!("{} more are in {file}.", events.len() - MOST_EVENTS));
+        page.prose(format!("{} more are in {file}.events.csv.", events.len() - MOST_EVENTS));
     }
 }

@@ -1,14 +1,16 @@
 //! One experiment: its rows go to files, meter and plots as they come, and none is kept.
 
+use super::Ended;
 use super::band::Band;
 use super::curves::{Curves, Samples};
-use crate::args::{Format, Simulate};
+use super::rows::{Progress, writers};
+use super::table::early_end;
+use crate::args::Simulate;
 use crate::failure::Failure;
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
-use indicatif::{ProgressBar, ProgressStyle};
-use std::io::IsTerminal;
 use std::time::{Duration, Instant};
+use taut::Error;
 use taut::case::{Case, Experiment};
 use taut::json::{self, Simulated};
 use taut::measure;
@@ -16,13 +18,7 @@ use taut::metrics::{Meter, Metrics};
 use taut::reduction::Reduction;
 use taut::solve::{self, ErrorEstimate, Flow, Solver};
 use taut::stage::{BeltModel, Stage};
-#[cfg(feature = "parquet")]
-use taut::trajectory::ParquetWriter;
 use taut::trajectory::{CsvWriter, Trajectory};
-use taut::{Error, Result};
-
-/// How long a run may take before its progress is shown.
-const PATIENCE: Duration = Duration::from_secs(1);
 
 /// What all runs of a command share.
 pub struct Setting<'a> {
@@ -57,6 +53,11 @@ pub struct Run<'a> {
 }
 
 impl Run<'_> {
+    /// How it ended.
+    pub fn ended(&self) -> Ended<'_> {
+        Ended { name: &self.experiment.name, outcome: &self.outcome, early: early_end(&self.outcome.ending) }
+    }
+
     /// What the summary says of it.
     pub fn told(&self) -> Simulated<'_> {
         Simulated {
@@ -81,10 +82,10 @@ impl<'a> Setting<'a> {
     pub fn run(&self, experiment: &'a Experiment) -> std::result::Result<Run<'a>, Failure> {
         let begin = Instant::now();
         let stage = &self.case.stage;
-        let mut writers = self.writers(experiment).map_err(Failure::work)?;
+        let mut writers = writers(self.folder, &experiment.file_name(), &self.args.format).map_err(Failure::work)?;
         let mut meter = Meter::new(stage, experiment);
         let mut curves = (self.folder.is_some() && !self.args.no_report).then(|| Curves::new(stage));
-        let mut progress = Progress::new(experiment, self.args.quiet);
+        let mut progress = Progress::new(&experiment.name, experiment.samples(), self.args.quiet);
         let mut trouble: Option<Error> = None;
         let mut estimate = match self.solver {
             Solver::General { tolerance } => Some((ErrorEstimate::new(stage, experiment), tolerance)),
@@ -155,94 +156,9 @@ impl<'a> Setting<'a> {
             None => writer.finish().map(|()| samples).map_err(Failure::work),
         }
     }
-
-    fn writers(&self, experiment: &Experiment) -> Result<Vec<Writer>> {
-        let Some(folder) = self.folder else { return Ok(Vec::new()) };
-        let asked = &self.args.format;
-        let formats = asked.iter().enumerate().filter(|&(k, format)| !asked[..k].contains(format)).map(|(_, f)| f);
-        let create = |format: &Format| match format {
-            Format::Csv => CsvWriter::create(folder.path(format!("{}.csv", experiment.file_name()))).map(Writer::Csv),
-            #[cfg(feature = "parquet")]
-            Format::Parquet => {
-                let path = folder.path(format!("{}.parquet", experiment.file_name()));
-                ParquetWriter::create(path).map(|writer| Writer::Parquet(Box::new(writer)))
-            }
-        };
-        formats.map(create).collect()
-    }
 }
 
 /// The file of an experiment's log.
 fn log_name(experiment: &Experiment) -> String {
     format!("{}.measured.csv", experiment.file_name())
-}
-
-/// A file that rows go to.
-enum Writer {
-    Csv(CsvWriter),
-    #[cfg(feature = "parquet")]
-    Parquet(Box<ParquetWriter>),
-}
-
-impl Writer {
-    fn write(&mut self, block: &Trajectory) -> Result<()> {
-        match self {
-            Writer::Csv(writer) => writer.write(block),
-            #[cfg(feature = "parquet")]
-            Writer::Parquet(writer) => writer.write(block),
-        }
-    }
-
-    fn finish(self) -> Result<()> {
-        match self {
-            Writer::Csv(writer) => writer.finish(),
-            #[cfg(feature = "parquet")]
-            Writer::Parquet(writer) => writer.finish(),
-        }
-    }
-
-    fn ending(&self) -> &'static str {
-        match self {
-            Writer::Csv(_) => "csv",
-            #[cfg(feature = "parquet")]
-            Writer::Parquet(_) => "parquet",
-        }
-    }
-}
-
-/// A bar on standard error, for runs that take longer than one likes to wait.
-struct Progress {
-    bar: Option<ProgressBar>,
-    name: String,
-    rows: u64,
-    all: u64,
-    wanted: bool,
-}
-
-impl Progress {
-    fn new(experiment: &Experiment, quiet: bool) -> Self {
-        let wanted = !quiet && std::io::stderr().is_terminal();
-        Self { bar: None, name: experiment.name.clone(), rows: 0, all: experiment.samples(), wanted }
-    }
-
-    fn advance(&mut self, rows: u64, begin: Instant) {
-        self.rows += rows;
-        if self.bar.is_none() && self.wanted && begin.elapsed() > PATIENCE {
-            let bar = ProgressBar::new(self.all);
-            if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {percent} %, {eta} left") {
-                bar.set_style(style);
-            }
-            bar.set_message(self.name.clone());
-            self.bar = Some(bar);
-        }
-        if let Some(bar) = &self.bar {
-            bar.set_position(self.rows);
-        }
-    }
-
-    fn clear(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
-    }
 }

@@ -11,12 +11,12 @@ use taut::mechanism::Part;
 use taut::metrics::{Balance, Metrics, largest};
 use taut::number;
 use taut::reduction::Reduction;
-use taut::solve::{Ending, Method, PositionError, Solver};
+use taut::solve::{Cost, Ending, Event, Method, Outcome, PositionError, Solver};
 use taut::stage::BeltModel;
 
 /// The text on the terminal.
 pub fn text(case: &Case, solver: Solver, runs: &[Run], folder: Option<&Folder>) -> String {
-    let mut text = format!("{}\n{}\n", bold(&case.title), solver_words(solver, runs));
+    let mut text = format!("{}\n{}\n", bold(&case.title), solver_words(solver, runs.iter().map(|run| &run.outcome)));
     for run in runs {
         let _ = write!(text, "\n{}\n", bold(&run.experiment.name));
         if let Some(told) = early_end(&run.outcome.ending) {
@@ -29,13 +29,17 @@ pub fn text(case: &Case, solver: Solver, runs: &[Run], folder: Option<&Folder>) 
     }
     text.push('\n');
     match folder {
-        Some(folder) => text.push_str(&written(folder, runs)),
+        Some(folder) => {
+            let files: Vec<&[String]> = runs.iter().map(|run| &run.files[..]).collect();
+            text.push_str(&written(folder, &files, runs.iter().any(|run| run.curves.is_some())));
+        }
         None => text.push_str("nothing was written: add --out DIR for files and a report\n"),
     }
     text
 }
 
-fn took(duration: Duration) -> String {
+/// How long it took.
+pub fn took(duration: Duration) -> String {
     number::engineering(duration.as_secs_f64(), "s", 3).replace('\u{a0}', " ")
 }
 
@@ -118,13 +122,13 @@ pub fn lines(run: &Run, solver: Solver) -> Vec<(&'static str, String)> {
         ("peak force", format!("{} in span {force_span} at {}", value(force.value, "N"), time(force.time))),
         ("peak current", format!("{} at {}", value(metrics.peak_current.value, "A"), time(metrics.peak_current.time))),
         ("stop time", stop(metrics, solver)),
-        ("events", events(run, solver)),
+        ("events", events(&run.outcome.events, solver)),
         (
             "r φ₁ - x",
             format!("at most {} at {}, {} at the end", value(error.value, "m"), time(error.time), value(left, "m")),
         ),
         ("accuracy", accuracy(run.outcome.error, solver)),
-        ("cost", cost(run)),
+        ("cost", cost(run.outcome.cost)),
     ];
     if matches!(solver, Solver::Table3 { .. }) {
         lines.retain(|(name, _)| *name != "accuracy");
@@ -143,7 +147,7 @@ pub fn lines(run: &Run, solver: Solver) -> Vec<(&'static str, String)> {
 }
 
 /// By how much positions may be off.
-fn accuracy(error: Option<PositionError>, solver: Solver) -> String {
+pub fn accuracy(error: Option<PositionError>, solver: Solver) -> String {
     let Some(error) = error else { return "not estimated".into() };
     let rounded = number::engineering(error.value, "m", 2).replace(['\u{a0}', '\u{202f}'], " ");
     match solver {
@@ -153,12 +157,11 @@ fn accuracy(error: Option<PositionError>, solver: Solver) -> String {
 }
 
 /// The word for a result that its error hides.
-pub fn hidden(run: &Run) -> Option<String> {
-    let error = run.outcome.error.filter(|error| error.hides_motion())?;
+pub fn hidden(name: &str, outcome: &Outcome) -> Option<String> {
+    let error = outcome.error.filter(|error| error.hides_motion())?;
     Some(format!(
-        "positions of the run \"{}\" may be off by {}, and it moves by no more than {}: this result is not to be relied on; \
+        "positions of the run \"{name}\" may be off by {}, and it moves by no more than {}: this result is not to be relied on; \
          shorten the run, or leave out what is so stiff",
-        run.experiment.name,
         value(error.value, "m"),
         value(error.way, "m"),
     ))
@@ -223,11 +226,11 @@ fn stop(metrics: &Metrics, solver: Solver) -> String {
     }
 }
 
-fn events(run: &Run, solver: Solver) -> String {
+/// How many there are, by part.
+pub fn events(events: &[Event], solver: Solver) -> String {
     if matches!(solver, Solver::Table3 { .. }) {
         return "none: a fixed step locates none".into();
     }
-    let events = &run.outcome.events;
     if events.is_empty() {
         return "none".into();
     }
@@ -247,8 +250,8 @@ fn events(run: &Run, solver: Solver) -> String {
     format!("{}: {}{by_rounding}", events.len(), each.join(", "))
 }
 
-fn cost(run: &Run) -> String {
-    let cost = run.outcome.cost;
+/// What it took to compute.
+pub fn cost(cost: Cost) -> String {
     let work = match cost.evaluations {
         0 if cost.modes == 1 => format!("{} steps, 1 mode", cost.steps),
         0 => format!("{} steps, {} modes", cost.steps, cost.modes),
@@ -257,9 +260,10 @@ fn cost(run: &Run) -> String {
     format!("{} rows, {work}", cost.samples)
 }
 
-fn solver_words(solver: Solver, runs: &[Run]) -> String {
+/// How it was solved.
+pub fn solver_words<'a>(solver: Solver, mut outcomes: impl Iterator<Item = &'a Outcome>) -> String {
     match solver {
-        Solver::Exact if runs.iter().all(|run| run.outcome.error.is_some_and(PositionError::is_exact)) => {
+        Solver::Exact if outcomes.all(|outcome| outcome.error.is_some_and(PositionError::is_exact)) => {
             "solved exactly".into()
         }
         Solver::Exact => "solved with matrix exponentials; rounding shows, see the accuracy".into(),
@@ -274,13 +278,14 @@ fn solver_words(solver: Solver, runs: &[Run]) -> String {
     }
 }
 
-fn written(folder: &Folder, runs: &[Run]) -> String {
+/// The files that were written; `files` are those of each run.
+pub fn written(folder: &Folder, files: &[&[String]], report: bool) -> String {
     let mut text = format!("wrote in {}:\n", folder.shown());
-    for run in runs {
-        let _ = writeln!(text, "  {}", run.files.join("  "));
+    for files in files {
+        let _ = writeln!(text, "  {}", files.join("  "));
     }
     text.push_str("  summary.json  case.toml");
-    if runs.iter().any(|run| run.curves.is_some()) {
+    if report {
         text.push_str("  report.html  plots/");
     }
     text.push('\n');

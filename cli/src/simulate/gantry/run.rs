@@ -1,0 +1,108 @@
+//! One experiment of a gantry: its rows go to files, meter and plots as they come, and none is kept.
+
+use super::super::Ended;
+use super::super::curves::{Curves, Way};
+use super::super::rows::{Progress, writers};
+use super::{plots, table};
+use crate::args::Simulate;
+use crate::failure::Failure;
+use crate::folder::Folder;
+use crate::interrupt::Interrupt;
+use std::time::{Duration, Instant};
+use taut::Error;
+use taut::case::{GantryCase, GantryExperiment};
+use taut::json::GantrySimulated;
+use taut::mechanism::Mechanism;
+use taut::metrics::{GantryMeter, GantryMetrics};
+use taut::solve::{self, Course, Detail, ErrorEstimate, Flow, Solver, stream_mechanism};
+use taut::stage::gantry::Gantry;
+use taut::trajectory::Trajectory;
+
+/// What all runs of a command share.
+pub struct Setting<'a> {
+    pub args: &'a Simulate,
+    pub case: &'a GantryCase,
+    pub mechanism: &'a Mechanism,
+    pub solver: Solver,
+    pub folder: Option<&'a Folder>,
+    pub interrupt: &'a Interrupt,
+}
+
+/// What is known of an experiment after it ran.
+pub struct Run<'a> {
+    pub experiment: &'a GantryExperiment,
+    pub outcome: solve::Outcome,
+    pub metrics: GantryMetrics,
+    /// Its curves, and the way of the cart, where plots are wanted.
+    pub curves: Option<(Curves, Way)>,
+    /// Its files, as paths within the folder.
+    pub files: Vec<String>,
+    /// How long solving and writing took.
+    pub took: Duration,
+}
+
+impl Run<'_> {
+    /// What the summary says of it.
+    pub fn told(&self) -> GantrySimulated<'_> {
+        let Run { experiment, outcome, metrics, files, .. } = self;
+        GantrySimulated { experiment, outcome, metrics, files }
+    }
+
+    /// How it ended.
+    pub fn ended(&self, gantry: &Gantry) -> Ended<'_> {
+        Ended { name: &self.experiment.name, outcome: &self.outcome, early: table::early_end(self, gantry) }
+    }
+}
+
+impl<'a> Setting<'a> {
+    /// Runs `experiment`.
+    pub fn run(&self, experiment: &'a GantryExperiment) -> Result<Run<'a>, Failure> {
+        let begin = Instant::now();
+        let course = Course::of(experiment);
+        let name = experiment.file_name();
+        let mut writers = writers(self.folder, &name, &self.args.format).map_err(Failure::work)?;
+        let mut meter = GantryMeter::new(&self.case.gantry);
+        let plotted = self.folder.is_some() && !self.args.no_report;
+        let mut curves = plotted.then(|| plots::curves(&self.case.gantry));
+        let mut progress = Progress::new(&experiment.name, experiment.samples(), self.args.quiet);
+        let mut trouble: Option<Error> = None;
+        let mut estimate = match self.solver {
+            Solver::General { tolerance } => Some((ErrorEstimate::of_mechanism(self.mechanism, &course), tolerance)),
+            Solver::Exact | Solver::Table3 { .. } => None,
+        };
+
+        let mut take = |block: &Trajectory| {
+            if let Some((estimate, _)) = &mut estimate {
+                estimate.take(block);
+            }
+            if let Some((curves, way)) = &mut curves {
+                curves.take(block);
+                way.take(block);
+            }
+            trouble = writers.iter_mut().find_map(|writer| writer.write(block).err());
+            progress.advance(block.len() as u64, begin);
+            if trouble.is_some() || self.interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue }
+        };
+        let shown = (Detail::Full, Some(&mut meter as &mut dyn solve::Observe));
+        let mut outcome = stream_mechanism(self.mechanism, &course, self.solver, shown, &mut take)?;
+        if let Some((estimate, tolerance)) = estimate {
+            let mut go_on = || if self.interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue };
+            outcome.error = estimate.finish_mechanism(self.mechanism, &course, tolerance, &outcome, &mut go_on)?;
+        }
+        progress.clear();
+        if let Some(trouble) = trouble {
+            return Err(Failure::work(trouble));
+        }
+
+        let mut files = Vec::new();
+        for writer in writers {
+            files.push(format!("{name}.{}", writer.ending()));
+            writer.finish().map_err(Failure::work)?;
+        }
+        if let Some(folder) = self.folder {
+            files.push(folder.write_events(&name, &outcome.events).map_err(Failure::work)?);
+        }
+        let metrics = meter.finish(&outcome.events);
+        Ok(Run { experiment, outcome, metrics, curves, files, took: begin.elapsed() })
+    }
+}

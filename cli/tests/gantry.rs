@@ -1,0 +1,188 @@
+//! Gantries as a user meets them: what the commands print and write of them, and what they say of what is not there.
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+fn taut(folder: &Path) -> Command {
+    let mut command = Command::cargo_bin("taut").unwrap();
+    command.current_dir(folder);
+    command
+}
+
+fn stage(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages").join(name)
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).unwrap()
+}
+
+fn json(bytes: &[u8]) -> Value {
+    serde_json::from_slice(bytes).unwrap()
+}
+
+/// Runs a command that is refused; what it says, without the folder of the stages.
+fn refused(args: &[&str], case: &Path) -> String {
+    let folder = TempDir::new().unwrap();
+    let run = taut(folder.path()).arg(args[0]).arg(case).args(&args[1..]).assert().code(2);
+    let output = run.get_output();
+    assert!(output.stdout.is_empty());
+    text(&output.stderr).replace(&case.parent().unwrap().display().to_string(), "stages")
+}
+
+#[test]
+fn simulate_writes_a_whole_folder() {
+    let folder = TempDir::new().unwrap();
+    let case = stage("h-frame/h-frame.toml");
+    let run = taut(folder.path()).arg("simulate").arg(&case).args(["--out", "out"]).assert().success();
+    let out = text(&run.get_output().stdout);
+    for word in [
+        "H-frame, one belt round both drives: bridge 0.838 kg, cart 0.362 kg",
+        "solved exactly",
+        "final position  bridge ",
+        "by the drives",
+        "peak force      left ",
+        "drives' error",
+        "events          9: left pulley 2, right pulley 3, bridge 2, cart 2",
+        "by a bound of rounding",
+        "one-motor.csv  one-motor.events.csv",
+    ] {
+        assert!(out.contains(word), "{word} is not in\n{out}");
+    }
+    let read = |name: &str| fs::read_to_string(folder.path().join("out").join(name)).unwrap();
+    let rows = read("one-motor.csv");
+    let heading = "time_s,left_voltage_V,right_voltage_V,left_angle_rad,left_speed_rad_s,right_angle_rad,right_speed_rad_s,\
+                   bridge_position_m,bridge_speed_m_s,cart_position_m,cart_speed_m_s,left_current_A,right_current_A,\
+                   left_span_force_N,right_span_force_N,back_span_force_N,";
+    assert!(rows.starts_with(heading), "{}", rows.lines().next().unwrap());
+    assert_eq!(rows.lines().count(), 1002);
+    let events = read("one-motor.events.csv");
+    for part in ["left", "right", "bridge", "cart"] {
+        assert!(events.contains(&format!(",{part},stuck,")), "{part}: {events}");
+    }
+    // What repeats the run does so bit for bit.
+    let again =
+        taut(folder.path()).args(["simulate", "out/case.toml", "--out", "again", "--quiet", "--no-report"]).assert();
+    assert!(again.success().get_output().stdout.is_empty());
+    for name in ["one-motor.csv", "along-x.csv", "along-y.events.csv", "case.toml"] {
+        assert!(fs::read(folder.path().join("again").join(name)).unwrap() == read(name).as_bytes(), "{name}");
+    }
+    assert!(!folder.path().join("again/report.html").exists());
+    let report = read("report.html");
+    for word in ["The gantry in plan view", "one motor: path", "along y: forces", "left pulley", "φ", "kind  = "] {
+        assert!(report.contains(word), "{word}");
+    }
+    for plot in ["drives", "positions", "path", "speeds", "forces", "friction"] {
+        for ending in ["svg", "png"] {
+            assert!(folder.path().join(format!("out/plots/along-x-{plot}.{ending}")).exists(), "{plot}.{ending}");
+        }
+    }
+}
+
+#[test]
+fn the_summary_is_data() {
+    let folder = TempDir::new().unwrap();
+    let case = stage("core-xy/core-xy.toml");
+    let more = ["--json", "--experiment", "along x", "--set", "bridge.mass=1 kg"];
+    let run = taut(folder.path()).arg("simulate").arg(&case).args(more).assert().success();
+    let told = json(&run.get_output().stdout);
+    assert_eq!((told["kind"].as_str(), told["solver"]["name"].as_str()), (Some("core-xy"), Some("exact")));
+    assert_eq!(told["machine"]["bridge_mass_kg"], 1.0);
+    assert_eq!(told["machine"]["span_stiffness_newton_per_m"]["b_back_span"], 95e3);
+    assert_eq!(told["experiments"].as_array().unwrap().len(), 1);
+    let run = &told["experiments"][0];
+    assert_eq!(run["position_error_basis"], "bound of rounding");
+    assert!(run["position_error_m"].as_f64().unwrap() < 1e-9);
+    let metrics = &run["metrics"];
+    assert!(metrics["final_bridge_position_m"].as_f64().unwrap() > 0.1);
+    assert!(metrics["peak_span_force_N"]["a_out_span"]["value"].as_f64().unwrap() > 1.0);
+    assert!(metrics["stop_time_s"].as_f64().unwrap() < 0.5 && metrics["settled"] == true);
+    let parts: Vec<&str> =
+        metrics["event_counts"].as_array().unwrap().iter().map(|count| count["body"].as_str().unwrap()).collect();
+    assert_eq!(parts, ["left", "right", "bridge", "cart"]);
+    let units =
+        |event: &Value| (event["part"].as_str().unwrap().to_string(), event["load_unit"].as_str().unwrap().to_string());
+    for event in run["events"].as_array().unwrap() {
+        let (part, unit) = units(event);
+        assert_eq!(unit, if part == "left" || part == "right" { "N m" } else { "N" });
+    }
+}
+
+#[test]
+fn spans_that_follow_are_solved_in_general_with_an_error_that_is_estimated() {
+    let folder = TempDir::new().unwrap();
+    for name in ["h-frame/follows.toml", "core-xy/follows.toml"] {
+        let told = |more: &[&str]| {
+            let run = taut(folder.path()).arg("simulate").arg(stage(name)).arg("--json").args(more).assert().success();
+            json(&run.get_output().stdout)
+        };
+        let (usual, fine) = (told(&[]), told(&["--solver", "general", "--tolerance", "1e-12"]));
+        assert_eq!(usual["solver"]["name"], "general");
+        assert_eq!((&usual["solver"]["tolerance"], &fine["solver"]["tolerance"]), (&1e-9.into(), &1e-12.into()));
+        assert_eq!(usual["experiments"][0]["position_error_basis"], "a second run with ten times the tolerance");
+        let at = |told: &Value, key: &str| told["experiments"][0]["metrics"][key].as_f64().unwrap();
+        let error = usual["experiments"][0]["position_error_m"].as_f64().unwrap();
+        for key in ["final_bridge_position_m", "final_cart_position_m"] {
+            assert!((at(&usual, key) - at(&fine, key)).abs() <= error && error < 1e-9, "{name}: {key}");
+        }
+    }
+    let told = refused(&["simulate", "--solver", "exact"], &stage("h-frame/follows.toml"));
+    assert_eq!(
+        told,
+        "error: the belt's spans follow the cart: this solver does not take it\n  \
+         next: leave --solver out, or write --solver general: it takes all of these\n"
+    );
+}
+
+#[test]
+fn who_leaves_the_travel_is_named() {
+    let folder = TempDir::new().unwrap();
+    let short = ["--set", "cart.travel.min=-20mm"];
+    let run = taut(folder.path()).arg("simulate").arg(stage("h-frame/h-frame.toml")).args(short).assert().code(1);
+    let output = run.get_output();
+    assert!(text(&output.stdout).contains("the cart leaves its travel there, and nothing stops it"));
+    assert!(text(&output.stderr).starts_with("error: the run \"one motor\" ended at "), "{}", text(&output.stderr));
+}
+
+#[test]
+fn options_of_an_axis_are_refused() {
+    let case = stage("h-frame/h-frame.toml");
+    for (args, told) in [
+        (
+            &["simulate", "--as-measured", "--out", "out"][..],
+            "error: --as-measured: this is there for a single axis, and not yet for a gantry\n  \
+             next: leave it out: the columns hold the encoder's counts, where the case has an [encoder]\n",
+        ),
+        (
+            &["simulate", "--draws", "posterior.csv"],
+            "error: --draws: this is there for a single axis, and not yet for a gantry\n  \
+             next: leave it out: gantries are not fitted yet, so there are no draws of one\n",
+        ),
+        (
+            &["simulate", "--solver", "table3"],
+            "error: --solver table3: the paper's Table 3, with its fixed step, is of a single axis\n  \
+             next: leave it out: a gantry is solved exactly, or by --solver general\n",
+        ),
+        (
+            &["simulate", "--step", "1ms"],
+            "error: --step: the paper's Table 3, with its fixed step, is of a single axis\n  \
+             next: leave it out: a gantry is solved exactly, or by --solver general\n",
+        ),
+        (
+            &["simulate", "--tolerance", "1e-6"],
+            "error: --tolerance: only the general solver has a tolerance\n  \
+             next: leave --tolerance out, or add --solver general\n",
+        ),
+        (
+            &["simulate", "--experiment", "along z"],
+            "error: --experiment: there is no experiment \"along z\"\n  \
+             allowed: \"one motor\", \"along x\", \"along y\"\n  \
+             next: name one of these, or leave --experiment out to run them all\n",
+        ),
+    ] {
+        assert_eq!(refused(args, &case), told);
+    }
+}

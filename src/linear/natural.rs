@@ -1,0 +1,259 @@
+//! How any mechanism swings by itself while everything slides: rigid and elastic modes, their damping, and how the place changes them.
+//!
+//! ```text
+//! M q̈ + C q̇ + K q = 0,   K = Aᵀ diag(k) A,   C = Aᵀ diag(c) A + B + n² K_t K_e / R
+//! ```
+//!
+//! over the bodies that move by themselves. Undamped modes are the eigenvectors of M^(−½) K M^(−½); as many of them are rigid as A leaves
+//! motions free, and of these the frequency is zero by construction.
+
+use super::{Root, eigen};
+use crate::error::{Error, Result};
+use crate::friction::Motion;
+use crate::mechanism::{AmplifierMode, BODIES, Kind, Mechanism, Mode, SpringLaw};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use std::f64::consts::PI;
+
+/// What makes a singular value of the spans' lever arms zero, as a share of the largest.
+const NOTHING: f64 = 1e-12;
+
+/// Rigid and elastic modes of a mechanism at one place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Natural {
+    /// The bodies that move by themselves, by their numbers; shapes are in their order.
+    pub bodies: Vec<usize>,
+    /// Motions that stretch nothing, one for each body that slides freely where there are such.
+    pub rigid: Vec<RigidMode>,
+    /// Motions that swing, the slowest first.
+    pub elastic: Vec<ElasticMode>,
+    /// Of the damped mechanism, an integrator for each rigid mode first.
+    pub poles: Vec<Root>,
+}
+
+/// A motion that stretches nothing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RigidMode {
+    /// The body that it moves by one unit, of the others that are chosen so none.
+    pub body: usize,
+    /// The way of each body, in its own unit, rad or m.
+    pub shape: Vec<f64>,
+}
+
+/// A motion that swings.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ElasticMode {
+    /// Frequency without damping, rad/s.
+    pub frequency: f64,
+    /// What damping makes of it; none where it makes no pair of poles of each mode.
+    pub damped: Option<Root>,
+    /// The way of each body at the belt, the largest being 1: r φ of what turns.
+    pub shape: Vec<f64>,
+    /// Share of the motion's energy that each body has.
+    pub energy: Vec<f64>,
+}
+
+impl ElasticMode {
+    /// Frequency without damping, Hz.
+    pub fn hertz(&self) -> f64 {
+        self.frequency / (2.0 * PI)
+    }
+
+    /// Damping ratio.
+    pub fn damping(&self) -> Option<f64> {
+        match self.damped {
+            Some(Root::Pair { damping, .. }) => Some(damping),
+            _ => None,
+        }
+    }
+}
+
+/// The matrices of a mechanism in which everything slides, over the bodies that move by themselves.
+struct Matrices {
+    bodies: Vec<usize>,
+    /// Diagonal of M.
+    mass: DVector<f64>,
+    stiffness: DMatrix<f64>,
+    damping: DMatrix<f64>,
+    /// Motions that no spring holds.
+    free: usize,
+}
+
+impl Natural {
+    /// The modes with the bodies at `position`, which matters to what follows them.
+    ///
+    /// ```
+    /// use taut::case::{Case, TEMPLATE};
+    /// use taut::linear::Natural;
+    /// let case = Case::from_text("axis.toml", TEMPLATE)?;
+    /// let modes = Natural::of(&case.stage.mechanism(), &[0.0; 6])?;
+    /// // An axis moves as a whole, and swings in two ways.
+    /// assert_eq!((modes.rigid.len(), modes.elastic.len()), (1, 2));
+    /// assert!(modes.elastic[0].hertz() > 100.0);
+    /// # Ok::<(), taut::Error>(())
+    /// ```
+    pub fn of(mechanism: &Mechanism, position: &[f64; BODIES]) -> Result<Self> {
+        let matrices = Matrices::of(mechanism, position);
+        let (values, vectors) = matrices.modes()?;
+        let Matrices { bodies, mass, damping, free, .. } = matrices;
+        // q = Φ η with Φᵀ M Φ = 1: the rigid ones are the first.
+        let shapes = DMatrix::from_fn(bodies.len(), bodies.len(), |i, j| vectors[(i, j)] / mass[i].sqrt());
+        let poles = poles(&values, &(shapes.transpose() * damping * &shapes), free)?;
+        let pairs: Vec<Root> = poles.iter().filter(|root| matches!(root, Root::Pair { .. })).copied().collect();
+        let is_complete = pairs.len() == values.len() - free;
+        let elastic = (free..values.len())
+            .map(|k| {
+                let shape = shapes.column(k);
+                let lever = |i: usize| mechanism.bodies[bodies[i]].kind.lever();
+                let ways: Vec<f64> = (0..bodies.len()).map(|i| lever(i) * shape[i]).collect();
+                let largest =
+                    ways.iter().copied().fold(0.0, |most: f64, way| if way.abs() > most.abs() { way } else { most });
+                ElasticMode {
+                    frequency: values[k].sqrt(),
+                    damped: is_complete.then(|| pairs[k - free]),
+                    shape: ways.iter().map(|way| way / largest + 0.0).collect(),
+                    energy: (0..bodies.len()).map(|i| vectors[(i, k)].powi(2)).collect(),
+                }
+            })
+            .collect();
+        let slides = |i: usize| mechanism.bodies[bodies[i]].kind == Kind::Linear;
+        let rigid = rigid(&shapes.columns(0, free).into_owned(), &slides);
+        let rigid = rigid.into_iter().map(|(i, shape)| RigidMode { body: bodies[i], shape }).collect();
+        Ok(Self { rigid, elastic, poles, bodies })
+    }
+
+    /// Undamped frequencies of the elastic modes alone, Hz, the lowest first.
+    pub fn frequencies(mechanism: &Mechanism, position: &[f64; BODIES]) -> Result<Vec<f64>> {
+        let matrices = Matrices::of(mechanism, position);
+        let (values, _) = matrices.modes()?;
+        Ok(values[matrices.free..].iter().map(|value| value.sqrt() / (2.0 * PI)).collect())
+    }
+}
+
+impl Matrices {
+    fn of(mechanism: &Mechanism, position: &[f64; BODIES]) -> Self {
+        let bodies: Vec<usize> = mechanism.leaders().collect();
+        let n = bodies.len();
+        let free = Mode::of([Motion::Free; BODIES]);
+        let inertia = mechanism.equations(free).inertia;
+        let mass = |&leader: &usize| {
+            mechanism.followers(leader).map(|body| mechanism.ratio(body).powi(2) * inertia[body]).sum::<f64>()
+        };
+        let mut damping = DMatrix::zeros(n, n);
+        for (i, body) in bodies.iter().enumerate() {
+            damping[(i, i)] = mechanism.friction(*body).forward.viscous;
+        }
+        for drive in &mechanism.drives {
+            // K_t K_e / R at the motor's own shaft, n² of it at the pulley                   (4)
+            let motor = &drive.motor;
+            if drive.amplifier.mode == AmplifierMode::Voltage && motor.inductance == 0.0 {
+                let i = bodies.iter().position(|body| *body == mechanism.leader(drive.shaft)).unwrap_or(0);
+                let way = motor.gear_ratio * mechanism.ratio(drive.shaft);
+                damping[(i, i)] += way * way * motor.torque_constant * motor.back_emf_constant / motor.resistance;
+            }
+        }
+        let mut stiffness = DMatrix::zeros(n, n);
+        let mut rows = Vec::new();
+        for (spring, part) in mechanism.springs.iter().enumerate() {
+            let holds = match part.law {
+                SpringLaw::TwoSided | SpringLaw::Tension { .. } => true,
+                // The flank of a gear that carries; an end stop is not touched.
+                SpringLaw::Gap { .. } => part.arms.len() > 1,
+                SpringLaw::Bounds { .. } | SpringLaw::None => false,
+            };
+            let arms = mechanism.leading_arms(spring);
+            let row = DVector::from_fn(n, |i, _| arms[bodies[i]]);
+            if !holds || row.amax() == 0.0 {
+                continue;
+            }
+            let k = part.follows.as_ref().map_or(part.stiffness, |follows| follows.stiffness(|body| position[body]));
+            stiffness += &row * row.transpose() * k;
+            damping += &row * row.transpose() * part.damping;
+            rows.push(row);
+        }
+        let mass = DVector::from_iterator(n, bodies.iter().map(mass));
+        // How many of the rows say something of their own, each body's way measured at the belt.
+        let rank = if rows.is_empty() {
+            0
+        } else {
+            let lever = |i: usize| mechanism.bodies[bodies[i]].kind.lever();
+            let a = DMatrix::from_fn(rows.len(), n, |j, i| rows[j][i] / lever(i));
+            let values = a.singular_values();
+            values.iter().filter(|value| **value > NOTHING * values.max()).count()
+        };
+        Self { free: n - rank, bodies, mass, stiffness, damping }
+    }
+
+    /// Eigenvalues of M^(−½) K M^(−½), the least first, those of rigid modes zero, and its eigenvectors.
+    fn modes(&self) -> Result<(Vec<f64>, DMatrix<f64>)> {
+        let n = self.bodies.len();
+        let root = self.mass.map(f64::sqrt);
+        let scaled = DMatrix::from_fn(n, n, |i, j| self.stiffness[(i, j)] / (root[i] * root[j]));
+        let eigen = SymmetricEigen::try_new(scaled, f64::EPSILON, 10_000).ok_or_else(|| {
+            Error::new("the natural modes cannot be found: the iteration does not settle")
+                .next("look for a stiffness or an inertia with a wrong unit")
+        })?;
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+        let value = |(k, &index): (usize, &usize)| if k < self.free { 0.0 } else { eigen.eigenvalues[index].max(0.0) };
+        let values = order.iter().enumerate().map(value).collect();
+        Ok((values, DMatrix::from_fn(n, n, |i, k| eigen.eigenvectors[(i, order[k])])))
+    }
+}
+
+/// Poles of η̈ + Ĉ η̇ + Ω² η = 0 of which the first `free` have no stiffness.
+fn poles(values: &[f64], damping: &DMatrix<f64>, free: usize) -> Result<Vec<Root>> {
+    let n = values.len();
+    let elastic = n - free;
+    // States: speeds of all modes, then ways of the elastic ones. A rigid way is an integrator, and nothing asks for it.
+    let a = DMatrix::from_fn(n + elastic, n + elastic, |i, j| match (i < n, j < n) {
+        (true, true) => -damping[(i, j)],
+        (true, false) => {
+            if j - n + free == i {
+                -values[i]
+            } else {
+                0.0
+            }
+        }
+        (false, true) => f64::from(u8::from(i - n + free == j)),
+        (false, false) => 0.0,
+    });
+    let mut poles = vec![Root::Zero; free];
+    poles.extend(Root::of(&eigen::eigenvalues(&a)?));
+    Ok(poles)
+}
+
+/// The same motions as sums of `shapes`, each of which moves one chosen body by one and the other chosen ones not at all; bodies that
+/// slide are chosen first.
+fn rigid(shapes: &DMatrix<f64>, slides: &dyn Fn(usize) -> bool) -> Vec<(usize, Vec<f64>)> {
+    let mut left = shapes.clone();
+    let count = left.ncols();
+    let mut chosen = Vec::new();
+    for k in 0..count {
+        let rest = left.columns(k, count - k).into_owned();
+        // The body that the motions left over move most, among those that slide if they move any.
+        let size = |i: &usize| rest.row(*i).norm();
+        let most = |only: bool| {
+            let bodies = (0..left.nrows()).filter(|i| !chosen.contains(i) && (!only || slides(*i)));
+            bodies.filter(|i| size(i) > 1e-9 * rest.norm()).max_by(|a, b| size(a).total_cmp(&size(b)))
+        };
+        let Some(body) = most(true).or_else(|| most(false)) else { break };
+        let column = (k..count).max_by(|a, b| left[(body, *a)].abs().total_cmp(&left[(body, *b)].abs())).unwrap_or(k);
+        left.swap_columns(k, column);
+        let pivot = left.column(k) / left[(body, k)];
+        left.set_column(k, &pivot);
+        for other in (0..count).filter(|other| *other != k) {
+            let less = left.column(other) - &pivot * left[(body, other)];
+            left.set_column(other, &less);
+        }
+        chosen.push(body);
+    }
+    let largest = left.amax();
+    let clean = |v: f64| if v.abs() <= 1e-12 * largest { 0.0 } else { v };
+    let mut modes: Vec<(usize, Vec<f64>)> = chosen
+        .iter()
+        .enumerate()
+        .map(|(k, body)| (*body, left.column(k).iter().map(|v| clean(*v)).collect()))
+        .collect();
+    modes.sort_by_key(|(body, _)| *body);
+    modes
+}

@@ -1,0 +1,290 @@
+//! Laws that hold for any gantry, on random ones.
+
+mod common;
+
+use proptest::prelude::*;
+use taut::case::{GantryCase, GantryExperiment};
+use taut::friction::Friction;
+use taut::mechanism::{Amplifier, AmplifierMode, Motor, State};
+use taut::signal::Signal;
+use taut::solve::{Course, Detail, Ending, Event, Flow, Solver, stream_mechanism};
+use taut::stage::Pulley;
+use taut::stage::gantry::{Belts, Gantry, Routing, Slide};
+use taut::trajectory::Trajectory;
+
+/// What a run of the first experiment of a case gives.
+struct Run {
+    rows: Trajectory,
+    events: Vec<Event>,
+}
+
+fn course(experiment: &GantryExperiment) -> Course {
+    Course {
+        inputs: experiment.inputs.to_vec(),
+        start: experiment.initial,
+        until: experiment.until,
+        every: experiment.every,
+    }
+}
+
+fn run(case: &GantryCase, solver: Solver) -> Run {
+    let mechanism = case.gantry.mechanism();
+    let mut rows = Trajectory::default();
+    let sink = &mut |block: &Trajectory| {
+        if rows.is_empty() {
+            rows = Trajectory::with_capacity(&block.columns, 1024);
+        }
+        rows.append(block);
+        Flow::Continue
+    };
+    let course = course(&case.experiments[0]);
+    let outcome = stream_mechanism(&mechanism, &course, solver, (Detail::Full, None), sink).unwrap();
+    assert_eq!(outcome.ending, Ending::Complete);
+    Run { rows, events: outcome.events }
+}
+
+/// A motor without gear play, and its amplifier.
+fn motor() -> impl Strategy<Value = Motor> {
+    (0.01..0.1_f64, 0.3..3.0_f64, prop_oneof![Just(0.0), 1e-4..2e-3_f64], 0.0..1e-5_f64, 1.0..6.0_f64).prop_map(
+        |(constant, resistance, inductance, rotor_inertia, gear_ratio)| Motor {
+            torque_constant: constant,
+            back_emf_constant: constant,
+            resistance,
+            inductance,
+            rotor_inertia,
+            gear_ratio,
+            gear_efficiency: 1.0,
+            gear_play: None,
+        },
+    )
+}
+
+/// Friction of about this size, the same both ways.
+fn dry(viscous: f64, coulomb: f64) -> impl Strategy<Value = Friction> {
+    (0.0..viscous, 0.0..coulomb, 1.0..1.5_f64)
+        .prop_map(|(viscous, coulomb, over)| Friction::with_breakaway(viscous, coulomb, over * coulomb))
+}
+
+fn slide(mass: f64) -> impl Strategy<Value = Slide> {
+    (0.3 * mass..3.0 * mass, dry(30.0, 1.0)).prop_map(|(mass, friction)| Slide { mass, friction, travel: None })
+}
+
+/// Gantries with one motor for both drives.
+fn gantry() -> impl Strategy<Value = Gantry> {
+    let stiffness = || prop::collection::vec(2e4..3e5_f64, 4);
+    let damping = prop_oneof![Just(vec![0.0; 4]), prop::collection::vec(0.0..50.0_f64, 4)];
+    let pulley = (1e-5..2e-4_f64, dry(2e-3, 0.02)).prop_map(|(inertia, friction)| Pulley { inertia, friction });
+    (any::<bool>(), motor(), 0.005..0.03_f64, pulley, slide(0.8), slide(0.4), stiffness(), damping).prop_map(
+        |(core, motor, pulley_radius, drive_pulley, bridge, cart, mut stiffness, mut damping)| {
+            let routing = if core { Routing::CoreXy } else { Routing::HFrame };
+            stiffness.truncate(routing.spans().len());
+            damping.truncate(routing.spans().len());
+            Gantry {
+                routing,
+                motors: [motor; 2],
+                amplifiers: [Amplifier::ideal(AmplifierMode::Voltage, 1.0); 2],
+                pulley_radius,
+                drive_pulley,
+                bridge,
+                cart,
+                belts: Belts { stiffness, damping, pretension: None, follows: None },
+                encoder: None,
+            }
+        },
+    )
+}
+
+fn inputs() -> impl Strategy<Value = [Signal; 2]> {
+    let pulse = || {
+        (-12.0..12.0_f64, 0.02..0.1_f64, 0.0..0.05_f64).prop_map(|(value, duration, at)| Signal::Pulse {
+            value,
+            duration,
+            at,
+        })
+    };
+    (pulse(), pulse()).prop_map(|(left, right)| [left, right])
+}
+
+fn follow(gantry: &Gantry, inputs: &[Signal; 2]) -> Run {
+    let mechanism = gantry.mechanism();
+    let course = Course { inputs: inputs.to_vec(), start: State::default(), until: 0.15, every: 1e-3 };
+    let mut rows = Trajectory::default();
+    let sink = &mut |block: &Trajectory| {
+        rows.columns.is_empty().then(|| rows = Trajectory::with_capacity(&block.columns, 256));
+        rows.append(block);
+        Flow::Continue
+    };
+    let outcome = stream_mechanism(&mechanism, &course, Solver::Exact, (Detail::Full, None), sink).unwrap();
+    assert_eq!(outcome.ending, Ending::Complete);
+    Run { rows, events: outcome.events }
+}
+
+fn negative(signal: &Signal) -> Signal {
+    let Signal::Pulse { value, duration, at } = *signal else { unreachable!("only pulses are drawn") };
+    Signal::Pulse { value: -value, duration, at }
+}
+
+/// Every value of a column of one run is `factor` times that of a column of the other.
+fn proportional(a: (&Run, &str), b: (&Run, &str), factor: f64, tolerance: f64) -> Result<(), TestCaseError> {
+    let (a, b) = (a.0.rows.get(a.1).unwrap(), b.0.rows.get(b.1).unwrap());
+    prop_assert_eq!(a.len(), b.len());
+    for (row, (a, b)) in a.iter().zip(b).enumerate() {
+        prop_assert!((a - factor * b).abs() <= tolerance, "row {row}: {a} and {b}");
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(common::random::cases(200))]
+
+    /// A belt is closed: what one span gains the others lose; and a motion that keeps all lengths stores nothing.
+    #[test]
+    fn belts_are_closed(gantry in gantry(), x in -0.3..0.3_f64, y in -0.3..0.3_f64) {
+        let mechanism = gantry.mechanism();
+        let belts: &[&[usize]] = if gantry.routing == Routing::HFrame { &[&[0, 1, 2]] } else { &[&[0, 1], &[2, 3]] };
+        for belt in belts {
+            let mut sum = [0.0; 4];
+            for span in *belt {
+                mechanism.springs[*span].arms.iter().for_each(|(body, arm)| sum[*body] += arm);
+            }
+            prop_assert_eq!(sum, [0.0; 4]);
+        }
+        let [left, right] = gantry.angles(x, y);
+        let mut state = State::default();
+        state.position[..4].copy_from_slice(&[left, right, x, y]);
+        let stiffest = gantry.belts.stiffness.iter().fold(0.0, |most: f64, k| most.max(*k));
+        prop_assert!(mechanism.energy(&state) <= stiffest * (1e-15_f64).powi(2));
+        state.position[0] += 1e-3;
+        prop_assert!(mechanism.energy(&state) > 0.0);
+    }
+
+    /// What comes in goes into heat or is stored, in any state and mode.
+    #[test]
+    fn power_is_balanced(
+        gantry in gantry(), speeds in prop::collection::vec(-2.0..2.0_f64, 4), ways in prop::collection::vec(-1e-4..1e-4_f64, 4),
+        volts in prop::collection::vec(-12.0..12.0_f64, 2),
+    ) {
+        let mechanism = gantry.mechanism();
+        let mut state = State::default();
+        for body in 0..4 {
+            let lever = mechanism.bodies[body].kind.lever();
+            (state.position[body], state.speed[body]) = (ways[body] / lever, speeds[body] / lever);
+        }
+        for (current, drive) in state.current.iter_mut().zip(&mechanism.drives) {
+            *current = if drive.has_current_state() { 1.5 } else { 0.0 };
+        }
+        let power = mechanism.power(mechanism.first_mode(&state), &state, &[volts[0], volts[1]]);
+        prop_assert!(power.imbalance().abs() <= 1e-12 * power.scale(), "{power:?}");
+        prop_assert!(power.friction.iter().chain(&power.spring).all(|&loss| loss >= 0.0), "{power:?}");
+    }
+
+    /// u → −u turns the motion around, bit for bit.
+    #[test]
+    fn mirrored_inputs_mirror_the_motion(gantry in gantry(), inputs in inputs()) {
+        let (there, back) = (follow(&gantry, &inputs), follow(&gantry, &inputs.each_ref().map(negative)));
+        for column in ["left_angle", "right_angle", "bridge_position", "cart_position", "cart_speed"] {
+            proportional((&there, column), (&back, column), -1.0, 0.0)?;
+        }
+        prop_assert_eq!(there.events.len(), back.events.len());
+    }
+
+    /// Left and right are each other's mirror: with springs and inputs exchanged, y turns around and x does not.
+    #[test]
+    fn left_and_right_mirror_each_other(gantry in gantry(), inputs in inputs()) {
+        let mut mirrored = gantry.clone();
+        let order: &[usize] = if gantry.routing == Routing::HFrame { &[1, 0, 2] } else { &[2, 3, 0, 1] };
+        mirrored.belts.stiffness = order.iter().map(|span| gantry.belts.stiffness[*span]).collect();
+        mirrored.belts.damping = order.iter().map(|span| gantry.belts.damping[*span]).collect();
+        // r φ₁ = −x − y and r φ₂ = x − y: the pulleys of an H-frame turn against each other, those of CoreXY alike.
+        let sign = if gantry.routing == Routing::HFrame { -1.0 } else { 1.0 };
+        let [left, right] = &inputs;
+        let exchanged = match gantry.routing {
+            Routing::HFrame => [negative(right), negative(left)],
+            Routing::CoreXy => [right.clone(), left.clone()],
+        };
+        let (a, b) = (follow(&gantry, &inputs), follow(&mirrored, &exchanged));
+        proportional((&a, "bridge_position"), (&b, "bridge_position"), 1.0, 1e-12)?;
+        proportional((&a, "cart_position"), (&b, "cart_position"), -1.0, 1e-12)?;
+        proportional((&a, "left_angle"), (&b, "right_angle"), sign, 1e-10)?;
+    }
+
+    /// A machine with all its inertias, stiffnesses, frictions and torques ten times as large moves alike.
+    #[test]
+    fn scaled_machines_move_alike(gantry in gantry(), inputs in inputs()) {
+        let mut large = gantry.clone();
+        let scale = |value: &mut f64| *value *= 10.0;
+        for motor in &mut large.motors {
+            scale(&mut motor.torque_constant);
+            scale(&mut motor.rotor_inertia);
+        }
+        scale(&mut large.drive_pulley.inertia);
+        scale(&mut large.bridge.mass);
+        scale(&mut large.cart.mass);
+        large.belts.stiffness.iter_mut().chain(&mut large.belts.damping).for_each(scale);
+        for friction in [&mut large.drive_pulley.friction, &mut large.bridge.friction, &mut large.cart.friction] {
+            for side in [&mut friction.forward, &mut friction.backward] {
+                [&mut side.viscous, &mut side.coulomb, &mut side.breakaway].into_iter().for_each(scale);
+            }
+        }
+        let (a, b) = (follow(&gantry, &inputs), follow(&large, &inputs));
+        for column in ["bridge_position", "cart_position"] {
+            proportional((&a, column), (&b, column), 1.0, 1e-11)?;
+        }
+        prop_assert_eq!(a.events.len(), b.events.len());
+    }
+
+    /// x and y of an H-frame are coupled through k_l − k_r alone, where nothing sticks.
+    #[test]
+    fn equal_spans_do_not_couple(gantry in gantry(), volts in 1.0..12.0_f64) {
+        let mut gantry = Gantry { routing: Routing::HFrame, ..gantry };
+        gantry.belts.stiffness = vec![1e5, 1e5, 6e4];
+        gantry.belts.damping = vec![3.0, 3.0, 1.0];
+        for friction in [&mut gantry.drive_pulley.friction, &mut gantry.bridge.friction, &mut gantry.cart.friction] {
+            *friction = Friction::symmetric(friction.forward.viscous, 0.0);
+        }
+        let step = |value: f64| Signal::Pulse { value, duration: 0.1, at: 0.0 };
+        let across = follow(&gantry, &[step(-volts), step(volts)]);
+        proportional((&across, "cart_position"), (&across, "cart_position"), 0.0, 1e-12)?;
+        prop_assert!(across.rows.get("bridge_position").unwrap().last().unwrap().abs() > 1e-4);
+        let along = follow(&gantry, &[step(-volts), step(-volts)]);
+        proportional((&along, "bridge_position"), (&along, "bridge_position"), 0.0, 1e-12)?;
+    }
+}
+
+/// The exact solver and the general one agree where both can be asked; spans that follow the cart are taken by the general one.
+#[test]
+fn spans_that_follow_the_cart_are_as_stiff_as_they_are_long() {
+    let text = |belt: &str| {
+        format!(
+            "kind = \"h-frame\"\n\
+             motor = {{ torque_constant = 0.05, back_emf_constant = 0.05, resistance = 1 }}\n\
+             drive_pulley = {{ radius = 0.01, inertia = 2e-5 }}\n\
+             bridge = {{ mass = 0.8, friction = {{ coulomb = 0.5 }}, travel = {{ min = -0.2, max = 0.2 }} }}\n\
+             cart = {{ mass = 0.4, friction = {{ coulomb = 0.3 }}, travel = {{ min = -0.2, max = 0.2 }} }}\n\
+             belt = {{ {belt} }}\n\
+             [[experiment]]\nname = \"pulse\"\nuntil = 0.3\nevery = 1e-3\n\
+             input = {{ left = {{ pulse = -9, for = 0.1 }}, right = {{ pulse = 3, for = 0.1 }} }}\n\
+             initial = {{ bridge_position = 0.05 }}\n"
+        )
+    };
+    let read = |belt: &str| GantryCase::from_text_with("frame.toml", &text(belt), &[]).unwrap();
+    let make = "modulus = \"8 GPa\", section = \"6 mm^2\", spans = [0.5, 0.6, 1.3]";
+    let (fixed, follows) = (read(make), read(&format!("{make}, follows_cart = true")));
+    assert!(fixed.gantry.mechanism().is_piecewise_linear() && !follows.gantry.mechanism().is_piecewise_linear());
+    let (exact, general) = (run(&fixed, Solver::Exact), run(&fixed, Solver::GENERAL));
+    let apart = |a: &Run, b: &Run, column: &str| {
+        let pairs = a.rows.get(column).unwrap().iter().zip(b.rows.get(column).unwrap());
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    assert!(apart(&exact, &general, "cart_position") < 1e-9);
+    let following = run(&follows, Solver::GENERAL);
+    assert!(apart(&exact, &following, "cart_position") > 1e-7);
+    // k = E A / l, with l_left + x + y: the force per stretch in every row.
+    let [x, y, phi, force] =
+        ["bridge_position", "cart_position", "left_angle", "left_span_force"].map(|c| following.rows.get(c).unwrap());
+    for row in (0..x.len()).step_by(10) {
+        let stiffness = 8e9 * 6e-6 / (0.5 + x[row] + y[row]);
+        let stretch = 0.01 * phi[row] + x[row] + y[row];
+        assert!((force[row] - stiffness * stretch).abs() < 1e-8, "row {row}: {} {}", force[row], stiffness * stretch);
+    }
+}
