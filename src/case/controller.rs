@@ -90,7 +90,8 @@ fn structure(table: &Table, stage: &Stage) -> Result<Structure> {
             integral: own.number("integral")?,
             filter: own.number("filter")?,
         }),
-        _ => Structure::Fuzzy(fuzzy(&own)?),
+        "fuzzy" => Structure::Fuzzy(fuzzy(&own)?),
+        _ => return Err(field.unread()),
     })
 }
 
@@ -169,7 +170,7 @@ fn feed_forward(table: &Table, structure: &Structure, stage: &Stage) -> Result<F
         let model = match structure {
             Structure::SlidingMode(_) => FeedForwardModel::Rigid,
             Structure::StateFeedback(_) => FeedForwardModel::Elastic,
-            _ => FeedForwardModel::None,
+            Structure::Pid(_) | Structure::Cascade(_) | Structure::Fuzzy(_) => FeedForwardModel::None,
         };
         return Ok(FeedForward { model, ..FeedForward::NONE });
     };

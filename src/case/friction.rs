@@ -64,7 +64,7 @@ fn law(table: &Table, friction: Friction) -> Result<Friction> {
             law.check_keys(&[], &[])?;
             Ok(friction.following(Law::Smooth { breakaway_velocity: law.number("breakaway_velocity")? }))
         }
-        _ => {
+        "lugre" => {
             law.check_keys(&[], &[])?;
             if friction.forward.coulomb == 0.0 || friction.backward.coulomb == 0.0 {
                 return Err(field
@@ -74,6 +74,7 @@ fn law(table: &Table, friction: Friction) -> Result<Friction> {
             let (stiffness, damping) = (law.number("stiffness")?, law.number("damping")?);
             Ok(friction.following(Law::LuGre { stiffness, damping, velocity: law.number("velocity")? }))
         }
+        _ => Err(field.unread()),
     }
 }
 

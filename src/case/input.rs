@@ -107,7 +107,8 @@ fn nested(field: &Field, context: &Context, depth: usize, in_sequence: bool) -> 
             let parts = parts.iter().map(|part| nested(part, context, depth + 1, false));
             Signal::Sum(parts.collect::<Result<_>>()?)
         }
-        _ => sequence(&main, context, depth)?,
+        "sequence" => sequence(&main, context, depth)?,
+        _ => return Err(field.unread()),
     })
 }
 

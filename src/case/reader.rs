@@ -39,6 +39,11 @@ impl<'a> Field<'a> {
         Error::new(format!("{}: {what}", self.path)).at(self.source.place(self.node.span.clone()))
     }
 
+    /// What is told of a word that is known and that nobody reads.
+    pub fn unread(&self) -> Error {
+        self.fail(format!("`{}` is known, but not read yet", self.key())).next("this is a fault of taut: please report it")
+    }
+
     /// A number in SI, checked against its row of the table of parameters.
     pub fn number(&self) -> Result<f64> {
         match parameter::find(&self.section) {
