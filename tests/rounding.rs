@@ -7,7 +7,7 @@ use taut::case::{Case, Experiment, Initial};
 use taut::friction::{Friction, Law, Motion, Shape, Side};
 use taut::signal::Signal;
 use taut::solve::{Ending, ErrorEstimate, Event, Flow, Solution, Solver, simulate, stream};
-use taut::stage::axis::{BODIES, CART, LABELS};
+use taut::stage::axis::{CART, LABELS};
 use taut::stage::{Amplifier, AmplifierMode, Stage};
 
 fn complete(stage: &Stage, experiment: &Experiment, solver: Solver) -> Solution {
@@ -296,19 +296,14 @@ fn what_the_hunt_found_stays_found() {
         if worst > 1e-8 {
             faults.push(format!("{name}: {worst:e} m apart"));
         }
-        for body in 0..BODIES {
+        for (body, label) in LABELS.into_iter().enumerate() {
             let first =
                 |solution: &Solution| solution.outcome.events.iter().find(|e| e.body() == Some(body)).map(|e| e.time);
             let moved = |solution: &Solution| bodies(&solution.outcome.events).iter().any(|(b, ..)| *b == body);
             if moved(&exact) != moved(&general)
                 || first(&exact).is_some_and(|t| t < 1e-12) != first(&general).is_some_and(|t| t < 1e-12)
             {
-                faults.push(format!(
-                    "{name}: {} begins at {:?} and {:?}",
-                    LABELS[body].name,
-                    first(&exact),
-                    first(&general)
-                ));
+                faults.push(format!("{name}: {} begins at {:?} and {:?}", label.name, first(&exact), first(&general)));
             }
         }
     }

@@ -41,7 +41,8 @@ impl<'a> Field<'a> {
 
     /// What is told of a word that is known and that nobody reads.
     pub fn unread(&self) -> Error {
-        self.fail(format!("`{}` is known, but not read yet", self.key())).next("this is a fault of taut: please report it")
+        self.fail(format!("`{}` is known, but not read yet", self.key()))
+            .next("this is a fault of taut: please report it")
     }
 
     /// A number in SI, checked against its row of the table of parameters.

@@ -252,8 +252,8 @@ impl<const R: usize, const C: usize> ModeMatrices<R, C> {
                 rate.set(row, column, value);
             }
         };
-        for body in 0..layout.bodies() {
-            if !stuck[body] {
+        for (body, stuck) in stuck.into_iter().enumerate().take(layout.bodies()) {
+            if !stuck {
                 put(&mut rate, layout.speed[body], &equations.acceleration[body]);
             }
             let mut way = layout.rate(mechanism, body);

@@ -293,8 +293,8 @@ impl<'a> Field<'a> {
         let mechanism = &*model.mechanism;
         let equations = mechanism.equations(*mode);
         let (mut mass, mut rates) = ([1.0; BODIES], Vec::with_capacity(model.size));
-        for body in 0..mechanism.bodies.len() {
-            mass[body] = mechanism.mass(mechanism.leader(body), &equations.inertia);
+        for (body, mass) in mass.iter_mut().enumerate().take(mechanism.bodies.len()) {
+            *mass = mechanism.mass(mechanism.leader(body), &equations.inertia);
             if mode.motion[body] != Motion::Stuck {
                 rates.push((model.speed(body), model.row(&equations.acceleration[body])));
             }
