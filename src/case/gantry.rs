@@ -83,7 +83,7 @@ pub(super) fn no_axis(root: &Table, routing: Routing) -> Error {
     field
         .fail(what)
         .allowed("kind = \"axis\", or no kind at all")
-        .next("`taut simulate`, `taut modes` and `taut sweep` take gantries; control, fit and tuning of them are yet to come")
+        .next("`taut simulate` and `taut modes` take gantries; sweeps, control, fit and tuning of them are yet to come")
 }
 
 impl GantryCase {
@@ -186,6 +186,20 @@ fn gantry(root: &Table, routing: Routing) -> Result<Gantry> {
     let drives = [drive(root, "left_drive")?, drive(root, "right_drive")?];
     let pulley = table(root, "drive_pulley", "radius and inertia")?;
     pulley.check_keys(&[], &[])?;
+    let belt = table(root, "belt", "stiffness")?;
+    let belts = belts(&belt, routing)?;
+    let [bridge, cart] = [slide(root, "bridge")?, slide(root, "cart")?];
+    if let Some(field) = belt.optional("follows_cart").filter(|_| belts.follows.is_some()) {
+        for (name, slide) in [("bridge", &bridge), ("cart", &cart)] {
+            if slide.travel.is_none() {
+                return Err(field
+                    .fail(format!(
+                        "spans that follow bridge and cart need the travel of both, and {name}.travel is missing"
+                    ))
+                    .next(format!("add for example travel = {{ min = \"-0.2 m\", max = \"0.2 m\" }} to [{name}]")));
+            }
+        }
+    }
     let encoder = root.optional("encoder").map(|field| encoder(&field.table()?)).transpose()?;
     Ok(Gantry {
         routing,
@@ -193,9 +207,9 @@ fn gantry(root: &Table, routing: Routing) -> Result<Gantry> {
         amplifiers: drives.map(|(_, amplifier)| amplifier),
         pulley_radius: stage::radius(&pulley)?,
         drive_pulley: stage::pulley(&pulley)?,
-        bridge: slide(root, "bridge")?,
-        cart: slide(root, "cart")?,
-        belts: belts(&table(root, "belt", "stiffness")?, routing)?,
+        bridge,
+        cart,
+        belts,
         encoder,
     })
 }
@@ -241,8 +255,7 @@ fn belts(table: &Table, routing: Routing) -> Result<Belts> {
     let count = labels.len();
     let per_span = format!("{count} values: {}", labels.join(", "));
     let pretension = table.number_if_given("pretension")?;
-    let damping =
-        table.optional("damping").map_or(Ok(vec![0.0; count]), |field| field.numbers(count, &per_span))?;
+    let damping = table.optional("damping").map_or(Ok(vec![0.0; count]), |field| field.numbers(count, &per_span))?;
     let follows = table.optional("follows_cart").map_or(Ok(false), |field| field.truth())?;
     let make = ["modulus", "section", "spans"];
     if let Some(stiffness) = table.optional("stiffness") {
@@ -266,8 +279,7 @@ fn belts(table: &Table, routing: Routing) -> Result<Belts> {
     let modulus = stage::modulus(&table.required("modulus", "for example modulus = \"8.335 GPa\"")?)?;
     let section = stage::section(&table.required("section", "for example section = \"5.5626 mm^2\"")?)?;
     let spans = vec!["\"0.5 m\""; count].join(", ");
-    let lengths =
-        table.required("spans", &format!("for example spans = [{spans}]"))?.numbers(count, &per_span)?;
+    let lengths = table.required("spans", &format!("for example spans = [{spans}]"))?.numbers(count, &per_span)?;
     let rigidity = modulus * section;
     // k = A E / l                                                                  (11)
     let stiffness: Vec<f64> = lengths.iter().map(|length| rigidity / length).collect();
@@ -306,7 +318,10 @@ fn experiment(field: &Field, gantry: &Gantry, folder: &Folder) -> Result<GantryE
     let sides = ["left", "right"];
     if let Some(key) = inputs.keys().find(|key| !sides.contains(key)) {
         let field = inputs.optional(key).unwrap_or_else(|| inputs.field.clone());
-        return Err(field.fail(format!("a gantry has two inputs, and `{key}` is none of them")).allowed("left, right").next(such_as));
+        return Err(field
+            .fail(format!("a gantry has two inputs, and `{key}` is none of them"))
+            .allowed("left, right")
+            .next(such_as));
     }
     let signal = |side: usize| match inputs.optional(sides[side]) {
         None => Ok(Signal::Step { value: 0.0, at: 0.0 }),

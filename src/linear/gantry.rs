@@ -5,11 +5,11 @@ use crate::case::GantryCase;
 use crate::error::Result;
 use crate::friction::Law;
 use crate::mechanism::{AmplifierMode, BODIES, Mechanism};
-use crate::stage::gantry::{BRIDGE, CART};
 use crate::stage::Travel;
+use crate::stage::gantry::{BRIDGE, CART};
 
 /// Places along either way of the map.
-const PLACES: usize = 31;
+const PLACES: usize = 33;
 
 /// The answers.
 #[derive(Debug, Clone)]
@@ -110,9 +110,12 @@ fn words(case: &GantryCase, mechanism: &Mechanism) -> Vec<String> {
     if bodies().any(|body| body.friction.forward.viscous != body.friction.backward.viscous) {
         words.push("viscous friction is that of forward motion".into());
     }
-    if gantry.motors.iter().zip(&gantry.amplifiers).any(|(motor, amplifier)| {
-        amplifier.mode == AmplifierMode::Voltage && motor.inductance != 0.0
-    }) {
+    if gantry
+        .motors
+        .iter()
+        .zip(&gantry.amplifiers)
+        .any(|(motor, amplifier)| amplifier.mode == AmplifierMode::Voltage && motor.inductance != 0.0)
+    {
         words.push("a motor with an inductance counts as giving no torque: what its current damps is left out".into());
     }
     if gantry.motors.iter().any(|motor| motor.gear_play.is_some_and(|play| play.backlash > 0.0)) {

@@ -105,11 +105,14 @@ impl Natural {
                 let shape = shapes.column(k);
                 let lever = |i: usize| mechanism.bodies[bodies[i]].kind.lever();
                 let ways: Vec<f64> = (0..bodies.len()).map(|i| lever(i) * shape[i]).collect();
-                let largest = ways.iter().copied().fold(0.0, |most: f64, way| if way.abs() > most.abs() { way } else { most });
+                // The first of those that go farthest, so that alike bodies do not change places by rounding.
+                let farther = |most: f64, way: f64| if way.abs() > most.abs() * (1.0 + 1e-9) { way } else { most };
+                let largest = ways.iter().copied().fold(0.0, farther);
+                let share = |way: &f64| if way.abs() <= NOTHING * largest.abs() { 0.0 } else { way / largest };
                 ElasticMode {
                     frequency: values[k].sqrt(),
                     damped: is_complete.then(|| pairs[k - free]),
-                    shape: ways.iter().map(|way| way / largest + 0.0).collect(),
+                    shape: ways.iter().map(share).collect(),
                     energy: (0..bodies.len()).map(|i| vectors[(i, k)].powi(2)).collect(),
                 }
             })
@@ -206,7 +209,13 @@ fn poles(values: &[f64], damping: &DMatrix<f64>, free: usize) -> Result<Vec<Root
     // States: speeds of all modes, then ways of the elastic ones. A rigid way is an integrator, and nothing asks for it.
     let a = DMatrix::from_fn(n + elastic, n + elastic, |i, j| match (i < n, j < n) {
         (true, true) => -damping[(i, j)],
-        (true, false) => if j - n + free == i { -values[i] } else { 0.0 },
+        (true, false) => {
+            if j - n + free == i {
+                -values[i]
+            } else {
+                0.0
+            }
+        }
         (false, true) => f64::from(u8::from(i - n + free == j)),
         (false, false) => 0.0,
     });
@@ -242,8 +251,11 @@ fn rigid(shapes: &DMatrix<f64>, slides: &dyn Fn(usize) -> bool) -> Vec<(usize, V
     }
     let largest = left.amax();
     let clean = |v: f64| if v.abs() <= 1e-12 * largest { 0.0 } else { v };
-    let mut modes: Vec<(usize, Vec<f64>)> =
-        chosen.iter().enumerate().map(|(k, body)| (*body, left.column(k).iter().map(|v| clean(*v)).collect())).collect();
+    let mut modes: Vec<(usize, Vec<f64>)> = chosen
+        .iter()
+        .enumerate()
+        .map(|(k, body)| (*body, left.column(k).iter().map(|v| clean(*v)).collect()))
+        .collect();
     modes.sort_by_key(|(body, _)| *body);
     modes
 }
