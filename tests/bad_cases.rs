@@ -7,7 +7,7 @@ mod wrong;
 
 use std::fs;
 use std::path::Path;
-use taut::case::Case;
+use taut::case::{Case, Opened};
 
 #[test]
 fn every_wrong_case_gives_its_message() {
@@ -20,17 +20,27 @@ fn every_wrong_log_of_a_case_gives_its_message() {
     compare("mapping");
 }
 
+/// Gantries, as the commands that take both kinds read them.
+#[test]
+fn every_wrong_gantry_gives_its_message() {
+    messages("gantry", 25, |path| Opened::read_with(path, &[]).err());
+}
+
 fn compare(folder: &str) {
+    messages(folder, 60, |path| Case::read(path).err());
+}
+
+fn messages(folder: &str, least: usize, read: impl Fn(&Path) -> Option<taut::Error>) {
     let folder = format!("tests/bad/{folder}");
-    wrong::every_message(&folder, "toml", 60, |path| {
+    wrong::every_message(&folder, "toml", least, |path| {
         // Messages name the file as the user does; here that is from within the folder.
-        Some(Case::read(path).err()?.to_string().replace(&format!("{folder}/"), ""))
+        Some(read(path)?.to_string().replace(&format!("{folder}/"), ""))
     });
 }
 
 #[test]
 fn no_message_is_left_without_its_file() {
-    for folder in ["case", "mapping"] {
+    for folder in ["case", "gantry", "mapping"] {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bad").join(folder);
         for entry in fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();

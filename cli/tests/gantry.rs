@@ -186,3 +186,74 @@ fn options_of_an_axis_are_refused() {
         assert_eq!(refused(args, &case), told);
     }
 }
+
+#[test]
+fn modes_tells_rigid_and_elastic_ones_and_maps_the_area() {
+    let folder = TempDir::new().unwrap();
+    let case = stage("core-xy/follows.toml");
+    let run = taut(folder.path()).arg("modes").arg(&case).args(["--out", "out"]).assert().success();
+    let out = text(&run.get_output().stdout);
+    for word in [
+        "Rigid modes",
+        "bridge      per m: left pulley 51.55 rad, right pulley 51.55 rad, cart 0",
+        "cart        per m: left pulley 51.55 rad, right pulley -51.55 rad, bridge 0",
+        "191.97 Hz   damping ",
+        "ways at the belt: left pulley 1.000, right pulley 1.000, bridge -0.279, cart 0.000",
+        "energy: ",
+        "elastic mode 2, Hz: from 220.1 to 354.9",
+        "modes.json  map.csv  report.html  plots/",
+    ] {
+        assert!(out.contains(word), "{word} is not in\n{out}");
+    }
+    let read = |name: &str| fs::read_to_string(folder.path().join("out").join(name)).unwrap();
+    let told: Value = serde_json::from_str(&read("modes.json")).unwrap();
+    assert_eq!(told["rigid"][0]["body"], "bridge");
+    assert!((told["rigid"][1]["shape"]["right_rad"].as_f64().unwrap() + 1.0 / 0.0194).abs() < 1e-9);
+    assert_eq!(told["rigid"][1]["shape"]["cart_m"], 1.0);
+    let elastic = told["elastic"].as_array().unwrap();
+    assert!(elastic.len() == 2 && elastic[0]["damping_ratio"].as_f64().unwrap() > 0.0);
+    let map = read("map.csv");
+    let mut rows = map.lines();
+    assert_eq!(rows.next(), Some("bridge_position_m,cart_position_m,elastic_1_Hz,elastic_2_Hz"));
+    let grid = &told["map"]["elastic_Hz"];
+    let places =
+        [&told["map"]["bridge_position_m"], &told["map"]["cart_position_m"]].map(|v| v.as_array().unwrap().len());
+    assert_eq!(rows.clone().count(), places[0] * places[1]);
+    // The second row: the bridge at its least, the cart one place on.
+    let row: Vec<f64> = rows.nth(1).unwrap().split(',').map(|v| v.parse().unwrap()).collect();
+    assert_eq!([row[2], row[3]], [0, 1].map(|mode: usize| grid[mode][0][1].as_f64().unwrap()));
+    assert!(read("report.html").contains("Elastic mode 2") && folder.path().join("out/plots/elastic-1.png").exists());
+
+    let same = taut(folder.path()).arg("modes").arg(stage("h-frame/h-frame.toml")).arg("--json").assert().success();
+    let told = json(&same.get_output().stdout);
+    assert_eq!((&told["stiffness_depends_on_position"], &told["map"]), (&Value::Bool(false), &Value::Null));
+    assert!((told["elastic"][0]["frequency_Hz"].as_f64().unwrap() - 196.643946994).abs() < 1e-9);
+}
+
+#[test]
+fn modes_refuses_what_is_asked_of_an_axis() {
+    let case = stage("h-frame/h-frame.toml");
+    for option in
+        [["--at", "1mm"], ["--speed", "0.1"], ["--stuck", "cart"], ["--sample-time", "1ms"], ["--from", "1Hz"]]
+    {
+        let told = refused(&["modes", option[0], option[1]], &case);
+        let begin = format!("error: {}: this is there for a single axis, and not for a gantry\n  next: ", option[0]);
+        assert!(told.starts_with(&begin) && told.ends_with("leave it out\n"), "{told}");
+    }
+}
+
+/// What is not there for a gantry says so, at the line that makes it one.
+#[test]
+fn commands_for_an_axis_say_what_takes_a_gantry() {
+    let case = stage("core-xy/core-xy.toml");
+    for command in ["fit", "tune", "move", "check", "shape"] {
+        assert_eq!(
+            refused(&[command], &case),
+            "error: stages/core-xy.toml:4:9: kind: this needs a single axis, and the case describes a gantry (CoreXY)\n  \
+             4 | kind  = \"core-xy\"\n    |         ^^^^^^^^^\n  \
+             allowed: kind = \"axis\", or no kind at all\n  \
+             next: `taut simulate` and `taut modes` take gantries; sweeps, control, fit and tuning of them are yet to come\n",
+            "{command}"
+        );
+    }
+}

@@ -6,15 +6,16 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
-use taut::case::{Case, Experiment, Move, TEMPLATE};
+use taut::case::{Case, Experiment, GantryCase, Move, Opened, TEMPLATE};
 use taut::control::spectrum::{Axis, Spectrum};
 use taut::control::{Loop, Rows, Standard};
 use taut::fit;
-use taut::linear::{Operation, StateSpace};
+use taut::linear::{GantryAnalysis, Operation, Root, StateSpace};
 use taut::log::{Accelerometer, ColumnId, Dialect, Filter, Log, Mapping, Quantity, Source, Survey, read_accelerometer};
+use taut::metrics::GantryMeter;
 use taut::signal::gcode::legs;
 use taut::signal::profile::{Limits, Profile};
-use taut::solve::{self, Ending, Flow, Solver};
+use taut::solve::{self, Course, Detail, Ending, Flow, Outcome, Solver};
 use taut::stage::Stage;
 use taut::sweep::Sweep;
 use taut::{Error, quantity};
@@ -71,8 +72,9 @@ fn with_file<T>(bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {
 pub(crate) fn case(bytes: &[u8]) -> Reached {
     let Ok(text) = std::str::from_utf8(bytes) else { return Reached::Refused };
     let name = repository().join("stages/sollmann-jouaneh/identification/input.toml");
-    let case = match Case::from_text(&name, text) {
-        Ok(case) => case,
+    let case = match Opened::from_text_with(&name, text, &[]) {
+        Ok(Opened::Axis(case)) => case,
+        Ok(Opened::Gantry(case)) => return gantry(&name, &case),
         Err(error) => return refused(&error),
     };
     let again = Case::from_text(&name, &case.text).unwrap_or_else(|error| panic!("its own text is refused: {error}"));
@@ -90,6 +92,39 @@ pub(crate) fn case(bytes: &[u8]) -> Reached {
             Err(error) => drop(refused(&error)),
         }
     }
+    Reached::Read
+}
+
+/// A gantry: its modes are found, and it is run, shortly.
+fn gantry(name: &Path, case: &GantryCase) -> Reached {
+    let again = GantryCase::from_text_with(name, &case.text, &[]);
+    let again = again.unwrap_or_else(|error| panic!("its own text is refused: {error}"));
+    assert!(again.text == case.text && again.gantry == case.gantry, "its own text reads otherwise");
+    let Ok(analysis) = GantryAnalysis::of(case) else { return Reached::Read };
+    let pace = |root: &Root| match *root {
+        Root::Zero => 0.0,
+        Root::Real(s) => s.abs(),
+        Root::Pair { frequency, .. } => frequency,
+    };
+    let fastest = analysis.modes.poles.iter().map(pace).fold(0.0, f64::max);
+    let (Some(experiment), true) = (case.experiments.first(), fastest.is_finite()) else { return Reached::Read };
+    let mut course = Course::of(experiment);
+    course.until = course.until.min(LONGEST.min(PHASE / fastest.max(1e-300)));
+    course.every = course.every.min(course.until).max(course.until / ROWS);
+    let mechanism = case.gantry.mechanism();
+    let mut meter = GantryMeter::new(&case.gantry);
+    let mut finite = true;
+    let shown = (Detail::Full, Some(&mut meter as &mut dyn solve::Observe));
+    let outcome = solve::stream_mechanism(&mechanism, &course, Solver::of_mechanism(&mechanism), shown, &mut |rows| {
+        for name in ["time", "bridge_position", "cart_position", "left_angle"] {
+            finite &= rows.get(name).is_some_and(|values| values.iter().all(|value| value.is_finite()));
+        }
+        Flow::Continue
+    });
+    if let Ok(outcome) = &outcome {
+        meter.finish(&outcome.events);
+    }
+    judge(outcome, finite);
     Reached::Read
 }
 
@@ -111,6 +146,11 @@ fn run(stage: &Stage, experiment: &Experiment, longest: f64) {
         }
         Flow::Continue
     });
+    judge(outcome, finite);
+}
+
+/// Rows are numbers, or the run says that they are not.
+fn judge(outcome: Result<Outcome, Error>, finite: bool) {
     match outcome {
         Ok(outcome) => {
             let diverged = matches!(outcome.ending, Ending::Diverged { .. });

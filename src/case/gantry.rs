@@ -80,9 +80,10 @@ pub(super) fn kind(root: &Table) -> Result<Option<Routing>> {
 pub(super) fn no_axis(root: &Table, routing: Routing) -> Error {
     let field = root.optional("kind").unwrap_or_else(|| root.field.clone());
     let what = format!("this needs a single axis, and the case describes a gantry ({})", routing.name());
-    field.fail(what).allowed("kind = \"axis\", or no kind at all").next(
-        "`taut simulate`, `taut modes` and `taut sweep` take gantries; control, fit and tuning of them are yet to come",
-    )
+    field
+        .fail(what)
+        .allowed("kind = \"axis\", or no kind at all")
+        .next("`taut simulate` and `taut modes` take gantries; sweeps, control, fit and tuning of them are yet to come")
 }
 
 impl GantryCase {
@@ -185,6 +186,20 @@ fn gantry(root: &Table, routing: Routing) -> Result<Gantry> {
     let drives = [drive(root, "left_drive")?, drive(root, "right_drive")?];
     let pulley = table(root, "drive_pulley", "radius and inertia")?;
     pulley.check_keys(&[], &[])?;
+    let belt = table(root, "belt", "stiffness")?;
+    let belts = belts(&belt, routing)?;
+    let [bridge, cart] = [slide(root, "bridge")?, slide(root, "cart")?];
+    if let Some(field) = belt.optional("follows_cart").filter(|_| belts.follows.is_some()) {
+        for (name, slide) in [("bridge", &bridge), ("cart", &cart)] {
+            if slide.travel.is_none() {
+                return Err(field
+                    .fail(format!(
+                        "spans that follow bridge and cart need the travel of both, and {name}.travel is missing"
+                    ))
+                    .next(format!("add for example travel = {{ min = \"-0.2 m\", max = \"0.2 m\" }} to [{name}]")));
+            }
+        }
+    }
     let encoder = root.optional("encoder").map(|field| encoder(&field.table()?)).transpose()?;
     Ok(Gantry {
         routing,
@@ -192,9 +207,9 @@ fn gantry(root: &Table, routing: Routing) -> Result<Gantry> {
         amplifiers: drives.map(|(_, amplifier)| amplifier),
         pulley_radius: stage::radius(&pulley)?,
         drive_pulley: stage::pulley(&pulley)?,
-        bridge: slide(root, "bridge")?,
-        cart: slide(root, "cart")?,
-        belts: belts(&table(root, "belt", "stiffness")?, routing)?,
+        bridge,
+        cart,
+        belts,
         encoder,
     })
 }

@@ -277,7 +277,9 @@ impl<'a> Table<'a> {
             let error = Error::new(format!("{} has no key `{key}`", self.title()))
                 .at(place())
                 .allowed(known.iter().filter(|k| !planned.contains(k)).copied().collect::<Vec<_>>().join(", "));
-            return Err(match (nearest(key, &known), elsewhere(key)) {
+            // What belongs to a table of an axis need not be there for a gantry.
+            let of_gantry = ["bridge", "gantry"].contains(&self.field.section.split('.').next().unwrap_or_default());
+            return Err(match (nearest(key, &known), elsewhere(key).filter(|_| !of_gantry)) {
                 (Some(near), _) => error.next(format!("did you mean `{near}`?")),
                 (None, Some(section)) => error.next(format!("`{key}` belongs to `{section}`")),
                 (None, None) => error,

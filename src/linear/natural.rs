@@ -105,12 +105,14 @@ impl Natural {
                 let shape = shapes.column(k);
                 let lever = |i: usize| mechanism.bodies[bodies[i]].kind.lever();
                 let ways: Vec<f64> = (0..bodies.len()).map(|i| lever(i) * shape[i]).collect();
-                let largest =
-                    ways.iter().copied().fold(0.0, |most: f64, way| if way.abs() > most.abs() { way } else { most });
+                // The first of those that go farthest, so that alike bodies do not change places by rounding.
+                let farther = |most: f64, way: f64| if way.abs() > most.abs() * (1.0 + 1e-9) { way } else { most };
+                let largest = ways.iter().copied().fold(0.0, farther);
+                let share = |way: &f64| if way.abs() <= NOTHING * largest.abs() { 0.0 } else { way / largest };
                 ElasticMode {
                     frequency: values[k].sqrt(),
                     damped: is_complete.then(|| pairs[k - free]),
-                    shape: ways.iter().map(|way| way / largest + 0.0).collect(),
+                    shape: ways.iter().map(share).collect(),
                     energy: (0..bodies.len()).map(|i| vectors[(i, k)].powi(2)).collect(),
                 }
             })

@@ -1,6 +1,7 @@
 //! `taut modes`: linearises the stage of a case, and says how it swings.
 
 mod figures;
+mod gantry;
 mod page;
 mod table;
 
@@ -12,7 +13,7 @@ use crate::terminal;
 use std::f64::consts::PI;
 use std::fmt::Write;
 use taut::Result;
-use taut::case::Case;
+use taut::case::{Case, Opened};
 use taut::files::write_atomically;
 use taut::json;
 use taut::linear::{Analysis, Hold, Question};
@@ -21,13 +22,19 @@ use taut::stage::BeltModel;
 /// Reads the case, linearises, writes, tells.
 pub fn run(args: &Args) -> Outcome {
     let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
-    let case = Case::read_with(&args.case, &changes)?;
-    let analysis = Analysis::of(&case, &question(args))?;
+    match Opened::read_with(&args.case, &changes)? {
+        Opened::Axis(case) => axis(args, &case),
+        Opened::Gantry(case) => gantry::run(args, &case),
+    }
+}
+
+fn axis(args: &Args, case: &Case) -> Outcome {
+    let analysis = Analysis::of(case, &question(args))?;
     let json = json::text(&json::modes(&analysis));
     let mut written = Vec::new();
     if let Some(folder) = &args.out {
         let names = ["modes.json", "frequency-response.csv", "report.html"];
-        let folder = Folder::create(folder, folder::inputs(&args.case, &case), names)?;
+        let folder = Folder::create(folder, folder::inputs(&args.case, case), names)?;
         written = write(&analysis, args, &folder, &json).map_err(Failure::work)?;
         folder.place()?;
     }

@@ -65,7 +65,7 @@ pub fn page(analysis: &Analysis, figures: &[Named]) -> Page {
 }
 
 /// Text of the terminal with true minus signs.
-fn printed(text: &str) -> String {
+pub fn printed(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut before = ' ';
     for c in text.chars() {

@@ -9,6 +9,8 @@ mod rows;
 mod run;
 pub mod table;
 
+pub use gantry::machine as gantry_machine;
+
 use crate::args::{Format, Simulate};
 use crate::failure::{Failure, Outcome, Status};
 use crate::folder::{self, Folder};

@@ -5,6 +5,8 @@ mod plots;
 mod run;
 mod table;
 
+pub use table::machine;
+
 use super::{Ended, names, status};
 use crate::args::Simulate;
 use crate::failure::{Failure, Outcome};

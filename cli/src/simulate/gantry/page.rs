@@ -14,7 +14,7 @@ pub fn page(setting: &Setting, text: &str, runs: &[Run], figures: &[Vec<Named>],
     page.prose(format!("{}.", machine(&case.gantry)));
     page.drawing(
         &gantry_drawing(&case.gantry),
-        "In plan view, with positive directions and the lengths of no part to scale. In the model the bridge does not yaw, and idlers have \
+        "In plan view with positive directions; lengths are not to scale. In the model the bridge does not yaw, and idlers have \
          neither inertia nor friction.",
     );
     for ((run, figures), way) in runs.iter().zip(figures).zip(ways) {

@@ -1,0 +1,142 @@
+//! The same for a gantry: rigid and elastic modes, and the resonances over the working area.
+
+mod page;
+mod table;
+
+use crate::args::Modes as Args;
+use crate::failure::{Failure, Outcome, Status};
+use crate::folder::{self, Folder};
+use crate::terminal;
+use std::fmt::Write;
+use taut::case::GantryCase;
+use taut::files::write_atomically;
+use taut::json;
+use taut::linear::{GantryAnalysis, ResonanceMap};
+use taut::number::engineering;
+use taut::report::{Axis, Map, Plane};
+use taut::{Error, Result};
+
+/// A plane and its name in file names.
+type Named = (String, Plane);
+
+/// Finds the modes, writes, tells.
+pub fn run(args: &Args, case: &GantryCase) -> Outcome {
+    refuse(args)?;
+    let analysis = GantryAnalysis::of(case)?;
+    let json = json::text(&json::gantry_modes(&analysis));
+    let mut written = Vec::new();
+    if let Some(root) = &args.out {
+        let map = analysis.map.is_some().then_some("map.csv");
+        let names = ["modes.json", "report.html"].into_iter().chain(map);
+        let folder = Folder::create(root, folder::inputs_of(&args.case, &case.files), names)?;
+        written = write(&analysis, args, &folder, &json).map_err(Failure::work)?;
+        folder.place()?;
+    }
+    if args.json {
+        terminal::show(&json);
+    } else if !args.quiet {
+        terminal::show(&table::text(&analysis, args.out.as_deref(), &written));
+    }
+    Ok(Status::Done)
+}
+
+/// Refuses what is asked of an axis alone.
+fn refuse(args: &Args) -> Result<()> {
+    let map = "the modes are those with bridge and cart at zero, and the map has every other place: leave it out";
+    let slides = "the modes of a gantry are those of everything sliding: leave it out";
+    let none = "there is no state space of a gantry yet: leave it out";
+    let asked = [
+        ("--at", args.at.is_some(), map),
+        ("--speed", args.speed.is_some(), slides),
+        ("--stuck", !args.stuck.is_empty(), slides),
+        ("--sample-time", args.sample_time.is_some(), none),
+        ("--from", args.from.is_some(), none),
+        ("--to", args.to.is_some(), none),
+    ];
+    match asked.into_iter().find(|(_, given, _)| *given) {
+        None => Ok(()),
+        Some((option, _, next)) => {
+            Err(Error::new("this is there for a single axis, and not for a gantry").in_file(option).next(next))
+        }
+    }
+}
+
+/// Whether the resonances depend on the place, in words.
+fn over_the_area(analysis: &GantryAnalysis) -> &'static str {
+    match &analysis.map {
+        Some(_) => "the spans follow bridge and cart: k = A E / l with the length that is left",
+        None => {
+            "the same everywhere: in this file the spans' stiffness does not depend on the place \
+             (belt.modulus, section, spans and follows_cart = true make the spans follow bridge and cart)"
+        }
+    }
+}
+
+/// Writes the files; returns their names.
+fn write(analysis: &GantryAnalysis, args: &Args, folder: &Folder, json: &str) -> Result<Vec<&'static str>> {
+    write_atomically(folder.path("modes.json"), json)?;
+    let mut names = vec!["modes.json"];
+    if let Some(map) = &analysis.map {
+        write_atomically(folder.path("map.csv"), csv(map))?;
+        names.push("map.csv");
+    }
+    if !args.no_report {
+        let planes = planes(analysis);
+        page::page(analysis, &planes).write(folder.path("report.html"))?;
+        names.push("report.html");
+        if !planes.is_empty() {
+            folder.make("plots")?;
+            names.push("plots/");
+        }
+        for (name, plane) in &planes {
+            plane.write_svg(folder.path("plots").join(format!("{name}.svg")))?;
+            plane.write_png(folder.path("plots").join(format!("{name}.png")))?;
+        }
+    }
+    Ok(names)
+}
+
+/// The map, a row for each place.
+fn csv(map: &ResonanceMap) -> String {
+    let mut text = String::from("bridge_position_m,cart_position_m");
+    (1..=map.hertz.len()).for_each(|k| {
+        let _ = write!(text, ",elastic_{k}_Hz");
+    });
+    text.push('\n');
+    for (i, x) in map.bridge.iter().enumerate() {
+        for (j, y) in map.cart.iter().enumerate() {
+            let _ = write!(text, "{x},{y}");
+            map.hertz.iter().for_each(|mode| {
+                let _ = write!(text, ",{}", mode[i][j]);
+            });
+            text.push('\n');
+        }
+    }
+    text
+}
+
+/// A map of each elastic mode, seen as the drawing is.
+fn planes(analysis: &GantryAnalysis) -> Vec<Named> {
+    let Some(map) = &analysis.map else { return Vec::new() };
+    let millimetres = |name: &str| Axis::new(name, "m").shown_as("mm", 1e3);
+    let plane = |(k, hertz): (usize, &Vec<Vec<f64>>)| {
+        let [(least, at), (most, to)] = map.range(k);
+        let place = |(x, y): (f64, f64)| format!("x = {}, y = {}", engineering(x, "m", 3), engineering(y, "m", 3));
+        let caption = format!(
+            "Undamped frequency with the bridge at x and the cart at y: from {} at {} to {} at {}.",
+            engineering(least, "Hz", 4),
+            place(at),
+            engineering(most, "Hz", 4),
+            place(to)
+        );
+        let shown = Map {
+            value: Axis::new("Frequency", "Hz"),
+            across: map.cart.clone(),
+            up: map.bridge.clone(),
+            values: hertz.clone(),
+        };
+        let plane = Plane::new(format!("Elastic mode {}", k + 1), millimetres("Cart y"), millimetres("Bridge x"));
+        (format!("elastic-{}", k + 1), plane.map(shown).caption(caption))
+    };
+    map.hertz.iter().enumerate().map(plane).collect()
+}
