@@ -19,7 +19,7 @@ type Sink<'a> = dyn FnMut(&Trajectory) -> Flow + 'a;
 /// Keeps some of a run's rows, and compares them with those of a second run.
 ///
 /// The error of a step is about in proportion to the tolerance, so the second run, with ten times the tolerance, is off by about ten
-/// times as much as the first: their difference is an estimate on the safe side. Where the motion is sensitive to its last digits
+/// times as much as the first: twice their difference is an estimate on the safe side. Where the motion is sensitive to its last digits
 /// (flanks that rattle, loads just at a breakaway) both differ by what that makes of them.
 ///
 /// ```
@@ -142,7 +142,8 @@ impl ErrorEstimate {
             interrupted |= flow() == Flow::Stop;
             if interrupted { Flow::Stop } else { Flow::Continue }
         })?;
-        Ok((!interrupted).then_some(PositionError { value, way }))
+        // Twice the difference: events add to it what no tolerance is in proportion to.
+        Ok((!interrupted).then_some(PositionError { value: 2.0 * value, way }))
     }
 }
 

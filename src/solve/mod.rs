@@ -107,6 +107,13 @@ impl Event {
     /// Adds it to `events`, unless nothing that shows has changed. A part other than a body that passes through a state without
     /// staying there goes straight.
     fn note(mut self, events: &mut Vec<Event>) {
+        // A body that is at once what it was before has done nothing.
+        let at_once = |e: &Event| self.time - e.time <= 4.0 * f64::EPSILON * self.time;
+        let last = events.iter().rposition(|e| e.part == self.part).filter(|&last| at_once(&events[last]));
+        if let Some(last) = last.filter(|&last| self.body().is_some() && events[last].from.code() == self.to.code()) {
+            events.remove(last);
+            return;
+        }
         let passed = |e: &Event| e.part == self.part && e.body().is_none();
         let now = events.iter().rev().take_while(|e| e.time == self.time);
         if let Some(back) = now.into_iter().position(passed) {

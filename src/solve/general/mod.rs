@@ -287,7 +287,9 @@ impl Core {
             return None;
         }
         let mut solver = DOP853 { max_step: Some(stretch.longest_step()), ..self.solver.clone() };
-        solver.first_step = solver.first_step.map(|step| step.min(length - self.tau));
+        // The formula looks at its longest step only from its second one on.
+        let longest = stretch.longest_step().min(length - self.tau);
+        solver.first_step = solver.first_step.map(|step| step.min(longest));
         let (relative, absolute, y) = (self.relative(), self.absolute(), self.y);
         let (from, size) = (self.tau, self.model.size);
         let mut observer = Observer { watches: field.watches(), run: self, field: &field, witness, hit: None };
