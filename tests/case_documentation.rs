@@ -2,25 +2,48 @@
 
 use std::fs;
 use std::path::Path;
-use taut::case::Case;
+use taut::case::{Case, GantryCase};
 use taut::parameter::{free_markdown, markdown, sections};
+
+/// Sections of the table of parameters that a gantry alone has.
+const OF_GANTRIES: [&str; 2] = ["bridge", "gantry.initial"];
 
 #[test]
 fn the_reference_holds_the_tables_of_the_program() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/case-file.md");
-    let text = fs::read_to_string(&path).unwrap();
-    let mut updated = text.clone();
-    let tables = sections().map(|section| (section, markdown(section)));
-    for (section, table) in tables.chain([("free", free_markdown())]) {
-        let (begin, end) = (format!("<!-- parameters: {section} -->\n"), "<!-- end -->");
-        let from = updated.find(&begin).unwrap_or_else(|| panic!("no table of {section}")) + begin.len();
-        let to = from + updated[from..].find(end).expect("an end");
-        updated.replace_range(from..to, &table);
+    for (document, of_gantries) in [("docs/case-file.md", false), ("docs/gantry.md", true)] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(document);
+        let text = fs::read_to_string(&path).unwrap();
+        let mut updated = text.clone();
+        let own = sections().filter(|section| OF_GANTRIES.contains(section) == of_gantries);
+        let tables = own.map(|section| (section, markdown(section)));
+        for (section, table) in tables.chain((!of_gantries).then(|| ("free", free_markdown()))) {
+            let (begin, end) = (format!("<!-- parameters: {section} -->\n"), "<!-- end -->");
+            let from = updated.find(&begin).unwrap_or_else(|| panic!("no table of {section}")) + begin.len();
+            let to = from + updated[from..].find(end).expect("an end");
+            updated.replace_range(from..to, &table);
+        }
+        if std::env::var_os("UPDATE_EXPECT").is_some() {
+            fs::write(&path, &updated).unwrap();
+        } else {
+            assert_eq!(text, updated, "run with UPDATE_EXPECT=1 to write the tables anew");
+        }
     }
-    if std::env::var_os("UPDATE_EXPECT").is_some() {
-        fs::write(&path, &updated).unwrap();
-    } else {
-        assert_eq!(text, updated, "run with UPDATE_EXPECT=1 to write the tables anew");
+}
+
+#[test]
+fn the_example_of_a_gantry_reads() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/gantry.md");
+    let text = fs::read_to_string(path).unwrap();
+    let blocks = text.split("```toml\n").skip(1).map(|block| block.split("```").next().unwrap_or_default());
+    let (variants, parts): (Vec<&str>, Vec<&str>) = blocks.partition(|block| block.starts_with("# instead"));
+    let whole = parts.join("\n");
+    let belt = whole.find("[belt]").unwrap();
+    let end = belt + whole[belt..].find("\n[").unwrap();
+    let follows = format!("{}{}{}", &whole[..belt], variants[0], &whole[end..]);
+    for (text, is_following) in [(&whole, false), (&follows, true)] {
+        let case =
+            GantryCase::from_text_with("docs/gantry.md", text, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        assert!(case.gantry.belts.follows.is_some() == is_following && case.experiments.len() == 2);
     }
 }
 

@@ -52,16 +52,29 @@ pub struct Paper {
 
 /// Write a commented case file to start from.
 ///
-/// The file describes a complete axis and two experiments, and simulates as it stands; its remarks name every key that can
-/// be added.
+/// The file describes a complete machine and two experiments, and simulates as it stands; its remarks name what can be added.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  taut init axis.toml")]
+#[command(after_help = "Examples:\n  taut init axis.toml\n  taut init --kind core-xy gantry.toml")]
 pub struct Init {
     /// The file to write, such as axis.toml
     pub file: PathBuf,
+    /// What it describes
+    #[arg(long, value_enum, default_value = "axis")]
+    pub kind: KindName,
     /// Replace the file if it exists
     #[arg(long)]
     pub force: bool,
+}
+
+/// A kind of machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum KindName {
+    /// One motor, two pulleys, a cart
+    Axis,
+    /// Two motors and one belt move a cart in a plane
+    HFrame,
+    /// Two motors, each with a belt of its own, move a cart in a plane
+    CoreXy,
 }
 
 /// Run the experiments of a case file.
@@ -391,12 +404,15 @@ pub struct Shape {
     pub quiet: bool,
 }
 
-/// Say how a stage swings: poles, zeros, frequency response, resonance along the travel.
+/// Say how a machine swings: poles, zeros, frequency response, resonance along the travel.
 ///
 /// Linearises the stage of a case while everything slides, and prints its poles with frequency and damping, the gain and
 /// the zeros of each output, and resonance and anti-resonance along the travel; with --sample-time also its discrete-time
 /// model. With --out it also writes modes.json with the matrices, frequency-response.csv, and a report with a Bode
 /// diagram, a map of the travel and a map of poles and zeros.
+///
+/// Of a gantry it prints rigid and elastic modes with frequency, damping and shape, and their frequencies over the working
+/// area; with --out it writes modes.json, map.csv and a report with the maps.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MODES)]
 pub struct Modes {

@@ -114,16 +114,25 @@ fn the_page_on_modes_shows_what_the_program_prints() {
 }
 
 #[test]
+fn the_page_on_gantries_shows_what_the_program_prints() {
+    check("docs/gantry.md");
+}
+
+#[test]
 fn the_pictures_are_those_that_the_commands_draw() {
     let folder = workplace();
     for line in [
         "taut simulate stages/sollmann-jouaneh/table4.toml --out out/table4 --quiet",
+        "taut simulate stages/h-frame/h-frame.toml --out out/h-frame --quiet",
+        "taut simulate stages/core-xy/core-xy.toml --out out/core-xy --quiet",
         "taut paper --out out/paper --json > claims.json",
     ] {
         assert_eq!(printed(folder.path(), line), "", "{line}");
     }
     for (picture, made) in [
         ("encoder-and-cart.svg", "out/table4/plots/5-v-pulse-positions.svg"),
+        ("h-frame.svg", "out/h-frame/plots/machine.svg"),
+        ("core-xy.svg", "out/core-xy/plots/machine.svg"),
         ("stage.svg", "out/paper/figures/figure-01-02.svg"),
         ("friction-laws.svg", "out/paper/figures/friction-laws.svg"),
         ("modes-along-the-travel.svg", "out/paper/figures/modes-along-the-travel.svg"),
@@ -151,6 +160,7 @@ fn what_the_documents_name_is_there() {
         "docs/commands.md",
         "docs/control.md",
         "docs/fit.md",
+        "docs/gantry.md",
         "docs/logs.md",
         "docs/paper.md",
         "docs/posterior.md",
@@ -171,6 +181,8 @@ fn what_the_documents_name_is_there() {
         "stages/ced/README.md",
         "stages/emps/README.md",
         "stages/two-mass/README.md",
+        "stages/h-frame/README.md",
+        "stages/core-xy/README.md",
     ];
     let folders = ["src", "cli", "stages", "tests", "examples", "docs", "authorities", "py", "xtask", "hunt", ".ci"];
     let mut missing = Vec::new();

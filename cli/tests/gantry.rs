@@ -257,3 +257,38 @@ fn commands_for_an_axis_say_what_takes_a_gantry() {
         );
     }
 }
+
+#[test]
+fn init_writes_gantries_that_run_as_they_stand() {
+    let folder = TempDir::new().unwrap();
+    for (kind, title) in [("h-frame", "H-frame, one belt"), ("core-xy", "CoreXY, a belt for each drive")] {
+        let file = format!("{kind}.toml");
+        taut(folder.path()).args(["init", "--kind", kind, &file]).assert().success();
+        let run = taut(folder.path()).args(["simulate", &file]).assert().success();
+        let out = text(&run.get_output().stdout);
+        assert!(out.contains(title) && out.contains("along x\n  final position  bridge 1"), "{out}");
+        // Every remark that names a key names one that there is.
+        let whole = fs::read_to_string(folder.path().join(&file)).unwrap().replace("# [", "[");
+        let given = whole.find("stiffness =").unwrap();
+        let shown: String = whole[..given].to_string()
+            + &whole[given..]
+                .replacen("stiffness", "# stiffness", 1)
+                .lines()
+                .map(|line| {
+                    match ["modulus", "section", "spans ", "follows_cart", "initial"]
+                        .iter()
+                        .any(|key| line.starts_with(&format!("# {key}")))
+                    {
+                        true => format!("{}\n", line.trim_start_matches("# ")),
+                        false => format!("{line}\n"),
+                    }
+                })
+                .collect::<String>();
+        let shown =
+            shown.replace("# resistance = \"0.8 ohm\"", "resistance = \"0.8 ohm\"").replace("# gain = -1", "gain = -1");
+        fs::write(folder.path().join("all.toml"), &shown).unwrap();
+        let all = taut(folder.path()).args(["simulate", "all.toml", "--experiment", "along x"]).assert();
+        let output = all.get_output();
+        assert!(text(&output.stdout).contains("following bridge and cart"), "{}\n{shown}", text(&output.stderr));
+    }
+}

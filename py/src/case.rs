@@ -9,11 +9,11 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::path::PathBuf;
 use std::sync::Arc;
-use taut::case::{Plan, TEMPLATE};
+use taut::case::{GantryCase, InputFile, Opened, Plan, TEMPLATE};
 use taut::files::{Inputs, write_atomically};
 use taut::fit::{Posterior, Profile, check, fit, posterior, profiles};
 use taut::json;
-use taut::linear::Analysis;
+use taut::linear::{Analysis, GantryAnalysis};
 use taut::posterior::Effort;
 use taut::solve::{Choice, Flow, Kind, Method};
 
@@ -24,14 +24,29 @@ const TUNE: usize = 400;
 #[pyclass(frozen, module = "taut._native")]
 pub struct Case {
     /// As the library has it.
-    pub inner: Arc<taut::case::Case>,
+    pub inner: Inner,
     /// Where it lies, or would: paths in it are relative to its folder.
     pub path: PathBuf,
 }
 
+/// A case of either kind.
+pub enum Inner {
+    Axis(Arc<taut::case::Case>),
+    Gantry(Arc<GantryCase>),
+}
+
+impl From<Opened> for Inner {
+    fn from(opened: Opened) -> Self {
+        match opened {
+            Opened::Axis(case) => Inner::Axis(Arc::from(case)),
+            Opened::Gantry(case) => Inner::Gantry(Arc::from(case)),
+        }
+    }
+}
+
 /// The files that a case names, which nothing is written over.
-pub fn inputs(case: &taut::case::Case) -> Inputs {
-    Inputs::new(case.files.iter().map(|file| &file.path))
+pub fn inputs(files: &[InputFile]) -> Inputs {
+    Inputs::new(files.iter().map(|file| &file.path))
 }
 
 #[pymethods]
@@ -39,30 +54,45 @@ impl Case {
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf, changes: Vec<String>) -> PyResult<Self> {
         let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-        let inner = unlocked(py, || taut::case::Case::read_with(&path, &changes))?.told(py)?;
-        Ok(Self { inner: Arc::new(inner), path })
+        let inner = unlocked(py, || Opened::read_with(&path, &changes))?.told(py)?.into();
+        Ok(Self { inner, path })
     }
 
     #[staticmethod]
     fn from_text(py: Python<'_>, path: PathBuf, text: &str, changes: Vec<String>) -> PyResult<Self> {
         let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-        let inner = unlocked(py, || taut::case::Case::from_text_with(&path, text, &changes))?.told(py)?;
-        Ok(Self { inner: Arc::new(inner), path })
+        let inner = unlocked(py, || Opened::from_text_with(&path, text, &changes))?.told(py)?.into();
+        Ok(Self { inner, path })
     }
 
     /// The same with changes, each as KEY=VALUE.
     fn changed(&self, py: Python<'_>, changes: Vec<String>) -> PyResult<Self> {
-        Self::from_text(py, self.path.clone(), &self.inner.text, changes)
+        Self::from_text(py, self.path.clone(), self.text(), changes)
+    }
+
+    /// As the case file has it.
+    #[getter]
+    fn kind(&self) -> &str {
+        match &self.inner {
+            Inner::Axis(_) => "axis",
+            Inner::Gantry(case) => case.gantry.routing.word(),
+        }
     }
 
     #[getter]
     fn title(&self) -> &str {
-        &self.inner.title
+        match &self.inner {
+            Inner::Axis(case) => &case.title,
+            Inner::Gantry(case) => &case.title,
+        }
     }
 
     #[getter]
     fn text(&self) -> &str {
-        &self.inner.text
+        match &self.inner {
+            Inner::Axis(case) => &case.text,
+            Inner::Gantry(case) => &case.text,
+        }
     }
 
     #[getter]
@@ -72,23 +102,32 @@ impl Case {
 
     #[getter]
     fn experiments(&self) -> Vec<&str> {
-        self.inner.experiments.iter().map(|experiment| experiment.name.as_str()).collect()
+        match &self.inner {
+            Inner::Axis(case) => case.experiments.iter().map(|experiment| experiment.name.as_str()).collect(),
+            Inner::Gantry(case) => case.experiments.iter().map(|experiment| experiment.name.as_str()).collect(),
+        }
     }
 
     #[getter]
     fn moves(&self) -> Vec<&str> {
-        self.inner.moves.iter().map(|motion| motion.name.as_str()).collect()
+        match &self.inner {
+            Inner::Axis(case) => case.moves.iter().map(|motion| motion.name.as_str()).collect(),
+            Inner::Gantry(_) => Vec::new(),
+        }
     }
 
     /// What stands under a key, in SI units.
     fn value<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
-        value::given(py, &guarded(|| self.inner.value(key))?.told(py)?)
+        let found = guarded(|| match &self.inner {
+            Inner::Axis(case) => case.value(key),
+            Inner::Gantry(case) => case.value(key),
+        });
+        value::given(py, &found?.told(py)?)
     }
 
     /// Writes the text, under a temporary name first; over the file it was read from, but over no log or input of it.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        unlocked(py, || inputs(&self.inner).check(&path).and_then(|()| write_atomically(path, &self.inner.text)))?
-            .told(py)
+        unlocked(py, || inputs(self.files()).check(&path).and_then(|()| write_atomically(path, self.text())))?.told(py)
     }
 
     #[pyo3(signature = (names, solver, tolerance, step, method))]
@@ -105,8 +144,17 @@ impl Case {
         let methods = [("rk4", Method::RungeKutta4), ("dp5", Method::DormandPrince5)];
         let solver = solver.map(|name| one_of("solver", name, &kinds)).transpose()?;
         let method = method.map(|name| one_of("method", name, &methods)).transpose()?;
-        let solver = guarded(|| Choice { solver, tolerance, step, method }.solver(&self.inner.stage))?.told(py)?;
-        runs::simulate(py, self, &names, solver)
+        let choice = Choice { solver, tolerance, step, method };
+        match &self.inner {
+            Inner::Axis(case) => {
+                let solver = guarded(|| choice.solver(&case.stage))?.told(py)?;
+                runs::simulate(py, case, &self.path, &names, solver)
+            }
+            Inner::Gantry(case) => {
+                let solver = guarded(|| choice.solver_of(&case.gantry.mechanism()))?.told(py)?;
+                runs::simulate_gantry(py, case, &names, solver)
+            }
+        }
     }
 
     /// Runs moves; timing is every, delay, limit of a controller in Python.
@@ -118,30 +166,32 @@ impl Case {
         timing: runs::Timing,
         spread: Option<f64>,
     ) -> PyResult<Vec<runs::Run>> {
-        runs::motion(py, self, &names, controller, timing, spread)
+        runs::motion(py, self.axis(py)?, &self.path, &names, controller, timing, spread)
     }
 
     fn check<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let plan = self.inner.fit_plan(&self.path).told(py)?;
-        let found = unlocked(py, || check(&self.inner, &plan))?.told(py)?;
-        value::json(py, &guarded(|| json::check(&self.inner, &found))?)
+        let case = self.axis(py)?;
+        let plan = case.fit_plan(&self.path).told(py)?;
+        let found = unlocked(py, || check(case, &plan))?.told(py)?;
+        value::json(py, &guarded(|| json::check(case, &found))?)
     }
 
     /// Fits, and draws from the posterior if so many draws and chains are asked for.
     fn fit(&self, py: Python<'_>, effort: Option<(usize, usize)>, profiled: bool) -> PyResult<Fit> {
-        let plan = self.inner.fit_plan(&self.path).told(py)?;
+        let case = self.axis(py)?;
+        let plan = case.fit_plan(&self.path).told(py)?;
         let effort = effort.map(|(draws, chains)| Effort { chains, draws, tune: TUNE, seed: plan.seed });
         // Before the fit, which may take long.
         effort.map_or(Ok(()), |effort| effort.check()).told(py)?;
         let interrupt = Interrupt::listen();
-        let found = unlocked(py, || self.fitted(&plan, effort, profiled, &interrupt));
+        let found = unlocked(py, || fitted(case, &plan, effort, profiled, &interrupt));
         interrupt.finish()?;
         let (fit, profiles, drawn) = found?.told(py)?;
-        let text = guarded(|| fit.case_text(&self.inner, &self.path))?.told(py)?;
-        let case = Self::from_text(py, self.path.clone(), &text, Vec::new())?;
-        let told = guarded(|| json::fit(&self.inner, &fit, &profiles, drawn.as_ref().map(json::posterior)))?;
+        let text = guarded(|| fit.case_text(case, &self.path))?.told(py)?;
+        let estimated = Self::from_text(py, self.path.clone(), &text, Vec::new())?;
+        let told = guarded(|| json::fit(case, &fit, &profiles, drawn.as_ref().map(json::posterior)))?;
         let draws = drawn.map(|drawn| Columns::of(py, drawn.table())).transpose()?;
-        Ok(Fit { data: value::json(py, &told)?.unbind(), case: Py::new(py, case)?, draws })
+        Ok(Fit { data: value::json(py, &told)?.unbind(), case: Py::new(py, estimated)?, draws })
     }
 
     #[allow(clippy::too_many_arguments)] // each is an option of the command line
@@ -158,32 +208,62 @@ impl Case {
         to: Option<f64>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let question = modes::question(at, speed, &stuck, sample_time, hold, delay, from, to)?;
-        let analysis = unlocked(py, || Analysis::of(&self.inner, &question))?.told(py)?;
+        let case = self.axis(py)?;
+        let analysis = unlocked(py, || Analysis::of(case, &question))?.told(py)?;
         modes::answers(py, &analysis)
+    }
+
+    /// Modes of a gantry, as `taut modes --json` has them.
+    fn gantry_modes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let Inner::Gantry(case) = &self.inner else {
+            return Err(taut::Error::new("this case describes an axis, not a gantry")).told(py);
+        };
+        let analysis = unlocked(py, || GantryAnalysis::of(case))?.told(py)?;
+        value::json(py, &guarded(|| json::gantry_modes(&analysis))?)
     }
 }
 
 impl Case {
-    fn fitted(
-        &self,
-        plan: &Plan,
-        effort: Option<Effort>,
-        profiled: bool,
-        interrupt: &Interrupt,
-    ) -> taut::Result<(taut::fit::Fit, Vec<Profile>, Option<Posterior>)> {
-        let stop = || interrupt.stop();
-        let flow = |stop: bool| if stop { Flow::Stop } else { Flow::Continue };
-        let found = fit(&self.inner, plan, Some(&stop), &mut |_| flow(interrupt.stop()))?;
-        let profiles = if profiled { profiles(&self.inner, plan, &found, Some(&stop))? } else { Vec::new() };
-        let drawn = match effort.filter(|_| !interrupt.stop()) {
-            Some(effort) => {
-                let watch = |_| !interrupt.stop();
-                Some(interrupt.beside(|| posterior(&self.inner, plan, &found, effort, &watch))?)
+    /// The case of an axis; told where it has to be one.
+    pub fn axis(&self, py: Python<'_>) -> PyResult<&Arc<taut::case::Case>> {
+        match &self.inner {
+            Inner::Axis(case) => Ok(case),
+            Inner::Gantry(case) => {
+                // Read as that of an axis, it is told where it says that it is none.
+                let told = guarded(|| taut::case::Case::from_text(&self.path, &case.text))?;
+                let told = told.err().unwrap_or_else(|| taut::Error::new("this needs a single axis"));
+                Err(crate::error::told(py, told))
             }
-            None => None,
-        };
-        Ok((found, profiles, drawn))
+        }
     }
+
+    fn files(&self) -> &[InputFile] {
+        match &self.inner {
+            Inner::Axis(case) => &case.files,
+            Inner::Gantry(case) => &case.files,
+        }
+    }
+}
+
+fn fitted(
+    case: &taut::case::Case,
+    plan: &Plan,
+    effort: Option<Effort>,
+    profiled: bool,
+    interrupt: &Interrupt,
+) -> taut::Result<(taut::fit::Fit, Vec<Profile>, Option<Posterior>)> {
+    let stop = || interrupt.stop();
+    let flow = |stop: bool| if stop { Flow::Stop } else { Flow::Continue };
+    let found = fit(case, plan, Some(&stop), &mut |_| flow(interrupt.stop()))?;
+    let profiles = if profiled { profiles(case, plan, &found, Some(&stop))? } else { Vec::new() };
+    let drawn = match effort.filter(|_| !interrupt.stop()) {
+        Some(effort) => {
+            let watch = |_| !interrupt.stop();
+            Some(interrupt.beside(|| posterior(case, plan, &found, effort, &watch))?)
+        }
+        None => None,
+    };
+    Ok((found, profiles, drawn))
 }
 
 fn one_of<T: Copy>(what: &str, name: &str, known: &[(&str, T)]) -> PyResult<T> {

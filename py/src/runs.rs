@@ -1,6 +1,6 @@
 //! Runs of experiments and moves.
 
-use crate::case::{Case, inputs};
+use crate::case::inputs;
 use crate::columns::{self, Columns};
 use crate::controller::Own;
 use crate::error::{Told, guarded, unlocked};
@@ -10,21 +10,20 @@ use pyo3::exceptions::PyRecursionError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::cell::Cell;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
-use taut::case::Experiment;
+use taut::case::{Case, Experiment, GantryCase, GantryExperiment, InputFile};
 use taut::control::{Loop, MoveRun, Rows, Standard, Worst, stream, worst};
-use taut::json::{self, Moved, Simulated, Simulation};
-use taut::metrics::{Meter, Metrics};
+use taut::json::{self, GantrySimulated, GantrySimulation, Moved, Simulated, Simulation};
+use taut::metrics::{GantryMeter, GantryMetrics, Meter, Metrics};
 use taut::reduction::Reduction;
-use taut::solve::{self, Flow, Outcome, Solver};
+use taut::solve::{self, Course, Detail, Flow, Outcome, Solver};
 use taut::trajectory::{CsvWriter, ParquetWriter, Trajectory};
 
 /// An experiment or a move that was run, everything in memory.
 #[pyclass(frozen, module = "taut._native")]
 pub struct Run {
-    case: Arc<taut::case::Case>,
     columns: Columns,
     what: What,
     /// Seconds that Rust took.
@@ -34,8 +33,29 @@ pub struct Run {
 
 /// What it was.
 enum What {
-    Experiment { index: usize, solver: Solver, outcome: Outcome, metrics: Box<Metrics>, reduction: Option<Reduction> },
-    Move { index: usize, run: Box<MoveRun>, worst: Option<Worst>, structure: String, timing: Loop },
+    Experiment {
+        case: Arc<Case>,
+        index: usize,
+        solver: Solver,
+        outcome: Outcome,
+        metrics: Box<Metrics>,
+        reduction: Option<Reduction>,
+    },
+    Gantry {
+        case: Arc<GantryCase>,
+        index: usize,
+        solver: Solver,
+        outcome: Outcome,
+        metrics: Box<GantryMetrics>,
+    },
+    Move {
+        case: Arc<Case>,
+        index: usize,
+        run: Box<MoveRun>,
+        worst: Option<Worst>,
+        structure: String,
+        timing: Loop,
+    },
 }
 
 #[pymethods]
@@ -60,16 +80,22 @@ impl Run {
     /// The experiment's or the move's.
     #[getter]
     fn name(&self) -> &str {
-        match self.what {
-            What::Experiment { index, .. } => &self.case.experiments[index].name,
-            What::Move { index, .. } => &self.case.moves[index].name,
+        match &self.what {
+            What::Experiment { case, index, .. } => &case.experiments[*index].name,
+            What::Gantry { case, index, .. } => &case.experiments[*index].name,
+            What::Move { case, index, .. } => &case.moves[*index].name,
         }
     }
 
     /// How it ended, in a word, and when, s.
     #[getter]
     fn ending(&self) -> (&'static str, f64) {
-        json::ending(self.outcome().ending, self.metrics().end)
+        let end = match &self.what {
+            What::Experiment { metrics, .. } => metrics.end,
+            What::Gantry { metrics, .. } => metrics.end,
+            What::Move { run, .. } => run.metrics.end,
+        };
+        json::ending(self.outcome().ending, end)
     }
 
     /// By how much positions may be off, m, where it is known.
@@ -80,36 +106,51 @@ impl Run {
 
     /// The key figures.
     fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let mode = self.case.stage.amplifier.mode;
-        let told = guarded(|| serde_json::to_value(json::Metrics::of(self.metrics(), mode)).unwrap_or_default())?;
-        value::json(py, &told)
+        let of_axis = |metrics: &Metrics, case: &Case| {
+            serde_json::to_value(json::Metrics::of(metrics, case.stage.amplifier.mode)).unwrap_or_default()
+        };
+        let told = guarded(|| match &self.what {
+            What::Experiment { case, metrics, .. } => of_axis(metrics, case),
+            What::Gantry { case, metrics, .. } => json::gantry_metrics(metrics, case.gantry.routing),
+            What::Move { case, run, .. } => of_axis(&run.metrics, case),
+        });
+        value::json(py, &told?)
     }
 
     /// Every event.
     fn events<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let events = || self.outcome().events.iter().map(json::Event::of).collect::<Vec<_>>();
+        let list = &self.outcome().events;
+        let events = || -> Vec<json::Event> {
+            match &self.what {
+                What::Gantry { case, .. } => {
+                    let mechanism = case.gantry.mechanism();
+                    list.iter().map(|event| json::Event::on(&mechanism, event)).collect()
+                }
+                What::Experiment { .. } | What::Move { .. } => list.iter().map(json::Event::of).collect(),
+            }
+        };
         value::json(py, &guarded(|| serde_json::to_value(events()).unwrap_or_default())?)
     }
 
     /// Writes the columns as `taut simulate` does, to .csv or .parquet.
     fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let trajectory = self.trajectory(py)?;
-        unlocked(py, || inputs(&self.case).check(&path).and_then(|()| write(&trajectory, &path)))?.told(py)
+        unlocked(py, || inputs(self.files()).check(&path).and_then(|()| write(&trajectory, &path)))?.told(py)
     }
 }
 
 impl Run {
     fn outcome(&self) -> &Outcome {
         match &self.what {
-            What::Experiment { outcome, .. } => outcome,
+            What::Experiment { outcome, .. } | What::Gantry { outcome, .. } => outcome,
             What::Move { run, .. } => &run.outcome,
         }
     }
 
-    fn metrics(&self) -> &Metrics {
+    fn files(&self) -> &[InputFile] {
         match &self.what {
-            What::Experiment { metrics, .. } => metrics,
-            What::Move { run, .. } => &run.metrics,
+            What::Experiment { case, .. } | What::Move { case, .. } => &case.files,
+            What::Gantry { case, .. } => &case.files,
         }
     }
 
@@ -119,7 +160,7 @@ impl Run {
     }
 }
 
-fn write(trajectory: &Trajectory, path: &std::path::Path) -> taut::Result<()> {
+fn write(trajectory: &Trajectory, path: &Path) -> taut::Result<()> {
     match path.extension().and_then(|ending| ending.to_str()) {
         Some("csv") => {
             let mut writer = CsvWriter::create(path)?;
@@ -135,9 +176,9 @@ fn write(trajectory: &Trajectory, path: &std::path::Path) -> taut::Result<()> {
     }
 }
 
-/// Runs experiments of a case.
-pub fn simulate(py: Python<'_>, case: &Case, names: &[String], solver: Solver) -> PyResult<Vec<Run>> {
-    let experiments = case.inner.experiments_named(&case.path, names).told(py)?;
+/// Runs experiments of a case that lies there.
+pub fn simulate(py: Python<'_>, case: &Arc<Case>, path: &Path, names: &[String], solver: Solver) -> PyResult<Vec<Run>> {
+    let experiments = case.experiments_named(path, names).told(py)?;
     experiments.into_iter().map(|experiment| one(py, case, experiment, solver)).collect()
 }
 
@@ -146,8 +187,8 @@ const COLUMNS: usize = 24;
 
 const FEWER: &str = "take a longer interval `every`, or write rows to a file as they come: taut simulate --out DIR";
 
-fn one(py: Python<'_>, case: &Case, experiment: &Experiment, solver: Solver) -> PyResult<Run> {
-    let stage = &case.inner.stage;
+fn one(py: Python<'_>, case: &Arc<Case>, experiment: &Experiment, solver: Solver) -> PyResult<Run> {
+    let stage = &case.stage;
     columns::fit(py, experiment.samples() as f64, COLUMNS, FEWER)?;
     let interrupt = Interrupt::listen();
     let found = unlocked(py, || {
@@ -172,25 +213,70 @@ fn one(py: Python<'_>, case: &Case, experiment: &Experiment, solver: Solver) -> 
     interrupt.finish()?;
     let (found, took) = found?;
     let (trajectory, outcome, metrics, reduction) = found.told(py)?;
-    let index = case.inner.experiments.iter().position(|other| std::ptr::eq(other, experiment)).unwrap_or_default();
-    let what = What::Experiment { index, solver, outcome, metrics: Box::new(metrics), reduction };
-    Ok(Run { case: Arc::clone(&case.inner), columns: Columns::of(py, trajectory)?, what, took })
+    let index = case.experiments.iter().position(|other| std::ptr::eq(other, experiment)).unwrap_or_default();
+    let metrics = Box::new(metrics);
+    let what = What::Experiment { case: Arc::clone(case), index, solver, outcome, metrics, reduction };
+    Ok(Run { columns: Columns::of(py, trajectory)?, what, took })
+}
+
+/// Runs experiments of a gantry.
+pub fn simulate_gantry(py: Python<'_>, case: &Arc<GantryCase>, names: &[String], solver: Solver) -> PyResult<Vec<Run>> {
+    let experiments = case.experiments_named(names).told(py)?;
+    experiments.into_iter().map(|experiment| one_of_gantry(py, case, experiment, solver)).collect()
+}
+
+fn one_of_gantry(
+    py: Python<'_>,
+    case: &Arc<GantryCase>,
+    experiment: &GantryExperiment,
+    solver: Solver,
+) -> PyResult<Run> {
+    let mechanism = case.gantry.mechanism();
+    columns::fit(py, experiment.samples() as f64, mechanism.columns.len(), FEWER)?;
+    let interrupt = Interrupt::listen();
+    let found = unlocked(py, || {
+        let begin = Instant::now();
+        let mut meter = GantryMeter::new(&case.gantry);
+        let mut trajectory = Trajectory::default();
+        let rows = experiment.samples().min(1 << 20) as usize + 1;
+        let mut take = |block: &Trajectory| {
+            if trajectory.columns.is_empty() {
+                trajectory = Trajectory::with_capacity(&block.columns, rows);
+            }
+            trajectory.append(block);
+            if interrupt.stop() { Flow::Stop } else { Flow::Continue }
+        };
+        let shown = (Detail::Full, Some(&mut meter as &mut dyn solve::Observe));
+        let outcome = solve::stream_mechanism(&mechanism, &Course::of(experiment), solver, shown, &mut take);
+        let found = outcome.map(|outcome| {
+            let metrics = meter.finish(&outcome.events);
+            (trajectory, outcome, metrics)
+        });
+        (found, begin.elapsed().as_secs_f64())
+    });
+    interrupt.finish()?;
+    let (found, took) = found?;
+    let (trajectory, outcome, metrics) = found.told(py)?;
+    let index = case.experiments.iter().position(|other| std::ptr::eq(other, experiment)).unwrap_or_default();
+    let what = What::Gantry { case: Arc::clone(case), index, solver, outcome, metrics: Box::new(metrics) };
+    Ok(Run { columns: Columns::of(py, trajectory)?, what, took })
 }
 
 /// The timing of a loop with a controller in Python, where it is not the case's.
 pub type Timing = (Option<f64>, Option<f64>, Option<f64>);
 
-/// Runs moves of a case in closed loop, with its own controller or one in Python.
+/// Runs moves of a case that lies there in closed loop, with its own controller or one in Python.
 pub fn motion(
     py: Python<'_>,
-    case: &Case,
+    case: &Arc<Case>,
+    path: &Path,
     names: &[String],
     controller: Option<&Bound<'_, PyAny>>,
     (every, delay, limit): Timing,
     share: Option<f64>,
 ) -> PyResult<Vec<Run>> {
-    let (design, moves) = case.inner.moves_named(&case.path, names).told(py)?;
-    let (stage, solver) = (&case.inner.stage, Solver::of(&case.inner.stage));
+    let (design, moves) = case.moves_named(path, names).told(py)?;
+    let (stage, solver) = (&case.stage, Solver::of(&case.stage));
     let usual = Loop::of(design);
     let timing = Loop {
         every: every.unwrap_or(usual.every),
@@ -243,9 +329,10 @@ pub fn motion(
             None => None,
         };
         let took = begin.elapsed().as_secs_f64();
-        let index = case.inner.moves.iter().position(|other| std::ptr::eq(other, motion)).unwrap_or_default();
-        let what = What::Move { index, run: Box::new(run), worst, structure: structure.clone(), timing };
-        runs.push(Run { case: Arc::clone(&case.inner), columns: Columns::of(py, trajectory)?, what, took });
+        let index = case.moves.iter().position(|other| std::ptr::eq(other, motion)).unwrap_or_default();
+        let (case, structure) = (Arc::clone(case), structure.clone());
+        let what = What::Move { case, index, run: Box::new(run), worst, structure, timing };
+        runs.push(Run { columns: Columns::of(py, trajectory)?, what, took });
     }
     Ok(runs)
 }
@@ -282,27 +369,42 @@ impl Drop for Inside {
 /// What `taut simulate --json` prints of these runs.
 #[pyfunction]
 pub fn simulation<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound<'py, PyAny>> {
-    let told: Vec<Simulated> = runs
+    let axis: Vec<Simulated> = runs
         .iter()
         .filter_map(|run| match &run.what {
-            What::Experiment { index, outcome, metrics, reduction, .. } => Some(Simulated {
-                experiment: &run.case.experiments[*index],
+            What::Experiment { case, index, outcome, metrics, reduction, .. } => Some(Simulated {
+                experiment: &case.experiments[*index],
                 outcome,
                 metrics,
                 reduction: *reduction,
                 band: None,
                 files: &[],
             }),
-            What::Move { .. } => None,
+            What::Gantry { .. } | What::Move { .. } => None,
         })
         .collect();
-    let first = runs.iter().find_map(|run| match run.what {
-        What::Experiment { solver, .. } => Some((&run.case, solver)),
+    let gantry: Vec<GantrySimulated> = runs
+        .iter()
+        .filter_map(|run| match &run.what {
+            What::Gantry { case, index, outcome, metrics, .. } => {
+                Some(GantrySimulated { experiment: &case.experiments[*index], outcome, metrics, files: &[] })
+            }
+            What::Experiment { .. } | What::Move { .. } => None,
+        })
+        .collect();
+    let told = runs.iter().find_map(|run| match &run.what {
+        What::Experiment { case, solver, .. } => {
+            Some(guarded(|| serde_json::to_value(Simulation::new(case, *solver, &axis)).unwrap_or_default()))
+        }
+        What::Gantry { case, solver, .. } => {
+            Some(guarded(|| serde_json::to_value(GantrySimulation::new(case, *solver, &gantry)).unwrap_or_default()))
+        }
         What::Move { .. } => None,
     });
-    let Some((case, solver)) = first else { return Ok(py.None().into_bound(py)) };
-    let told = guarded(|| serde_json::to_value(Simulation::new(case, solver, &told)).unwrap_or_default())?;
-    value::json(py, &told)
+    match told {
+        Some(told) => value::json(py, &told?),
+        None => Ok(py.None().into_bound(py)),
+    }
 }
 
 /// What `taut move --json` prints of these runs.
@@ -311,15 +413,15 @@ pub fn moves<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound
     let told: Vec<Moved> = runs
         .iter()
         .filter_map(|run| match &run.what {
-            What::Move { index, run: moved, worst, .. } => {
-                Some(Moved { motion: &run.case.moves[*index], run: moved, worst: worst.as_ref(), files: &[] })
+            What::Move { case, index, run: moved, worst, .. } => {
+                Some(Moved { motion: &case.moves[*index], run: moved, worst: worst.as_ref(), files: &[] })
             }
-            What::Experiment { .. } => None,
+            What::Experiment { .. } | What::Gantry { .. } => None,
         })
         .collect();
     let first = runs.iter().find_map(|run| match &run.what {
-        What::Move { structure, timing, .. } => Some((&run.case.title, structure, timing)),
-        What::Experiment { .. } => None,
+        What::Move { case, structure, timing, .. } => Some((&case.title, structure, timing)),
+        What::Experiment { .. } | What::Gantry { .. } => None,
     });
     let Some((title, structure, timing)) = first else { return Ok(py.None().into_bound(py)) };
     value::json(py, &guarded(|| json::moves(title, structure, timing, &told))?)

@@ -23,7 +23,8 @@ pub struct Sweep {
 impl Sweep {
     #[new]
     fn new(py: Python<'_>, case: &Case) -> PyResult<Self> {
-        let inner = unlocked(py, || taut::sweep::Sweep::new(&case.inner).map_err(|error| error.in_file(&case.path)))?;
+        let axis = case.axis(py)?;
+        let inner = unlocked(py, || taut::sweep::Sweep::new(axis).map_err(|error| error.in_file(&case.path)))?;
         Ok(Self { inner: inner.told(py)? })
     }
 

@@ -24,7 +24,7 @@ pub use gantry::{GantryCase, GantryExperiment, Opened};
 pub use get::Given;
 pub use motion::Move;
 pub use sweep::{Kinds, Origin, Sampling, Sweeping, Variation};
-pub use template::TEMPLATE;
+pub use template::{TEMPLATE, gantry_template};
 pub use tune::{Cost, Known, Tuning};
 
 use crate::chance::hash;

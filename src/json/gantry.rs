@@ -85,6 +85,11 @@ struct MetricsTold {
     event_counts: Vec<CountTold>,
 }
 
+/// What one run shows.
+pub fn gantry_metrics(metrics: &GantryMetrics, routing: Routing) -> Value {
+    serde_json::to_value(MetricsTold::of(metrics, routing)).unwrap_or_default()
+}
+
 impl GantrySimulation {
     /// Of the runs of a case.
     pub fn new(case: &GantryCase, solver: Solver, runs: &[GantrySimulated]) -> Self {

@@ -14,7 +14,7 @@ mod simulation;
 
 pub use check::check;
 pub use fit::fit;
-pub use gantry::{GantrySimulated, GantrySimulation};
+pub use gantry::{GantrySimulated, GantrySimulation, gantry_metrics};
 pub use gantry_modes::gantry_modes;
 pub use modes::modes;
 pub use moves::{Moved, moves};

@@ -11,8 +11,8 @@ Mistakes are :class:`taut.Error`, a ``ValueError`` with the text that the comman
 """
 
 from ._native import Bug, Error, Seen, __version__
-from .case import Case, read, template
-from .results import Check, Estimate, Fit, LinearModel, Modes
+from .case import Case, GantryCase, read, template
+from .results import Check, Estimate, Fit, GantryModes, LinearModel, Modes
 from .runs import Run, Runs
 from .sweeps import sweep, sweep_tables
 from .table import Table
@@ -24,6 +24,8 @@ __all__ = [
     "Error",
     "Estimate",
     "Fit",
+    "GantryCase",
+    "GantryModes",
     "LinearModel",
     "Modes",
     "Run",

@@ -8,7 +8,7 @@ from typing import Any, Protocol, overload
 
 from . import _checks, _html, _native
 from ._toml import change
-from .results import Check, Fit, LinearModel, Modes
+from .results import Check, Fit, GantryModes, LinearModel, Modes
 from .runs import Run, Runs
 from .sweeps import sweep
 from .table import Table
@@ -26,7 +26,7 @@ class Controller(Protocol):
 
 
 class Case:
-    """A case file: a stage, and what is done with it.
+    """A case file: a machine, and what is done with it. That of a gantry is a :class:`GantryCase` by itself.
 
     ``case["cart.mass"]`` reads a value in SI units, ``case["cart.mass"] = "0.6 kg"`` or ``= 0.6`` writes one: by the keys of
     the case file, with comments and layout kept, and checked as the file is. ``case.text`` is the file.
@@ -36,13 +36,22 @@ class Case:
 
     def __init__(self, text: str, path: str | PathLike[str] = "case.toml") -> None:
         """Reads a case from text. ``path`` stands in messages; other files that the text names are found from its folder."""
-        self._native = _native.Case.from_text(_checks.path(path), _checks.text("text", text), [])
+        self._take(_native.Case.from_text(_checks.path(path), _checks.text("text", text), []))
 
     @classmethod
     def _of(cls, native: _native.Case) -> Case:
-        case = cls.__new__(cls)
-        case._native = native
+        case = Case.__new__(Case)
+        case._take(native)
         return case
+
+    def _take(self, native: _native.Case) -> None:
+        self._native = native
+        self.__class__ = Case if native.kind == "axis" else GantryCase
+
+    @property
+    def kind(self) -> str:
+        """What it describes: ``axis``, ``h-frame`` or ``core-xy``."""
+        return self._native.kind
 
     @property
     def title(self) -> str:
@@ -92,7 +101,7 @@ class Case:
 
     def update(self, changes: Mapping[str, Any]) -> None:
         """Writes several values, which are checked together."""
-        self._native = self._native.changed([change(key, value) for key, value in changes.items()])
+        self._take(self._native.changed([change(key, value) for key, value in changes.items()]))
 
     def changed(self, changes: Mapping[str, Any]) -> Case:
         """Another case with these values; this one stays as it is."""
@@ -269,17 +278,36 @@ class Case:
 
     def __repr__(self) -> str:
         done = [*self.experiments, *self.moves]
-        return f"<taut.Case {self.title!r}: {', '.join(done)}>"
+        return f"<taut.{type(self).__name__} {self.title!r}: {', '.join(done)}>"
 
     def _repr_html_(self) -> str:
-        keys = ("cart.mass", "drive_pulley.inertia", "motor.torque_constant", "motor.resistance", "belt.stiffness")
-        rows = [(key, self.get(key)) for key in keys]
+        keys = ("bridge.mass", "cart.mass", "drive_pulley.inertia", "motor.torque_constant", "motor.resistance", "belt.stiffness")
+        rows = [(key, self.get(key)) for key in keys if key in self or key != "bridge.mass"]
         done = [("experiment", name) for name in self.experiments] + [("move", name) for name in self.moves]
         return _html.table(self.title, ("key", "SI"), rows + done)
 
 
+class GantryCase(Case):
+    """A case file of a gantry: two drives, ``left`` and ``right``, a ``bridge``, and a ``cart`` on it.
+
+    It simulates and is edited as any case. There are no moves, fits, sweeps and tuning of gantries yet.
+    """
+
+    __slots__ = ()
+
+    def __init__(self, text: str, path: str | PathLike[str] = "case.toml") -> None:
+        """Reads a gantry from text."""
+        super().__init__(text, path)
+        if self.kind == "axis":
+            raise _native.Error("this case describes an axis, not a gantry")
+
+    def modes(self) -> GantryModes:  # type: ignore[override]  # what an axis is asked for, a gantry has not
+        """Rigid and elastic modes while everything slides, and the resonances over the working area."""
+        return GantryModes(self._native.gantry_modes())
+
+
 def read(path: str | PathLike[str]) -> Case:
-    """Reads a case file."""
+    """Reads a case file; that of a gantry becomes a :class:`GantryCase`."""
     return Case._of(_native.Case.read(_checks.path(path), []))
 
 

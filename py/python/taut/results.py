@@ -172,3 +172,46 @@ class Modes:
         rows = [(p["re"], p["im"], p["frequency_Hz"], p["damping_ratio"]) for p in self.data["poles"]]
         head = ("real part, 1/s", "imaginary part, 1/s", "frequency, Hz", "damping ratio")
         return _html.table(f"{self.data['title']}: poles", head, rows)
+
+
+@dataclass(frozen=True)
+class GantryModes:
+    """How a gantry swings while everything slides."""
+
+    data: dict[str, Any]
+    """What ``taut modes --json`` prints."""
+
+    @property
+    def resonances(self) -> list[float]:
+        """Undamped frequencies of the elastic modes, Hz, with bridge and cart at zero."""
+        return [float(mode["frequency_Hz"]) for mode in self.data["elastic"]]
+
+    @property
+    def damping(self) -> list[float | None]:
+        """Their damping ratios; None where damping is so strong that not every mode swings."""
+        return [mode["damping_ratio"] for mode in self.data["elastic"]]
+
+    @property
+    def map(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None:
+        """Positions of the bridge and of the cart (m), and the frequencies (Hz) by mode, bridge and cart.
+
+        None where the stiffness does not depend on the place.
+        """
+        found = self.data["map"]
+        if found is None:
+            return None
+        bridge, cart, hertz = (np.array(found[key]) for key in ("bridge_position_m", "cart_position_m", "elastic_Hz"))
+        return bridge, cart, hertz
+
+    def __repr__(self) -> str:
+        found = ", ".join(f"{frequency:.4g} Hz" for frequency in self.resonances)
+        return f"<taut.GantryModes {self.data['title']!r}: resonances at {found}>"
+
+    def _repr_html_(self) -> str:
+        bodies = ("left", "right", "bridge", "cart")
+        rows = [
+            (mode["frequency_Hz"], mode["damping_ratio"], *(mode["shape_at_belt"].get(body) for body in bodies))
+            for mode in self.data["elastic"]
+        ]
+        head = ("frequency, Hz", "damping ratio", *bodies)
+        return _html.table(f"{self.data['title']}: elastic modes", head, rows)

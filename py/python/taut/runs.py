@@ -73,9 +73,11 @@ class Run(Table):
     def plot(self, *columns: str) -> Figure:
         """A matplotlib figure of these columns over time, one panel for each unit.
 
-        Without names: the positions of the cart and of the encoder's pulley, and the input.
+        Without names: where the cart is and should be, its speed, and the voltage; of a gantry also those of the bridge and both drives.
         """
-        names = columns or tuple(name for name in ("reference", "cart_position", "cart_speed", "voltage") if name in self)
+        usual = ["reference", "bridge_position", "cart_position", "bridge_speed", "cart_speed"]
+        usual += ["voltage", "left_voltage", "right_voltage"]
+        names = columns or tuple(name for name in usual if name in self)
         panels: dict[str, list[str]] = {}
         for name in names:
             own = next((own for own, heading in self.headings.items() if name in (own, heading)), None)

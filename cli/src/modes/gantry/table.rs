@@ -88,7 +88,8 @@ pub fn elastic(analysis: &GantryAnalysis, mechanism: &Mechanism, mode: &ElasticM
     let shape: Vec<String> =
         bodies().zip(&mode.shape).map(|(body, way)| format!("{} {}", name(body), fixed(*way, 3))).collect();
     let mut shares: Vec<(usize, f64)> = bodies().zip(mode.energy.iter().copied()).collect();
-    shares.sort_by(|a, b| b.1.total_cmp(&a.1));
+    // Alike ones stay in the order of the bodies.
+    shares.sort_by(|a, b| (b.1 * 1e6).round().total_cmp(&(a.1 * 1e6).round()));
     let shares = shares.iter().filter(|(_, share)| *share >= 0.005);
     let energy: Vec<String> =
         shares.map(|(body, share)| format!("{} {} %", name(*body), fixed(100.0 * share, 0))).collect();

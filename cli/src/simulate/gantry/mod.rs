@@ -17,6 +17,7 @@ use run::{Run, Setting};
 use taut::case::GantryCase;
 use taut::files::write_atomically;
 use taut::json::{self, GantrySimulation};
+use taut::report::{gantry_drawing, png};
 use taut::solve::Solver;
 use taut::{Error, Result};
 
@@ -82,6 +83,9 @@ fn write(folder: &Folder, setting: &Setting, summary: &str, runs: &[Run]) -> Res
     page::page(setting, &text, runs, &figures, &ways).write(folder.path("report.html"))?;
     folder.make("plots")?;
     let places = folder.path("plots");
+    let drawing = gantry_drawing(&case.gantry);
+    write_atomically(places.join("machine.svg"), &drawing)?;
+    write_atomically(places.join("machine.png"), png(&drawing, 2.0)?)?;
     for (run, way) in runs.iter().zip(&ways) {
         let Some(way) = way else { continue };
         way.write_svg(places.join(format!("{}-path.svg", run.experiment.file_name())))?;

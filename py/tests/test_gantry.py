@@ -1,0 +1,80 @@
+"""Gantries: read, edited, simulated, and how they swing."""
+
+import json
+import os
+import pickle
+import subprocess
+
+import numpy as np
+import pytest
+
+import taut
+
+
+@pytest.fixture
+def gantry(root):
+    return taut.read(root / "stages/h-frame/h-frame.toml")
+
+
+def test_a_gantry_opens_as_any_case(gantry, root):
+    assert isinstance(gantry, taut.GantryCase) and gantry.kind == "h-frame"
+    assert gantry.experiments == ["one motor", "along x", "along y"] and gantry.moves == []
+    assert gantry["cart.travel.max"] == 0.25 and gantry["experiment.0.input.left.for"] == 0.25
+    assert gantry["belt.stiffness"] == [132760.0, 132760.0, 58885.0]
+    gantry["bridge.mass"] = "1 kg"
+    assert gantry["bridge.mass"] == 1.0 and "# without the cart" in gantry.text
+    assert isinstance(taut.Case(gantry.text), taut.GantryCase) and isinstance(gantry.copy(), taut.GantryCase)
+    assert pickle.loads(pickle.dumps(gantry)) == gantry
+    assert "bridge.mass" in gantry._repr_html_()
+    assert type(taut.Case(taut.template())) is taut.Case and taut.Case(taut.template()).kind == "axis"
+    with pytest.raises(taut.Error, match="describes an axis"):
+        taut.GantryCase(taut.template())
+
+
+def test_columns_events_and_figures(gantry):
+    run = gantry.simulate("one motor")
+    for column in ("left_voltage", "right_angle", "bridge_position", "cart_speed", "left_span_force", "cart_state"):
+        assert len(run[column]) == 1001
+    assert run.units["left_speed"] == "rad/s" and run.headings["bridge_position"] == "bridge_position_m"
+    assert {event["part"] for event in run.events} == {"left", "right", "bridge", "cart"}
+    units = {event["part"]: event["load_unit"] for event in run.events}
+    assert units == {"left": "N m", "right": "N m", "bridge": "N", "cart": "N"}
+    assert run.metrics["final_bridge_position_m"] == run["bridge_position"][-1]
+    assert abs(run.metrics["peak_left_current_A"]["value"]) >= np.abs(run["left_current"]).max()
+    assert run.ending == "complete" and run.position_error < 1e-9
+    assert run.metrics["stop_time_s"] == max(event["time_s"] for event in run.events)
+    # The pulleys say where bridge and cart are, but for what the belt stretches: r phi1 = -x - y, r phi2 = x - y.
+    r, left, right = gantry["drive_pulley.radius"], run["left_angle"], run["right_angle"]
+    assert np.abs(r * (right - left) / 2 - run["bridge_position"]).max() < 1e-4
+    assert np.abs(-r * (right + left) / 2 - run["cart_position"]).max() < 1e-4
+
+
+def test_data_is_what_the_command_prints(gantry):
+    program = os.environ.get("TAUT_PROGRAM")
+    if program is None:
+        pytest.skip("TAUT_PROGRAM names no program")
+    for words, data in (("simulate", gantry.simulate().data), ("modes", gantry.modes().data)):
+        told = subprocess.run([program, words, gantry.path, "--json"], capture_output=True, check=True, text=True)
+        want = json.loads(told.stdout)
+        for experiment in want.get("experiments", []):
+            experiment["files"] = []
+        assert data == want
+
+
+def test_modes(gantry, root):
+    modes = gantry.modes()
+    assert modes.resonances == pytest.approx([196.643946994, 220.198687165], abs=1e-8)
+    assert all(0 < damping < 0.1 for damping in modes.damping) and modes.map is None
+    assert "196.6 Hz" in repr(modes) and "elastic modes" in modes._repr_html_()
+    bridge, cart, hertz = taut.read(root / "stages/core-xy/follows.toml").modes().map
+    assert hertz.shape == (2, len(bridge), len(cart)) and (hertz > 100).all()
+
+
+def test_what_is_not_there_says_so(gantry):
+    assert repr(gantry) == "<taut.GantryCase 'H-frame': one motor, along x, along y>"
+    for refused in (gantry.check, gantry.fit, gantry.move):
+        with pytest.raises(taut.Error, match="this needs a single axis") as told:
+            refused()
+        assert told.value.line == 4
+    with pytest.raises(taut.Error, match="is of a single axis"):
+        gantry.simulate(solver="table3")
