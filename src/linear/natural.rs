@@ -150,7 +150,10 @@ impl Matrices {
             if drive.amplifier.mode == AmplifierMode::Voltage && motor.inductance == 0.0 {
                 let i = bodies.iter().position(|body| *body == mechanism.leader(drive.shaft)).unwrap_or(0);
                 let way = motor.gear_ratio * mechanism.ratio(drive.shaft);
-                damping[(i, i)] += way * way * motor.torque_constant * motor.back_emf_constant / motor.resistance;
+                // Of a stiff gear with losses its share is passed on.
+                let passed = if drive.has_rotor() { 1.0 } else { motor.gear_efficiency };
+                let emf = motor.torque_constant * motor.back_emf_constant / motor.resistance;
+                damping[(i, i)] += passed * way * way * emf;
             }
         }
         let mut stiffness = DMatrix::zeros(n, n);

@@ -43,8 +43,11 @@ pub struct Watched {
 }
 
 impl Watch {
-    /// For a run of this mechanism. Each quantity in `sums` has to be among the mechanism's readings, and so has the speed of each rotor
-    /// that turns by itself.
+    /// For a run of this mechanism.
+    ///
+    /// # Panics
+    ///
+    /// Where a quantity in `sums`, or the speed of a rotor that turns by itself, is not among the mechanism's readings.
     pub fn new(mechanism: &Mechanism, sums: &[Sum]) -> Self {
         let place = |wanted: &Shown| {
             let place = mechanism.readings.iter().position(|shown| shown == wanted);

@@ -273,7 +273,8 @@ fn drive(out: &mut Svg, gantry: &Gantry, side: usize) {
     let mut lines = motor_lines(motor, amplifier);
     if let Some(encoder) = gantry.encoder {
         let at = if encoder.at == EncoderPlace::Motor { "motor" } else { "pulley" };
-        lines.push(format!("encoder at the {at}, {} lines", engineering(encoder.lines, "", 6)));
+        lines.push(format!("encoder at the {at},"));
+        lines.push(format!("{} lines", engineering(encoder.lines, "", 6)));
     }
     let top = (y + 40.0 - 17.0 * lines.len() as f64).min(470.0);
     block(out, (at, top), Anchor::Start, &heading, &lines);
