@@ -387,7 +387,8 @@ fn natural_modes_have_the_poles_of_the_state_space() {
             Root::Real(s) => s.abs(),
             Root::Pair { frequency, .. } => frequency,
         };
-        let mut sizes = [Root::of(&system.poles().unwrap()), natural.poles].map(|roots| roots.iter().map(size).collect());
+        let mut sizes =
+            [Root::of(&system.poles().unwrap()), natural.poles].map(|roots| roots.iter().map(size).collect());
         sizes.iter_mut().for_each(|sizes: &mut Vec<f64>| sizes.sort_by(f64::total_cmp));
         let [want, have] = sizes;
         assert_eq!(have.len(), want.len());
