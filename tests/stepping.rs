@@ -231,3 +231,22 @@ fn what_cannot_be_stepped_is_told() {
     fn is_send<T: Send + Clone>() {}
     is_send::<Machine>();
 }
+
+/// A run that is finished before its end said that it was complete, at its end.
+#[test]
+fn a_run_that_is_finished_early_was_called_complete() {
+    let case = taut::case::Case::from_text("axis.toml", taut::case::TEMPLATE).unwrap();
+    let experiment = &case.experiments[0];
+    for solver in [Solver::Exact, Solver::GENERAL] {
+        let mut rows = 0;
+        let sink = &mut |block: &Trajectory| {
+            rows += block.len();
+            Flow::Continue
+        };
+        let mut run = taut::solve::Run::new(&case.stage, experiment, solver, Detail::Full, None, sink).unwrap();
+        assert!(run.hold(&[5.0], 0.1) && run.time() == 0.1);
+        let outcome = run.finish();
+        assert_eq!(outcome.ending, taut::solve::Ending::Interrupted { time: 0.1 }, "{solver:?}");
+        assert!(rows <= 101, "{rows} rows");
+    }
+}

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::mechanism::State;
 use crate::quantity::rounded;
 use crate::signal::profile::{Profile, Reference};
-use crate::solve::{Pieces, Run};
+use crate::solve::Run;
 use crate::stage::axis::{CART, DRIVE};
 use crate::stage::{Encoder, EncoderPlace, Stage};
 use crate::trajectory::Interval;
@@ -182,14 +182,12 @@ impl Sampled<'_> {
 impl Sampled<'_> {
     /// Drives a run to its end, `until`, s: the input is held from one decision to the next.
     pub(super) fn drive(&mut self, run: &mut Run, until: f64) {
-        let mut time = 0.0;
         loop {
             let (input, end) = self.decide(&run.state(), run.current(0));
-            run.set_input(&Pieces::held(&[input], time, end));
-            if time >= until || !run.advance(end.min(until)) {
+            let is_at_end = run.time() >= until;
+            if !run.hold(&[input], end) || is_at_end {
                 return;
             }
-            time = end.min(until);
         }
     }
 

@@ -5,7 +5,7 @@ use crate::signal::{DEGREE, Piece, Signal};
 
 /// One polynomial for each input, from `start` to `end`; what is not there is zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pieces {
+pub(super) struct Pieces {
     /// Where they begin, s; powers count from here.
     pub start: f64,
     /// Where the first of them ends, s.

@@ -20,7 +20,6 @@ mod table3;
 pub use crate::trajectory::Grid;
 pub use choice::{Choice, Kind};
 pub use estimate::ErrorEstimate;
-pub use inputs::Pieces;
 pub use machine::Machine;
 use observe::Output;
 pub use observe::{Curve, Gap, Observe, Polynomial, QUANTITIES, Reading, TERMS, reading};

@@ -60,8 +60,8 @@ pub(super) trait Running {
 
     fn current(&self, drive: usize) -> f64;
 
-    /// Puts out the last row, if nothing has ended the run before.
-    fn finish(&mut self) -> Outcome;
+    /// Ends the run where it stands: at its end, where the last row is put out, or before.
+    fn finish(&mut self, is_at_end: bool) -> Outcome;
 
     /// The modes that it has made ready.
     fn known(&mut self) -> Known {
@@ -73,7 +73,7 @@ pub(super) trait Running {
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};
-/// use taut::solve::{Detail, Ending, Flow, Pieces, Run, Solver};
+/// use taut::solve::{Detail, Ending, Flow, Run, Solver};
 /// use taut::stage::axis::CART;
 ///
 /// // Full voltage until the cart has gone far enough, looked at every millisecond.
@@ -85,15 +85,11 @@ pub(super) trait Running {
 ///     Flow::Continue
 /// };
 /// let mut run = Run::new(&case.stage, experiment, Solver::Exact, Detail::Full, None, &mut sink)?;
-/// let mut time = 0.0;
-/// while time < experiment.until {
+/// for k in 1..=1000 {
 ///     let voltage = if run.state().position[CART] < 0.05 { 10.0 } else { 0.0 };
-///     let until = time + 1e-3;
-///     run.set_input(&Pieces::held(&[voltage], time, until));
-///     if !run.advance(until) {
+///     if !run.hold(&[voltage], 1e-3 * f64::from(k)) {
 ///         break;
 ///     }
-///     time = until;
 /// }
 /// let outcome = run.finish();
 /// assert!(outcome.ending == Ending::Complete && last > 0.05 && last < 0.08);
@@ -101,6 +97,8 @@ pub(super) trait Running {
 /// ```
 pub struct Run<'a> {
     running: Box<dyn Running + 'a>,
+    /// Where it stands, s, and where it is to end.
+    time: f64,
     end: f64,
 }
 
@@ -161,7 +159,7 @@ impl<'a> Run<'a> {
                     .next("take the exact solver, or the general one"));
             }
         };
-        Ok(Self { running, end })
+        Ok(Self { running, time: 0.0, end })
     }
 
     /// A run of a mechanism that is no stage of an axis. Errors: what the solver does not take.
@@ -179,14 +177,24 @@ impl<'a> Run<'a> {
         Self::of(&Arc::new(mechanism.clone()), &start, (solver, straight), Known::default(), output)
     }
 
-    /// Takes up new inputs, from now on.
-    pub fn set_input(&mut self, pieces: &Pieces) {
-        self.running.set_input(pieces);
+    /// Holds these inputs, one for each drive, from now until `until`, s, or to the end of the run; false if something ended it before.
+    pub fn hold(&mut self, inputs: &[f64], until: f64) -> bool {
+        self.running.set_input(&Pieces::held(inputs, self.time, until));
+        self.advance(until)
     }
 
     /// Goes on to `until`, s, or to the end of the run; false if something ended it before.
-    pub fn advance(&mut self, until: f64) -> bool {
-        self.running.advance(until)
+    fn advance(&mut self, until: f64) -> bool {
+        let goes_on = self.time >= self.end || self.running.advance(until);
+        if goes_on {
+            self.time = self.time.max(until.min(self.end));
+        }
+        goes_on
+    }
+
+    /// Where it stands, s.
+    pub fn time(&self) -> f64 {
+        self.time
     }
 
     /// The state now, in angles and positions.
@@ -199,21 +207,19 @@ impl<'a> Run<'a> {
         self.running.current(drive)
     }
 
-    /// Ends the run where it stands, with its last row if it has come that far.
+    /// Ends the run where it stands: complete, with its last row, if it has come to its end, and interrupted before.
     pub fn finish(mut self) -> Outcome {
-        self.running.finish()
+        self.running.finish(self.time >= self.end)
     }
 
     /// Runs to the end along these signals.
     pub(super) fn along(mut self, signals: &[Signal]) -> (Outcome, Known) {
-        let mut time = 0.0;
         loop {
-            let until = self.running.set_signals(signals, time);
-            if time >= self.end || !self.running.advance(until) {
+            let until = self.running.set_signals(signals, self.time);
+            if self.time >= self.end || !self.advance(until) {
                 break;
             }
-            time = until.min(self.end);
         }
-        (self.running.finish(), self.running.known())
+        (self.running.finish(self.time >= self.end), self.running.known())
     }
 }

@@ -220,11 +220,15 @@ where
         self.core.value(&self.core.mechanism.current(drive, &self.core.mode))
     }
 
-    fn finish(&mut self) -> Outcome {
+    fn finish(&mut self, is_at_end: bool) -> Outcome {
         if self.core.trouble.is_none() {
-            // Behind a last, shorter interval it stands at the last row, too.
-            self.go_to(self.grid.intervals());
-            self.put_out();
+            if is_at_end {
+                // Behind a last, shorter interval it stands at the last row, too.
+                self.go_to(self.grid.intervals());
+                self.put_out();
+            } else {
+                self.core.trouble = Some(Ending::Interrupted { time: self.time() });
+            }
         }
         self.end_shown();
         self.recorder.finish();

@@ -84,7 +84,10 @@ impl Running for Run<'_> {
         self.core.value(&self.core.model.mechanism.current(drive, &self.core.mode))
     }
 
-    fn finish(&mut self) -> Outcome {
+    fn finish(&mut self, is_at_end: bool) -> Outcome {
+        if self.core.trouble.is_none() && !is_at_end {
+            self.core.trouble = Some(Ending::Interrupted { time: self.core.time() });
+        }
         if self.core.trouble.is_none() {
             let core = &self.core;
             let field = Field::new(&core.model, &core.mode, &core.stretch);
