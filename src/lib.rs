@@ -54,12 +54,11 @@
 //! - [`sweep`]: many runs with parameters varied.
 //! - [`tune`]: gains of a controller, good for the worst axis that parameters, loads and places can make.
 //! - `json`: results as data (feature `json`).
-//! - `report`: figures, drawings and an HTML page of them (feature `report`, on by default).
 //!
 //! # Features
 //!
-//! `report` (default) adds figures and reports; `parquet` adds Parquet files; `json` adds results as data; `posterior` draws from the posterior of a fit.
-//! Without them the library is the physics alone.
+//! `parquet` adds Parquet files; `json` adds results as data; `posterior` draws from the posterior of a fit.
+//! Without them the library is the physics alone. Figures and reports are a crate of their own, `taut-report`.
 
 pub mod case;
 pub mod chance;
@@ -82,8 +81,6 @@ pub mod parameter;
 pub mod posterior;
 pub mod quantity;
 pub mod reduction;
-#[cfg(feature = "report")]
-pub mod report;
 pub mod signal;
 pub mod solve;
 pub mod stage;

@@ -1,7 +1,7 @@
 //! Model and log side by side.
 
 use taut::fit::{Estimate, LogFit, OutputFit, Posterior, Profile};
-use taut::report::{Axis, Colour, Figure, Panel, Series, Style};
+use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// Logs drawn; the numbers of the rest are in the tables.
 pub const MOST_LOGS: usize = 12;

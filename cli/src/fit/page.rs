@@ -3,7 +3,7 @@
 use super::{Found, figures, posterior, table};
 use taut::case::Case;
 use taut::fit::{Ending, Fit, Profile};
-use taut::report::{Callout, Cell, Page, Table};
+use taut_report::{Callout, Cell, Page, Table};
 
 /// The page; `text` is the case with the estimates.
 pub fn page(case: &Case, found: &Found, text: &str) -> Page {

@@ -13,7 +13,7 @@ use taut::Result;
 use taut::case::{Case, Plan};
 use taut::fit::{Credible, Fit, Posterior, posterior};
 use taut::posterior::Effort;
-use taut::report::{Callout, Cell, Page, Table};
+use taut_report::{Callout, Cell, Page, Table};
 
 /// Draws that tune a chain.
 const TUNE: usize = 400;

@@ -5,7 +5,7 @@ use nalgebra::Complex;
 use std::f64::consts::PI;
 use taut::linear::Analysis;
 use taut::linear::{Place, Root};
-use taut::report::{Axis, Colour, Figure, Panel, Series, Style};
+use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// A figure and its name in file names.
 pub type Named = (&'static str, Figure);

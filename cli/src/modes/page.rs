@@ -5,7 +5,7 @@ use super::figures::Named;
 use super::table::{gain, pole, poles, words, z, zeros};
 use taut::linear::Analysis;
 use taut::number::{engineering, engineering_ascii};
-use taut::report::{Callout, Cell, Page, Table, stage_drawing};
+use taut_report::{Callout, Cell, Page, Table, stage_drawing};
 
 /// The page.
 pub fn page(analysis: &Analysis, figures: &[Named]) -> Page {

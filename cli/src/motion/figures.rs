@@ -2,9 +2,9 @@
 
 use super::Done;
 use crate::simulate::plots::Named;
-use taut::report::{Axis, Colour, Decimator, Figure, Panel, Series, Style};
 use taut::stage::Stage;
 use taut::trajectory::Trajectory;
+use taut_report::{Axis, Colour, Decimator, Figure, Panel, Series, Style};
 
 /// Points that a curve keeps.
 const POINTS: usize = 3000;

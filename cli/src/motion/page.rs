@@ -3,7 +3,7 @@
 use super::{Tried, table};
 use crate::simulate::plots::Named;
 use crate::simulate::table::early_end;
-use taut::report::{Callout, Cell, Page, Table, stage_drawing};
+use taut_report::{Callout, Cell, Page, Table, stage_drawing};
 
 /// The page; `text` is the case that repeats the moves.
 pub fn page(tried: &Tried, text: &str, figures: &[Vec<Named>]) -> Page {

@@ -2,10 +2,10 @@
 
 use taut::mechanism::{Form, Mechanism, Mode, State};
 use taut::number::engineering;
-use taut::report::diagram::Sign;
-use taut::report::{BodyEquation, FrictionTerm, Inertia, MotorEquation, Term, axis_diagram, body_diagram};
 use taut::stage::Stage;
 use taut::stage::axis::{CART, DRIVE, IDLER};
+use taut_report::diagram::Sign;
+use taut_report::{BodyEquation, FrictionTerm, Inertia, MotorEquation, Term, axis_diagram, body_diagram};
 
 /// Figure 18: the drive pulley, eq. (16).
 pub fn drive_pulley(stage: &Stage) -> String {

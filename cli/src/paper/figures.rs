@@ -6,7 +6,7 @@ use super::plots::{Curve, Plot};
 use super::studies::{Effect, From};
 use super::words::{mm, percent, si, um};
 use taut::number::significant;
-use taut::report::{Axis, Colour, Style};
+use taut_report::{Axis, Colour, Style};
 
 /// What every caption says where the paper shows a measurement.
 const NO_MEASUREMENT: &str = "The paper shows a measured curve beside each: it is not available as data and nothing is drawn in its \

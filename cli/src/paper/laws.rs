@@ -7,7 +7,7 @@ use super::words::{share, si};
 use std::cmp::Ordering;
 use std::f64::consts::FRAC_1_SQRT_2;
 use taut::friction::{Friction, Law, Shape, velocity_of_decay};
-use taut::report::{Axis, Colour, Style};
+use taut_report::{Axis, Colour, Style};
 
 /// F_s of eq. (14), N: chosen, since the paper gives none.
 const STATIC: f64 = 0.1;

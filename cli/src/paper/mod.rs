@@ -69,7 +69,7 @@ fn write(folder: &Folder, findings: &Findings, claims: &[Claim], plots: &[Plot])
     ["figures", "data"].into_iter().try_for_each(|name| folder.make(name))?;
     let stage = &findings.sets.table4.stage;
     let drawings = [
-        ("figure-01-02", taut::report::stage_drawing(&findings.sets.table1.stage)),
+        ("figure-01-02", taut_report::stage_drawing(&findings.sets.table1.stage)),
         ("figure-18", diagrams::drive_pulley(stage)),
         ("figure-19", diagrams::whole(stage)),
     ];
@@ -90,7 +90,7 @@ fn write(folder: &Folder, findings: &Findings, claims: &[Claim], plots: &[Plot])
 /// An SVG and the PNG of it.
 fn picture(folder: &Path, name: &str, svg: &str) -> Result<()> {
     write_atomically(folder.join(format!("{name}.svg")), svg)?;
-    write_atomically(folder.join(format!("{name}.png")), taut::report::png(svg, 2.0)?)
+    write_atomically(folder.join(format!("{name}.png")), taut_report::png(svg, 2.0)?)
 }
 
 /// What the terminal shows.

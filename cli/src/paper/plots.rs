@@ -1,6 +1,6 @@
 //! A figure together with the columns from which it is drawn.
 
-use taut::report::{Axis, Colour, Figure, Panel, Series, Style};
+use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// A figure, its file's name, and its data in SI units.
 pub struct Plot {

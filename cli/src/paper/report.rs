@@ -9,7 +9,7 @@ use super::words::{found, mm, percent, rule, share, si, symbols, um, value};
 use super::{diagrams, tables};
 use maud::{Markup, html};
 use taut::number::significant;
-use taut::report::{Callout, Cell, Page, Table, stage_drawing};
+use taut_report::{Callout, Cell, Page, Table, stage_drawing};
 
 /// Puts it together. `plots` are looked up by their files' names.
 pub fn page(f: &Findings, claims: &[Claim], plots: &[Plot]) -> Page {

@@ -6,9 +6,9 @@ use super::model::VOLTS;
 use super::studies::{Effect, From};
 use super::words::{signed, symbols};
 use taut::number::{engineering, significant};
-use taut::report::{Cell, Table};
 use taut::solve::Method;
 use taut::stage::Stage;
+use taut_report::{Cell, Table};
 
 /// Tables 1, 2 and 4: the printed symbol, ours, and what runs.
 pub fn parameters(f: &Findings) -> Table {

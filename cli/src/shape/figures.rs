@@ -4,7 +4,7 @@ use super::{Findings, Found, Source};
 use taut::control::resonance::Resonance;
 use taut::control::shaping::Target;
 use taut::control::spectrum::Spectrum;
-use taut::report::{Axis, Colour, Figure, Panel, Series, Style};
+use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// All figures, with the names of their files.
 pub fn figures(found: &Findings) -> Vec<(String, Figure)> {

@@ -2,7 +2,7 @@
 
 use super::{Findings, Found, table};
 use taut::control::compare::Comparison;
-use taut::report::{Callout, Cell, Figure, Page, Table};
+use taut_report::{Callout, Cell, Figure, Page, Table};
 
 /// The page.
 pub fn page(found: &Findings, figures: &[(String, Figure)]) -> Page {

@@ -4,11 +4,11 @@ use super::run::Setting;
 use rayon::prelude::*;
 use taut::case::Experiment;
 use taut::chance::quantile;
-use taut::report::{Axis, Colour, Figure, Panel, Series, Style};
 use taut::solve::{self, Ending, Flow};
 use taut::stage::Stage;
 use taut::trajectory::{Column, CsvWriter, Trajectory};
 use taut::{Error, Result};
+use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// Rows that a band has at most: of longer runs every second one, every third, …
 const ROWS: u64 = 10_000;

@@ -6,8 +6,8 @@ use super::table::{early_end, lines};
 use taut::case::Case;
 use taut::json::load_unit;
 use taut::number;
-use taut::report::{Callout, Cell, Page, Table, stage_drawing};
 use taut::solve::{Event, Solver};
+use taut_report::{Callout, Cell, Page, Table, stage_drawing};
 
 /// Events shown; the rest is in the events' own file.
 const MOST_EVENTS: usize = 200;

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use taut::Result;
 use taut::case::Case;
-use taut::report::{Axis, Colour, Figure, Panel, Series, Style};
 use taut::stage::AmplifierMode;
+use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// A figure and its name in file names.
 pub type Named = (&'static str, Figure);

@@ -5,7 +5,7 @@ use super::summary::{Group, Measured, Summary};
 use super::table::short;
 use taut::case::file_name;
 use taut::number::engineering;
-use taut::report::{Axis, Colour, Figure, Panel, Series, Style};
+use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// Figures that are drawn of each experiment, where they vary.
 const DRAWN: [&str; 8] = [

@@ -2,7 +2,7 @@
 
 use super::summary::Summary;
 use super::{Work, table};
-use taut::report::{Callout, Cell, Figure, Page, Table};
+use taut_report::{Callout, Cell, Figure, Page, Table};
 
 /// The page; `text` is the case.
 pub fn page(work: &Work, summary: &Summary, text: &str, figures: &[(String, Figure)]) -> Page {

@@ -7,9 +7,9 @@ use taut::Result;
 use taut::case::Move;
 use taut::control::feedback::Feedback;
 use taut::control::{Loop, Rows, Standard, stream};
-use taut::report::{Axis, Colour, Decimator, Figure, Panel, Series, Style};
 use taut::solve::{Flow, Solver};
 use taut::tune::{Corner, Verdict, loops};
+use taut_report::{Axis, Colour, Decimator, Figure, Panel, Series, Style};
 
 /// Points that a curve keeps.
 const POINTS: usize = 2000;

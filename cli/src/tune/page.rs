@@ -2,7 +2,7 @@
 
 use super::Work;
 use super::table::{self, Row};
-use taut::report::{Callout, Cell, Figure, Page, Table};
+use taut_report::{Callout, Cell, Figure, Page, Table};
 
 /// The page; `text` is the tuned case.
 pub fn page(work: &Work, text: &str, figures: &[(String, Figure)]) -> Page {

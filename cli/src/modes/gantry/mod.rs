@@ -13,8 +13,8 @@ use taut::files::write_atomically;
 use taut::json;
 use taut::linear::{GantryAnalysis, ResonanceMap};
 use taut::number::engineering;
-use taut::report::{Axis, Map, Plane};
 use taut::{Error, Result};
+use taut_report::{Axis, Map, Plane};
 
 /// A plane and its name in file names.
 type Named = (String, Plane);

@@ -6,7 +6,7 @@ use super::table::{elastic, rigid, slow};
 use super::{Named, over_the_area};
 use crate::simulate::gantry_machine;
 use taut::linear::GantryAnalysis;
-use taut::report::{Callout, Cell, Page, Table, gantry_drawing};
+use taut_report::{Callout, Cell, Page, Table, gantry_drawing};
 
 /// The page.
 pub fn page(analysis: &GantryAnalysis, planes: &[Named]) -> Page {

@@ -17,9 +17,9 @@ use run::{Run, Setting};
 use taut::case::GantryCase;
 use taut::files::write_atomically;
 use taut::json::{self, GantrySimulation};
-use taut::report::{gantry_drawing, png};
 use taut::solve::Solver;
 use taut::{Error, Result};
+use taut_report::{gantry_drawing, png};
 
 /// Simulates, measures, reports.
 pub fn run(args: &Simulate, case: &GantryCase) -> Outcome {

@@ -4,7 +4,7 @@ use super::super::page::{events, figures_table, how, repeated};
 use super::super::plots::Named;
 use super::run::{Run, Setting};
 use super::table::{early_end, lines, machine};
-use taut::report::{Callout, Page, Plane, gantry_drawing};
+use taut_report::{Callout, Page, Plane, gantry_drawing};
 
 /// The page for these runs; `text` is the case that repeats them.
 pub fn page(setting: &Setting, text: &str, runs: &[Run], figures: &[Vec<Named>], ways: &[Option<Plane>]) -> Page {

@@ -4,9 +4,9 @@ use super::super::curves::{Curves, Source, Way};
 use super::super::plots::Named;
 use super::run::Run;
 use taut::case::GantryCase;
-use taut::report::{Axis, Colour, Figure, Panel, Plane, Series, Style};
 use taut::stage::AmplifierMode;
 use taut::stage::gantry::{Gantry, LABELS, Routing};
+use taut_report::{Axis, Colour, Figure, Panel, Plane, Series, Style};
 
 /// The curves that a report shows, and the way of the cart, before the first row.
 pub fn curves(gantry: &Gantry) -> (Curves, Way) {

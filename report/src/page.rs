@@ -4,11 +4,11 @@ use super::figure::Figure;
 use super::plane::Plane;
 use super::svg::PALETTE;
 use super::{embed, plot};
-use crate::error::Result;
-use crate::files::write_atomically;
 use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 use std::fmt::Write;
 use std::path::Path;
+use taut::error::Result;
+use taut::files::write_atomically;
 
 /// A report under construction: call what comes next, then [`Page::html`] or [`Page::write`].
 ///
@@ -102,12 +102,12 @@ impl From<Callout> for Cell {
 impl Cell {
     /// A number with so many significant digits.
     pub fn number(value: f64, digits: usize) -> Self {
-        Cell::Number(crate::number::significant(value, digits))
+        Cell::Number(taut::number::significant(value, digits))
     }
 
     /// A number with so many decimals.
     pub fn fixed(value: f64, decimals: usize) -> Self {
-        Cell::Number(crate::number::fixed(value, decimals))
+        Cell::Number(taut::number::fixed(value, decimals))
     }
 }
 
@@ -127,7 +127,7 @@ impl Table {
 
     /// Adds a column; its unit stands in the heading and may be empty.
     pub fn column(mut self, heading: impl Into<String>, unit: &str) -> Self {
-        self.headings.push((heading.into(), crate::number::pretty_unit(unit)));
+        self.headings.push((heading.into(), taut::number::pretty_unit(unit)));
         self
     }
 

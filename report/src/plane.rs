@@ -3,10 +3,10 @@
 use super::axis::Scale;
 use super::figure::{Axis, Series};
 use super::svg::{self, Anchor, Svg, n};
-use crate::error::Result;
-use crate::files::write_atomically;
 use std::fmt::Write;
 use std::path::Path;
+use taut::error::Result;
+use taut::files::write_atomically;
 
 /// Largest size of the plot area, pixels.
 const AREA: (f64, f64) = (620.0, 460.0);

@@ -1,9 +1,9 @@
 //! SVG to PNG with a font of our own, so that the picture does not depend on the machine.
 
-use crate::error::{Error, Result};
 use resvg::tiny_skia::{Color, Pixmap, Transform};
 use resvg::usvg::{Options, Tree, fontdb};
 use std::sync::{Arc, LazyLock};
+use taut::error::{Error, Result};
 
 /// Noto Sans, regular and bold (SIL Open Font Licence 1.1), from the crate `notosans`.
 static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {

@@ -1,12 +1,11 @@
 //! The report as its reader gets it: well-formed, self-contained, escaped, the same every time.
-#![cfg(feature = "report")]
 
 use resvg::tiny_skia::Pixmap;
 use resvg::usvg::roxmltree::{Document, ParsingOptions};
 use taut::friction::Friction;
-use taut::report::diagram::Sign;
-use taut::report::*;
 use taut::stage::*;
+use taut_report::diagram::Sign;
+use taut_report::*;
 
 const NASTY: &str = "<script>alert(\"1\")</script> & 'two' \u{0}\u{1b}]]>";
 

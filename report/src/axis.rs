@@ -70,7 +70,7 @@ impl Scale {
                 .filter(|d| d.rem_euclid(every) == 0)
                 .flat_map(|d| factors.iter().map(move |f| f * 10f64.powi(d)))
                 .filter(|&v| v >= self.lo * (1.0 - 1e-9) && v <= self.hi * (1.0 + 1e-9))
-                .map(|v| (v, crate::number::engineering(v, "", 3)))
+                .map(|v| (v, taut::number::engineering(v, "", 3)))
                 .collect();
         }
         let step = round_step((self.hi - self.lo) / wanted);
@@ -97,9 +97,9 @@ fn label(value: f64, step: f64, largest: f64) -> String {
     let value = if value.abs() < 1e-9 * step { 0.0 } else { value };
     if !(1e-4..1e6).contains(&largest) {
         let digits = (largest / step).log10().ceil().clamp(0.0, 15.0) as usize + 1;
-        return crate::number::engineering(value, "", digits);
+        return taut::number::engineering(value, "", digits);
     }
-    crate::number::fixed(value, (-(step * 1.0001).log10().floor()).clamp(0.0, 17.0) as usize)
+    taut::number::fixed(value, (-(step * 1.0001).log10().floor()).clamp(0.0, 17.0) as usize)
 }
 
 #[cfg(test)]

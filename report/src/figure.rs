@@ -1,9 +1,9 @@
 //! What a figure shows, said once for SVG, PNG and the page.
 
 use super::svg::Colour;
-use crate::error::Result;
-use crate::files::write_atomically;
 use std::path::Path;
+use taut::error::Result;
+use taut::files::write_atomically;
 
 /// One or more panels above a common x axis.
 ///
@@ -96,12 +96,12 @@ pub struct Marker {
 impl Axis {
     /// A linear axis; `unit` may be written `m/s^2`.
     pub fn new(label: impl Into<String>, unit: &str) -> Self {
-        Self { label: label.into(), unit: crate::number::pretty_unit(unit), factor: 1.0, log: false }
+        Self { label: label.into(), unit: taut::number::pretty_unit(unit), factor: 1.0, log: false }
     }
 
     /// Shows the data in another unit, of which `factor` make one of the data's: `("mm", 1e3)` for metres.
     pub fn shown_as(mut self, unit: &str, factor: f64) -> Self {
-        self.unit = crate::number::pretty_unit(unit);
+        self.unit = taut::number::pretty_unit(unit);
         self.factor = factor;
         self
     }

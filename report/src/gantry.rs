@@ -2,11 +2,11 @@
 
 use super::drawing::friction;
 use super::svg::{self, Anchor, Colour, Paint, Svg, n};
-use crate::mechanism::{Amplifier, Motor};
-use crate::number::engineering;
-use crate::stage::gantry::{Gantry, Routing, Slide};
-use crate::stage::{AmplifierMode, EncoderPlace};
 use std::f64::consts::PI;
+use taut::mechanism::{Amplifier, Motor};
+use taut::number::engineering;
+use taut::stage::gantry::{Gantry, Routing, Slide};
+use taut::stage::{AmplifierMode, EncoderPlace};
 
 const WIDTH: f64 = 860.0;
 const HEIGHT: f64 = 664.0;

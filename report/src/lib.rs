@@ -5,7 +5,7 @@
 //! reader zooms. Everything is a pure function of its input until a `write` is called.
 //!
 //! ```
-//! use taut::report::{Axis, Callout, Figure, Page, Panel};
+//! use taut_report::{Axis, Callout, Figure, Page, Panel};
 //!
 //! let time: Vec<f64> = (0..=100).map(|i| 0.01 * i as f64).collect();
 //! let position: Vec<f64> = time.iter().map(|t| 0.05 * (1.0 - (-5.0 * t).exp())).collect();

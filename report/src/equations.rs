@@ -1,7 +1,7 @@
 //! The equations that run, drawn: one body (after Fig. 18) and the whole axis (after Fig. 19).
 
 use super::diagram::{Diagram, Kind, Port, Sign};
-use crate::number::engineering;
+use taut::number::engineering;
 
 /// One equation of motion with its numbers, as the solver uses them.
 #[derive(Debug, Clone, PartialEq)]

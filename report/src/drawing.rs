@@ -1,10 +1,10 @@
 //! The stage, drawn with its symbols and values (after the paper's Fig. 2).
 
 use super::svg::{self, Anchor, Colour, Svg, n};
-use crate::friction::Friction;
-use crate::number::{engineering, significant};
-use crate::stage::{AmplifierMode, EncoderPlace, Pulley, Stage};
 use std::f64::consts::PI;
+use taut::friction::Friction;
+use taut::number::{engineering, significant};
+use taut::stage::{AmplifierMode, EncoderPlace, Pulley, Stage};
 
 const WIDTH: f64 = 860.0;
 const DRIVE: (f64, f64) = (120.0, 200.0);
