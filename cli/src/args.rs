@@ -1,5 +1,6 @@
 //! The command line, and its help.
 
+use crate::command::Common;
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use taut::control::shaper::Kind;
@@ -9,18 +10,22 @@ use taut::stage::Stage;
 
 /// Belt-driven axes: described in a file, simulated exactly.
 #[derive(Debug, Parser)]
-#[command(name = "taut", version, max_term_width = 100, after_help = STATUS)]
+#[command(name = "taut", version = VERSION, max_term_width = 100, after_help = STATUS)]
 pub struct Args {
     #[command(subcommand)]
     pub command: Command,
 }
+
+/// The version, and what this program was built from.
+const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("TAUT_BUILT_FROM"), ")");
 
 const STATUS: &str = "\
 Start with:
   taut init axis.toml
   taut simulate axis.toml --out results
 
-Exit status: 0 done, 1 the work could not be done or ended early, 2 the input was wrong, 130 ended by Ctrl-C.";
+Exit status: 0 done, 1 the work could not be done or its result is not to be relied on,
+2 the input was wrong, 130 ended by Ctrl-C.";
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
@@ -34,6 +39,26 @@ pub enum Command {
     Fit(Fit),
     Shape(Shape),
     Modes(Modes),
+    Completions(Completions),
+    Man(Man),
+}
+
+impl Command {
+    /// Whether the result, and an error, is wanted as JSON.
+    pub fn json(&self) -> bool {
+        match self {
+            Self::Paper(args) => args.json,
+            Self::Simulate(args) => args.common.json,
+            Self::Move(args) => args.common.json,
+            Self::Tune(args) => args.common.json,
+            Self::Sweep(args) => args.common.json,
+            Self::Check(args) => args.common.json,
+            Self::Fit(args) => args.common.json,
+            Self::Shape(args) => args.common.json,
+            Self::Modes(args) => args.common.json,
+            Self::Init(_) | Self::Completions(_) | Self::Man(_) => false,
+        }
+    }
 }
 
 /// Recompute the paper of Sollmann and Jouaneh (2011): every table, figure and claim.
@@ -48,6 +73,24 @@ pub struct Paper {
     /// Print the claims as JSON, the same as in claims.json
     #[arg(long)]
     pub json: bool,
+}
+
+/// Print the completions of the command line for a shell.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  taut completions bash > ~/.local/share/bash-completion/completions/taut")]
+pub struct Completions {
+    /// The shell
+    #[arg(value_enum)]
+    pub shell: clap_complete::Shell,
+}
+
+/// Print the manual page, or write that of every command into a folder.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  taut man | man -l -\n  taut man --out ~/.local/share/man/man1")]
+pub struct Man {
+    /// The folder for one page for each command; it is made if it is not there
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
 /// Write a commented case file to start from.
@@ -87,14 +130,8 @@ pub enum KindName {
 #[derive(Debug, clap::Args)]
 #[command(after_help = SIMULATE)]
 pub struct Simulate {
-    /// The case file
+    /// The case file; - is standard input
     pub case: PathBuf,
-    /// The folder to write results into; it is made if it is not there
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Change one value of the case for this run, as often as needed
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub changes: Vec<String>,
     /// Run only the experiment of this name, as often as needed
     #[arg(long = "experiment", value_name = "NAME")]
     pub experiments: Vec<String>,
@@ -122,15 +159,8 @@ pub struct Simulate {
     /// How many of them to run
     #[arg(long, value_name = "N", default_value_t = 200, requires = "draws", value_parser = count)]
     pub machines: usize,
-    /// Leave out the report and the plots
-    #[arg(long)]
-    pub no_report: bool,
-    /// Print the summary as JSON, the same as in summary.json
-    #[arg(long)]
-    pub json: bool,
-    /// Print nothing but errors
-    #[arg(long, short, conflicts_with = "json")]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub common: Common,
 }
 
 const SIMULATE: &str = "\
@@ -156,27 +186,14 @@ pub struct Move {
     /// The case file; several to compare them
     #[arg(required = true)]
     pub case: Vec<PathBuf>,
-    /// The folder to write results into; it is made if it is not there
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Change one value of the case for this run, as often as needed
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub changes: Vec<String>,
     /// Run only the move of this name, as often as needed
     #[arg(long = "move", value_name = "NAME")]
     pub moves: Vec<String>,
     /// Also run with each parameter of the axis wrong by this share, the controller knowing nothing of it: 20%
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub spread: Option<f64>,
-    /// Leave out the report and the plots
-    #[arg(long)]
-    pub no_report: bool,
-    /// Print the summary as JSON, the same as in summary.json
-    #[arg(long)]
-    pub json: bool,
-    /// Print nothing but errors
-    #[arg(long, short, conflicts_with = "json")]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub common: Common,
 }
 
 const MOVE: &str = "\
@@ -191,31 +208,20 @@ Examples:
 /// sensitivity with every parameter off, every load and all along the travel. Prints gains, margins, the worst axis, cart
 /// errors and limit cycles before and after.
 #[derive(Debug, clap::Args)]
-#[command(after_help = TUNE)]
+#[command(after_help = TUNE, mut_arg("out", |out| out.value_name("FILE or DIR").help(
+    "The case file to write (ends in .toml), or the folder for it, a summary, a report and plots"
+)))]
 pub struct Tune {
-    /// The case file
+    /// The case file; - is standard input
     pub case: PathBuf,
-    /// The case file to write (ends in .toml), or the folder for it, a summary, a report and plots
-    #[arg(long, value_name = "FILE or DIR")]
-    pub out: Option<PathBuf>,
     /// Write the gains into the case file itself
     #[arg(long, conflicts_with = "out")]
     pub in_place: bool,
-    /// Change one value of the case for this run, as often as needed; it is written with the gains
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub changes: Vec<String>,
     /// Let each parameter of the axis be off by this share, whatever the file says: 20%
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub spread: Option<f64>,
-    /// Leave out the report and the plots
-    #[arg(long)]
-    pub no_report: bool,
-    /// Print the summary as JSON, the same as in tune.json
-    #[arg(long)]
-    pub json: bool,
-    /// Print nothing but errors
-    #[arg(long, short, conflicts_with = "json")]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub common: Common,
 }
 
 const TUNE: &str = "\
@@ -233,9 +239,11 @@ best gains so far, with exit status 130.";
 /// (units in its metadata) or CSV; with --out DIR also a summary, a report and plots. The same command goes on where an
 /// interrupted or killed one was. Rows are the same, bit for bit, on any number of threads.
 #[derive(Debug, clap::Args)]
-#[command(after_help = SWEEP)]
+#[command(after_help = SWEEP, mut_arg("out", |out| out.value_name("FILE or DIR").help(
+    "The file of the rows (ends in .parquet or .csv), or the folder for it, a summary, a report and plots"
+)))]
 pub struct Sweep {
-    /// The case file
+    /// The case file; - is standard input
     pub case: PathBuf,
     /// How many machines to run
     #[arg(long, value_name = "N")]
@@ -255,27 +263,14 @@ pub struct Sweep {
     /// Interval between the rows of --trajectories; figures do not depend on it [default: the experiment's]
     #[arg(long, value_name = "TIME")]
     pub interval: Option<String>,
-    /// The file of the rows (ends in .parquet or .csv), or the folder for it, a summary, a report and plots
-    #[arg(long, value_name = "FILE or DIR")]
-    pub out: Option<PathBuf>,
     /// Also write every quantity over time of every run
     #[arg(long, requires = "out")]
     pub trajectories: bool,
     /// How many threads [default: as many as there are processors]
     #[arg(long, value_name = "T", value_parser = count)]
     pub threads: Option<usize>,
-    /// Change one value of the case for this sweep, as often as needed
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub changes: Vec<String>,
-    /// Leave out the report and the plots
-    #[arg(long)]
-    pub no_report: bool,
-    /// Print the summary as JSON, the same as in sweep.json
-    #[arg(long)]
-    pub json: bool,
-    /// Print nothing but errors
-    #[arg(long, short, conflicts_with = "json")]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub common: Common,
 }
 
 const SWEEP: &str = "\
@@ -299,14 +294,10 @@ Ctrl-C keeps what is done, with exit status 130; the same command then goes on."
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  taut check axis.toml")]
 pub struct Check {
-    /// The case file
+    /// The case file; - is standard input
     pub case: PathBuf,
-    /// Change one value of the case for this run, as often as needed
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub changes: Vec<String>,
-    /// Print it as JSON
-    #[arg(long)]
-    pub json: bool,
+    #[command(flatten)]
+    pub common: Common,
 }
 
 /// Find the parameters in [fit] of a case from its logs.
@@ -317,14 +308,8 @@ pub struct Check {
 #[derive(Debug, clap::Args)]
 #[command(after_help = FIT)]
 pub struct Fit {
-    /// The case file
+    /// The case file; - is standard input
     pub case: PathBuf,
-    /// The folder to write results into; it is made if it is not there
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Change one value of the case for this run, as often as needed
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub changes: Vec<String>,
     /// Also draw from the posterior, with the priors in [fit.priors]: intervals where those of the fit are too simple
     #[arg(long)]
     pub posterior: bool,
@@ -334,15 +319,8 @@ pub struct Fit {
     /// Chains, each from a start of its own
     #[arg(long, value_name = "N", default_value_t = 4, requires = "posterior", value_parser = count)]
     pub chains: usize,
-    /// Leave out the report
-    #[arg(long)]
-    pub no_report: bool,
-    /// Print the result as JSON, the same as in fit.json
-    #[arg(long)]
-    pub json: bool,
-    /// Print nothing but errors
-    #[arg(long, short, conflicts_with = "json")]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub common: Common,
 }
 
 const FIT: &str = "\
@@ -366,12 +344,6 @@ pub struct Shape {
     pub spectrum: PathBuf,
     /// Another one to compare: the other belt, or after a change
     pub second: Option<PathBuf>,
-    /// The folder to write results into; it is made if it is not there
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Change one value of a case file, as often as needed
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub changes: Vec<String>,
     /// Axis of the accelerometer [default: the sum of x, y and z]
     #[arg(long, value_enum)]
     pub axis: Option<AxisName>,
@@ -393,15 +365,8 @@ pub struct Shape {
     /// Of a case file: what the motor does [default: held]
     #[arg(long, value_enum)]
     pub motor: Option<MotorName>,
-    /// Leave out the report and the pictures
-    #[arg(long)]
-    pub no_report: bool,
-    /// Print the result as JSON, the same as in shape.json
-    #[arg(long)]
-    pub json: bool,
-    /// Print nothing but errors
-    #[arg(long, short, conflicts_with = "json")]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub common: Common,
 }
 
 /// Say how a machine swings: poles, zeros, frequency response, resonance along the travel.
@@ -416,14 +381,8 @@ pub struct Shape {
 #[derive(Debug, clap::Args)]
 #[command(after_help = MODES)]
 pub struct Modes {
-    /// The case file
+    /// The case file; - is standard input
     pub case: PathBuf,
-    /// The folder to write results into; it is made if it is not there
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Change one value of the case for this run, as often as needed
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub changes: Vec<String>,
     /// Where the cart is; matters to spans that follow it and to friction along the travel [default: 0 m]
     #[arg(long, value_name = "POSITION", value_parser = metres, allow_hyphen_values = true)]
     pub at: Option<f64>,
@@ -448,15 +407,8 @@ pub struct Modes {
     /// Highest frequency of the response, in Hz [default: above the fastest resonance]
     #[arg(long, value_name = "FREQUENCY", value_parser = hertz)]
     pub to: Option<f64>,
-    /// Leave out the report and the plots
-    #[arg(long)]
-    pub no_report: bool,
-    /// Print the result as JSON, the same as in modes.json
-    #[arg(long)]
-    pub json: bool,
-    /// Print nothing but errors
-    #[arg(long, short, conflicts_with = "json")]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub common: Common,
 }
 
 const SHAPE: &str = "\

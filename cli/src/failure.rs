@@ -1,5 +1,6 @@
 //! How a command ends.
 
+use serde_json::json;
 use taut::Error;
 
 /// The end of a command that has a result.
@@ -33,6 +34,21 @@ impl Failure {
             place.file = taut::files::shown(&place.file);
         }
         Self { error, status: 1 }
+    }
+
+    /// As data, for `--json`.
+    pub fn json(&self) -> String {
+        let place = self.error.place.as_ref();
+        let error = json!({
+            "what": self.error.what,
+            "file": place.map(|place| place.file.display().to_string()),
+            "line": place.and_then(|place| place.span.as_ref()).map(|span| span.line),
+            "column": place.and_then(|place| place.span.as_ref()).map(|span| span.column),
+            "allowed": self.error.allowed,
+            "next": self.error.next,
+            "text": self.error.to_string(),
+        });
+        taut::json::text(&json!({ "schema": "taut/error/1", "status": self.status, "error": error }))
     }
 }
 

@@ -1,7 +1,9 @@
 //! The folder of results. Its files are written in a hidden folder within it and get their places together, at the end;
 //! none takes the place of a file that the command reads.
 
+use crate::command::Common;
 use crate::failure::Failure;
+use crate::listing::{self, Listing};
 use crate::terminal;
 use std::collections::HashMap;
 use std::ffi::OsStr;
@@ -30,6 +32,15 @@ pub fn inputs_of(path: &Path, files: &[InputFile]) -> Inputs {
 }
 
 impl Folder {
+    /// The folder of `--out`, made as [`Folder::create`] makes it; none where none is asked for.
+    pub fn wanted<N: AsRef<Path>>(
+        common: &Common,
+        inputs: impl FnOnce() -> Inputs,
+        names: impl IntoIterator<Item = N>,
+    ) -> std::result::Result<Option<Self>, Failure> {
+        common.out.as_deref().map(|root| Self::create(root, inputs(), names)).transpose()
+    }
+
     /// Makes the folder if it is not there. `names` are files that will be written: one that is among the inputs is told
     /// before the work; all others, before the first file gets its place.
     pub fn create<N: AsRef<Path>>(
@@ -58,12 +69,28 @@ impl Folder {
         self.batch.path(name)
     }
 
-    /// Gives all files their places.
-    pub fn place(&self) -> std::result::Result<(), Failure> {
-        for name in self.batch.names().map_err(Failure::work)? {
+    /// Gives all files their places, with a list of them, and removes what an earlier run listed and this one did not write;
+    /// what somebody changed since stays, and is named. Returns the names of what was written.
+    pub fn place(&self, quiet: bool) -> std::result::Result<Vec<PathBuf>, Failure> {
+        let mut names = self.batch.names().map_err(Failure::work)?;
+        let list = Listing::of(&self.batch.path(""), &names).map_err(Failure::work)?;
+        write_atomically(self.batch.path(listing::NAME), list.text()).map_err(Failure::work)?;
+        for name in names.iter().map(PathBuf::as_path).chain([Path::new(listing::NAME)]) {
             self.inputs.check(&self.root.join(name))?;
         }
-        self.batch.place().map_err(Failure::work)
+        let mut left = Listing::read(&self.root).map(|list| list.left(&self.root, &names)).unwrap_or_default();
+        left.stale.retain(|name| self.inputs.check(&self.root.join(name)).is_ok());
+        self.batch.place(&left.stale).map_err(Failure::work)?;
+        if !left.changed.is_empty() && !quiet {
+            let changed: Vec<String> = left.changed.iter().map(|name| name.display().to_string()).collect();
+            terminal::show_note(&format!(
+                "{}: of an earlier run, and changed since it was written, so it stays: {}",
+                self.root.display(),
+                changed.join(", ")
+            ));
+        }
+        names.push(listing::NAME.into());
+        Ok(names)
     }
 
     /// The folder itself.
@@ -76,7 +103,7 @@ impl Folder {
         self.root.display().to_string()
     }
 
-    /// The events as CSV; returns the file's name.
+    /// The events as CSV.
     pub fn write_events(&self, name: &str, events: &[Event]) -> Result<String> {
         let mut text = String::from("time_s,part,from,to,load,by_rounding\n");
         for e in events {

@@ -2,14 +2,18 @@
 
 mod args;
 mod check;
+mod command;
 mod failure;
 mod fit;
 mod folder;
 mod init;
 mod interrupt;
+mod listing;
+mod manual;
 mod modes;
 mod motion;
 mod paper;
+mod progress;
 mod shape;
 mod simulate;
 mod sweep;
@@ -26,6 +30,7 @@ fn main() -> ExitCode {
         Ok(args) => args,
         Err(told) => return terminal::show_help_or_mistake(&told),
     };
+    let json = args.command.json();
     let done = match args.command {
         Command::Paper(args) => paper::run(&args),
         Command::Init(args) => init::run(&args),
@@ -37,12 +42,17 @@ fn main() -> ExitCode {
         Command::Tune(args) => tune::run(&args),
         Command::Sweep(args) => sweep::run(&args),
         Command::Modes(args) => modes::run(&args),
+        Command::Completions(args) => manual::completions(&args),
+        Command::Man(args) => manual::run(&args),
     };
     match done {
         Ok(Status::Done) => ExitCode::SUCCESS,
         Ok(Status::Incomplete) => ExitCode::from(1),
         Ok(Status::Interrupted(signal)) => ExitCode::from(128 + signal),
         Err(failure) => {
+            if json {
+                terminal::show(&failure.json());
+            }
             terminal::show_error(&failure.error);
             ExitCode::from(failure.status)
         }

@@ -36,6 +36,91 @@ pub fn show(text: &str) {
     }
 }
 
+/// Columns of the terminal; else those that the environment names; else 100.
+fn columns() -> usize {
+    let seen = terminal_size::terminal_size_of(io::stdout()).map(|(width, _)| usize::from(width.0));
+    let named = || std::env::var("COLUMNS").ok()?.trim().parse().ok();
+    seen.or_else(named).unwrap_or(100).max(LEAST_COLUMNS)
+}
+
+/// Fewer columns than these are not kept to.
+const LEAST_COLUMNS: usize = 40;
+
+/// `text` with the lines that are too long for the terminal broken between words: behind a name, the rest stands under what the
+/// line says of it.
+pub fn wrapped(text: &str) -> String {
+    let columns = columns();
+    let mut out = String::with_capacity(text.len());
+    for line in text.split_inclusive('\n') {
+        match visible(line.trim_end_matches('\n')) > columns {
+            true => wrap(line, columns, &mut out),
+            false => out.push_str(line),
+        }
+    }
+    out
+}
+
+fn wrap(line: &str, columns: usize, out: &mut String) {
+    let indent = indent(line, columns);
+    let mut used = 0;
+    // Spaces belong to the word behind them, so that columns stay where they are.
+    for word in words(line.trim_end_matches('\n')) {
+        let wide = visible(word);
+        if used > indent && used + wide > columns {
+            out.push('\n');
+            out.push_str(&" ".repeat(indent));
+            let bare = word.trim_start();
+            out.push_str(bare);
+            used = indent + visible(bare);
+        } else {
+            out.push_str(word);
+            used += wide;
+        }
+    }
+    out.push('\n');
+}
+
+/// Where the rest of a line that is broken begins.
+fn indent(line: &str, columns: usize) -> usize {
+    let leading = line.len() - line.trim_start().len();
+    let told = line[leading..].find("  ").map(|gap| {
+        let behind = &line[leading + gap..];
+        visible(&line[..leading + gap]) + behind.len() - behind.trim_start().len()
+    });
+    match told {
+        Some(column) if column <= columns / 2 => column,
+        _ => leading + 4,
+    }
+}
+
+/// The words of a line, each with the spaces before it.
+fn words(line: &str) -> impl Iterator<Item = &str> {
+    let mut rest = line;
+    std::iter::from_fn(move || {
+        let spaces = rest.len() - rest.trim_start_matches(' ').len();
+        let end = rest[spaces..].find(' ').map_or(rest.len(), |end| spaces + end);
+        let (word, behind) = rest.split_at(end);
+        rest = behind;
+        (!word.is_empty()).then_some(word)
+    })
+}
+
+/// Columns that a text takes: colours take none.
+fn visible(text: &str) -> usize {
+    let (mut count, mut colour) = (0, false);
+    for c in text.chars() {
+        match (colour, c) {
+            (false, '\u{1b}') => colour = true,
+            (true, 'm') => colour = false,
+            (true, _) => {}
+            // What goes above the letter before it, as in R̂, takes none.
+            (false, '\u{300}'..='\u{36f}') => {}
+            (false, _) => count += 1,
+        }
+    }
+    count
+}
+
 /// `text` in bold, if standard output is a terminal.
 pub fn bold(text: &str) -> String {
     paint(io::stdout().is_terminal(), "\u{1b}[1m", text)
@@ -63,4 +148,23 @@ fn paint(terminal: bool, colour: &str, text: &str) -> String {
 
 fn colour_wanted() -> bool {
     std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(columns: usize, line: &str) -> String {
+        let mut out = String::new();
+        wrap(line, columns, &mut out);
+        out
+    }
+
+    #[test]
+    fn long_lines_break_between_words_under_what_they_say() {
+        assert_eq!(at(24, "  name    one two three four\n"), "  name    one two three\n          four\n");
+        assert_eq!(at(20, "a sentence without any gap\n"), "a sentence without\n    any gap\n");
+        assert_eq!(at(12, "averyveryverylongword and more\n"), "averyveryverylongword\n    and more\n");
+        assert_eq!(visible("\u{1b}[1mbold\u{1b}[0m R\u{302}"), 6);
+    }
 }

@@ -1,9 +1,6 @@
 //! What a figure shows, said once for SVG, PNG and the page.
 
 use super::svg::Colour;
-use std::path::Path;
-use taut::error::Result;
-use taut::files::write_atomically;
 
 /// One or more panels above a common x axis.
 ///
@@ -195,20 +192,5 @@ impl Figure {
     /// The figure as an SVG file with its title, light and dark.
     pub fn svg(&self) -> String {
         super::plot::svg(self, true)
-    }
-
-    /// The figure as a PNG, `scale` pixels (1 to 4 are sensible) per SVG pixel, on white.
-    pub fn png(&self, scale: f32) -> Result<Vec<u8>> {
-        super::png(&self.svg(), scale)
-    }
-
-    /// Writes [`Figure::svg`] to `path`.
-    pub fn write_svg(&self, path: impl AsRef<Path>) -> Result<()> {
-        write_atomically(path, self.svg())
-    }
-
-    /// Writes [`Figure::png`] at twice the size to `path`.
-    pub fn write_png(&self, path: impl AsRef<Path>) -> Result<()> {
-        write_atomically(path, self.png(2.0)?)
     }
 }

@@ -29,6 +29,7 @@ pub mod equations;
 pub mod figure;
 mod gantry;
 pub mod page;
+mod picture;
 mod plane;
 mod plot;
 mod raster;
@@ -40,6 +41,7 @@ pub use equations::{BodyEquation, FrictionTerm, Inertia, MotorEquation, Term, ax
 pub use figure::{Axis, Figure, Marker, Panel, Series, Style};
 pub use gantry::gantry_drawing;
 pub use page::{Callout, Cell, Page, Table};
+pub use picture::Picture;
 pub use plane::{Map, Plane};
 pub use raster::png;
 pub use svg::Colour;

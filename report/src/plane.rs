@@ -4,9 +4,6 @@ use super::axis::Scale;
 use super::figure::{Axis, Series};
 use super::svg::{self, Anchor, Svg, n};
 use std::fmt::Write;
-use std::path::Path;
-use taut::error::Result;
-use taut::files::write_atomically;
 
 /// Largest size of the plot area, pixels.
 const AREA: (f64, f64) = (620.0, 460.0);
@@ -95,21 +92,6 @@ impl Plane {
     /// The same without its title, for a page that has one.
     pub(super) fn bare(&self) -> String {
         self.draw(false)
-    }
-
-    /// The picture as a PNG, `scale` pixels per SVG pixel, on white.
-    pub fn png(&self, scale: f32) -> Result<Vec<u8>> {
-        super::png(&self.svg(), scale)
-    }
-
-    /// Writes [`Plane::svg`] to `path`.
-    pub fn write_svg(&self, path: impl AsRef<Path>) -> Result<()> {
-        write_atomically(path, self.svg())
-    }
-
-    /// Writes [`Plane::png`] at twice the size to `path`.
-    pub fn write_png(&self, path: impl AsRef<Path>) -> Result<()> {
-        write_atomically(path, self.png(2.0)?)
     }
 
     /// Scales in shown units, and the size of the plot area at one scale.

@@ -49,8 +49,8 @@ impl Batch {
         Ok(names)
     }
 
-    /// Gives all files their places, with a marker beside them meanwhile.
-    pub fn place(&self) -> Result<()> {
+    /// Gives all files their places, and removes `stale` ones that stand in the folder, with a marker beside them meanwhile.
+    pub fn place(&self, stale: &[PathBuf]) -> Result<()> {
         let names = self.names()?;
         let places: Vec<PathBuf> = names.iter().map(|name| self.root.join(name)).collect();
         if let Some(taken) = places.iter().find(|place| place.is_dir()) {
@@ -66,6 +66,14 @@ impl Batch {
                 })?;
             }
             put(&self.hidden.join(name), to).map_err(|e| cannot_write(to, &e))?;
+        }
+        for path in stale.iter().map(|name| self.root.join(name)) {
+            match fs::remove_file(&path) {
+                Err(e) if e.kind() != ErrorKind::NotFound => return Err(cannot_write(&path, &e)),
+                _ => {}
+            }
+            // A folder that is empty now goes, too; one that is not says so and stays.
+            let _ = path.parent().filter(|parent| *parent != self.root).map(fs::remove_dir);
         }
         fs::remove_file(&marker).map_err(|e| cannot_write(&marker, &e))
     }

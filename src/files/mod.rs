@@ -179,7 +179,7 @@ mod tests {
         assert_eq!(names(&folder), [".0.taut.tmp", ".1.taut.tmp", "a.txt"]);
         assert_eq!(fs::read(folder.join("a.txt")).unwrap(), b"old");
         assert_eq!(batch.names().unwrap(), [Path::new("a.txt"), Path::new("plots/b.svg")]);
-        batch.place().unwrap();
+        batch.place(&[]).unwrap();
         drop((batch, other));
         assert_eq!(names(&folder), ["a.txt", "plots"]);
         assert_eq!(fs::read(folder.join("a.txt")).unwrap(), b"new");
@@ -196,7 +196,7 @@ mod tests {
         write_atomically(batch.path("a.txt"), "new").unwrap();
         fs::create_dir(batch.path("plots")).unwrap();
         write_atomically(batch.path("plots/b.svg"), "new").unwrap();
-        let error = batch.place().unwrap_err();
+        let error = batch.place(&[]).unwrap_err();
         assert!(error.to_string().contains("plots"), "{error}");
         drop(batch);
         assert!(fs::read_to_string(folder.join(MARKER)).unwrap().contains("the same command"));

@@ -6,23 +6,19 @@ mod posterior;
 pub mod table;
 
 use crate::args::Fit as Args;
+use crate::command::{Finished, Remark, Report};
 use crate::failure::{Failure, Outcome, Status};
 use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
+use crate::progress::Progress;
 use crate::terminal;
-use indicatif::ProgressBar;
-use std::io::IsTerminal;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use taut::Result;
-use taut::case::Case;
-use taut::files::write_atomically;
+use taut::case::{Case, Plan};
 use taut::fit::{Ending, Fit, Posterior, Profile, fit, profiles};
 use taut::json;
 use taut::solve::Flow;
 use taut::trajectory::CsvWriter;
-
-/// How long a fit may take before its progress is shown.
-const PATIENCE: Duration = Duration::from_secs(1);
 
 /// What was found, and what is told of it.
 pub struct Found {
@@ -35,129 +31,88 @@ pub struct Found {
 
 /// Reads the case, fits, writes, tells.
 pub fn run(args: &Args) -> Outcome {
-    let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
-    let case = Case::read_with(&args.case, &changes)?;
+    let common = &args.common;
+    let case = common.case(&args.case)?;
     let plan = case.fit_plan(&args.case)?;
-    let folder = match &args.out {
-        Some(root) => {
-            let folder = Folder::create(root, folder::inputs(&args.case, &case), names(args))?;
-            folder::leading(&case, folder.root())?;
-            Some(folder)
-        }
-        None => None,
-    };
+    let folder = Folder::wanted(common, || folder::inputs(&args.case, &case), names(args))?;
+    if let Some(folder) = &folder {
+        folder::leading(&case, folder.root())?;
+    }
     let interrupt = Interrupt::listen();
     let begin = Instant::now();
-    let mut progress = Progress::new(!args.quiet);
-    let is_stopped = || interrupt.signal().is_some();
-    let fit = fit(&case, &plan, Some(&is_stopped), &mut |cost| {
-        progress.show(cost, begin);
+    let Some(found) = find(args, &case, &plan, &interrupt)? else {
+        terminal::show_error(&"interrupted before the search began; nothing was written");
+        return Ok(Status::Interrupted(interrupt.signal().unwrap_or_default()));
+    };
+    let took = begin.elapsed();
+    let fit = &found.fit;
+    let json = json::fit(&case, fit, &found.profiles, found.drawn.as_ref().map(json::posterior));
+    let advice = "add --out DIR for fitted.toml, fit.json and a report";
+    let mut finished = Finished::new(("fit.json", json::text(&json)), table::text(&case, &found, took), advice);
+    if let Some(folder) = &folder {
+        let text = fit.case_text(&case, &args.case)?;
+        let text = folder::leading(&Case::from_text(&args.case, &text)?, folder.root())?;
+        if let Some(drawn) = &found.drawn {
+            write_draws(folder, drawn).map_err(Failure::work)?;
+        }
+        if !common.no_report {
+            finished.report = Some(Report { page: page::page(&case, &found, &text), pictures: Vec::new() });
+        }
+        finished.files.push(("fitted.toml".into(), text));
+    }
+    if args.posterior && found.drawn.is_none() {
+        let told = "interrupted before the first draw: there is no posterior";
+        finished.remarks.push(Remark::Error(told.into()));
+    }
+    finished.status = match (interrupt.signal(), found.fit.ending) {
+        (Some(signal), _) => Status::Interrupted(signal),
+        (None, _) if found.drawn.is_some_and(|drawn| !drawn.doubts().is_empty()) => Status::Incomplete,
+        (None, Ending::Converged | Ending::Stalled) => Status::Done,
+        (None, _) => Status::Incomplete,
+    };
+    finished.finish(common, folder)
+}
+
+/// The search, then profiles and draws where they are wanted; Ctrl-C leaves out the rest. None where it came before any result.
+fn find(args: &Args, case: &Case, plan: &Plan, interrupt: &Interrupt) -> Result<Option<Found>> {
+    let (common, is_stopped) = (&args.common, || interrupt.signal().is_some());
+    let (progress, mut steps) = (Progress::new("simulating the logs", None, common.quiet), 0);
+    let fit = fit(case, plan, Some(&is_stopped), &mut |cost| {
+        steps += 1;
+        progress.tell(|| format!("step {steps}, cost {cost:.6e}"));
         if is_stopped() { Flow::Stop } else { Flow::Continue }
     });
-    let fit = match (fit, interrupt.signal()) {
+    let fit = match fit {
         // Simulations that were ended early say that the model does not get through the logs.
-        (Err(_), Some(signal)) => {
-            progress.clear();
-            terminal::show_error(&"interrupted before the search began; nothing was written");
-            return Ok(Status::Interrupted(signal));
-        }
-        (fit, _) => fit?,
+        Err(_) if is_stopped() => return Ok(None),
+        fit => fit?,
     };
-    let shown = args.out.is_some() && !args.no_report && !is_stopped();
-    progress.say("profiles of the parameters; Ctrl-C leaves out the rest", begin);
-    let profiles = match shown.then(|| profiles(&case, &plan, &fit, Some(&is_stopped))) {
+    progress.tell(|| "profiles of the parameters".into());
+    let profiles = match (common.reports() && !is_stopped()).then(|| profiles(case, plan, &fit, Some(&is_stopped))) {
         Some(Err(_)) if is_stopped() => Vec::new(),
         Some(profiles) => profiles?,
         None => Vec::new(),
     };
     progress.clear();
     let drawn = match args.posterior && !is_stopped() {
-        true => match posterior::draw(args, &case, &plan, &fit, &interrupt) {
+        true => match posterior::draw(args, case, plan, &fit, interrupt) {
             Err(_) if is_stopped() => None,
             drawn => Some(drawn?).filter(|drawn| drawn.count() > 0),
         },
         false => None,
     };
-    if args.posterior && drawn.is_none() {
-        terminal::show_error(&"interrupted before the first draw: there is no posterior");
-    }
-    let found = Found { fit, profiles, drawn };
-    let took = begin.elapsed();
-    let json = json::text(&json::fit(&case, &found.fit, &found.profiles, found.drawn.as_ref().map(json::posterior)));
-    let mut written = Vec::new();
-    if let Some(folder) = &folder {
-        written = write(args, folder, &case, &found, &json).map_err(Failure::work)?;
-        folder.place()?;
-    }
-    if args.json {
-        terminal::show(&json);
-    } else if !args.quiet {
-        terminal::show(&table::text(&case, &found, took, args.out.as_deref(), &written));
-    }
-    Ok(match (interrupt.signal(), found.fit.ending) {
-        (Some(signal), _) => Status::Interrupted(signal),
-        (None, _) if found.drawn.is_some_and(|drawn| !drawn.doubts().is_empty()) => Status::Incomplete,
-        (None, Ending::Converged | Ending::Stalled) => Status::Done,
-        (None, _) => Status::Incomplete,
-    })
+    Ok(Some(Found { fit, profiles, drawn }))
 }
 
 /// The files that will be written.
 fn names(args: &Args) -> impl Iterator<Item = &'static str> {
-    let report = (!args.no_report).then_some("report.html");
+    let report = (!args.common.no_report).then_some("report.html");
     ["fitted.toml", "fit.json"].into_iter().chain(args.posterior.then_some("posterior.csv")).chain(report)
 }
 
-/// Writes the files; returns their names.
-fn write(args: &Args, folder: &Folder, case: &Case, found: &Found, json: &str) -> Result<Vec<&'static str>> {
-    let text = found.fit.case_text(case, &args.case)?;
-    let text = folder::leading(&Case::from_text(&args.case, &text)?, folder.root())?;
-    write_atomically(folder.path("fitted.toml"), &text)?;
-    write_atomically(folder.path("fit.json"), json)?;
-    let mut names = vec!["fitted.toml", "fit.json"];
-    if let Some(drawn) = &found.drawn {
-        let mut writer = CsvWriter::create(folder.path("posterior.csv"))?;
-        writer.write(&drawn.table())?;
-        writer.finish()?;
-        names.push("posterior.csv");
-    }
-    if !args.no_report {
-        page::page(case, found, &text).write(folder.path("report.html"))?;
-        names.push("report.html");
-    }
-    Ok(names)
-}
-
-/// What is shown of a fit that takes longer than one likes to wait.
-struct Progress {
-    bar: Option<ProgressBar>,
-    wanted: bool,
-    steps: u64,
-}
-
-impl Progress {
-    fn new(wanted: bool) -> Self {
-        Self { bar: None, wanted: wanted && std::io::stderr().is_terminal(), steps: 0 }
-    }
-
-    fn show(&mut self, cost: f64, begin: Instant) {
-        self.steps += 1;
-        self.say(&format!("step {}, cost {cost:.6e}; Ctrl-C keeps the best so far", self.steps), begin);
-    }
-
-    fn say(&mut self, what: &str, begin: Instant) {
-        if self.bar.is_none() && self.wanted && begin.elapsed() > PATIENCE {
-            self.bar = Some(ProgressBar::new_spinner());
-        }
-        if let Some(bar) = &self.bar {
-            bar.set_message(what.to_string());
-            bar.tick();
-        }
-    }
-
-    fn clear(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
-    }
+/// Writes the draws.
+fn write_draws(folder: &Folder, drawn: &Posterior) -> Result<()> {
+    let mut writer = CsvWriter::create(folder.path("posterior.csv"))?;
+    writer.write(&drawn.table())?;
+    writer.finish()
 }

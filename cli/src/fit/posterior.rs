@@ -1,14 +1,11 @@
 //! Draws from the posterior: made with progress, and told on the terminal and in the report.
 
-use super::{PATIENCE, figures, table};
+use super::{figures, table};
 use crate::args::Fit as Args;
 use crate::interrupt::Interrupt;
+use crate::progress::Progress;
 use crate::terminal::bold;
-use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write;
-use std::io::IsTerminal;
-use std::sync::OnceLock;
-use std::time::Instant;
 use taut::Result;
 use taut::case::{Case, Plan};
 use taut::fit::{Credible, Fit, Posterior, posterior};
@@ -25,28 +22,12 @@ const MOST_FIGURES: usize = 12;
 pub fn draw(args: &Args, case: &Case, plan: &Plan, fit: &Fit, interrupt: &Interrupt) -> Result<Posterior> {
     let effort = Effort { chains: args.chains, draws: args.draws, tune: TUNE, seed: plan.seed };
     let all = (effort.chains * (effort.tune + effort.draws)) as u64;
-    let wanted = !args.quiet && std::io::stderr().is_terminal();
-    let (begin, bar) = (Instant::now(), OnceLock::new());
+    let progress = Progress::new("draws; Ctrl-C keeps those there are", Some(all), args.common.quiet);
     let watch = |made: usize| {
-        if wanted && begin.elapsed() > PATIENCE {
-            bar.get_or_init(|| shown(all)).set_position(made as u64);
-        }
+        progress.set(made as u64);
         interrupt.signal().is_none()
     };
-    let drawn = posterior(case, plan, fit, effort, &watch);
-    if let Some(bar) = bar.get() {
-        bar.finish_and_clear();
-    }
-    drawn
-}
-
-fn shown(all: u64) -> ProgressBar {
-    let bar = ProgressBar::new(all);
-    if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {percent} %, {eta} left") {
-        bar.set_style(style);
-    }
-    bar.set_message("draws; Ctrl-C keeps those there are");
-    bar
+    posterior(case, plan, fit, effort, &watch)
 }
 
 /// How it ended, in a sentence.

@@ -3,14 +3,13 @@
 use super::{Found, posterior};
 use crate::terminal::bold;
 use std::fmt::Write;
-use std::path::Path;
 use std::time::Duration;
 use taut::case::Case;
 use taut::fit::{Ending, Estimate, Fit, Profile, Score};
 use taut::number;
 
 /// The text on the terminal.
-pub fn text(case: &Case, found: &Found, took: Duration, out: Option<&Path>, written: &[&str]) -> String {
+pub fn text(case: &Case, found: &Found, took: Duration) -> String {
     let fit = &found.fit;
     let mut text = format!("{}\n", bold(&case.title));
     let _ = writeln!(text, "{}", ending(fit));
@@ -45,12 +44,6 @@ pub fn text(case: &Case, found: &Found, took: Duration, out: Option<&Path>, writ
         fit.work.simulations,
         plain(&number::engineering(took.as_secs_f64(), "s", 3)),
     );
-    match out {
-        Some(folder) => {
-            let _ = writeln!(text, "wrote in {}: {}", folder.display(), written.join("  "));
-        }
-        None => text.push_str("nothing was written: add --out DIR for fitted.toml, fit.json and a report\n"),
-    }
     text
 }
 

@@ -6,44 +6,42 @@ mod page;
 mod table;
 
 use crate::args::{BodyName, HoldName, Modes as Args};
-use crate::failure::{Failure, Outcome, Status};
+use crate::command::{Finished, Report};
+use crate::failure::Outcome;
 use crate::folder::{self, Folder};
-use crate::simulate::plots;
-use crate::terminal;
 use std::f64::consts::PI;
 use std::fmt::Write;
-use taut::Result;
 use taut::case::{Case, Opened};
-use taut::files::write_atomically;
 use taut::json;
 use taut::linear::{Analysis, Hold, Question};
 use taut::stage::BeltModel;
 
 /// Reads the case, linearises, writes, tells.
 pub fn run(args: &Args) -> Outcome {
-    let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
-    match Opened::read_with(&args.case, &changes)? {
+    match args.common.open(&args.case)? {
         Opened::Axis(case) => axis(args, &case),
         Opened::Gantry(case) => gantry::run(args, &case),
     }
 }
 
 fn axis(args: &Args, case: &Case) -> Outcome {
+    let common = &args.common;
     let analysis = Analysis::of(case, &question(args))?;
-    let json = json::text(&json::modes(&analysis));
-    let mut written = Vec::new();
-    if let Some(folder) = &args.out {
-        let names = ["modes.json", "frequency-response.csv", "report.html"];
-        let folder = Folder::create(folder, folder::inputs(&args.case, case), names)?;
-        written = write(&analysis, args, &folder, &json).map_err(Failure::work)?;
-        folder.place()?;
+    let names = ["modes.json", "frequency-response.csv", "report.html"];
+    let folder = Folder::wanted(common, || folder::inputs(&args.case, case), names)?;
+    let advice = "add --out DIR for matrices, frequency response and a report";
+    let json = ("modes.json", json::text(&json::modes(&analysis)));
+    let mut finished = Finished::new(json, table::text(&analysis), advice);
+    if common.out.is_some() {
+        finished.files.push(("frequency-response.csv".into(), csv(&analysis)));
     }
-    if args.json {
-        terminal::show(&json);
-    } else if !args.quiet {
-        terminal::show(&table::text(&analysis, args.out.as_deref(), &written));
+    if common.reports() {
+        let figures = figures::all(&analysis);
+        let page = page::page(&analysis, &figures);
+        let pictures = figures.into_iter().map(|(name, figure)| (name.to_string(), figure.into()));
+        finished.report = Some(Report { page, pictures: pictures.collect() });
     }
-    Ok(Status::Done)
+    finished.finish(common, folder)
 }
 
 /// What the command line asks.
@@ -79,23 +77,6 @@ pub fn along(analysis: &Analysis) -> &'static str {
                  (belt.modulus, section, spans and follows_cart = true make them follow the cart)"
         }
     }
-}
-
-/// Writes the files; returns their names.
-fn write(analysis: &Analysis, args: &Args, folder: &Folder, json: &str) -> Result<Vec<&'static str>> {
-    write_atomically(folder.path("modes.json"), json)?;
-    write_atomically(folder.path("frequency-response.csv"), csv(analysis))?;
-    let mut names = vec!["modes.json", "frequency-response.csv"];
-    if !args.no_report {
-        let figures = figures::all(analysis);
-        page::page(analysis, &figures).write(folder.path("report.html"))?;
-        folder.make("plots")?;
-        for (name, figure) in &figures {
-            plots::write_both(&folder.path("plots").join(name), figure)?;
-        }
-        names.extend(["report.html", "plots/"]);
-    }
-    Ok(names)
 }
 
 /// The response of every output: magnitude as it is and in dB, phase in degrees.

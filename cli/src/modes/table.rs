@@ -5,7 +5,6 @@ use crate::terminal::bold;
 use nalgebra::Complex;
 use std::f64::consts::PI;
 use std::fmt::Write;
-use std::path::Path;
 use taut::linear::Analysis;
 use taut::linear::{Discrete, Place, Root, Transfer};
 use taut::number::{ascii, engineering_ascii};
@@ -14,7 +13,7 @@ use taut::number::{ascii, engineering_ascii};
 const ROWS: usize = 7;
 
 /// The text on the terminal.
-pub fn text(analysis: &Analysis, folder: Option<&Path>, written: &[&str]) -> String {
+pub fn text(analysis: &Analysis) -> String {
     let system = &analysis.system;
     let mut text = format!("{}\n", bold(&analysis.case.title));
     let names: Vec<String> = system.states.iter().map(|state| words(state.name)).collect();
@@ -41,12 +40,7 @@ pub fn text(analysis: &Analysis, folder: Option<&Path>, written: &[&str]) -> Str
     if let Some(model) = &analysis.discrete {
         discrete(&mut text, model);
     }
-    match folder {
-        Some(folder) => {
-            let _ = write!(text, "\nwrote in {}:\n  {}\n", folder.display(), written.join("  "));
-        }
-        None => text.push_str("\nnothing was written: add --out DIR for matrices, frequency response and a report\n"),
-    }
+    text.push('\n');
     text
 }
 

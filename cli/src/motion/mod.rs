@@ -5,12 +5,12 @@ mod page;
 mod table;
 
 use crate::args::Move as Args;
+use crate::command::{Finished, Remark, Report};
 use crate::failure::{Failure, Outcome, Status};
 use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
 use crate::simulate::plots;
 use crate::simulate::table::early_end;
-use crate::terminal;
 use figures::Curves;
 use std::fmt::Write;
 use std::path::Path;
@@ -49,18 +49,16 @@ pub struct Tried<'a> {
 
 /// Reads the cases, runs their moves, reports.
 pub fn run(args: &Args) -> Outcome {
-    let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
-    let cases: Vec<Case> = args.case.iter().map(|path| Case::read_with(path, &changes)).collect::<Result<_>>()?;
-    if cases.len() > 1 && args.out.is_some() {
+    let common = &args.common;
+    let cases: Vec<Case> = args.case.iter().map(|path| common.case(path)).collect::<Result<_>>()?;
+    if cases.len() > 1 && common.out.is_some() {
         return Err(Error::new("--out takes the results of one case")
             .in_file("--out")
             .next("name one case, or leave --out out")
             .into());
     }
-    let folder = match (&args.out, &cases[..], &args.case[..]) {
-        (Some(root), [case], [path]) => {
-            Some(Folder::create(root, folder::inputs(path, case), names(args, case, path)?)?)
-        }
+    let folder = match (&cases[..], &args.case[..]) {
+        ([case], [path]) => Folder::wanted(common, || folder::inputs(path, case), names(args, case, path)?)?,
         _ => None,
     };
     let interrupt = Interrupt::listen();
@@ -76,23 +74,23 @@ pub fn run(args: &Args) -> Outcome {
         }
         tried.push(Tried { case, design, done });
     }
-    let json = match &tried[..] {
-        [one] => json::text(&told(one)),
-        several => json::text(&several.iter().map(told).collect::<Vec<_>>()),
+    let (json, text, advice) = match &tried[..] {
+        [one] => (json::text(&told(one)), table::text(one), "add --out DIR for files and a report"),
+        several => (json::text(&several.iter().map(told).collect::<Vec<_>>()), table::comparison(several), ""),
     };
+    let mut finished = Finished::new(("summary.json", json), text, advice);
     if let (Some(folder), [tried]) = (&folder, &tried[..]) {
-        write(folder, tried, args, &json).map_err(Failure::work)?;
-        folder.place()?;
-    }
-    if args.json {
-        terminal::show(&json);
-    } else if !args.quiet {
-        match &tried[..] {
-            [one] => terminal::show(&table::text(one, folder.as_ref())),
-            several => terminal::show(&table::comparison(several)),
+        let text = folder.bring_inputs(tried.case).map_err(Failure::work)?;
+        if !common.no_report {
+            let figures: Vec<_> = tried.done.iter().map(figures::figures).collect();
+            let page = page::page(tried, &text, &figures);
+            let names = tried.done.iter().map(|done| done.motion.file_name());
+            finished.report = Some(Report { page, pictures: plots::named(names, figures) });
         }
+        finished.files.push(("case.toml".into(), text));
     }
-    Ok(status(&tried, &interrupt))
+    (finished.status, finished.remarks) = status(&tried, &interrupt);
+    finished.finish(common, folder)
 }
 
 /// The files that will be written, but for plots.
@@ -100,7 +98,7 @@ fn names(args: &Args, case: &Case, path: &Path) -> Result<Vec<String>> {
     let (_, moves) = case.moves_named(path, &args.moves)?;
     let tables = ["csv", "events.csv", "samples.csv"];
     let tables = moves.iter().flat_map(|one| tables.map(|ending| format!("{}.{ending}", one.file_name())));
-    let report = (!args.no_report).then(|| "report.html".to_string());
+    let report = (!args.common.no_report).then(|| "report.html".to_string());
     let common = ["summary.json", "case.toml"].map(str::to_string);
     Ok(tables.chain(common).chain(report).chain(folder::brought(case).into_values()).collect())
 }
@@ -127,7 +125,7 @@ fn one<'a>(
     let name = motion.file_name();
     let writer = folder.map(|folder| CsvWriter::create(folder.path(format!("{name}.csv")))).transpose();
     let mut writer = writer.map_err(Failure::work)?;
-    let mut curves = folder.is_some().then(|| Curves::new(stage)).filter(|_| !args.no_report);
+    let mut curves = folder.is_some().then(|| Curves::new(stage)).filter(|_| !args.common.no_report);
     let mut trouble = None;
     let solver = Solver::of(stage);
     let mut take = |block: &Trajectory| {
@@ -169,33 +167,17 @@ fn write_samples(folder: &Folder, name: &str, case: &Case, run: &MoveRun) -> Res
     Ok(name)
 }
 
-/// What belongs to all moves: summary, case, report and plots.
-fn write(folder: &Folder, tried: &Tried, args: &Args, json: &str) -> Result<()> {
-    write_atomically(folder.path("summary.json"), json)?;
-    let text = folder.bring_inputs(tried.case)?;
-    write_atomically(folder.path("case.toml"), &text)?;
-    if args.no_report {
-        return Ok(());
-    }
-    let figures: Vec<_> = tried.done.iter().map(figures::figures).collect();
-    page::page(tried, &text, &figures).write(folder.path("report.html"))?;
-    folder.make("plots")?;
-    let names: Vec<String> = tried.done.iter().map(|done| done.motion.file_name()).collect();
-    plots::write_all(&folder.path("plots"), &names, &figures)
-}
-
 /// How it ended, and a word about every move that did not reach its end.
-fn status(tried: &[Tried], interrupt: &Interrupt) -> Status {
-    let mut complete = true;
-    for done in tried.iter().flat_map(|tried| &tried.done) {
-        if let Some(told) = early_end(&done.run.outcome.ending) {
-            terminal::show_error(&format!("the move \"{}\" {told}", done.motion.name));
-            complete = false;
-        }
-    }
-    match interrupt.signal() {
+fn status(tried: &[Tried], interrupt: &Interrupt) -> (Status, Vec<Remark>) {
+    let early = |done: &Done| {
+        let told = early_end(&done.run.outcome.ending)?;
+        Some(Remark::Error(format!("the move \"{}\" {told}", done.motion.name)))
+    };
+    let remarks: Vec<Remark> = tried.iter().flat_map(|tried| &tried.done).filter_map(early).collect();
+    let status = match interrupt.signal() {
         Some(signal) => Status::Interrupted(signal),
-        None if complete => Status::Done,
+        None if remarks.is_empty() => Status::Done,
         None => Status::Incomplete,
-    }
+    };
+    (status, remarks)
 }

@@ -1,7 +1,6 @@
 //! The key figures for people.
 
 use super::{Done, Tried};
-use crate::folder::Folder;
 use crate::simulate::table::{early_end, plain, time, value};
 use crate::terminal::bold;
 use std::fmt::Write;
@@ -62,7 +61,7 @@ pub fn controller(design: &Design, stage: &Stage) -> String {
 }
 
 /// Text on the terminal for one case.
-pub fn text(tried: &Tried, folder: Option<&Folder>) -> String {
+pub fn text(tried: &Tried) -> String {
     let mut text = format!("{}\n{}\n", bold(&tried.case.title), controller(tried.design, &tried.case.stage));
     for done in &tried.done {
         let _ = write!(text, "\n{}\n", bold(&done.motion.name));
@@ -74,20 +73,6 @@ pub fn text(tried: &Tried, folder: Option<&Folder>) -> String {
         }
     }
     text.push('\n');
-    match folder {
-        None => text.push_str("nothing was written: add --out DIR for files and a report\n"),
-        Some(folder) => {
-            let _ = writeln!(text, "wrote in {}:", folder.shown());
-            for done in &tried.done {
-                let _ = writeln!(text, "  {}", done.files.join("  "));
-            }
-            text.push_str("  summary.json  case.toml");
-            if tried.done.iter().any(|done| done.curves.is_some()) {
-                text.push_str("  report.html  plots/");
-            }
-            text.push('\n');
-        }
-    }
     text
 }
 

@@ -6,17 +6,15 @@ mod page;
 mod table;
 
 use crate::args::{AxisName, MotorName, Shape as Args};
-use crate::failure::{Failure, Outcome, Status};
+use crate::command::{Finished, Report};
+use crate::failure::Outcome;
 use crate::folder::Folder;
-use crate::simulate::plots;
-use crate::terminal;
 use std::path::{Path, PathBuf};
-use taut::case::Case;
 use taut::control::compare::{Comparison, compare};
 use taut::control::resonance::{Drive, Resonance, resonances};
 use taut::control::shaping::{Choice, Criterion, Target, choose};
 use taut::control::spectrum::{Axis, Spectrum};
-use taut::files::{Inputs, write_atomically};
+use taut::files::Inputs;
 use taut::log::read_accelerometer;
 use taut::{Error, Result};
 
@@ -56,20 +54,18 @@ pub fn run(args: &Args) -> Outcome {
         _ => None,
     };
     let found = Findings { each, comparison };
-    let json = json::text(&found);
-    let mut written = Vec::new();
-    if let Some(folder) = &args.out {
-        let inputs = Inputs::new(found.each.iter().flat_map(|one| std::iter::once(&one.file).chain(&one.also)));
-        let folder = Folder::create(folder, inputs, ["shape.json", "report.html"])?;
-        written = write(args, &folder, &found, &json).map_err(Failure::work)?;
-        folder.place()?;
+    let common = &args.common;
+    let inputs = || Inputs::new(found.each.iter().flat_map(|one| std::iter::once(&one.file).chain(&one.also)));
+    let folder = Folder::wanted(common, inputs, ["shape.json", "report.html"])?;
+    let advice = "add --out DIR for a report, pictures and shape.json";
+    let mut finished = Finished::new(("shape.json", json::text(&found)), table::text(&found), advice);
+    if common.reports() {
+        let figures = figures::figures(&found);
+        let page = page::page(&found, &figures);
+        let pictures = figures.into_iter().map(|(name, figure)| (name, figure.into())).collect();
+        finished.report = Some(Report { page, pictures });
     }
-    if args.json {
-        terminal::show(&json);
-    } else if !args.quiet {
-        terminal::show(&table::text(&found, args.out.as_deref(), &written));
-    }
-    Ok(Status::Done)
+    finished.finish(common, folder)
 }
 
 fn find(args: &Args, file: &Path) -> Result<Found> {
@@ -110,8 +106,7 @@ fn model(args: &Args, file: &Path) -> Result<(Source, Vec<PathBuf>)> {
         let error = Error::new("a case file has no accelerometer").in_file("--axis");
         return Err(error.next("leave --axis out, or give a spectrum"));
     }
-    let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
-    let case = Case::read_with(file, &changes)?;
+    let case = args.common.case(file)?;
     let drive = match args.motor {
         Some(MotorName::Free) => Drive::Free,
         Some(MotorName::Held) | None => Drive::Held,
@@ -123,7 +118,7 @@ fn model(args: &Args, file: &Path) -> Result<(Source, Vec<PathBuf>)> {
 
 fn measured(args: &Args, file: &Path) -> Result<Source> {
     let only_models = [
-        ("--set", !args.changes.is_empty()),
+        ("--set", !args.common.changes.is_empty()),
         ("--motor", args.motor.is_some()),
         ("--uncertainty", args.uncertainty.is_some()),
     ];
@@ -145,24 +140,6 @@ fn measured(args: &Args, file: &Path) -> Result<Source> {
         return Err(error.next("choose another axis, or leave --axis out"));
     }
     Ok(Source::Spectrum(spectrum))
-}
-
-/// Writes the files; returns their names.
-fn write(args: &Args, folder: &Folder, found: &Findings, json: &str) -> Result<Vec<String>> {
-    write_atomically(folder.path("shape.json"), json)?;
-    let mut names = vec!["shape.json".to_string()];
-    if args.no_report {
-        return Ok(names);
-    }
-    let figures = figures::figures(found);
-    for (name, figure) in &figures {
-        plots::write_both(&folder.path(name), figure)?;
-        names.push(format!("{name}.svg"));
-        names.push(format!("{name}.png"));
-    }
-    page::page(found, &figures).write(folder.path("report.html"))?;
-    names.push("report.html".into());
-    Ok(names)
 }
 
 impl Found {

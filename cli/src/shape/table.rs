@@ -3,11 +3,10 @@
 use super::{Findings, Found};
 use crate::terminal::bold;
 use std::fmt::Write;
-use std::path::Path;
 use taut::control::shaping::Fitted;
 
 /// The text on the terminal.
-pub fn text(found: &Findings, out: Option<&Path>, written: &[String]) -> String {
+pub fn text(found: &Findings) -> String {
     let mut text = String::new();
     for one in &found.each {
         let _ = write!(text, "{}\n{}\n\n", bold(&one.name()), one.told());
@@ -22,12 +21,6 @@ pub fn text(found: &Findings, out: Option<&Path>, written: &[String]) -> String 
             let _ = writeln!(text, "{sentence}");
         }
         text.push('\n');
-    }
-    match out {
-        Some(folder) => {
-            let _ = writeln!(text, "wrote in {}: {}", folder.display(), written.join("  "));
-        }
-        None => text.push_str("nothing was written: add --out DIR for a report, pictures and shape.json\n"),
     }
     text
 }

@@ -12,44 +12,43 @@ pub mod table;
 pub use gantry::machine as gantry_machine;
 
 use crate::args::{Format, Simulate};
+use crate::command::{Finished, Remark, Report};
 use crate::failure::{Failure, Outcome, Status};
 use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
-use crate::terminal;
 use run::{Run, Setting};
 use taut::case::{Case, Opened};
-use taut::files::write_atomically;
 use taut::json::{self, Simulation};
 use taut::solve::{self, Ending, Solver};
 use taut::stage::Stage;
 use taut::{Error, Result};
 
+/// What a user gets by writing it.
+const ADVICE: &str = "add --out DIR for files and a report";
+
 /// Reads the case, simulates, measures, reports.
 pub fn run(args: &Simulate) -> Outcome {
-    let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
-    match Opened::read_with(&args.case, &changes)? {
+    match args.common.open(&args.case)? {
         Opened::Axis(case) => axis(args, &case),
         Opened::Gantry(case) => gantry::run(args, &case),
     }
 }
 
 fn axis(args: &Simulate, case: &Case) -> Outcome {
+    let common = &args.common;
     let solver = args.solver(&case.stage)?;
     let experiments = case.experiments_named(&args.case, &args.experiments)?;
     if args.as_measured {
         measurable(case, solver, args)?;
     }
     let machines = machines(case, args)?;
-    let mut inputs = folder::inputs(&args.case, case);
-    args.draws.iter().for_each(|file| inputs.add(file));
-    let create = |root| {
-        Folder::create(
-            root,
-            inputs,
-            names(args, folder::brought(case).into_values(), experiments.iter().map(|one| one.file_name())),
-        )
+    let inputs = || {
+        let mut inputs = folder::inputs(&args.case, case);
+        args.draws.iter().for_each(|file| inputs.add(file));
+        inputs
     };
-    let folder = args.out.as_deref().map(create).transpose()?;
+    let files = names(args, folder::brought(case).into_values(), experiments.iter().map(|one| one.file_name()));
+    let folder = Folder::wanted(common, inputs, files)?;
     let interrupt = Interrupt::listen();
     let setting = Setting { args, case, solver, folder: folder.as_ref(), interrupt: &interrupt, machines: &machines };
 
@@ -61,18 +60,21 @@ fn axis(args: &Simulate, case: &Case) -> Outcome {
         }
     }
     let told: Vec<_> = runs.iter().map(Run::told).collect();
-    let summary = json::text(&Simulation::new(case, solver, &told));
+    let json = ("summary.json", json::text(&Simulation::new(case, solver, &told)));
+    let mut finished = Finished::new(json, table::text(case, solver, &runs), ADVICE);
     if let Some(folder) = &folder {
-        write(folder, &setting, &summary, &runs).map_err(Failure::work)?;
-        folder.place()?;
-    }
-    if args.json {
-        terminal::show(&summary);
-    } else if !args.quiet {
-        terminal::show(&table::text(case, solver, &runs, folder.as_ref()));
+        let text = folder.bring_inputs(case).map_err(Failure::work)?;
+        if !common.no_report {
+            let figures: Vec<_> = runs.iter().map(|run| plots::figures(case, run)).collect();
+            let page = page::page(case, &text, solver, &runs, &figures);
+            let names = runs.iter().map(|run| run.experiment.file_name());
+            finished.report = Some(Report { page, pictures: plots::named(names, figures) });
+        }
+        finished.files.push(("case.toml".into(), text));
     }
     let ended: Vec<Ended> = runs.iter().map(Run::ended).collect();
-    Ok(status(&ended, solver, &interrupt))
+    (finished.status, finished.remarks) = status(&ended, solver, &interrupt);
+    finished.finish(common, folder)
 }
 
 /// The files that will be written, but for plots: `brought` are those of the case's inputs, `experiments` the names of the runs' own.
@@ -92,24 +94,9 @@ fn names(
         ending => ending == "events.csv",
     });
     let tables = endings.flat_map(|ending| experiments.iter().map(move |one| format!("{one}.{ending}")));
-    let report = (!args.no_report).then(|| "report.html".to_string());
+    let report = (!args.common.no_report).then(|| "report.html".to_string());
     let common = ["summary.json", "case.toml"].map(str::to_string);
     tables.chain(common).chain(report).chain(brought).collect()
-}
-
-/// What belongs to all experiments: summary, case, report and plots.
-fn write(folder: &Folder, setting: &Setting, summary: &str, runs: &[Run]) -> Result<()> {
-    let case = setting.case;
-    write_atomically(folder.path("summary.json"), summary)?;
-    let text = folder.bring_inputs(case)?;
-    write_atomically(folder.path("case.toml"), &text)?;
-    if setting.args.no_report {
-        return Ok(());
-    }
-    let figures: Vec<_> = runs.iter().map(|run| plots::figures(case, run)).collect();
-    page::page(case, &text, setting.solver, runs, &figures).write(folder.path("report.html"))?;
-    folder.make("plots")?;
-    plots::write(&folder.path("plots"), runs, &figures)
 }
 
 /// The machines of --draws.
@@ -150,7 +137,8 @@ pub struct Ended<'a> {
 }
 
 /// How it ended, and a word about every run that did not reach its end.
-fn status(runs: &[Ended], solver: Solver, interrupt: &Interrupt) -> Status {
+fn status(runs: &[Ended], solver: Solver, interrupt: &Interrupt) -> (Status, Vec<Remark>) {
+    let mut remarks = Vec::new();
     for Ended { name, outcome, early } in runs {
         if let Some(told) = early {
             let advice = match (outcome.ending, solver) {
@@ -158,16 +146,15 @@ fn status(runs: &[Ended], solver: Solver, interrupt: &Interrupt) -> Status {
                 (Ending::Diverged { .. }, Solver::General { .. }) => "; a smaller --tolerance may help",
                 _ => "",
             };
-            terminal::show_error(&format!("the run \"{name}\" {told}{advice}"));
+            remarks.push(Remark::Error(format!("the run \"{name}\" {told}{advice}")));
         }
-        if let Some(told) = table::hidden(name, outcome) {
-            terminal::show_warning(&told);
-        }
+        remarks.extend(table::hidden(name, outcome).map(Remark::Warning));
     }
     let relied = |run: &Ended| run.outcome.ending == Ending::Complete && table::hidden(run.name, run.outcome).is_none();
-    match interrupt.signal() {
+    let status = match interrupt.signal() {
         Some(signal) => Status::Interrupted(signal),
         None if runs.iter().all(relied) => Status::Done,
         None => Status::Incomplete,
-    }
+    };
+    (status, remarks)
 }

@@ -2,12 +2,9 @@
 
 use super::curves::{Curves, Samples};
 use super::run::Run;
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use taut::Result;
 use taut::case::Case;
 use taut::stage::AmplifierMode;
-use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
+use taut_report::{Axis, Colour, Figure, Panel, Picture, Series, Style};
 
 /// A figure and its name in file names.
 pub type Named = (&'static str, Figure);
@@ -112,45 +109,10 @@ impl Plot<'_> {
     }
 }
 
-/// Writes a figure as SVG and PNG. Names may hold points: endings are added, not replaced.
-pub fn write_both(path: &Path, figure: &Figure) -> Result<()> {
-    let with = |ending: &str| {
-        let mut whole = path.as_os_str().to_os_string();
-        whole.push(ending);
-        PathBuf::from(whole)
-    };
-    figure.write_svg(with(".svg"))?;
-    figure.write_png(with(".png"))
-}
-
-/// Writes every figure as SVG and PNG.
-pub fn write(folder: &Path, runs: &[Run], figures: &[Vec<Named>]) -> Result<()> {
-    let names: Vec<String> = runs.iter().map(|run| run.experiment.file_name()).collect();
-    write_all(folder, &names, figures)
-}
-
-/// The same for figures of runs of these names, on all processors.
-pub fn write_all(folder: &Path, runs: &[String], figures: &[Vec<Named>]) -> Result<()> {
-    let mut jobs = Vec::new();
-    for (run, figures) in runs.iter().zip(figures) {
-        for (name, figure) in figures {
-            jobs.push((folder.join(format!("{run}-{name}")), figure));
-        }
-    }
-    let next = AtomicUsize::new(0);
-    let work = || -> Result<()> {
-        while let Some((path, figure)) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
-            write_both(path, figure)?;
-        }
-        Ok(())
-    };
-    let workers = std::thread::available_parallelism().map_or(1, usize::from).min(jobs.len().max(1));
-    std::thread::scope(|scope| {
-        let threads: Vec<_> = (1..workers).map(|_| scope.spawn(work)).collect();
-        let mine = work();
-        threads.into_iter().fold(mine, |done, thread| match thread.join() {
-            Ok(theirs) => done.and(theirs),
-            Err(panic) => std::panic::resume_unwind(panic),
-        })
-    })
+/// The figures of runs of these file names, each called after its run.
+pub fn named(runs: impl Iterator<Item = String>, figures: Vec<Vec<Named>>) -> Vec<(String, Picture)> {
+    let named = runs.zip(figures).flat_map(|(run, figures)| {
+        figures.into_iter().map(move |(name, figure)| (format!("{run}-{name}"), figure.into()))
+    });
+    named.collect()
 }

@@ -1,17 +1,11 @@
-//! Where rows go: files in the formats that are asked for, and a bar that tells how many there are.
+//! Where rows go: files in the formats that are asked for.
 
 use crate::args::Format;
 use crate::folder::Folder;
-use indicatif::{ProgressBar, ProgressStyle};
-use std::io::IsTerminal;
-use std::time::{Duration, Instant};
 use taut::Result;
 #[cfg(feature = "parquet")]
 use taut::trajectory::ParquetWriter;
 use taut::trajectory::{CsvWriter, Trajectory};
-
-/// How long a run may take before its progress is shown.
-const PATIENCE: Duration = Duration::from_secs(1);
 
 /// A file in each format for the experiment of this file name; none without a folder.
 pub fn writers(folder: Option<&Folder>, name: &str, asked: &[Format]) -> Result<Vec<Writer>> {
@@ -60,46 +54,6 @@ impl Writer {
             Writer::Csv(_) => "csv",
             #[cfg(feature = "parquet")]
             Writer::Parquet(_) => "parquet",
-        }
-    }
-}
-
-/// A bar on standard error, for runs that take longer than one likes to wait.
-pub struct Progress {
-    bar: Option<ProgressBar>,
-    name: String,
-    rows: u64,
-    all: u64,
-    wanted: bool,
-}
-
-impl Progress {
-    /// Of a run of this name with so many rows.
-    pub fn new(name: &str, all: u64, quiet: bool) -> Self {
-        let wanted = !quiet && std::io::stderr().is_terminal();
-        Self { bar: None, name: name.to_string(), rows: 0, all, wanted }
-    }
-
-    /// So many more rows are there of what began then.
-    pub fn advance(&mut self, rows: u64, begin: Instant) {
-        self.rows += rows;
-        if self.bar.is_none() && self.wanted && begin.elapsed() > PATIENCE {
-            let bar = ProgressBar::new(self.all);
-            if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {percent} %, {eta} left") {
-                bar.set_style(style);
-            }
-            bar.set_message(self.name.clone());
-            self.bar = Some(bar);
-        }
-        if let Some(bar) = &self.bar {
-            bar.set_position(self.rows);
-        }
-    }
-
-    /// Takes it away.
-    pub fn clear(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
         }
     }
 }

@@ -3,12 +3,13 @@
 use super::Ended;
 use super::band::Band;
 use super::curves::{Curves, Samples};
-use super::rows::{Progress, writers};
+use super::rows::writers;
 use super::table::early_end;
 use crate::args::Simulate;
 use crate::failure::Failure;
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
+use crate::progress::Progress;
 use std::time::{Duration, Instant};
 use taut::Error;
 use taut::case::{Case, Experiment};
@@ -84,8 +85,8 @@ impl<'a> Setting<'a> {
         let stage = &self.case.stage;
         let mut writers = writers(self.folder, &experiment.file_name(), &self.args.format).map_err(Failure::work)?;
         let mut meter = Meter::new(stage, experiment);
-        let mut curves = (self.folder.is_some() && !self.args.no_report).then(|| Curves::new(stage));
-        let mut progress = Progress::new(&experiment.name, experiment.samples(), self.args.quiet);
+        let mut curves = (self.folder.is_some() && !self.args.common.no_report).then(|| Curves::new(stage));
+        let progress = Progress::new(&experiment.name, Some(experiment.samples()), self.args.common.quiet);
         let mut trouble: Option<Error> = None;
         let mut estimate = match self.solver {
             Solver::General { tolerance } => Some((ErrorEstimate::new(stage, experiment), tolerance)),
@@ -100,7 +101,7 @@ impl<'a> Setting<'a> {
                 curves.take(block);
             }
             trouble = writers.iter_mut().find_map(|writer| writer.write(block).err());
-            progress.advance(block.len() as u64, begin);
+            progress.add(block.len() as u64);
             if trouble.is_some() || self.interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue }
         };
         let mut outcome = solve::stream_observed(stage, experiment, self.solver, &mut meter, &mut take)?;

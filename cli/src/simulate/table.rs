@@ -2,7 +2,6 @@
 
 use super::band::Band;
 use super::run::Run;
-use crate::folder::Folder;
 use crate::terminal::bold;
 use std::fmt::Write;
 use std::time::Duration;
@@ -15,7 +14,7 @@ use taut::solve::{Cost, Ending, Event, Method, Outcome, PositionError, Solver};
 use taut::stage::BeltModel;
 
 /// The text on the terminal.
-pub fn text(case: &Case, solver: Solver, runs: &[Run], folder: Option<&Folder>) -> String {
+pub fn text(case: &Case, solver: Solver, runs: &[Run]) -> String {
     let mut text = format!("{}\n{}\n", bold(&case.title), solver_words(solver, runs.iter().map(|run| &run.outcome)));
     for run in runs {
         let _ = write!(text, "\n{}\n", bold(&run.experiment.name));
@@ -28,13 +27,6 @@ pub fn text(case: &Case, solver: Solver, runs: &[Run], folder: Option<&Folder>) 
         let _ = writeln!(text, "  {:<16}{}", "took", took(run.took));
     }
     text.push('\n');
-    match folder {
-        Some(folder) => {
-            let files: Vec<&[String]> = runs.iter().map(|run| &run.files[..]).collect();
-            text.push_str(&written(folder, &files, runs.iter().any(|run| run.curves.is_some())));
-        }
-        None => text.push_str("nothing was written: add --out DIR for files and a report\n"),
-    }
     text
 }
 
@@ -276,18 +268,4 @@ pub fn solver_words<'a>(solver: Solver, mut outcomes: impl Iterator<Item = &'a O
             format!("the paper's Table 3, {method}, step {}: a reproduction, not exact", value(step, "s"))
         }
     }
-}
-
-/// The files that were written; `files` are those of each run.
-pub fn written(folder: &Folder, files: &[&[String]], report: bool) -> String {
-    let mut text = format!("wrote in {}:\n", folder.shown());
-    for files in files {
-        let _ = writeln!(text, "  {}", files.join("  "));
-    }
-    text.push_str("  summary.json  case.toml");
-    if report {
-        text.push_str("  report.html  plots/");
-    }
-    text.push('\n');
-    text
 }

@@ -29,7 +29,7 @@ pub fn told(work: &Work, target: &Target, threads: usize) -> Result<(), Failure>
     let begin = Instant::now();
     let _ = work.sweep.rows(0, 1, &|| false);
     let seconds = begin.elapsed().as_secs_f64() * room.runs as f64 / threads as f64;
-    if !work.args.quiet && (room.all > NOTABLE.0 || seconds > NOTABLE.1) {
+    if !work.args.common.quiet && (room.all > NOTABLE.0 || seconds > NOTABLE.1) {
         let time = Duration::try_from_secs_f64(seconds).map_or_else(|_| "ages".to_string(), shown);
         let threads = if threads == 1 { "one thread".to_string() } else { format!("{threads} threads") };
         terminal::show_note(&format!("{}; it takes roughly {time} on {threads}", room.words()));

@@ -6,18 +6,18 @@ mod json;
 mod options;
 mod output;
 mod page;
-mod progress;
 mod store;
 mod summary;
 mod table;
 mod trajectories;
 
 use crate::args::Sweep as Args;
+use crate::command::{Finished, Report};
 use crate::failure::{Failure, Outcome, Status};
 use crate::interrupt::Interrupt;
+use crate::progress::Progress;
 use crate::terminal;
 use options::Target;
-use progress::Progress;
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
 use store::Store;
@@ -39,9 +39,8 @@ pub struct Work<'a> {
 
 /// Reads the case, runs what is not there yet, sums up, writes, tells.
 pub fn run(args: &Args) -> Outcome {
-    let changes = options::changes(args)?;
-    let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-    let case = Case::read_with(&args.case, &changes)?;
+    let common = options::with_changes(args)?;
+    let case = common.case(&args.case)?;
     let sweep = Sweep::new(&case).map_err(|error| error.in_file(&args.case))?;
     let target = Target::of(args, &case)?;
     if args.trajectories {
@@ -72,25 +71,38 @@ pub fn run(args: &Args) -> Outcome {
         return Ok(Status::Interrupted(signal));
     }
     let summary = pool.install(|| Summary::of(&work, &store)).map_err(Failure::work)?;
-    let json = json::text(&work, &summary);
-    let Some(written) = output::write(&work, &target, &store, &summary, &json)? else {
+    let json = ("sweep.json", json::text(&work, &summary));
+    let text = table::text(&work, &summary, took, sweep.runs() - before);
+    let mut finished = Finished::new(json, text, "add --out FILE.parquet or --out DIR");
+    let Some(written) = output::write(&work, &target, &store)? else {
         told_interrupted(&work, &store);
         return Ok(Status::Interrupted(interrupt.signal().unwrap_or(2)));
     };
+    finished.written = written;
+    let folder = match target {
+        Target::Nowhere | Target::File(_) => None,
+        Target::Folder(folder) => {
+            let text = folder.bring_inputs(&case).map_err(Failure::work)?;
+            if !common.no_report {
+                let figures = figures::all(&work, &summary);
+                let page = page::page(&work, &summary, &text, &figures);
+                let pictures = figures.into_iter().map(|(name, figure)| (name, figure.into())).collect();
+                finished.report = Some(Report { page, pictures });
+            }
+            finished.files.push(("case.toml".into(), text));
+            Some(folder)
+        }
+    };
+    let status = pool.install(|| finished.finish(&common, folder))?;
     store.remove().map_err(Failure::work)?;
-    if args.json {
-        terminal::show(&json);
-    } else if !args.quiet {
-        terminal::show(&table::text(&work, &summary, took, sweep.runs() - before, &written));
-    }
-    Ok(Status::Done)
+    Ok(status)
 }
 
 /// How many threads: no more than there are processors, or runs.
 fn threads(args: &Args, sweep: &Sweep) -> usize {
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
     let useful = processors.min(usize::try_from(sweep.runs()).unwrap_or(usize::MAX)).max(1);
-    if let Some(asked) = args.threads.filter(|&asked| asked > useful && !args.quiet) {
+    if let Some(asked) = args.threads.filter(|&asked| asked > useful && !args.common.quiet) {
         let runs = if useful < processors { format!("{useful} runs") } else { format!("{processors} processors") };
         terminal::show_note(&format!("--threads {asked}: {useful} are started, for there are {runs}"));
     }
@@ -100,7 +112,7 @@ fn threads(args: &Args, sweep: &Sweep) -> usize {
 /// Runs the chunks that are not there yet, each written when it is whole.
 fn rows(work: &Work, store: &Store) -> Result<()> {
     let pending = store.pending();
-    let progress = Progress::new(work, store.done());
+    let progress = Progress::new("runs", Some(work.sweep.runs()), work.args.common.quiet).with_done(store.done());
     let stop = || work.interrupt.signal().is_some();
     pending.into_par_iter().try_for_each(|chunk| {
         let (first, count) = store.range(chunk);

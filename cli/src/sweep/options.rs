@@ -1,6 +1,7 @@
 //! From the command line to changes of the case, and to where results go.
 
 use crate::args::Sweep as Args;
+use crate::command::Common;
 use crate::failure::Failure;
 use crate::folder::{self, Folder};
 use std::path::{Path, PathBuf};
@@ -8,12 +9,12 @@ use taut::case::Case;
 use taut::files::Inputs;
 use taut::{Error, Result};
 
-/// The command line as changes of the case: what is swept stands in its text, and that repeats it.
-pub fn changes(args: &Args) -> Result<Vec<String>> {
-    let mut changes = args.changes.clone();
+/// The options with the command line as changes of the case: what is swept stands in its text, and that repeats it.
+pub fn with_changes(args: &Args) -> Result<Common> {
+    let mut common = args.common.clone();
     let mut put = |key: &str, value: Option<String>| {
         if let Some(value) = value {
-            changes.push(format!("sweep.{key}={value}"));
+            common.changes.push(format!("sweep.{key}={value}"));
         }
     };
     put("runs", args.runs.clone());
@@ -35,7 +36,7 @@ pub fn changes(args: &Args) -> Result<Vec<String>> {
         }
         put(&format!("vary.\"{key}\""), Some(how.to_string()));
     }
-    Ok(changes)
+    Ok(common)
 }
 
 /// The file of the rows in a folder of results.
@@ -67,7 +68,7 @@ impl Target {
     }
 
     fn named(args: &Args, case: &Case, inputs: &Inputs) -> std::result::Result<Self, Failure> {
-        let Some(out) = &args.out else { return Ok(Self::Nowhere) };
+        let Some(out) = &args.common.out else { return Ok(Self::Nowhere) };
         let ending = out.extension().map(|ending| ending.to_string_lossy().to_lowercase());
         let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
         match ending.as_deref() {
@@ -92,7 +93,7 @@ impl Target {
                 .allowed("FILE.parquet, FILE.csv, or a folder")
                 .into()),
             _ => {
-                let report = (!args.no_report).then(|| "report.html".to_string());
+                let report = (!args.common.no_report).then(|| "report.html".to_string());
                 let names = [ROWS, "sweep.json", "case.toml"].map(str::to_string).into_iter().chain(report);
                 let names = names.chain(folder::brought(case).into_values());
                 Folder::create(out, inputs.clone(), names).map(Self::Folder)

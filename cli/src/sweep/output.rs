@@ -2,26 +2,17 @@
 
 use super::options::{Target, trajectories};
 use super::store::Store;
-use super::summary::Summary;
-use super::{Work, figures, page, trajectories};
+use super::{Work, trajectories};
 use crate::failure::Failure;
-use crate::folder::Folder;
-use crate::simulate::plots;
 use std::path::{Path, PathBuf};
 use taut::Result;
-use taut::files::write_atomically;
 #[cfg(feature = "parquet")]
 use taut::trajectory::ParquetWriter;
 use taut::trajectory::{CsvWriter, Trajectory};
 
-/// Writes what was asked for; returns the names, or none where it was interrupted.
-pub fn write(
-    work: &Work,
-    target: &Target,
-    store: &Store,
-    summary: &Summary,
-    json: &str,
-) -> std::result::Result<Option<Vec<String>>, Failure> {
+/// Writes the rows and what is written beside them; returns the names of those that have their places, or none where it was
+/// interrupted.
+pub fn write(work: &Work, target: &Target, store: &Store) -> std::result::Result<Option<Vec<String>>, Failure> {
     let Some(rows) = target.rows() else { return Ok(Some(Vec::new())) };
     let mut files = vec![rows.clone()];
     files.extend(work.args.trajectories.then(|| trajectories(&rows)));
@@ -34,32 +25,10 @@ pub fn write(
         return Ok(None);
     };
     tables.into_iter().try_for_each(Writer::finish).map_err(Failure::work)?;
-    let mut names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
-    if let Target::Folder(folder) = target {
-        let written = others(work, folder, summary, json).map_err(Failure::work)?;
-        folder.place()?;
-        let shown = folder.shown();
-        names.extend(written.into_iter().map(|name| format!("{shown}/{name}")));
-    }
-    Ok(Some(names))
-}
-
-/// What a folder holds beside the rows; returns the names.
-fn others(work: &Work, folder: &Folder, summary: &Summary, json: &str) -> Result<Vec<&'static str>> {
-    let text = folder.bring_inputs(work.case)?;
-    write_atomically(folder.path("sweep.json"), json)?;
-    write_atomically(folder.path("case.toml"), &text)?;
-    let mut written = vec!["sweep.json", "case.toml"];
-    if !work.args.no_report {
-        let figures = figures::all(work, summary);
-        page::page(work, summary, &text, &figures).write(folder.path("report.html"))?;
-        folder.make("plots")?;
-        for (name, figure) in &figures {
-            plots::write_both(&folder.path("plots").join(name), figure)?;
-        }
-        written.extend(["report.html", "plots/"]);
-    }
-    Ok(written)
+    Ok(Some(match target {
+        Target::Folder(_) => Vec::new(),
+        Target::File(_) | Target::Nowhere => files.iter().map(|file| file.display().to_string()).collect(),
+    }))
 }
 
 /// The rows, and the trajectories where they are wanted, whole but without their names; none where it was interrupted.

@@ -66,7 +66,7 @@ pub fn endings(group: &Group) -> Option<String> {
 }
 
 /// Text on the terminal.
-pub fn text(work: &Work, summary: &Summary, took: Duration, run: u64, written: &[String]) -> String {
+pub fn text(work: &Work, summary: &Summary, took: Duration, run: u64) -> String {
     let mut text = format!("{}\n{}\n", bold(&work.case.title), plan(work));
     for group in &summary.groups {
         let _ = writeln!(text, "\n{}", bold(&group.name));
@@ -103,11 +103,5 @@ pub fn text(work: &Work, summary: &Summary, took: Duration, run: u64, written: &
         0 => writeln!(text, "\n  took nothing: all runs were done already"),
         _ => writeln!(text, "\n  took {}: {run} runs, {rate:.0} simulations a second", shown(took)),
     };
-    match written {
-        [] => text.push_str("nothing was written: add --out FILE.parquet or --out DIR\n"),
-        names => {
-            let _ = writeln!(text, "wrote {}", names.join("  "));
-        }
-    }
     text.replace('\u{a0}', " ")
 }

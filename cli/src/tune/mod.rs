@@ -6,10 +6,11 @@ mod page;
 mod table;
 
 use crate::args::Tune as Args;
+use crate::command::{self, Finished, Report};
 use crate::failure::{Failure, Outcome, Status};
 use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
-use crate::simulate::plots;
+use crate::progress::Progress;
 use crate::terminal;
 use std::path::{Path, PathBuf};
 use taut::case::{Case, Cost, Tuning};
@@ -35,45 +36,56 @@ pub struct Work<'a> {
 
 /// Reads the case, tunes, writes, tells.
 pub fn run(args: &Args) -> Outcome {
-    let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
-    let case = Case::read_with(&args.case, &changes)?;
+    let common = &args.common;
+    let case = common.case(&args.case)?;
     let tuning = tuning(args, &case);
     let target = target(args, &case)?;
     let interrupt = Interrupt::listen();
-    let tuned = match (tune(&case, &tuning, &|| interrupt.signal().is_some()), interrupt.signal()) {
+    let progress = Progress::new("designs are tried", None, common.quiet);
+    let stop = || {
+        progress.tick();
+        interrupt.signal().is_some()
+    };
+    let tuned = match (tune(&case, &tuning, &stop), interrupt.signal()) {
         (Ok(tuned), _) => tuned,
         // What was looked at so far says nothing about the rest.
         (Err(_), Some(signal)) => {
+            progress.clear();
             terminal::show_error(&"interrupted before any gains were found; nothing was written");
             return Ok(Status::Interrupted(signal));
         }
         (Err(error), None) => return Err(error.in_file(&args.case).into()),
     };
+    progress.clear();
     let work = Work { case: &case, tuning: &tuning, tuned: &tuned };
     let text = tuned.case_text(&case, &args.case)?;
-    let json = json::text(&work);
-    let mut written = Vec::new();
-    match &target {
-        Target::Nowhere => {}
-        Target::File(path) => {
-            write_atomically(path, moved(&text, args, path)?).map_err(Failure::work)?;
-            written.push(path.display().to_string());
-        }
-        Target::Folder(folder) => {
-            written = write(&work, folder, &text, &json, args).map_err(Failure::work)?;
-            folder.place()?;
-        }
-    }
-    if args.json {
-        terminal::show(&json);
-    } else if !args.quiet {
-        terminal::show(&table::text(&work, &written));
-    }
-    Ok(match interrupt.signal() {
+    let advice = "add --out FILE.toml, --out DIR or --in-place";
+    let mut finished = Finished::new(("tune.json", json::text(&work)), table::text(&work), advice);
+    finished.status = match interrupt.signal() {
         Some(signal) => Status::Interrupted(signal),
         None if tuned.holds => Status::Done,
         None => Status::Incomplete,
-    })
+    };
+    let folder = match target {
+        Target::Nowhere => None,
+        Target::File(path) => {
+            write_atomically(&path, moved(&text, args, &path)?).map_err(Failure::work)?;
+            finished.written.push(path.display().to_string());
+            None
+        }
+        Target::Folder(folder) => {
+            let text = folder.bring_inputs(&Case::from_text(&args.case, &text)?).map_err(Failure::work)?;
+            if !common.no_report {
+                let figures = figures::all(&work).map_err(Failure::work)?;
+                let page = page::page(&work, &text, &figures);
+                let pictures = figures.into_iter().map(|(name, figure)| (name.to_string(), figure.into()));
+                finished.report = Some(Report { page, pictures: pictures.collect() });
+            }
+            finished.files.push(("tuned.toml".into(), text));
+            Some(folder)
+        }
+    };
+    finished.finish(common, folder)
 }
 
 /// What the file says, with what the command line says.
@@ -89,12 +101,16 @@ fn tuning(args: &Args, case: &Case) -> Tuning {
 /// Where to write; never over a file that is read, unless that is asked for.
 fn target(args: &Args, case: &Case) -> std::result::Result<Target, Failure> {
     if args.in_place {
+        if command::is_standard_input(&args.case) {
+            let error = Error::new("standard input cannot be written to").in_file("--in-place");
+            return Err(error.next("name a file: --out FILE.toml").into());
+        }
         return Ok(Target::File(args.case.clone()));
     }
-    let Some(out) = &args.out else { return Ok(Target::Nowhere) };
+    let Some(out) = &args.common.out else { return Ok(Target::Nowhere) };
     let inputs = folder::inputs(&args.case, case);
     if !out.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
-        let report = (!args.no_report).then(|| "report.html".to_string());
+        let report = (!args.common.no_report).then(|| "report.html".to_string());
         let names = ["tuned.toml", "tune.json"].map(str::to_string).into_iter().chain(report);
         let names = names.chain(folder::brought(case).into_values());
         return Folder::create(out, inputs, names).map(Target::Folder);
@@ -123,22 +139,4 @@ fn moved(text: &str, args: &Args, path: &Path) -> Result<String> {
         return Ok(text.to_string());
     }
     folder::leading(&Case::from_text(&args.case, text)?, parent(path))
-}
-
-fn write(work: &Work, folder: &Folder, text: &str, json: &str, args: &Args) -> Result<Vec<String>> {
-    let text = folder.bring_inputs(&Case::from_text(&args.case, text)?)?;
-    write_atomically(folder.path("tuned.toml"), &text)?;
-    write_atomically(folder.path("tune.json"), json)?;
-    let mut names = vec!["tuned.toml".to_string(), "tune.json".to_string()];
-    if !args.no_report {
-        let figures = figures::all(work)?;
-        page::page(work, &text, &figures).write(folder.path("report.html"))?;
-        folder.make("plots")?;
-        for (name, figure) in &figures {
-            plots::write_both(&folder.path("plots").join(name), figure)?;
-        }
-        names.extend(["report.html".to_string(), "plots/".to_string()]);
-    }
-    let shown = folder.shown();
-    Ok(names.into_iter().map(|name| format!("{shown}/{name}")).collect())
 }

@@ -126,7 +126,7 @@ fn rows(text: &mut String, title: &str, rows: &[Row]) {
 }
 
 /// Text on the terminal.
-pub fn text(work: &Work, written: &[String]) -> String {
+pub fn text(work: &Work) -> String {
     let (tuned, case) = (work.tuned, work.case);
     let (before, after): (&Verdict, &Verdict) = (&tuned.before, &tuned.after);
     let mut text = format!("{}\n{}\n", bold(&case.title), after.design.structure.name());
@@ -148,11 +148,5 @@ pub fn text(work: &Work, written: &[String]) -> String {
     let verdict =
         if tuned.holds { "the limits hold on the worst axis" } else { "the limits do NOT hold on the worst axis" };
     let _ = writeln!(text, "\n{verdict}; {} designs tried in {} rounds", tuned.work.1, tuned.work.0);
-    match written {
-        [] => text.push_str("nothing was written: add --out FILE.toml, --out DIR or --in-place\n"),
-        names => {
-            let _ = writeln!(text, "wrote {}", names.join("  "));
-        }
-    }
     text.replace('\u{a0}', " ")
 }

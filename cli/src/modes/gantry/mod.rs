@@ -4,12 +4,11 @@ mod page;
 mod table;
 
 use crate::args::Modes as Args;
-use crate::failure::{Failure, Outcome, Status};
+use crate::command::{Finished, Report};
+use crate::failure::Outcome;
 use crate::folder::{self, Folder};
-use crate::terminal;
 use std::fmt::Write;
 use taut::case::GantryCase;
-use taut::files::write_atomically;
 use taut::json;
 use taut::linear::{GantryAnalysis, ResonanceMap};
 use taut::number::engineering;
@@ -22,22 +21,24 @@ type Named = (String, Plane);
 /// Finds the modes, writes, tells.
 pub fn run(args: &Args, case: &GantryCase) -> Outcome {
     refuse(args)?;
+    let common = &args.common;
     let analysis = GantryAnalysis::of(case)?;
-    let json = json::text(&json::gantry_modes(&analysis));
-    let mut written = Vec::new();
-    if let Some(root) = &args.out {
-        let map = analysis.map.is_some().then_some("map.csv");
-        let names = ["modes.json", "report.html"].into_iter().chain(map);
-        let folder = Folder::create(root, folder::inputs_of(&args.case, &case.files), names)?;
-        written = write(&analysis, args, &folder, &json).map_err(Failure::work)?;
-        folder.place()?;
+    let map = analysis.map.is_some().then_some("map.csv");
+    let names = ["modes.json", "report.html"].into_iter().chain(map);
+    let folder = Folder::wanted(common, || folder::inputs_of(&args.case, &case.files), names)?;
+    let advice = "add --out DIR for the modes as data, the map and a report";
+    let json = ("modes.json", json::text(&json::gantry_modes(&analysis)));
+    let mut finished = Finished::new(json, table::text(&analysis), advice);
+    if common.out.is_some() {
+        finished.files.extend(analysis.map.as_ref().map(|map| ("map.csv".to_string(), csv(map))));
     }
-    if args.json {
-        terminal::show(&json);
-    } else if !args.quiet {
-        terminal::show(&table::text(&analysis, args.out.as_deref(), &written));
+    if common.reports() {
+        let planes = planes(&analysis);
+        let page = page::page(&analysis, &planes);
+        let pictures = planes.into_iter().map(|(name, plane)| (name, plane.into())).collect();
+        finished.report = Some(Report { page, pictures });
     }
-    Ok(Status::Done)
+    finished.finish(common, folder)
 }
 
 /// Refuses what is asked of an axis alone.
@@ -70,30 +71,6 @@ fn over_the_area(analysis: &GantryAnalysis) -> &'static str {
              (belt.modulus, section, spans and follows_cart = true make the spans follow bridge and cart)"
         }
     }
-}
-
-/// Writes the files; returns their names.
-fn write(analysis: &GantryAnalysis, args: &Args, folder: &Folder, json: &str) -> Result<Vec<&'static str>> {
-    write_atomically(folder.path("modes.json"), json)?;
-    let mut names = vec!["modes.json"];
-    if let Some(map) = &analysis.map {
-        write_atomically(folder.path("map.csv"), csv(map))?;
-        names.push("map.csv");
-    }
-    if !args.no_report {
-        let planes = planes(analysis);
-        page::page(analysis, &planes).write(folder.path("report.html"))?;
-        names.push("report.html");
-        if !planes.is_empty() {
-            folder.make("plots")?;
-            names.push("plots/");
-        }
-        for (name, plane) in &planes {
-            plane.write_svg(folder.path("plots").join(format!("{name}.svg")))?;
-            plane.write_png(folder.path("plots").join(format!("{name}.png")))?;
-        }
-    }
-    Ok(names)
 }
 
 /// The map, a row for each place.

@@ -5,7 +5,6 @@ use super::over_the_area;
 use crate::simulate::gantry_machine;
 use crate::terminal::bold;
 use std::fmt::Write;
-use std::path::Path;
 use taut::linear::{ElasticMode, GantryAnalysis, ResonanceMap, RigidMode, Root};
 use taut::mechanism::Mechanism;
 use taut::number::{ascii, engineering_ascii, fixed};
@@ -14,7 +13,7 @@ use taut::number::{ascii, engineering_ascii, fixed};
 const PLACES: usize = 5;
 
 /// The text on the terminal.
-pub fn text(analysis: &GantryAnalysis, folder: Option<&Path>, written: &[&str]) -> String {
+pub fn text(analysis: &GantryAnalysis) -> String {
     let gantry = &analysis.case.gantry;
     let mechanism = gantry.mechanism();
     let mut text = format!("{}\n{}\n", bold(&analysis.case.title), gantry_machine(gantry));
@@ -42,12 +41,7 @@ pub fn text(analysis: &GantryAnalysis, folder: Option<&Path>, written: &[&str]) 
     if let Some(map) = &analysis.map {
         area(&mut text, map);
     }
-    match folder {
-        Some(folder) => {
-            let _ = write!(text, "\nwrote in {}:\n  {}\n", folder.display(), written.join("  "));
-        }
-        None => text.push_str("\nnothing was written: add --out DIR for the modes as data, the map and a report\n"),
-    }
+    text.push('\n');
     text
 }
 

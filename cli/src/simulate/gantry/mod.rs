@@ -7,30 +7,29 @@ mod table;
 
 pub use table::machine;
 
-use super::{Ended, names, status};
+use super::{ADVICE, Ended, names, status};
 use crate::args::Simulate;
+use crate::command::{Finished, Report};
 use crate::failure::{Failure, Outcome};
 use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
-use crate::terminal;
 use run::{Run, Setting};
 use taut::case::GantryCase;
-use taut::files::write_atomically;
 use taut::json::{self, GantrySimulation};
 use taut::solve::Solver;
 use taut::{Error, Result};
-use taut_report::{gantry_drawing, png};
+use taut_report::{Picture, gantry_drawing};
 
 /// Simulates, measures, reports.
 pub fn run(args: &Simulate, case: &GantryCase) -> Outcome {
     refuse(args)?;
+    let common = &args.common;
     let mechanism = case.gantry.mechanism();
     let solver = args.choice().solver_of(&mechanism)?;
     let experiments = case.experiments_named(&args.experiments)?;
-    let inputs = folder::inputs_of(&args.case, &case.files);
     let brought = folder::brought_of(&case.files).into_values();
     let files = names(args, brought, experiments.iter().map(|one| one.file_name()));
-    let folder = args.out.as_deref().map(|root| Folder::create(root, inputs, files)).transpose()?;
+    let folder = Folder::wanted(common, || folder::inputs_of(&args.case, &case.files), files)?;
     let interrupt = Interrupt::listen();
     let setting = Setting { args, case, mechanism: &mechanism, solver, folder: folder.as_ref(), interrupt: &interrupt };
 
@@ -42,18 +41,33 @@ pub fn run(args: &Simulate, case: &GantryCase) -> Outcome {
         }
     }
     let told: Vec<_> = runs.iter().map(Run::told).collect();
-    let summary = json::text(&GantrySimulation::new(case, solver, &told));
+    let json = ("summary.json", json::text(&GantrySimulation::new(case, solver, &told)));
+    let mut finished = Finished::new(json, table::text(case, solver, &runs), ADVICE);
     if let Some(folder) = &folder {
-        write(folder, &setting, &summary, &runs).map_err(Failure::work)?;
-        folder.place()?;
-    }
-    if args.json {
-        terminal::show(&summary);
-    } else if !args.quiet {
-        terminal::show(&table::text(case, solver, &runs, folder.as_ref()));
+        let brought = folder.bring(&case.files).map_err(Failure::work)?;
+        let text = case.text_with(|file| brought.get(&file.path).cloned().unwrap_or_default());
+        if !common.no_report {
+            finished.report = Some(report(&setting, &text, &runs));
+        }
+        finished.files.push(("case.toml".into(), text));
     }
     let ended: Vec<Ended> = runs.iter().map(|run| run.ended(&case.gantry)).collect();
-    Ok(status(&ended, solver, &interrupt))
+    (finished.status, finished.remarks) = status(&ended, solver, &interrupt);
+    finished.finish(common, folder)
+}
+
+/// The page and its pictures: the machine, every run over time, and the way of the cart in the plane.
+fn report(setting: &Setting, text: &str, runs: &[Run]) -> Report {
+    let case = setting.case;
+    let figures: Vec<_> = runs.iter().map(|run| plots::figures(case, run)).collect();
+    let ways: Vec<_> = runs.iter().map(|run| plots::way(case, run)).collect();
+    let page = page::page(setting, text, runs, &figures, &ways);
+    let names = || runs.iter().map(|run| run.experiment.file_name());
+    let mut pictures = vec![("machine".to_string(), Picture::Drawing(gantry_drawing(&case.gantry)))];
+    let ways = names().zip(ways).filter_map(|(name, way)| Some((format!("{name}-path"), way?.into())));
+    pictures.extend(ways);
+    pictures.extend(super::plots::named(names(), figures));
+    Report { page, pictures }
 }
 
 /// Refuses what is there for an axis alone.
@@ -66,33 +80,6 @@ fn refuse(args: &Simulate) -> Result<()> {
         return Ok(());
     };
     Err(Error::new("this is there for a single axis, and not yet for a gantry").in_file(option).next(next))
-}
-
-/// What belongs to all experiments: summary, case, report and plots.
-fn write(folder: &Folder, setting: &Setting, summary: &str, runs: &[Run]) -> Result<()> {
-    let case = setting.case;
-    write_atomically(folder.path("summary.json"), summary)?;
-    let brought = folder.bring(&case.files)?;
-    let text = case.text_with(|file| brought.get(&file.path).cloned().unwrap_or_default());
-    write_atomically(folder.path("case.toml"), &text)?;
-    if setting.args.no_report {
-        return Ok(());
-    }
-    let figures: Vec<_> = runs.iter().map(|run| plots::figures(case, run)).collect();
-    let ways: Vec<_> = runs.iter().map(|run| plots::way(case, run)).collect();
-    page::page(setting, &text, runs, &figures, &ways).write(folder.path("report.html"))?;
-    folder.make("plots")?;
-    let places = folder.path("plots");
-    let drawing = gantry_drawing(&case.gantry);
-    write_atomically(places.join("machine.svg"), &drawing)?;
-    write_atomically(places.join("machine.png"), png(&drawing, 2.0)?)?;
-    for (run, way) in runs.iter().zip(&ways) {
-        let Some(way) = way else { continue };
-        way.write_svg(places.join(format!("{}-path.svg", run.experiment.file_name())))?;
-        way.write_png(places.join(format!("{}-path.png", run.experiment.file_name())))?;
-    }
-    let names: Vec<String> = runs.iter().map(|run| run.experiment.file_name()).collect();
-    super::plots::write_all(&places, &names, &figures)
 }
 
 /// What a solver is called where nothing has to be said of how exact it is.

@@ -2,12 +2,13 @@
 
 use super::super::Ended;
 use super::super::curves::{Curves, Way};
-use super::super::rows::{Progress, writers};
+use super::super::rows::writers;
 use super::{plots, table};
 use crate::args::Simulate;
 use crate::failure::Failure;
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
+use crate::progress::Progress;
 use std::time::{Duration, Instant};
 use taut::Error;
 use taut::case::{GantryCase, GantryExperiment};
@@ -62,9 +63,9 @@ impl<'a> Setting<'a> {
         let name = experiment.file_name();
         let mut writers = writers(self.folder, &name, &self.args.format).map_err(Failure::work)?;
         let mut meter = GantryMeter::new(&self.case.gantry);
-        let plotted = self.folder.is_some() && !self.args.no_report;
+        let plotted = self.folder.is_some() && !self.args.common.no_report;
         let mut curves = plotted.then(|| plots::curves(&self.case.gantry));
-        let mut progress = Progress::new(&experiment.name, experiment.samples(), self.args.quiet);
+        let progress = Progress::new(&experiment.name, Some(experiment.samples()), self.args.common.quiet);
         let mut trouble: Option<Error> = None;
         let mut estimate = match self.solver {
             Solver::General { tolerance } => Some((ErrorEstimate::of_mechanism(self.mechanism, &course), tolerance)),
@@ -80,7 +81,7 @@ impl<'a> Setting<'a> {
                 way.take(block);
             }
             trouble = writers.iter_mut().find_map(|writer| writer.write(block).err());
-            progress.advance(block.len() as u64, begin);
+            progress.add(block.len() as u64);
             if trouble.is_some() || self.interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue }
         };
         let shown = (Detail::Full, Some(&mut meter as &mut dyn solve::Observe));

@@ -1,9 +1,8 @@
 //! The summary for people: a small table for each experiment.
 
-use super::super::table::{self, accuracy, cost, events, solver_words, speed, time, took, travel, value, written};
+use super::super::table::{self, accuracy, cost, events, solver_words, speed, time, took, travel, value};
 use super::is_general;
 use super::run::Run;
-use crate::folder::Folder;
 use crate::terminal::bold;
 use std::fmt::Write;
 use taut::case::GantryCase;
@@ -17,7 +16,7 @@ const LEAST_LENGTH: f64 = 1e-13;
 const LEAST_FORCE: f64 = 1e-9;
 
 /// The text on the terminal.
-pub fn text(case: &GantryCase, solver: Solver, runs: &[Run], folder: Option<&Folder>) -> String {
+pub fn text(case: &GantryCase, solver: Solver, runs: &[Run]) -> String {
     let gantry = &case.gantry;
     let how = solver_words(solver, runs.iter().map(|run| &run.outcome));
     let mut text = format!("{}\n{}\n{how}\n", bold(&case.title), machine(gantry));
@@ -32,13 +31,6 @@ pub fn text(case: &GantryCase, solver: Solver, runs: &[Run], folder: Option<&Fol
         let _ = writeln!(text, "  {:<16}{}", "took", took(run.took));
     }
     text.push('\n');
-    match folder {
-        Some(folder) => {
-            let files: Vec<&[String]> = runs.iter().map(|run| &run.files[..]).collect();
-            text.push_str(&written(folder, &files, runs.iter().any(|run| run.curves.is_some())));
-        }
-        None => text.push_str("nothing was written: add --out DIR for files and a report\n"),
-    }
     text
 }
 

@@ -1,12 +1,16 @@
 //! `taut check`: what the logs of a case can tell of its parameters, before any fit.
 
+mod page;
+
 use crate::args::Check as Args;
-use crate::failure::{Outcome, Status};
+use crate::command::{Finished, Report};
+use crate::failure::Outcome;
 use crate::fit::table;
-use crate::terminal::{self, bold};
+use crate::folder::{self, Folder};
+use crate::terminal::bold;
 use std::fmt::Write;
 use taut::case::Case;
-use taut::fit::{Check, check};
+use taut::fit::{Balance, Check, check};
 use taut::json;
 use taut::log::{Severity, Survey};
 
@@ -15,12 +19,18 @@ const MOST_WHOLE: usize = 4;
 
 /// Reads the case, looks, tells.
 pub fn run(args: &Args) -> Outcome {
-    let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
-    let case = Case::read_with(&args.case, &changes)?;
+    let common = &args.common;
+    let case = common.case(&args.case)?;
     let plan = case.fit_plan(&args.case)?;
+    let folder = Folder::wanted(common, || folder::inputs(&args.case, &case), ["check.json", "report.html"])?;
     let found = check(&case, &plan)?;
-    terminal::show(&if args.json { json::text(&json::check(&case, &found)) } else { text(&case, &found) });
-    Ok(Status::Done)
+    let text = text(&case, &found);
+    let json = ("check.json", json::text(&json::check(&case, &found)));
+    let mut finished = Finished::new(json, text, "add --out DIR for check.json and a report");
+    if common.reports() {
+        finished.report = Some(Report { page: page::page(&case, &found), pictures: Vec::new() });
+    }
+    finished.finish(common, folder)
 }
 
 fn text(case: &Case, found: &Check) -> String {
@@ -31,10 +41,8 @@ fn text(case: &Case, found: &Check) -> String {
     }
     if let Some(found) = &found.balance {
         let _ = write!(text, "\n{}\n", bold("A rigid axis by regression, all at the drive pulley"));
-        let values = [found.inertia, found.viscous, found.coulomb, found.load];
-        let names = [("inertia", "kg m^2"), ("viscous", "N m s/rad"), ("Coulomb", "N m"), ("load", "N m")];
-        for ((name, unit), (value, error)) in names.iter().zip(values.iter().zip(found.errors)) {
-            let _ = writeln!(text, "  {name:<9}{} ± {}", table::value(*value, unit, 5), table::value(error, unit, 2));
+        for (name, unit, value, error) in regression(found) {
+            let _ = writeln!(text, "  {name:<9}{} ± {}", table::value(value, unit, 5), table::value(error, unit, 2));
         }
         let left = 100.0 * found.unexplained;
         let _ = writeln!(
@@ -46,11 +54,7 @@ fn text(case: &Case, found: &Check) -> String {
     let _ = write!(text, "\n{}\n", bold("How well each parameter would be known, all others free"));
     let known = &found.identifiability;
     let wide = known.names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
-    for (j, name) in known.names.iter().enumerate() {
-        let error = match known.error[j] {
-            e if e.is_finite() => format!("to {:.2} %", 100.0 * e),
-            _ => "not at all".into(),
-        };
+    for (name, error) in shares(found) {
         let _ = writeln!(text, "  {name:<wide$}  {error}");
     }
     let _ = writeln!(
@@ -75,6 +79,23 @@ fn text(case: &Case, found: &Check) -> String {
         }
     }
     text
+}
+
+/// Each parameter with its standard error in words.
+fn shares(found: &Check) -> impl Iterator<Item = (String, String)> {
+    let known = &found.identifiability;
+    known.names.iter().zip(&known.error).map(|(name, error)| match error.is_finite() {
+        true => (name.clone(), format!("to {:.2} %", 100.0 * error)),
+        false => (name.clone(), "not at all".into()),
+    })
+}
+
+/// What the balance of torques gives, each with its unit, value and standard error.
+fn regression(found: &Balance) -> impl Iterator<Item = (&'static str, &'static str, f64, f64)> {
+    let values = [found.inertia, found.viscous, found.coulomb, found.load];
+    let names = [("inertia", "kg m^2"), ("viscous", "N m s/rad"), ("Coulomb", "N m"), ("load", "N m")];
+    let rows = names.into_iter().zip(values).zip(found.errors);
+    rows.map(|(((name, unit), value), error)| (name, unit, value, error))
 }
 
 /// What a log shows, indented; not `whole`: in its first line and its warnings.

@@ -1,0 +1,61 @@
+//! The report: one HTML file.
+
+use super::{shares, shown};
+use crate::fit::table;
+use taut::case::Case;
+use taut::fit::{Balance, Check};
+use taut_report::{Callout, Cell, Page, Table};
+
+/// The page.
+pub fn page(case: &Case, found: &Check) -> Page {
+    let mut page = Page::new(case.title.clone()).subtitle("What the logs can tell of the parameters.");
+    page.section("What is determined");
+    verdict(&mut page, found);
+    let mut rows = Table::new("How well each parameter would be known, all others free.");
+    rows = rows.column("Parameter", "").column("Standard error", "");
+    for (name, error) in shares(found) {
+        rows.row([name, error].map(Cell::from));
+    }
+    page.table(&rows);
+    page.prose(format!("{}.", found.noise_words));
+    if !found.experiments.is_empty() {
+        page.section("What one more experiment would tell");
+        let mut rows =
+            Table::new("By simulation, the best first.").column("Experiment", "").column("What it tells", "");
+        for experiment in &found.experiments {
+            rows.row([experiment.name.to_string(), experiment.told.clone()].map(Cell::from));
+        }
+        page.table(&rows);
+    }
+    if let Some(found) = &found.balance {
+        regression(&mut page, found);
+    }
+    page.section("What the logs show");
+    for log in &found.logs {
+        shown(log, true).lines().for_each(|line| page.prose(line.trim()));
+    }
+    page.section("The case");
+    page.embed("case.toml", &case.text);
+    page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
+    page
+}
+
+fn verdict(page: &mut Page, found: &Check) {
+    if found.identifiability.complete() {
+        page.callout(Callout::Holds, "All of it", "everything that is searched for is determined.");
+    }
+    for (group, choices) in found.identifiability.groups.iter().zip(&found.choices) {
+        page.callout(Callout::Fails, "Not determined", format!("{}.", group.words));
+        choices.iter().for_each(|choice| page.prose(choice.to_string()));
+    }
+}
+
+fn regression(page: &mut Page, found: &Balance) {
+    page.section("A rigid axis by regression");
+    let mut rows = Table::new("All at the drive pulley; a first guess, not a fit.");
+    rows = rows.column("Quantity", "").column("Value", "").column("Standard error", "");
+    for (name, unit, value, error) in super::regression(found) {
+        rows.row([name.to_string(), table::value(value, unit, 5), table::value(error, unit, 2)].map(Cell::from));
+    }
+    page.table(&rows);
+}

@@ -1,0 +1,51 @@
+//! `taut man` and `taut completions`: the command line for readers and shells, from its own definition.
+
+use crate::args::{Args, Completions, Man};
+use crate::failure::{Failure, Outcome, Status};
+use crate::terminal;
+use clap::CommandFactory;
+use std::path::Path;
+use taut::files::write_atomically;
+use taut::{Error, Result};
+
+/// Prints the completions for a shell.
+pub fn completions(args: &Completions) -> Outcome {
+    let mut text = Vec::new();
+    clap_complete::generate(args.shell, &mut Args::command(), "taut", &mut text);
+    terminal::show(&String::from_utf8_lossy(&text));
+    Ok(Status::Done)
+}
+
+/// Prints the manual page of the program; into a folder it writes that of every command.
+pub fn run(args: &Man) -> Outcome {
+    let mut command = Args::command();
+    command.build();
+    let Some(folder) = &args.out else {
+        terminal::show(&page(&command)?);
+        return Ok(Status::Done);
+    };
+    std::fs::create_dir_all(folder).map_err(|e| {
+        let error = Error::new(format!("this folder cannot be made: {e}")).in_file(folder);
+        error.next("name a folder that you may write to")
+    })?;
+    let mut names = vec![write(folder, "taut", &command).map_err(Failure::work)?];
+    for one in command.get_subcommands().filter(|one| one.get_name() != "help") {
+        names.push(write(folder, &format!("taut-{}", one.get_name()), one).map_err(Failure::work)?);
+    }
+    terminal::show(&terminal::wrapped(&format!("wrote in {}:\n  {}\n", folder.display(), names.join("  "))));
+    Ok(Status::Done)
+}
+
+fn write(folder: &Path, name: &str, command: &clap::Command) -> Result<String> {
+    let file = format!("{name}.1");
+    write_atomically(folder.join(&file), page(command)?)?;
+    Ok(file)
+}
+
+/// The page in troff.
+fn page(command: &clap::Command) -> Result<String> {
+    let mut text = Vec::new();
+    let made = clap_mangen::Man::new(command.clone()).render(&mut text);
+    made.map_err(|e| Error::new(format!("the manual page cannot be made: {e}")))?;
+    Ok(String::from_utf8_lossy(&text).into_owned())
+}
