@@ -137,6 +137,18 @@ const BAD: &[(&str, &str, &str, &str)] = &[
         "add the unit, or leave the quotes away if the number is in SI units",
     ),
     ("90", "rad", "\"90\" has no unit; an angle (rad) is wanted", "add the unit, such as deg, rad or rev"),
+    (
+        "10 V/1000rpm",
+        "V s/rad",
+        "\"10 V/1000rpm\" has `1000rpm` where a unit should be",
+        "numbers stand before the unit; a thousand is the prefix k: V/1000rpm is V/krpm",
+    ),
+    (
+        "100 rpm/V",
+        "V s/rad",
+        "\"100 rpm/V\" is in kg^-1 m^-2 s^2 A rad; a back-EMF constant (V s/rad) is wanted",
+        "that is the inverse of what is wanted: write 0.0954930 V s/rad",
+    ),
     ("5 KN", "N", "\"5 KN\" has an unknown unit `KN`", "did you mean kN?"),
     ("5 volst", "V", "\"5 volst\" has an unknown unit `volst`", "did you mean volt?"),
     ("5 Nms", "N m s/rad", "\"5 Nms\" has an unknown unit `Nms`", "did you mean N ms, or Nm s?"),

@@ -399,7 +399,7 @@ pub struct Modes {
     #[arg(long, value_enum, requires = "sample_time")]
     pub hold: Option<HoldName>,
     /// By how much the input is late, computing time for one [default: 0 s]
-    #[arg(long, value_name = "TIME", value_parser = seconds, requires = "sample_time")]
+    #[arg(long, value_name = "TIME", value_parser = delay, requires = "sample_time")]
     pub delay: Option<f64>,
     /// Lowest frequency of the response, in Hz [default: below the slowest pole or zero]
     #[arg(long, value_name = "FREQUENCY", value_parser = hertz)]
@@ -534,7 +534,7 @@ fn share(text: &str) -> Result<f64, String> {
         Ok(number) => number,
         Err(_) => quantity::read(text, "").map_err(|e| e.to_string())?,
     };
-    if share > 0.0 && share < 1.0 { Ok(share) } else { Err("a share between 0 and 1 is needed, such as 20%".into()) }
+    if (0.0..1.0).contains(&share) { Ok(share) } else { Err("a share from 0 to below 1 is needed, such as 20%".into()) }
 }
 
 /// A number in the SI unit, or with a unit of its own.
@@ -563,6 +563,13 @@ fn positive(text: &str, unit: &str, needed: &str) -> Result<f64, String> {
 
 fn step(text: &str) -> Result<f64, String> {
     positive(text, "s", "step above zero, such as 0.1ms,")
+}
+
+fn delay(text: &str) -> Result<f64, String> {
+    match number(text, "s")? {
+        value if value >= 0.0 => Ok(value),
+        _ => Err("a time of 0 s or more is needed, such as 0.1ms".into()),
+    }
 }
 
 fn seconds(text: &str) -> Result<f64, String> {

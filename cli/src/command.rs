@@ -83,6 +83,8 @@ fn standard_input() -> Result<String> {
 
 /// What a command found, to be written and printed.
 pub struct Finished {
+    /// The command.
+    pub command: &'static str,
     /// The result as data, and the name of its file in a folder of results.
     pub json: (&'static str, String),
     /// The result for people.
@@ -124,8 +126,9 @@ impl Remark {
 
 impl Finished {
     /// A result as data and for people, all done, and nothing else to write or to say.
-    pub fn new(json: (&'static str, String), text: String, advice: &'static str) -> Self {
+    pub fn new(command: &'static str, json: (&'static str, String), text: String, advice: &'static str) -> Self {
         Self {
+            command,
             json,
             text,
             files: Vec::new(),
@@ -141,7 +144,7 @@ impl Finished {
     pub fn finish(mut self, common: &Common, folder: Option<Folder>) -> Outcome {
         if let Some(folder) = folder {
             self.write(common, &folder).map_err(Failure::work)?;
-            let names = folder.place(common.quiet)?;
+            let names = folder.place(self.command, common.quiet)?;
             self.written.push(listed(&folder, &names));
         }
         if common.json {

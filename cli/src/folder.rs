@@ -3,7 +3,7 @@
 
 use crate::command::Common;
 use crate::failure::Failure;
-use crate::listing::{self, Listing};
+use crate::listing::{self, Left, Listing};
 use crate::terminal;
 use std::collections::HashMap;
 use std::ffi::OsStr;
@@ -69,16 +69,19 @@ impl Folder {
         self.batch.path(name)
     }
 
-    /// Gives all files their places, with a list of them, and removes what an earlier run listed and this one did not write;
-    /// what somebody changed since stays, and is named. Returns the names of what was written.
-    pub fn place(&self, quiet: bool) -> std::result::Result<Vec<PathBuf>, Failure> {
+    /// Gives all files their places, with a list of them, and removes what `command` listed in an earlier run and did not
+    /// write in this one; what somebody changed since stays, and is named. Returns the names of what was written.
+    pub fn place(&self, command: &str, quiet: bool) -> std::result::Result<Vec<PathBuf>, Failure> {
         let mut names = self.batch.names().map_err(Failure::work)?;
-        let list = Listing::of(&self.batch.path(""), &names).map_err(Failure::work)?;
-        write_atomically(self.batch.path(listing::NAME), list.text()).map_err(Failure::work)?;
-        for name in names.iter().map(PathBuf::as_path).chain([Path::new(listing::NAME)]) {
-            self.inputs.check(&self.root.join(name))?;
+        let mut list = Listing::of(command, &self.batch.path(""), &names).map_err(Failure::work)?;
+        let mut left = Left::default();
+        if let Some(earlier) = Listing::read(&self.root) {
+            left = earlier.left(command, &self.root, &names);
+            list = list.with_others(command, earlier);
         }
-        let mut left = Listing::read(&self.root).map(|list| list.left(&self.root, &names)).unwrap_or_default();
+        write_atomically(self.batch.path(listing::NAME), list.text()).map_err(Failure::work)?;
+        names.push(listing::NAME.into());
+        names.iter().try_for_each(|name| self.inputs.check(&self.root.join(name)))?;
         left.stale.retain(|name| self.inputs.check(&self.root.join(name)).is_ok());
         self.batch.place(&left.stale).map_err(Failure::work)?;
         if !left.changed.is_empty() && !quiet {
@@ -89,7 +92,6 @@ impl Folder {
                 changed.join(", ")
             ));
         }
-        names.push(listing::NAME.into());
         Ok(names)
     }
 

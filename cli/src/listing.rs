@@ -31,6 +31,8 @@ struct Entry {
     path: String,
     bytes: u64,
     sha256: String,
+    /// The command that wrote it: each removes its own alone.
+    command: String,
 }
 
 /// Of the files that an earlier run listed and this one does not write.
@@ -43,16 +45,25 @@ pub struct Left {
 }
 
 impl Listing {
-    /// Of these files, written below `at`.
-    pub fn of(at: &Path, names: &[PathBuf]) -> Result<Self> {
+    /// Of these files, written below `at` by `command`.
+    pub fn of(command: &str, at: &Path, names: &[PathBuf]) -> Result<Self> {
         let entry = |name: &PathBuf| {
             let (bytes, sha256) = fingerprint(&at.join(name))
                 .map_err(|e| Error::new(format!("this file cannot be read back: {e}")).in_file(name))?;
             let parts: Vec<_> = name.components().map(|part| part.as_os_str().to_string_lossy()).collect();
-            Ok(Entry { path: parts.join("/"), bytes, sha256 })
+            Ok(Entry { path: parts.join("/"), bytes, sha256, command: command.into() })
         };
         let files = names.iter().map(entry).collect::<Result<_>>()?;
         Ok(Self { schema: SCHEMA.into(), version: env!("CARGO_PKG_VERSION").into(), files })
+    }
+
+    /// Takes over what other commands listed, but for what this one writes anew.
+    pub fn with_others(mut self, command: &str, earlier: Self) -> Self {
+        let is_new = |entry: &Entry| self.files.iter().all(|own| own.path != entry.path);
+        let others: Vec<Entry> =
+            earlier.files.into_iter().filter(|entry| entry.command != command && is_new(entry)).collect();
+        self.files.extend(others);
+        self
     }
 
     /// As the file holds it.
@@ -67,10 +78,10 @@ impl Listing {
         serde_json::from_str(&text).ok().filter(|list: &Self| list.schema == SCHEMA)
     }
 
-    /// What of it is there still, but for the files of these names.
-    pub fn left(&self, folder: &Path, names: &[PathBuf]) -> Left {
+    /// What `command` wrote and is there still, but for the files of these names.
+    pub fn left(&self, command: &str, folder: &Path, names: &[PathBuf]) -> Left {
         let mut left = Left::default();
-        for entry in &self.files {
+        for entry in self.files.iter().filter(|entry| entry.command == command) {
             let path = PathBuf::from(&entry.path);
             // A list that leads out of the folder is not one of ours.
             let inside = path.components().all(|part| matches!(part, Component::Normal(_)));
@@ -116,14 +127,22 @@ mod tests {
         let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
         ["kept.csv", "stale.csv", "changed.csv", "gone.csv"].iter().for_each(|name| write(name, name));
         let names = ["kept.csv", "stale.csv", "changed.csv", "gone.csv"].map(PathBuf::from);
-        let mut list = Listing::of(folder.path(), &names).unwrap();
-        list.files.push(Entry { path: "../outside.csv".into(), bytes: 0, sha256: String::new() });
+        let mut list = Listing::of("simulate", folder.path(), &names).unwrap();
+        let outside =
+            Entry { path: "../outside.csv".into(), bytes: 0, sha256: String::new(), command: "simulate".into() };
+        list.files.push(outside);
         write(NAME, &list.text());
         write("changed.csv", "by hand");
         write("own.csv", "never listed");
         std::fs::remove_file(folder.path().join("gone.csv")).unwrap();
-        let left = Listing::read(folder.path()).unwrap().left(folder.path(), &["kept.csv".into()]);
+        let list = Listing::read(folder.path()).unwrap();
+        let left = list.left("simulate", folder.path(), &["kept.csv".into()]);
         assert_eq!(left, Left { stale: vec!["stale.csv".into()], changed: vec!["changed.csv".into()] });
+        // Another command leaves them all alone, and lists them still.
+        assert_eq!(list.left("modes", folder.path(), &[]), Left::default());
+        let both = Listing::of("modes", folder.path(), &["kept.csv".into()]).unwrap().with_others("modes", list);
+        assert_eq!(both.files.iter().filter(|entry| entry.path == "kept.csv").count(), 1);
+        assert_eq!(both.files.len(), 5);
     }
 
     #[test]

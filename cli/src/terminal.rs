@@ -93,16 +93,30 @@ fn indent(line: &str, columns: usize) -> usize {
     }
 }
 
-/// The words of a line, each with the spaces before it.
+/// The words of a line, each with the spaces before it; a number keeps the unit behind it.
 fn words(line: &str) -> impl Iterator<Item = &str> {
     let mut rest = line;
     std::iter::from_fn(move || {
-        let spaces = rest.len() - rest.trim_start_matches(' ').len();
-        let end = rest[spaces..].find(' ').map_or(rest.len(), |end| spaces + end);
+        let mut end = word(rest);
+        while rest[..end].ends_with(|c: char| c.is_ascii_digit()) && is_unit(&rest[end..]) {
+            end += word(&rest[end..]);
+        }
         let (word, behind) = rest.split_at(end);
         rest = behind;
         (!word.is_empty()).then_some(word)
     })
+}
+
+/// Where the first word ends, spaces before it included.
+fn word(text: &str) -> usize {
+    let spaces = text.len() - text.trim_start_matches(' ').len();
+    text[spaces..].find(' ').map_or(text.len(), |end| spaces + end)
+}
+
+/// Whether a text goes on with one space and what may be a unit.
+fn is_unit(text: &str) -> bool {
+    let mut letters = text.chars();
+    letters.next() == Some(' ') && letters.next().is_some_and(|c| c.is_alphabetic() || "%°".contains(c))
 }
 
 /// Columns that a text takes: colours take none.
@@ -165,6 +179,7 @@ mod tests {
         assert_eq!(at(24, "  name    one two three four\n"), "  name    one two three\n          four\n");
         assert_eq!(at(20, "a sentence without any gap\n"), "a sentence without\n    any gap\n");
         assert_eq!(at(12, "averyveryverylongword and more\n"), "averyveryverylongword\n    and more\n");
+        assert_eq!(at(14, "  name  1.5 m, 2.25 mm\n"), "  name  1.5 m,\n        2.25 mm\n");
         assert_eq!(visible("\u{1b}[1mbold\u{1b}[0m R\u{302}"), 6);
     }
 }

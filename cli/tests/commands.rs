@@ -94,6 +94,7 @@ fn the_folder_holds_what_it_should_and_nothing_else() {
         "5-v-pulse.csv",
         "5-v-pulse.events.csv",
         "case.toml",
+        "files.json",
         "plots",
         "report.html",
         "summary.json",
@@ -103,7 +104,7 @@ fn the_folder_holds_what_it_should_and_nothing_else() {
     let mut expected = Vec::new();
     for run in ["10-v-pulse", "5-v-pulse"] {
         for plot in plots {
-            expected.extend([format!("{run}-{plot}.png"), format!("{run}-{plot}.svg")]);
+            expected.push(format!("{run}-{plot}.svg"));
         }
     }
     assert_eq!(names(&out.join("plots")), expected);
@@ -325,7 +326,7 @@ fn moves_in_closed_loop() {
     assert_eq!(rows.lines().count(), 602);
     let samples = fs::read_to_string(moved.join("short-fast.samples.csv")).unwrap();
     assert_eq!(samples.lines().next().unwrap(), "time_s,reference_m,measured_m,asked_V,given_V");
-    assert!(moved.join("report.html").exists() && moved.join("plots/short-fast-motion.png").exists());
+    assert!(moved.join("report.html").exists() && moved.join("plots/short-fast-motion.svg").exists());
     // The case that was written repeats the move.
     let again =
         taut(folder.path()).args(["move", "moved/case.toml", "--move", "short fast", "--json"]).output().unwrap();
@@ -366,7 +367,10 @@ fn modes_of_the_papers_machine() {
     let gain = found["outputs"][1]["low_frequency_gain"].as_f64().unwrap();
     assert!((gain / speed - 1.0).abs() < 1e-9, "{gain} {speed}");
     assert!(found["operation"]["sticks_at_rest"] == true && found["stiffness_depends_on_position"] == false);
-    assert_eq!(names(&folder.path().join("out")), ["frequency-response.csv", "modes.json", "plots", "report.html"]);
+    assert_eq!(
+        names(&folder.path().join("out")),
+        ["files.json", "frequency-response.csv", "modes.json", "plots", "report.html"]
+    );
     let rest = taut(folder.path()).args(["modes", file, "--speed", "0"]).assert().success();
     assert!(text(&rest.get_output().stdout).contains("at rest this stage sticks"));
     for (wrong, told) in [

@@ -223,8 +223,8 @@ fn a_folder_whose_name_is_not_utf_8_is_written_whole() {
     let at = folder.path();
     let odd = |name: &[u8]| OsStr::from_bytes(name).to_os_string();
     for (command, name, last) in [
-        ("simulate", &b"s\xff"[..], "plots/5-v-pulse-speeds.png"),
-        ("move", b"m\xff", "plots/short-motion.png"),
+        ("simulate", &b"s\xff"[..], "plots/5-v-pulse-speeds.svg"),
+        ("move", b"m\xff", "plots/short-motion.svg"),
         ("modes", b"l\xff", "report.html"),
         ("shape", b"i\xff", "report.html"),
         ("fit", b"f\xff", "report.html"),
@@ -339,5 +339,41 @@ fn what_cannot_be_printed_is_an_error() {
         assert_eq!(output.status.code(), Some(1), "{args:?}");
         let told = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(told.contains("error: the results cannot be written to standard output: "), "{args:?}: {told}");
+    }
+}
+
+/// A second run of a command left the files of the first one beside its own: `10-v-pulse.csv` of another case file.
+#[test]
+fn a_later_run_takes_away_what_it_wrote_before_and_nothing_else() {
+    let folder = with_a_log("log.csv");
+    let at = folder.path();
+    let out = at.join("out");
+    let run = |args: &[&str]| {
+        let done = taut(at).args(args).args(["--out", "out"]).output().unwrap();
+        assert!(matches!(done.status.code(), Some(0..=2)), "{done:?}");
+        String::from_utf8(done.stderr).unwrap()
+    };
+    run(&["simulate", "rig.toml", "--png"]);
+    run(&["modes", "rig.toml", "--no-report"]);
+    fs::write(out.join("mine.txt"), "by hand").unwrap();
+    fs::write(out.join("5-v-pulse.events.csv"), "changed by hand").unwrap();
+    assert!(out.join("plots/5-v-pulse-speeds.png").exists());
+    let told = run(&["simulate", "rig.toml", "--no-report", "--format", "csv", "--experiment", "nothing of the kind"]);
+    assert!(
+        told.contains("nothing of the kind") && out.join("5-v-pulse.csv").exists(),
+        "what failed removes nothing: {told}"
+    );
+    let told = run(&["simulate", "rig.toml", "--no-report", "--set", "experiment.0.name=another"]);
+    assert!(
+        told.contains("out: of an earlier run, and changed since it was written, so it stays: 5-v-pulse.events.csv"),
+        "{told}"
+    );
+    for gone in ["report.html", "plots", "5-v-pulse.csv"] {
+        assert!(!out.join(gone).exists(), "{gone}");
+    }
+    for there in
+        ["mine.txt", "another.csv", "modes.json", "frequency-response.csv", "5-v-pulse.events.csv", "files.json"]
+    {
+        assert!(out.join(there).exists(), "{there}");
     }
 }

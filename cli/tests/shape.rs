@@ -42,7 +42,7 @@ fn a_spectrum_a_second_one_and_their_files() {
     let main = &value["comparison"]["main_peaks"];
     assert_eq!((main["first"].as_f64(), main["second"].as_f64()), (Some(40.0), Some(48.0)));
     assert!((main["stiffness_per_mass"].as_f64().unwrap() - 1.44).abs() < 1e-12);
-    let wanted = ["shape.json", "report.html", "spectrum.svg", "spectrum.png", "spectrum-2.svg", "compared.png"];
+    let wanted = ["shape.json", "report.html", "plots/spectrum.svg", "plots/spectrum-2.svg", "plots/compared.svg"];
     assert!(wanted.iter().all(|name| out.join(name).metadata().unwrap().len() > 500));
     let written: Value = serde_json::from_slice(&std::fs::read(out.join("shape.json")).unwrap()).unwrap();
     assert_eq!(written, value);

@@ -157,7 +157,7 @@ fn a_folder_has_rows_summary_case_report_and_plots() {
     let report = fs::read_to_string(out.join("report.html")).unwrap();
     assert!(report.contains("first order") && report.contains("motor.resistance"));
     assert!(out.join("plots/5-v-pulse-peak-motor-current-indices.svg").exists());
-    assert!(out.join("plots/5-v-pulse-final-cart-position-histogram.png").exists());
+    assert!(out.join("plots/5-v-pulse-final-cart-position-histogram.svg").exists());
     // The case of the folder repeats it.
     let again: Value = serde_json::from_str(&done(&out, &["case.toml", "--json"])).unwrap();
     assert_eq!(again, summary);

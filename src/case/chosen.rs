@@ -9,7 +9,8 @@ impl Case {
     /// The experiments of these names, in the case's order; all if none is named. `path` is the case's own.
     pub fn experiments_named(&self, path: &Path, names: &[String]) -> Result<Vec<&Experiment>> {
         if self.experiments.is_empty() {
-            return Err(Error::new(format!("\"{}\" has moves, and no experiments", self.title))
+            let has = if self.moves.is_empty() { "neither experiments nor moves" } else { "moves, and no experiments" };
+            return Err(Error::new(format!("\"{}\" has {has}", self.title))
                 .in_file(path)
                 .next("run its moves with `taut move`, or add an [[experiment]]"));
         }

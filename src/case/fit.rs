@@ -176,11 +176,15 @@ pub(super) fn plan(root: &Table, stage: &Stage, experiments: &[Experiment]) -> R
         let of_file = |experiment: &&Experiment| experiment.log.is_some() && matches(&experiment.name, name);
         if let (None, Some(field)) = (experiments.iter().find(of_file), table.optional("held_out")) {
             let names: Vec<String> =
-                experiments.iter().filter(|e| e.log.is_some()).take(10).map(|e| format!("\"{}\"", e.name)).collect();
+                experiments.iter().filter(|e| e.log.is_some()).map(|e| format!("\"{}\"", e.name)).collect();
+            let shown = match names.len() {
+                all if all > MOST_NAMES => format!("{} and {} more", names[..MOST_NAMES].join(", "), all - MOST_NAMES),
+                _ => names.join(", "),
+            };
             return Err(field
                 .fail(format!("there is no experiment \"{name}\" with a log"))
-                .allowed(names.join(", "))
-                .next("name experiments, or the beginning of their names and a *"));
+                .allowed(shown)
+                .next("name experiments, with * for any part of a name, as in \"april-*-fast\""));
         }
     }
     let huber =
@@ -241,9 +245,23 @@ pub(super) fn free(field: &Field, name: &str, stage: &Stage) -> Result<()> {
     })
 }
 
-/// Whether a name is meant by a pattern: the name itself, or its beginning and a `*`.
+/// Names that an error lists at most.
+const MOST_NAMES: usize = 10;
+
+/// Whether a name is meant by a pattern: the name itself, where each `*` stands for anything, nothing too.
 pub fn matches(name: &str, pattern: &str) -> bool {
-    pattern.strip_suffix('*').map_or(name == pattern, |start| name.starts_with(start))
+    let Some((start, rest)) = pattern.split_once('*') else { return name == pattern };
+    let Some(mut left) = name.strip_prefix(start) else { return false };
+    let mut parts: Vec<&str> = rest.split('*').collect();
+    let end = parts.pop().unwrap_or_default();
+    // The first place that fits leaves the most for those behind it.
+    for part in parts {
+        match left.find(part) {
+            Some(at) => left = &left[at + part.len()..],
+            None => return false,
+        }
+    }
+    left.ends_with(end)
 }
 
 /// A list of texts.
@@ -417,4 +435,28 @@ fn nuisances(table: &Table) -> Result<Nuisances> {
         initial_state: flag("initial_state")?,
         bias: flag("bias")?,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::matches;
+
+    #[test]
+    fn a_star_stands_for_any_part_of_a_name() {
+        for (name, pattern, meant) in [
+            ("april 3", "april 3", true),
+            ("april 3", "april", false),
+            ("april 3", "april*", true),
+            ("april 3", "*3", true),
+            ("april 3", "a*l*3", true),
+            ("april 3", "*", true),
+            ("april 3", "*april 3*", true),
+            ("april 3", "a*a*", false),
+            ("aa", "a*a", true),
+            ("a", "a*a", false),
+            ("€1", "*1", true),
+        ] {
+            assert_eq!(matches(name, pattern), meant, "{name} {pattern}");
+        }
+    }
 }

@@ -223,9 +223,9 @@ impl Case {
         let folder = Folder::of(name);
         let controller = controller::controller(&root, &stage)?;
         let moves = motion::moves(&root, &stage, controller.as_ref())?;
-        // A case of moves needs no experiments.
+        // A case of moves needs no experiments, nor does one of a controller that is to be tuned.
         let experiments = match root.optional("experiment") {
-            None if !moves.is_empty() => Vec::new(),
+            None if !moves.is_empty() || controller.is_some() => Vec::new(),
             _ => experiments(&root, &stage, &folder)?,
         };
         let measurement = measurement::measurement(&root, &stage, &experiments)?;

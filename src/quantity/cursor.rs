@@ -392,6 +392,9 @@ impl<'a> Cursor<'a> {
         if name.is_empty() {
             let rest = self.from(self.at);
             let next = match self.peek() {
+                Some('1') if rest.starts_with("1000") => {
+                    "numbers stand before the unit; a thousand is the prefix k: V/1000rpm is V/krpm"
+                }
                 Some(c) if c.is_ascii_digit() => "numbers stand before the unit; powers are written m^2",
                 _ => "units are letters with powers, such as N m s/rad or kg m^2",
             };

@@ -100,8 +100,13 @@ pub fn read(text: &str, unit: &str) -> Result<f64> {
     let error = Error::new(format!("\"{text}\" is {}; {} is wanted", is.describe(), want.describe()));
     // Pounds and kilograms of force: what is missing is exactly one acceleration of gravity.
     let as_force = is.times(Dimension::new(0, 1, -2, 0, 0), 1).map(Dimension::without_angle);
-    Err(match as_force == Some(want.without_angle()) {
-        true => error.next("a weight as a force is lbf, ozf, kgf or gf; lb, oz, kg and g are masses"),
+    if as_force == Some(want.without_angle()) {
+        return Err(error.next("a weight as a force is lbf, ozf, kgf or gf; lb, oz, kg and g are masses"));
+    }
+    // Motors are sold by K_v in rpm/V, and modelled by K_e in V s/rad.
+    let inverse = Dimension::NONE.times(is, -1).map(Dimension::without_angle);
+    Err(match inverse == Some(want.without_angle()) && given.value != 0.0 {
+        true => error.next(format!("that is the inverse of what is wanted: write {}", show(1.0 / given.value, unit))),
         false => error,
     })
 }

@@ -26,7 +26,7 @@ pub fn run(args: &Args) -> Outcome {
     let found = check(&case, &plan)?;
     let text = text(&case, &found);
     let json = ("check.json", json::text(&json::check(&case, &found)));
-    let mut finished = Finished::new(json, text, "add --out DIR for check.json and a report");
+    let mut finished = Finished::new("check", json, text, "add --out DIR for check.json and a report");
     if common.reports() {
         finished.report = Some(Report { page: page::page(&case, &found), pictures: Vec::new() });
     }

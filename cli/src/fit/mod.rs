@@ -48,7 +48,7 @@ pub fn run(args: &Args) -> Outcome {
     let fit = &found.fit;
     let json = json::fit(&case, fit, &found.profiles, found.drawn.as_ref().map(json::posterior));
     let advice = "add --out DIR for fitted.toml, fit.json and a report";
-    let mut finished = Finished::new(("fit.json", json::text(&json)), table::text(&case, &found, took), advice);
+    let mut finished = Finished::new("fit", ("fit.json", json::text(&json)), table::text(&case, &found, took), advice);
     if let Some(folder) = &folder {
         let text = fit.case_text(&case, &args.case)?;
         let text = folder::leading(&Case::from_text(&args.case, &text)?, folder.root())?;

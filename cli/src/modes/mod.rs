@@ -31,7 +31,7 @@ fn axis(args: &Args, case: &Case) -> Outcome {
     let folder = Folder::wanted(common, || folder::inputs(&args.case, case), names)?;
     let advice = "add --out DIR for matrices, frequency response and a report";
     let json = ("modes.json", json::text(&json::modes(&analysis)));
-    let mut finished = Finished::new(json, table::text(&analysis), advice);
+    let mut finished = Finished::new("modes", json, table::text(&analysis), advice);
     if common.out.is_some() {
         finished.files.push(("frequency-response.csv".into(), csv(&analysis)));
     }

@@ -78,7 +78,7 @@ pub fn run(args: &Args) -> Outcome {
         [one] => (json::text(&told(one)), table::text(one), "add --out DIR for files and a report"),
         several => (json::text(&several.iter().map(told).collect::<Vec<_>>()), table::comparison(several), ""),
     };
-    let mut finished = Finished::new(("summary.json", json), text, advice);
+    let mut finished = Finished::new("move", ("summary.json", json), text, advice);
     if let (Some(folder), [tried]) = (&folder, &tried[..]) {
         let text = folder.bring_inputs(tried.case).map_err(Failure::work)?;
         if !common.no_report {

@@ -43,7 +43,7 @@ pub fn run(args: &Paper) -> Outcome {
     let claims = claims(&findings);
     let plots = plots(&findings);
     write(&folder, &findings, &claims, &plots).map_err(Failure::work)?;
-    folder.place(false)?;
+    folder.place("paper", args.json)?;
     terminal::show(&if args.json { claims::json(&claims) } else { table(&claims, out) });
     Ok(Status::Done)
 }

@@ -58,7 +58,7 @@ pub fn run(args: &Args) -> Outcome {
     let inputs = || Inputs::new(found.each.iter().flat_map(|one| std::iter::once(&one.file).chain(&one.also)));
     let folder = Folder::wanted(common, inputs, ["shape.json", "report.html"])?;
     let advice = "add --out DIR for a report, pictures and shape.json";
-    let mut finished = Finished::new(("shape.json", json::text(&found)), table::text(&found), advice);
+    let mut finished = Finished::new("shape", ("shape.json", json::text(&found)), table::text(&found), advice);
     if common.reports() {
         let figures = figures::figures(&found);
         let page = page::page(&found, &figures);

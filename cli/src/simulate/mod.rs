@@ -61,7 +61,7 @@ fn axis(args: &Simulate, case: &Case) -> Outcome {
     }
     let told: Vec<_> = runs.iter().map(Run::told).collect();
     let json = ("summary.json", json::text(&Simulation::new(case, solver, &told)));
-    let mut finished = Finished::new(json, table::text(case, solver, &runs), ADVICE);
+    let mut finished = Finished::new("simulate", json, table::text(case, solver, &runs), ADVICE);
     if let Some(folder) = &folder {
         let text = folder.bring_inputs(case).map_err(Failure::work)?;
         if !common.no_report {

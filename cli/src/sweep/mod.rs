@@ -73,7 +73,7 @@ pub fn run(args: &Args) -> Outcome {
     let summary = pool.install(|| Summary::of(&work, &store)).map_err(Failure::work)?;
     let json = ("sweep.json", json::text(&work, &summary));
     let text = table::text(&work, &summary, took, sweep.runs() - before);
-    let mut finished = Finished::new(json, text, "add --out FILE.parquet or --out DIR");
+    let mut finished = Finished::new("sweep", json, text, "add --out FILE.parquet or --out DIR");
     let Some(written) = output::write(&work, &target, &store)? else {
         told_interrupted(&work, &store);
         return Ok(Status::Interrupted(interrupt.signal().unwrap_or(2)));

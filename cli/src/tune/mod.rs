@@ -60,7 +60,7 @@ pub fn run(args: &Args) -> Outcome {
     let work = Work { case: &case, tuning: &tuning, tuned: &tuned };
     let text = tuned.case_text(&case, &args.case)?;
     let advice = "add --out FILE.toml, --out DIR or --in-place";
-    let mut finished = Finished::new(("tune.json", json::text(&work)), table::text(&work), advice);
+    let mut finished = Finished::new("tune", ("tune.json", json::text(&work)), table::text(&work), advice);
     finished.status = match interrupt.signal() {
         Some(signal) => Status::Interrupted(signal),
         None if tuned.holds => Status::Done,

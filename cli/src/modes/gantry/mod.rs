@@ -28,7 +28,7 @@ pub fn run(args: &Args, case: &GantryCase) -> Outcome {
     let folder = Folder::wanted(common, || folder::inputs_of(&args.case, &case.files), names)?;
     let advice = "add --out DIR for the modes as data, the map and a report";
     let json = ("modes.json", json::text(&json::gantry_modes(&analysis)));
-    let mut finished = Finished::new(json, table::text(&analysis), advice);
+    let mut finished = Finished::new("modes", json, table::text(&analysis), advice);
     if common.out.is_some() {
         finished.files.extend(analysis.map.as_ref().map(|map| ("map.csv".to_string(), csv(map))));
     }

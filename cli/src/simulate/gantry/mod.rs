@@ -42,7 +42,7 @@ pub fn run(args: &Simulate, case: &GantryCase) -> Outcome {
     }
     let told: Vec<_> = runs.iter().map(Run::told).collect();
     let json = ("summary.json", json::text(&GantrySimulation::new(case, solver, &told)));
-    let mut finished = Finished::new(json, table::text(case, solver, &runs), ADVICE);
+    let mut finished = Finished::new("simulate", json, table::text(case, solver, &runs), ADVICE);
     if let Some(folder) = &folder {
         let brought = folder.bring(&case.files).map_err(Failure::work)?;
         let text = case.text_with(|file| brought.get(&file.path).cloned().unwrap_or_default());
