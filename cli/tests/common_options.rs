@@ -60,8 +60,8 @@ fn a_case_comes_from_standard_input() {
     assert!(String::from_utf8(wrong.stderr).unwrap().starts_with("error: -:1:"));
     let binary = taut(folder.path()).args(["simulate", "-"]).write_stdin(&b"\xff\xfe"[..]).output().unwrap();
     assert_eq!(String::from_utf8(binary.stderr).unwrap(), "error: -: standard input is not UTF-8 text\n");
-    let in_place = taut(folder.path()).args(["tune", "-", "--in-place"]);
-    let output = { in_place }.write_stdin(case("sollmann-jouaneh/controllers/pid.toml")).output().unwrap();
+    let pid = case("sollmann-jouaneh/controllers/pid.toml");
+    let output = taut(folder.path()).args(["tune", "-", "--in-place"]).write_stdin(pid).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8(output.stderr).unwrap().contains("standard input cannot be written to"));
 }
