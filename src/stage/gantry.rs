@@ -18,7 +18,7 @@ use super::{Encoder, EncoderPlace, Pulley, Travel};
 use crate::error::{Error, Result};
 use crate::friction::{Friction, Law};
 use crate::mechanism::{
-    Amplifier, Body, Drive, Follows, Heading, Kind, Label, Mechanism, Motor, Shown, Spring, SpringLaw,
+    Amplifier, Body, Drive, Follows, Heading, Kind, Label, Mechanism, Motor, Roles, Shown, Spring, SpringLaw,
 };
 
 /// Number of the left drive pulley (A) among the bodies.
@@ -283,6 +283,7 @@ impl Gantry {
             springs.push(way(body, slide.travel));
         }
         let mut mechanism = Mechanism::new(bodies, springs, drives);
+        mechanism.roles = Roles { loads: vec![BRIDGE, CART], spans: (0..self.routing.spans().len()).collect() };
         mechanism.readings = self.readings(&mechanism);
         mechanism.columns = self.columns(&mechanism);
         mechanism
