@@ -95,6 +95,14 @@ impl Routing {
         }
     }
 
+    /// The stretch of each span as a sum of those two that tell the drives' errors, (span, weight): the spans of one belt add up to nothing.
+    pub fn stretches(self) -> &'static [&'static [(usize, f64)]] {
+        match self {
+            Routing::HFrame => &[&[(0, 1.0)], &[(1, 1.0)], &[(0, -1.0), (1, -1.0)]],
+            Routing::CoreXy => &[&[(0, 1.0)], &[(0, -1.0)], &[(2, 1.0)], &[(2, -1.0)]],
+        }
+    }
+
     /// Rows of A for pulleys of radius `r`, and how the spans' lengths change with x and y.
     fn rows(self, r: f64) -> Vec<([f64; BODIES], [f64; 2])> {
         match self {
@@ -307,14 +315,14 @@ impl Gantry {
         rows.into_iter().enumerate().map(span).collect()
     }
 
-    /// Speeds of bridge and cart, currents of both drives, forces of the spans, the stretches that tell what the drives do not see, and
-    /// the speeds of rotors that turn by themselves.
+    /// Speeds of bridge and cart, currents of both drives, forces of the spans, the stretches that tell what the drives do not see and from
+    /// which those of all spans follow, and the speeds of the motors: of rotors that turn by themselves, or of their pulleys.
     fn readings(&self, mechanism: &Mechanism) -> Vec<Shown> {
         let mut readings =
             vec![Shown::Speed(BRIDGE, 1.0), Shown::Speed(CART, 1.0), Shown::Current(0), Shown::Current(1)];
         readings.extend((0..self.routing.spans().len()).map(|span| Shown::Force(span, 1.0)));
         readings.extend(self.routing.drive_error()[0].map(|(span, _)| Shown::Stretch(span)));
-        readings.extend((BODIES..mechanism.bodies.len()).map(|rotor| Shown::Speed(rotor, 1.0)));
+        readings.extend(mechanism.drives.iter().map(|drive| Shown::Speed(drive.shaft, 1.0)));
         readings
     }
 
