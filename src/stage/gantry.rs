@@ -141,8 +141,44 @@ pub struct Belts {
     pub damping: Vec<f64>,
     /// Tension of every span at rest, N; none for spans that can push.
     pub pretension: Option<f64>,
+    /// What the stiffness is computed from, where it is not given.
+    pub make: Option<Make>,
     /// E A, N, and the lengths of the spans with bridge and cart at zero, m, where the spans follow them.
     pub follows: Option<(f64, Vec<f64>)>,
+}
+
+/// Spans by material and lengths.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Make {
+    /// Modulus of elasticity E, Pa.
+    pub modulus: f64,
+    /// Cross-section A that carries the load, m².
+    pub section: f64,
+    /// Length of each span with bridge and cart at zero, m.
+    pub spans: Vec<f64>,
+}
+
+impl Make {
+    /// k = A E / l of each span, N/m.                                                     (11)
+    pub fn stiffness(&self) -> Vec<f64> {
+        let rigidity = self.rigidity();
+        self.spans.iter().map(|length| rigidity / length).collect()
+    }
+
+    /// E A, N.
+    pub fn rigidity(&self) -> f64 {
+        self.modulus * self.section
+    }
+}
+
+impl Belts {
+    /// Takes up what was changed of the make.
+    pub fn follow_make(&mut self) {
+        if let Some(make) = &self.make {
+            self.stiffness = make.stiffness();
+            self.follows = self.follows.take().map(|_| (make.rigidity(), make.spans.clone()));
+        }
+    }
 }
 
 /// A gantry with two drives and a belt, or two.
@@ -216,6 +252,18 @@ impl Gantry {
             positive("a gear ratio", motor.gear_ratio)?;
             if motor.gear_play.is_some() {
                 positive("a rotor's inertia", motor.rotor_inertia)?;
+            }
+        }
+        for (name, slide) in [("bridge", &self.bridge), ("cart", &self.cart)] {
+            if slide.travel.is_some_and(|travel| travel.min >= travel.max) {
+                let what = format!("the travel of the {name} ends before it begins");
+                return Err(Error::new(what).allowed("max above min"));
+            }
+        }
+        for friction in [self.drive_pulley.friction, self.bridge.friction, self.cart.friction] {
+            if matches!(friction.law, Law::LuGre { .. }) {
+                let least = friction.forward.coulomb.min(friction.backward.coulomb);
+                positive("Coulomb friction under bristles", least)?;
             }
         }
         if self.belts.follows.is_some() {

@@ -22,7 +22,7 @@ use rayon::prelude::*;
 use std::time::{Duration, Instant};
 use store::Store;
 use summary::Summary;
-use taut::case::Case;
+use taut::case::Opened;
 use taut::sweep::Sweep;
 use taut::{Error, Result};
 
@@ -32,7 +32,7 @@ const MOST_KEPT: u64 = 100_000;
 /// What was asked for.
 pub struct Work<'a> {
     pub args: &'a Args,
-    pub case: &'a Case,
+    pub case: &'a Opened,
     pub sweep: &'a Sweep,
     pub interrupt: &'a Interrupt,
 }
@@ -41,8 +41,8 @@ pub struct Work<'a> {
 pub fn run(args: &Args) -> Outcome {
     let changes = options::changes(args)?;
     let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-    let case = Case::read_with(&args.case, &changes)?;
-    let sweep = Sweep::new(&case).map_err(|error| error.in_file(&args.case))?;
+    let case = Opened::read_with(&args.case, &changes)?;
+    let sweep = Sweep::of(&case).map_err(|error| error.in_file(&args.case))?;
     let target = Target::of(args, &case)?;
     if args.trajectories {
         trajectories::check(&sweep)?;

@@ -46,7 +46,8 @@ pub fn write(
 
 /// What a folder holds beside the rows; returns the names.
 fn others(work: &Work, folder: &Folder, summary: &Summary, json: &str) -> Result<Vec<&'static str>> {
-    let text = folder.bring_inputs(work.case)?;
+    let names = folder.bring(work.case.files())?;
+    let text = work.case.text_with(|file| names.get(&file.path).cloned().unwrap_or_default());
     write_atomically(folder.path("sweep.json"), json)?;
     write_atomically(folder.path("case.toml"), &text)?;
     let mut written = vec!["sweep.json", "case.toml"];
