@@ -304,7 +304,7 @@ fn a_sweep_of_a_case_file_has_its_designs() {
     let folder = TempDir::new().unwrap();
     let whole = fs::read_to_string(stage("core-xy/core-xy.toml")).unwrap();
     for (design, runs) in [
-        ("design = \"one-at-a-time\"\n[sweep.vary]\nall = \"factors(2, 0.5)\"\n", "49 runs"),
+        ("design = \"one-at-a-time\"\n[sweep.vary]\nall = \"factors(2, 0.5)\"\n", "47 runs"),
         (
             "design = \"random\"\nruns = 3\nindices = true\n[sweep.vary]\n\"left_drive.motor.resistance\" = \"5 %\"\n",
             "9 runs",
@@ -345,8 +345,7 @@ fn a_sweep_that_a_gantry_cannot_have_is_told() {
         ("total.viscous=20%", "`total.viscous` is a sum over the bodies of a single axis, and this is a gantry\n"),
         ("cart.friction.stribeck.force=20%", "`cart.friction.stribeck.force` has no value in this case\n"),
         ("bridge.mass=values(-1 kg)", "-1 kg has to be above zero\n"),
-        ("cart.mass=values(1 s)", "\"1 s\" is in s; a mass (kg) is wanted\n"),
-        ("cart.mass=-20%", "a share"),
+        ("cart.mass=values(1 s)", "\"1 s\" is a time (s); a mass (kg) is wanted\n"),
     ] {
         let told = told(vary, &[]);
         assert!(told.contains(message), "{vary}: {told}");
@@ -389,7 +388,7 @@ fn a_sweep_that_was_interrupted_goes_on() {
     let folder = TempDir::new().unwrap();
     let run = |out: &str| {
         let mut run = Program::new(env!("CARGO_BIN_EXE_taut"));
-        run.arg("sweep").arg(stage("core-xy/core-xy.toml")).args(["--runs", "3000", "--vary", "all=20%", "--out", out]);
+        run.arg("sweep").arg(stage("core-xy/core-xy.toml")).args(["--runs", "1200", "--vary", "all=20%", "--out", out]);
         run.current_dir(folder.path()).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null());
         run
     };
