@@ -34,7 +34,7 @@ fn main() -> Result<()> {
     let begin = Instant::now();
     std::thread::scope(|scope| (0..threads).for_each(|_| drop(scope.spawn(work))));
     let seconds = begin.elapsed().as_secs_f64();
-    let simulations = runs * sweep.experiments().len() as u64;
+    let simulations = runs * sweep.groups().len() as u64;
     println!(
         "{{\"runs\": {runs}, \"threads\": {threads}, \"simulations\": {simulations}, \"seconds\": {seconds:.4}, \
          \"simulations_per_second\": {:.0}, \"bits\": \"{:016x}\"}}",

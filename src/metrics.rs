@@ -520,10 +520,10 @@ const SLOWER: f64 = 1e4;
 const FASTER: f64 = 50.0;
 const FINER: f64 = 1.05;
 
-/// The three peaks' largest, with the number (1 to 3) of its span.
-pub fn largest(peaks: &[Peak; 3]) -> (usize, Peak) {
-    let mut largest = (1, peaks[0]);
-    for (number, peak) in (1..).zip(*peaks) {
+/// The largest of the spans' peaks, with the number (from 1 on) of its span.
+pub fn largest(peaks: &[Peak]) -> (usize, Peak) {
+    let mut largest = (1, peaks.first().copied().unwrap_or_default());
+    for (number, peak) in (1..).zip(peaks.iter().copied()) {
         if peak.value.abs() > largest.1.value.abs() {
             largest = (number, peak);
         }

@@ -5,6 +5,7 @@ use taut::case::GantryCase;
 use taut::linear::{GantryAnalysis, Natural, Root};
 use taut::metrics::{GantryMeter, GantryMetrics, Peak};
 use taut::solve::{Course, Detail, Ending, ErrorEstimate, Event, Flow, Solver, stream_mechanism};
+use taut::stage::gantry::Routing;
 use taut::trajectory::Trajectory;
 
 /// What a run of the first experiment of a case gives.
@@ -114,8 +115,19 @@ fn metered(case: &GantryCase, solver: Solver, every: f64) -> (GantryMetrics, Tra
 
 /// All peaks of a run.
 fn peaks(metrics: &GantryMetrics) -> Vec<Peak> {
-    let pairs = [metrics.peak_speed, metrics.peak_error, metrics.peak_current];
-    pairs.concat().into_iter().chain(metrics.peak_force.iter().copied()).collect()
+    let pairs = [metrics.peak_speed, metrics.peak_error, metrics.peak_current, metrics.peak_drive_speed];
+    [&pairs.concat()[..], &metrics.peak_stretch, &metrics.peak_force].concat()
+}
+
+/// The stretch of each span by its lever arms, s = A q, from columns of q.
+fn stretches(case: &GantryCase, q: [&[f64]; 4]) -> Vec<Vec<f64>> {
+    let r = case.gantry.pulley_radius;
+    let arms: &[[f64; 4]] = match case.gantry.routing {
+        Routing::HFrame => &[[r, 0.0, 1.0, 1.0], [0.0, -r, 1.0, -1.0], [-r, r, -2.0, 0.0]],
+        Routing::CoreXy => &[[r, 0.0, -1.0, -1.0], [-r, 0.0, 1.0, 1.0], [0.0, r, -1.0, 1.0], [0.0, -r, 1.0, -1.0]],
+    };
+    let at = |arms: &[f64; 4], row: usize| arms.iter().zip(q).map(|(arm, column)| arm * column[row]).sum();
+    arms.iter().map(|arms| (0..q[0].len()).map(|row| at(arms, row)).collect()).collect()
 }
 
 /// The largest magnitudes in rows, in the same order.
@@ -127,6 +139,13 @@ fn largest_rows(case: &GantryCase, rows: &Trajectory) -> Vec<f64> {
     let mut columns = vec![get("bridge_speed"), get("cart_speed")];
     columns.extend([0, 1].map(|k| errors.iter().map(|error| error[k]).collect()));
     columns.extend([get("left_current"), get("right_current")]);
+    // Of the motors: rotors that turn by themselves, or the pulleys.
+    columns.extend(["left", "right"].map(|side| {
+        let rotor = rows.get(&format!("{side}_rotor_speed"));
+        rotor.map_or_else(|| get(&format!("{side}_speed")), <[f64]>::to_vec)
+    }));
+    let stretches = stretches(case, [&left, &right, &x, &y]);
+    columns.extend(stretches);
     columns.extend(case.gantry.routing.spans().iter().map(|span| get(&format!("{}_force", span.key))));
     columns.iter().map(|column| column.iter().fold(0.0, |most: f64, v| most.max(v.abs()))).collect()
 }

@@ -87,7 +87,7 @@ fn gantry() -> impl Strategy<Value = Gantry> {
                 drive_pulley,
                 bridge,
                 cart,
-                belts: Belts { stiffness, damping, pretension: None, follows: None },
+                belts: Belts { stiffness, damping, pretension: None, make: None, follows: None },
                 encoder: None,
             }
         },

@@ -173,8 +173,8 @@ fn every_number_is_free_in_a_fit_and_varied_in_a_sweep() {
                 assert!(!named(&key).unwrap().range.contains(2.0 * value), "{key}");
                 continue;
             };
-            assert_eq!(sweep.machine(0), case.stage, "{key}");
-            let less = value_of(&sweep.machine(1), &key).unwrap();
+            assert_eq!(sweep.machine(0).axis(), Some(&case.stage), "{key}");
+            let less = value_of(sweep.machine(1).axis().unwrap(), &key).unwrap();
             assert!(less == 0.25 * value || key.contains(".static") && less < value, "{key}");
             assert_eq!(sweep.columns()[1].name, key);
         }
@@ -316,15 +316,25 @@ fn the_table_is_of_one_piece() {
         }
         match parameter.field {
             Field::Form(of, _) | Field::PartOf(of) => assert!(matches!(row(of).field, Field::Machine(_)), "{of}"),
-            Field::Elsewhere => assert!(parameter.off == Off::No && parameter.part.is_none(), "{}", parameter.key),
+            Field::Elsewhere => assert!(parameter.part.is_none(), "{}", parameter.key),
             Field::Machine(_) => {}
         }
+        match parameter.gantry {
+            Field::Form(of, _) | Field::PartOf(of) => assert!(matches!(row(of).gantry, Field::Machine(_)), "{of}"),
+            Field::Elsewhere | Field::Machine(_) => {}
+        }
+        let places = [matches!(parameter.field, Field::Elsewhere), matches!(parameter.gantry, Field::Elsewhere)];
+        assert!(parameter.off == Off::No || places != [true; 2], "{}", parameter.key);
         let machine =
             ["motor.", "amplifier.", "drive_pulley.", "idler_pulley.", "cart.", "belt.", "travel.", "encoder."];
         let is_machine = machine.iter().any(|table| parameter.key.starts_with(table));
-        assert_eq!(is_machine, !matches!(parameter.field, Field::Elsewhere), "{}", parameter.key);
+        assert_eq!(is_machine, !places[0], "{}", parameter.key);
+        // The cart of a gantry has the rows of its bridge.
+        let gantry = ["motor.", "amplifier.", "drive_pulley.", "bridge.", "belt.", "encoder."];
+        let is_gantry = gantry.iter().any(|table| parameter.key.starts_with(table));
+        assert_eq!(is_gantry, !places[1], "{}", parameter.key);
     }
-    assert!(free_markdown().contains("| `cart.friction.static` | yes | cart's dry friction | `coulomb` |"));
+    assert!(free_markdown().contains("| `cart.friction.static` | axis | yes | cart's dry friction | `coulomb` |"));
 }
 
 /// What `--vary all` varies on the paper's machine.

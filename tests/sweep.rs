@@ -1,10 +1,13 @@
 //! Sweeps: the same rows however they are split, distributions, designs, metrics, sensitivity indices.
 
 mod common;
+#[path = "sweep/gantry.rs"]
+mod gantry;
 
 use taut::case::{Case, Sampling};
 use taut::metrics::Meter;
 use taut::solve::{Bench, Flow, Solver, stream_observed};
+use taut::stage::Stage;
 use taut::sweep::{DIMENSIONS, OF_EXPERIMENT, Sobol, Spread, Status, Sweep, indices, rank_correlation};
 use taut::trajectory::Trajectory;
 
@@ -17,6 +20,11 @@ fn sweep(changes: &[&str]) -> Sweep {
 
 fn rows(sweep: &Sweep, first: u64, count: usize) -> Trajectory {
     sweep.rows(first, count, &|| false).expect("nobody stops it")
+}
+
+/// The axis of a run.
+fn machine(sweep: &Sweep, run: u64) -> Stage {
+    sweep.machine(run).axis().expect("an axis").clone()
 }
 
 /// The bits of every number.
@@ -73,20 +81,20 @@ fn one_at_a_time_leaves_all_others_as_they_are() {
     let sweep = sweep(&["sweep.design=one-at-a-time", "sweep.vary.all=factors(2, 0.5)"]);
     assert_eq!(sweep.runs(), 33);
     let nominal = common::table4();
-    assert_eq!(sweep.machine(0), nominal);
+    assert_eq!(machine(&sweep, 0), nominal);
     let mut doubled = nominal.clone();
     doubled.motor.torque_constant *= 2.0;
-    assert_eq!(sweep.machine(1), doubled);
+    assert_eq!(machine(&sweep, 1), doubled);
     let mut halved = nominal;
     halved.motor.torque_constant *= 0.5;
-    assert_eq!(sweep.machine(2), halved);
+    assert_eq!(machine(&sweep, 2), halved);
 }
 
 #[test]
 fn breakaway_goes_along_with_coulomb_friction() {
     let sweep = sweep(&["sweep.runs=50", "sweep.vary.all=50 %"]);
     for run in 0..50 {
-        let stage = sweep.machine(run);
+        let stage = machine(&sweep, run);
         for law in [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction] {
             assert!(law.forward == law.backward && law.forward.breakaway == law.forward.coulomb);
         }
@@ -357,9 +365,9 @@ fn moves_in_closed_loop_are_swept_too() {
     let file = format!("{}/stages/sollmann-jouaneh/controllers/pid.toml", env!("CARGO_MANIFEST_DIR"));
     let case = Case::read_with(file, &["sweep.runs=4", "sweep.vary.\"cart.mass\"=20 %"]).unwrap();
     let sweep = Sweep::new(&case).unwrap();
-    assert!(!sweep.moves().is_empty());
+    assert!(sweep.groups()[0].is_move);
     let table = rows(&sweep, 0, 4);
-    let name = sweep.moves()[0].file_name();
+    let name = sweep.groups()[0].file.clone();
     let errors = table.get(&format!("{name}.peak_cart_error")).unwrap();
     assert!(errors.iter().all(|error| error.is_finite() && *error != 0.0) && errors[0] != errors[1]);
     assert_eq!(bits(&table), bits(&rows(&sweep, 0, 4)));
@@ -397,7 +405,7 @@ fn machines_come_from_a_fit() {
         round.sort_by(|a, b| a.0.total_cmp(&b.0));
         assert_eq!(round, [(0.35, 0.19), (0.36, 0.2), (0.37, 0.22)]);
     }
-    let machine = drawn.machine(2);
+    let machine = machine(&drawn, 2);
     assert_eq!((machine.cart.mass, machine.cart.friction.forward.breakaway), pairs[2]);
 
     let error = Sweep::new(&Case::read_with(&path, &["sweep.runs=7", "sweep.from=uncertainty"]).unwrap()).unwrap_err();

@@ -250,10 +250,165 @@ fn commands_for_an_axis_say_what_takes_a_gantry() {
             "error: stages/core-xy.toml:4:9: kind: this needs a single axis, and the case describes a gantry (CoreXY)\n  \
              4 | kind  = \"core-xy\"\n    |         ^^^^^^^^^\n  \
              allowed: kind = \"axis\", or no kind at all\n  \
-             next: `taut simulate` and `taut modes` take gantries; sweeps, control, fit and tuning of them are yet to come\n",
+             next: `taut simulate`, `taut modes` and `taut sweep` take gantries; control, fit and tuning of them are yet to come\n",
             "{command}"
         );
     }
+}
+
+#[test]
+fn a_sweep_writes_a_whole_folder_that_repeats_it() {
+    let folder = TempDir::new().unwrap();
+    let plan =
+        ["--runs", "24", "--design", "sobol", "--vary", "all=20%", "--trajectories", "--threads", "2", "--out", "out"];
+    let run = taut(folder.path()).arg("sweep").arg(stage("h-frame/h-frame.toml")).args(plan).assert().success();
+    let told = text(&run.get_output().stdout);
+    for word in [
+        "24 runs of 3 simulations each: 21 parameters, sobol",
+        "bridge position at the end",
+        "peak current of the left drive",
+        "largest force in the belts",
+        "figures that count events",
+    ] {
+        assert!(told.contains(word), "{word} is not in\n{told}");
+    }
+    let out = folder.path().join("out");
+    let summary: Value = serde_json::from_str(&fs::read_to_string(out.join("sweep.json")).unwrap()).unwrap();
+    let figures = summary["experiments"][1]["figures"].as_array().unwrap();
+    let speed = figures.iter().find(|figure| figure["name"] == "peak_left_speed").unwrap();
+    assert!(speed["unit"] == "rad/s" && speed["spread"]["count"] == 24);
+    assert!(fs::read_to_string(out.join("report.html")).unwrap().contains("along y: bridge position at the end"));
+    for plot in ["one-motor-final-bridge-position-histogram.svg", "along-x-peak-left-current-scatter.png"] {
+        assert!(out.join("plots").join(plot).exists(), "{plot}");
+    }
+    assert!(!folder.path().join("out/runs.parquet.parts").exists());
+    let read = |file: &Path, names: &[&str]| taut::log::read_columns(file, names).unwrap();
+    let rows = read(&out.join("runs.parquet"), &["run", "cart.mass_kg", "along-x.final_bridge_position_m"]);
+    assert!(rows[0].len() == 24 && rows[1].iter().all(|mass| (0.8 * 0.362..1.2 * 0.362).contains(mass)));
+    let names = ["run", "experiment", "time_s", "bridge_position_m", "left_span_force_N"];
+    let trajectories = read(&out.join("runs-trajectories.parquet"), &names);
+    assert_eq!(trajectories[0].len(), 24 * 3 * 1001);
+    let last = (0..trajectories[0].len()).rfind(|row| trajectories[1][*row] == 1.0).unwrap();
+    assert_eq!((trajectories[0][last], trajectories[2][last], trajectories[3][last]), (23.0, 1.0, rows[2][23]));
+    // The case of the folder repeats it, on another number of threads.
+    let again = ["sweep", "case.toml", "--threads", "1", "--out", "again.parquet", "--json"];
+    let run = taut(&out).args(again).assert().success();
+    assert_eq!(json(&run.get_output().stdout), summary);
+    assert_eq!(fs::read(out.join("again.parquet")).unwrap(), fs::read(out.join("runs.parquet")).unwrap());
+}
+
+#[test]
+fn a_sweep_of_a_case_file_has_its_designs() {
+    let folder = TempDir::new().unwrap();
+    let whole = fs::read_to_string(stage("core-xy/core-xy.toml")).unwrap();
+    for (design, runs) in [
+        ("design = \"one-at-a-time\"\n[sweep.vary]\nall = \"factors(2, 0.5)\"\n", "47 runs"),
+        (
+            "design = \"random\"\nruns = 3\nindices = true\n[sweep.vary]\n\"left_drive.motor.resistance\" = \"5 %\"\n",
+            "9 runs",
+        ),
+        (
+            "design = \"grid\"\n[sweep.vary]\n\"cart.travel.max\" = [\"0.2 m\", \"0.3 m\"]\n\"bridge.friction.coulomb = cart.friction.coulomb\" = \"factors(1, 2)\"\n",
+            "4 runs",
+        ),
+    ] {
+        fs::write(folder.path().join("case.toml"), format!("{whole}\n[sweep]\n{design}")).unwrap();
+        let run = taut(folder.path()).args(["sweep", "case.toml"]).assert().success();
+        let told = text(&run.get_output().stdout);
+        assert!(told.contains(runs), "{runs}: {told}");
+    }
+}
+
+#[test]
+fn a_sweep_that_a_gantry_cannot_have_is_told() {
+    let case = stage("h-frame/h-frame.toml");
+    let told =
+        |vary: &str, more: &[&str]| refused(&[&["sweep", "--runs", "4", "--vary", vary][..], more].concat(), &case);
+    for (vary, message) in [
+        (
+            "idler_pulley.inertia=20%",
+            "sweep.vary.idler_pulley.inertia: `idler_pulley.inertia` is of a single axis, and this is a gantry\n",
+        ),
+        ("cart.load=20%", "`cart.load` is no parameter of the machine\n"),
+        ("sweep.runs=20%", "`sweep.runs` is no number of the machine\n"),
+        ("third_drive.motor.resistance=20%", "`third_drive.motor.resistance` is no parameter of the machine\n"),
+        ("left_drive.cart.mass=20%", "`left_drive.cart.mass` is no parameter of the machine\n"),
+        ("bridge.mas=20%", "next: did you mean `bridge.mass`?\n"),
+        (
+            "belt.stiffness.3=20%",
+            "`belt.stiffness.3` is none of the 3 that there are\n  1 | sweep.vary.\"belt.stiffness.3\"=20%\n    \
+             |                               ^^^\n  allowed: belt.stiffness.0 to belt.stiffness.2\n",
+        ),
+        ("belt.modulus=20%", "`belt.modulus` has no value in this case\n"),
+        ("total.viscous=20%", "`total.viscous` is a sum over the bodies of a single axis, and this is a gantry\n"),
+        ("cart.friction.stribeck.force=20%", "`cart.friction.stribeck.force` has no value in this case\n"),
+        ("bridge.mass=values(-1 kg)", "-1 kg has to be above zero\n"),
+        ("cart.mass=values(1 s)", "\"1 s\" is a time (s); a mass (kg) is wanted\n"),
+    ] {
+        let told = told(vary, &[]);
+        assert!(told.contains(message), "{vary}: {told}");
+    }
+    // A key that is nothing like any lists those of this gantry.
+    let all = told("idler_pulley.inertia=20%", &[]);
+    for key in [
+        "motor.resistance, ",
+        "drive_pulley.radius, ",
+        "bridge.mass, cart.mass, ",
+        "cart.friction.coulomb, ",
+        "belt.stiffness, ",
+    ] {
+        assert!(all.contains(key), "{key}: {all}");
+    }
+    assert!(!all.contains("idler_pulley.friction") && !all.contains("gear_stiffness"), "{all}");
+    assert!(all.ends_with("next: of one drive alone write for example left_drive.motor.resistance\n"), "{all}");
+
+    let from = told("cart.mass=20%", &["--set", "sweep.from=uncertainty"]);
+    assert!(
+        from.contains("sweep.from: a gantry is not fitted yet, so nothing is known of how its parameters are spread\n"),
+        "{from}"
+    );
+    let interval = told("cart.mass=20%", &["--interval", "2 s"]);
+    assert!(interval.contains("an interval of 2 s does not suit \"one motor\"\n"), "{interval}");
+    let apart = told("motor.resistance=20%", &["--set", "left_drive.motor.resistance=0.8 ohm"]);
+    assert!(apart.contains("`motor.resistance` is not the same in both drives\n"), "{apart}");
+    assert_eq!(
+        refused(&["sweep"], &case),
+        "error: stages/h-frame.toml: this case does not say what is varied\n  \
+         next: give for example --runs 1000 --vary cart.mass=20%, or add a table [sweep]\n"
+    );
+}
+
+/// Ctrl-C in the middle: the same command goes on, and the file is that of a run in one go.
+#[test]
+#[cfg(unix)]
+fn a_sweep_that_was_interrupted_goes_on() {
+    use std::process::{Command as Program, Stdio};
+    let folder = TempDir::new().unwrap();
+    let run = |out: &str| {
+        let mut run = Program::new(env!("CARGO_BIN_EXE_taut"));
+        run.arg("sweep").arg(stage("core-xy/core-xy.toml")).args(["--runs", "1200", "--vary", "all=20%", "--out", out]);
+        run.current_dir(folder.path()).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null());
+        run
+    };
+    let parts = folder.path().join("cut.parquet.parts");
+    let done = || {
+        fs::read_dir(&parts).map_or(0, |entries| {
+            entries.flatten().filter(|e| e.path().extension().is_some_and(|e| e == "part")).count()
+        })
+    };
+    let mut child = run("cut.parquet").spawn().unwrap();
+    while done() < 2 {
+        assert!(child.try_wait().unwrap().is_none(), "it was done too soon");
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    assert!(Program::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(done() >= 2 && !folder.path().join("cut.parquet").exists());
+    for out in ["cut.parquet", "whole.parquet"] {
+        assert!(run(out).output().unwrap().status.success());
+    }
+    let [cut, whole] = ["cut.parquet", "whole.parquet"].map(|name| fs::read(folder.path().join(name)).unwrap());
+    assert!(cut == whole && !parts.exists());
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Many runs: rows by number, on threads of this machine.
 
-use crate::case::Case;
+use crate::case::{Case, Inner};
 use crate::columns::{self, Columns};
 use crate::error::{Told, unlocked};
 use crate::interrupt::Interrupt;
@@ -23,8 +23,11 @@ pub struct Sweep {
 impl Sweep {
     #[new]
     fn new(py: Python<'_>, case: &Case) -> PyResult<Self> {
-        let axis = case.axis(py)?;
-        let inner = unlocked(py, || taut::sweep::Sweep::new(axis).map_err(|error| error.in_file(&case.path)))?;
+        let planned = || match &case.inner {
+            Inner::Axis(case) => taut::sweep::Sweep::new(case),
+            Inner::Gantry(case) => taut::sweep::Sweep::of_gantry(case),
+        };
+        let inner = unlocked(py, || planned().map_err(|error| error.in_file(&case.path)))?;
         Ok(Self { inner: inner.told(py)? })
     }
 

@@ -70,6 +70,18 @@ def test_modes(gantry, root):
     assert hertz.shape == (2, len(bridge), len(cart)) and (hertz > 100).all()
 
 
+def test_a_row_of_a_sweep_is_the_run_of_its_machine(gantry):
+    table = gantry.sweep(4, vary={"cart.mass": "20 %", "left_drive.motor.resistance": "5 %"}, design="sobol")
+    assert len(table["run"]) == 4 and len(set(table["cart.mass"])) == 4
+    for row in (0, 3):
+        keys = ("cart.mass", "left_drive.motor.resistance")
+        run = gantry.changed({key: float(table[key][row]) for key in keys}).simulate("one motor")
+        assert table["one-motor.final_bridge_position"][row] == run.metrics["final_bridge_position_m"]
+        assert table["one-motor.peak_left_span_force"][row] == run.metrics["peak_span_force_N"]["left_span"]["value"]
+    with pytest.raises(taut.Error, match="is no parameter of the machine"):
+        gantry.sweep(4, vary={"idler_pulley.inertia": "20 %"})
+
+
 def test_what_is_not_there_says_so(gantry):
     assert repr(gantry) == "<taut.GantryCase 'H-frame': one motor, along x, along y>"
     for refused in (gantry.check, gantry.fit, gantry.move):

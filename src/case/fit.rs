@@ -4,7 +4,7 @@ use super::Experiment;
 use super::reader::{Field, Table, nearest};
 use super::tree::Kind;
 use crate::error::Result;
-use crate::parameter::{self, Free, INPUT, Parameter, Range};
+use crate::parameter::{self, Free, INPUT, Numbers, Parameter, Range};
 use crate::stage::Stage;
 
 /// What a fit may change, and how it is done.
@@ -237,8 +237,8 @@ fn closed(field: &Field, table: &Table, root: &Table, experiments: &[Experiment]
 }
 
 /// Refuses a name that is no parameter of this machine.
-pub(super) fn free(field: &Field, name: &str, stage: &Stage) -> Result<()> {
-    Free::new(stage, name, &[], &[]).map(|_| ()).map_err(|error| {
+pub(super) fn free(field: &Field, name: &str, machine: &dyn Numbers) -> Result<()> {
+    Free::new(machine, name, &[], &[]).map(|_| ()).map_err(|error| {
         let mut told = field.fail(error.what);
         (told.allowed, told.next) = (error.allowed, error.next);
         told

@@ -2,11 +2,11 @@
 
 use super::friction::friction;
 use super::reader::{Field, Table};
-use super::{Case, Folder, InputFile, check_name, input, listed, set, stage, times, title, unique};
+use super::{Case, Folder, InputFile, Sweeping, check_name, input, listed, set, stage, sweep, times, title, unique};
 use crate::error::{Error, Result};
 use crate::mechanism::{Amplifier, DRIVES, Motor, State};
 use crate::signal::Signal;
-use crate::stage::gantry::{BRIDGE, Belts, CART, Gantry, LEFT, RIGHT, Routing, Slide};
+use crate::stage::gantry::{BRIDGE, Belts, CART, Gantry, LEFT, Make, RIGHT, Routing, Slide};
 use crate::stage::{AmplifierMode, Encoder, EncoderPlace};
 use crate::trajectory::Grid;
 use std::collections::HashMap;
@@ -21,6 +21,8 @@ pub struct GantryCase {
     pub gantry: Gantry,
     /// What is done with it, in the file's order.
     pub experiments: Vec<GantryExperiment>,
+    /// What is varied in many runs, where the file says so.
+    pub sweep: Option<Sweeping>,
     /// The text it was read from, with `--set` applied: read again, it gives the same case.
     pub text: String,
     /// The files that its inputs name, in the text's order.
@@ -68,6 +70,43 @@ impl Opened {
             None => Case::from_text_with(name, text, changes).map(|case| Self::Axis(Box::new(case))),
         }
     }
+
+    /// What the file says it is; its name where it does not say.
+    pub fn title(&self) -> &str {
+        match self {
+            Opened::Axis(case) => &case.title,
+            Opened::Gantry(case) => &case.title,
+        }
+    }
+
+    /// The text it was read from, with `--set` applied: read again, it gives the same case.
+    pub fn text(&self) -> &str {
+        match self {
+            Opened::Axis(case) => &case.text,
+            Opened::Gantry(case) => &case.text,
+        }
+    }
+
+    /// The files that it names, in the text's order.
+    pub fn files(&self) -> &[InputFile] {
+        match self {
+            Opened::Axis(case) => &case.files,
+            Opened::Gantry(case) => &case.files,
+        }
+    }
+
+    /// What is varied in many runs, where the file says so.
+    pub fn sweep(&self) -> Option<&Sweeping> {
+        match self {
+            Opened::Axis(case) => case.sweep.as_ref(),
+            Opened::Gantry(case) => case.sweep.as_ref(),
+        }
+    }
+
+    /// The text with other names for the files of its inputs; it is to lie where these names lead to them.
+    pub fn text_with(&self, name: impl Fn(&InputFile) -> String) -> String {
+        super::text_with(self.text(), self.files(), name)
+    }
 }
 
 /// Which gantry the file describes; none for an axis.
@@ -80,10 +119,9 @@ pub(super) fn kind(root: &Table) -> Result<Option<Routing>> {
 pub(super) fn no_axis(root: &Table, routing: Routing) -> Error {
     let field = root.optional("kind").unwrap_or_else(|| root.field.clone());
     let what = format!("this needs a single axis, and the case describes a gantry ({})", routing.name());
-    field
-        .fail(what)
-        .allowed("kind = \"axis\", or no kind at all")
-        .next("`taut simulate` and `taut modes` take gantries; sweeps, control, fit and tuning of them are yet to come")
+    field.fail(what).allowed("kind = \"axis\", or no kind at all").next(
+        "`taut simulate`, `taut modes` and `taut sweep` take gantries; control, fit and tuning of them are yet to come",
+    )
 }
 
 impl GantryCase {
@@ -126,7 +164,7 @@ impl GantryCase {
                 }));
             }
         }
-        for key in ["measurement", "controller", "move", "fit", "tune", "uncertainty", "sweep"] {
+        for key in ["measurement", "controller", "move", "fit", "tune", "uncertainty"] {
             if let Some(field) = root.optional(key) {
                 return Err(field.fail("this is not there yet for a gantry").next("leave it out for now"));
             }
@@ -144,6 +182,7 @@ impl GantryCase {
             "belt",
             "encoder",
             "experiment",
+            "sweep",
         ];
         root.check_keys(&tables, &[])?;
         let folder = Folder::of(name);
@@ -151,7 +190,15 @@ impl GantryCase {
         gantry.check().map_err(|error| if error.place.is_none() { error.in_file(name) } else { error })?;
         let experiments = experiments(&root, &gantry, &folder)?;
         let title = title(&root, name)?;
-        Ok(Self { title, gantry, experiments, text: source.text.clone(), files: folder.files() })
+        let context = sweep::Context {
+            machine: &gantry,
+            experiments: experiments.iter().map(|experiment| (experiment.name.as_str(), experiment.until)).collect(),
+            fit: None,
+            known: &[],
+            folder: &folder,
+        };
+        let sweep = sweep::sweeping(&root, &context)?;
+        Ok(Self { title, gantry, experiments, sweep, text: source.text.clone(), files: folder.files() })
     }
 
     /// Reads a gantry from a file with changes.
@@ -269,7 +316,8 @@ fn belts(table: &Table, routing: Routing) -> Result<Belts> {
                 .fail("a given stiffness does not say how it changes with the length of a span")
                 .next("give modulus, section and spans instead of stiffness"));
         }
-        return Ok(Belts { stiffness: stiffness.numbers(count, &per_span)?, damping, pretension, follows: None });
+        let stiffness = stiffness.numbers(count, &per_span)?;
+        return Ok(Belts { stiffness, damping, pretension, make: None, follows: None });
     }
     if make.iter().all(|key| table.optional(key).is_none()) {
         let example = vec!["\"100 kN/m\""; count].join(", ");
@@ -280,13 +328,13 @@ fn belts(table: &Table, routing: Routing) -> Result<Belts> {
     let section = stage::section(&table.required("section", "for example section = \"5.5626 mm^2\"")?)?;
     let spans = vec!["\"0.5 m\""; count].join(", ");
     let lengths = table.required("spans", &format!("for example spans = [{spans}]"))?.numbers(count, &per_span)?;
-    let rigidity = modulus * section;
-    // k = A E / l                                                                  (11)
-    let stiffness: Vec<f64> = lengths.iter().map(|length| rigidity / length).collect();
+    let make = Make { modulus, section, spans: lengths };
+    let stiffness = make.stiffness();
     for k in &stiffness {
         table.computed("stiffness", &table.field, *k)?;
     }
-    Ok(Belts { stiffness, damping, pretension, follows: follows.then_some((rigidity, lengths)) })
+    let follows = follows.then(|| (make.rigidity(), make.spans.clone()));
+    Ok(Belts { stiffness, damping, pretension, make: Some(make), follows })
 }
 
 fn encoder(table: &Table) -> Result<Encoder> {

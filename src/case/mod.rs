@@ -233,8 +233,8 @@ impl Case {
         let tune = tune::tuning(&root, controller.as_ref(), &moves)?;
         let known = tune::known(&root)?;
         let context = sweep::Context {
-            stage: &stage,
-            experiments: &experiments,
+            machine: &stage,
+            experiments: experiments.iter().map(|experiment| (experiment.name.as_str(), experiment.until)).collect(),
             fit: fit.as_ref(),
             known: &known,
             folder: &folder,

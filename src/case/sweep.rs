@@ -3,10 +3,9 @@
 use super::fit::{free, pair, plain, prior_of};
 use super::reader::{Field, Table};
 use super::tree::{Entry, Kind, Node};
-use super::{Experiment, Folder, InputFile, Known, Plan, Prior};
+use super::{Folder, InputFile, Known, Plan, Prior};
 use crate::error::Result;
-use crate::parameter::{self, Parameter, Range};
-use crate::stage::Stage;
+use crate::parameter::{Numbers, Parameter, Range};
 use std::path::PathBuf;
 
 /// Most values of a grid, of one parameter.
@@ -115,8 +114,9 @@ pub enum Origin {
 
 /// What else of the case counts.
 pub(super) struct Context<'a> {
-    pub stage: &'a Stage,
-    pub experiments: &'a [Experiment],
+    pub machine: &'a dyn Numbers,
+    /// Name of each experiment, and when it ends, s.
+    pub experiments: Vec<(&'a str, f64)>,
     pub fit: Option<&'a Plan>,
     pub known: &'a [Known],
     pub folder: &'a Folder<'a>,
@@ -134,7 +134,7 @@ pub(super) fn sweeping(root: &Table, context: &Context) -> Result<Option<Sweepin
         let given = field.table()?;
         for key in given.keys() {
             let Some(field) = given.optional(key) else { continue };
-            vary.push((key.to_string(), variation(&field, key, design, context.stage)?));
+            vary.push((key.to_string(), variation(&field, key, design, context.machine)?));
         }
     }
     let from = table.optional("from").map(|field| origin(&field, context)).transpose()?;
@@ -163,13 +163,13 @@ pub(super) fn sweeping(root: &Table, context: &Context) -> Result<Option<Sweepin
         _ => {}
     }
     let interval = table.number_if_given("interval")?;
-    for experiment in context.experiments {
+    for &(name, until) in &context.experiments {
         if let (Some(interval), Some(field)) = (interval, table.optional("interval"))
-            && (interval > experiment.until || experiment.until / interval > super::MOST_SAMPLES)
+            && (interval > until || until / interval > super::MOST_SAMPLES)
         {
             return Err(field
-                .fail(format!("an interval of {interval} s does not suit \"{}\"", experiment.name))
-                .allowed(format!("up to {} s, and no more than 1e9 rows", experiment.until)));
+                .fail(format!("an interval of {interval} s does not suit \"{name}\""))
+                .allowed(format!("up to {until} s, and no more than 1e9 rows")));
         }
     }
     Ok(Some(Sweeping { runs, design, seed: table.seed()?, interval, vary, from, indices }))
@@ -177,6 +177,11 @@ pub(super) fn sweeping(root: &Table, context: &Context) -> Result<Option<Sweepin
 
 fn origin(field: &Field, context: &Context) -> Result<Origin> {
     let text = field.text()?;
+    if context.machine.axis().is_none() {
+        return Err(field
+            .fail("a gantry is not fitted yet, so nothing is known of how its parameters are spread")
+            .next("leave it out, and say in [sweep.vary] how each parameter varies"));
+    }
     if text != "uncertainty" {
         if context.fit.is_none() {
             return Err(field
@@ -204,9 +209,9 @@ const KINDS: &str = "\"20 %\", uniform = [least, most], normal = [mean, deviatio
                      values = [...], grid = [from, to, count], factors = [...]";
 
 /// What stands at a key of `[sweep.vary]`.
-fn variation(field: &Field, key: &str, design: Sampling, stage: &Stage) -> Result<Variation> {
-    let first = key.split(" = ").next().unwrap_or(key);
-    check_key(field, key, stage)?;
+fn variation(field: &Field, key: &str, design: Sampling, machine: &dyn Numbers) -> Result<Variation> {
+    let row = machine.row(key.split(" = ").next().unwrap_or(key));
+    check_key(field, key, machine)?;
     let node = match &field.node.kind {
         Kind::Text(text) => short(field, text)?,
         Kind::List(_) => table_of(field.node, "values", field.node.kind.clone()),
@@ -232,7 +237,7 @@ fn variation(field: &Field, key: &str, design: Sampling, stage: &Stage) -> Resul
             .allowed("values = [...], grid = [from, to, count] or factors = [...]")
             .next("or take design = \"sobol\""));
     }
-    let number = |field: &Field| match parameter::named(first) {
+    let number = |field: &Field| match row {
         Some(row) => field.number_of(row),
         None => plain(field, "a number in SI units"),
     };
@@ -264,7 +269,7 @@ fn variation(field: &Field, key: &str, design: Sampling, stage: &Stage) -> Resul
             let (from, to) = (number(from)?, number(to)?);
             Kinds::Values((0..count).map(|k| from + (to - from) * k as f64 / (count - 1) as f64).collect())
         }
-        kind => Kinds::Drawn(prior_of(kind, &at, first)?),
+        kind => Kinds::Drawn(prior_of(kind, &at, row.map_or(key, |row| row.key))?),
     };
     if let (Kinds::Values(_) | Kinds::Factors(_), Some(field)) = (&kind, table.optional("within")) {
         return Err(field.fail("values that are given are not cut off").next("leave `within` out"));
@@ -277,10 +282,10 @@ const FACTOR: Parameter = Parameter::unwritten("", Range::new(1e-6, 1e6), "2");
 const COUNT: Parameter = Parameter::unwritten("", Range::whole(2.0, MOST_VALUES as f64), "11");
 
 /// Refuses names that are no parameter of this machine.
-fn check_key(field: &Field, key: &str, stage: &Stage) -> Result<()> {
+fn check_key(field: &Field, key: &str, machine: &dyn Numbers) -> Result<()> {
     match key {
         "all" => Ok(()),
-        _ => free(field, key, stage),
+        _ => free(field, key, machine),
     }
 }
 

@@ -76,8 +76,14 @@ struct MetricsTold {
     left_current: PeakTold,
     #[serde(rename = "peak_right_current_A")]
     right_current: PeakTold,
+    #[serde(rename = "peak_left_speed_rad_s")]
+    left_speed: PeakTold,
+    #[serde(rename = "peak_right_speed_rad_s")]
+    right_speed: PeakTold,
     peak_drives_minus_bridge_m: PeakTold,
     peak_drives_minus_cart_m: PeakTold,
+    #[serde(rename = "peak_span_stretch_m")]
+    stretch: Map<String, Value>,
     #[serde(rename = "peak_span_force_N")]
     force: Map<String, Value>,
     stop_time_s: Option<f64>,
@@ -146,6 +152,8 @@ impl MetricsTold {
         let [bridge_by_drives, cart_by_drives] = metrics.final_by_drives;
         let [peak_bridge_speed, peak_cart_speed] = metrics.peak_speed.map(PeakTold::from);
         let [bridge_error, cart_error] = metrics.peak_error.map(PeakTold::from);
+        let [left_speed, right_speed] = metrics.peak_drive_speed.map(PeakTold::from);
+        let peaks = |peaks: &[Peak]| by_span(routing, peaks.iter().map(|peak| super::peak(*peak)));
         let [left_current, right_current] = metrics.peak_current.map(PeakTold::from);
         Self {
             end_time_s: metrics.end,
@@ -159,9 +167,12 @@ impl MetricsTold {
             peak_cart_speed_m_s: peak_cart_speed,
             left_current,
             right_current,
+            left_speed,
+            right_speed,
             peak_drives_minus_bridge_m: bridge_error,
             peak_drives_minus_cart_m: cart_error,
-            force: by_span(routing, metrics.peak_force.iter().map(|force: &Peak| super::peak(*force))),
+            stretch: peaks(&metrics.peak_stretch),
+            force: peaks(&metrics.peak_force),
             stop_time_s: metrics.stop_time,
             settled: metrics.settled,
             event_counts: LABELS

@@ -263,6 +263,15 @@ pub struct State {
     pub current: [f64; DRIVES],
 }
 
+/// What the parts of a machine are there for, by their numbers. Who asks for figures asks here, and takes keys and names from the labels.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Roles {
+    /// Bodies that it is there to move.
+    pub loads: Vec<usize>,
+    /// Springs that carry the drives' motion to them.
+    pub spans: Vec<usize>,
+}
+
 /// Bodies, springs and drives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mechanism {
@@ -276,6 +285,8 @@ pub struct Mechanism {
     pub columns: Vec<Heading>,
     /// What an observer reads, in its order: no more than [`crate::solve::QUANTITIES`].
     pub readings: Vec<Shown>,
+    /// What its parts are there for.
+    pub roles: Roles,
     /// Where ways are counted from: what follows them or changes along them begins there.
     pub origin: [f64; BODIES],
     /// Friction of each body and of those that move with it.
@@ -295,7 +306,8 @@ impl Mechanism {
                 friction[body].law = part.friction.law;
             }
         }
-        Self { bodies, springs, drives, columns: Vec::new(), readings: Vec::new(), origin: [0.0; BODIES], friction }
+        let (columns, readings, roles) = (Vec::new(), Vec::new(), Roles::default());
+        Self { bodies, springs, drives, columns, readings, roles, origin: [0.0; BODIES], friction }
     }
 
     /// The body that this one moves with: itself, unless something makes several bodies one.

@@ -3,12 +3,12 @@
 
 use super::watch::{Sum, Watch, Watched};
 use super::{EventCount, Peak};
-use crate::mechanism::{DRIVES, Mode, Shown, State};
+use crate::mechanism::{DRIVES, Mechanism, Mode, Roles, Shown, State};
 use crate::solve::{Curve, Event, Gap, Observe};
-use crate::stage::gantry::{BODIES, BRIDGE, CART, Gantry, LEFT, RIGHT};
+use crate::stage::gantry::{BODIES, Gantry};
 
-/// Peaks before those of the spans: speeds of bridge and cart, errors of both, currents.
-const FIRST_SPAN: usize = 6;
+/// Peaks before those of the spans: speeds of bridge and cart, errors of both, currents, speeds of the motors.
+const FIRST_SPAN: usize = 8;
 
 /// What one run of a gantry shows. SI units; x is the bridge's position, y the cart's on it.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +27,10 @@ pub struct GantryMetrics {
     pub peak_error: [Peak; 2],
     /// Currents of the left and the right motor of largest magnitude, A.
     pub peak_current: [Peak; DRIVES],
+    /// Speeds of the left and the right motor behind its gear, of largest magnitude, rad/s: those of the pulleys where the gear is stiff.
+    pub peak_drive_speed: [Peak; DRIVES],
+    /// Stretch of each span of largest magnitude, m, in the order of [`Routing::spans`](crate::stage::gantry::Routing).
+    pub peak_stretch: Vec<Peak>,
     /// Force in each span of largest magnitude, N, damping included, in the order of [`Routing::spans`](crate::stage::gantry::Routing).
     pub peak_force: Vec<Peak>,
     /// When everything came to rest, s, if it has; 0 if nothing ever moved. None while anything moves, and where a body has no dry friction
@@ -68,34 +72,50 @@ pub struct GantryMetrics {
 #[derive(Debug, Clone)]
 pub struct GantryMeter {
     gantry: Gantry,
+    roles: Roles,
+    /// The bodies that the drives' pulleys are.
+    pulleys: [usize; DRIVES],
     watch: Watch,
 }
 
 impl GantryMeter {
     /// A meter for a run of this gantry.
     pub fn new(gantry: &Gantry) -> Self {
-        let mut sums: Vec<Sum> = [BRIDGE, CART].map(|body| vec![(Shown::Speed(body, 1.0), 1.0)]).to_vec();
-        sums.extend(gantry.routing.drive_error().map(|sum| {
-            let stretch = |(span, weight): (usize, f64)| (Shown::Stretch(span), weight);
-            sum.map(stretch).to_vec()
-        }));
-        sums.extend((0..DRIVES).map(|drive| vec![(Shown::Current(drive), 1.0)]));
-        sums.extend((0..gantry.routing.spans().len()).map(|span| vec![(Shown::Force(span, 1.0), 1.0)]));
-        Self { gantry: gantry.clone(), watch: Watch::new(&gantry.mechanism(), &sums) }
+        Self::of(gantry, &gantry.mechanism())
+    }
+
+    /// The same where its mechanism is there already.
+    pub fn of(gantry: &Gantry, mechanism: &Mechanism) -> Self {
+        let (roles, drives) = (mechanism.roles.clone(), &mechanism.drives);
+        let alone = |shown: Shown| vec![(shown, 1.0)];
+        let stretches =
+            |sum: &[(usize, f64)]| sum.iter().map(|&(span, weight)| (Shown::Stretch(span), weight)).collect();
+        let mut sums: Vec<Sum> = roles.loads.iter().map(|load| alone(Shown::Speed(*load, 1.0))).collect();
+        sums.extend(gantry.routing.drive_error().map(|sum| stretches(&sum)));
+        sums.extend((0..DRIVES).map(|drive| alone(Shown::Current(drive))));
+        sums.extend(drives.iter().map(|drive| alone(Shown::Speed(drive.shaft, 1.0))));
+        sums.extend(gantry.routing.stretches().iter().map(|sum| stretches(sum)));
+        sums.extend(roles.spans.iter().map(|span| alone(Shown::Force(*span, 1.0))));
+        let pulleys = std::array::from_fn(|drive| drives[drive].pulley);
+        Self { gantry: gantry.clone(), roles, pulleys, watch: Watch::new(mechanism, &sums) }
     }
 
     /// The metrics of the run that was observed and whose events these are.
     pub fn finish(self, events: &[Event]) -> GantryMetrics {
-        let Watched { end, state, peaks, stop_time, bodies_rest, rotors_rest, events } = self.watch.finish(events);
+        let Self { gantry, roles, pulleys, watch } = self;
+        let Watched { end, state, peaks, stop_time, bodies_rest, rotors_rest, events } = watch.finish(events);
+        let (stretches, forces) = peaks[FIRST_SPAN..].split_at(roles.spans.len());
         GantryMetrics {
             end,
-            final_position: [state.position[BRIDGE], state.position[CART]],
-            final_speed: [state.speed[BRIDGE], state.speed[CART]],
-            final_by_drives: self.gantry.place([state.position[LEFT], state.position[RIGHT]]),
+            final_position: std::array::from_fn(|load| state.position[roles.loads[load]]),
+            final_speed: std::array::from_fn(|load| state.speed[roles.loads[load]]),
+            final_by_drives: gantry.place(pulleys.map(|pulley| state.position[pulley])),
             peak_speed: [peaks[0], peaks[1]],
             peak_error: [peaks[2], peaks[3]],
             peak_current: [peaks[4], peaks[5]],
-            peak_force: peaks[FIRST_SPAN..].to_vec(),
+            peak_drive_speed: [peaks[6], peaks[7]],
+            peak_stretch: stretches.to_vec(),
+            peak_force: forces.to_vec(),
             stop_time,
             settled: bodies_rest && rotors_rest,
             bodies_rest,

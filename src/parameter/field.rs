@@ -1,79 +1,125 @@
 //! Where a parameter sits in a machine, how it is read there and how it is set.
 
 use crate::friction::{Friction, Law, Shape, decay_of_velocity, velocity_of_decay};
+use crate::stage::gantry::{Gantry, Slide};
 use crate::stage::{Belt, BeltModel, Stage};
 
-/// Where a parameter sits.
-#[derive(Debug, Clone, Copy)]
-pub enum Field {
-    /// In no machine: it is a number of a run, a recorder, a controller or a method.
+/// Where a parameter sits in a machine of one kind: an axis, or a [`Gantry`].
+#[derive(Debug)]
+pub enum Field<M = Stage> {
+    /// In no machine: it is a number of a run, a recorder, a controller, a method, or of a machine of the other kind.
     Elsewhere,
     /// In a machine.
-    Machine(Accessor),
+    Machine(Accessor<M>),
     /// In a machine, where it is another form of the number with this key.
-    Form(&'static str, Accessor),
+    Form(&'static str, Accessor<M>),
     /// The number with this key is computed from it and from others, and the machine keeps the result alone.
     PartOf(&'static str),
 }
 
 /// Reads and sets a number of a machine, or each of a list.
-#[derive(Debug, Clone, Copy)]
-pub struct Accessor {
+#[derive(Debug)]
+pub struct Accessor<M = Stage> {
     /// How its elements are named.
     pub(super) list: List,
     /// How many it has.
-    pub(super) count: fn(&Stage) -> usize,
+    pub(super) count: fn(&M) -> usize,
     /// The value at a place in the list; none where the machine has no such part, or computes it from others.
-    pub(super) get: fn(&Stage, usize) -> Option<f64>,
+    pub(super) get: fn(&M, usize) -> Option<f64>,
     /// Sets it, and what is computed from it; does nothing where the machine has no such part.
-    pub(super) set: fn(&mut Stage, usize, f64),
+    pub(super) set: fn(&mut M, usize, f64),
 }
+
+// By hand, as a derived one would ask the same of the machine.
+impl<M> Clone for Accessor<M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M> Copy for Accessor<M> {}
+
+impl<M> Clone for Field<M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M> Copy for Field<M> {}
 
 /// How the elements of a parameter are named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum List {
+pub enum List {
     /// It is a single number.
     None,
     /// `belt.stiffness.0`
     Numbers,
     /// `cart.friction.along.0.factor`: a list of points.
     Points,
+    /// `left_drive.motor.resistance`, `right_drive.motor.resistance`: one of each drive. `motor.resistance` is both.
+    Drives,
+    /// `bridge.mass`, `cart.mass`: one of each thing that slides, with the key of the bridge's in the table.
+    Slides,
 }
 
-impl Accessor {
-    const fn number(get: fn(&Stage, usize) -> Option<f64>, set: fn(&mut Stage, usize, f64)) -> Self {
-        Self { list: List::None, count: |_| 1, get, set }
+/// What the drives of a gantry are called in keys, before the key of an axis.
+pub(super) const DRIVES: [&str; 2] = ["left_drive.", "right_drive."];
+
+/// What slides in a gantry, as keys begin.
+pub(super) const SLIDES: [&str; 2] = ["bridge.", "cart."];
+
+impl List {
+    /// The key of an element, as `--set` names it, of the parameter with this key.
+    pub(super) fn key(self, key: &str, index: usize) -> String {
+        match self {
+            List::None => key.to_string(),
+            List::Numbers => format!("{key}.{index}"),
+            List::Points => match key.rsplit_once('.') {
+                Some((points, name)) => format!("{points}.{index}.{name}"),
+                None => key.to_string(),
+            },
+            List::Drives => format!("{}{key}", DRIVES.get(index).copied().unwrap_or_default()),
+            List::Slides => match (SLIDES.get(index), key.strip_prefix(SLIDES[0])) {
+                (Some(slide), Some(rest)) => format!("{slide}{rest}"),
+                _ => key.to_string(),
+            },
+        }
+    }
+
+    /// Whether the parameter's own key names all elements together.
+    pub(super) fn has_whole(self) -> bool {
+        self != List::Slides
     }
 }
 
-impl Field {
+impl<M> Accessor<M> {
+    const fn new(
+        list: List,
+        count: fn(&M) -> usize,
+        get: fn(&M, usize) -> Option<f64>,
+        set: fn(&mut M, usize, f64),
+    ) -> Self {
+        Self { list, count, get, set }
+    }
+}
+
+impl<M> Field<M> {
     /// A number that a machine may have.
-    pub(super) const fn number(get: fn(&Stage, usize) -> Option<f64>, set: fn(&mut Stage, usize, f64)) -> Self {
-        Self::Machine(Accessor::number(get, set))
+    pub(super) const fn number(get: fn(&M, usize) -> Option<f64>, set: fn(&mut M, usize, f64)) -> Self {
+        Self::Machine(Accessor::new(List::None, |_| 1, get, set))
     }
 
     /// Another form of the number with the key `of`.
-    pub(super) const fn form(
-        of: &'static str,
-        get: fn(&Stage, usize) -> Option<f64>,
-        set: fn(&mut Stage, usize, f64),
-    ) -> Self {
-        Self::Form(of, Accessor::number(get, set))
-    }
-
-    /// A number of each span.
-    pub(super) const fn spans(get: fn(&Stage, usize) -> Option<f64>, set: fn(&mut Stage, usize, f64)) -> Self {
-        Self::Machine(Accessor { list: List::Numbers, count: |_| 3, get, set })
-    }
-
-    /// A number of each point of the cart's friction along the travel: the first or the second.
-    pub(super) const fn points(get: fn(&Stage, usize) -> Option<f64>, set: fn(&mut Stage, usize, f64)) -> Self {
-        let count = |stage: &Stage| stage.cart.along.as_ref().map_or(0, |along| along.points().len());
-        Self::Machine(Accessor { list: List::Points, count, get, set })
+    const fn form(self, of: &'static str) -> Self {
+        match self {
+            Self::Machine(accessor) | Self::Form(_, accessor) => Self::Form(of, accessor),
+            Self::Elsewhere => Self::Elsewhere,
+            Self::PartOf(whole) => Self::PartOf(whole),
+        }
     }
 
     /// How a machine's number is read and set.
-    pub(super) fn accessor(&self) -> Option<&Accessor> {
+    pub(super) fn accessor(&self) -> Option<&Accessor<M>> {
         match self {
             Self::Machine(accessor) | Self::Form(_, accessor) => Some(accessor),
             Self::Elsewhere | Self::PartOf(_) => None,
@@ -81,37 +127,134 @@ impl Field {
     }
 }
 
-/// A number that every machine has.
+impl Field {
+    /// A number of each span.
+    pub(super) const fn spans(get: fn(&Stage, usize) -> Option<f64>, set: fn(&mut Stage, usize, f64)) -> Self {
+        Self::Machine(Accessor::new(List::Numbers, |_| 3, get, set))
+    }
+
+    /// A number of each point of the cart's friction along the travel: the first or the second.
+    pub(super) const fn points(get: fn(&Stage, usize) -> Option<f64>, set: fn(&mut Stage, usize, f64)) -> Self {
+        let count = |stage: &Stage| stage.cart.along.as_ref().map_or(0, |along| along.points().len());
+        Self::Machine(Accessor::new(List::Points, count, get, set))
+    }
+}
+
+impl Field<Gantry> {
+    /// A number of each span.
+    pub(super) const fn gantry_spans(get: fn(&Gantry, usize) -> Option<f64>, set: fn(&mut Gantry, usize, f64)) -> Self {
+        Self::Machine(Accessor::new(List::Numbers, |gantry| gantry.belts.stiffness.len(), get, set))
+    }
+
+    /// A number of each drive.
+    pub(super) const fn drives(get: fn(&Gantry, usize) -> Option<f64>, set: fn(&mut Gantry, usize, f64)) -> Self {
+        Self::Machine(Accessor::new(List::Drives, |_| 2, get, set))
+    }
+
+    /// A number of bridge and cart.
+    pub(super) const fn slides(get: fn(&Gantry, usize) -> Option<f64>, set: fn(&mut Gantry, usize, f64)) -> Self {
+        Self::Machine(Accessor::new(List::Slides, |_| 2, get, set))
+    }
+}
+
+/// Where a parameter sits in machines of either kind.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    pub axis: Field,
+    pub gantry: Field<Gantry>,
+}
+
+impl Place {
+    /// In an axis alone.
+    pub const fn axis(axis: Field) -> Self {
+        Self { axis, gantry: Field::Elsewhere }
+    }
+
+    /// In a gantry alone.
+    pub const fn gantry(gantry: Field<Gantry>) -> Self {
+        Self { axis: Field::Elsewhere, gantry }
+    }
+
+    /// Another form of the number with the key `of`.
+    pub const fn form(self, of: &'static str) -> Self {
+        Self { axis: self.axis.form(of), gantry: self.gantry.form(of) }
+    }
+
+    /// The same in an axis alone.
+    pub const fn part_of_axis(whole: &'static str) -> Self {
+        Self::axis(Field::PartOf(whole))
+    }
+
+    /// In neither: the number with the key `whole` is computed from it.
+    pub const fn part_of(whole: &'static str) -> Self {
+        Self { axis: Field::PartOf(whole), gantry: Field::PartOf(whole) }
+    }
+}
+
+/// The thing that slides with this number: 0 for the bridge, 1 for the cart.
+pub(super) fn slide(gantry: &Gantry, index: usize) -> &Slide {
+    if index == 0 { &gantry.bridge } else { &gantry.cart }
+}
+
+pub(super) fn slide_mut(gantry: &mut Gantry, index: usize) -> &mut Slide {
+    if index == 0 { &mut gantry.bridge } else { &mut gantry.cart }
+}
+
+/// A number that every axis has.
 macro_rules! always {
-    (|$stage:ident| $($place:tt)*) => {
-        Field::number(|$stage, _| Some($($place)*), |$stage, _, value| $($place)* = value)
+    (|$machine:ident| $($place:tt)*) => {
+        Place::axis(Field::number(|$machine, _| Some($($place)*), |$machine, _, value| $($place)* = value))
     };
 }
 
-/// A number that stands in an `Option`.
-macro_rules! optional {
-    (|$stage:ident| $($place:tt)*) => {
-        Field::number(|$stage, _| $($place)*, |$stage, _, value| $($place)* = $($place)*.map(|_| value))
+/// A number that every axis and every gantry has, in the same place.
+macro_rules! everywhere {
+    (|$machine:ident| $($place:tt)*) => {
+        Place {
+            gantry: Field::number(|$machine, _| Some($($place)*), |$machine, _, value| $($place)* = value),
+            ..always!(|$machine| $($place)*)
+        }
     };
 }
 
 /// A number of a part that stands in an `Option`.
 macro_rules! part {
-    (|$stage:ident| $part:expr, $reach:expr => $name:ident) => {
+    (both |$machine:ident| $part:expr, $reach:expr => $name:ident) => {
+        Place {
+            axis: part!(field |$machine| $part, $reach => $name),
+            gantry: part!(field |$machine| $part, $reach => $name),
+        }
+    };
+    (field |$machine:ident| $part:expr, $reach:expr => $name:ident) => {
         Field::number(
-            |$stage, _| $part.map(|part| part.$name),
-            |$stage, _, value| {
+            |$machine, _| $part.map(|part| part.$name),
+            |$machine, _, value| {
                 if let Some(part) = $reach {
                     part.$name = value;
                 }
             },
         )
     };
+    (|$machine:ident| $part:expr, $reach:expr => $name:ident) => {
+        Place::axis(part!(field |$machine| $part, $reach => $name))
+    };
 }
 
 /// A number of the belt's make, from which its stiffness is computed.
 macro_rules! make {
-    ($constructor:ident, |$make:ident, $span:pat_param| $($place:tt)*) => {
+    (number, |$make:ident, $span:pat_param| $($place:tt)*) => {
+        Place {
+            axis: make!(axis number, |$make, $span| $($place)*),
+            gantry: make!(gantry number, |$make, $span| $($place)*),
+        }
+    };
+    (spans, |$make:ident, $span:pat_param| $($place:tt)*) => {
+        Place {
+            axis: make!(axis spans, |$make, $span| $($place)*),
+            gantry: make!(gantry gantry_spans, |$make, $span| $($place)*),
+        }
+    };
+    (axis $constructor:ident, |$make:ident, $span:pat_param| $($place:tt)*) => {
         Field::$constructor(
             |stage, $span| stage.belt.make.map(|$make| $($place)*),
             |stage, $span, value| {
@@ -123,9 +266,140 @@ macro_rules! make {
             },
         )
     };
+    (gantry $constructor:ident, |$make:ident, $span:pat_param| $($place:tt)*) => {
+        Field::$constructor(
+            |gantry, $span| gantry.belts.make.as_ref().map(|$make| $($place)*),
+            |gantry, $span, value| {
+                if let Some($make) = &mut gantry.belts.make {
+                    $($place)* = value;
+                    gantry.belts.follow_make();
+                }
+            },
+        )
+    };
 }
 
-pub(super) use {always, make, optional, part};
+/// A number of the motor or the amplifier, of which a gantry has two.
+macro_rules! of_drive {
+    ($one:ident, $each:ident, |$part:ident| $get:expr, |$new:ident, $value:ident| $set:expr) => {
+        Place {
+            axis: Field::number(
+                |stage, _| {
+                    let $part = &stage.$one;
+                    $get
+                },
+                |stage, _, $value| {
+                    let $new = &mut stage.$one;
+                    $set
+                },
+            ),
+            gantry: Field::drives(
+                |gantry, drive| {
+                    let $part = gantry.$each.get(drive)?;
+                    $get
+                },
+                |gantry, drive, $value| {
+                    if let Some($new) = gantry.$each.get_mut(drive) {
+                        $set
+                    }
+                },
+            ),
+        }
+    };
+}
+
+/// A number of the motor.
+macro_rules! motor {
+    ($name:ident) => {
+        of_drive!(motor, motors, |motor| Some(motor.$name), |motor, value| motor.$name = value)
+    };
+    (play $name:ident) => {
+        of_drive!(motor, motors, |motor| motor.gear_play.map(|play| play.$name), |motor, value| {
+            if let Some(play) = &mut motor.gear_play {
+                play.$name = value;
+            }
+        })
+    };
+}
+
+/// A number of the amplifier that it need not have.
+macro_rules! amplifier {
+    ($name:ident) => {
+        of_drive!(amplifier, amplifiers, |amplifier| amplifier.$name, |amplifier, value| {
+            amplifier.$name = amplifier.$name.map(|_| value)
+        })
+    };
+}
+
+/// A number of what slides in a gantry.
+macro_rules! of_slide {
+    (|$part:ident| $get:expr, |$new:ident, $value:ident| $set:expr) => {
+        Place::gantry(Field::slides(
+            |gantry, index| {
+                let $part = slide(gantry, index);
+                $get
+            },
+            |gantry, index, $value| {
+                let $new = slide_mut(gantry, index);
+                $set
+            },
+        ))
+    };
+}
+
+/// A number of a body's friction: of the drive pulley in both kinds of machine, of what slides in a gantry, or of another body of an axis.
+macro_rules! of_friction {
+    (field $body:ident, |$law:ident| $get:expr, |$new:ident, $value:ident| $set:expr) => {
+        Field::number(
+            |machine, _| {
+                let $law = &machine.$body.friction;
+                $get
+            },
+            |machine, _, $value| {
+                let $new = &mut machine.$body.friction;
+                $set
+            },
+        )
+    };
+    (drive_pulley, $($how:tt)*) => {
+        Place { axis: of_friction!(field drive_pulley, $($how)*), gantry: of_friction!(field drive_pulley, $($how)*) }
+    };
+    (bridge, |$law:ident| $get:expr, |$new:ident, $value:ident| $set:expr) => {
+        of_slide!(
+            |slide| {
+                let $law = &slide.friction;
+                $get
+            },
+            |slide, $value| {
+                let $new = &mut slide.friction;
+                $set
+            }
+        )
+    };
+    ($body:ident, $($how:tt)*) => {
+        Place::axis(of_friction!(field $body, $($how)*))
+    };
+}
+
+/// A number of the friction law that `$law` stands for.
+macro_rules! of_law {
+    ($body:ident, $law:ident, $name:ident) => {
+        of_friction!(
+            $body,
+            |friction| match friction.law {
+                Law::$law { $name, .. } => Some($name),
+                _ => None,
+            },
+            |friction, value| {
+                if let Law::$law { $name, .. } = &mut friction.law {
+                    *$name = value;
+                }
+            }
+        )
+    };
+}
+
+pub(super) use {always, amplifier, everywhere, make, motor, of_drive, of_friction, of_law, of_slide, part};
 
 /// The stiffness of a span, where it is given as such.
 pub(super) fn stiffness(belt: &Belt, span: usize) -> Option<f64> {
@@ -187,25 +461,6 @@ pub(super) fn stribeck_decay(friction: &Friction) -> Option<f64> {
 pub(super) fn set_stribeck_decay(friction: &mut Friction, decay: f64) {
     set_stribeck_velocity(friction, velocity_of_decay(decay));
 }
-
-/// A number of the friction law that `$law` stands for.
-macro_rules! of_law {
-    ($body:ident, $law:ident, $name:ident) => {
-        Field::number(
-            |stage, _| match stage.$body.friction.law {
-                Law::$law { $name, .. } => Some($name),
-                _ => None,
-            },
-            |stage, _, value| {
-                if let Law::$law { $name, .. } = &mut stage.$body.friction.law {
-                    *$name = value;
-                }
-            },
-        )
-    };
-}
-
-pub(super) use of_law;
 
 /// A number of a point of the cart's friction along the travel: 0 for the position, 1 for the factor.
 pub(super) fn of_point(stage: &Stage, point: usize, part: usize) -> Option<f64> {

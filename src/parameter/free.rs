@@ -1,10 +1,9 @@
 //! Free parameters: numbers of a machine that a fit searches for, a sweep varies or that are off, with all that goes along.
 
 use super::field::List;
-use super::{Field, Off, Parameter, Sum, all, at_pulley, named};
+use super::{Field, Numbers, Off, Parameter, Sits, Sum, all, at_pulley};
 use crate::error::{Error, Result};
 use crate::friction::Friction;
-use crate::stage::Stage;
 
 /// A number of a machine: a row of the table, and its place where that is a list.
 #[derive(Debug, Clone, Copy)]
@@ -16,8 +15,8 @@ struct Number {
 impl PartialEq for Number {
     /// Two forms of one number are the same.
     fn eq(&self, other: &Self) -> bool {
-        let own = |row: &Parameter| match row.field {
-            Field::Form(of, _) => of,
+        let own = |row: &Parameter| match (&row.field, &row.gantry) {
+            (Field::Form(of, _), _) | (_, Field::Form(of, _)) => *of,
             _ => row.key,
         };
         own(self.row) == own(other.row) && self.index == other.index
@@ -25,8 +24,13 @@ impl PartialEq for Number {
 }
 
 impl Number {
-    fn value(self, stage: &Stage) -> Option<f64> {
-        (self.row.field.accessor()?.get)(stage, self.index)
+    fn value(self, machine: &dyn Numbers) -> Option<f64> {
+        machine.get(self.row, self.index)
+    }
+
+    /// Its key, as `--set` names it.
+    fn key(self, machine: &dyn Numbers) -> String {
+        machine.sits(self.row).key(self.row, self.index)
     }
 }
 
@@ -72,29 +76,31 @@ impl Free {
     /// assert!(error.to_string().contains("has no value in this case"));
     /// # Ok::<(), taut::Error>(())
     /// ```
-    pub fn new(stage: &Stage, name: &str, free: &[&str], bounds: &GivenBounds) -> Result<Self> {
+    pub fn new(machine: &dyn Numbers, name: &str, free: &[&str], bounds: &GivenBounds) -> Result<Self> {
         if name.starts_with("total.") {
-            return Self::sum(stage, name, free, bounds);
+            return Self::sum(machine, name, free, bounds);
         }
         let keys: Vec<&str> = name.split(" = ").collect();
-        let sets = keys.iter().map(|key| numbers(stage, key)).collect::<Result<Vec<_>>>()?;
-        let values: Vec<f64> = sets.iter().filter_map(|(numbers, _)| numbers.first()?.value(stage)).collect();
+        let sets = keys.iter().map(|key| numbers(machine, key, free)).collect::<Result<Vec<_>>>()?;
+        let values: Vec<f64> = sets.iter().filter_map(|(numbers, _)| numbers.first()?.value(machine)).collect();
         let first = values.first().copied().unwrap_or_default();
         let ratios: Vec<f64> = match values.contains(&0.0) {
             true => vec![1.0; values.len()],
             false => values.iter().map(|value| value / first).collect(),
         };
         let mut members = Vec::new();
-        for ((key, (numbers, row)), ratio) in keys.iter().zip(&sets).zip(&ratios) {
+        for ((key, (numbers, _)), ratio) in keys.iter().zip(&sets).zip(&ratios) {
             for &number in numbers {
                 // The elements of a list keep their ratios among each other.
-                let present = number.value(stage).unwrap_or(0.0);
+                let present = number.value(machine).unwrap_or(0.0);
                 let listed = numbers.len() > 1 && first != 0.0 && present != 0.0;
                 members.push((number, if listed { present / first } else { *ratio }));
             }
-            if numbers.len() == 1 && row.key == *key {
+            if let [number] = numbers[..]
+                && number.key(machine) == *key
+            {
                 let is_free = |other: &str| free.contains(&other) || keys.contains(&other);
-                members.extend(followers(stage, row, &is_free).map(|number| (number, *ratio)));
+                members.extend(followers(machine, number, &is_free).map(|number| (number, *ratio)));
             }
         }
         let row = sets.first().map(|(_, row)| *row);
@@ -113,14 +119,20 @@ impl Free {
     }
 
     /// A sum over all bodies, at the drive pulley; its parts keep their ratios.
-    fn sum(stage: &Stage, name: &str, free: &[&str], bounds: &GivenBounds) -> Result<Self> {
+    fn sum(machine: &dyn Numbers, name: &str, free: &[&str], bounds: &GivenBounds) -> Result<Self> {
+        let Some(stage) = machine.axis() else {
+            return Err(Error::new(format!(
+                "`{name}` is a sum over the bodies of a single axis, and this is a gantry"
+            ))
+            .next("name a number of the gantry as --set does, such as cart.mass or bridge.friction.viscous"));
+        };
         let Some(sum) = Sum::named(name) else {
             return Err(Error::new(format!("there is no group `{name}`")).allowed(Sum::ALL.map(Sum::name).join(", ")));
         };
         let mut parts: Vec<(String, Number, f64)> = Vec::new();
         for row in sum.parts(true) {
-            for number in numbers(stage, row.key)?.0 {
-                parts.push((element_key(row, number.index), number, number.value(stage).unwrap_or(0.0)));
+            for number in numbers(stage, row.key, &[])?.0 {
+                parts.push((number.key(stage), number, number.value(stage).unwrap_or(0.0)));
             }
         }
         let total: f64 = parts.iter().map(|(key, _, value)| value * at_pulley(stage, key)).sum();
@@ -133,16 +145,16 @@ impl Free {
         let mut members = Vec::new();
         for (_, number, value) in &parts {
             members.push((*number, value / total));
-            members.extend(followers(stage, number.row, &is_free).map(|number| (number, value / total)));
+            members.extend(followers(stage, *number, &is_free).map(|number| (number, value / total)));
         }
         let (low, high) = limits(name, &[], total, (0.0, 1e15), bounds)?;
         let keys = parts.into_iter().map(|(key, _, value)| (key, value / total)).collect();
         Ok(Self { name: name.to_string(), unit: sum.unit(), start: total, low, high, keys, members })
     }
 
-    /// Puts `value` into `stage`. Of several free parameters that is for [`set`].
-    pub fn set(&self, stage: &mut Stage, value: f64) {
-        set(stage, [(self, value)]);
+    /// Puts `value` into a machine. Of several free parameters that is for [`set`].
+    pub fn set(&self, machine: &mut dyn Numbers, value: f64) {
+        set(machine, [(self, value)]);
     }
 
     /// Whether both set a number of the machine.
@@ -156,45 +168,48 @@ impl Free {
     }
 }
 
-/// Puts values of free parameters into `stage`, in whatever order.
-pub fn set<'a>(stage: &mut Stage, values: impl IntoIterator<Item = (&'a Free, f64)>) {
+/// Puts values of free parameters into a machine, in whatever order.
+pub fn set<'a>(machine: &mut dyn Numbers, values: impl IntoIterator<Item = (&'a Free, f64)>) {
     for (free, value) in values {
         for (number, factor) in &free.members {
-            if let Some(accessor) = number.row.field.accessor() {
-                (accessor.set)(stage, number.index, value * factor);
-            }
+            machine.set(number.row, number.index, value * factor);
         }
     }
     // At rest a body holds at least what it resists with in motion.
-    let bodies = [&mut stage.drive_pulley.friction, &mut stage.cart.friction, &mut stage.idler_pulley.friction];
-    for Friction { forward, backward, .. } in bodies {
+    for Friction { forward, backward, .. } in machine.frictions() {
         forward.breakaway = forward.breakaway.max(forward.coulomb);
         backward.breakaway = backward.breakaway.max(backward.coulomb);
     }
 }
 
 /// The present value of a parameter, of a list the first one.
-pub fn value(stage: &Stage, key: &str) -> Option<f64> {
-    numbers(stage, key).ok()?.0.first()?.value(stage)
+pub fn value(machine: &dyn Numbers, key: &str) -> Option<f64> {
+    numbers(machine, key, &[]).ok()?.0.first()?.value(machine)
 }
 
 /// All numbers of a machine by their keys, of every form.
-pub fn values(stage: &Stage) -> Vec<(String, f64)> {
+pub fn values(machine: &dyn Numbers) -> Vec<(String, f64)> {
     let of = |row: &'static Parameter| {
-        let accessor = row.field.accessor()?;
-        let value = move |index| Some((element_key(row, index), (accessor.get)(stage, index)?));
-        Some((0..(accessor.count)(stage)).filter_map(value))
+        let sits = machine.sits(row);
+        let (_, count) = sits.listed()?;
+        let value = move |index| Some((sits.key(row, index), machine.get(row, index)?));
+        Some((0..count).filter_map(value))
     };
     all().filter_map(of).flatten().collect()
 }
 
-/// The keys of everything of a machine that may be off and is not zero. Directions and breakaways that have the same value count
-/// once.
-pub fn every(stage: &Stage) -> Vec<String> {
+/// The keys of everything of a machine that may be off and is not zero. Directions and breakaways that have the same value, and drives
+/// that are alike, count once.
+pub fn every(machine: &dyn Numbers) -> Vec<String> {
     let mut keys = Vec::new();
-    for row in all().filter(|row| row.off != Off::No && !follows_any(stage, row)) {
-        let there = present(stage, row).filter(|(_, value)| *value != 0.0);
-        keys.extend(there.map(|(number, _)| element_key(row, number.index)));
+    for row in all().filter(|row| row.off != Off::No) {
+        let there: Vec<(Number, f64)> = present(machine, row).filter(|(_, value)| *value != 0.0).collect();
+        if are_alike_drives(machine, row) && !there.is_empty() {
+            keys.push(row.key.to_string());
+            continue;
+        }
+        let leads = there.into_iter().filter(|(number, _)| !follows_any(machine, *number));
+        keys.extend(leads.map(|(number, _)| number.key(machine)));
     }
     // Body by body, as the paper counts them, friction last: the order in which a seed draws them.
     let rank = |key: &String| match key.split_once(".friction.") {
@@ -211,11 +226,11 @@ pub fn every(stage: &Stage) -> Vec<String> {
 }
 
 /// What may be off of a machine, each as a factor on all numbers that are tied by nature.
-pub fn kinds(stage: &Stage) -> Vec<Free> {
+pub fn kinds(machine: &dyn Numbers) -> Vec<Free> {
     let mut kinds: Vec<Free> = Vec::new();
     for row in all() {
         let Off::With(name) = row.off else { continue };
-        let own = present(stage, row).filter(|(_, value)| *value != 0.0);
+        let own = present(machine, row).filter(|(_, value)| *value != 0.0);
         let own: Vec<(Number, f64)> = own.collect();
         match kinds.iter_mut().find(|kind| kind.name == name) {
             _ if own.is_empty() => {}
@@ -235,93 +250,111 @@ pub fn kinds(stage: &Stage) -> Vec<Free> {
 }
 
 /// The numbers of a row that a machine has, with their finite values.
-fn present<'a>(stage: &'a Stage, row: &'static Parameter) -> impl Iterator<Item = (Number, f64)> + 'a {
-    let accessor = row.field.accessor();
-    let count = accessor.map_or(0, |accessor| (accessor.count)(stage));
+fn present<'a>(machine: &'a dyn Numbers, row: &'static Parameter) -> impl Iterator<Item = (Number, f64)> + 'a {
+    let count = machine.sits(row).listed().map_or(0, |(_, count)| count);
     (0..count).filter_map(move |index| {
         let number = Number { row, index };
-        Some((number, number.value(stage).filter(|value| value.is_finite())?))
+        Some((number, number.value(machine).filter(|value| value.is_finite())?))
     })
 }
 
+/// Whether both drives of a gantry have this number, and the same one: it is then that of the motor that both are.
+fn are_alike_drives(machine: &dyn Numbers, row: &'static Parameter) -> bool {
+    let Some((List::Drives, count)) = machine.sits(row).listed() else { return false };
+    let first = machine.get(row, 0);
+    first.is_some() && (1..count).all(|index| machine.get(row, index) == first)
+}
+
 /// Whether it has the value of something that it follows.
-fn follows_any(stage: &Stage, row: &'static Parameter) -> bool {
-    row.follows.iter().any(|key| is_equal(stage, row, key))
+fn follows_any(machine: &dyn Numbers, number: Number) -> bool {
+    leads(machine, number).next().is_some()
 }
 
-fn is_equal(stage: &Stage, row: &'static Parameter, key: &str) -> bool {
-    let own = Number { row, index: 0 }.value(stage);
-    own.is_some() && own == value(stage, key)
+/// What a number follows, as far as it has the same value: of the same body, the one that is asked first first.
+fn leads<'a>(machine: &'a dyn Numbers, number: Number) -> impl Iterator<Item = Number> + 'a {
+    let Number { row, index } = number;
+    let own = number.value(machine);
+    let followed = row.follows.iter().filter_map(move |key| Some(Number { row: super::find(key)?, index }));
+    followed.filter(move |lead| own.is_some() && own == lead.value(machine))
 }
 
-/// What goes along with `row` where `is_free` are set by themselves.
+/// What goes along with `number` where `is_free` are set by themselves.
 fn followers<'a>(
-    stage: &'a Stage,
-    row: &'static Parameter,
+    machine: &'a dyn Numbers,
+    number: Number,
     is_free: &'a dyn Fn(&str) -> bool,
 ) -> impl Iterator<Item = Number> + 'a {
-    let goes_along = move |other: &&'static Parameter| {
-        !other.follows.is_empty() && !is_free(other.key) && leader(stage, other, is_free) == Some(row.key)
+    let of_row = move |row: &'static Parameter| Number { row, index: number.index };
+    let goes_along = move |other: &Number| {
+        !other.row.follows.is_empty()
+            && !is_free(&other.key(machine))
+            && leader(machine, *other, is_free).is_some_and(|lead| lead.row.key == number.row.key)
     };
-    all().filter(goes_along).map(|row| Number { row, index: 0 })
+    all().map(of_row).filter(goes_along)
 }
 
-/// The key that a parameter goes with: its own if that is free, or what it follows, directly or by way of another one.
-fn leader(stage: &Stage, row: &'static Parameter, is_free: &dyn Fn(&str) -> bool) -> Option<&'static str> {
-    if is_free(row.key) {
-        return Some(row.key);
+/// The number that another goes with: itself if that is free, or what it follows, directly or by way of another one.
+fn leader(machine: &dyn Numbers, number: Number, is_free: &dyn Fn(&str) -> bool) -> Option<Number> {
+    let is_free_itself = |number: &Number| is_free(&number.key(machine));
+    if is_free_itself(&number) {
+        return Some(number);
     }
-    let equal = || row.follows.iter().filter(|key| is_equal(stage, row, key));
-    let further = || equal().find_map(|key| leader(stage, named(key)?, is_free));
-    equal().find(|key| is_free(key)).copied().or_else(further)
+    let further = || leads(machine, number).find_map(|lead| leader(machine, lead, is_free));
+    leads(machine, number).find(is_free_itself).or_else(further)
 }
 
-/// The key of an element, as `--set` names it.
-pub(super) fn element_key(row: &Parameter, index: usize) -> String {
-    match row.field.accessor().map_or(List::None, |accessor| accessor.list) {
-        List::None => row.key.to_string(),
-        List::Numbers => format!("{}.{index}", row.key),
-        List::Points => match row.key.rsplit_once('.') {
-            Some((points, name)) => format!("{points}.{index}.{name}"),
-            None => row.key.to_string(),
-        },
-    }
-}
-
-/// The numbers that a key names, and its row. Errors: a key that names none, or one that this machine has not.
-fn numbers(stage: &Stage, key: &str) -> Result<(Vec<Number>, &'static Parameter)> {
-    let row = named(key).ok_or_else(|| unknown(stage, key))?;
-    let accessor = match &row.field {
-        Field::Machine(accessor) | Field::Form(_, accessor) => accessor,
-        Field::PartOf(whole) => {
+/// The numbers that a key names, without those of a drive that are among `free` by themselves, and its row. Errors: a key that names none,
+/// or one that this machine has not.
+fn numbers(machine: &dyn Numbers, key: &str, free: &[&str]) -> Result<(Vec<Number>, &'static Parameter)> {
+    let row = machine.row(key).ok_or_else(|| unknown(machine, key))?;
+    let sits = machine.sits(row);
+    let (list, count) = match sits {
+        Sits::Machine(list, count) | Sits::Form(_, list, count) => (list, count),
+        Sits::PartOf(whole) => {
             return Err(Error::new(format!("`{key}` is only a part of what `{whole}` is computed from"))
                 .next(format!("name `{whole}` instead")));
         }
-        Field::Elsewhere => {
+        Sits::Elsewhere if machine.axis().is_none() => {
+            let what = if row.field.accessor().is_some() {
+                "is of a single axis, and this is a gantry"
+            } else {
+                "is no number of the machine"
+            };
+            return Err(of_gantries(machine, Error::new(format!("`{key}` {what}"))));
+        }
+        Sits::Elsewhere => {
             return Err(Error::new(format!("`{key}` is no number of the machine"))
                 .allowed("numbers of motor, amplifier, pulleys, cart, belt, travel and encoder")
                 .next("name one of them as --set does, such as cart.mass or cart.friction.viscous"));
         }
     };
-    let count = (accessor.count)(stage);
-    let whole = row.key == key;
-    let named = |index: &usize| whole || element_key(row, *index) == key;
-    let numbers: Vec<Number> = (0..count).filter(named).map(|index| Number { row, index }).collect();
+    let whole = row.key == key && list.has_whole();
+    let named = |index: &usize| whole || list.key(row.key, *index) == key;
+    let mut numbers: Vec<Number> = (0..count).filter(named).map(|index| Number { row, index }).collect();
     if numbers.is_empty() && count > 0 {
         // Of a number there are no elements, of a list not that many.
-        return Err(match accessor.list {
-            List::None => unknown(stage, key),
-            _ => Error::new(format!("`{key}` is none of the {count} that there are")).allowed(format!(
-                "{} to {}",
-                element_key(row, 0),
-                element_key(row, count - 1)
-            )),
+        return Err(match list {
+            List::None | List::Drives | List::Slides => unknown(machine, key),
+            List::Numbers | List::Points => Error::new(format!("`{key}` is none of the {count} that there are"))
+                .allowed(format!("{} to {}", list.key(row.key, 0), list.key(row.key, count - 1))),
         });
     }
-    let there = |number: &Number| number.value(stage).is_some_and(f64::is_finite);
+    if whole && list == List::Drives {
+        numbers.retain(|number| !free.contains(&number.key(machine).as_str()));
+        if let [first, rest @ ..] = &numbers[..]
+            && rest.iter().any(|other| other.value(machine) != first.value(machine))
+        {
+            return Err(Error::new(format!("`{key}` is not the same in both drives")).next(format!(
+                "name `{}` or `{}`",
+                list.key(key, 0),
+                list.key(key, 1)
+            )));
+        }
+    }
+    let there = |number: &Number| number.value(machine).is_some_and(f64::is_finite);
     match !numbers.is_empty() && numbers.iter().all(there) {
         true => Ok((numbers, row)),
-        false => Err(not_there(stage, key, row)),
+        false => Err(not_there(machine, key, row)),
     }
 }
 
@@ -355,31 +388,62 @@ fn limits(
     Ok((low, high))
 }
 
-fn unknown(stage: &Stage, key: &str) -> Error {
+fn unknown(machine: &dyn Numbers, key: &str) -> Error {
     let error = Error::new(format!("`{key}` is no parameter of the machine"));
-    let whole = all().filter(|row| row.field.accessor().is_some()).map(|row| row.key.to_string());
-    let known: Vec<String> = whole.chain(values(stage).into_iter().map(|(key, _)| key)).collect();
+    let whole = |row: &Parameter| machine.sits(row).listed().is_some_and(|(list, _)| list.has_whole());
+    let whole = all().filter(|row| whole(row)).map(|row| row.key.to_string());
+    let known: Vec<String> = whole.chain(values(machine).into_iter().map(|(key, _)| key)).collect();
     let distance = |name: &str| strsim::damerau_levenshtein(name, key);
-    match known.iter().min_by_key(|name| distance(name)) {
-        Some(near) if distance(near) * 3 <= key.len() => error.next(format!("did you mean `{near}`?")),
-        _ => error.next("name a machine's number as --set does, such as cart.mass or cart.friction.viscous"),
+    let near = known.iter().min_by_key(|name| distance(name)).filter(|near| distance(near) * 3 <= key.len());
+    let error = if machine.axis().is_none() { of_gantries(machine, error) } else { error };
+    match near {
+        Some(near) => error.next(format!("did you mean `{near}`?")),
+        None if machine.axis().is_none() => error,
+        None => error.next("name a machine's number as --set does, such as cart.mass or cart.friction.viscous"),
     }
 }
 
+/// What a gantry has instead.
+fn of_gantries(machine: &dyn Numbers, error: Error) -> Error {
+    let keys = keys_there(machine).join(", ");
+    error.allowed(keys).next("of one drive alone write for example left_drive.motor.resistance")
+}
+
+/// The keys of the numbers that a machine has, lists and both drives together where they have a key of their own.
+fn keys_there(machine: &dyn Numbers) -> Vec<String> {
+    let keys = |row: &'static Parameter| -> Vec<String> {
+        let sits = machine.sits(row);
+        match sits.listed() {
+            Some((list, _)) if list.has_whole() && present(machine, row).next().is_some() => vec![row.key.to_string()],
+            _ => present(machine, row).map(|(number, _)| number.key(machine)).collect(),
+        }
+    };
+    all().flat_map(keys).collect()
+}
+
 /// Of a parameter that this machine has not: what it has in the same table, and what to do.
-fn not_there(stage: &Stage, key: &str, row: &Parameter) -> Error {
+fn not_there(machine: &dyn Numbers, key: &str, row: &Parameter) -> Error {
     let table = match key.split_once(".friction.") {
         Some((body, _)) => format!("{body}.friction."),
         None => format!("{}.", key.split('.').next().unwrap_or_default()),
     };
-    let beside = values(stage).into_iter().map(|(key, _)| key);
+    let beside = values(machine).into_iter().map(|(key, _)| key);
     let beside: Vec<String> = beside.filter(|other| other.starts_with(&table)).collect();
     let error = Error::new(format!("`{key}` has no value in this case"));
     let error = if beside.is_empty() { error } else { error.allowed(beside.join(", ")) };
     let (parent, name) = row.key.rsplit_once('.').unwrap_or_default();
-    let is_made = stage.belt.make.is_some();
-    error.next(match row.field {
-        Field::Form(of, _) if value(stage, of).is_some() => format!("name `{of}` instead"),
+    let is_made = super::find("belt.modulus").is_some_and(|row| machine.get(row, 0).is_some());
+    // Of a gantry's cart the row is the bridge's.
+    let parent = key.rsplit_once('.').filter(|(_, last)| *last == name).map_or(parent, |(parent, _)| parent);
+    let form = match machine.sits(row) {
+        Sits::Form(of, list, count) => {
+            let place = (0..count).find(|index| list.key(row.key, *index) == key);
+            Some(list.key(of, place.unwrap_or(0))).filter(|of| value(machine, of).is_some())
+        }
+        Sits::Machine(..) | Sits::PartOf(_) | Sits::Elsewhere => None,
+    };
+    error.next(match form {
+        Some(of) => format!("name `{of}` instead"),
         _ if row.key == "belt.stiffness" && is_made => {
             "it follows from modulus, section and spans: name one of these".into()
         }

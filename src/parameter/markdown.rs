@@ -1,7 +1,6 @@
 //! The table as text for the documents.
 
 use super::field::List;
-use super::free::element_key;
 use super::table::SECTIONS;
 use super::{Fallback, Field, Off, Parameter, all};
 use crate::quantity::shortest;
@@ -36,23 +35,39 @@ pub fn markdown(section: &str) -> String {
 
 /// The parameters that can be free, as a Markdown table.
 pub fn free_markdown() -> String {
-    let mut text = String::from("| key | `--vary all` | off together with | goes along with |\n|---|---|---|---|\n");
+    let mut text =
+        String::from("| key | machine | `--vary all` | off together with | goes along with |\n|---|---|---|---|---|\n");
     for row in all() {
-        let Some(accessor) = row.field.accessor() else { continue };
+        let of_axis = row.field.accessor().map(|accessor| accessor.list);
+        let of_gantry = row.gantry.accessor().map(|accessor| accessor.list);
+        let (machine, Some(list)) = (
+            match (of_axis, of_gantry) {
+                (Some(_), Some(_)) => "both",
+                (Some(_), None) => "axis",
+                (None, _) => "gantry",
+            },
+            of_axis.or(of_gantry),
+        ) else {
+            continue;
+        };
         let all = match row.off {
             Off::No => "–",
             Off::Alone | Off::With(_) => "yes",
         };
         let kind = match row.off {
-            Off::With(kind) => kind,
-            Off::No | Off::Alone => "–",
+            Off::With(kind) if of_axis.is_some() => kind,
+            Off::With(_) | Off::No | Off::Alone => "–",
         };
-        let along = match (row.field, row.follows) {
-            (Field::Form(of, _), _) => format!("is another form of `{}`", last(of)),
-            (_, []) => "–".to_string(),
-            (_, keys) => keys.iter().map(|key| format!("`{}`", last(key))).collect::<Vec<_>>().join(", "),
+        let form = match (&row.field, &row.gantry) {
+            (Field::Form(of, _), _) | (_, Field::Form(of, _)) => Some(of),
+            _ => None,
         };
-        let _ = writeln!(text, "| {} | {all} | {kind} | {along} |", keys(row, accessor.list));
+        let along = match (form, row.follows) {
+            (Some(of), _) => format!("is another form of `{}`", last(of)),
+            (None, []) => "–".to_string(),
+            (None, keys) => keys.iter().map(|key| format!("`{}`", last(key))).collect::<Vec<_>>().join(", "),
+        };
+        let _ = writeln!(text, "| {} | {machine} | {all} | {kind} | {along} |", keys(row, list));
     }
     text
 }
@@ -63,9 +78,11 @@ fn last(key: &str) -> &str {
 
 /// A key, and those of its elements.
 fn keys(row: &Parameter, list: List) -> String {
+    let element = |index| list.key(row.key, index);
     match list {
-        List::None => format!("`{}`", row.key),
-        List::Numbers => format!("`{}`, `{}` to `.2`", row.key, element_key(row, 0)),
-        List::Points => format!("`{}`, `{}` and so on", row.key, element_key(row, 0)),
+        List::None | List::Drives => format!("`{}`", row.key),
+        List::Numbers => format!("`{}`, `{}` to `.2`", row.key, element(0)),
+        List::Points => format!("`{}`, `{}` and so on", row.key, element(0)),
+        List::Slides => format!("`{}`, `{}`", element(0), element(1)),
     }
 }

@@ -6,16 +6,19 @@
 
 mod field;
 mod free;
+mod machine;
 mod markdown;
 mod table;
 
-pub use field::{Accessor, Field};
+pub use field::{Accessor, Field, List};
 pub use free::{Free, GivenBounds, every, kinds, set, value, values};
+pub use machine::{Numbers, Sits};
 pub use markdown::{free_markdown, markdown};
 
 use crate::error::{Error, Result};
 use crate::quantity::{rounded, shortest};
 use crate::stage::Stage;
+use crate::stage::gantry::Gantry;
 use table::SECTIONS;
 
 /// One number of the case file.
@@ -35,8 +38,10 @@ pub struct Parameter {
     pub sentence: &'static str,
     /// How it is typically written.
     pub example: &'static str,
-    /// Where it sits.
+    /// Where it sits in an axis.
     pub field: Field,
+    /// Where it sits in a gantry.
+    pub gantry: Field<Gantry>,
     /// Whether it may be off where nobody names it, and with which others.
     pub off: Off,
     /// What it goes with as long as it has the same value and is not named itself: keys, the one that is asked first first.
@@ -298,12 +303,12 @@ pub fn at_pulley(stage: &Stage, key: &str) -> f64 {
 }
 
 /// Refuses a machine with a number out of its range.
-pub fn check(stage: &Stage) -> Result<()> {
+pub fn check(machine: &dyn Numbers) -> Result<()> {
     for row in all() {
-        let Field::Machine(accessor) = row.field else { continue };
-        for index in 0..(accessor.count)(stage) {
-            if let Some(value) = (accessor.get)(stage, index).filter(|value| !row.range.contains(*value)) {
-                let name = free::element_key(row, index);
+        let Sits::Machine(list, count) = machine.sits(row) else { continue };
+        for index in 0..count {
+            if let Some(value) = machine.get(row, index).filter(|value| !row.range.contains(*value)) {
+                let name = list.key(row.key, index);
                 let unit = if row.unit.is_empty() { String::new() } else { format!(" {}", row.unit) };
                 return Err(Error::new(format!("{name} cannot be {}{unit}", rounded(value)))
                     .allowed(row.range.describe(row.unit)));

@@ -1,8 +1,9 @@
 //! The rows: every number that a case file can hold.
 
 use super::field::{
-    always, breakaway, make, of_law, of_point, optional, part, set_coulomb, set_of_point, set_stribeck_decay,
-    set_stribeck_force, set_stribeck_velocity, stiffness, stribeck_decay, stribeck_force, stribeck_velocity,
+    Place, always, amplifier, breakaway, everywhere, make, motor, of_drive, of_friction, of_law, of_point, of_slide,
+    part, set_coulomb, set_of_point, set_stribeck_decay, set_stribeck_force, set_stribeck_velocity, slide, slide_mut,
+    stiffness, stribeck_decay, stribeck_force, stribeck_velocity,
 };
 use super::{Arm, Fallback, Field, INPUT, Off, Parameter, Range, Sum};
 use crate::friction::Law;
@@ -16,8 +17,8 @@ const fn row(
     example: &'static str,
     sentence: &'static str,
 ) -> Parameter {
-    let (field, off) = (Field::Elsewhere, Off::No);
-    Parameter { key, symbol, unit, default, range, sentence, example, field, off, follows: &[], part: None }
+    let (field, gantry, off) = (Field::Elsewhere, Field::Elsewhere, Off::No);
+    Parameter { key, symbol, unit, default, range, sentence, example, field, gantry, off, follows: &[], part: None }
 }
 
 impl Parameter {
@@ -26,9 +27,9 @@ impl Parameter {
         row("", "", unit, Fallback::Required, range, example, "")
     }
 
-    /// It sits there in a machine.
-    const fn at(self, field: Field) -> Self {
-        Self { field, ..self }
+    /// It sits there in machines.
+    const fn at(self, place: Place) -> Self {
+        Self { field: place.axis, gantry: place.gantry, ..self }
     }
 
     /// It may be off, with all others of that name.
@@ -52,11 +53,11 @@ impl Parameter {
     }
 }
 
-/// Rows of a machine whose numbers cannot be free yet: a gantry's.
-const fn elsewhere<const N: usize>(mut rows: [Parameter; N]) -> [Parameter; N] {
+/// The same rows as parts of no sum: those sums are an axis's.
+const fn alone<const N: usize>(mut rows: [Parameter; N]) -> [Parameter; N] {
     let mut i = 0;
     while i < N {
-        rows[i] = Parameter { field: Field::Elsewhere, off: Off::No, part: None, ..rows[i] };
+        rows[i] = Parameter { part: None, ..rows[i] };
         i += 1;
     }
     rows
@@ -92,7 +93,7 @@ macro_rules! friction {
                 $slope_example,
                 "Viscous friction: resistance per speed.",
             )
-            .at(always!(|s| s.$body.friction.forward.viscous))
+            .at(of_friction!($body, |f| Some(f.forward.viscous), |f, value| f.forward.viscous = value))
             .off(concat!($whose, " viscous friction"))
             .part(Sum::Viscous, $arm_of_slope),
             row(
@@ -104,10 +105,7 @@ macro_rules! friction {
                 $load_example,
                 "Coulomb friction: what resists at any speed.",
             )
-            .at(Field::number(
-                |s, _| Some(s.$body.friction.forward.coulomb),
-                |s, _, value| set_coulomb(&mut s.$body.friction, true, value),
-            ))
+            .at(of_friction!($body, |f| Some(f.forward.coulomb), |f, value| set_coulomb(f, true, value)))
             .off(concat!($whose, " dry friction"))
             .part(Sum::Coulomb, $arm),
             row(
@@ -119,10 +117,7 @@ macro_rules! friction {
                 $static_example,
                 "Breakaway: what it holds at rest before it slides; at least `coulomb`.",
             )
-            .at(Field::number(
-                |s, _| breakaway(&s.$body.friction, true),
-                |s, _, value| s.$body.friction.forward.breakaway = value,
-            ))
+            .at(of_friction!($body, |f| breakaway(f, true), |f, value| f.forward.breakaway = value))
             .off(concat!($whose, " dry friction"))
             .follows(&[concat!($key, ".friction.coulomb")]),
             row(
@@ -134,7 +129,7 @@ macro_rules! friction {
                 $slope_example,
                 "Viscous friction in the negative direction.",
             )
-            .at(always!(|s| s.$body.friction.backward.viscous))
+            .at(of_friction!($body, |f| Some(f.backward.viscous), |f, value| f.backward.viscous = value))
             .off(concat!($whose, " viscous friction"))
             .follows(&[concat!($key, ".friction.viscous")])
             .part(Sum::Viscous, $arm_of_slope),
@@ -147,10 +142,7 @@ macro_rules! friction {
                 $load_example,
                 "Coulomb friction in the negative direction.",
             )
-            .at(Field::number(
-                |s, _| Some(s.$body.friction.backward.coulomb),
-                |s, _, value| set_coulomb(&mut s.$body.friction, false, value),
-            ))
+            .at(of_friction!($body, |f| Some(f.backward.coulomb), |f, value| set_coulomb(f, false, value)))
             .off(concat!($whose, " dry friction"))
             .follows(&[concat!($key, ".friction.coulomb")])
             .part(Sum::Coulomb, $arm),
@@ -163,10 +155,7 @@ macro_rules! friction {
                 $static_example,
                 "Breakaway in the negative direction; at least `coulomb_backward`.",
             )
-            .at(Field::number(
-                |s, _| breakaway(&s.$body.friction, false),
-                |s, _, value| s.$body.friction.backward.breakaway = value,
-            ))
+            .at(of_friction!($body, |f| breakaway(f, false), |f, value| f.backward.breakaway = value))
             .off(concat!($whose, " dry friction"))
             .follows(&[concat!($key, ".friction.static"), concat!($key, ".friction.coulomb_backward")]),
             row(
@@ -178,10 +167,7 @@ macro_rules! friction {
                 $load_example,
                 "By how much the breakaway exceeds `coulomb`, on each side, eq. (14); instead of `static`.",
             )
-            .at(Field::number(
-                |s, _| stribeck_force(&s.$body.friction),
-                |s, _, value| set_stribeck_force(&mut s.$body.friction, value),
-            ))
+            .at(of_friction!($body, |f| stribeck_force(f), |f, value| set_stribeck_force(f, value)))
             .off(concat!($whose, " dry friction")),
             row(
                 concat!($key, ".friction.stribeck.decay"),
@@ -192,11 +178,8 @@ macro_rules! friction {
                 $decay_example,
                 "How fast that excess is gone: e^(−F_τ v²), eq. (14); 1 / velocity².",
             )
-            .at(Field::form(
-                concat!($key, ".friction.stribeck.velocity"),
-                |s, _| stribeck_decay(&s.$body.friction),
-                |s, _, value| set_stribeck_decay(&mut s.$body.friction, value),
-            )),
+            .at(of_friction!($body, |f| stribeck_decay(f), |f, value| set_stribeck_decay(f, value))
+                .form(concat!($key, ".friction.stribeck.velocity"))),
             row(
                 concat!($key, ".friction.stribeck.velocity"),
                 "v_s",
@@ -206,10 +189,7 @@ macro_rules! friction {
                 $velocity_example,
                 "Speed at which 1/e of it is left. With `shape = \"exponential\"` it goes as e^(−v/v_s), else as e^(−(v/v_s)²).",
             )
-            .at(Field::number(
-                |s, _| stribeck_velocity(&s.$body.friction),
-                |s, _, value| set_stribeck_velocity(&mut s.$body.friction, value),
-            ))
+            .at(of_friction!($body, |f| stribeck_velocity(f), |f, value| set_stribeck_velocity(f, value)))
             .off(concat!($whose, " Stribeck velocity")),
             row(
                 concat!($key, ".friction.smooth.breakaway_velocity"),
@@ -261,7 +241,7 @@ macro_rules! friction {
 
 /// Inertia of one pulley: given, or from its geometry.
 macro_rules! pulley {
-    ($body:ident, $inertia:literal) => {
+    ($body:ident, $inertia:literal, $place:expr, $part_of:path) => {
         [
             row(
                 concat!(stringify!($body), ".inertia"),
@@ -272,7 +252,7 @@ macro_rules! pulley {
                 "6.3e-5 kg m^2",
                 "Moment of inertia about its axis; or a table with the four rows below.",
             )
-            .at(always!(|s| s.$body.inertia))
+            .at($place)
             .off("pulleys' inertia")
             .part(Sum::Inertia, One),
             row(
@@ -284,7 +264,7 @@ macro_rules! pulley {
                 "38.3 mm",
                 "Outer diameter of the hollow cylinder that stands for the pulley.",
             )
-            .at(Field::PartOf(concat!(stringify!($body), ".inertia"))),
+            .at($part_of(concat!(stringify!($body), ".inertia"))),
             row(
                 concat!(stringify!($body), ".inertia.bore_diameter"),
                 "d_i",
@@ -294,9 +274,9 @@ macro_rules! pulley {
                 "6.35 mm",
                 "Diameter of its bore; smaller than the outer one.",
             )
-            .at(Field::PartOf(concat!(stringify!($body), ".inertia"))),
+            .at($part_of(concat!(stringify!($body), ".inertia"))),
             row(concat!(stringify!($body), ".inertia.width"), "w", "m", Required, POSITIVE, "12.7 mm", "Its width.")
-                .at(Field::PartOf(concat!(stringify!($body), ".inertia"))),
+                .at($part_of(concat!(stringify!($body), ".inertia"))),
             row(
                 concat!(stringify!($body), ".inertia.density"),
                 "ρ",
@@ -306,7 +286,7 @@ macro_rules! pulley {
                 "2.7 g/cm^3",
                 "Density of its material.",
             )
-            .at(Field::PartOf(concat!(stringify!($body), ".inertia"))),
+            .at($part_of(concat!(stringify!($body), ".inertia"))),
         ]
     };
 }
@@ -349,50 +329,47 @@ macro_rules! channel {
 #[rustfmt::skip]
 const MOTOR: &[Parameter] = &[
     row("motor.torque_constant", "K_t", "N m/A", Required, NOT_NEGATIVE, "23 mN m/A", "Torque per ampere, at the motor's own shaft.")
-        .at(always!(|s| s.motor.torque_constant)).off("motor constants"),
+        .at(motor!(torque_constant)).off("motor constants"),
     row("motor.back_emf_constant", "K_e", "V s/rad", Required, NOT_NEGATIVE, "23 mV s/rad", "Voltage per speed, at the motor's own shaft.")
-        .at(always!(|s| s.motor.back_emf_constant)).off("motor constants"),
+        .at(motor!(back_emf_constant)).off("motor constants"),
     row("motor.resistance", "R", "ohm", Required, POSITIVE, "0.71 ohm", "Resistance of the armature.")
-        .at(always!(|s| s.motor.resistance)).off("resistance"),
+        .at(motor!(resistance)).off("resistance"),
     row("motor.inductance", "L", "H", Value(0.0), NOT_NEGATIVE, "0.66 mH", "Inductance of the armature; with 0 the current follows the voltage at once.")
-        .at(always!(|s| s.motor.inductance)).off("inductance"),
+        .at(motor!(inductance)).off("inductance"),
     row("motor.rotor_inertia", "J_r", "kg m^2", Value(0.0), NOT_NEGATIVE, "4.2e-6 kg m^2", "Inertia of the rotor, at the motor's own shaft.")
-        .at(always!(|s| s.motor.rotor_inertia)).off("rotor inertia").part(Sum::Inertia, Gear(2)),
+        .at(motor!(rotor_inertia)).off("rotor inertia").part(Sum::Inertia, Gear(2)),
     row("motor.gear_ratio", "n", "", Value(1.0), Range::new(1e-6, 1e6), "5.9", "Motor turns per turn of the drive pulley.")
-        .at(always!(|s| s.motor.gear_ratio)),
+        .at(motor!(gear_ratio)),
     row("motor.gear_efficiency", "η", "", Value(1.0), UP_TO_ONE, "0.73", "The part of the power that passes the gear, whichever side drives.")
-        .at(Field::number(
-            |s, _| s.motor.gear_play.is_none().then_some(s.motor.gear_efficiency),
-            |s, _, value| s.motor.gear_efficiency = value,
-        )),
+        .at(of_drive!(motor, motors, |m| m.gear_play.is_none().then_some(m.gear_efficiency), |m, value| m.gear_efficiency = value)),
     row("motor.backlash", "2α", "rad", Value(0.0), Range { below: true, ..Range::new(0.0, 6.3) }, "0.5 deg", "Play of the gear: by how much the drive pulley can turn while the rotor stands. Needs `gear_stiffness`.")
-        .at(part!(|s| s.motor.gear_play, &mut s.motor.gear_play => backlash)).off("gear's backlash"),
+        .at(motor!(play backlash)).off("gear's backlash"),
     row("motor.gear_stiffness", "k_g", "N m/rad", Words("stiff"), POSITIVE, "300 N m/rad", "Stiffness of the gear between rotor and drive pulley, at the pulley; makes the rotor an inertia of its own.")
-        .at(part!(|s| s.motor.gear_play, &mut s.motor.gear_play => stiffness)).off("gear's stiffness"),
+        .at(motor!(play stiffness)).off("gear's stiffness"),
     row("motor.gear_damping", "c_g", "N m s/rad", Value(0.0), NOT_NEGATIVE, "0.01 N m s", "Damping of the gear where its flanks touch, at the pulley.")
-        .at(part!(|s| s.motor.gear_play, &mut s.motor.gear_play => damping)).off("gear's damping"),
+        .at(motor!(play damping)).off("gear's damping"),
 ];
 
 #[rustfmt::skip]
 const AMPLIFIER: &[Parameter] = &[
     row("amplifier.gain", "", "", Value(1.0), ANY, "1", "Output, V or A, per unit of input; negative where the wires are swapped.")
-        .at(always!(|s| s.amplifier.gain)),
+        .at(of_drive!(amplifier, amplifiers, |a| Some(a.gain), |a, value| a.gain = value)),
     row("amplifier.voltage_limit", "V_max", "V", Words("none"), POSITIVE, "24 V", "Largest voltage at the motor's terminals, either way.")
-        .at(optional!(|s| s.amplifier.voltage_limit)),
+        .at(amplifier!(voltage_limit)),
     row("amplifier.current_limit", "I_max", "A", Words("none"), POSITIVE, "12 A", "Largest current, either way.")
-        .at(optional!(|s| s.amplifier.current_limit)),
+        .at(amplifier!(current_limit)),
     row("amplifier.bandwidth", "f_b", "Hz", Words("none: the current follows at once"), FREQUENCY, "1 kHz", "Bandwidth of the current loop, first order; only in current mode.")
-        .at(optional!(|s| s.amplifier.bandwidth)).off("current loop's bandwidth"),
+        .at(amplifier!(bandwidth)).off("current loop's bandwidth"),
 ];
 
 #[rustfmt::skip]
 const RADIUS: &[Parameter] = &[
     row("drive_pulley.radius", "r", "m", Words("from `teeth` and `pitch`"), POSITIVE, "19.4 mm", "Pitch radius, the same for both pulleys.")
-        .at(always!(|s| s.pulley_radius)).alone(),
+        .at(everywhere!(|s| s.pulley_radius)).alone(),
     row("drive_pulley.teeth", "z", "", Words("not used with `radius`"), Range::whole(1.0, 1e6), "60", "Number of teeth or grooves; instead of `radius`, with `pitch`.")
-        .at(Field::PartOf("drive_pulley.radius")),
+        .at(Place::part_of("drive_pulley.radius")),
     row("drive_pulley.pitch", "p", "m", Words("not used with `radius`"), POSITIVE, "2.03 mm", "Distance from tooth to tooth along the belt.")
-        .at(Field::PartOf("drive_pulley.radius")),
+        .at(Place::part_of("drive_pulley.radius")),
 ];
 
 #[rustfmt::skip]
@@ -409,31 +386,43 @@ const CART: &[Parameter] = &[
 const BELT: &[Parameter] = &[
     row("belt.stiffness", "k₁ k₂ k₃", "N/m", Words("from `modulus`, `section` and `spans`"), POSITIVE, "132.76 kN/m",
         "Stiffness of each span: drive pulley to cart, cart to idler pulley, and the way back. Three values in a list.")
-        .at(Field::spans(|s, span| stiffness(&s.belt, span), |s, span, value| s.belt.stiffness[span] = value))
+        .at(Place {
+            axis: Field::spans(|s, span| stiffness(&s.belt, span), |s, span, value| s.belt.stiffness[span] = value),
+            gantry: Field::gantry_spans(
+                |g, span| g.belts.stiffness.get(span).copied().filter(|_| g.belts.make.is_none()),
+                |g, span, value| g.belts.stiffness[span] = value,
+            ),
+        })
         .off("belt's stiffness").part(Sum::Stiffness, One),
     row("belt.modulus", "E", "Pa", Words("not used with `stiffness`"), POSITIVE, "8.335 GPa",
         "Modulus of elasticity, eq. (11); or a list of parts, each `{ share, modulus }`, for a composite.")
         .at(make!(number, |make, _| make.modulus)).off("belt's stiffness"),
     row("belt.modulus.share", "", "", Required, UP_TO_ONE, "1/3", "Share of the section that is of this material; all shares add up to 1.")
-        .at(Field::PartOf("belt.modulus")),
+        .at(Place::part_of("belt.modulus")),
     row("belt.modulus.modulus", "E", "Pa", Required, POSITIVE, "50 GPa", "Modulus of this material.")
-        .at(Field::PartOf("belt.modulus")),
+        .at(Place::part_of("belt.modulus")),
     row("belt.section", "A", "m^2", Words("not used with `stiffness`"), POSITIVE, "5.5626 mm^2",
         "Cross-section that carries the load; or `{ plain, toothed, toothed_share }` for a toothed belt, eq. (12).")
         .at(make!(number, |make, _| make.section)),
     row("belt.section.plain", "A_nt", "m^2", Required, POSITIVE, "5.5626 mm^2", "Cross-section between the teeth.")
-        .at(Field::PartOf("belt.section")),
+        .at(Place::part_of("belt.section")),
     row("belt.section.toothed", "A_t", "m^2", Required, POSITIVE, "10.4 mm^2", "Cross-section at a tooth.")
-        .at(Field::PartOf("belt.section")),
+        .at(Place::part_of("belt.section")),
     row("belt.section.toothed_share", "", "", Required, Range::new(0.0, 1.0), "0.5", "Share of the belt's length that has the cross-section `toothed`.")
-        .at(Field::PartOf("belt.section")),
+        .at(Place::part_of("belt.section")),
     row("belt.spans", "l₁ l₂ l₃", "m", Words("not used with `stiffness`"), POSITIVE, "0.34925 m", "Length of each span. Three values in a list.")
         .at(make!(spans, |make, span| make.spans[span])),
     row("belt.damping", "c₁ c₂ c₃", "N s/m", Value(0.0), NOT_NEGATIVE, "0 N s/m", "Damping of each span, parallel to its stiffness. Three values in a list.")
-        .at(Field::spans(|s, span| Some(s.belt.damping[span]), |s, span, value| s.belt.damping[span] = value))
+        .at(Place {
+            axis: Field::spans(|s, span| Some(s.belt.damping[span]), |s, span, value| s.belt.damping[span] = value),
+            gantry: Field::gantry_spans(|g, span| g.belts.damping.get(span).copied(), |g, span, value| g.belts.damping[span] = value),
+        })
         .off("belt's damping"),
     row("belt.pretension", "T₀", "N", Words("none: spans can push"), POSITIVE, "50 N", "Tension of every span at rest; a span whose tension is used up goes slack and carries nothing.")
-        .at(optional!(|s| s.belt.pretension)).off("belt's pretension"),
+        .at(Place {
+            axis: Field::number(|s, _| s.belt.pretension, |s, _, value| s.belt.pretension = s.belt.pretension.map(|_| value)),
+            gantry: Field::number(|g, _| g.belts.pretension, |g, _, value| g.belts.pretension = g.belts.pretension.map(|_| value)),
+        }).off("belt's pretension"),
 ];
 
 #[rustfmt::skip]
@@ -451,15 +440,15 @@ const TRAVEL: &[Parameter] = &[
 #[rustfmt::skip]
 const ALONG: &[Parameter] = &[
     row("cart.friction.along.position", "x", "m", Required, ANY, "0.1 m", "First number of each point of `along`: where along the travel, growing from point to point.")
-        .at(Field::points(|s, point| of_point(s, point, 0), |s, point, value| set_of_point(s, point, 0, value))),
+        .at(Place::axis(Field::points(|s, point| of_point(s, point, 0), |s, point, value| set_of_point(s, point, 0, value)))),
     row("cart.friction.along.factor", "", "", Required, NOT_NEGATIVE, "1.5", "Second number: what Coulomb friction, breakaway and `stribeck.force` are multiplied by there; straight lines between points.")
-        .at(Field::points(|s, point| of_point(s, point, 1), |s, point, value| set_of_point(s, point, 1, value))),
+        .at(Place::axis(Field::points(|s, point| of_point(s, point, 1), |s, point, value| set_of_point(s, point, 1, value)))),
 ];
 
 #[rustfmt::skip]
 const ENCODER: &[Parameter] = &[
     row("encoder.lines", "", "", Required, POSITIVE, "512", "Lines per turn, or at the cart per metre; in quadrature each gives four counts.")
-        .at(part!(|s| s.encoder, &mut s.encoder => lines)),
+        .at(part!(both |s| s.encoder, &mut s.encoder => lines)),
 ];
 
 #[rustfmt::skip]
@@ -504,11 +493,32 @@ const INITIAL: &[Parameter] = &[
 
 #[rustfmt::skip]
 const BRIDGE: &[Parameter] = &[
-    row("bridge.mass", "m", "kg", Required, POSITIVE, "0.838 kg", "Mass of the bridge without the cart; of the cart with its load."),
-    row("bridge.travel.min", "", "m", Required, ANY, "-0.2 m", "Least position."),
-    row("bridge.travel.max", "", "m", Required, ANY, "0.2 m", "Greatest position; above `min`."),
-    row("bridge.travel.stop_stiffness", "k_s", "N/m", Words("no stops: a run ends there"), POSITIVE, "20 kN/m", "Stiffness of the end stops."),
-    row("bridge.travel.stop_damping", "c_s", "N s/m", Value(0.0), NOT_NEGATIVE, "50 N s/m", "Their damping."),
+    row("bridge.mass", "m", "kg", Required, POSITIVE, "0.838 kg", "Mass of the bridge without the cart; of the cart with its load.")
+        .at(of_slide!(|s| Some(s.mass), |s, value| s.mass = value)).off("mass"),
+    row("bridge.travel.min", "", "m", Required, ANY, "-0.2 m", "Least position.")
+        .at(of_slide!(|s| s.travel.map(|travel| travel.min), |s, value| {
+            if let Some(travel) = &mut s.travel {
+                travel.min = value;
+            }
+        })),
+    row("bridge.travel.max", "", "m", Required, ANY, "0.2 m", "Greatest position; above `min`.")
+        .at(of_slide!(|s| s.travel.map(|travel| travel.max), |s, value| {
+            if let Some(travel) = &mut s.travel {
+                travel.max = value;
+            }
+        })),
+    row("bridge.travel.stop_stiffness", "k_s", "N/m", Words("no stops: a run ends there"), POSITIVE, "20 kN/m", "Stiffness of the end stops.")
+        .at(of_slide!(|s| s.travel.and_then(|travel| travel.stop).map(|stop| stop.stiffness), |s, value| {
+            if let Some(stop) = s.travel.as_mut().and_then(|travel| travel.stop.as_mut()) {
+                stop.stiffness = value;
+            }
+        })),
+    row("bridge.travel.stop_damping", "c_s", "N s/m", Value(0.0), NOT_NEGATIVE, "50 N s/m", "Their damping.")
+        .at(of_slide!(|s| s.travel.and_then(|travel| travel.stop).map(|stop| stop.damping), |s, value| {
+            if let Some(stop) = s.travel.as_mut().and_then(|travel| travel.stop.as_mut()) {
+                stop.damping = value;
+            }
+        })),
 ];
 
 #[rustfmt::skip]
@@ -650,7 +660,7 @@ pub(super) const SECTIONS: &[(&str, &[&[Parameter]])] = &[
         "drive_pulley",
         &[
             RADIUS,
-            &pulley!(drive_pulley, "J₁"),
+            &pulley!(drive_pulley, "J₁", everywhere!(|s| s.drive_pulley.inertia), Place::part_of),
             &friction!(
                 "drive_pulley",
                 drive_pulley,
@@ -677,7 +687,7 @@ pub(super) const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     (
         "idler_pulley",
         &[
-            &pulley!(idler_pulley, "J₂"),
+            &pulley!(idler_pulley, "J₂", always!(|s| s.idler_pulley.inertia), Place::part_of_axis),
             &friction!(
                 "idler_pulley",
                 idler_pulley,
@@ -733,9 +743,9 @@ pub(super) const SECTIONS: &[(&str, &[&[Parameter]])] = &[
         "bridge",
         &[
             BRIDGE,
-            &elsewhere(friction!(
+            &alone(friction!(
                 "bridge",
-                cart,
+                bridge,
                 "bridge's",
                 Radius(1),
                 Radius(2),

@@ -13,7 +13,7 @@
 
 use super::{BeltModel, EncoderPlace, Stage};
 use crate::friction::Law;
-use crate::mechanism::{Body, Drive, Follows, Heading, Kind, Label, Mechanism, Shown, Spring, SpringLaw, State};
+use crate::mechanism::{Body, Drive, Follows, Heading, Kind, Label, Mechanism, Roles, Shown, Spring, SpringLaw, State};
 
 /// Number of the drive pulley among the bodies.
 pub const DRIVE: usize = 0;
@@ -59,6 +59,7 @@ impl Stage {
             amplifier: self.amplifier,
         };
         let mut mechanism = Mechanism::new(self.bodies(), springs, vec![drive]);
+        mechanism.roles = Roles { loads: vec![CART], spans: (0..SPANS).collect() };
         mechanism.readings = self.readings(&mechanism);
         mechanism.columns = self.columns(&mechanism);
         mechanism

@@ -18,7 +18,7 @@ use super::{Encoder, EncoderPlace, Pulley, Travel};
 use crate::error::{Error, Result};
 use crate::friction::{Friction, Law};
 use crate::mechanism::{
-    Amplifier, Body, Drive, Follows, Heading, Kind, Label, Mechanism, Motor, Shown, Spring, SpringLaw,
+    Amplifier, Body, Drive, Follows, Heading, Kind, Label, Mechanism, Motor, Roles, Shown, Spring, SpringLaw,
 };
 
 /// Number of the left drive pulley (A) among the bodies.
@@ -95,6 +95,14 @@ impl Routing {
         }
     }
 
+    /// The stretch of each span as a sum of those two that tell the drives' errors, (span, weight): the spans of one belt add up to nothing.
+    pub fn stretches(self) -> &'static [&'static [(usize, f64)]] {
+        match self {
+            Routing::HFrame => &[&[(0, 1.0)], &[(1, 1.0)], &[(0, -1.0), (1, -1.0)]],
+            Routing::CoreXy => &[&[(0, 1.0)], &[(0, -1.0)], &[(2, 1.0)], &[(2, -1.0)]],
+        }
+    }
+
     /// Rows of A for pulleys of radius `r`, and how the spans' lengths change with x and y.
     fn rows(self, r: f64) -> Vec<([f64; BODIES], [f64; 2])> {
         match self {
@@ -133,8 +141,44 @@ pub struct Belts {
     pub damping: Vec<f64>,
     /// Tension of every span at rest, N; none for spans that can push.
     pub pretension: Option<f64>,
+    /// What the stiffness is computed from, where it is not given.
+    pub make: Option<Make>,
     /// E A, N, and the lengths of the spans with bridge and cart at zero, m, where the spans follow them.
     pub follows: Option<(f64, Vec<f64>)>,
+}
+
+/// Spans by material and lengths.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Make {
+    /// Modulus of elasticity E, Pa.
+    pub modulus: f64,
+    /// Cross-section A that carries the load, m².
+    pub section: f64,
+    /// Length of each span with bridge and cart at zero, m.
+    pub spans: Vec<f64>,
+}
+
+impl Make {
+    /// k = A E / l of each span, N/m.                                                     (11)
+    pub fn stiffness(&self) -> Vec<f64> {
+        let rigidity = self.rigidity();
+        self.spans.iter().map(|length| rigidity / length).collect()
+    }
+
+    /// E A, N.
+    pub fn rigidity(&self) -> f64 {
+        self.modulus * self.section
+    }
+}
+
+impl Belts {
+    /// Takes up what was changed of the make.
+    pub fn follow_make(&mut self) {
+        if let Some(make) = &self.make {
+            self.stiffness = make.stiffness();
+            self.follows = self.follows.take().map(|_| (make.rigidity(), make.spans.clone()));
+        }
+    }
 }
 
 /// A gantry with two drives and a belt, or two.
@@ -210,6 +254,18 @@ impl Gantry {
                 positive("a rotor's inertia", motor.rotor_inertia)?;
             }
         }
+        for (name, slide) in [("bridge", &self.bridge), ("cart", &self.cart)] {
+            if slide.travel.is_some_and(|travel| travel.min >= travel.max) {
+                let what = format!("the travel of the {name} ends before it begins");
+                return Err(Error::new(what).allowed("max above min"));
+            }
+        }
+        for friction in [self.drive_pulley.friction, self.bridge.friction, self.cart.friction] {
+            if matches!(friction.law, Law::LuGre { .. }) {
+                let least = friction.forward.coulomb.min(friction.backward.coulomb);
+                positive("Coulomb friction under bristles", least)?;
+            }
+        }
         if self.belts.follows.is_some() {
             let (Some(across), Some(along)) = (self.bridge.travel, self.cart.travel) else {
                 return Err(Error::new("spans that follow bridge and cart need the travel of both"));
@@ -283,6 +339,7 @@ impl Gantry {
             springs.push(way(body, slide.travel));
         }
         let mut mechanism = Mechanism::new(bodies, springs, drives);
+        mechanism.roles = Roles { loads: vec![BRIDGE, CART], spans: (0..self.routing.spans().len()).collect() };
         mechanism.readings = self.readings(&mechanism);
         mechanism.columns = self.columns(&mechanism);
         mechanism
@@ -306,14 +363,14 @@ impl Gantry {
         rows.into_iter().enumerate().map(span).collect()
     }
 
-    /// Speeds of bridge and cart, currents of both drives, forces of the spans, the stretches that tell what the drives do not see, and
-    /// the speeds of rotors that turn by themselves.
+    /// Speeds of bridge and cart, currents of both drives, forces of the spans, the stretches that tell what the drives do not see and from
+    /// which those of all spans follow, and the speeds of the motors: of rotors that turn by themselves, or of their pulleys.
     fn readings(&self, mechanism: &Mechanism) -> Vec<Shown> {
         let mut readings =
             vec![Shown::Speed(BRIDGE, 1.0), Shown::Speed(CART, 1.0), Shown::Current(0), Shown::Current(1)];
         readings.extend((0..self.routing.spans().len()).map(|span| Shown::Force(span, 1.0)));
         readings.extend(self.routing.drive_error()[0].map(|(span, _)| Shown::Stretch(span)));
-        readings.extend((BODIES..mechanism.bodies.len()).map(|rotor| Shown::Speed(rotor, 1.0)));
+        readings.extend(mechanism.drives.iter().map(|drive| Shown::Speed(drive.shaft, 1.0)));
         readings
     }
 

@@ -1,9 +1,28 @@
 //! The key figures of a run that a sweep keeps, as tables.
 
 use crate::control::MoveRun;
-use crate::metrics::{Metrics, Peak};
+use crate::mechanism::{Drive, Label, Mechanism};
+use crate::metrics::{GantryMetrics, Metrics, Peak};
 
-/// One of them.
+/// A key figure, as a column has it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Figure {
+    /// Its name, as a column.
+    pub name: String,
+    /// Its SI unit; empty for a pure number.
+    pub unit: &'static str,
+    /// Its name for people.
+    pub words: String,
+}
+
+impl Figure {
+    pub(super) fn of<T>(measure: &Measure<T>) -> Self {
+        let &Measure { name, unit, words, .. } = measure;
+        Self { name: name.to_string(), unit, words: words.to_string() }
+    }
+}
+
+/// A key figure, and how it is had from a run.
 pub struct Measure<T> {
     /// Its name, as a column.
     pub name: &'static str,
@@ -67,6 +86,61 @@ pub const OF_MOVE: &[Measure<MoveRun>] = &[
     row("peak_belt_force", "N", "largest force in the belt", |m| magnitude(&m.metrics.peak_force)),
 ];
 
-fn magnitude(peaks: &[Peak; 3]) -> f64 {
+/// A key figure of a gantry: of one of its loads, drives, spans or bodies, or of all of it.
+#[derive(Debug, Clone)]
+pub struct OfPart {
+    /// What it is.
+    pub figure: Figure,
+    /// The place of the part among the others of its role.
+    place: usize,
+    of: fn(&GantryMetrics, usize) -> f64,
+}
+
+impl OfPart {
+    /// Its value; NaN where a run has none.
+    pub fn value(&self, metrics: &GantryMetrics) -> f64 {
+        (self.of)(metrics, self.place)
+    }
+}
+
+/// Those of an experiment of a gantry, in the order of the columns; what its parts are called, the mechanism says.
+#[rustfmt::skip]
+pub fn of_gantry(mechanism: &Mechanism) -> Vec<OfPart> {
+    let loads: Vec<Label> = mechanism.roles.loads.iter().map(|load| mechanism.bodies[*load].label).collect();
+    let spans: Vec<Label> = mechanism.roles.spans.iter().map(|span| mechanism.springs[*span].label).collect();
+    // The drives, as their columns begin and for people.
+    let key = |drive: &Drive| mechanism.bodies[drive.pulley].label.key;
+    let drives: Vec<Label> = mechanism.drives.iter().map(|drive| Label { key: key(drive), name: drive.label.name }).collect();
+    let bodies: Vec<Label> = mechanism.held_bodies().map(|body| mechanism.bodies[body].label).collect();
+    let whole = [Label { key: "", name: "" }];
+    let mut figures = Vec::new();
+    // In names `*` stands for the part.
+    let mut each = |parts: &[Label], name: &str, unit: &'static str, words: &str, of: fn(&GantryMetrics, usize) -> f64| {
+        for (place, part) in parts.iter().enumerate() {
+            let figure = Figure { name: name.replace('*', part.key), unit, words: words.replace('*', part.name) };
+            figures.push(OfPart { figure, place, of });
+        }
+    };
+    each(&loads, "final_*_position", "m", "* position at the end", |m, load| m.final_position[load]);
+    each(&loads, "final_*_speed", "m/s", "* speed at the end", |m, load| m.final_speed[load]);
+    each(&loads, "final_*_by_drives", "m", "* position at the end, by the drives", |m, load| m.final_by_drives[load]);
+    each(&loads, "final_drives_minus_*", "m", "drives minus * at the end", |m, load| m.final_by_drives[load] - m.final_position[load]);
+    each(&loads, "peak_*_speed", "m/s", "peak * speed", |m, load| m.peak_speed[load].value);
+    each(&loads, "peak_*_speed_time", "s", "time of the peak * speed", |m, load| m.peak_speed[load].time);
+    each(&loads, "peak_drives_minus_*", "m", "largest drives minus *", |m, load| m.peak_error[load].value);
+    each(&drives, "peak_*_speed", "rad/s", "peak speed of the *", |m, drive| m.peak_drive_speed[drive].value);
+    each(&drives, "peak_*_current", "A", "peak current of the *", |m, drive| m.peak_current[drive].value);
+    each(&spans, "peak_*_stretch", "m", "peak stretch of the *", |m, span| m.peak_stretch[span].value);
+    each(&spans, "peak_*_force", "N", "peak force in the *", |m, span| m.peak_force[span].value);
+    each(&whole, "peak_belt_force", "N", "largest force in the belts", |m, _| magnitude(&m.peak_force));
+    each(&whole, "stop_time", "s", "time of the last stop", |m, _| m.stop_time.unwrap_or(f64::NAN));
+    each(&whole, "settled", "", "at rest at the end", |m, _| f64::from(u8::from(m.settled)));
+    each(&bodies, "*_stops", "", "stops of the *", |m, body| m.events[body].stops as f64);
+    each(&bodies, "*_reversals", "", "reversals of the *", |m, body| m.events[body].reversals as f64);
+    figures
+}
+
+/// The largest of peaks, without its sign.
+fn magnitude(peaks: &[Peak]) -> f64 {
     crate::metrics::largest(peaks).1.value.abs()
 }

@@ -1,7 +1,7 @@
 //! Many runs with parameters varied.
 //!
-//! A [`Sweep`] is made of a case that says what is varied ([`crate::case::Sweeping`]). Each of its runs is one machine, with every
-//! experiment and move of the case: row `i` follows from the case and `i` alone, bit for bit, so that rows can be computed in any order, in pieces,
+//! A [`Sweep`] is made of a case, of an axis or a gantry, that says what is varied ([`crate::case::Sweeping`]). Each of its runs is one
+//! machine, with every experiment and move of the case: row `i` follows from the case and `i` alone, bit for bit, so that rows can be computed in any order, in pieces,
 //! by any number of threads and machines. The kernel does no I/O and starts no thread.
 //!
 //! ```
@@ -18,8 +18,10 @@
 //! # Ok::<(), taut::Error>(())
 //! ```
 
+mod axis;
 mod chance;
 mod distribution;
+mod gantry;
 mod indices;
 mod measures;
 mod plan;
@@ -29,18 +31,16 @@ mod statistics;
 
 pub use distribution::Distribution;
 pub use indices::{Estimate, Index, indices};
-pub use measures::{Measure, OF_EXPERIMENT, OF_MOVE};
+pub use measures::{Figure, Measure, OF_EXPERIMENT, OF_MOVE, OfPart, of_gantry};
 pub use sobol::{DIMENSIONS, Sobol};
 pub use statistics::{SHARES, Spread, rank_correlation};
 
-use crate::case::{Experiment, Move, Sampling};
-use crate::control::{self, MoveRun, Setup};
-use crate::design::Design;
-use crate::error::{Error, Result};
-use crate::metrics::{Held, Meter};
-use crate::parameter::{self, Free};
-use crate::solve::{self, Bench, Ending, Flow, Solver};
+use crate::case::Sampling;
+use crate::error::Result;
+use crate::parameter::{self, Free, Numbers};
+use crate::solve::{Ending, Flow, Outcome};
 use crate::stage::Stage;
+use crate::stage::gantry::Gantry;
 use crate::trajectory::{Column, Trajectory};
 use points::Points;
 use std::sync::Arc;
@@ -50,7 +50,7 @@ use std::sync::Arc;
 pub enum Status {
     /// At the end of the experiment.
     Complete,
-    /// The cart left its travel.
+    /// The cart, or the bridge, left its travel.
     LeftTravel,
     /// More events than the bound allows.
     TooManyEvents,
@@ -108,13 +108,116 @@ struct Draws {
     columns: Vec<Vec<f64>>,
 }
 
+/// A machine of a sweep.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Machine {
+    /// An axis.
+    Axis(Box<Stage>),
+    /// A gantry.
+    Gantry(Box<Gantry>),
+}
+
+impl Machine {
+    /// It, where it is an axis.
+    pub fn axis(&self) -> Option<&Stage> {
+        match self {
+            Machine::Axis(stage) => Some(stage),
+            Machine::Gantry(_) => None,
+        }
+    }
+
+    /// It, where it is a gantry.
+    pub fn gantry(&self) -> Option<&Gantry> {
+        match self {
+            Machine::Axis(_) => None,
+            Machine::Gantry(gantry) => Some(gantry),
+        }
+    }
+}
+
+/// Something that each machine does, and what is told of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Group {
+    /// Its name.
+    pub name: String,
+    /// Its name as that of a file, with which those of its columns begin.
+    pub file: String,
+    /// Whether it is a move in closed loop, and no experiment. The controller takes every machine for the one of the case.
+    pub is_move: bool,
+    /// Its figures, whose columns stand behind that of its status.
+    pub figures: Vec<Figure>,
+}
+
+/// What is swept: a machine as the case has it, and what it does.
+#[derive(Debug, Clone)]
+enum Subject {
+    Axis(axis::Axis),
+    Gantry(gantry::Swept),
+}
+
+impl Subject {
+    fn numbers(&self) -> &dyn Numbers {
+        match self {
+            Subject::Axis(axis) => &axis.stage,
+            Subject::Gantry(swept) => &swept.gantry,
+        }
+    }
+
+    fn groups(&self) -> Vec<Group> {
+        match self {
+            Subject::Axis(axis) => axis.groups(),
+            Subject::Gantry(swept) => swept.groups(),
+        }
+    }
+
+    /// Refuses a case whose own machine cannot be run.
+    fn check(&self) -> Result<()> {
+        match self {
+            Subject::Axis(axis) => axis.check(),
+            Subject::Gantry(swept) => swept.check(),
+        }
+    }
+}
+
+/// Runs machines of a subject, one after another.
+enum Worker<'a> {
+    Axis(Box<axis::Worker<'a>>),
+    Gantry(&'a gantry::Swept, Box<Gantry>),
+}
+
+impl<'a> Worker<'a> {
+    fn of(subject: &'a Subject) -> Self {
+        match subject {
+            Subject::Axis(axis) => Worker::Axis(Box::new(axis::Worker::new(axis))),
+            Subject::Gantry(swept) => Worker::Gantry(swept, Box::new(swept.gantry.clone())),
+        }
+    }
+
+    /// The machine as the case has it, for numbers to be set.
+    fn reset(&mut self) -> &mut dyn Numbers {
+        match self {
+            Worker::Axis(worker) => worker.reset(),
+            Worker::Gantry(swept, gantry) => {
+                gantry.as_mut().clone_from(&swept.gantry);
+                gantry.as_mut()
+            }
+        }
+    }
+
+    /// Adds status and figures of all that the machine does.
+    fn run(&mut self, values: &mut Vec<f64>) {
+        match self {
+            Worker::Axis(worker) => worker.run(values),
+            Worker::Gantry(swept, gantry) => swept.run(gantry, values),
+        }
+    }
+}
+
 /// Many runs of a case.
 #[derive(Debug, Clone)]
 pub struct Sweep {
-    stage: Stage,
-    experiments: Vec<Experiment>,
-    moves: Vec<Move>,
-    controller: Option<Design>,
+    subject: Subject,
+    groups: Vec<Group>,
     parameters: Vec<Parameter>,
     draws: Option<Arc<Draws>>,
     points: Points,
@@ -146,19 +249,9 @@ impl Sweep {
         self.indices
     }
 
-    /// The experiments that each machine does.
-    pub fn experiments(&self) -> &[Experiment] {
-        &self.experiments
-    }
-
-    /// The moves in closed loop that each machine does; the controller takes every machine for the one of the case.
-    pub fn moves(&self) -> &[Move] {
-        &self.moves
-    }
-
-    /// The machine as the case has it.
-    pub fn stage(&self) -> &Stage {
-        &self.stage
+    /// What each machine does, in the order of the columns: experiments, then moves.
+    pub fn groups(&self) -> &[Group] {
+        &self.groups
     }
 
     /// The columns of [`Sweep::rows`], without rows: `run`, the parameters, then a status and the figures of each experiment, whose
@@ -184,12 +277,20 @@ impl Sweep {
     }
 
     /// The machine of a run.
-    pub fn machine(&self, run: u64) -> Stage {
+    pub fn machine(&self, run: u64) -> Machine {
+        match &self.subject {
+            Subject::Axis(axis) => Machine::Axis(Box::new(self.with_run(&axis.stage, run))),
+            Subject::Gantry(swept) => Machine::Gantry(Box::new(self.with_run(&swept.gantry, run))),
+        }
+    }
+
+    /// The same machine with the numbers of a run.
+    fn with_run<M: Numbers + Clone>(&self, nominal: &M, run: u64) -> M {
+        let mut machine = nominal.clone();
         let mut values = Vec::with_capacity(self.inputs());
         self.put_values(run, &mut values);
-        let mut stage = self.stage.clone();
-        self.set(&mut stage, run, &values);
-        stage
+        self.set(&mut machine, run, &values);
+        machine
     }
 
     /// Runs `count` machines from run `first` on: a row for each, with its parameters, and of each experiment how it ended and its
@@ -197,46 +298,26 @@ impl Sweep {
     pub fn rows(&self, first: u64, count: usize, stop: &dyn Fn() -> bool) -> Option<Trajectory> {
         let mut table = Trajectory::with_capacity(&self.headings, count);
         let mut values = Vec::with_capacity(self.headings.len());
-        let mut stage = self.stage.clone();
-        let mut bench = Bench::default();
-        let held: Vec<Option<Held>> = self.experiments.iter().map(Held::last).collect();
+        let mut worker = Worker::of(&self.subject);
         for run in self.range(first, count) {
             if stop() {
                 return None;
             }
             self.put_values(run, &mut values);
-            stage.clone_from(&self.stage);
-            self.set(&mut stage, run, &values);
-            let machine = bench.mount(&stage);
-            for (experiment, held) in self.experiments.iter().zip(&held) {
-                let mut meter = Meter::with(&stage, *held);
-                let outcome = machine.clone().and_then(|()| bench.observe(experiment, &mut meter));
-                let told = outcome.map(|outcome| (outcome.ending, meter.finish(&outcome.events)));
-                put_measures(told, OF_EXPERIMENT, &mut values);
-            }
-            for motion in &self.moves {
-                let told =
-                    machine.clone().and_then(|()| self.close(&stage, motion)).map(|run| (run.outcome.ending, run));
-                put_measures(told, OF_MOVE, &mut values);
-            }
+            self.set(worker.reset(), run, &values);
+            worker.run(&mut values);
             push(&mut table, &values);
         }
         Some(table)
     }
 
-    /// A move in closed loop.
-    fn close(&self, stage: &Stage, motion: &Move) -> Result<MoveRun> {
-        let Some(design) = &self.controller else { return Err(Error::new("there is no controller")) };
-        let setup = Setup {
-            stage,
-            model: &self.stage,
-            design,
-            profile: &motion.profile,
-            until: motion.until,
-            window: motion.window,
-            solver: Solver::of(stage),
-        };
-        control::closed_loop(&setup)
+    /// Runs one experiment of a machine, the number of its group, and hands every quantity over time to `sink` in blocks. Errors: a machine
+    /// that cannot be run.
+    pub fn stream(&self, run: u64, experiment: usize, sink: &mut dyn FnMut(&Trajectory) -> Flow) -> Result<Outcome> {
+        match &self.subject {
+            Subject::Axis(axis) => axis.stream(&self.with_run(&axis.stage, run), experiment, sink),
+            Subject::Gantry(swept) => swept.stream(&self.with_run(&swept.gantry, run), experiment, sink),
+        }
     }
 
     fn range(&self, first: u64, count: usize) -> std::ops::Range<u64> {
@@ -256,34 +337,23 @@ impl Sweep {
     }
 
     /// Sets everything to its value in this run.
-    fn set(&self, stage: &mut Stage, run: u64, values: &[f64]) {
+    fn set(&self, machine: &mut dyn Numbers, run: u64, values: &[f64]) {
         let drawn = self.draws.iter().flat_map(|draws| &draws.free);
         let varied = self.parameters.iter().enumerate();
         let free = drawn
             .map(|free| (free, true))
             .chain(varied.map(|(place, parameter)| (&parameter.free, self.points.varies(run, place))));
         let set = free.zip(&values[1..]).filter(|((_, set), _)| *set);
-        parameter::set(stage, set.map(|((free, _), value)| (free, *value)));
-    }
-
-    /// Refuses a case whose own machine cannot be run.
-    fn check(&self) -> Result<()> {
-        for experiment in &self.experiments {
-            solve::stream(&self.stage, experiment, Solver::of(&self.stage), &mut |_| Flow::Stop)?;
-        }
-        for motion in &self.moves {
-            self.close(&self.stage, motion)?;
-        }
-        Ok(())
+        parameter::set(machine, set.map(|((free, _), value)| (free, *value)));
     }
 }
 
-/// How a run ended, and its figures; NaN where it has not reached its end.
-fn put_measures<T>(told: Result<(Ending, T)>, measures: &[Measure<T>], values: &mut Vec<f64>) {
+/// Adds how a run ended, and its figures by these; NaN where it has not reached its end.
+fn put_figures<T, M>(told: Result<(Ending, T)>, measures: &[M], of: impl Fn(&M, &T) -> f64, values: &mut Vec<f64>) {
     let status = told.as_ref().map_or(Status::Refused, |(ending, _)| status(*ending));
     values.push(status.code());
     match told {
-        Ok((_, run)) if status == Status::Complete => values.extend(measures.iter().map(|measure| (measure.of)(&run))),
+        Ok((_, run)) if status == Status::Complete => values.extend(measures.iter().map(|measure| of(measure, &run))),
         _ => values.extend(measures.iter().map(|_| f64::NAN)),
     }
 }
@@ -305,25 +375,13 @@ fn status(ending: Ending) -> Status {
 }
 
 /// The columns that a sweep of these has.
-fn headings(
-    draws: Option<&Draws>,
-    parameters: &[Parameter],
-    experiments: &[Experiment],
-    moves: &[Move],
-) -> Vec<Column> {
+fn headings(draws: Option<&Draws>, parameters: &[Parameter], groups: &[Group]) -> Vec<Column> {
     let free = draws.iter().flat_map(|draws| &draws.free).chain(parameters.iter().map(|parameter| &parameter.free));
     let mut columns = vec![Column::new("run", "")];
     columns.extend(free.map(|free| Column::new(free.name.clone(), free.unit)));
-    for experiment in experiments {
-        put_headings(&experiment.file_name(), OF_EXPERIMENT, &mut columns);
-    }
-    for motion in moves {
-        put_headings(&motion.file_name(), OF_MOVE, &mut columns);
+    for Group { file, figures, .. } in groups {
+        columns.push(Column::new(format!("{file}.status"), ""));
+        columns.extend(figures.iter().map(|figure| Column::new(format!("{file}.{}", figure.name), figure.unit)));
     }
     columns
-}
-
-fn put_headings<T>(name: &str, measures: &[Measure<T>], columns: &mut Vec<Column>) {
-    columns.push(Column::new(format!("{name}.status"), ""));
-    columns.extend(measures.iter().map(|measure| Column::new(format!("{name}.{}", measure.name), measure.unit)));
 }

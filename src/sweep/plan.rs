@@ -2,11 +2,11 @@
 
 use super::distribution::ends;
 use super::points::Points;
-use super::{DIMENSIONS, Distribution, Draws, Parameter, Sweep, headings};
-use crate::case::{Case, Kinds, Origin, Prior, Sampling, Sweeping, Variation};
+use super::{DIMENSIONS, Distribution, Draws, Parameter, Subject, Sweep, axis, gantry, headings};
+use crate::case::{Case, GantryCase, Kinds, Known, Opened, Origin, Prior, Sampling, Sweeping, Variation};
 use crate::error::{Error, Result};
 use crate::fit;
-use crate::parameter::{Free, every, named};
+use crate::parameter::{Free, Numbers, every};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -14,26 +14,52 @@ use std::sync::Arc;
 const MOST_RUNS: u64 = 1 << 53;
 
 impl Sweep {
-    /// What the case's `[sweep]` says. Errors: nothing to vary, parameters that exclude each other, more of them than Sobol' points have
-    /// dimensions, a machine that cannot be run.
+    /// What the `[sweep]` of an axis's case says. Errors: nothing to vary, parameters that exclude each other, more of them than Sobol'
+    /// points have dimensions, a machine that cannot be run.
     pub fn new(case: &Case) -> Result<Self> {
-        let Some(plan) = &case.sweep else {
-            return Err(Error::new("this case does not say what is varied")
-                .next("give for example --runs 1000 --vary cart.mass=20%, or add a table [sweep]"));
-        };
-        let stage = case.stage.clone();
+        let plan = planned(case.sweep.as_ref())?;
         let draws = match &plan.from {
             Some(Origin::Posterior(file)) => Some(Arc::new(draws(case, plan, file)?)),
             _ => None,
         };
-        let chosen = chosen(case, plan, draws.as_deref())?;
+        Self::planned(Subject::Axis(axis::Axis::of(case, plan.interval)), plan, draws, &case.known)
+    }
+
+    /// What that of a gantry's case says. Errors: as [`Sweep::new`].
+    ///
+    /// ```
+    /// use taut::case::GantryCase;
+    /// use taut::sweep::Sweep;
+    /// let plan = ["sweep.runs=20", "sweep.vary.\"cart.mass\"=20 %", "sweep.vary.\"left_drive.motor.resistance\"=5 %"];
+    /// let case = GantryCase::read_with("stages/h-frame/h-frame.toml", &plan)?;
+    /// let table = Sweep::of_gantry(&case)?.rows(0, 20, &|| false).expect("not stopped");
+    /// let positions = table.get("one-motor.final_bridge_position").expect("a column");
+    /// assert!(positions.iter().all(|x| (-0.14..-0.08).contains(x)));
+    /// # Ok::<(), taut::Error>(())
+    /// ```
+    pub fn of_gantry(case: &GantryCase) -> Result<Self> {
+        let plan = planned(case.sweep.as_ref())?;
+        Self::planned(Subject::Gantry(gantry::Swept::of(case, plan.interval)), plan, None, &[])
+    }
+
+    /// What that of a case of either kind says.
+    pub fn of(case: &Opened) -> Result<Self> {
+        match case {
+            Opened::Axis(case) => Self::new(case),
+            Opened::Gantry(case) => Self::of_gantry(case),
+        }
+    }
+
+    fn planned(subject: Subject, plan: &Sweeping, draws: Option<Arc<Draws>>, known: &[Known]) -> Result<Self> {
+        let machine = subject.numbers();
+        let chosen = chosen(machine, known, plan, draws.as_deref())?;
         let mut parameters = Vec::new();
         let mut changes = Vec::new();
         for (place, (free, variation)) in chosen.into_iter().enumerate() {
             if plan.design == Sampling::OneAtATime {
                 changes.extend(around(&free, &variation).into_iter().map(|value| (place, value)));
             }
-            let distribution = distribution(&free, &variation, plan.design)?;
+            let distribution = distribution(machine, &free, &variation, plan.design)?;
             parameters.push(Parameter { free, distribution });
         }
         let dimensions = if plan.indices { 2 * parameters.len() } else { parameters.len() };
@@ -60,29 +86,20 @@ impl Sweep {
             Sampling::OneAtATime => Points::one_at_a_time(plan.seed, changes),
             design => Points::new(design, plan.seed, samples, parameters.len(), plan.indices),
         };
-        let mut experiments = case.experiments.clone();
-        for experiment in &mut experiments {
-            // What was measured does not count here.
-            experiment.log = None;
-            experiment.every = plan.interval.unwrap_or(experiment.every);
-        }
-        let headings = headings(draws.as_deref(), &parameters, &experiments, &case.moves);
-        let sweep = Self {
-            stage,
-            experiments,
-            moves: case.moves.clone(),
-            controller: case.controller.clone(),
-            parameters,
-            draws,
-            points,
-            sampling: plan.design,
-            indices: plan.indices,
-            runs,
-            headings,
-        };
-        sweep.check()?;
-        Ok(sweep)
+        subject.check()?;
+        let groups = subject.groups();
+        let headings = headings(draws.as_deref(), &parameters, &groups);
+        let (sampling, indices) = (plan.design, plan.indices);
+        Ok(Self { subject, groups, parameters, draws, points, sampling, indices, runs, headings })
     }
+}
+
+/// What a case says of its sweep.
+fn planned(plan: Option<&Sweeping>) -> Result<&Sweeping> {
+    plan.ok_or_else(|| {
+        Error::new("this case does not say what is varied")
+            .next("give for example --runs 1000 --vary cart.mass=20%, or add a table [sweep]")
+    })
 }
 
 /// The keys that the plan names.
@@ -91,12 +108,16 @@ fn keys(plan: &Sweeping) -> impl Iterator<Item = &str> {
 }
 
 /// What is varied by itself, and how.
-fn chosen(case: &Case, plan: &Sweeping, draws: Option<&Draws>) -> Result<Vec<(Free, Variation)>> {
-    let stage = &case.stage;
+fn chosen(
+    machine: &dyn Numbers,
+    known: &[Known],
+    plan: &Sweeping,
+    draws: Option<&Draws>,
+) -> Result<Vec<(Free, Variation)>> {
     let drawn = draws.iter().flat_map(|draws| &draws.free).flat_map(|free| &free.keys).map(|(key, _)| key.as_str());
-    let known = case.known.iter().filter(|_| plan.from == Some(Origin::Uncertainty));
-    let all: Vec<&str> = keys(plan).chain(drawn).chain(known.flat_map(|known| known.name.split(" = "))).collect();
-    let free = |name: &str| Free::new(stage, name, &all, &[]);
+    let estimates = known.iter().filter(|_| plan.from == Some(Origin::Uncertainty));
+    let all: Vec<&str> = keys(plan).chain(drawn).chain(estimates.flat_map(|known| known.name.split(" = "))).collect();
+    let free = |name: &str| Free::new(machine, name, &all, &[]);
     let mut chosen: Vec<(Free, Variation)> = Vec::new();
     for (name, variation) in plan.vary.iter().filter(|(name, _)| name != "all") {
         let free = free(name)?;
@@ -110,7 +131,7 @@ fn chosen(case: &Case, plan: &Sweeping, draws: Option<&Draws>) -> Result<Vec<(Fr
         chosen.push((free, variation.clone()));
     }
     if plan.from == Some(Origin::Uncertainty) {
-        for known in case.known.iter().filter(|known| known.name.contains('.')) {
+        for known in known.iter().filter(|known| known.name.contains('.')) {
             let free = free(&known.name)?;
             if chosen.iter().any(|(other, _)| other.overlaps(&free)) {
                 continue;
@@ -127,7 +148,7 @@ fn chosen(case: &Case, plan: &Sweeping, draws: Option<&Draws>) -> Result<Vec<(Fr
         }
     }
     if let Some((_, variation)) = plan.vary.iter().find(|(name, _)| name == "all") {
-        for key in every(stage) {
+        for key in every(machine) {
             let free = free(&key)?;
             let others = chosen.iter().map(|(other, _)| other).chain(draws.iter().flat_map(|draws| &draws.free));
             if !others.into_iter().any(|other| other.overlaps(&free)) {
@@ -139,16 +160,16 @@ fn chosen(case: &Case, plan: &Sweeping, draws: Option<&Draws>) -> Result<Vec<(Fr
 }
 
 /// What a parameter may be: the range in the table of parameters, and what the plan says.
-fn allowed(free: &Free, variation: &Variation) -> [f64; 2] {
-    let row = free.keys.first().and_then(|(key, _)| named(key)).filter(|_| !free.name.starts_with("total."));
+fn allowed(machine: &dyn Numbers, free: &Free, variation: &Variation) -> [f64; 2] {
+    let row = free.keys.first().and_then(|(key, _)| machine.row(key)).filter(|_| !free.name.starts_with("total."));
     let [low, high] = row.map_or([0.0, f64::MAX], |row| [row.range.low, row.range.high]);
     let [least, most] = variation.within.unwrap_or([low, high]);
     [low.max(least), high.min(most)]
 }
 
-fn distribution(free: &Free, variation: &Variation, design: Sampling) -> Result<Distribution> {
+fn distribution(machine: &dyn Numbers, free: &Free, variation: &Variation, design: Sampling) -> Result<Distribution> {
     let start = free.start;
-    let within = allowed(free, variation);
+    let within = allowed(machine, free, variation);
     let inside = |values: Vec<f64>| match values.iter().find(|value| !(within[0]..=within[1]).contains(*value)) {
         None => Ok(Distribution::Values(values)),
         Some(value) => Err(Error::new(format!("`{}` cannot become {value} {}", free.name, free.unit))

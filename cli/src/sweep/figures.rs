@@ -8,11 +8,15 @@ use taut::number::engineering;
 use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// Figures that are drawn of each experiment, where they vary.
-const DRAWN: [&str; 8] = [
+const DRAWN: [&str; 12] = [
+    "final_bridge_position",
     "final_cart_position",
+    "peak_bridge_speed",
     "peak_cart_speed",
     "peak_belt_force",
     "peak_motor_current",
+    "peak_left_current",
+    "peak_right_current",
     "stop_time",
     "peak_cart_error",
     "settling_time",
@@ -46,7 +50,7 @@ fn title(group: &Group, measured: &Measured) -> String {
 }
 
 fn axis(measured: &Measured) -> Axis {
-    let axis = Axis::new(capital(measured.words), measured.unit);
+    let axis = Axis::new(capital(&measured.words), measured.unit);
     match measured.unit {
         "m" => axis.shown_as("mm", 1e3),
         "s" => axis.shown_as("ms", 1e3),
@@ -90,7 +94,7 @@ fn scatter(work: &Work, summary: &Summary, group: &Group, measured: &Measured) -
     let by = if work.sweep.indices() { "total index" } else { "rank correlation" };
     let caption = format!(
         "{} depends most on {} ({by} {}); up to 1500 runs are shown.",
-        capital(measured.words),
+        capital(&measured.words),
         parameter.name,
         taut::number::fixed(much, 2)
     );

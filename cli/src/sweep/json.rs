@@ -9,11 +9,11 @@ use taut::sweep::{Estimate, Spread};
 pub fn text(work: &Work, summary: &Summary) -> String {
     let sweep = work.sweep;
     let value = json!({
-        "title": work.case.title,
+        "title": work.case.title(),
         "version": env!("CARGO_PKG_VERSION"),
         "runs": sweep.runs(),
         "design": sweep.sampling().word(),
-        "seed": work.case.sweep.as_ref().map(|sweep| sweep.seed),
+        "seed": work.case.sweep().map(|sweep| sweep.seed),
         "indices": sweep.indices(),
         "shares_of_every": summary.every,
         "columns": sweep.columns().iter().map(|column| column.heading()).collect::<Vec<_>>(),

@@ -22,7 +22,7 @@ use rayon::prelude::*;
 use std::time::{Duration, Instant};
 use store::Store;
 use summary::Summary;
-use taut::case::Case;
+use taut::case::Opened;
 use taut::sweep::Sweep;
 use taut::{Error, Result};
 
@@ -32,7 +32,7 @@ const MOST_KEPT: u64 = 100_000;
 /// What was asked for.
 pub struct Work<'a> {
     pub args: &'a Args,
-    pub case: &'a Case,
+    pub case: &'a Opened,
     pub sweep: &'a Sweep,
     pub interrupt: &'a Interrupt,
 }
@@ -40,8 +40,8 @@ pub struct Work<'a> {
 /// Reads the case, runs what is not there yet, sums up, writes, tells.
 pub fn run(args: &Args) -> Outcome {
     let common = options::with_changes(args)?;
-    let case = common.case(&args.case)?;
-    let sweep = Sweep::new(&case).map_err(|error| error.in_file(&args.case))?;
+    let case = common.open(&args.case)?;
+    let sweep = Sweep::of(&case).map_err(|error| error.in_file(&args.case))?;
     let target = Target::of(args, &case)?;
     if args.trajectories {
         trajectories::check(&sweep)?;
@@ -82,7 +82,8 @@ pub fn run(args: &Args) -> Outcome {
     let folder = match target {
         Target::Nowhere | Target::File(_) => None,
         Target::Folder(folder) => {
-            let text = folder.bring_inputs(&case).map_err(Failure::work)?;
+            let names = folder.bring(case.files()).map_err(Failure::work)?;
+            let text = case.text_with(|file| names.get(&file.path).cloned().unwrap_or_default());
             if !common.no_report {
                 let figures = figures::all(&work, &summary);
                 let page = page::page(&work, &summary, &text, &figures);

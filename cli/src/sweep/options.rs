@@ -5,7 +5,7 @@ use crate::command::Common;
 use crate::failure::Failure;
 use crate::folder::{self, Folder};
 use std::path::{Path, PathBuf};
-use taut::case::Case;
+use taut::case::Opened;
 use taut::files::Inputs;
 use taut::{Error, Result};
 
@@ -56,8 +56,8 @@ pub enum Target {
 
 impl Target {
     /// What `--out` says; the folder for it is made.
-    pub fn of(args: &Args, case: &Case) -> std::result::Result<Self, Failure> {
-        let inputs = folder::inputs(&args.case, case);
+    pub fn of(args: &Args, case: &Opened) -> std::result::Result<Self, Failure> {
+        let inputs = folder::inputs_of(&args.case, case.files());
         let target = Self::named(args, case, &inputs)?;
         if let Some(rows) = target.rows() {
             inputs.check(&rows)?;
@@ -67,7 +67,7 @@ impl Target {
         Ok(target)
     }
 
-    fn named(args: &Args, case: &Case, inputs: &Inputs) -> std::result::Result<Self, Failure> {
+    fn named(args: &Args, case: &Opened, inputs: &Inputs) -> std::result::Result<Self, Failure> {
         let Some(out) = &args.common.out else { return Ok(Self::Nowhere) };
         let ending = out.extension().map(|ending| ending.to_string_lossy().to_lowercase());
         let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -95,7 +95,7 @@ impl Target {
             _ => {
                 let report = (!args.common.no_report).then(|| "report.html".to_string());
                 let names = [ROWS, "sweep.json", "case.toml"].map(str::to_string).into_iter().chain(report);
-                let names = names.chain(folder::brought(case).into_values());
+                let names = names.chain(folder::brought_of(case.files()).into_values());
                 Folder::create(out, inputs.clone(), names).map(Self::Folder)
             }
         }

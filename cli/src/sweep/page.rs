@@ -6,7 +6,7 @@ use taut_report::{Callout, Cell, Figure, Page, Table};
 
 /// The page; `text` is the case.
 pub fn page(work: &Work, summary: &Summary, text: &str, figures: &[(String, Figure)]) -> Page {
-    let mut page = Page::new(work.case.title.clone()).subtitle(format!("Sweep: {}.", table::plan(work)));
+    let mut page = Page::new(work.case.title()).subtitle(format!("Sweep: {}.", table::plan(work)));
     for group in &summary.groups {
         if let Some(endings) = table::endings(group) {
             page.callout(Callout::Fails, format!("{}: not all runs came to their end", group.name), endings);

@@ -8,7 +8,7 @@ use super::store::Store;
 use rayon::prelude::*;
 use taut::Result;
 use taut::case::Sampling;
-use taut::sweep::{Index, OF_EXPERIMENT, OF_MOVE, Spread, Status, indices, rank_correlation};
+use taut::sweep::{Index, Spread, Status, indices, rank_correlation};
 
 /// Values of a column that shares are computed from.
 pub const MOST_VALUES: u64 = 1 << 20;
@@ -21,9 +21,6 @@ pub const REPLICATES: usize = 200;
 
 /// Points of a scatter plot.
 const POINTS: usize = 1500;
-
-/// Name, unit and words of a figure.
-type Named = (&'static str, &'static str, &'static str);
 
 /// The whole summary.
 pub struct Summary {
@@ -56,9 +53,9 @@ pub struct Group {
 
 /// One figure of one experiment.
 pub struct Measured {
-    pub name: &'static str,
+    pub name: String,
     pub unit: &'static str,
-    pub words: &'static str,
+    pub words: String,
     /// None where no run has it.
     pub spread: Option<Spread>,
     /// By parameter: Spearman's rank correlation, where machines are drawn.
@@ -129,22 +126,16 @@ impl Summary {
             })
             .collect::<Result<Vec<_>>>()?;
         let is_drawn = sweep.sampling() != Sampling::OneAtATime;
-        let experiments = sweep.experiments().iter().map(|experiment| experiment.name.clone());
-        let experiments =
-            experiments.map(|name| (name, OF_EXPERIMENT.iter().map(|m| (m.name, m.unit, m.words)).collect()));
-        let moves = sweep.moves().iter().map(|motion| motion.name.clone());
-        let moves = moves.map(|name| (name, OF_MOVE.iter().map(|m| (m.name, m.unit, m.words)).collect()));
-        let all: Vec<(String, Vec<Named>)> = experiments.chain(moves).collect();
         let mut groups = Vec::new();
         let mut place = inputs;
-        for (name, measures) in all {
+        for group in sweep.groups() {
             let statuses = column(place)?;
             let count = |status: &Status| statuses.iter().filter(|code| **code == status.code()).count();
             let endings =
                 Status::ALL.iter().map(|status| (*status, count(status))).filter(|(_, count)| *count > 0).collect();
             let first = place + 1;
-            place = first + measures.len();
-            let measured = measures.into_par_iter().enumerate().map(|(number, (name, unit, words))| {
+            place = first + group.figures.len();
+            let measured = group.figures.par_iter().enumerate().map(|(number, figure)| {
                 let values = column(first + number)?;
                 let ranked = thinned(&values, MOST_RANKED);
                 let of_drawn = |(_, _, x): &(_, _, Vec<f64>)| rank_correlation(x, &ranked);
@@ -155,9 +146,9 @@ impl Summary {
                     false => None,
                 };
                 Ok(Measured {
-                    name,
-                    unit,
-                    words,
+                    name: figure.name.clone(),
+                    unit: figure.unit,
+                    words: figure.words.clone(),
                     spread: Spread::of(&values),
                     ranks: if is_drawn { drawn.iter().map(of_drawn).collect() } else { Vec::new() },
                     indices,
@@ -166,7 +157,7 @@ impl Summary {
                     points: thinned(&ranked, POINTS),
                 })
             });
-            groups.push(Group { name, endings, measures: measured.collect::<Result<_>>()? });
+            groups.push(Group { name: group.name.clone(), endings, measures: measured.collect::<Result<_>>()? });
         }
         let parameters = drawn
             .into_iter()

@@ -29,7 +29,7 @@ pub fn plan(work: &Work) -> String {
     let sweep = work.sweep;
     let count = sweep.inputs() - 1;
     let parameters = if count == 1 { "1 parameter".to_string() } else { format!("{count} parameters") };
-    let jobs = sweep.experiments().len() + sweep.moves().len();
+    let jobs = sweep.groups().len();
     let each = if jobs == 1 { String::new() } else { format!(" of {jobs} simulations each") };
     let indices = if sweep.indices() { ", for Sobol' indices" } else { "" };
     format!("{} runs{each}: {parameters}, {}{indices}", sweep.runs(), sweep.sampling().word())
@@ -67,7 +67,7 @@ pub fn endings(group: &Group) -> Option<String> {
 
 /// Text on the terminal.
 pub fn text(work: &Work, summary: &Summary, took: Duration, run: u64) -> String {
-    let mut text = format!("{}\n{}\n", bold(&work.case.title), plan(work));
+    let mut text = format!("{}\n{}\n", bold(work.case.title()), plan(work));
     for group in &summary.groups {
         let _ = writeln!(text, "\n{}", bold(&group.name));
         if let Some(endings) = endings(group) {
@@ -97,8 +97,7 @@ pub fn text(work: &Work, summary: &Summary, took: Duration, run: u64) -> String 
     if summary.every > 1 {
         let _ = writeln!(text, "\nShares are those of every {}th run: {MOST_VALUES} values at most", summary.every);
     }
-    let rate =
-        run as f64 * (work.sweep.experiments().len() + work.sweep.moves().len()) as f64 / took.as_secs_f64().max(1e-9);
+    let rate = run as f64 * work.sweep.groups().len() as f64 / took.as_secs_f64().max(1e-9);
     let _ = match run {
         0 => writeln!(text, "\n  took nothing: all runs were done already"),
         _ => writeln!(text, "\n  took {}: {run} runs, {rate:.0} simulations a second", shown(took)),

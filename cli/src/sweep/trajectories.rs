@@ -2,7 +2,7 @@
 
 use super::Work;
 use super::output::Writer;
-use taut::solve::{self, Flow, Solver};
+use taut::solve::Flow;
 use taut::sweep::Sweep;
 use taut::trajectory::{Column, Trajectory};
 use taut::{Error, Result};
@@ -21,11 +21,11 @@ pub fn check(sweep: &Sweep) -> Result<()> {
         .allowed(format!("up to {MOST} runs"))
         .next("sweep for the metrics, then run again those machines that are worth a look"));
     }
-    match sweep.experiments() {
-        [] => Err(Error::new("moves in closed loop have no trajectories here")
+    match sweep.groups().iter().all(|group| group.is_move) {
+        true => Err(Error::new("moves in closed loop have no trajectories here")
             .in_file("--trajectories")
             .next("run `taut move` with the machine in question")),
-        _ => Ok(()),
+        false => Ok(()),
     }
 }
 
@@ -33,10 +33,10 @@ pub fn check(sweep: &Sweep) -> Result<()> {
 pub fn write(work: &Work, writer: &mut Writer) -> Result<bool> {
     let mut wide = Trajectory::default();
     for run in 0..work.sweep.runs() {
-        let stage = work.sweep.machine(run);
-        for (number, experiment) in work.sweep.experiments().iter().enumerate() {
+        let experiments = work.sweep.groups().iter().filter(|group| !group.is_move).count();
+        for number in 0..experiments {
             let mut failed = None;
-            let outcome = solve::stream(&stage, experiment, Solver::of(&stage), &mut |block| {
+            let outcome = work.sweep.stream(run, number, &mut |block| {
                 widen(&mut wide, run as f64, number as f64, block);
                 match writer.write(&wide) {
                     Ok(()) if work.interrupt.signal().is_none() => Flow::Continue,

@@ -290,7 +290,7 @@ class Case:
 class GantryCase(Case):
     """A case file of a gantry: two drives, ``left`` and ``right``, a ``bridge``, and a ``cart`` on it.
 
-    It simulates and is edited as any case. There are no moves, fits, sweeps and tuning of gantries yet.
+    It simulates, is swept and is edited as any case. There are no moves, fits and tuning of gantries yet.
     """
 
     __slots__ = ()

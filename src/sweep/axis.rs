@@ -1,0 +1,126 @@
+//! Sweeps of an axis: its experiments and its moves in closed loop.
+
+use super::measures::{Figure, OF_EXPERIMENT, OF_MOVE};
+use super::{Group, put_figures};
+use crate::case::{Case, Experiment, Move};
+use crate::control::{self, MoveRun, Setup};
+use crate::design::Design;
+use crate::error::{Error, Result};
+use crate::metrics::{Held, Meter};
+use crate::solve::{self, Bench, Flow, Outcome, Solver};
+use crate::stage::Stage;
+use crate::trajectory::Trajectory;
+
+/// An axis, and what each of its machines does.
+#[derive(Debug, Clone)]
+pub(super) struct Axis {
+    pub stage: Stage,
+    experiments: Vec<Experiment>,
+    moves: Vec<Move>,
+    controller: Option<Design>,
+}
+
+impl Axis {
+    /// That of a case, with this interval between rows.
+    pub fn of(case: &Case, interval: Option<f64>) -> Self {
+        let mut experiments = case.experiments.clone();
+        for experiment in &mut experiments {
+            // What was measured does not count here.
+            experiment.log = None;
+            experiment.every = interval.unwrap_or(experiment.every);
+        }
+        let (stage, moves, controller) = (case.stage.clone(), case.moves.clone(), case.controller.clone());
+        Self { stage, experiments, moves, controller }
+    }
+
+    /// What each machine does, and its figures.
+    pub fn groups(&self) -> Vec<Group> {
+        let experiments = self.experiments.iter().map(|experiment| Group {
+            name: experiment.name.clone(),
+            file: experiment.file_name(),
+            is_move: false,
+            figures: OF_EXPERIMENT.iter().map(Figure::of).collect(),
+        });
+        let moves = self.moves.iter().map(|motion| Group {
+            name: motion.name.clone(),
+            file: motion.file_name(),
+            is_move: true,
+            figures: OF_MOVE.iter().map(Figure::of).collect(),
+        });
+        experiments.chain(moves).collect()
+    }
+
+    /// Refuses a case whose own machine cannot be run.
+    pub fn check(&self) -> Result<()> {
+        for experiment in &self.experiments {
+            solve::stream(&self.stage, experiment, Solver::of(&self.stage), &mut |_| Flow::Stop)?;
+        }
+        for motion in &self.moves {
+            self.close(&self.stage, motion)?;
+        }
+        Ok(())
+    }
+
+    /// Runs one experiment of a machine, for its rows.
+    pub fn stream(
+        &self,
+        stage: &Stage,
+        experiment: usize,
+        sink: &mut dyn FnMut(&Trajectory) -> Flow,
+    ) -> Result<Outcome> {
+        let experiment = self.experiments.get(experiment).ok_or_else(|| Error::new("there is no such experiment"))?;
+        solve::stream(stage, experiment, Solver::of(stage), sink)
+    }
+
+    /// A move in closed loop; the controller takes every machine for the one of the case.
+    fn close(&self, stage: &Stage, motion: &Move) -> Result<MoveRun> {
+        let Some(design) = &self.controller else { return Err(Error::new("there is no controller")) };
+        let setup = Setup {
+            stage,
+            model: &self.stage,
+            design,
+            profile: &motion.profile,
+            until: motion.until,
+            window: motion.window,
+            solver: Solver::of(stage),
+        };
+        control::closed_loop(&setup)
+    }
+}
+
+/// Runs one machine after another, and keeps what can be used again.
+pub(super) struct Worker<'a> {
+    axis: &'a Axis,
+    pub stage: Stage,
+    bench: Bench,
+    held: Vec<Option<Held>>,
+}
+
+impl<'a> Worker<'a> {
+    pub fn new(axis: &'a Axis) -> Self {
+        let held = axis.experiments.iter().map(Held::last).collect();
+        Self { axis, stage: axis.stage.clone(), bench: Bench::default(), held }
+    }
+
+    /// The machine as the case has it.
+    pub fn reset(&mut self) -> &mut Stage {
+        self.stage.clone_from(&self.axis.stage);
+        &mut self.stage
+    }
+
+    /// Adds status and figures of all that the machine does.
+    pub fn run(&mut self, values: &mut Vec<f64>) {
+        let Self { axis, stage, bench, held } = self;
+        let machine = bench.mount(stage);
+        for (experiment, held) in axis.experiments.iter().zip(held) {
+            let mut meter = Meter::with(stage, *held);
+            let outcome = machine.clone().and_then(|()| bench.observe(experiment, &mut meter));
+            let told = outcome.map(|outcome| (outcome.ending, meter.finish(&outcome.events)));
+            put_figures(told, OF_EXPERIMENT, |measure, metrics| (measure.of)(metrics), values);
+        }
+        for motion in &axis.moves {
+            let told = machine.clone().and_then(|()| axis.close(stage, motion)).map(|run| (run.outcome.ending, run));
+            put_figures(told, OF_MOVE, |measure, run| (measure.of)(run), values);
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Sweeps of a gantry: its experiments.
+
+use super::measures::{OfPart, of_gantry};
+use super::{Group, put_figures};
+use crate::case::{GantryCase, GantryExperiment};
+use crate::error::{Error, Result};
+use crate::metrics::{GantryMeter, GantryMetrics};
+use crate::parameter;
+use crate::solve::{Course, Detail, Ending, Flow, Outcome, Solver, stream_mechanism};
+use crate::stage::gantry::Gantry;
+use crate::trajectory::Trajectory;
+
+/// A gantry, and what each of its machines does.
+#[derive(Debug, Clone)]
+pub(super) struct Swept {
+    pub gantry: Gantry,
+    experiments: Vec<GantryExperiment>,
+    figures: Vec<OfPart>,
+}
+
+impl Swept {
+    /// That of a case, with this interval between rows.
+    pub fn of(case: &GantryCase, interval: Option<f64>) -> Self {
+        let mut experiments = case.experiments.clone();
+        for experiment in &mut experiments {
+            experiment.every = interval.unwrap_or(experiment.every);
+        }
+        Self { gantry: case.gantry.clone(), experiments, figures: of_gantry(&case.gantry.mechanism()) }
+    }
+
+    /// What each machine does, and its figures.
+    pub fn groups(&self) -> Vec<Group> {
+        let group = |experiment: &GantryExperiment| Group {
+            name: experiment.name.clone(),
+            file: experiment.file_name(),
+            is_move: false,
+            figures: self.figures.iter().map(|of_part| of_part.figure.clone()).collect(),
+        };
+        self.experiments.iter().map(group).collect()
+    }
+
+    /// Refuses a case whose own machine cannot be run.
+    pub fn check(&self) -> Result<()> {
+        check(&self.gantry)?;
+        (0..self.experiments.len())
+            .try_for_each(|experiment| self.stream(&self.gantry, experiment, &mut |_| Flow::Stop).map(|_| ()))
+    }
+
+    /// Runs one experiment of a machine, for its rows.
+    pub fn stream(
+        &self,
+        gantry: &Gantry,
+        experiment: usize,
+        sink: &mut dyn FnMut(&Trajectory) -> Flow,
+    ) -> Result<Outcome> {
+        let experiment = self.experiments.get(experiment).ok_or_else(|| Error::new("there is no such experiment"))?;
+        check(gantry)?;
+        let mechanism = gantry.mechanism();
+        let solver = Solver::of_mechanism(&mechanism);
+        stream_mechanism(&mechanism, &Course::of(experiment), solver, (Detail::Full, None), sink)
+    }
+
+    /// Adds status and figures of all that a machine does.
+    pub fn run(&self, gantry: &Gantry, values: &mut Vec<f64>) {
+        let machine = check(gantry).map(|()| gantry.mechanism());
+        for experiment in &self.experiments {
+            let run = |mechanism: &_| -> Result<(Ending, GantryMetrics)> {
+                let mut meter = GantryMeter::of(gantry, mechanism);
+                let (course, solver) = (Course::of(experiment), Solver::of_mechanism(mechanism));
+                let observed = (Detail::None, Some(&mut meter as _));
+                let outcome = stream_mechanism(mechanism, &course, solver, observed, &mut |_| Flow::Continue)?;
+                Ok((outcome.ending, meter.finish(&outcome.events)))
+            };
+            let told = machine.as_ref().map_err(Error::clone).and_then(run);
+            put_figures(told, &self.figures, OfPart::value, values);
+        }
+    }
+}
+
+/// Refuses numbers that are no machine.
+fn check(gantry: &Gantry) -> Result<()> {
+    parameter::check(gantry)?;
+    gantry.check()
+}
