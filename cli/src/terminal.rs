@@ -37,7 +37,7 @@ pub fn show(text: &str) {
 }
 
 /// Columns of the terminal; else those that the environment names; else 100.
-fn columns() -> usize {
+pub fn columns() -> usize {
     let seen = terminal_size::terminal_size_of(io::stdout()).map(|(width, _)| usize::from(width.0));
     let named = || std::env::var("COLUMNS").ok()?.trim().parse().ok();
     seen.or_else(named).unwrap_or(100).max(LEAST_COLUMNS)
@@ -89,7 +89,7 @@ fn indent(line: &str, columns: usize) -> usize {
     });
     match told {
         Some(column) if column <= columns / 2 => column,
-        _ => leading + 4,
+        _ => (leading + 4).min(columns / 2),
     }
 }
 

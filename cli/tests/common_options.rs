@@ -57,7 +57,7 @@ fn a_case_comes_from_standard_input() {
     }
     let wrong = taut(folder.path()).args(["simulate", "-"]).write_stdin("cart = 1").output().unwrap();
     assert_eq!(wrong.status.code(), Some(2));
-    assert!(String::from_utf8(wrong.stderr).unwrap().starts_with("error: -:1:"));
+    assert!(String::from_utf8(wrong.stderr).unwrap().starts_with("error: -: [motor] is missing"));
     let binary = taut(folder.path()).args(["simulate", "-"]).write_stdin(&b"\xff\xfe"[..]).output().unwrap();
     assert_eq!(String::from_utf8(binary.stderr).unwrap(), "error: -: standard input is not UTF-8 text\n");
     let pid = case("sollmann-jouaneh/controllers/pid.toml");

@@ -1,4 +1,5 @@
-//! The key figures of a run that a sweep keeps, as tables.
+//! The key figures of a run that a sweep keeps, as tables. Peaks are magnitudes: of a motion there and back the sign of the larger
+//! peak is chance, and shares of signed ones would mean nothing.
 
 use crate::control::MoveRun;
 use crate::mechanism::{Drive, Label, Mechanism};
@@ -45,18 +46,18 @@ pub const OF_EXPERIMENT: &[Measure<Metrics>] = &[
     row("final_cart_position", "m", "cart position at the end", |m| m.final_cart_position),
     row("final_cart_speed", "m/s", "cart speed at the end", |m| m.final_cart_speed),
     row("final_drive_travel_minus_cart", "m", "drive travel minus cart at the end", |m| m.final_drive_travel - m.final_cart_position),
-    row("peak_cart_speed", "m/s", "peak cart speed", |m| m.peak_cart_speed.value),
+    row("peak_cart_speed", "m/s", "peak cart speed", |m| m.peak_cart_speed.value.abs()),
     row("peak_cart_speed_time", "s", "time of the peak cart speed", |m| m.peak_cart_speed.time),
-    row("peak_drive_speed", "m/s", "peak drive speed r φ₁′", |m| m.peak_drive_speed.value),
+    row("peak_drive_speed", "m/s", "peak drive speed r φ₁′", |m| m.peak_drive_speed.value.abs()),
     row("steady_speed", "m/s", "steady cart speed", |m| m.steady_speed.map_or(f64::NAN, |steady| steady.value)),
-    row("peak_span1_stretch", "m", "peak stretch of span 1", |m| m.peak_stretch[0].value),
-    row("peak_span2_stretch", "m", "peak stretch of span 2", |m| m.peak_stretch[1].value),
-    row("peak_span3_stretch", "m", "peak stretch of span 3", |m| m.peak_stretch[2].value),
-    row("peak_span1_force", "N", "peak force in span 1", |m| m.peak_force[0].value),
-    row("peak_span2_force", "N", "peak force in span 2", |m| m.peak_force[1].value),
-    row("peak_span3_force", "N", "peak force in span 3", |m| m.peak_force[2].value),
+    row("peak_span1_stretch", "m", "peak stretch of span 1", |m| m.peak_stretch[0].value.abs()),
+    row("peak_span2_stretch", "m", "peak stretch of span 2", |m| m.peak_stretch[1].value.abs()),
+    row("peak_span3_stretch", "m", "peak stretch of span 3", |m| m.peak_stretch[2].value.abs()),
+    row("peak_span1_force", "N", "peak force in span 1", |m| m.peak_force[0].value.abs()),
+    row("peak_span2_force", "N", "peak force in span 2", |m| m.peak_force[1].value.abs()),
+    row("peak_span3_force", "N", "peak force in span 3", |m| m.peak_force[2].value.abs()),
     row("peak_belt_force", "N", "largest force in the belt", |m| magnitude(&m.peak_force)),
-    row("peak_motor_current", "A", "peak motor current", |m| m.peak_current.value),
+    row("peak_motor_current", "A", "peak motor current", |m| m.peak_current.value.abs()),
     row("stop_time", "s", "time of the last stop", |m| m.stop_time.unwrap_or(f64::NAN)),
     row("settled", "", "at rest at the end", |m| f64::from(u8::from(m.settled))),
     row("drive_stops", "", "stops of the drive pulley", |m| m.events[0].stops as f64),
@@ -70,16 +71,16 @@ pub const OF_EXPERIMENT: &[Measure<Metrics>] = &[
 /// Those of a move in closed loop, in the order of the columns.
 #[rustfmt::skip]
 pub const OF_MOVE: &[Measure<MoveRun>] = &[
-    row("peak_cart_error", "m", "largest cart error x − y", |m| m.figures.cart.peak.value),
+    row("peak_cart_error", "m", "largest cart error x − y", |m| m.figures.cart.peak.value.abs()),
     row("rms_cart_error", "m", "rms of the cart error", |m| m.figures.cart.rms),
     row("final_cart_error", "m", "cart error at the end", |m| m.figures.final_cart_error),
-    row("peak_following_error", "m", "largest following error r φ₁ − y", |m| m.figures.following.peak.value),
+    row("peak_following_error", "m", "largest following error r φ₁ − y", |m| m.figures.following.peak.value.abs()),
     row("rms_following_error", "m", "rms of the following error", |m| m.figures.following.rms),
     row("settling_time", "s", "settling time after the profile", |m| m.figures.settling.unwrap_or(f64::NAN)),
     row("overshoot", "m", "overshoot of the cart", |m| m.figures.overshoot),
-    row("peak_motor_current", "A", "peak motor current", |m| m.figures.current.0.value),
+    row("peak_motor_current", "A", "peak motor current", |m| m.figures.current.0.value.abs()),
     row("rms_motor_current", "A", "rms motor current", |m| m.figures.current.1),
-    row("peak_motor_voltage", "V", "peak motor voltage", |m| m.figures.voltage.0.value),
+    row("peak_motor_voltage", "V", "peak motor voltage", |m| m.figures.voltage.0.value.abs()),
     row("limited_time", "s", "time at the controller's limit", |m| m.figures.limited),
     row("energy_taken", "J", "electrical energy taken in", |m| m.figures.energy.0),
     row("restlessness", "Hz", "changes of direction of the command per second", |m| m.figures.restlessness),
@@ -125,13 +126,13 @@ pub fn of_gantry(mechanism: &Mechanism) -> Vec<OfPart> {
     each(&loads, "final_*_speed", "m/s", "* speed at the end", |m, load| m.final_speed[load]);
     each(&loads, "final_*_by_drives", "m", "* position at the end, by the drives", |m, load| m.final_by_drives[load]);
     each(&loads, "final_drives_minus_*", "m", "drives minus * at the end", |m, load| m.final_by_drives[load] - m.final_position[load]);
-    each(&loads, "peak_*_speed", "m/s", "peak * speed", |m, load| m.peak_speed[load].value);
+    each(&loads, "peak_*_speed", "m/s", "peak * speed", |m, load| m.peak_speed[load].value.abs());
     each(&loads, "peak_*_speed_time", "s", "time of the peak * speed", |m, load| m.peak_speed[load].time);
-    each(&loads, "peak_drives_minus_*", "m", "largest drives minus *", |m, load| m.peak_error[load].value);
-    each(&drives, "peak_*_speed", "rad/s", "peak speed of the *", |m, drive| m.peak_drive_speed[drive].value);
-    each(&drives, "peak_*_current", "A", "peak current of the *", |m, drive| m.peak_current[drive].value);
-    each(&spans, "peak_*_stretch", "m", "peak stretch of the *", |m, span| m.peak_stretch[span].value);
-    each(&spans, "peak_*_force", "N", "peak force in the *", |m, span| m.peak_force[span].value);
+    each(&loads, "peak_drives_minus_*", "m", "largest drives minus *", |m, load| m.peak_error[load].value.abs());
+    each(&drives, "peak_*_speed", "rad/s", "peak speed of the *", |m, drive| m.peak_drive_speed[drive].value.abs());
+    each(&drives, "peak_*_current", "A", "peak current of the *", |m, drive| m.peak_current[drive].value.abs());
+    each(&spans, "peak_*_stretch", "m", "peak stretch of the *", |m, span| m.peak_stretch[span].value.abs());
+    each(&spans, "peak_*_force", "N", "peak force in the *", |m, span| m.peak_force[span].value.abs());
     each(&whole, "peak_belt_force", "N", "largest force in the belts", |m, _| magnitude(&m.peak_force));
     each(&whole, "stop_time", "s", "time of the last stop", |m, _| m.stop_time.unwrap_or(f64::NAN));
     each(&whole, "settled", "", "at rest at the end", |m, _| f64::from(u8::from(m.settled)));

@@ -96,6 +96,24 @@ impl Measured {
         all.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
         all
     }
+
+    /// The same of those alone that the runs show: chance makes a rank correlation as large as the least of them once in a
+    /// thousand, the interval of an index excludes a hundredth, and a change one at a time is a change.
+    pub fn shown_influence(&self) -> Vec<(usize, f64)> {
+        let is_shown = |(place, much): &(usize, f64)| match &self.indices {
+            Some(indices) => indices.get(*place).is_some_and(|index| index.total.interval[0] > 0.01),
+            None if !self.tornado.is_empty() => *much != 0.0,
+            None => much.abs() > self.chance(),
+        };
+        self.influence().into_iter().filter(is_shown).collect()
+    }
+
+    /// The rank correlation that independent quantities exceed once in a thousand: its deviation is 1/√(n − 1)
+    /// (E. S. Pearson, B. B. Snow 1962).
+    pub fn chance(&self) -> f64 {
+        let count = self.spread.as_ref().map_or(0, |spread| spread.count);
+        3.29 / (count.max(2) as f64 - 1.0).sqrt()
+    }
 }
 
 impl Summary {

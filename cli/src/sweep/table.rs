@@ -2,7 +2,7 @@
 
 use super::summary::{Group, MOST_VALUES, Measured, Summary};
 use super::{Work, shown};
-use crate::terminal::bold;
+use crate::terminal::{bold, columns};
 use std::fmt::Write;
 use std::time::Duration;
 use taut::number::engineering;
@@ -53,8 +53,10 @@ pub fn influence(summary: &Summary, measured: &Measured, most: usize) -> String 
             false => format!("{name} {}{}", if much > 0.0 { "+" } else { "" }, number(much, measured.unit)),
         }
     };
-    let telling = |(_, much): &(usize, f64)| much.abs() > if measured.tornado.is_empty() { 0.05 } else { 0.0 };
-    measured.influence().into_iter().filter(telling).take(most).map(told).collect::<Vec<_>>().join(", ")
+    match measured.shown_influence() {
+        none if none.is_empty() => "nothing that these runs show".into(),
+        some => some.into_iter().take(most).map(told).collect::<Vec<_>>().join(", "),
+    }
 }
 
 /// How runs ended, if not all to the end.
@@ -84,11 +86,16 @@ pub fn text(work: &Work, summary: &Summary, took: Duration, run: u64) -> String 
             rows.push([measured.words.to_string(), low, middle, high, influence(summary, measured, 3)]);
         }
         let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
-        let widths = [0, 1, 2, 3].map(width);
+        let widths = [0, 1, 2, 3, 4].map(width);
+        // Two columns of space before each; where that is too wide, the last column gets lines of its own.
+        let is_wide = widths.iter().map(|wide| wide + 2).sum::<usize>() > columns();
         for [name, low, middle, high, most] in &rows {
-            let [a, b, c, d] = widths;
-            let line = format!("  {name:<a$}  {low:>b$}  {middle:>c$}  {high:>d$}  {most}");
-            let _ = writeln!(text, "{}", line.trim_end());
+            let [a, b, c, d, _] = widths;
+            let line = format!("  {name:<a$}  {low:>b$}  {middle:>c$}  {high:>d$}");
+            let _ = match is_wide {
+                true => writeln!(text, "{line}\n      {most}"),
+                false => writeln!(text, "{}", format!("{line}  {most}").trim_end()),
+            };
         }
         if left_out > 0 {
             let _ = writeln!(text, "  and {left_out} figures that count events, or are the same in all runs: --json");
