@@ -2,6 +2,7 @@
 //!
 //! Everything is in SI units, and the keys name them.
 
+mod case_schema;
 mod check;
 mod fit;
 mod gantry;
@@ -12,6 +13,7 @@ mod moves;
 mod posterior;
 mod simulation;
 
+pub use case_schema::case_schema;
 pub use check::check;
 pub use fit::fit;
 pub use gantry::{GantrySimulated, GantrySimulation, gantry_metrics};
