@@ -13,9 +13,10 @@ mod stretch;
 
 use super::coordinates::Coordinates;
 use super::inputs::Pieces;
+use super::machine::Engine;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
 use super::record::Extra;
-use super::{Cost, Ending, Event};
+use super::{Cost, Ending, Event, PositionError};
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
 use crate::mechanism::{
@@ -230,52 +231,6 @@ impl Core {
         }
     }
 
-    /// The mechanism, its ways counted from where it began.
-    pub(super) fn mechanism(&self) -> &Mechanism {
-        &self.model.mechanism
-    }
-
-    /// What a row shows beyond the linear equations.
-    pub(super) fn extra(&self) -> Extra {
-        self.model.extra(&self.mode, &self.y)
-    }
-
-    /// Takes up new inputs, and what they bring about at once.
-    pub(super) fn take_input(&mut self, pieces: &Pieces) {
-        self.take_up(Stretch::of(*pieces, f64::INFINITY), false);
-    }
-
-    /// Steps are as short as the inputs need by themselves.
-    pub(super) fn bound_input(&mut self, _: &Pieces, _: f64) {}
-
-    /// Goes on to `until` and adds the events on the way to `events`.
-    pub(super) fn go_to(&mut self, until: f64, events: &mut Vec<Event>) -> std::result::Result<(), Ending> {
-        self.end = until;
-        self.pace = Pace::since(self.cost.steps, self.time());
-        self.stretch.end = until;
-        if self.trouble.is_none() && self.tau < self.stretch.length() {
-            self.reach(&mut Nobody);
-        }
-        self.handed_on += self.events.len();
-        events.append(&mut self.events);
-        self.trouble.map_or(Ok(()), Err)
-    }
-
-    /// The state in angles and positions.
-    pub(super) fn state(&self) -> State {
-        self.coordinates.state(&self.model.layout, &self.model.inner(&self.y))
-    }
-
-    /// The inputs now.
-    pub(super) fn input(&self) -> [f64; DRIVES] {
-        self.stretch.input(self.tau)
-    }
-
-    /// The value of a form now, by the linear equations.
-    pub(super) fn value(&self, form: &Form) -> f64 {
-        self.model.value(form, &self.model.inner(&self.y), &self.input())
-    }
-
     /// Integrates to the end of the stretch, or to the first guard that falls.
     fn integrate(&mut self, stretch: &Stretch, witness: &mut dyn Witness) -> Option<Hit> {
         let model = Arc::clone(&self.model);
@@ -481,6 +436,72 @@ impl Core {
             }
         }
         self.trouble = Some(Ending::TooManyEvents { time });
+    }
+}
+
+impl Engine for Core {
+    fn copy(&self) -> Box<dyn Engine> {
+        Box::new(self.clone())
+    }
+
+    fn mechanism(&self) -> &Mechanism {
+        &self.model.mechanism
+    }
+
+    fn time(&self) -> f64 {
+        Core::time(self)
+    }
+
+    fn is_smooth(&self) -> bool {
+        true
+    }
+
+    fn smooth(&self) -> Box<dyn Engine> {
+        self.copy()
+    }
+
+    fn take_input(&mut self, pieces: &Pieces) {
+        self.take_up(Stretch::of(*pieces, f64::INFINITY), false);
+    }
+
+    /// Steps are as short as the inputs need by themselves.
+    fn bound_input(&mut self, _: &Pieces, _: f64) {}
+
+    fn go_to(&mut self, until: f64, events: &mut Vec<Event>) -> std::result::Result<(), Ending> {
+        self.end = until;
+        self.pace = Pace::since(self.cost.steps, self.time());
+        self.stretch.end = until;
+        if self.trouble.is_none() && self.tau < self.stretch.length() {
+            self.reach(&mut Nobody);
+        }
+        self.handed_on += self.events.len();
+        events.append(&mut self.events);
+        self.trouble.map_or(Ok(()), Err)
+    }
+
+    fn state(&self) -> State {
+        self.coordinates.state(&self.model.layout, &self.model.inner(&self.y))
+    }
+
+    fn mode(&self) -> &Mode {
+        &self.mode
+    }
+
+    fn input(&self) -> [f64; DRIVES] {
+        self.stretch.input(self.tau)
+    }
+
+    fn value(&self, form: &Form) -> f64 {
+        self.model.value(form, &self.model.inner(&self.y), &self.input())
+    }
+
+    fn extra(&self) -> Extra {
+        self.model.extra(&self.mode, &self.y)
+    }
+
+    /// Nothing is known of it while it goes; [`super::ErrorEstimate`] has it of a run.
+    fn error(&self) -> Option<PositionError> {
+        None
     }
 }
 

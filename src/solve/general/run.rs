@@ -7,6 +7,7 @@ use super::{Core, Witness};
 use crate::mechanism::{Layout, Mechanism, State};
 use crate::signal::Signal;
 use crate::solve::inputs::Pieces;
+use crate::solve::machine::Engine;
 use crate::solve::observe::Output;
 use crate::solve::record::Recorder;
 use crate::solve::run::{Running, Start};
