@@ -129,7 +129,7 @@ impl Machine {
                 check::piecewise_linear(mechanism)?;
                 let space = Arc::new(exact::Space::new(mechanism, false));
                 let mechanism = Arc::new(mechanism.seen_from(&space.layout, start));
-                exact::in_kernel(&space.clone(), Exact { mechanism, space, start, interval })
+                exact::in_kernel(space.size(), Exact { mechanism, space, start, interval })
             }
             Solver::General { tolerance } => {
                 let fastest = check::fastest_rate(mechanism);

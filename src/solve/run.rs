@@ -151,7 +151,7 @@ impl<'a> Run<'a> {
             Solver::Exact => {
                 check::piecewise_linear(mechanism)?;
                 let space = exact::Space::new(mechanism, !straight);
-                exact::in_kernel(&space.clone(), OfExact { mechanism, space, start, known, output: output.within() })
+                exact::in_kernel(space.size(), OfExact { mechanism, space, start, known, output: output.within() })
             }
             Solver::General { tolerance } => {
                 let fastest = check::fastest_rate(mechanism);

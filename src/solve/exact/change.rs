@@ -36,10 +36,11 @@ impl<const R: usize, const C: usize> Core<R, C> {
         (self.value(&form), resistance, self.noise(&form))
     }
 
-    /// Gears carry as they do at rest.
+    /// Gears that lose power carry as they do at rest; to others it makes no difference.
     fn settle_torques(&self, mode: &mut Mode) {
-        for drive in 0..self.common.mechanism.drives.len() {
-            let torque = self.common.mechanism.torque_at_rest(drive, &self.common.mode);
+        let mechanism = &self.common.mechanism;
+        for (drive, _) in mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.loses()) {
+            let torque = mechanism.torque_at_rest(drive, &self.common.mode);
             mode.drive[drive].torque_positive = self.value(&torque) >= 0.0;
         }
     }
@@ -116,8 +117,9 @@ impl<const R: usize, const C: usize> Core<R, C> {
     }
 
     /// Whether a body stops where rounding decides: its speed tends to zero for ever, and nothing slows it down any more.
-    fn is_by_rounding(&self, cause: Cause) -> bool {
+    fn is_by_rounding(&mut self, cause: Cause) -> bool {
         let Cause::Stop(body) = cause else { return false };
+        self.common.rounding.see(&self.largest);
         let place = self.common.space.layout.speed[body];
         let slows = self.matrices.rate(&self.z)[place].abs();
         // Its own speed is known to the rounding of the speeds that it had.

@@ -1,6 +1,6 @@
 //! The kernels: what is compiled for vectors of one size each, and which of them a machine takes.
 
-use super::{ModeMatrices, Space};
+use super::ModeMatrices;
 use crate::mechanism::{BODIES, DRIVES};
 use crate::signal::DEGREE;
 use std::any::Any;
@@ -18,9 +18,8 @@ pub(in crate::solve) trait Make {
 /// Writes [`in_kernel`] from the list of kernels: places that move, and places in all.
 macro_rules! kernels {
     ($([$rows:literal, $columns:literal])* else [$most_rows:literal, $most_columns:literal]) => {
-        /// Makes something for the smallest kernel that has room for a machine's vector.
-        pub(in crate::solve) fn in_kernel<M: Make>(space: &Space, what: M) -> M::Made {
-            let (moving, constant) = space.size();
+        /// Makes something for the smallest kernel that has room for a machine's vector: see [`super::Space::size`].
+        pub(in crate::solve) fn in_kernel<M: Make>((moving, constant): (usize, usize), what: M) -> M::Made {
             match () {
                 $(() if moving <= $rows && $rows + constant <= $columns => what.make::<$rows, $columns>(),)*
                 () => what.make::<$most_rows, $most_columns>(),

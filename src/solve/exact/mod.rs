@@ -39,6 +39,8 @@ const SOON: f64 = 1e-6;
 pub(super) struct Core<const R: usize, const C: usize> {
     /// State in the solver's coordinates, inputs and their derivatives, and a one.
     z: [f64; C],
+    /// The largest magnitudes that each place of it has had in rows so far.
+    largest: [f64; C],
     matrices: Arc<ModeMatrices<R, C>>,
     known: Modes<R, C>,
     /// Matrices that were there before.
@@ -149,7 +151,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
             asks: false,
             trouble: None,
         };
-        Self { z, matrices, known, shared, common }
+        Self { z, largest: [0.0; C], matrices, known, shared, common }
     }
 
     pub(super) fn time(&self) -> f64 {
@@ -158,6 +160,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
 
     /// The bound of what rounding has done so far.
     fn bound_of_rounding(&mut self) -> PositionError {
+        self.common.rounding.see(&self.largest);
         self.common.rounding.swing(self.matrices.swing, self.time());
         let steps = self.common.cost.steps + self.common.cost.series;
         let origin = self.common.coordinates.origin().iter().fold(0.0, |most: f64, origin| most.max(origin.abs()));
@@ -200,7 +203,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
             self.common.asks = false;
         }
         self.check();
-        self.common.rounding.see(&self.z);
+        self.see();
         self.common.handed_on += self.common.events.len();
         events.append(&mut self.common.events);
         match self.common.trouble {
@@ -245,6 +248,14 @@ impl<const R: usize, const C: usize> Core<R, C> {
     #[inline]
     fn is_finite(&self) -> bool {
         self.z.iter().sum::<f64>().is_finite()
+    }
+
+    /// Keeps in mind how large what moves is here.
+    #[inline]
+    fn see(&mut self) {
+        for (largest, z) in self.largest.iter_mut().zip(&self.z) {
+            *largest = if z.abs() > *largest { z.abs() } else { *largest };
+        }
     }
 
     /// Notices a state that is no number any more.
@@ -504,7 +515,7 @@ impl Make for Smoothed {
         z[C - 1] = 1.0;
         let mut known = Vec::new();
         let (matrices, _) = ModeMatrices::of(&mut known, &common.mechanism, &common.space, &common.mode, common.h);
-        Box::new(Core::<R, C> { z, matrices, known, shared: 0, common })
+        Box::new(Core::<R, C> { z, largest: [0.0; C], matrices, known, shared: 0, common })
     }
 }
 
@@ -526,12 +537,14 @@ impl<const R: usize, const C: usize> Engine for Core<R, C> {
     }
 
     fn smooth(&self) -> Box<dyn Engine> {
+        let mut common = self.common.clone();
+        common.rounding.see(&self.largest);
         let old = &self.common.space;
         let derivative = |drive: usize| (0..=old.highest).map(move |k| self.z[old.chain::<R>(drive, k)]);
         let derivatives = (0..old.layout.inputs).map(|drive| derivative(drive).collect()).collect();
         let space = Arc::new(Space::new(&self.common.mechanism, true));
-        let common = Common { space: Arc::clone(&space), ..self.common.clone() };
-        in_kernel(&space, Smoothed { z: self.z[..old.layout.states].to_vec(), derivatives, common })
+        common.space = Arc::clone(&space);
+        in_kernel(space.size(), Smoothed { z: self.z[..old.layout.states].to_vec(), derivatives, common })
     }
 
     fn take_input(&mut self, pieces: &Pieces) {

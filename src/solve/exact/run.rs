@@ -36,7 +36,8 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         let grid = Grid::new(start.every, start.until);
         let seen = mechanism.seen_by(&space.layout, &start.state);
         let list = std::mem::take(known.list::<R, C>());
-        let recorder = Recorder::new(&seen, &space.layout, grid, output);
+        let inputs = |drive| space.chain::<R>(drive, 0);
+        let recorder = Recorder::new(&seen, &space.layout, (R, &inputs), grid, output);
         let core = Core::new(seen, Arc::new(space), &start.state, (grid.interval(), grid.end()), list);
         Self { core, grid, row: 0, recorder, watching: Watching::new(), known }
     }
@@ -130,9 +131,9 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
         }
         if self.recorder.next_row() == self.row && self.core.common.trouble.is_none() {
             let core = &mut self.core;
-            core.common.rounding.see(&core.z);
+            core.see();
             self.recorder.segment(core.common.taken, &core.common.coordinates, &core.common.mode);
-            self.recorder.push(&core.z, &core.common.space.input::<R>(&core.z));
+            self.recorder.push(core.z.first_chunk::<R>().expect("what moves stands first"));
         }
         self.heed();
     }
@@ -159,6 +160,16 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             return true;
         }
         let step = law.step(0);
+        if resting {
+            // One row, again and again.
+            self.row += self.recorder.repeat(safe - 1);
+            self.heed();
+            if self.goes() {
+                self.row += 1;
+            }
+            self.go_to(self.row);
+            return true;
+        }
         let mut closer = 0;
         for j in 0..safe {
             if j > 0 {
@@ -169,7 +180,6 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
                 }
             }
             match &mut bow {
-                _ if resting => {}
                 Some(bow) => {
                     let mut end = self.core.z;
                     step.advance(&mut end);
@@ -185,7 +195,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             self.row += 1;
         }
         self.go_to(self.row);
-        self.core.common.cost.steps += if resting { 0 } else { safe };
+        self.core.common.cost.steps += safe;
         true
     }
 }
