@@ -164,7 +164,7 @@ impl Core {
             if part.kind == Kind::Linear {
                 absolute[model.speed(body)] *= r;
             }
-            let friction = mechanism.friction(body);
+            let friction = &part.friction;
             if let (Some(place), Law::LuGre { stiffness, .. }) = (model.bristle[body], friction.law) {
                 // Bristles bend by F_b/σ₀ at most.
                 absolute[place] = tolerance * friction.forward.breakaway.max(friction.backward.breakaway) / stiffness;
@@ -247,7 +247,8 @@ impl Core {
         solver.first_step = solver.first_step.map(|step| step.min(longest));
         let (relative, absolute, y) = (self.relative(), self.absolute(), self.y);
         let (from, size) = (self.tau, self.model.size);
-        let mut observer = Observer { watches: field.watches(), run: self, field: &field, witness, hit: None };
+        let mut observer =
+            Observer { watches: field.watches(), run: self, field: &field, witness, values: Vec::new(), hit: None };
         let result = solver.solve(&field, from, &y[..size], length, relative, absolute, Some(&mut observer));
         let hit = observer.hit;
         self.cost.evaluations += field.evaluations();
@@ -275,9 +276,10 @@ impl Core {
     fn decide(&self, body: usize, input: &[f64; DRIVES]) -> Motion {
         let (model, state) = (&*self.model, &self.y);
         let (mode, noise) = (&self.mode, model.noise(body, &self.mode, state, input));
-        if model.load(body, true, mode, state, input) > model.breakaway(body, true, state) + noise {
+        let held = model.bristle_force(body, state);
+        if model.load(body, true, mode, state, input) - held > model.breakaway(body, true, state) + noise {
             Motion::Forward
-        } else if model.load(body, false, mode, state, input) < -model.breakaway(body, false, state) - noise {
+        } else if model.load(body, false, mode, state, input) - held < -model.breakaway(body, false, state) - noise {
             Motion::Backward
         } else {
             Motion::Stuck
@@ -511,6 +513,8 @@ struct Observer<'r> {
     field: &'r Field<'r>,
     witness: &'r mut dyn Witness,
     watches: Vec<Cause>,
+    /// The conditions at the nodes of a step.
+    values: Vec<[f64; NODES]>,
     hit: Option<Hit>,
 }
 
@@ -563,7 +567,8 @@ impl Observer<'_> {
             return None;
         }
         self.run.cost.looks += 1;
-        let mut values = [[0.0; NODES]; model::MOST_GUARDS];
+        let mut values = std::mem::take(&mut self.values);
+        values.resize(self.watches.len(), [0.0; NODES]);
         for node in 0..NODES {
             let tau = from + (to - from) * node as f64 / (NODES - 1) as f64;
             let guards = match node {
@@ -607,6 +612,7 @@ impl Observer<'_> {
                 }
             }
         }
+        self.values = values;
         let (s, slope, index, slack) = first?;
         // A speed that has fallen through is looked for where it was zero.
         let slack = if matches!(self.watches[index], Cause::Stop(_)) { 0.0 } else { slack };
