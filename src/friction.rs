@@ -76,7 +76,7 @@ impl Friction {
 
     /// Whether a body can be held at rest by it, so that its motion has modes.
     pub fn sticks(&self) -> bool {
-        matches!(self.law, Law::Coulomb | Law::Stribeck { .. }) && !self.is_linear()
+        !self.law.never_sticks() && !self.is_linear()
     }
 
     /// The values for this direction.

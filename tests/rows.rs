@@ -6,7 +6,7 @@ use common::{experiment, table4};
 use taut::case::{Case, Experiment, TEMPLATE};
 use taut::measure::measure;
 use taut::signal::Signal;
-use taut::solve::{Ending, Method, Solver, simulate};
+use taut::solve::{Detail, Ending, Flow, Method, Run, Solver, simulate, stream};
 use taut::trajectory::Trajectory;
 
 fn every(every: f64, until: f64) -> Experiment {
@@ -86,4 +86,61 @@ fn what_is_zero_is_written_as_zero() {
             }
         }
     }
+}
+
+/// At rest a row is computed once and repeated: through the ends of blocks, and up to a row in the middle of one where it goes on.
+#[test]
+fn rows_at_rest_are_those_that_are_asked_for_one_by_one() {
+    let stage = table4();
+    let pulse = |at: f64| Signal::Pulse { value: 5.0, duration: 0.0505, at };
+    for at in [0.0, 0.1, 0.7003, 0.512] {
+        let experiment = experiment(pulse(at), 1.9);
+        let whole = simulate(&stage, &experiment, Solver::Exact).unwrap().trajectory;
+        let mut single: Vec<Vec<f64>> = vec![Vec::new(); whole.columns.len()];
+        let mut sink = |rows: &Trajectory| {
+            single.iter_mut().zip(&rows.columns).for_each(|(all, rows)| all.extend(&rows.values));
+            Flow::Continue
+        };
+        let mut run = Run::new(&stage, &experiment, Solver::Exact, Detail::Full, None, &mut sink).unwrap();
+        for k in 0..1900 {
+            // Row by row, and up to the edges of the pulse.
+            let (begin, end) = (1e-3 * f64::from(k), 1e-3 * f64::from(k + 1));
+            let edges = [at, at + 0.0505].into_iter().filter(|edge| (begin + 1e-9..end - 1e-9).contains(edge));
+            for until in edges.chain([end]) {
+                let middle = 0.5 * (run.time() + until);
+                let volts = if (at..at + 0.0505).contains(&middle) { 5.0 } else { 0.0 };
+                assert!(run.hold(&[volts], until));
+            }
+        }
+        assert_eq!(run.finish().ending, Ending::Complete);
+        for (whole, single) in whole.columns.iter().zip(&single) {
+            assert_eq!(whole.values.len(), single.len(), "{}", whole.name);
+            for (row, (a, b)) in whole.values.iter().zip(single).enumerate() {
+                assert!(
+                    (a - b).abs() <= 1e-9 * (1.0 + b.abs()),
+                    "{} in row {row}, pulse at {at}: {a} and {b}",
+                    whole.name
+                );
+            }
+        }
+    }
+}
+
+/// A receiver that wants no more is heard at the end of the block that it was handed, with nothing but rest behind and before.
+#[test]
+fn a_receiver_that_wants_no_more_is_heard_at_rest() {
+    let (stage, mut rows) = (table4(), 0);
+    let mut sink = |block: &Trajectory| {
+        rows += block.columns[0].values.len();
+        if rows >= 512 { Flow::Stop } else { Flow::Continue }
+    };
+    let still = experiment(Signal::Pulse { value: 5.0, duration: 0.1, at: 5.0 }, 6.0);
+    let outcome = stream(&stage, &still, Solver::Exact, &mut sink).unwrap();
+    assert_eq!(rows, 512);
+    assert!(
+        matches!(outcome.ending, Ending::Interrupted { time } if (time - 0.511).abs() < 1e-12),
+        "{:?}",
+        outcome.ending
+    );
+    assert_eq!(outcome.cost.samples, 512);
 }

@@ -42,6 +42,14 @@ pub enum Law {
 }
 
 impl Law {
+    /// Whether a body under it is never at rest for good: it creeps, or hangs on its bristles.
+    pub fn never_sticks(self) -> bool {
+        match self {
+            Law::Coulomb | Law::Stribeck { .. } => false,
+            Law::Smooth { .. } | Law::LuGre { .. } => true,
+        }
+    }
+
     /// The speed on whose scale friction changes, where it is a curve.
     pub fn velocity(self) -> Option<f64> {
         match self {

@@ -225,9 +225,9 @@ fn moving(plant: &Mechanism, held: [bool; 3]) -> Vec<usize> {
 fn bristles(plant: &Mechanism, held: [bool; 3], speed: f64) -> Vec<Kind> {
     let forward = speed >= 0.0;
     let has = |body: &usize| {
-        let friction = plant.friction(*body);
+        let friction = &plant.bodies[*body].friction;
         let v = speed.abs() / plant.bodies[*body].kind.lever();
         matches!(friction.law, Law::LuGre { .. }) && friction.dry(forward, v) > 0.0 && !held[*body]
     };
-    plant.leaders().filter(|&body| body < BODIES).filter(has).map(Kind::Bristle).collect()
+    (0..BODIES).filter(has).map(Kind::Bristle).collect()
 }

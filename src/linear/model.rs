@@ -193,13 +193,16 @@ impl Linear<'_> {
             let Some(place) = frame.speed_place[body] else { continue };
             let (mut row, input) = frame.row(&equations.acceleration[body]);
             let mass = plant.mass(body, &equations.inertia);
-            // M v̇ = what is linear − what friction adds to it
-            let (on_speed, on_bristle) = self.friction(body);
-            row[place] -= on_speed / mass;
-            if let Some(bristle) = frame.bristle_place[body] {
-                row[bristle] -= on_bristle / mass;
-                let [on_speed, on_bristle] = self.bristle(body);
-                (a[(bristle, place)], a[(bristle, bristle)]) = (on_speed, on_bristle);
+            // M v̇ = what is linear − Σ ρ (what friction adds to it), of all that moves with it at ρ v
+            for member in plant.followers(body) {
+                let ratio = plant.ratio(member);
+                let (on_speed, on_bristle) = self.friction(member);
+                row[place] -= ratio * ratio * on_speed / mass;
+                if let Some(bristle) = frame.bristle_place[member] {
+                    row[bristle] -= ratio * on_bristle / mass;
+                    let [on_speed, on_bristle] = self.bristle(member);
+                    (a[(bristle, place)], a[(bristle, bristle)]) = (ratio * on_speed, on_bristle);
+                }
             }
             a.row_mut(place).copy_from(&row.transpose());
             b[place] = input;
@@ -222,9 +225,9 @@ impl Linear<'_> {
         self.plant.bodies[body].along.as_ref().map_or(1.0, |along| along.factor(self.operation.position))
     }
 
-    /// ∂F_f/∂v beyond the viscous friction that stands in the equations, and ∂F_f/∂z of a bristle.
+    /// ∂F_f/∂v of a body's own friction beyond the viscous friction that stands in the equations, and ∂F_f/∂z of a bristle.
     fn friction(&self, body: usize) -> (f64, f64) {
-        let friction = self.plant.friction(body);
+        let friction = &self.plant.bodies[body].friction;
         let v = self.speed(body);
         let side = friction.side(v >= 0.0);
         let viscous = match self.mode.motion[body] {
@@ -244,7 +247,7 @@ impl Linear<'_> {
 
     /// ∂ż/∂v and ∂ż/∂z of the bristles of a body.
     fn bristle(&self, body: usize) -> [f64; 2] {
-        let friction = self.plant.friction(body);
+        let friction = &self.plant.bodies[body].friction;
         let Law::LuGre { stiffness, .. } = friction.law else { return [0.0; 2] };
         let v = self.speed(body);
         if v == 0.0 {

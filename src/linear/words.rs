@@ -65,6 +65,11 @@ fn leaders(mechanism: &Mechanism) -> impl Iterator<Item = usize> + '_ {
     mechanism.leaders().filter(|&body| !mechanism.bodies[body].is_rotor)
 }
 
+/// These bodies, and those that move with them.
+fn members<'a>(plant: &'a Mechanism, leaders: &'a [usize]) -> impl Iterator<Item = usize> + 'a {
+    leaders.iter().flat_map(|&leader| plant.followers(leader))
+}
+
 fn sliding(plant: &Mechanism, operation: Operation, moving: &[usize]) -> Option<String> {
     let breakaway = |body: &usize| {
         let most = plant.friction(*body).breakaway(operation.speed >= 0.0);
@@ -74,7 +79,7 @@ fn sliding(plant: &Mechanism, operation: Operation, moving: &[usize]) -> Option<
     };
     let way = if operation.speed >= 0.0 { "forward" } else { "backward" };
     let holds: Vec<String> = moving.iter().filter_map(breakaway).collect();
-    let curve = moving.iter().any(|body| plant.friction(*body).law != Law::Coulomb);
+    let curve = members(plant, moving).any(|body| plant.bodies[body].friction.law != Law::Coulomb);
     let pace = match operation.speed == 0.0 {
         true => "in the limit of zero speed".to_string(),
         false => format!("at {}", engineering_ascii(operation.speed.abs(), "m/s", 4)),
@@ -101,11 +106,11 @@ fn sliding(plant: &Mechanism, operation: Operation, moving: &[usize]) -> Option<
 }
 
 fn curves(plant: &Mechanism, operation: Operation, moving: &[usize]) -> Vec<String> {
-    let of = |body: &usize| {
-        let friction = plant.friction(*body);
-        let part = &plant.bodies[*body];
+    let of = |body: usize| {
+        let part = &plant.bodies[body];
+        let friction = part.friction;
         let speed = operation.speed / part.kind.lever();
-        let (name, unit) = (part.label.name, if *body == CART { "N s/m" } else { "N m s/rad" });
+        let (name, unit) = (part.label.name, if body == CART { "N s/m" } else { "N m s/rad" });
         match friction.law {
             Law::Coulomb => None,
             Law::LuGre { .. } if operation.speed == 0.0 => {
@@ -122,5 +127,5 @@ fn curves(plant: &Mechanism, operation: Operation, moving: &[usize]) -> Vec<Stri
             }
         }
     };
-    moving.iter().filter_map(of).collect()
+    members(plant, moving).filter_map(of).collect()
 }

@@ -289,8 +289,8 @@ pub struct Mechanism {
     pub roles: Roles,
     /// Where ways are counted from: what follows them or changes along them begins there.
     pub origin: [f64; BODIES],
-    /// Friction of each body and of those that move with it.
-    friction: Vec<Friction>,
+    /// Friction of each body and of those that move with it, as far as it is straight, and whether it sticks.
+    friction: Vec<(Friction, bool)>,
 }
 
 impl Mechanism {
@@ -298,14 +298,21 @@ impl Mechanism {
     pub fn new(bodies: Vec<Body>, springs: Vec<Spring>, drives: Vec<Drive>) -> Self {
         assert!(bodies.len() <= BODIES && springs.len() <= SPRINGS && drives.len() <= DRIVES);
         assert!(bodies.iter().is_sorted_by_key(|body| body.is_rotor));
-        let mut friction = vec![Friction::default(); bodies.len()];
-        for (body, part) in bodies.iter().enumerate() {
-            let (leader, ratio) = part.leader;
-            friction[leader].add(&part.friction, ratio);
-            if leader == body {
-                friction[body].law = part.friction.law;
+        let mut friction = vec![(Friction::default(), Friction::default()); bodies.len()];
+        for part in &bodies {
+            let ((leader, ratio), mut own) = (part.leader, part.friction);
+            let (all, sticking) = &mut friction[leader];
+            if own.law.never_sticks() {
+                // What is not b v is no part of the straight equations.
+                for side in [&mut own.forward, &mut own.backward] {
+                    (side.coulomb, side.breakaway) = (0.0, 0.0);
+                }
+            } else {
+                sticking.add(&own, ratio);
             }
+            all.add(&own, ratio);
         }
+        let friction = friction.into_iter().map(|(all, sticking)| (all, !sticking.is_linear())).collect();
         let (columns, readings, roles) = (Vec::new(), Vec::new(), Roles::default());
         Self { bodies, springs, drives, columns, readings, roles, origin: [0.0; BODIES], friction }
     }
@@ -335,16 +342,17 @@ impl Mechanism {
         0..self.bodies.iter().take_while(|body| !body.is_rotor).count()
     }
 
-    /// Friction law of a body; nothing for one that another leads.
+    /// Friction of a body and of those that move with it, as far as it is b v ± F_c and a breakaway: what the equations of a mode have.
+    /// What never sticks adds nothing but b v. Nothing for a body that another leads.
     pub fn friction(&self, body: usize) -> &Friction {
-        &self.friction[body]
+        &self.friction[body].0
     }
 
     /// Whether a body can stick or has a direction-dependent law, so that its motion has modes at all.
     pub fn has_modes(&self, body: usize) -> bool {
         let leader = self.leader(body);
         let by_gear = |drive: &Drive| drive.loses() && self.leader(drive.shaft) == leader;
-        self.friction(leader).sticks() || self.drives.iter().any(by_gear)
+        self.friction[leader].1 || self.drives.iter().any(by_gear)
     }
 
     /// Whether its equations are linear but for changes of mode: what the exact solver takes.

@@ -5,10 +5,10 @@
 use super::Course;
 use crate::case::Experiment;
 use crate::error::{Error, Result};
-use crate::friction::{Friction, Law};
+use crate::friction::Law;
 use crate::mechanism::{AmplifierMode, Mechanism, SpringLaw, State};
 use crate::parameter;
-use crate::stage::axis::{CART, DRIVE, LABELS};
+use crate::stage::axis::CART;
 use crate::stage::{BeltModel, Stage};
 use std::f64::consts::PI;
 
@@ -73,18 +73,6 @@ pub(super) fn stage(stage: &Stage) -> Result<()> {
                 }
             }
         }
-        let never_sticks = matches!(law.law, Law::Smooth { .. } | Law::LuGre { .. });
-        if body == DRIVE && never_sticks && motor.gear_efficiency < 1.0 {
-            return Err(Error::new(
-                "a gear that loses power, and a friction law that never sticks at the drive pulley",
-            )
-            .allowed("one of the two")
-            .next("set gear_efficiency to 1, or give the drive pulley Coulomb friction or a Stribeck curve"));
-        }
-    }
-    let reduced = stage.belt.model != BeltModel::Elastic;
-    if reduced {
-        one_law_each(stage)?;
     }
     if stage.belt.follows_cart {
         let (Some(make), Some(travel)) = (stage.belt.make, stage.travel) else {
@@ -182,28 +170,6 @@ pub(super) fn fastest_rate(mechanism: &Mechanism) -> f64 {
         fastest = fastest.max((stiffness / body.inertia).sqrt()).max((damping + viscous) / body.inertia);
     }
     fastest
-}
-
-/// Where several bodies move as one, a law other than Coulomb's stands for all of them, at the one that leads.
-fn one_law_each(stage: &Stage) -> Result<()> {
-    let mechanism = stage.mechanism();
-    let laws = [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction];
-    for leader in mechanism.leaders().filter(|&body| !mechanism.bodies[body].is_rotor) {
-        let followers = || mechanism.followers(leader).filter(|&body| body != leader);
-        let plain = |body: usize| laws[body].law == Law::Coulomb;
-        let none = |body: usize| laws[body] == Friction::default();
-        if !(followers().all(plain) && (plain(leader) || followers().all(none))) {
-            return Err(Error::new(format!(
-                "in this model of the belt the {} moves as one with others, whose friction laws cannot be added up",
-                LABELS[leader].name
-            ))
-            .allowed(format!(
-                "such a law for the {} alone, or Coulomb friction for all of them",
-                LABELS[leader].name
-            )));
-        }
-    }
-    Ok(())
 }
 
 fn too_fast(what: &str, rate: f64) -> Error {

@@ -60,9 +60,14 @@ impl Pieces {
         self.pieces().map(|piece| piece.degree()).max().unwrap_or(0)
     }
 
-    /// The inputs at `tau` after the start.
-    pub fn values(&self, tau: f64) -> [f64; DRIVES] {
-        self.coefficients.map(|coefficients| coefficients.iter().rev().fold(0.0, |sum, c| sum * tau + c))
+    /// The inputs at `tau` after the start, no power of time being above `degree`.
+    #[inline]
+    pub fn values(&self, tau: f64, degree: usize) -> [f64; DRIVES] {
+        let mut values = [0.0; DRIVES];
+        for (value, coefficients) in values.iter_mut().zip(&self.coefficients) {
+            *value = coefficients[..=degree].iter().rev().fold(0.0, |sum, c| sum * tau + c);
+        }
+        values
     }
 
     /// One by one.

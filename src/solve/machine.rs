@@ -1,10 +1,11 @@
 //! A machine that is stepped from outside.
 
-use super::exact::{self, Kernel};
+use super::exact::{self, Make};
 use super::inputs::Pieces;
+use super::record::Extra;
 use super::{Ending, Event, PositionError, Solver, check, general};
 use crate::error::{Error, Result};
-use crate::mechanism::{Form, Heading, Layout, Mechanism, Mode, Shown, SpringLaw, State, What};
+use crate::mechanism::{DRIVES, Form, Heading, Layout, Mechanism, Mode, Shown, SpringLaw, State, What};
 use crate::signal::Piece;
 use crate::stage::Stage;
 use std::sync::Arc;
@@ -34,65 +35,78 @@ const INTERVAL: f64 = 1e-3;
 /// assert!(copy.state().position[CART] > machine.state().position[CART]);
 /// # Ok::<(), taut::Error>(())
 /// ```
-#[derive(Clone)]
 pub struct Machine {
-    engine: Engine,
+    engine: Box<dyn Engine>,
     inputs: Pieces,
     /// Whether inputs were set since it was advanced last.
     is_set: bool,
 }
 
-#[derive(Clone)]
-enum Engine {
-    Straight(Box<exact::Core<8, 10>>),
-    Rotor(Box<exact::Core<12, 14>>),
-    Smooth(Box<exact::Core<16, 18>>),
-    Two(Box<exact::Core<16, 19>>),
-    TwoSmooth(Box<exact::Core<28, 31>>),
-    General(Box<general::Core>),
+impl Clone for Machine {
+    fn clone(&self) -> Self {
+        Self { engine: self.engine.copy(), inputs: self.inputs, is_set: self.is_set }
+    }
 }
 
-/// The same for the core of any engine.
-macro_rules! each {
-    ($engine:expr, $core:ident => $what:expr) => {
-        match $engine {
-            Engine::Straight($core) => $what,
-            Engine::Rotor($core) => $what,
-            Engine::Smooth($core) => $what,
-            Engine::Two($core) => $what,
-            Engine::TwoSmooth($core) => $what,
-            Engine::General($core) => $what,
-        }
-    };
+/// What solves the equations of a machine under way: one of the exact solver's kernels, or the general solver.
+pub(super) trait Engine: Send + Sync {
+    /// A copy that goes on in the same way.
+    fn copy(&self) -> Box<dyn Engine>;
+
+    /// The mechanism, its ways counted from where it began.
+    fn mechanism(&self) -> &Mechanism;
+
+    /// Where it stands, s.
+    fn time(&self) -> f64;
+
+    /// Whether it takes inputs that bend.
+    fn is_smooth(&self) -> bool;
+
+    /// One that does, where this one stands.
+    fn smooth(&self) -> Box<dyn Engine>;
+
+    /// Takes up new inputs, and what they bring about at once.
+    fn take_input(&mut self, pieces: &Pieces);
+
+    /// Bounds how fast the inputs change until `until`.
+    fn bound_input(&mut self, pieces: &Pieces, until: f64);
+
+    /// Goes on to `until` and adds the events on the way to `events`.
+    fn go_to(&mut self, until: f64, events: &mut Vec<Event>) -> std::result::Result<(), Ending>;
+
+    /// The state in angles and positions.
+    fn state(&self) -> State;
+
+    /// What its parts do.
+    fn mode(&self) -> &Mode;
+
+    /// The inputs now.
+    fn input(&self) -> [f64; DRIVES];
+
+    /// The value of a form now, by the linear equations.
+    fn value(&self, form: &Form) -> f64;
+
+    /// What a row shows beyond the linear equations.
+    fn extra(&self) -> Extra;
+
+    /// By how much positions may be off, where that is known.
+    fn error(&self) -> Option<PositionError>;
 }
 
-impl Engine {
-    /// The exact engine of a mechanism in `start`.
-    fn exact(mechanism: Arc<Mechanism>, start: &State, interval: f64, smooth: bool) -> Self {
-        let space = exact::Space::new(&mechanism, smooth);
-        let kernel = Kernel::of(&space);
-        let (space, reach) = (Arc::new(space), (interval, f64::INFINITY));
-        match kernel {
-            Kernel::Straight => Engine::Straight(Box::new(exact::Core::new(mechanism, space, start, reach, vec![]))),
-            Kernel::Rotor => Engine::Rotor(Box::new(exact::Core::new(mechanism, space, start, reach, vec![]))),
-            Kernel::Smooth => Engine::Smooth(Box::new(exact::Core::new(mechanism, space, start, reach, vec![]))),
-            Kernel::Two => Engine::Two(Box::new(exact::Core::new(mechanism, space, start, reach, vec![]))),
-            Kernel::TwoSmooth => Engine::TwoSmooth(Box::new(exact::Core::new(mechanism, space, start, reach, vec![]))),
-        }
-    }
+/// Makes the exact engine of a mechanism in `start`, its inputs straight.
+struct Exact<'s> {
+    mechanism: Arc<Mechanism>,
+    space: Arc<exact::Space>,
+    start: &'s State,
+    interval: f64,
+}
 
-    /// The same engine with room for inputs that bend.
-    fn smooth(self) -> Self {
-        match self {
-            Engine::Straight(core) => Engine::Smooth(Box::new(core.smooth())),
-            Engine::Rotor(core) => Engine::Smooth(Box::new(core.smooth())),
-            Engine::Two(core) => Engine::TwoSmooth(Box::new(core.smooth())),
-            other => other,
-        }
-    }
+impl Make for Exact<'_> {
+    type Made = Box<dyn Engine>;
 
-    fn is_smooth(&self) -> bool {
-        matches!(self, Engine::Smooth(_) | Engine::TwoSmooth(_) | Engine::General(_))
+    fn make<const R: usize, const C: usize>(self) -> Self::Made {
+        let Self { mechanism, space, start, interval } = self;
+        Box::new(exact::Core::<R, C>::new(mechanism, space, start, (interval, f64::INFINITY), vec![]))
     }
 }
 
@@ -110,17 +124,18 @@ impl Machine {
             return Err(Error::new(format!("an interval of {interval:e} s cannot be")).allowed("above zero"));
         }
         check::state(start)?;
-        let engine = match solver {
+        let engine: Box<dyn Engine> = match solver {
             Solver::Exact => {
                 check::piecewise_linear(mechanism)?;
-                let layout = Layout::new(mechanism);
-                Engine::exact(Arc::new(mechanism.seen_from(&layout, start)), start, interval, false)
+                let space = Arc::new(exact::Space::new(mechanism, false));
+                let mechanism = Arc::new(mechanism.seen_from(&space.layout, start));
+                exact::in_kernel(space.size(), Exact { mechanism, space, start, interval })
             }
             Solver::General { tolerance } => {
                 let fastest = check::fastest_rate(mechanism);
                 general::check(fastest, 0.0, tolerance)?;
                 let reach = (tolerance, fastest, f64::INFINITY);
-                Engine::General(Box::new(general::Core::new(mechanism, Layout::new(mechanism), start, reach)))
+                Box::new(general::Core::new(mechanism, Layout::new(mechanism), start, reach))
             }
             Solver::Table3 { .. } => {
                 return Err(Error::new("the paper's Table 3 is not stepped from outside")
@@ -132,12 +147,12 @@ impl Machine {
 
     /// The mechanism, its ways counted from where it began.
     pub fn mechanism(&self) -> &Mechanism {
-        each!(&self.engine, core => core.mechanism())
+        self.engine.mechanism()
     }
 
     /// Where it stands, s.
     pub fn time(&self) -> f64 {
-        each!(&self.engine, core => core.time())
+        self.engine.time()
     }
 
     /// The input of a drive from now on, until another is set: a polynomial that has begun, or begins now. Inputs of several drives that are
@@ -163,38 +178,31 @@ impl Machine {
     pub fn advance(&mut self, until: f64, events: &mut Vec<Event>) -> std::result::Result<(), Ending> {
         if std::mem::take(&mut self.is_set) {
             if self.inputs.degree() > 1 && !self.engine.is_smooth() {
-                self.engine = self.engine.clone().smooth();
+                self.engine = self.engine.smooth();
             }
             let inputs = self.inputs.since(self.time());
-            each!(&mut self.engine, core => core.take_input(&inputs));
+            self.engine.take_input(&inputs);
         }
         if self.inputs.degree() > 1 {
             let inputs = self.inputs;
-            each!(&mut self.engine, core => core.bound_input(&inputs, until));
+            self.engine.bound_input(&inputs, until);
         }
-        each!(&mut self.engine, core => core.go_to(until, events))
+        self.engine.go_to(until, events)
     }
 
     /// The state in angles and positions.
     pub fn state(&self) -> State {
-        each!(&self.engine, core => core.state())
+        self.engine.state()
     }
 
     /// What its parts do.
     pub fn mode(&self) -> &Mode {
-        each!(&self.engine, core => &core.mode)
+        self.engine.mode()
     }
 
     /// By how much positions may be off, m; of the general solver nothing is known.
     pub fn error(&self) -> Option<PositionError> {
-        match &self.engine {
-            Engine::Straight(core) => Some(core.clone().error()),
-            Engine::Rotor(core) => Some(core.clone().error()),
-            Engine::Smooth(core) => Some(core.clone().error()),
-            Engine::Two(core) => Some(core.clone().error()),
-            Engine::TwoSmooth(core) => Some(core.clone().error()),
-            Engine::General(_) => None,
-        }
+        self.engine.error()
     }
 
     /// The columns that [`Machine::outputs`] gives: those of a run.
@@ -206,9 +214,9 @@ impl Machine {
     pub fn outputs(&self, into: &mut [f64]) {
         let (mechanism, mode) = (self.mechanism(), self.mode());
         let state = self.state();
-        let value = |form: &Form| each!(&self.engine, core => core.value(form));
+        let value = |form: &Form| self.engine.value(form);
         let within = |value: f64, limit: Option<f64>| limit.map_or(value, |limit| value.clamp(-limit, limit));
-        let input = each!(&self.engine, core => core.input());
+        let input = self.engine.input();
         for (into, heading) in into.iter_mut().zip(&mechanism.columns) {
             *into = match heading.shown {
                 Shown::Time => self.time(),
@@ -223,12 +231,12 @@ impl Machine {
                 Shown::Speed(body, factor) => state.speed[body] * factor,
                 Shown::Stretch(spring) => value(&Form::stretch(spring)),
                 Shown::Force(spring, factor) => {
-                    let extra = each!(&self.engine, core => core.extra().force[spring]);
+                    let extra = self.engine.extra().force[spring];
                     (value(&mechanism.spring_force(spring, mode)) + extra) * factor
                 }
                 Shown::Friction(body) => self.friction(body, mechanism, mode, &state, &value),
                 Shown::Motion(body) => f64::from(mode.motion[body].code()),
-                Shown::Bristle(body) => each!(&self.engine, core => core.extra().bristle[body]),
+                Shown::Bristle(body) => self.engine.extra().bristle[body],
                 Shown::Contact(spring) => {
                     let what = match mechanism.springs[spring].law {
                         SpringLaw::Tension { .. } => What::Span(spring),
@@ -250,7 +258,7 @@ impl Machine {
         state: &State,
         value: &dyn Fn(&Form) -> f64,
     ) -> f64 {
-        let extra = each!(&self.engine, core => core.extra());
+        let extra = self.engine.extra();
         // What holds a body at rest is what acts on it, least and most by the way that a gear with losses counts.
         let load = |positive: bool, forward: bool| value(&mechanism.load(body, forward, &mode.with_torque(positive)));
         let all = [load(true, true), load(true, false), load(false, true), load(false, false)];

@@ -13,6 +13,9 @@ use std::sync::Arc;
 /// Rows handed on at a time; small enough to stay in the processor's cache.
 const BLOCK: usize = 256;
 
+/// Room for a state with the inputs behind it, whatever the mechanism.
+pub(crate) const STATE: usize = 2 * BODIES + 2 * DRIVES;
+
 /// What a row shows that does not follow from its state by the linear equations.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Extra {
@@ -40,10 +43,12 @@ pub(crate) struct Recorder<'a> {
     layout: Layout,
     grid: Grid,
     pub(crate) detail: Detail,
-    /// States in the solver's coordinates, each with the inputs behind it, row after row.
+    /// States in the solver's coordinates with the inputs among them or behind them, row after row.
     raw: Vec<f64>,
-    /// How many numbers a row has, and how many rows there are.
+    /// How many numbers a row has, and where the inputs stand.
     stride: usize,
+    inputs: [usize; DRIVES],
+    /// How many rows there are; those behind the ones that are written out are like the last of them.
     count: usize,
     segments: Vec<Segment>,
     /// Which mode the last one is of.
@@ -76,12 +81,16 @@ struct Source {
 }
 
 impl<'a> Recorder<'a> {
+    /// That of rows of `stride` numbers, states in the places of the layout and inputs where `input` says.
     pub(crate) fn new(
         mechanism: &Arc<Mechanism>,
         layout: &Layout,
+        (stride, input): (usize, &dyn Fn(usize) -> usize),
         grid: Grid,
         Output { detail, sink, observer }: Output<'a>,
     ) -> Self {
+        let mut inputs = [0; DRIVES];
+        inputs.iter_mut().enumerate().take(layout.inputs).for_each(|(drive, place)| *place = input(drive));
         let shown = |heading: &&Heading| is_shown(heading, detail);
         let empty = |heading: &Heading| Column {
             values: Vec::with_capacity(BLOCK),
@@ -93,8 +102,9 @@ impl<'a> Recorder<'a> {
             grid,
             detail,
             block: Trajectory { columns: mechanism.columns.iter().filter(shown).map(empty).collect() },
-            raw: vec![0.0; if detail == Detail::None { 0 } else { BLOCK * (layout.states + layout.inputs) }],
-            stride: layout.states + layout.inputs,
+            raw: Vec::with_capacity(if detail == Detail::None { 0 } else { BLOCK * stride }),
+            stride,
+            inputs,
             count: 0,
             segments: Vec::new(),
             taken: None,
@@ -122,37 +132,69 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Adds the next row: a state in the solver's coordinates, in the places of the layout, and inputs.
+    /// Adds the next row: a state in the solver's coordinates, in the places of the layout, with the inputs.
     #[inline]
-    pub(crate) fn push(&mut self, state: &[f64], input: &[f64; DRIVES]) {
+    pub(crate) fn push<const N: usize>(&mut self, row: &[f64; N]) {
         if self.detail == Detail::None {
             self.rows += 1;
             return;
         }
-        let row = &mut self.raw[self.count * self.stride..][..self.stride];
-        let (own, inputs) = row.split_at_mut(self.layout.states);
-        own.iter_mut().zip(state).for_each(|(own, state)| *own = *state);
-        inputs.iter_mut().zip(input).for_each(|(own, input)| *own = *input);
+        debug_assert_eq!(N, self.stride);
+        if self.raw.len() != self.count * N {
+            self.write_out();
+        }
+        self.raw.extend_from_slice(row);
         self.count += 1;
         if self.count == BLOCK {
             self.hand_on();
         }
     }
 
-    /// The same of a whole state.
+    /// Writes out rows that are like the one before, or forgets those that were handed on.
+    #[cold]
+    fn write_out(&mut self) {
+        if self.count == 0 {
+            self.raw.clear();
+        }
+        let last = self.raw.len().saturating_sub(self.stride);
+        while self.raw.len() < self.count * self.stride {
+            self.raw.extend_from_within(last..last + self.stride);
+        }
+    }
+
+    /// Adds the last row so many times more, or until the receiver wants no more; says how often. Nothing but time goes on.
+    pub(crate) fn repeat(&mut self, times: u64) -> u64 {
+        let mut left = times;
+        while left > 0 && self.flow == Flow::Continue {
+            if self.count == 0 {
+                // The last row has just been handed on: its numbers stand yet.
+                self.raw.drain(..self.raw.len() - self.stride);
+            }
+            let more = left.min((BLOCK - self.count) as u64);
+            self.count += more as usize;
+            left -= more;
+            if self.count == BLOCK {
+                self.hand_on();
+            }
+        }
+        times - left
+    }
+
+    /// Adds the next row: a whole state, of a recorder of rows of [`STATE`] numbers.
     pub(crate) fn push_state(&mut self, inner: &State, input: &[f64; DRIVES], extra: Option<Extra>) {
         if self.detail != Detail::None {
             self.extra.extend(extra);
         }
-        let mut state = [0.0; 2 * BODIES + DRIVES];
+        let mut row = [0.0; STATE];
         for body in 0..self.layout.bodies() {
-            state[self.layout.coordinate[body]] = inner.position[body];
-            state[self.layout.speed[body]] = inner.speed[body];
+            row[self.layout.coordinate[body]] = inner.position[body];
+            row[self.layout.speed[body]] = inner.speed[body];
         }
         for drive in 0..self.layout.inputs {
-            state[self.layout.current[drive]] = inner.current[drive];
+            row[self.layout.current[drive]] = inner.current[drive];
+            row[self.inputs[drive]] = input[drive];
         }
-        self.push(&state, input);
+        self.push(&row);
     }
 
     /// Counts so many rows that nobody is to see.
@@ -195,11 +237,12 @@ impl<'a> Recorder<'a> {
         let mechanism = &*self.mechanism;
         let rows = Rows {
             layout: &self.layout,
-            raw: &self.raw[..self.count * self.stride],
+            raw: &self.raw,
             stride: self.stride,
-            count: self.count,
+            inputs: self.inputs,
+            count: self.raw.len() / self.stride,
         };
-        let ends = self.segments.iter().skip(1).map(|segment| segment.start).chain([self.count]);
+        let ends = self.segments.iter().skip(1).map(|segment| segment.start).chain([rows.count]);
         let segments: Vec<(Range<usize>, &Segment)> =
             self.segments.iter().zip(ends).map(|(segment, end)| (segment.start..end, segment)).collect();
         // Amplifiers, gears, belt and stops: rows in the same state of all of them follow one formula.
@@ -220,7 +263,8 @@ impl<'a> Recorder<'a> {
             let out = &mut column.values[..rows.count];
             // −0 + 0 is 0.
             match heading.shown {
-                Shown::Time => put(out, |j| grid.time(first + j as u64)),
+                // Below: it goes on where all else stands.
+                Shown::Time => {}
                 Shown::Input(drive) => out.copy_from_slice(&source.input[drive]),
                 Shown::Voltage(drive) => {
                     for (rows, mode) in &alike {
@@ -261,6 +305,11 @@ impl<'a> Recorder<'a> {
                 }
                 Shown::Bristle(body) => put(out, |j| extra.get(j).map_or(0.0, |extra| extra.bristle[body])),
             }
+            let last = column.values.last().copied().unwrap_or(0.0);
+            column.values.resize(self.count, last);
+            if heading.shown == Shown::Time {
+                put(&mut column.values, |j| grid.time(first + j as u64));
+            }
         }
     }
 }
@@ -280,6 +329,7 @@ struct Rows<'r> {
     layout: &'r Layout,
     raw: &'r [f64],
     stride: usize,
+    inputs: [usize; DRIVES],
     count: usize,
 }
 
@@ -332,7 +382,7 @@ impl Source {
             }
         }
         for (index, drive) in mechanism.drives.iter().enumerate() {
-            rows.column(layout.states + index, &mut self.input[index]);
+            rows.column(rows.inputs[index], &mut self.input[index]);
             match drive.has_current_state() {
                 true => rows.column(layout.current[index], &mut self.armature[index]),
                 false => self.armature[index].resize(rows.count, 0.0),

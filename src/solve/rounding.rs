@@ -44,8 +44,7 @@ impl Rounding {
         Self { places: bodies.map(place).collect(), ..Self::default() }
     }
 
-    /// Takes a state of the solver.
-    #[inline]
+    /// Takes a state of the solver, or the largest magnitudes that each of its places has had.
     pub(super) fn see(&mut self, z: &[f64]) {
         for &[(speed, lever), (way, length)] in &self.places {
             self.speed = self.speed.max(lever * z[speed].abs());

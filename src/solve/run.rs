@@ -1,6 +1,6 @@
 //! Runs: a machine and a recorder, stepped by whoever decides its inputs.
 
-use super::exact::{self, Kernel, Known};
+use super::exact::{self, Known, Make};
 use super::inputs::Pieces;
 use super::observe::{Observe, Output};
 use super::{Detail, Flow, Outcome, Solver, check, general};
@@ -69,6 +69,24 @@ pub(super) trait Running {
     }
 }
 
+/// Makes a run of the exact solver.
+struct OfExact<'m, 'a> {
+    mechanism: &'m Arc<Mechanism>,
+    space: exact::Space,
+    start: &'m Start,
+    known: Known,
+    output: Output<'a>,
+}
+
+impl<'a> Make for OfExact<'_, 'a> {
+    type Made = Box<dyn Running + 'a>;
+
+    fn make<const R: usize, const C: usize>(self) -> Self::Made {
+        let Self { mechanism, space, start, known, output } = self;
+        Box::new(exact::Run::<R, C>::new(mechanism, space, start, known, output))
+    }
+}
+
 /// A run whose inputs are set from outside: a sampled controller's, or those of anything else that answers the motion.
 ///
 /// ```
@@ -133,21 +151,7 @@ impl<'a> Run<'a> {
             Solver::Exact => {
                 check::piecewise_linear(mechanism)?;
                 let space = exact::Space::new(mechanism, !straight);
-                match Kernel::of(&space) {
-                    Kernel::Straight => {
-                        Box::new(exact::Run::<8, 10>::new(mechanism, space, start, known, output.within()))
-                    }
-                    Kernel::Rotor => {
-                        Box::new(exact::Run::<12, 14>::new(mechanism, space, start, known, output.within()))
-                    }
-                    Kernel::Smooth => {
-                        Box::new(exact::Run::<16, 18>::new(mechanism, space, start, known, output.within()))
-                    }
-                    Kernel::Two => Box::new(exact::Run::<16, 19>::new(mechanism, space, start, known, output.within())),
-                    Kernel::TwoSmooth => {
-                        Box::new(exact::Run::<28, 31>::new(mechanism, space, start, known, output.within()))
-                    }
-                }
+                exact::in_kernel(space.size(), OfExact { mechanism, space, start, known, output: output.within() })
             }
             Solver::General { tolerance } => {
                 let fastest = check::fastest_rate(mechanism);

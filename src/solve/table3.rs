@@ -5,7 +5,7 @@
 
 use super::coordinates::Coordinates;
 use super::observe::{Gap, Output, QUANTITIES, Reading, Readout};
-use super::record::Recorder;
+use super::record::{Recorder, STATE};
 use super::{Cost, Ending, Flow, Grid, Method, Outcome};
 use crate::case::Experiment;
 use crate::error::{Error, Result};
@@ -43,7 +43,8 @@ pub(crate) fn run(
     let mut state = experiment.initial.state(mechanism);
     let layout = Layout::new(mechanism);
     let coordinates = Coordinates::new(&layout, &State::default()).0;
-    let mut recorder = Recorder::new(mechanism, &layout, grid, output.within());
+    let mut recorder =
+        Recorder::new(mechanism, &layout, (STATE, &|drive| layout.states + drive), grid, output.within());
     let readout = Readout::new(mechanism, &Mode::of([]));
     let mut cost = Cost { modes: 1, ..Cost::default() };
     let mut ending = Ending::Complete;

@@ -248,7 +248,7 @@ impl Stage {
             add("encoder_count", "", Shown::Counts(body, counts), false);
         }
         for (body, name) in ["drive_bristle", "cart_bristle", "idler_bristle"].into_iter().enumerate() {
-            if matches!(mechanism.friction(body).law, Law::LuGre { .. }) {
+            if matches!(mechanism.bodies[body].friction.law, Law::LuGre { .. }) {
                 add(name, mechanism.bodies[body].kind.units()[0], Shown::Bristle(body), false);
             }
         }

@@ -439,7 +439,7 @@ impl Gantry {
             }
         }
         for (body, label) in LABELS.into_iter().enumerate() {
-            if matches!(mechanism.friction(body).law, Law::LuGre { .. }) {
+            if matches!(mechanism.bodies[body].friction.law, Law::LuGre { .. }) {
                 add(
                     format!("{}_bristle", label.key),
                     mechanism.bodies[body].kind.units()[0],

@@ -28,25 +28,26 @@ impl<const R: usize, const C: usize> Core<R, C> {
     /// Load on a body at rest that would go forward, or backward (the same unless the gear loses power); what friction
     /// would then take of it; and what rounding may have done to it.
     fn load(&self, body: usize, forward: bool) -> (f64, f64, f64) {
-        let mut mode = self.mode;
+        let mut mode = self.common.mode;
         self.settle_torques(&mut mode);
-        let form = self.mechanism.load(body, forward, &mode);
-        let law = self.mechanism.friction(body);
+        let form = self.common.mechanism.load(body, forward, &mode);
+        let law = self.common.mechanism.friction(body);
         let resistance = if forward { law.forward.coulomb } else { -law.backward.coulomb };
         (self.value(&form), resistance, self.noise(&form))
     }
 
-    /// Gears carry as they do at rest.
+    /// Gears that lose power carry as they do at rest; to others it makes no difference.
     fn settle_torques(&self, mode: &mut Mode) {
-        for drive in 0..self.mechanism.drives.len() {
-            let torque = self.mechanism.torque_at_rest(drive, &self.mode);
+        let mechanism = &self.common.mechanism;
+        for (drive, _) in mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.loses()) {
+            let torque = mechanism.torque_at_rest(drive, &self.common.mode);
             mode.drive[drive].torque_positive = self.value(&torque) >= 0.0;
         }
     }
 
     /// What a body at zero speed does under its present load.
     fn decide(&self, body: usize) -> Motion {
-        let law = self.mechanism.friction(body);
+        let law = self.common.mechanism.friction(body);
         let (forward, _, noise) = self.load(body, true);
         if forward > law.forward.breakaway + noise {
             return Motion::Forward;
@@ -57,15 +58,16 @@ impl<const R: usize, const C: usize> Core<R, C> {
 
     /// Goes into the mode that follows when `cause` ends the present one.
     pub(super) fn change(&mut self, cause: Cause) {
-        self.changes = if self.since_change <= MOMENT * self.matrices.reach() { self.changes + 1 } else { 0 };
-        self.since_change = 0.0;
-        if self.changes > CHANGES_AT_ONCE {
-            self.trouble = Some(Ending::TooManyEvents { time: self.time() });
+        self.common.changes =
+            if self.common.since_change <= MOMENT * self.matrices.reach() { self.common.changes + 1 } else { 0 };
+        self.common.since_change = 0.0;
+        if self.common.changes > CHANGES_AT_ONCE {
+            self.common.trouble = Some(Ending::TooManyEvents { time: self.time() });
         }
         let by_rounding = self.is_by_rounding(cause);
         let (body, to) = match cause {
             Cause::GearTorque(drive) => {
-                let positive = &mut self.mode.drive[drive].torque_positive;
+                let positive = &mut self.common.mode.drive[drive].torque_positive;
                 *positive = !*positive;
                 self.take_up_mode();
                 self.tolerate(cause);
@@ -76,74 +78,75 @@ impl<const R: usize, const C: usize> Core<R, C> {
                 return;
             }
             Cause::Leave(_) => {
-                self.trouble = Some(Ending::LeftTravel { time: self.time() });
+                self.common.trouble = Some(Ending::LeftTravel { time: self.time() });
                 return;
             }
             Cause::Stop(body) => {
-                for follower in self.mechanism.followers(body) {
-                    self.z[self.space.layout.speed[follower]] = 0.0;
+                for follower in self.common.mechanism.followers(body) {
+                    self.z[self.common.space.layout.speed[follower]] = 0.0;
                 }
                 // Where rounding turns a body back again and again without a moment passing, it rests.
-                (body, if self.changes > TURNS_AT_ONCE { Motion::Stuck } else { self.decide(body) })
+                (body, if self.common.changes > TURNS_AT_ONCE { Motion::Stuck } else { self.decide(body) })
             }
             Cause::BreakForward(body) => (body, Motion::Forward),
             Cause::BreakBackward(body) => (body, Motion::Backward),
         };
         // Where it stops, the load is the one on the side it came from.
-        let from = self.mode.motion[body];
+        let from = self.common.mode.motion[body];
         let side = if to == Motion::Stuck { from } else { to };
         let (load, resistance, noise) = self.load(body, side != Motion::Backward);
-        self.fresh[body] = match (to, cause) {
+        self.common.fresh[body] = match (to, cause) {
             (Motion::Stuck | Motion::Free, _) => 0,
             (_, Cause::Stop(_)) => 1,
             // Where breakaway equals Coulomb friction the acceleration starts from zero, but for rounding.
             _ if (load - resistance).abs() <= 2.0 * noise => 2,
             _ => 1,
         };
-        for follower in self.mechanism.followers(body) {
-            self.mode.motion[follower] = to;
+        for follower in self.common.mechanism.followers(body) {
+            self.common.mode.motion[follower] = to;
         }
-        let tolerance = if self.changes > TURNS_AT_ONCE { 20.0 } else { 2.0 } * noise;
+        let tolerance = if self.common.changes > TURNS_AT_ONCE { 20.0 } else { 2.0 } * noise;
         for side in [Cause::BreakForward(body), Cause::BreakBackward(body)] {
-            self.tolerance[side.kind()] = tolerance;
+            self.common.tolerance[side.kind()] = tolerance;
         }
         // That the gear holds a rotor is nobody's stick.
-        if !self.mechanism.bodies[body].is_rotor {
+        if !self.common.mechanism.bodies[body].is_rotor {
             self.note(What::Body(body), Status::Motion(from), load, by_rounding);
         }
         self.take_up_mode();
     }
 
     /// Whether a body stops where rounding decides: its speed tends to zero for ever, and nothing slows it down any more.
-    fn is_by_rounding(&self, cause: Cause) -> bool {
+    fn is_by_rounding(&mut self, cause: Cause) -> bool {
         let Cause::Stop(body) = cause else { return false };
-        let place = self.space.layout.speed[body];
+        self.common.rounding.see(&self.largest);
+        let place = self.common.space.layout.speed[body];
         let slows = self.matrices.rate(&self.z)[place].abs();
         // Its own speed is known to the rounding of the speeds that it had.
         let mut sizes = self.z;
-        sizes[place] = self.rounding.largest_speed(&self.mechanism.bodies[body]);
+        sizes[place] = self.common.rounding.largest_speed(&self.common.mechanism.bodies[body]);
         slows <= 20.0 * self.matrices.noise_of_rate(&sizes)[place]
     }
 
     /// Lets a part other than a body do something else.
     fn switch(&mut self, switch: Switch) {
-        let before = self.mode.status(switch.what());
+        let before = self.common.mode.status(switch.what());
         // Let go by the motion and not by an edge of the input, a current leaves its limit with no rate of its own.
         let at_edge = |guard: &Watch<C>| guard.value(&self.z).abs() <= 20.0 * guard.noise(&self.z);
         let gently = self.matrices.guards.iter().any(|guard| guard.cause == Cause::Switch(switch) && at_edge(guard));
-        self.mode.switch(switch);
+        self.common.mode.switch(switch);
         self.note(switch.what(), before, 0.0, false);
         self.take_up_mode();
         match switch {
             Switch::Current(drive, side) if self.current_stands(drive) => {
                 if side != Limit::Inside {
                     // It stands at its limit, to the last bit.
-                    let limit = self.mechanism.drives[drive].amplifier.current_limit;
-                    self.z[self.space.layout.current[drive]] = side.sign() * limit.unwrap_or(0.0);
+                    let limit = self.common.mechanism.drives[drive].amplifier.current_limit;
+                    self.z[self.common.space.layout.current[drive]] = side.sign() * limit.unwrap_or(0.0);
                 }
                 self.tolerate(Cause::Switch(switch));
                 if let (Status::Limit(left), true) = (before, side == Limit::Inside && gently) {
-                    self.fresh[Cause::Switch(Switch::Current(drive, left)).kind()] = 2;
+                    self.common.fresh[Cause::Switch(Switch::Current(drive, left)).kind()] = 2;
                 }
             }
             _ => self.tolerate(Cause::Switch(switch)),
@@ -152,15 +155,15 @@ impl<const R: usize, const C: usize> Core<R, C> {
 
     /// Whether the current of a drive is a state that its limit holds.
     fn current_stands(&self, drive: usize) -> bool {
-        let drive = &self.mechanism.drives[drive];
+        let drive = &self.common.mechanism.drives[drive];
         drive.has_current_state() && drive.amplifier.mode == AmplifierMode::Voltage
     }
 
     /// Notes an event, unless nothing that shows has changed.
     fn note(&mut self, what: What, from: Status, load: f64, by_rounding: bool) {
-        let (part, to) = (Part::of(&self.mechanism, what), self.mode.status(what));
+        let (part, to) = (Part::of(&self.common.mechanism, what), self.common.mode.status(what));
         let event = Event { time: self.time(), part, from, to, load, by_rounding };
-        event.note(&mut self.events);
+        event.note(&mut self.common.events);
     }
 
     /// Takes what has just become a condition on a part for zero where it is that but for rounding.
@@ -170,11 +173,13 @@ impl<const R: usize, const C: usize> Core<R, C> {
             let (now, noise) = (guard.value(&self.z), guard.noise(&self.z));
             let zero = now.abs() <= 20.0 * noise;
             let index = guard.cause.kind();
-            (self.tolerance[index], self.fresh[index]) = match zero {
+            (self.common.tolerance[index], self.common.fresh[index]) = match zero {
                 // A torque that turns again and again without a moment passing is none.
-                false if matches!(cause, Cause::GearTorque(_)) && self.changes > TURNS_AT_ONCE => (2.0 * now.abs(), 0),
+                false if matches!(cause, Cause::GearTorque(_)) && self.common.changes > TURNS_AT_ONCE => {
+                    (2.0 * now.abs(), 0)
+                }
                 false => (0.0, 0),
-                true if self.changes <= TURNS_AT_ONCE => (f64::max(-now, 0.0), 1),
+                true if self.common.changes <= TURNS_AT_ONCE => (f64::max(-now, 0.0), 1),
                 // Where rounding moves a part back and forth without a moment passing, it stays where it is.
                 true => (40.0 * noise, 0),
             };
@@ -183,21 +188,21 @@ impl<const R: usize, const C: usize> Core<R, C> {
 
     /// Takes up the equations of the present mode.
     fn take_up_mode(&mut self) {
-        self.rounding.swing(self.matrices.swing, self.time());
-        let (mechanism, space) = (&self.mechanism, &self.space);
-        let (matrices, is_new) = ModeMatrices::of(&mut self.known, mechanism, space, &self.mode, self.h);
+        self.common.rounding.swing(self.matrices.swing, self.time());
+        let (mechanism, space) = (&self.common.mechanism, &self.common.space);
+        let (matrices, is_new) = ModeMatrices::of(&mut self.known, mechanism, space, &self.common.mode, self.common.h);
         self.matrices = matrices;
-        self.taken += 1;
+        self.common.taken += 1;
         let inner = self.inner();
-        self.coordinates.hold(&self.space.layout, &self.mode, &inner);
-        self.cost.modes += u64::from(is_new);
+        self.common.coordinates.hold(&self.common.space.layout, &self.common.mode, &inner);
+        self.common.cost.modes += u64::from(is_new);
     }
 
     /// A load that passes a breakaway by rounding alone does not break it.
     fn tolerate_loads(&mut self, law: &ModeMatrices<R, C>) {
         for guard in &law.guards {
             if let Cause::BreakForward(_) | Cause::BreakBackward(_) = guard.cause {
-                let tolerance = &mut self.tolerance[guard.cause.kind()];
+                let tolerance = &mut self.common.tolerance[guard.cause.kind()];
                 *tolerance = tolerance.max(2.0 * guard.noise(&self.z));
             }
         }
@@ -220,8 +225,8 @@ impl<const R: usize, const C: usize> Core<R, C> {
             };
             let fallen = law.guards.iter().filter(|guard| falls(guard)).min_by_key(|guard| guard.cause.rank());
             // What does not depend on bodies is settled: now their loads are known, and to which rounding.
-            if self.at_edge && fallen.is_none_or(|guard| guard.cause.rank() == BODIES) {
-                self.at_edge = false;
+            if self.common.at_edge && fallen.is_none_or(|guard| guard.cause.rank() == BODIES) {
+                self.common.at_edge = false;
                 self.tolerate_loads(&law);
                 if fallen.is_some() {
                     continue;
@@ -230,7 +235,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
             match fallen {
                 Some(guard) => {
                     self.change(guard.cause);
-                    if self.trouble.is_some() {
+                    if self.common.trouble.is_some() {
                         return;
                     }
                 }
@@ -238,17 +243,17 @@ impl<const R: usize, const C: usize> Core<R, C> {
                     // A torque that starts from zero does so whichever way the gear counts as carrying.
                     let of_gears = law.guards.iter().filter(|guard| matches!(guard.cause, Cause::GearTorque(_)));
                     for torque in of_gears.filter(|torque| torque.is_zero(&self.z)) {
-                        self.fresh[torque.cause.kind()] = 1;
+                        self.common.fresh[torque.cause.kind()] = 1;
                     }
-                    if (self.handed_on + self.events.len()) as f64
+                    if (self.common.handed_on + self.common.events.len()) as f64
                         > f64::min(EVENTS_AT_LEAST + EVENTS_PER_SECOND * self.time(), EVENTS_AT_MOST)
                     {
-                        self.trouble = Some(Ending::TooManyEvents { time: self.time() });
+                        self.common.trouble = Some(Ending::TooManyEvents { time: self.time() });
                     }
                     return;
                 }
             }
         }
-        self.trouble = Some(Ending::TooManyEvents { time: self.time() });
+        self.common.trouble = Some(Ending::TooManyEvents { time: self.time() });
     }
 }

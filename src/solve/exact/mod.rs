@@ -9,12 +9,14 @@
 //! g = w·z therefore changes no faster than |w|·√(2V), |w| being the norm dual to V; and likewise its slope, with ẏ.
 
 mod change;
+mod kernel;
 mod matrices;
 mod run;
 mod shown;
 
 use super::coordinates::Coordinates;
 use super::inputs::Pieces;
+use super::machine::Engine;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
 use super::propagator::SERIES_ORDER;
 use super::record::Extra;
@@ -22,6 +24,8 @@ use super::roots;
 use super::rounding::Rounding;
 use super::{Cost, Ending, Event, PositionError};
 use crate::mechanism::{Cause, DRIVES, Form, Mechanism, Mode, State};
+use kernel::Modes;
+pub(super) use kernel::{Known, Make, in_kernel};
 pub(super) use matrices::Space;
 use matrices::{ModeMatrices, Size, Watch};
 pub(super) use run::Run;
@@ -30,92 +34,29 @@ use std::sync::Arc;
 /// For so small a part of the series' reach a speed that has left zero is still told by its series alone.
 const SOON: f64 = 1e-6;
 
-/// The modes that were made ready, by the room that their vectors need: what runs of one machine can share.
-#[derive(Default, Clone)]
-pub(super) struct Known {
-    straight: Vec<Arc<ModeMatrices<8, 10>>>,
-    rotor: Vec<Arc<ModeMatrices<12, 14>>>,
-    smooth: Vec<Arc<ModeMatrices<16, 18>>>,
-    two: Vec<Arc<ModeMatrices<16, 19>>>,
-    two_smooth: Vec<Arc<ModeMatrices<28, 31>>>,
-}
-
-impl Known {
-    /// Forgets all of them: another machine.
-    pub(super) fn clear(&mut self) {
-        *self = Self::default();
-    }
-}
-
-/// Kernels for vectors of `R` moving places and `C` in all: which of the lists is theirs.
-pub(super) trait Room<const R: usize, const C: usize> {
-    fn list(&mut self) -> &mut Vec<Arc<ModeMatrices<R, C>>>;
-}
-
-macro_rules! room {
-    ($($list:ident: $rows:literal, $columns:literal;)*) => {
-        $(impl Room<$rows, $columns> for Known {
-            fn list(&mut self) -> &mut Vec<Arc<ModeMatrices<$rows, $columns>>> {
-                &mut self.$list
-            }
-        })*
-    };
-}
-room! {
-    straight: 8, 10;
-    rotor: 12, 14;
-    smooth: 16, 18;
-    two: 16, 19;
-    two_smooth: 28, 31;
-}
-
-/// The kernel for a machine: the smallest that has room for its vector.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kernel {
-    /// One drive, three bodies, straight inputs: eight moving quantities.
-    Straight,
-    /// The same with a rotor of its own.
-    Rotor,
-    /// One drive and smooth inputs, which carry their derivatives along.
-    Smooth,
-    /// Two drives.
-    Two,
-    /// Two drives and smooth inputs.
-    TwoSmooth,
-}
-
-impl Kernel {
-    /// That of a machine whose inputs are smooth, or straight.
-    pub(super) fn of(space: &Space) -> Self {
-        let fits = |rows: usize, columns: usize| {
-            let (moving, constant) = space.size();
-            moving <= rows && rows + constant == columns
-        };
-        match () {
-            () if fits(8, 10) => Self::Straight,
-            () if fits(12, 14) => Self::Rotor,
-            () if fits(16, 18) => Self::Smooth,
-            () if fits(16, 19) => Self::Two,
-            () => Self::TwoSmooth,
-        }
-    }
-}
-
 /// A machine under way: its state, its mode, and what is needed to go on. A clone of it goes on in the same way.
 #[derive(Clone)]
 pub(super) struct Core<const R: usize, const C: usize> {
+    /// State in the solver's coordinates, inputs and their derivatives, and a one.
+    z: [f64; C],
+    /// The largest magnitudes that each place of it has had in rows so far.
+    largest: [f64; C],
+    matrices: Arc<ModeMatrices<R, C>>,
+    known: Modes<R, C>,
+    /// Matrices that were there before.
+    shared: u64,
+    pub(super) common: Common,
+}
+
+/// What of a machine under way does not depend on the kernel.
+#[derive(Clone)]
+pub(super) struct Common {
     pub(super) mechanism: Arc<Mechanism>,
     pub(super) space: Arc<Space>,
     pub(super) coordinates: Coordinates,
     /// The interval whose halves there are matrices for, s.
     h: f64,
-    /// State in the solver's coordinates, inputs and their derivatives, and a one.
-    z: [f64; C],
     pub(super) mode: Mode,
-    matrices: Arc<ModeMatrices<R, C>>,
-    known: Vec<Arc<ModeMatrices<R, C>>>,
-    /// Matrices that were there before.
-    shared: u64,
     /// How many leading Taylor coefficients of a sliding body's speed are zero by definition, because it starts from rest:
     /// 1 where it is accelerated, 2 where the load has only just reached its friction. The same for all else that is watched.
     fresh: [u8; Cause::KINDS],
@@ -166,7 +107,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
         space: Arc<Space>,
         start: &State,
         (h, end): (f64, f64),
-        mut known: Vec<Arc<ModeMatrices<R, C>>>,
+        mut known: Modes<R, C>,
     ) -> Self {
         let layout = &space.layout;
         let (mut coordinates, inner) = Coordinates::new(layout, start);
@@ -184,16 +125,12 @@ impl<const R: usize, const C: usize> Core<R, C> {
         let shared = propagators(&known);
         let (matrices, is_new) = ModeMatrices::of(&mut known, &mechanism, &space, &mode, h);
         let rounding = Rounding::new(&space.layout, &mechanism);
-        Self {
+        let common = Common {
             mechanism,
             space,
             coordinates,
             h,
-            z,
             mode,
-            matrices,
-            known,
-            shared,
             fresh: [0; Cause::KINDS],
             tolerance: [0.0; Cause::KINDS],
             at_edge: true,
@@ -213,192 +150,98 @@ impl<const R: usize, const C: usize> Core<R, C> {
             end,
             asks: false,
             trouble: None,
-        }
+        };
+        Self { z, largest: [0.0; C], matrices, known, shared, common }
     }
 
     pub(super) fn time(&self) -> f64 {
-        self.base + self.offset
+        self.common.base + self.common.offset
     }
 
     /// The bound of what rounding has done so far.
-    pub(super) fn error(&mut self) -> PositionError {
-        self.rounding.swing(self.matrices.swing, self.time());
-        let steps = self.cost.steps + self.cost.series;
-        let origin = self.coordinates.origin().iter().fold(0.0, |most: f64, origin| most.max(origin.abs()));
-        self.rounding.bound(steps, self.time(), origin)
-    }
-
-    /// The mechanism, its ways counted from where it began.
-    pub(super) fn mechanism(&self) -> &Mechanism {
-        &self.mechanism
-    }
-
-    /// What a row shows beyond the linear equations: nothing.
-    pub(super) fn extra(&self) -> Extra {
-        Extra::default()
-    }
-
-    /// Takes up new inputs, and what they bring about at once.
-    pub(super) fn take_input(&mut self, pieces: &Pieces) {
-        self.set_input(pieces);
-        self.resolve();
-    }
-
-    /// Bounds how fast the inputs change until `until`.
-    pub(super) fn bound_input(&mut self, pieces: &Pieces, until: f64) {
-        let rest = pieces.since(self.time());
-        for drive in 0..self.space.layout.inputs {
-            let length = until - self.time();
-            (self.input_rate[drive], self.input_curvature[drive]) = change_rates(&rest.coefficients[drive], length);
-        }
+    fn bound_of_rounding(&mut self) -> PositionError {
+        self.common.rounding.see(&self.largest);
+        self.common.rounding.swing(self.matrices.swing, self.time());
+        let steps = self.common.cost.steps + self.common.cost.series;
+        let origin = self.common.coordinates.origin().iter().fold(0.0, |most: f64, origin| most.max(origin.abs()));
+        self.common.rounding.bound(steps, self.time(), origin)
     }
 
     /// Goes on to `until` and adds the events on the way to `events`.
-    pub(super) fn go_to(&mut self, until: f64, events: &mut Vec<Event>) -> Result<(), Ending> {
-        self.end = until;
-        (self.questions, self.pace) = (0, Pace::default());
+    fn go_on_to(&mut self, until: f64, events: &mut Vec<Event>) -> Result<(), Ending> {
+        self.common.end = until;
+        (self.common.questions, self.common.pace) = (0, Pace::default());
         self.count_from(self.time());
-        let length = until - self.base;
+        let length = until - self.common.base;
         // What a sum of decimal times may be off by; no part of the interval, which may be long.
-        let near = (8.0 * f64::EPSILON * until.abs()).min(1e-9 * self.h);
-        while length - self.offset > near && self.trouble.is_none() {
+        let near = (8.0 * f64::EPSILON * until.abs()).min(1e-9 * self.common.h);
+        while length - self.common.offset > near && self.common.trouble.is_none() {
             self.check();
             // Halves, quarters and eighths of the interval, for which there are matrices, are hit to the last bit.
-            let (left, eighth) = (length - self.offset, 0.125 * self.h);
+            let (left, eighth) = (length - self.common.offset, 0.125 * self.common.h);
             let snapped = (left / eighth).round() * eighth;
             let left = if (left - snapped).abs() <= near { snapped } else { left };
             let matrices = Arc::clone(&self.matrices);
             let y = matrices.rate(&self.z);
-            let safe = match left >= self.h {
-                true => self.safe_intervals((left / self.h) as u64, &y),
+            let safe = match left >= self.common.h {
+                true => self.safe_intervals((left / self.common.h) as u64, &y),
                 false => 0,
             };
             if safe > 0 {
                 let step = matrices.step(0);
                 (0..safe).for_each(|_| step.advance(&mut self.z));
-                self.cost.steps += safe;
-                self.move_on(safe as f64 * self.h);
+                self.common.cost.steps += safe;
+                self.move_on(safe as f64 * self.common.h);
                 continue;
             }
-            if let Some(cause) = self.advance(left.min(self.h)) {
+            if let Some(cause) = self.advance(left.min(self.common.h)) {
                 self.change(cause);
                 self.resolve();
-            } else if left <= self.h && !self.asks && self.trouble.is_none() {
+            } else if left <= self.common.h && !self.common.asks && self.common.trouble.is_none() {
                 break;
             }
-            self.asks = false;
+            self.common.asks = false;
         }
         self.check();
-        self.rounding.see(&self.z);
-        self.handed_on += self.events.len();
-        events.append(&mut self.events);
-        match self.trouble {
+        self.see();
+        self.common.handed_on += self.common.events.len();
+        events.append(&mut self.common.events);
+        match self.common.trouble {
             Some(ending) => Err(ending),
             None => {
-                self.count_from(until.max(self.base));
+                self.count_from(until.max(self.common.base));
                 Ok(())
             }
         }
     }
 
-    /// The same with room for `R2` moving places: for inputs that bend.
-    pub(super) fn smooth<const R2: usize, const C2: usize>(self) -> Core<R2, C2> {
-        let space = Arc::new(Space::new(&self.mechanism, true));
-        let mut z = [0.0; C2];
-        z[..space.layout.states].copy_from_slice(&self.z[..space.layout.states]);
-        for drive in 0..space.layout.inputs {
-            for k in 0..=self.space.highest {
-                z[space.chain::<R2>(drive, k)] = self.z[self.space.chain::<R>(drive, k)];
-            }
-        }
-        z[C2 - 1] = 1.0;
-        let mut known = Vec::new();
-        let (matrices, _) = ModeMatrices::of(&mut known, &self.mechanism, &space, &self.mode, self.h);
-        let Self {
-            mechanism,
-            coordinates,
-            h,
-            mode,
-            fresh,
-            tolerance,
-            at_edge,
-            input_rate,
-            input_curvature,
-            base,
-            offset,
-            events,
-            handed_on,
-            taken,
-            since_change,
-            changes,
-            cost,
-            rounding,
-            questions,
-            pace,
-            end,
-            asks,
-            trouble,
-            ..
-        } = self;
-        Core {
-            mechanism,
-            space,
-            coordinates,
-            h,
-            z,
-            mode,
-            matrices,
-            known,
-            shared: 0,
-            fresh,
-            tolerance,
-            at_edge,
-            input_rate,
-            input_curvature,
-            base,
-            offset,
-            events,
-            handed_on,
-            taken,
-            since_change,
-            changes,
-            cost,
-            rounding,
-            questions,
-            pace,
-            end,
-            asks,
-            trouble,
-        }
-    }
-
     /// Takes up new inputs.
     pub(super) fn set_input(&mut self, pieces: &Pieces) {
-        self.cost.pieces += 1;
-        self.fresh = [0; Cause::KINDS];
-        self.at_edge = true;
-        for drive in 0..self.space.layout.inputs {
+        self.common.cost.pieces += 1;
+        self.common.fresh = [0; Cause::KINDS];
+        self.common.at_edge = true;
+        for drive in 0..self.common.space.layout.inputs {
             self.take_up(drive, &pieces.coefficients[drive], pieces.end - pieces.start);
         }
     }
 
     /// Puts an input's value and derivatives where the state has them.
     fn take_up(&mut self, drive: usize, coefficients: &[f64], length: f64) {
-        let highest = self.space.highest;
+        let highest = self.common.space.highest;
         if coefficients[1..].iter().all(|&c| c == 0.0) {
-            (0..=highest).for_each(|k| self.z[self.space.chain::<R>(drive, k)] = 0.0);
-            self.z[self.space.chain::<R>(drive, 0)] = coefficients[0];
-            (self.input_rate[drive], self.input_curvature[drive]) = (0.0, 0.0);
+            (0..=highest).for_each(|k| self.z[self.common.space.chain::<R>(drive, k)] = 0.0);
+            self.z[self.common.space.chain::<R>(drive, 0)] = coefficients[0];
+            (self.common.input_rate[drive], self.common.input_curvature[drive]) = (0.0, 0.0);
             return;
         }
         let mut factorial = 1.0;
         for (k, &c) in coefficients.iter().enumerate().take(highest + 1) {
             factorial *= k.max(1) as f64;
             // u⁽ᵏ⁾ = k! c_k
-            self.z[self.space.chain::<R>(drive, k)] = c * factorial;
+            self.z[self.common.space.chain::<R>(drive, k)] = c * factorial;
         }
         let length = if length.is_finite() { length } else { 0.0 };
-        (self.input_rate[drive], self.input_curvature[drive]) = change_rates(coefficients, length);
+        (self.common.input_rate[drive], self.common.input_curvature[drive]) = change_rates(coefficients, length);
     }
 
     /// Whether the state is made of numbers.
@@ -407,16 +250,24 @@ impl<const R: usize, const C: usize> Core<R, C> {
         self.z.iter().sum::<f64>().is_finite()
     }
 
+    /// Keeps in mind how large what moves is here.
+    #[inline]
+    fn see(&mut self) {
+        for (largest, z) in self.largest.iter_mut().zip(&self.z) {
+            *largest = if z.abs() > *largest { z.abs() } else { *largest };
+        }
+    }
+
     /// Notices a state that is no number any more.
     fn check(&mut self) {
         if !self.is_finite() {
-            self.trouble = Some(Ending::Diverged { time: self.time() });
+            self.common.trouble = Some(Ending::Diverged { time: self.time() });
         }
     }
 
     /// Counts from `base`, where it is, on.
     fn count_from(&mut self, base: f64) {
-        (self.base, self.offset) = (base, 0.0);
+        (self.common.base, self.common.offset) = (base, 0.0);
     }
 
     /// How many whole intervals, up to `most`, no guard can fall on.
@@ -425,15 +276,15 @@ impl<const R: usize, const C: usize> Core<R, C> {
         if law.guards.is_empty() {
             return most;
         }
-        self.cost.looks += 1;
+        self.common.cost.looks += 1;
         let size = law.size(y);
-        let push = law.push(&self.input_rate) * 0.5;
+        let push = law.push(&self.common.input_rate) * 0.5;
         let mut time = f64::INFINITY;
         for guard in &law.guards {
             // g(τ) ≥ g − (|w| √2V + |w_u| |u̇|) τ − |w| |b| |u̇| τ²/2
             let g = self.standing(guard);
             let grow = law.growth_factor();
-            let slope = grow * law.steepness(guard, size, 0.0) + guard.at_once(&self.input_rate);
+            let slope = grow * law.steepness(guard, size, 0.0) + guard.at_once(&self.common.input_rate);
             let bend = grow * law.steepness(guard, Size::ZERO, push);
             let moves = slope > 0.0 || bend > 0.0;
             if g < 0.0 || (g == 0.0 && moves) || self.fresh_order(guard.cause) > 0 {
@@ -444,7 +295,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
         }
         time = time.min(law.growth_time());
         // A float that is too large becomes the largest integer.
-        most.min((time / self.h * 0.999) as u64)
+        most.min((time / self.common.h * 0.999) as u64)
     }
 
     /// Value of a guard, with what rounding alone may have made negative forgiven.
@@ -452,21 +303,21 @@ impl<const R: usize, const C: usize> Core<R, C> {
         guard.standing(&self.z)
             + match guard.cause {
                 Cause::Stop(_) => 0.0,
-                cause => self.tolerance[cause.kind()],
+                cause => self.common.tolerance[cause.kind()],
             }
     }
 
     fn fresh_order(&self, cause: Cause) -> usize {
         match cause {
             Cause::BreakForward(_) | Cause::BreakBackward(_) => 0,
-            cause => usize::from(self.fresh[cause.kind()]),
+            cause => usize::from(self.common.fresh[cause.kind()]),
         }
     }
 
     /// Advances by `distance`, at most an interval; stops at the first guard that falls and says why.
     pub(super) fn advance(&mut self, mut distance: f64) -> Option<Cause> {
         let law = Arc::clone(&self.matrices);
-        if self.fresh != [0; Cause::KINDS] && distance > 0.0 {
+        if self.common.fresh != [0; Cause::KINDS] && distance > 0.0 {
             // A speed that starts from zero is told apart from one that falls to zero by its series.
             let first = distance.min(law.reach());
             if let Some(cause) = self.advance_by_series(&law, first) {
@@ -497,7 +348,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
                     Some(end) => self.z = end,
                     None => law.step(level).advance(&mut self.z),
                 }
-                self.cost.steps += 1;
+                self.common.cost.steps += 1;
                 self.move_on(length);
                 None
             }
@@ -510,22 +361,22 @@ impl<const R: usize, const C: usize> Core<R, C> {
 
     /// Whether nothing stands against going on.
     fn goes(&self) -> bool {
-        self.trouble.is_none() && !self.asks
+        self.common.trouble.is_none() && !self.common.asks
     }
 
     /// Wants to be asked now and then whether to go on, and looks whether this leads anywhere; false if not.
     fn goes_on(&mut self) -> bool {
-        self.questions += 1;
-        if self.questions.is_multiple_of(STEPS_BETWEEN_QUESTIONS) && self.trouble.is_none() {
-            self.asks = true;
-            self.trouble = self.pace.too_stiff(self.questions, self.time(), self.end);
+        self.common.questions += 1;
+        if self.common.questions.is_multiple_of(STEPS_BETWEEN_QUESTIONS) && self.common.trouble.is_none() {
+            self.common.asks = true;
+            self.common.trouble = self.common.pace.too_stiff(self.common.questions, self.time(), self.common.end);
         }
         self.goes()
     }
 
     fn move_on(&mut self, by: f64) {
-        self.offset += by;
-        self.since_change += by;
+        self.common.offset += by;
+        self.common.since_change += by;
     }
 
     /// Decides, if it can, that no guard falls within `length`.
@@ -533,18 +384,19 @@ impl<const R: usize, const C: usize> Core<R, C> {
         if law.guards.is_empty() {
             return Bound::Safe(None);
         }
-        self.cost.looks += 1;
+        self.common.cost.looks += 1;
         let y = law.rate(&self.z);
         let grow = law.growth_over(length);
-        let (size, push) = (law.size(&y), law.push(&self.input_rate) * length);
-        let steepness = |guard: &Watch<C>| grow * law.steepness(guard, size, push) + guard.at_once(&self.input_rate);
+        let (size, push) = (law.size(&y), law.push(&self.common.input_rate) * length);
+        let steepness =
+            |guard: &Watch<C>| grow * law.steepness(guard, size, push) + guard.at_once(&self.common.input_rate);
         let undecided = |g: f64, steepness: f64| !(g > steepness * length || (g >= 0.0 && steepness == 0.0));
         if !law.guards.iter().any(|guard| undecided(self.standing(guard), steepness(guard))) {
             return Bound::Safe(None);
         }
 
         let second = law.rate_of_rate(&y);
-        let (size, push) = (law.size(&second), law.push(&self.input_curvature) * length);
+        let (size, push) = (law.size(&second), law.push(&self.common.input_curvature) * length);
         let mut falling = false;
         for guard in &law.guards {
             let g = self.standing(guard);
@@ -552,7 +404,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
                 continue;
             }
             let slope = guard.slope(&y);
-            let bend = grow * law.steepness(guard, size, push) + guard.at_once(&self.input_curvature);
+            let bend = grow * law.steepness(guard, size, push) + guard.at_once(&self.common.input_curvature);
             // g(τ) ≥ g + ġ τ − |g̈| τ²/2
             let stays = g >= 0.0 && g + slope.min(0.0) * length - 0.5 * bend * length * length > 0.0;
             let rises = g >= 0.0 && slope > bend * length;
@@ -572,16 +424,16 @@ impl<const R: usize, const C: usize> Core<R, C> {
 
     /// Advances by a `distance` within the reach of the Taylor series, to the first guard that falls.
     fn advance_by_series(&mut self, law: &ModeMatrices<R, C>, distance: f64) -> Option<Cause> {
-        self.cost.series += 1;
+        self.common.cost.series += 1;
         let series = law.series(&self.z, distance);
         let mut sizes = None;
         let mut first: Option<(f64, Cause)> = None;
         // Term 1 of the series is ż · distance: most guards are too far away to fall, as in `bound`.
         let change = std::array::from_fn(|j| series[1][j]);
-        let (size, push) = (law.size(&change), law.push(&self.input_rate) * distance * distance);
+        let (size, push) = (law.size(&change), law.push(&self.common.input_rate) * distance * distance);
         let grow = law.growth_over(distance);
         for guard in &law.guards {
-            let fall = grow * law.steepness(guard, size, push) + guard.at_once(&self.input_rate) * distance;
+            let fall = grow * law.steepness(guard, size, push) + guard.at_once(&self.common.input_rate) * distance;
             if self.standing(guard) > fall {
                 continue;
             }
@@ -610,33 +462,130 @@ impl<const R: usize, const C: usize> Core<R, C> {
         }
         self.move_on(s * distance);
         if s * distance > SOON * law.reach() {
-            self.fresh = [0; Cause::KINDS];
+            self.common.fresh = [0; Cause::KINDS];
         }
         first.map(|(_, cause)| cause)
     }
 
     /// The state in the solver's coordinates.
     fn inner(&self) -> State {
-        self.space.inner(&self.z)
+        self.common.space.inner(&self.z)
     }
 
     /// The state in angles and positions.
     pub(super) fn state(&self) -> State {
-        self.coordinates.state(&self.space.layout, &self.inner())
+        self.common.coordinates.state(&self.common.space.layout, &self.inner())
     }
 
     pub(super) fn input(&self) -> [f64; DRIVES] {
-        self.space.input::<R>(&self.z)
+        self.common.space.input::<R>(&self.z)
     }
 
     /// What rounding may have done to the value of a form.
     fn noise(&self, form: &Form) -> f64 {
-        form.noise(&self.space.layout, &self.inner(), &self.input())
+        form.noise(&self.common.space.layout, &self.inner(), &self.input())
     }
 
     /// The value of a form now.
     pub(super) fn value(&self, form: &Form) -> f64 {
-        self.space.layout.value(form, &self.inner(), &self.input())
+        self.common.space.layout.value(form, &self.inner(), &self.input())
+    }
+}
+
+/// Makes what goes on where another one stands, with room for inputs that bend.
+struct Smoothed {
+    /// Of another kernel: states and inputs, as [`Space::inner`] and [`Space::chain`] find them there.
+    z: Vec<f64>,
+    derivatives: Vec<Vec<f64>>,
+    common: Common,
+}
+
+impl Make for Smoothed {
+    type Made = Box<dyn Engine>;
+
+    fn make<const R: usize, const C: usize>(self) -> Self::Made {
+        let Self { z: states, derivatives, common } = self;
+        let mut z = [0.0; C];
+        z[..states.len()].copy_from_slice(&states);
+        for (drive, derivatives) in derivatives.iter().enumerate() {
+            for (k, value) in derivatives.iter().enumerate() {
+                z[common.space.chain::<R>(drive, k)] = *value;
+            }
+        }
+        z[C - 1] = 1.0;
+        let mut known = Vec::new();
+        let (matrices, _) = ModeMatrices::of(&mut known, &common.mechanism, &common.space, &common.mode, common.h);
+        Box::new(Core::<R, C> { z, largest: [0.0; C], matrices, known, shared: 0, common })
+    }
+}
+
+impl<const R: usize, const C: usize> Engine for Core<R, C> {
+    fn copy(&self) -> Box<dyn Engine> {
+        Box::new(self.clone())
+    }
+
+    fn mechanism(&self) -> &Mechanism {
+        &self.common.mechanism
+    }
+
+    fn time(&self) -> f64 {
+        Core::time(self)
+    }
+
+    fn is_smooth(&self) -> bool {
+        self.common.space.highest > 1
+    }
+
+    fn smooth(&self) -> Box<dyn Engine> {
+        let mut common = self.common.clone();
+        common.rounding.see(&self.largest);
+        let old = &self.common.space;
+        let derivative = |drive: usize| (0..=old.highest).map(move |k| self.z[old.chain::<R>(drive, k)]);
+        let derivatives = (0..old.layout.inputs).map(|drive| derivative(drive).collect()).collect();
+        let space = Arc::new(Space::new(&self.common.mechanism, true));
+        common.space = Arc::clone(&space);
+        in_kernel(space.size(), Smoothed { z: self.z[..old.layout.states].to_vec(), derivatives, common })
+    }
+
+    fn take_input(&mut self, pieces: &Pieces) {
+        self.set_input(pieces);
+        self.resolve();
+    }
+
+    fn bound_input(&mut self, pieces: &Pieces, until: f64) {
+        let (rest, length) = (pieces.since(self.time()), until - self.time());
+        for drive in 0..self.common.space.layout.inputs {
+            (self.common.input_rate[drive], self.common.input_curvature[drive]) =
+                change_rates(&rest.coefficients[drive], length);
+        }
+    }
+
+    fn go_to(&mut self, until: f64, events: &mut Vec<Event>) -> Result<(), Ending> {
+        self.go_on_to(until, events)
+    }
+
+    fn state(&self) -> State {
+        Core::state(self)
+    }
+
+    fn mode(&self) -> &Mode {
+        &self.common.mode
+    }
+
+    fn input(&self) -> [f64; DRIVES] {
+        Core::input(self)
+    }
+
+    fn value(&self, form: &Form) -> f64 {
+        Core::value(self, form)
+    }
+
+    fn extra(&self) -> Extra {
+        Extra::default()
+    }
+
+    fn error(&self) -> Option<PositionError> {
+        Some(self.clone().bound_of_rounding())
     }
 }
 

@@ -1,7 +1,7 @@
 //! A run: a machine, and a recorder of its rows.
 
 use super::shown::Watching;
-use super::{Core, Known, Room, Space};
+use super::{Core, Known, Space};
 use crate::mechanism::{Mechanism, State};
 use crate::solve::inputs::Pieces;
 use crate::solve::observe::Output;
@@ -24,10 +24,7 @@ pub(in crate::solve) struct Run<'a, const R: usize, const C: usize> {
     known: Known,
 }
 
-impl<'a, const R: usize, const C: usize> Run<'a, R, C>
-where
-    Known: Room<R, C>,
-{
+impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     /// A run that begins in `start`.
     pub(in crate::solve) fn new(
         mechanism: &Arc<Mechanism>,
@@ -38,8 +35,9 @@ where
     ) -> Self {
         let grid = Grid::new(start.every, start.until);
         let seen = mechanism.seen_by(&space.layout, &start.state);
-        let list = std::mem::take(known.list());
-        let recorder = Recorder::new(&seen, &space.layout, grid, output);
+        let list = std::mem::take(known.list::<R, C>());
+        let inputs = |drive| space.chain::<R>(drive, 0);
+        let recorder = Recorder::new(&seen, &space.layout, (R, &inputs), grid, output);
         let core = Core::new(seen, Arc::new(space), &start.state, (grid.interval(), grid.end()), list);
         Self { core, grid, row: 0, recorder, watching: Watching::new(), known }
     }
@@ -74,26 +72,26 @@ where
 
     /// Advances to `offset` behind row `row`, event by event.
     fn reach(&mut self, row: u64, offset: f64) {
-        while (self.row < row || (self.row == row && self.core.offset < offset)) && self.goes() {
+        while (self.row < row || (self.row == row && self.core.common.offset < offset)) && self.goes() {
             self.core.check();
-            if self.core.offset == 0.0 {
+            if self.core.common.offset == 0.0 {
                 self.put_out();
                 if self.row < row && self.goes() && self.take_safe_intervals(row - self.row) {
                     continue;
                 }
             }
             let ahead = if self.row < row { self.grid.interval() } else { offset };
-            match self.advance_shown(ahead - self.core.offset) {
+            match self.advance_shown(ahead - self.core.common.offset) {
                 Some(cause) => {
                     self.core.change(cause);
                     self.core.resolve();
                     self.jumped();
                 }
                 // Paused in the midst of an interval: it is taken up where it was left.
-                None if self.core.asks => self.ask_receiver(),
+                None if self.core.common.asks => self.ask_receiver(),
                 None if !self.goes() => {}
                 None if self.row < row => self.go_to(self.row + 1),
-                None => self.core.offset = offset,
+                None => self.core.common.offset = offset,
             }
         }
     }
@@ -105,37 +103,37 @@ where
 
     /// Asks the receiver whether to go on.
     fn ask_receiver(&mut self) {
-        self.core.asks = false;
+        self.core.common.asks = false;
         self.recorder.ask();
         self.heed();
     }
 
     fn goes(&self) -> bool {
-        self.core.trouble.is_none()
+        self.core.common.trouble.is_none()
     }
 
     /// Ends where the receiver wants no more.
     #[inline]
     fn heed(&mut self) {
-        if self.recorder.flow == Flow::Stop && self.core.trouble.is_none() {
-            self.core.trouble = Some(Ending::Interrupted { time: self.time() });
+        if self.recorder.flow == Flow::Stop && self.core.common.trouble.is_none() {
+            self.core.common.trouble = Some(Ending::Interrupted { time: self.time() });
         }
     }
 
     fn time(&self) -> f64 {
-        self.grid.time(self.row) + self.core.offset
+        self.grid.time(self.row) + self.core.common.offset
     }
 
     /// Puts out the present row, once, and looks whether all is well.
     fn put_out(&mut self) {
         if !self.core.is_finite() {
-            self.core.trouble = Some(Ending::Diverged { time: self.time() });
+            self.core.common.trouble = Some(Ending::Diverged { time: self.time() });
         }
-        if self.recorder.next_row() == self.row && self.core.trouble.is_none() {
+        if self.recorder.next_row() == self.row && self.core.common.trouble.is_none() {
             let core = &mut self.core;
-            core.rounding.see(&core.z);
-            self.recorder.segment(core.taken, &core.coordinates, &core.mode);
-            self.recorder.push(&core.z, &core.space.input::<R>(&core.z));
+            core.see();
+            self.recorder.segment(core.common.taken, &core.common.coordinates, &core.common.mode);
+            self.recorder.push(core.z.first_chunk::<R>().expect("what moves stands first"));
         }
         self.heed();
     }
@@ -155,24 +153,33 @@ where
             let (begin, z) = (self.core.time(), self.core.z);
             self.move_shown(&law, begin, safe as f64 * h, z, bow);
         }
-        self.core.since_change += safe as f64 * h;
+        self.core.common.since_change += safe as f64 * h;
         if resting && self.recorder.detail == Detail::None {
             self.recorder.skip(safe - 1);
             self.go_to(self.row + safe);
             return true;
         }
         let step = law.step(0);
+        if resting {
+            // One row, again and again.
+            self.row += self.recorder.repeat(safe - 1);
+            self.heed();
+            if self.goes() {
+                self.row += 1;
+            }
+            self.go_to(self.row);
+            return true;
+        }
         let mut closer = 0;
         for j in 0..safe {
             if j > 0 {
                 self.put_out();
-                if self.core.trouble.is_some() {
+                if self.core.common.trouble.is_some() {
                     self.go_to(self.row);
                     return true;
                 }
             }
             match &mut bow {
-                _ if resting => {}
                 Some(bow) => {
                     let mut end = self.core.z;
                     step.advance(&mut end);
@@ -188,15 +195,12 @@ where
             self.row += 1;
         }
         self.go_to(self.row);
-        self.core.cost.steps += if resting { 0 } else { safe };
+        self.core.common.cost.steps += safe;
         true
     }
 }
 
-impl<const R: usize, const C: usize> Running for Run<'_, R, C>
-where
-    Known: Room<R, C>,
-{
+impl<const R: usize, const C: usize> Running for Run<'_, R, C> {
     fn set_input(&mut self, pieces: &Pieces) {
         self.core.set_input(pieces);
         self.core.resolve();
@@ -205,11 +209,11 @@ where
 
     fn advance(&mut self, until: f64) -> bool {
         let end = self.grid.end();
-        if self.core.trouble.is_none() {
+        if self.core.common.trouble.is_none() {
             let (row, offset) = self.locate(until.min(end));
             self.reach(row, offset);
         }
-        self.core.trouble.is_none()
+        self.core.common.trouble.is_none()
     }
 
     fn state(&self) -> State {
@@ -217,35 +221,40 @@ where
     }
 
     fn current(&self, drive: usize) -> f64 {
-        self.core.value(&self.core.mechanism.current(drive, &self.core.mode))
+        self.core.value(&self.core.common.mechanism.current(drive, &self.core.common.mode))
     }
 
     fn finish(&mut self, is_at_end: bool) -> Outcome {
-        if self.core.trouble.is_none() {
+        if self.core.common.trouble.is_none() {
             if is_at_end {
                 // Behind a last, shorter interval it stands at the last row, too.
                 self.go_to(self.grid.intervals());
                 self.put_out();
             } else {
-                self.core.trouble = Some(Ending::Interrupted { time: self.time() });
+                self.core.common.trouble = Some(Ending::Interrupted { time: self.time() });
             }
         }
         self.end_shown();
         self.recorder.finish();
-        self.core.cost.samples = self.recorder.rows;
-        let ending = match (self.core.trouble, self.recorder.flow) {
+        self.core.common.cost.samples = self.recorder.rows;
+        let ending = match (self.core.common.trouble, self.recorder.flow) {
             (Some(trouble), _) => trouble,
             (None, Flow::Stop) => Ending::Interrupted { time: self.core.time() },
             (None, Flow::Continue) => Ending::Complete,
         };
         let core = &mut self.core;
-        core.cost.propagators = super::propagators(&core.known) - core.shared;
-        let error = Some(core.error());
-        Outcome { events: std::mem::take(&mut core.events), ending, cost: std::mem::take(&mut core.cost), error }
+        core.common.cost.propagators = super::propagators(&core.known) - core.shared;
+        let error = Some(core.bound_of_rounding());
+        Outcome {
+            events: std::mem::take(&mut core.common.events),
+            ending,
+            cost: std::mem::take(&mut core.common.cost),
+            error,
+        }
     }
 
     fn known(&mut self) -> Known {
-        *self.known.list() = std::mem::take(&mut self.core.known);
+        *self.known.list::<R, C>() = std::mem::take(&mut self.core.known);
         std::mem::take(&mut self.known)
     }
 }

@@ -1,7 +1,7 @@
 //! What an observer is shown of a run: every interval, and closer where something may happen within.
 
 use super::matrices::Shown;
-use super::{Known, ModeMatrices, Room, Run};
+use super::{ModeMatrices, Run};
 use crate::mechanism::Cause;
 use crate::solve::observe::{Curve, Gap, QUANTITIES, Reading};
 use std::sync::Arc;
@@ -48,10 +48,7 @@ impl Watching {
     }
 }
 
-impl<const R: usize, const C: usize> Run<'_, R, C>
-where
-    Known: Room<R, C>,
-{
+impl<const R: usize, const C: usize> Run<'_, R, C> {
     /// Whether somebody observes.
     pub(super) fn is_observed(&self) -> bool {
         self.recorder.observer.is_some()
@@ -64,10 +61,10 @@ where
 
     /// The run has ended.
     pub(super) fn end_shown(&mut self) {
-        let (time, state, mode) = (self.core.time(), self.core.state(), self.core.mode);
+        let (time, state, mode) = (self.core.time(), self.core.state(), self.core.common.mode);
         if self.is_observed() {
             let law = Arc::clone(&self.core.matrices);
-            let shown = law.shown(&self.core.mechanism, &self.core.space);
+            let shown = law.shown(&self.core.common.mechanism, &self.core.common.space);
             self.show(shown, time, 0.0, &self.core.z.clone(), &[0.0; QUANTITIES]);
         }
         if let Some(observer) = &mut self.recorder.observer {
@@ -81,8 +78,13 @@ where
     }
 
     fn bow_from(&self, law: &ModeMatrices<R, C>, z: &[f64; C], interval: f64, whole: f64) -> Reading {
-        let shown = law.shown(&self.core.mechanism, &self.core.space);
-        law.bow(shown, &law.rate(z), (&self.core.input_rate, &self.core.input_curvature), (interval, whole))
+        let shown = law.shown(&self.core.common.mechanism, &self.core.common.space);
+        law.bow(
+            shown,
+            &law.rate(z),
+            (&self.core.common.input_rate, &self.core.common.input_curvature),
+            (interval, whole),
+        )
     }
 
     /// Shows the interval of `length` that began at `begin` and has led to `end`; says whether the observer wants to see closer.
@@ -100,7 +102,7 @@ where
         for (scale, to) in self.watching.scale.iter_mut().zip(to) {
             *scale = scale.max(to.abs());
         }
-        let gap = Gap { begin, length, from, to, bow, mode: &self.core.mode };
+        let gap = Gap { begin, length, from, to, bow, mode: &self.core.common.mode };
         self.recorder.observer.as_mut().is_some_and(|observer| observer.pass(&gap))
     }
 
@@ -114,7 +116,8 @@ where
         bow: &Reading,
     ) -> bool {
         let start = self.core.z;
-        let closer = self.show(law.shown(&self.core.mechanism, &self.core.space), begin, length, &end, bow);
+        let closer =
+            self.show(law.shown(&self.core.common.mechanism, &self.core.common.space), begin, length, &end, bow);
         if closer {
             self.show_closer(law, start, begin, length);
         }
@@ -203,7 +206,7 @@ where
     /// What is to be seen of `z`.
     fn sight(&self, law: &ModeMatrices<R, C>, z: &[f64; C]) -> Sight<R, C> {
         let rate = law.rate(z);
-        let value = self.read(law.shown(&self.core.mechanism, &self.core.space), z);
+        let value = self.read(law.shown(&self.core.common.mechanism, &self.core.common.space), z);
         Sight { z: *z, rate, value, slope: self.rates(law, &rate) }
     }
 
@@ -211,7 +214,7 @@ where
     fn rates(&self, law: &ModeMatrices<R, C>, rate: &[f64; R]) -> Reading {
         let mut wide = [0.0; C];
         wide[..R].copy_from_slice(rate);
-        law.shown(&self.core.mechanism, &self.core.space).change(&wide)
+        law.shown(&self.core.common.mechanism, &self.core.common.space).change(&wide)
     }
 
     /// The curve between two sights.
@@ -235,7 +238,7 @@ where
 
     /// What is read in `z`.
     fn read(&self, shown: &Shown<C>, z: &[f64; C]) -> Reading {
-        shown.read(z, self.core.coordinates.origin())
+        shown.read(z, self.core.common.coordinates.origin())
     }
 
     /// The same as [`Core::advance`], and shows the way to whoever observes.
@@ -244,9 +247,9 @@ where
             return self.core.advance(distance);
         }
         let core = &mut self.core;
-        let (law, before, begin, offset) = (Arc::clone(&core.matrices), core.z, core.time(), core.offset);
+        let (law, before, begin, offset) = (Arc::clone(&core.matrices), core.z, core.time(), core.common.offset);
         let cause = core.advance(distance);
-        let (after, length) = (core.z, core.offset - offset);
+        let (after, length) = (core.z, core.common.offset - offset);
         core.z = before;
         let bow = self.bow(&law, length, length);
         self.move_shown(&law, begin, length, after, &bow);

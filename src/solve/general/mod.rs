@@ -13,9 +13,10 @@ mod stretch;
 
 use super::coordinates::Coordinates;
 use super::inputs::Pieces;
+use super::machine::Engine;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
 use super::record::Extra;
-use super::{Cost, Ending, Event};
+use super::{Cost, Ending, Event, PositionError};
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
 use crate::mechanism::{
@@ -163,7 +164,7 @@ impl Core {
             if part.kind == Kind::Linear {
                 absolute[model.speed(body)] *= r;
             }
-            let friction = mechanism.friction(body);
+            let friction = &part.friction;
             if let (Some(place), Law::LuGre { stiffness, .. }) = (model.bristle[body], friction.law) {
                 // Bristles bend by F_b/σ₀ at most.
                 absolute[place] = tolerance * friction.forward.breakaway.max(friction.backward.breakaway) / stiffness;
@@ -230,52 +231,6 @@ impl Core {
         }
     }
 
-    /// The mechanism, its ways counted from where it began.
-    pub(super) fn mechanism(&self) -> &Mechanism {
-        &self.model.mechanism
-    }
-
-    /// What a row shows beyond the linear equations.
-    pub(super) fn extra(&self) -> Extra {
-        self.model.extra(&self.mode, &self.y)
-    }
-
-    /// Takes up new inputs, and what they bring about at once.
-    pub(super) fn take_input(&mut self, pieces: &Pieces) {
-        self.take_up(Stretch::of(*pieces, f64::INFINITY), false);
-    }
-
-    /// Steps are as short as the inputs need by themselves.
-    pub(super) fn bound_input(&mut self, _: &Pieces, _: f64) {}
-
-    /// Goes on to `until` and adds the events on the way to `events`.
-    pub(super) fn go_to(&mut self, until: f64, events: &mut Vec<Event>) -> std::result::Result<(), Ending> {
-        self.end = until;
-        self.pace = Pace::since(self.cost.steps, self.time());
-        self.stretch.end = until;
-        if self.trouble.is_none() && self.tau < self.stretch.length() {
-            self.reach(&mut Nobody);
-        }
-        self.handed_on += self.events.len();
-        events.append(&mut self.events);
-        self.trouble.map_or(Ok(()), Err)
-    }
-
-    /// The state in angles and positions.
-    pub(super) fn state(&self) -> State {
-        self.coordinates.state(&self.model.layout, &self.model.inner(&self.y))
-    }
-
-    /// The inputs now.
-    pub(super) fn input(&self) -> [f64; DRIVES] {
-        self.stretch.input(self.tau)
-    }
-
-    /// The value of a form now, by the linear equations.
-    pub(super) fn value(&self, form: &Form) -> f64 {
-        self.model.value(form, &self.model.inner(&self.y), &self.input())
-    }
-
     /// Integrates to the end of the stretch, or to the first guard that falls.
     fn integrate(&mut self, stretch: &Stretch, witness: &mut dyn Witness) -> Option<Hit> {
         let model = Arc::clone(&self.model);
@@ -292,7 +247,8 @@ impl Core {
         solver.first_step = solver.first_step.map(|step| step.min(longest));
         let (relative, absolute, y) = (self.relative(), self.absolute(), self.y);
         let (from, size) = (self.tau, self.model.size);
-        let mut observer = Observer { watches: field.watches(), run: self, field: &field, witness, hit: None };
+        let mut observer =
+            Observer { watches: field.watches(), run: self, field: &field, witness, values: Vec::new(), hit: None };
         let result = solver.solve(&field, from, &y[..size], length, relative, absolute, Some(&mut observer));
         let hit = observer.hit;
         self.cost.evaluations += field.evaluations();
@@ -320,9 +276,10 @@ impl Core {
     fn decide(&self, body: usize, input: &[f64; DRIVES]) -> Motion {
         let (model, state) = (&*self.model, &self.y);
         let (mode, noise) = (&self.mode, model.noise(body, &self.mode, state, input));
-        if model.load(body, true, mode, state, input) > model.breakaway(body, true, state) + noise {
+        let held = model.bristle_force(body, state);
+        if model.load(body, true, mode, state, input) - held > model.breakaway(body, true, state) + noise {
             Motion::Forward
-        } else if model.load(body, false, mode, state, input) < -model.breakaway(body, false, state) - noise {
+        } else if model.load(body, false, mode, state, input) - held < -model.breakaway(body, false, state) - noise {
             Motion::Backward
         } else {
             Motion::Stuck
@@ -484,12 +441,80 @@ impl Core {
     }
 }
 
+impl Engine for Core {
+    fn copy(&self) -> Box<dyn Engine> {
+        Box::new(self.clone())
+    }
+
+    fn mechanism(&self) -> &Mechanism {
+        &self.model.mechanism
+    }
+
+    fn time(&self) -> f64 {
+        Core::time(self)
+    }
+
+    fn is_smooth(&self) -> bool {
+        true
+    }
+
+    fn smooth(&self) -> Box<dyn Engine> {
+        self.copy()
+    }
+
+    fn take_input(&mut self, pieces: &Pieces) {
+        self.take_up(Stretch::of(*pieces, f64::INFINITY), false);
+    }
+
+    /// Steps are as short as the inputs need by themselves.
+    fn bound_input(&mut self, _: &Pieces, _: f64) {}
+
+    fn go_to(&mut self, until: f64, events: &mut Vec<Event>) -> std::result::Result<(), Ending> {
+        self.end = until;
+        self.pace = Pace::since(self.cost.steps, self.time());
+        self.stretch.end = until;
+        if self.trouble.is_none() && self.tau < self.stretch.length() {
+            self.reach(&mut Nobody);
+        }
+        self.handed_on += self.events.len();
+        events.append(&mut self.events);
+        self.trouble.map_or(Ok(()), Err)
+    }
+
+    fn state(&self) -> State {
+        self.coordinates.state(&self.model.layout, &self.model.inner(&self.y))
+    }
+
+    fn mode(&self) -> &Mode {
+        &self.mode
+    }
+
+    fn input(&self) -> [f64; DRIVES] {
+        self.stretch.input(self.tau)
+    }
+
+    fn value(&self, form: &Form) -> f64 {
+        self.model.value(form, &self.model.inner(&self.y), &self.input())
+    }
+
+    fn extra(&self) -> Extra {
+        self.model.extra(&self.mode, &self.y)
+    }
+
+    /// Nothing is known of it while it goes; [`super::ErrorEstimate`] has it of a run.
+    fn error(&self) -> Option<PositionError> {
+        None
+    }
+}
+
 /// Looks at every step: finds the guard that falls first, and shows the way until there.
 struct Observer<'r> {
     run: &'r mut Core,
     field: &'r Field<'r>,
     witness: &'r mut dyn Witness,
     watches: Vec<Cause>,
+    /// The conditions at the nodes of a step.
+    values: Vec<[f64; NODES]>,
     hit: Option<Hit>,
 }
 
@@ -542,7 +567,8 @@ impl Observer<'_> {
             return None;
         }
         self.run.cost.looks += 1;
-        let mut values = [[0.0; NODES]; model::MOST_GUARDS];
+        let mut values = std::mem::take(&mut self.values);
+        values.resize(self.watches.len(), [0.0; NODES]);
         for node in 0..NODES {
             let tau = from + (to - from) * node as f64 / (NODES - 1) as f64;
             let guards = match node {
@@ -586,6 +612,7 @@ impl Observer<'_> {
                 }
             }
         }
+        self.values = values;
         let (s, slope, index, slack) = first?;
         // A speed that has fallen through is looked for where it was zero.
         let slack = if matches!(self.watches[index], Cause::Stop(_)) { 0.0 } else { slack };

@@ -1,7 +1,7 @@
 //! The equations as the integrator sees them: the linear ones of a mode, and what a law or a belt adds to them.
 
 use super::stretch::Stretch;
-use crate::friction::{Law, Motion};
+use crate::friction::{Friction, Law, Motion};
 use crate::mechanism::{
     BODIES, Cause, DRIVES, Equations, Form, Layout, Mechanism, Mode, ROUNDING, SPRINGS, State, Switch,
 };
@@ -19,9 +19,6 @@ pub(super) type Vector = [f64; MOST];
 /// Most conditions watched at once: two for each body, one for each gear, two for each limit and for each spring.
 pub(super) const MOST_GUARDS: usize = 2 * BODIES + 5 * DRIVES + 2 * SPRINGS;
 
-/// Room for what a linear form is made of: the integrated quantities, the inputs, and a one.
-pub(super) const WIDE: usize = MOST + DRIVES + 1;
-
 /// A spring that follows the bodies.
 struct Following {
     spring: usize,
@@ -29,6 +26,18 @@ struct Following {
     terms: Vec<(usize, f64)>,
     /// By how much its force acts on each body that moves by itself.
     arms: Vec<(usize, f64)>,
+}
+
+/// A body whose own friction is not that of the linear equations, be it moved by another or not.
+struct Curved {
+    body: usize,
+    /// The body that it moves with, and its way per way of that one.
+    leader: usize,
+    ratio: f64,
+    friction: Friction,
+    /// Where its speed stands, and the deflection of its bristles, if it has them.
+    speed: usize,
+    bristle: Option<usize>,
 }
 
 /// A machine made ready for the integrator.
@@ -45,15 +54,15 @@ pub(super) struct Model {
     pub(super) bristle: [Option<usize>; BODIES],
     /// Whether anything is added to the linear equations at all.
     pub(super) adds: bool,
-    /// Bodies whose friction is not that of the linear equations.
-    curved: Vec<usize>,
+    curved: Vec<Curved>,
     following: Vec<Following>,
 }
 
 /// What is added to the linear equations.
 #[derive(Clone, Copy, Default)]
 struct Added {
-    /// Forces and torques on each body that moves by itself: of springs that follow, less friction beyond b v ± F_c.
+    /// Forces and torques on each body that moves by itself: of springs that follow, and, to be taken off, friction beyond b v ± F_c of
+    /// all that moves with it.
     load: [f64; BODIES],
     friction: [f64; BODIES],
     /// Rates of the bristles.
@@ -76,12 +85,19 @@ impl Model {
         }
         (held.end..mechanism.bodies.len()).for_each(|body| place[body] = room(2));
         for (body, place) in bristle.iter_mut().enumerate().take(mechanism.bodies.len()) {
-            *place = matches!(mechanism.friction(body).law, Law::LuGre { .. }).then(|| room(1));
+            *place = matches!(mechanism.bodies[body].friction.law, Law::LuGre { .. }).then(|| room(1));
         }
         let adds = !mechanism.is_piecewise_linear();
-        let is_curved =
-            |&b: &usize| !mechanism.friction(b).is_piecewise_linear() || mechanism.bodies[b].along.is_some();
-        let curved = mechanism.leaders().filter(is_curved).collect();
+        let is_curved = |&b: &usize| {
+            let part = &mechanism.bodies[b];
+            !part.friction.is_piecewise_linear() || part.along.is_some()
+        };
+        let curved = (0..mechanism.bodies.len()).filter(is_curved).map(|body| {
+            let part = &mechanism.bodies[body];
+            let (leader, ratio) = part.leader;
+            Curved { body, leader, ratio, friction: part.friction, speed: place[body] + 1, bristle: bristle[body] }
+        });
+        let curved = curved.collect();
         let follows = |&spring: &usize| mechanism.springs[spring].follows.is_some();
         let following = (0..mechanism.springs.len()).filter(follows).map(|spring| {
             let arms = mechanism.leading_arms(spring).into_iter().enumerate();
@@ -95,9 +111,9 @@ impl Model {
         Self { mechanism, layout, place, current, size, bristle, adds, curved, following }
     }
 
-    /// Coefficients of a form on the integrated quantities, the inputs, and a one.
-    fn row(&self, form: &Form) -> [f64; WIDE] {
-        let mut row = [0.0; WIDE];
+    /// Coefficients of the integrated quantities in a form that are not zero.
+    fn terms(&self, form: &Form) -> impl Iterator<Item = (usize, f64)> + use<> {
+        let mut row = [0.0; MOST];
         let on = self.layout.on_coordinates(form);
         for body in 0..self.mechanism.bodies.len() {
             (row[self.coordinate(body)], row[self.speed(body)]) = (on.position[body], on.speed[body]);
@@ -107,25 +123,7 @@ impl Model {
                 row[*place] = current;
             }
         }
-        for (drive, input) in form.input.iter().enumerate().take(self.mechanism.drives.len()) {
-            row[self.size + drive] = *input;
-        }
-        row[self.width() - 1] = form.constant;
-        row
-    }
-
-    /// How many coefficients a form has.
-    fn width(&self) -> usize {
-        self.size + self.mechanism.drives.len() + 1
-    }
-
-    /// The value of a row of coefficients.
-    #[inline(always)]
-    fn value_of(&self, row: &[f64; WIDE], y: &[f64], input: &[f64; DRIVES]) -> f64 {
-        let (on_y, rest) = row.split_at(self.size);
-        let sum = on_y.iter().zip(y).fold(0.0, |sum, (coefficient, value)| sum + coefficient * value);
-        let drives = self.mechanism.drives.len();
-        rest[..drives].iter().zip(input).fold(sum + rest[drives], |sum, (c, input)| sum + c * input)
+        row.into_iter().enumerate().filter(|(_, coefficient)| *coefficient != 0.0)
     }
 
     /// Place of a body's coordinate.
@@ -205,7 +203,7 @@ impl Model {
     pub(super) fn load(&self, body: usize, forward: bool, mode: &Mode, y: &[f64], input: &[f64; DRIVES]) -> f64 {
         let inner = self.inner(y);
         let mut settled = *mode;
-        for drive in 0..self.mechanism.drives.len() {
+        for (drive, _) in self.mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.loses()) {
             let torque = self.mechanism.torque_at_rest(drive, mode);
             settled.drive[drive].torque_positive = self.value(&torque, &inner, input) >= 0.0;
         }
@@ -217,44 +215,75 @@ impl Model {
         self.mechanism.load(body, true, mode).noise(&self.layout, &self.inner(y), input)
     }
 
-    /// What a body at rest holds this way, where it is.
+    /// What a body at rest holds this way, where it is, with all that moves with it: Σ ρ a(x) F_b.
     #[inline]
-    pub(super) fn breakaway(&self, body: usize, forward: bool, y: &[f64]) -> f64 {
-        self.factor(body, y) * self.mechanism.friction(body).breakaway(forward)
+    pub(super) fn breakaway(&self, leader: usize, forward: bool, y: &[f64]) -> f64 {
+        let own = |body: usize| {
+            let part = &self.mechanism.bodies[body];
+            self.mechanism.ratio(body) * (self.factor(body, y) * part.friction.breakaway(forward))
+        };
+        self.mechanism.followers(leader).map(own).sum()
+    }
+
+    /// What bent bristles hold a body at rest with, and all that moves with it: Σ ρ σ₀ z.
+    #[inline]
+    pub(super) fn bristle_force(&self, leader: usize, y: &[f64]) -> f64 {
+        let of = |curved: &Curved| match (curved.friction.law, curved.bristle) {
+            (Law::LuGre { stiffness, .. }, Some(place)) => curved.ratio * (stiffness * y[place]),
+            _ => 0.0,
+        };
+        self.curved.iter().filter(|curved| curved.leader == leader).map(of).sum()
     }
 
     /// What the laws and the belt add to the linear equations, and how the bristles move.
     #[inline(always)]
     fn added(&self, mode: &Mode, y: &[f64]) -> Added {
         let mut added = Added { load: self.loads(mode, y), ..Added::default() };
-        for &body in &self.curved {
-            let friction = self.mechanism.friction(body);
-            let v = y[self.speed(body)];
-            added.friction[body] = match (mode.motion[body], friction.law) {
-                (Motion::Stuck, _) => 0.0,
-                // In the equations there is b v ± F_c; here what the law differs by.
-                (Motion::Forward, _) => self.factor(body, y) * friction.dry(true, v) - friction.forward.coulomb,
-                (Motion::Backward, _) => friction.backward.coulomb - self.factor(body, y) * friction.dry(false, -v),
-                // In the equations there is b v.
-                (Motion::Free, Law::Coulomb | Law::Stribeck { .. }) => 0.0,
-                (Motion::Free, law) => {
-                    let forward = v >= 0.0;
-                    let dry = self.factor(body, y) * friction.dry(forward, v.abs());
-                    let viscous = (friction.side(forward).viscous - friction.forward.viscous) * v;
-                    match (law, self.bristle[body]) {
-                        (Law::LuGre { stiffness, damping, .. }, Some(place)) => {
-                            let z = y[place];
-                            // ż = v − σ₀ |v| z / g(v)
-                            added.bristle[body] = v - stiffness * v.abs() * z / dry;
-                            // σ₀ z + σ₁ ż
-                            stiffness * z + damping * added.bristle[body] + viscous
-                        }
-                        _ => dry.copysign(v) + viscous,
-                    }
-                }
-            };
+        for curved in &self.curved {
+            let (friction, bristle) = self.beyond_straight(curved, mode.motion[curved.body], y);
+            // Power is conserved: F = ρ τ
+            added.friction[curved.leader] += curved.ratio * friction;
+            added.bristle[curved.body] = bristle;
         }
         added
+    }
+
+    /// What a body's own friction differs by from that of the linear equations, and how fast its bristles bend.
+    #[inline(always)]
+    fn beyond_straight(&self, curved: &Curved, motion: Motion, y: &[f64]) -> (f64, f64) {
+        let (body, friction, v) = (curved.body, &curved.friction, y[curved.speed]);
+        // The speed counted in the direction of motion: where a trial step overshoots, the law goes on smoothly.
+        let (forward, speed) = match motion {
+            // Held, neither body nor bristles move.
+            Motion::Stuck => return (0.0, 0.0),
+            Motion::Forward => (true, v),
+            Motion::Backward => (false, -v),
+            Motion::Free => (v >= 0.0, v.abs()),
+        };
+        let sign = if forward { 1.0 } else { -1.0 };
+        let side = friction.side(forward);
+        // In the equations there is b v of this direction; of a body that is free, b v of the forward one.
+        let viscous = match motion {
+            Motion::Free => (side.viscous - friction.forward.viscous) * v,
+            Motion::Forward | Motion::Backward | Motion::Stuck => 0.0,
+        };
+        match friction.law {
+            // Nothing but b v.
+            Law::Coulomb | Law::Stribeck { .. } if motion == Motion::Free => (0.0, 0.0),
+            // In the equations there is ± F_c, too.
+            Law::Coulomb | Law::Stribeck { .. } => {
+                (sign * (self.factor(body, y) * friction.dry(forward, speed) - side.coulomb), 0.0)
+            }
+            Law::Smooth { .. } => (sign * (self.factor(body, y) * friction.dry(forward, speed)) + viscous, 0.0),
+            Law::LuGre { stiffness, damping, .. } => {
+                let dry = self.factor(body, y) * friction.dry(forward, speed);
+                let z = curved.bristle.map_or(0.0, |place| y[place]);
+                // ż = v − σ₀ |v| z / g(v)
+                let rate = v - stiffness * speed * z / dry;
+                // σ₀ z + σ₁ ż
+                (stiffness * z + damping * rate + viscous, rate)
+            }
+        }
     }
 
     /// The same as a row shows it.
@@ -273,17 +302,55 @@ impl Model {
     }
 }
 
+/// Linear forms of the integrated quantities and the inputs, without what counts for nothing in them.
+#[derive(Default)]
+struct Rows {
+    terms: Vec<(usize, f64)>,
+    /// Where the terms of each end; its constant part, and its coefficients of the inputs.
+    rows: Vec<(usize, f64, [f64; DRIVES])>,
+}
+
+impl Rows {
+    fn push(&mut self, model: &Model, form: &Form) {
+        self.terms.extend(model.terms(form));
+        self.rows.push((self.terms.len(), form.constant, form.input));
+    }
+
+    /// Their values.
+    #[inline(always)]
+    fn values<'r>(&'r self, y: &'r [f64], input: &'r [f64; DRIVES]) -> impl Iterator<Item = f64> + 'r {
+        let mut begin = 0;
+        self.rows.iter().map(move |&(end, constant, on_input)| {
+            let terms = &self.terms[begin..end];
+            begin = end;
+            let sum = terms.iter().fold(0.0, |sum, &(place, coefficient)| sum + coefficient * y[place]);
+            on_input.iter().zip(input).fold(sum + constant, |sum, (coefficient, input)| sum + coefficient * input)
+        })
+    }
+}
+
+/// A speed that changes: where it stands, the body that leads, its way per way of that one, and what moves with both.
+struct Moving {
+    place: usize,
+    leader: usize,
+    ratio: f64,
+    mass: f64,
+}
+
 /// The equations of one mode under one stretch of the inputs: ẏ = f(τ, y), τ counted from the beginning of the stretch.
 pub(super) struct Field<'a> {
     model: &'a Model,
     mode: Mode,
     equations: Equations,
-    /// Rates of the quantities that move, by the linear equations: places and coefficients.
-    rates: Vec<(usize, [f64; WIDE])>,
+    /// Rates of the quantities that move, by the linear equations, and where these stand.
+    rates: Rows,
+    places: Vec<usize>,
     /// The conditions, by the linear equations.
-    guards: Vec<[f64; WIDE]>,
+    guards: Rows,
     /// Inertia that moves with each body, per unit of its leader's way.
     mass: [f64; BODIES],
+    /// Bodies that are not held.
+    moving: Vec<Moving>,
     pub(super) stretch: &'a Stretch,
     evaluations: Cell<u64>,
 }
@@ -292,11 +359,15 @@ impl<'a> Field<'a> {
     pub(super) fn new(model: &'a Model, mode: &Mode, stretch: &'a Stretch) -> Self {
         let mechanism = &*model.mechanism;
         let equations = mechanism.equations(*mode);
-        let (mut mass, mut rates) = ([1.0; BODIES], Vec::with_capacity(model.size));
+        let (mut mass, mut rates, mut places) = ([1.0; BODIES], Rows::default(), Vec::with_capacity(model.size));
+        let mut add = |place: usize, rate: &Form| {
+            rates.push(model, rate);
+            places.push(place);
+        };
         for (body, mass) in mass.iter_mut().enumerate().take(mechanism.bodies.len()) {
             *mass = mechanism.mass(mechanism.leader(body), &equations.inertia);
             if mode.motion[body] != Motion::Stuck {
-                rates.push((model.speed(body), model.row(&equations.acceleration[body])));
+                add(model.speed(body), &equations.acceleration[body]);
             }
             let mut way = model.layout.rate(mechanism, body);
             for (speed, motion) in way.speed.iter_mut().zip(mode.motion) {
@@ -304,13 +375,20 @@ impl<'a> Field<'a> {
                     *speed = 0.0;
                 }
             }
-            rates.push((model.coordinate(body), model.row(&way)));
+            add(model.coordinate(body), &way);
         }
         for (place, rate) in model.current.iter().zip(&equations.current_rate) {
-            rates.extend(place.map(|place| (place, model.row(rate))));
+            place.iter().for_each(|&place| add(place, rate));
         }
-        let guards = equations.guards.iter().map(|guard| model.row(&guard.form)).collect();
-        Self { model, mode: *mode, equations, rates, guards, mass, stretch, evaluations: Cell::new(0) }
+        let mut guards = Rows::default();
+        equations.guards.iter().for_each(|guard| guards.push(model, &guard.form));
+        let moves = |&body: &usize| mode.motion[body] != Motion::Stuck;
+        let moving = (0..mechanism.bodies.len()).filter(moves).map(|body| {
+            let (leader, ratio) = mechanism.bodies[body].leader;
+            Moving { place: model.speed(body), leader, ratio, mass: mass[body] }
+        });
+        let (moving, evaluations) = (moving.collect(), Cell::new(0));
+        Self { model, mode: *mode, equations, rates, places, guards, mass, moving, stretch, evaluations }
     }
 
     pub(super) fn evaluations(&self) -> u64 {
@@ -339,9 +417,7 @@ impl<'a> Field<'a> {
         let mechanism = &*model.mechanism;
         let input = self.input(tau);
         let mut values = [0.0; MOST_GUARDS];
-        for (value, row) in values.iter_mut().zip(&self.guards) {
-            *value = model.value_of(row, y, &input);
-        }
+        values.iter_mut().zip(self.guards.values(y, &input)).for_each(|(value, of)| *value = of);
         if !model.adds {
             return values;
         }
@@ -352,12 +428,14 @@ impl<'a> Field<'a> {
         let added = model.added(&self.mode, y);
         for (value, guard) in values.iter_mut().zip(&self.equations.guards) {
             *value += match guard.cause {
-                // a(x) F_b − (load + what the belt adds)
+                // a(x) F_b − (load + what the belt adds − what bent bristles hold)
                 Cause::BreakForward(body) => {
-                    model.breakaway(body, true, y) - mechanism.friction(body).forward.breakaway - added.load[body]
+                    let load = added.load[body] - model.bristle_force(body, y);
+                    model.breakaway(body, true, y) - mechanism.friction(body).forward.breakaway - load
                 }
                 Cause::BreakBackward(body) => {
-                    model.breakaway(body, false, y) - mechanism.friction(body).backward.breakaway + added.load[body]
+                    let load = added.load[body] - model.bristle_force(body, y);
+                    model.breakaway(body, false, y) - mechanism.friction(body).backward.breakaway + load
                 }
                 Cause::GearTorque(drive) if !mechanism.drives[drive].has_rotor() => {
                     let part = &mechanism.drives[drive];
@@ -392,17 +470,13 @@ impl FirstOrderSystem for Field<'_> {
         let model = self.model;
         let input = self.input(tau);
         rate.fill(0.0);
-        for (place, row) in &self.rates {
-            rate[*place] = model.value_of(row, y, &input);
-        }
+        self.places.iter().zip(self.rates.values(y, &input)).for_each(|(place, value)| rate[*place] = value);
         if model.adds {
-            let mechanism = &*model.mechanism;
             let added = model.added(&self.mode, y);
-            for body in (0..mechanism.bodies.len()).filter(|&body| self.mode.motion[body] != Motion::Stuck) {
+            for &Moving { place, leader, ratio, mass } in &self.moving {
                 // J φ̈ = what is linear + what the belt adds − what the law adds
-                let leader = mechanism.leader(body);
-                let change = (added.load[leader] - added.friction[leader]) / self.mass[body];
-                rate[model.speed(body)] += mechanism.ratio(body) * change;
+                let change = (added.load[leader] - added.friction[leader]) / mass;
+                rate[place] += ratio * change;
             }
             for (place, bristle) in model.bristle.iter().zip(added.bristle) {
                 if let Some(place) = place {

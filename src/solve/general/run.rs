@@ -7,8 +7,9 @@ use super::{Core, Witness};
 use crate::mechanism::{Layout, Mechanism, State};
 use crate::signal::Signal;
 use crate::solve::inputs::Pieces;
+use crate::solve::machine::Engine;
 use crate::solve::observe::Output;
-use crate::solve::record::Recorder;
+use crate::solve::record::{Recorder, STATE};
 use crate::solve::run::{Running, Start};
 use crate::solve::{Ending, Flow, Grid, Outcome};
 
@@ -37,7 +38,9 @@ impl<'a> Run<'a> {
     ) -> Self {
         let grid = Grid::new(start.every, start.until);
         let core = Core::new(mechanism, Layout::new(mechanism), &start.state, (tolerance, fastest, grid.end()));
-        let recorder = Recorder::new(&core.model.mechanism, &core.model.layout, grid, output);
+        let layout = &core.model.layout;
+        let input = |drive| layout.states + drive;
+        let recorder = Recorder::new(&core.model.mechanism, layout, (STATE, &input), grid, output);
         Self { core, rows: Rows { grid, recorder, shown: None }, has_input: false }
     }
 

@@ -5,6 +5,7 @@ use super::fall::{NODES, through};
 use super::model::{Field, Model, Vector};
 use super::run::Rows;
 use crate::mechanism::{DRIVES, Mechanism, Mode, Shown as Quantity};
+use crate::solve::machine::Engine;
 use crate::solve::observe::{Curve, Gap, QUANTITIES, Reading, Readout};
 
 /// What is read off in a mode, for the mode that was entered last.

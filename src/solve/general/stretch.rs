@@ -16,6 +16,8 @@ pub(super) struct Stretch {
     pub(super) end: f64,
     /// The pieces, and where each begins, counted from the beginning of the stretch.
     parts: Vec<(f64, Pieces)>,
+    /// The highest power of time in any of them.
+    degree: usize,
 }
 
 impl Stretch {
@@ -32,12 +34,14 @@ impl Stretch {
             parts.push((stop - begin, next));
             (stop, last) = (next.end, next);
         }
-        Self { begin, end: stop.min(end), parts }
+        let degree = parts.iter().map(|(_, pieces)| pieces.degree()).max().unwrap_or(0);
+        Self { begin, end: stop.min(end), parts, degree }
     }
 
     /// One piece, up to `end` at most.
     pub(super) fn of(pieces: Pieces, end: f64) -> Self {
-        Self { begin: pieces.start, end: pieces.end.min(end), parts: vec![(0.0, pieces)] }
+        let degree = pieces.degree();
+        Self { begin: pieces.start, end: pieces.end.min(end), parts: vec![(0.0, pieces)], degree }
     }
 
     pub(super) fn pieces(&self) -> usize {
@@ -56,7 +60,7 @@ impl Stretch {
             _ => self.parts.partition_point(|(begin, _)| *begin <= tau).max(1) - 1,
         };
         let (begin, pieces) = &self.parts[index];
-        pieces.values(tau - begin)
+        pieces.values(tau - begin, self.degree)
     }
 
     /// Longest step over which the input is told by eight of its values.
