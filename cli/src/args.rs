@@ -39,6 +39,7 @@ pub enum Command {
     Fit(Fit),
     Shape(Shape),
     Modes(Modes),
+    Schema(Schema),
     Completions(Completions),
     Man(Man),
 }
@@ -56,7 +57,7 @@ impl Command {
             Self::Fit(args) => args.common.json,
             Self::Shape(args) => args.common.json,
             Self::Modes(args) => args.common.json,
-            Self::Init(_) | Self::Completions(_) | Self::Man(_) => false,
+            Self::Init(_) | Self::Schema(_) | Self::Completions(_) | Self::Man(_) => false,
         }
     }
 }
@@ -73,6 +74,14 @@ pub struct Paper {
     /// Print the claims as JSON, the same as in claims.json
     #[arg(long)]
     pub json: bool,
+}
+
+/// Print the JSON Schema of the case file or of a result, so that editors complete and check.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  taut schema\n  taut schema case > taut-case.schema.json")]
+pub struct Schema {
+    /// Which one; without a name they are listed
+    pub name: Option<String>,
 }
 
 /// Print the completions of the command line for a shell.

@@ -48,7 +48,7 @@ impl Failure {
             "next": self.error.next,
             "text": self.error.to_string(),
         });
-        taut::json::text(&json!({ "schema": "taut/error/1", "status": self.status, "error": error }))
+        taut::json::text(&json!({ "schema": taut::json::identity("error"), "status": self.status, "error": error }))
     }
 }
 

@@ -42,6 +42,7 @@ fn main() -> ExitCode {
         Command::Tune(args) => tune::run(&args),
         Command::Sweep(args) => sweep::run(&args),
         Command::Modes(args) => modes::run(&args),
+        Command::Schema(args) => manual::schema(&args),
         Command::Completions(args) => manual::completions(&args),
         Command::Man(args) => manual::run(&args),
     };

@@ -1,12 +1,28 @@
-//! `taut man` and `taut completions`: the command line for readers and shells, from its own definition.
+//! `taut man`, `taut completions` and `taut schema`: the command line for readers and shells, cases and results for editors.
 
-use crate::args::{Args, Completions, Man};
+use crate::args::{Args, Completions, Man, Schema};
 use crate::failure::{Failure, Outcome, Status};
 use crate::terminal;
 use clap::CommandFactory;
 use std::path::Path;
 use taut::files::write_atomically;
-use taut::{Error, Result};
+use taut::{Error, Result, json};
+
+/// Prints a schema, or their names.
+pub fn schema(args: &Schema) -> Outcome {
+    let Some(name) = &args.name else {
+        let wide = json::schemas().map(|(name, _)| name.len()).max().unwrap_or(0);
+        let lines = json::schemas().map(|(name, words)| format!("  {name:<wide$}  {words}\n"));
+        terminal::show(&format!("taut schema NAME prints one of\n{}", lines.collect::<String>()));
+        return Ok(Status::Done);
+    };
+    let schema = json::schema(name).ok_or_else(|| {
+        let names: Vec<&str> = json::schemas().map(|(name, _)| name).collect();
+        Error::new(format!("there is no schema \"{name}\"")).in_file("taut schema").allowed(names.join(", "))
+    })?;
+    terminal::show(&json::text(&schema));
+    Ok(Status::Done)
+}
 
 /// Prints the completions for a shell.
 pub fn completions(args: &Completions) -> Outcome {

@@ -260,7 +260,8 @@ fn log() -> Value {
 
 fn controller() -> Value {
     let rule = json!({ "type": "number" });
-    let feed_forward = [("model", words(["none", "rigid", "elastic"])), ("compensate_stretch", json!({ "type": "boolean" }))];
+    let feed_forward =
+        [("model", words(["none", "rigid", "elastic"])), ("compensate_stretch", json!({ "type": "boolean" }))];
     table(
         "controller",
         &[
@@ -322,7 +323,8 @@ fn sweep() -> Value {
         ("within", pair()),
     ];
     let way = object(&way.map(|(name, schema)| (name.to_string(), schema)).into_iter().collect());
-    let vary = json!({ "type": "object", "additionalProperties": any(vec![json!({ "type": "string" }), list(plain()), way]) });
+    let vary =
+        json!({ "type": "object", "additionalProperties": any(vec![json!({ "type": "string" }), list(plain()), way]) });
     table(
         "sweep",
         &[

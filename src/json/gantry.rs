@@ -25,6 +25,7 @@ pub struct GantrySimulated<'a> {
 /// The whole summary.
 #[derive(Debug, Serialize)]
 pub struct GantrySimulation {
+    schema: String,
     title: String,
     version: &'static str,
     kind: &'static str,
@@ -102,6 +103,7 @@ impl GantrySimulation {
         let mechanism = case.gantry.mechanism();
         let routing = case.gantry.routing;
         Self {
+            schema: super::identity("gantry-simulate"),
             title: case.title.clone(),
             version: env!("CARGO_PKG_VERSION"),
             kind: routing.word(),

@@ -28,6 +28,7 @@ pub fn gantry_modes(analysis: &GantryAnalysis) -> Value {
         })
     });
     json!({
+        "schema": super::identity("gantry-modes"),
         "title": analysis.case.title,
         "version": env!("CARGO_PKG_VERSION"),
         "kind": gantry.routing.word(),

@@ -11,6 +11,7 @@ mod modes;
 mod moves;
 #[cfg(feature = "posterior")]
 mod posterior;
+mod result_schema;
 mod simulation;
 
 pub use case_schema::case_schema;
@@ -22,6 +23,7 @@ pub use modes::modes;
 pub use moves::{Moved, moves};
 #[cfg(feature = "posterior")]
 pub use posterior::posterior;
+pub use result_schema::{identity, schema, schemas};
 pub use simulation::{Band, Event, Metrics, Simulated, Simulation, load_unit};
 
 use crate::metrics::Peak;

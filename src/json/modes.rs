@@ -30,6 +30,7 @@ pub fn modes(analysis: &Analysis) -> Value {
     let stuck: Vec<&str> =
         operation.held.iter().zip(LABELS).filter(|(held, _)| **held).map(|(_, label)| label.key).collect();
     json!({
+        "schema": super::identity("modes"),
         "title": analysis.case.title,
         "version": env!("CARGO_PKG_VERSION"),
         "operation": {

@@ -21,6 +21,7 @@ pub struct Moved<'a> {
 /// The moves of a case of this title under a controller of this name.
 pub fn moves(title: &str, structure: &str, timing: &Loop, moved: &[Moved]) -> Value {
     json!({
+        "schema": super::identity("move"),
         "title": title,
         "version": env!("CARGO_PKG_VERSION"),
         "structure": structure,

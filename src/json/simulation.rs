@@ -31,6 +31,7 @@ pub struct Simulated<'a> {
 /// The whole summary.
 #[derive(Debug, Serialize)]
 pub struct Simulation {
+    schema: String,
     title: String,
     version: &'static str,
     solver: SolverUsed,
@@ -198,6 +199,7 @@ impl Simulation {
     /// The summary of these runs.
     pub fn new(case: &Case, solver: Solver, runs: &[Simulated]) -> Self {
         Self {
+            schema: super::identity("simulate"),
             title: case.title.clone(),
             version: env!("CARGO_PKG_VERSION"),
             solver: SolverUsed::of(solver),

@@ -9,6 +9,8 @@ use taut::control::shaping::Fitted;
 /// The text.
 pub fn text(found: &Findings) -> String {
     let mut value = one(&found.each[0]);
+    value["schema"] = json!(taut::json::identity("shape"));
+    value["version"] = json!(env!("CARGO_PKG_VERSION"));
     value["second"] = found.each.get(1).map_or(Value::Null, one);
     value["comparison"] = found.comparison.as_ref().map_or(Value::Null, comparison);
     taut::json::text(&value)

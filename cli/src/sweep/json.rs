@@ -9,6 +9,7 @@ use taut::sweep::{Estimate, Spread};
 pub fn text(work: &Work, summary: &Summary) -> String {
     let sweep = work.sweep;
     let value = json!({
+        "schema": taut::json::identity("sweep"),
         "title": work.case.title(),
         "version": env!("CARGO_PKG_VERSION"),
         "runs": sweep.runs(),
