@@ -58,7 +58,7 @@
 //!
 //! # Features
 //!
-//! `report` (default) adds figures and reports; `parquet` adds Parquet files; `json` adds results as data; `posterior` draws from the posterior of a fit.
+//! `report` (default) adds figures and reports; `parquet` adds Parquet files; `json` adds results as data.
 //! Without them the library is the physics alone.
 
 pub mod case;
@@ -77,9 +77,8 @@ pub mod measure;
 pub mod mechanism;
 pub mod metrics;
 pub mod number;
+pub mod nuts;
 pub mod parameter;
-#[cfg(feature = "posterior")]
-pub mod posterior;
 pub mod quantity;
 pub mod reduction;
 #[cfg(feature = "report")]

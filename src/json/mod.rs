@@ -8,7 +8,6 @@ mod gantry;
 mod gantry_modes;
 mod modes;
 mod moves;
-#[cfg(feature = "posterior")]
 mod posterior;
 mod simulation;
 
@@ -18,7 +17,6 @@ pub use gantry::{GantrySimulated, GantrySimulation, gantry_metrics};
 pub use gantry_modes::gantry_modes;
 pub use modes::modes;
 pub use moves::{Moved, moves};
-#[cfg(feature = "posterior")]
 pub use posterior::posterior;
 pub use simulation::{Band, Event, Metrics, Simulated, Simulation, load_unit};
 

@@ -12,7 +12,7 @@ use std::time::Instant;
 use taut::Result;
 use taut::case::{Case, Plan};
 use taut::fit::{Credible, Fit, Posterior, posterior};
-use taut::posterior::Effort;
+use taut::nuts::Effort;
 use taut::report::{Callout, Cell, Page, Table};
 
 /// Draws that tune a chain.
