@@ -213,7 +213,7 @@ log = { file = "log.csv", time = "t", cart_position = "x", from = "9.5 s" }"#;
     assert_eq!(log.input, [5.0, 5.0, 0.0]);
 }
 
-mod common;
+use crate::common;
 
 /// Logs of three machines, with what their readme and their publications say of them.
 #[test]

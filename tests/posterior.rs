@@ -1,10 +1,7 @@
 //! Draws from the posterior of machines whose truth is known.
 
-#[path = "common/chance.rs"]
-mod chance;
-#[path = "common/logged.rs"]
-mod logged;
-
+use crate::common::chance;
+use crate::common::logged;
 use chance::Chance;
 use logged::logged;
 use taut::case::{Case, Plan, Prior, TEMPLATE};

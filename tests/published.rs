@@ -1,9 +1,8 @@
 //! Logs of real machines, fitted by their case files, beside what others have published for them.
 //!
-//! The table in `docs/fit.md` is made here: `UPDATE_EXPECT=1 cargo test -p taut --test published` writes it anew.
+//! The table in `docs/fit.md` is made here: `UPDATE_EXPECT=1 cargo test -p taut --test all published::` writes it anew.
 
-mod common;
-
+use crate::common;
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;

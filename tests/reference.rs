@@ -1,8 +1,7 @@
 //! Against the high-precision trajectories of `../shared/reference`: positions within 1e-9 m and 1e-9 rad, speeds within
 //! 1e-7 m/s and 1e-5 rad/s, event times within 1e-9 s, the same modes in the same order.
 
-mod common;
-
+use crate::common;
 use taut::signal::Signal;
 use taut::solve::{Ending, Solver, simulate};
 use taut::stage::Stage;

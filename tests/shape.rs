@@ -1,8 +1,6 @@
 //! Input shapers: their laws, the published tables, Klipper's printed results, and other people's numbers.
 
-#[path = "common/wrong.rs"]
-mod wrong;
-
+use crate::common::wrong;
 use std::f64::consts::PI;
 use std::fs;
 use std::path::{Path, PathBuf};

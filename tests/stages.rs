@@ -1,9 +1,8 @@
 //! Every machine under `stages/` gives the curves beside it.
 //!
-//! `UPDATE_EXPECT=1 cargo test --test stages` writes the curves anew.
+//! `UPDATE_EXPECT=1 cargo test -p taut --test all stages::` writes the curves anew.
 
-mod common;
-
+use crate::common;
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -131,7 +130,11 @@ fn every_machine_gives_its_curves() {
             }
         }
     }
-    assert!(wrong.is_empty(), "{}\nUPDATE_EXPECT=1 cargo test --test stages writes them anew", wrong.join("\n"));
+    assert!(
+        wrong.is_empty(),
+        "{}\nUPDATE_EXPECT=1 cargo test -p taut --test all stages:: writes them anew",
+        wrong.join("\n")
+    );
 }
 
 #[test]

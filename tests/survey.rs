@@ -1,7 +1,6 @@
 //! What a survey says of logs: of measured ones, and of a simulated one with a known fault.
 
-mod common;
-
+use crate::common;
 use std::f64::consts::TAU;
 use taut::case::{Case, TEMPLATE};
 use taut::log::{Log, Output, Quantity, Severity, Survey};

@@ -1,7 +1,6 @@
 //! Sweeps: the same rows however they are split, distributions, designs, metrics, sensitivity indices.
 
-mod common;
-
+use crate::common;
 use taut::case::{Case, Sampling};
 use taut::metrics::Meter;
 use taut::solve::{Bench, Flow, Solver, stream_observed};

@@ -1,7 +1,11 @@
 //! What several tests share: the paper's machine, and where the reference data lie.
 #![allow(dead_code)]
 
+pub mod chance;
+pub mod document;
+pub mod logged;
 pub mod random;
+pub mod wrong;
 
 use std::path::PathBuf;
 use taut::case::{Experiment, Initial};
