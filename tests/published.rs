@@ -114,8 +114,7 @@ fn rmse(found: &Fit, row: &Row) -> f64 {
 
 #[test]
 fn published_problems_are_met() {
-    if common::shared("data").is_none() {
-        eprintln!("skipped: ../shared/data is not there");
+    if common::data::data(["emps/estimation.mat", "pendulepi/february.csv", "ced/DATAUNIF.csv"]).is_none() {
         return;
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -150,8 +149,7 @@ fn published_problems_are_met() {
 /// The inverse-dynamics regression of EMPS gives what its authors published: mass, viscous and Coulomb friction, offset.
 #[test]
 fn the_regression_of_emps_is_that_of_its_authors() {
-    if common::shared("data").is_none() {
-        eprintln!("skipped: ../shared/data is not there");
+    if common::data::data(["emps/estimation.mat"]).is_none() {
         return;
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));

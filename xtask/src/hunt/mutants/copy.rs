@@ -58,13 +58,10 @@ impl Tree {
         let here = std::env::current_dir().map_err(|error| error.to_string())?;
         let root = here.join("target/mutants/taut");
         let _ = fs::remove_dir_all(&root);
-        // Data that some tests read stand beside the repository.
+        // Data that some tests read are not in the list of files.
         #[cfg(unix)]
-        if let Ok(shared) = here.join("../shared").canonicalize() {
-            let made = fs::create_dir_all(&root).and_then(|()| {
-                let link = here.join("target/mutants/shared");
-                if link.exists() { Ok(()) } else { std::os::unix::fs::symlink(shared, link) }
-            });
+        if let Ok(data) = here.join("data").canonicalize() {
+            let made = fs::create_dir_all(&root).and_then(|()| std::os::unix::fs::symlink(data, root.join("data")));
             made.map_err(|error| format!("target/mutants: {error}"))?;
         }
         let listed = Command::new("git").args(["ls-files", "-z", "--cached"]).output();
