@@ -208,8 +208,7 @@ impl<'a> Chain<'a> {
         let gain = energy - point.energy();
         self.accepted[0] += if gain.is_nan() { 0.0 } else { exp(gain.min(0.0)) };
         self.accepted[1] += 1.0;
-        // Not a number is none either.
-        self.diverged |= !(gain > -LARGEST_ERROR);
+        self.diverged |= gain.is_nan() || gain <= -LARGEST_ERROR;
         if self.diverged { Err(Ended) } else { Ok(Stretch::of(point, gain)) }
     }
 }
