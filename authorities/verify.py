@@ -13,8 +13,8 @@ import events_expm
 import events_scipy
 from model import Friction, Stage
 
-# Beside the repository, unless TAUT_REFERENCE says otherwise.
-REFERENCE = Path(os.environ.get("TAUT_REFERENCE", Path(__file__).resolve().parents[2] / "shared" / "reference"))
+# In the repository, unless TAUT_REFERENCE says otherwise.
+REFERENCE = Path(os.environ.get("TAUT_REFERENCE", Path(__file__).resolve().parents[1] / "data" / "reference"))
 
 PAPER = dict(torque_constant=23e-3, back_emf_constant=23e-3, resistance=0.71, pulley_radius=0.0194, cart_mass=0.362)
 

@@ -57,8 +57,8 @@
 //!
 //! # Features
 //!
-//! `parquet` adds Parquet files; `json` adds results as data; `posterior` draws from the posterior of a fit.
-//! Without them the library is the physics alone. Figures and reports are a crate of their own, `taut-report`.
+//! `parquet` adds Parquet files; `json` adds results as data. Without them the library is the physics alone. Figures and reports
+//! are a crate of their own, `taut-report`.
 
 pub mod case;
 pub mod chance;
@@ -76,9 +76,8 @@ pub mod measure;
 pub mod mechanism;
 pub mod metrics;
 pub mod number;
+pub mod nuts;
 pub mod parameter;
-#[cfg(feature = "posterior")]
-pub mod posterior;
 pub mod quantity;
 pub mod reduction;
 pub mod signal;

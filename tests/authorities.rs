@@ -5,8 +5,6 @@
 //! Positions within 1e-9 m and rad, speeds within 1e-7 m/s and 1e-5 rad/s, event times within 1e-9 s, or four times the
 //! authority's own uncertainty where that is more; the same modes in the same order.
 
-mod common;
-
 use serde_json::Value;
 use taut::case::{Experiment, Initial};
 use taut::friction::{Friction, Side};

@@ -1,8 +1,6 @@
 //! Every wrong log in `tests/bad/log` gives exactly the message beside it; `UPDATE_EXPECT=1` writes the messages again.
 
-#[path = "common/wrong.rs"]
-mod wrong;
-
+use crate::common::wrong;
 use std::fs;
 use std::path::Path;
 use taut::log::{read_columns, read_samples};

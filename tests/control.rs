@@ -1,7 +1,6 @@
 //! Moves, controllers and closed loops.
 
-mod common;
-
+use crate::common;
 use common::random::{cases, decades};
 use nalgebra::DMatrix;
 use proptest::prelude::*;

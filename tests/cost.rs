@@ -1,7 +1,6 @@
 //! What runs cost, in pieces of work: a slip that leaves every result right may still make all runs slow.
 
-mod common;
-
+use crate::common;
 use common::experiment;
 use taut::signal::Signal;
 use taut::solve::{Cost, Solver, simulate};

@@ -3,9 +3,7 @@
 //! Nothing here calls the library's own function for what it makes; each text stands in `docs/case-file.md` or `docs/random.md`. A change
 //! of either that the other does not follow fails here. Controllers are in `definitions_control.rs`.
 
-#[path = "common/document.rs"]
-mod document;
-
+use crate::common::document;
 use document::{Pcg, mix};
 use std::f64::consts::PI;
 use taut::case::{Case, Experiment, TEMPLATE};

@@ -1,8 +1,6 @@
 //! Controllers as `docs/control.md` defines them sample by sample, made again from its words, beside those of the library.
 
-#[path = "common/document.rs"]
-mod document;
-
+use crate::common::document;
 use document::Pcg;
 use std::f64::consts::PI;
 use taut::case::{Case, TEMPLATE};

@@ -1,10 +1,7 @@
 //! Fits: certified least-squares problems, machines whose truth is known, and what logs cannot tell.
 
-#[path = "common/chance.rs"]
-mod chance;
-#[path = "common/logged.rs"]
-mod logged;
-
+use crate::common::chance;
+use crate::common::logged;
 use chance::Chance;
 use logged::logged;
 use taut::case::{Case, Plan, TEMPLATE};
@@ -397,7 +394,7 @@ fn intervals_hold_the_truth_about_as_often_as_they_say() {
     assert!((0.88..=1.0).contains(&share) && found.lost + found.refused + found.astray == 0, "{}", found.told());
 }
 
-/// The whole run; `cargo test --test fit -- --ignored --nocapture` prints the shares.
+/// The whole run; `cargo test -p taut --test all fit:: -- --ignored --nocapture` prints the shares.
 #[test]
 #[ignore = "minutes"]
 fn intervals_hold_the_truth_of_a_thousand_machines() {

@@ -1,7 +1,6 @@
 //! Laws that hold for any gantry, on random ones.
 
-mod common;
-
+use crate::common;
 use proptest::prelude::*;
 use taut::case::{GantryCase, GantryExperiment};
 use taut::friction::Friction;

@@ -1,7 +1,6 @@
 //! The general solver: against the exact one where both apply, and against laws that hold for any friction.
 
-mod common;
-
+use crate::common;
 use common::random::{self, Dry};
 use proptest::prelude::*;
 use taut::case::{Experiment, Initial};

@@ -1,8 +1,7 @@
 //! Hard cases: extreme parameters, loads exactly at breakaway, edges anywhere, contacts that only graze. They end
 //! correctly or with a clear word; they never hang and never put out what is no number.
 
-mod common;
-
+use crate::common;
 use common::random::decades;
 use common::{experiment, table4};
 use proptest::prelude::*;

@@ -1,7 +1,6 @@
 //! What happens at one instant: limits, gear, spans and stops are settled before bodies break away.
 
-mod common;
-
+use crate::common;
 use common::random::{self, Dry};
 use proptest::prelude::*;
 use taut::case::{Case, Experiment, Initial};

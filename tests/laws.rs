@@ -1,7 +1,6 @@
 //! Laws that hold for any stage and any input, tried on random ones.
 
-mod common;
-
+use crate::common;
 use common::random::{self, Dry};
 use proptest::prelude::*;
 use taut::case::{Experiment, Initial};

@@ -1,7 +1,6 @@
 //! Linear analysis: against python-control with SLICOT and 60-digit numbers (`authorities/linear.py`), and by laws that hold for any stage.
 
-mod common;
-
+use crate::common;
 use common::random::{Dry, cases, equipped, stage};
 use common::{experiment, table1, table2, table4};
 use nalgebra::Complex;

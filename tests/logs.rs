@@ -213,15 +213,16 @@ log = { file = "log.csv", time = "t", cart_position = "x", from = "9.5 s" }"#;
     assert_eq!(log.input, [5.0, 5.0, 0.0]);
 }
 
-mod common;
+use crate::common;
 
 /// Logs of three machines, with what their readme and their publications say of them.
 #[test]
 fn measured_data_of_others() {
-    let Some(data) = common::shared("data") else {
-        eprintln!("skipped: ../shared/data is not there");
+    let files = ["pendulepi/february.csv", "emps/estimation.mat", "ced/DATAUNIF.csv", "ced/DATAPRBS.csv"];
+    if common::data::data(files).is_none() {
         return;
-    };
+    }
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("data");
     let read = |experiment: &str| {
         let case = Case::from_text(data.join("case.toml"), &case_text(experiment));
         case.unwrap_or_else(|error| panic!("{error}")).experiments
@@ -329,13 +330,8 @@ fn the_examples_of_the_documents_read() {
         let (_, file) = example.split_once("file = \"").unwrap();
         let file = file.split('"').next().unwrap();
         let mut example = example.to_string();
-        if let Some(path) = file.strip_prefix("../../shared/") {
-            let Some(path) =
-                common::shared(path.rsplit_once('/').unwrap().0).map(|at| at.join(file.rsplit('/').next().unwrap()))
-            else {
-                eprintln!("skipped: {file} is not there");
-                continue;
-            };
+        if let Some(path) = file.strip_prefix("../data/") {
+            let Some([path]) = common::data::data([path]) else { continue };
             example = example.replace(file, path.to_str().unwrap());
         } else {
             fs::write(folder.join(file), csv).unwrap();
@@ -347,4 +343,25 @@ fn the_examples_of_the_documents_read() {
         read += 1;
     }
     assert!(read >= 2);
+}
+
+/// The logs of three machines under `stages` are not part of the project: whoever fits them without has to be told how to get them.
+#[test]
+fn a_log_that_is_not_there_says_what_fetches_it() {
+    let of = |more: &str| {
+        let log = format!("log = {{ file = \"no/such.csv\", {more}time = \"t\", input = \"u\", drive_angle = \"a\" }}");
+        Case::from_text("case.toml", &case_text(&log)).unwrap_err().to_string()
+    };
+    assert_eq!(of(""), "no/such.csv: there is no such file\n  next: check the name and the folder it is in");
+    assert_eq!(
+        of("fetch = \"cargo xtask data\", "),
+        "no/such.csv: there is no such file\n  next: `cargo xtask data` fetches it"
+    );
+    // A file that is there is not fetched, whatever is wrong with it.
+    let file = folder("fetch").join("broken.csv");
+    fs::write(&file, "t,u\n").unwrap();
+    let log =
+        format!("log = {{ file = {file:?}, fetch = \"make it\", time = \"t\", input = \"u\", drive_angle = \"a\" }}");
+    let told = Case::from_text("case.toml", &case_text(&log)).unwrap_err().to_string();
+    assert!(!told.contains("make it"), "{told}");
 }

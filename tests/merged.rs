@@ -3,7 +3,7 @@
 //! What moves as one has one speed: sliding friction adds up, each law's at its own speed ρ v, and so do breakaways, bristles and what never
 //! sticks. [`Written`] has that in one line per body and a Runge-Kutta formula of its own.
 
-mod common;
+use crate::common;
 
 use common::random;
 use proptest::prelude::*;

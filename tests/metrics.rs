@@ -1,7 +1,6 @@
 //! The metrics of runs, against definitions written a second time on whole trajectories, and whatever their rows.
 
-mod common;
-
+use crate::common;
 use common::random::{self, Dry};
 use common::{experiment, table1, table4};
 use proptest::prelude::*;

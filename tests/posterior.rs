@@ -1,16 +1,13 @@
 //! Draws from the posterior of machines whose truth is known.
 
-#[path = "common/chance.rs"]
-mod chance;
-#[path = "common/logged.rs"]
-mod logged;
-
+use crate::common::chance;
+use crate::common::logged;
 use chance::Chance;
 use logged::logged;
 use taut::case::{Case, Plan, Prior, TEMPLATE};
 use taut::fit::least_squares::Residuals;
 use taut::fit::{Fit, Posterior, Problem, fit, machines, posterior};
-use taut::posterior::Effort;
+use taut::nuts::Effort;
 use taut::solve::{Flow, Solver, simulate};
 
 const COULOMB: &str = "cart.friction.coulomb";
@@ -196,4 +193,19 @@ fn draws_repeat_and_end_early() {
     assert!(cut.doubts()[0].contains("interrupted"));
     let never = posterior(&case, &plan, &found, effort, &|_| false).unwrap();
     assert!(never.count() == 0 && never.doubts().len() >= 2, "{:?}", never.doubts());
+}
+
+/// A parameter that the logs do not determine made the sampler wander between its bounds until somebody ended it.
+#[test]
+fn what_is_not_determined_is_refused_at_once() {
+    let case = with_log(19.0, 0.2, 3);
+    let plan = plan(&[VISCOUS, COULOMB]);
+    let mut found = fit(&case, &plan, None, &mut |_| Flow::Continue).unwrap();
+    found.estimates[1].error = Some(f64::INFINITY);
+    let told = posterior(&case, &plan, &found, Effort::default(), &|_| panic!("it began")).unwrap_err().to_string();
+    assert_eq!(
+        told,
+        "no posterior: cart.friction.coulomb is not determined by these logs\n  next: take it out of fit.free, or add a log that \
+         determines it; `taut check` proposes some"
+    );
 }

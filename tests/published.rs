@@ -1,9 +1,8 @@
 //! Logs of real machines, fitted by their case files, beside what others have published for them.
 //!
-//! The table in `docs/fit.md` is made here: `UPDATE_EXPECT=1 cargo test -p taut --test published` writes it anew.
+//! The table in `docs/fit.md` is made here: `UPDATE_EXPECT=1 cargo test -p taut --test all published::` writes it anew.
 
-mod common;
-
+use crate::common;
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
@@ -115,8 +114,7 @@ fn rmse(found: &Fit, row: &Row) -> f64 {
 
 #[test]
 fn published_problems_are_met() {
-    if common::shared("data").is_none() {
-        eprintln!("skipped: ../shared/data is not there");
+    if common::data::data(["emps/estimation.mat", "pendulepi/february.csv", "ced/DATAUNIF.csv"]).is_none() {
         return;
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -151,8 +149,7 @@ fn published_problems_are_met() {
 /// The inverse-dynamics regression of EMPS gives what its authors published: mass, viscous and Coulomb friction, offset.
 #[test]
 fn the_regression_of_emps_is_that_of_its_authors() {
-    if common::shared("data").is_none() {
-        eprintln!("skipped: ../shared/data is not there");
+    if common::data::data(["emps/estimation.mat"]).is_none() {
         return;
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));

@@ -1,8 +1,7 @@
-//! Against the high-precision trajectories of `../shared/reference`: positions within 1e-9 m and 1e-9 rad, speeds within
+//! Against the high-precision reference trajectories: positions within 1e-9 m and 1e-9 rad, speeds within
 //! 1e-7 m/s and 1e-5 rad/s, event times within 1e-9 s, the same modes in the same order.
 
-mod common;
-
+use crate::common;
 use taut::signal::Signal;
 use taut::solve::{Ending, Solver, simulate};
 use taut::stage::Stage;
@@ -12,10 +11,7 @@ fn rows(text: &str) -> Vec<Vec<f64>> {
 }
 
 fn compare(case: &str, stage: Stage, input: Signal) {
-    let Some(folder) = common::shared("reference") else {
-        eprintln!("skipped: the reference data are not here");
-        return;
-    };
+    let Some(folder) = common::data::reference() else { return };
     let read = |name: String| rows(&std::fs::read_to_string(folder.join(name)).unwrap());
     let want = read(format!("{case}.csv"));
     let events = read(format!("{case}.events.csv"));

@@ -1,7 +1,6 @@
 //! What rounding may do to a run, and what it must not: far from the origin, on stiff belts, at rest on an edge.
 
-mod common;
-
+use crate::common;
 use common::table4;
 use taut::case::{Case, Experiment, Initial};
 use taut::friction::{Friction, Law, Motion, Shape, Side};
@@ -264,7 +263,7 @@ fn a_run_that_would_not_end_is_told_and_can_be_stopped() {
     stage.motor.back_emf_constant = 1e3;
     let mut asked = 0;
     let sine = Signal::Sine { amplitude: 5.0, frequency: 3.0, phase: 0.0, offset: 0.0 };
-    let long = crate::experiment(sine, 100.0, 10.0);
+    let long = self::experiment(sine, 100.0, 10.0);
     for solver in [Solver::Exact, Solver::General { tolerance: 1e-9 }] {
         let outcome = stream(&stage, &long, solver, &mut |_| {
             asked += 1;

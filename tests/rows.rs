@@ -1,7 +1,6 @@
 //! The rows of a run: when they are, that the last is at the end, and that no zero has a sign.
 
-mod common;
-
+use crate::common;
 use common::{experiment, table4};
 use taut::case::{Case, Experiment, TEMPLATE};
 use taut::measure::measure;

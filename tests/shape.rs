@@ -1,8 +1,6 @@
 //! Input shapers: their laws, the published tables, Klipper's printed results, and other people's numbers.
 
-#[path = "common/wrong.rs"]
-mod wrong;
-
+use crate::common::{data, wrong};
 use std::f64::consts::PI;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -162,13 +160,10 @@ fn the_published_table_of_robustness() {
     assert!(missing.is_empty(), "docs/shape.md does not have:\n{}", missing.join("\n"));
 }
 
-fn data() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/klipper-ender3");
-    let folder = folder.is_dir().then_some(folder);
-    if folder.is_none() {
-        println!("skipped: ../shared/data/klipper-ender3 is not there");
-    }
-    folder
+fn spectra() -> Option<PathBuf> {
+    let files = ["x_20210701_223821", "x_20210821_152037", "y_20210630_223910", "y_20210630_230110"];
+    let [first, ..] = data::data(files.map(|name| format!("klipper-ender3/resonances_{name}.csv")))?;
+    first.parent().map(Path::to_path_buf)
 }
 
 fn spectrum(file: &Path) -> Spectrum {
@@ -178,7 +173,7 @@ fn spectrum(file: &Path) -> Spectrum {
 /// Frequency (Hz), vibration (%) of zv, mzv, ei, 2hump_ei, 3hump_ei, and the recommendation.
 type Printed = (&'static str, [(f64, f64); 5], &'static str);
 
-/// As ../shared/data/README.md has them.
+/// As Klipper printed them for these files.
 const PRINTED: [Printed; 3] = [
     ("resonances_x_20210821_152037.csv", [(58.2, 15.8), (40.8, 2.0), (51.2, 0.2), (63.0, 0.0), (77.6, 0.0)], "ei"),
     ("resonances_y_20210630_223910.csv", [(46.0, 9.5), (29.4, 1.0), (39.4, 0.0), (50.2, 0.0), (62.0, 0.0)], "ei"),
@@ -187,7 +182,7 @@ const PRINTED: [Printed; 3] = [
 
 #[test]
 fn what_klipper_printed() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = spectra() else { return };
     for (file, printed, recommended) in PRINTED {
         let spectrum = spectrum(&folder.join(file));
         let choice = choose(Target::Spectrum(&spectrum), &Criterion::default()).unwrap();
@@ -257,10 +252,10 @@ fn samples_from_a_file() {
     assert!((power / (0.5 * 700.0 * 700.0) - 1.0).abs() < 1e-3, "{power}");
 }
 
-/// The lighter motor: the first peak goes from 40.0 to 45.0 Hz (../shared/data/README.md).
+/// The lighter motor: the first peak goes from 40.0 to 45.0 Hz, as Klipper printed it.
 #[test]
 fn two_motors_compared() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = spectra() else { return };
     let heavy = spectrum(&folder.join("resonances_x_20210701_223821.csv"));
     let light = spectrum(&folder.join("resonances_x_20210821_152037.csv"));
     let first = |spectrum: &Spectrum| spectrum.peaks()[0].0;
@@ -280,7 +275,7 @@ fn two_motors_compared() {
 /// `max_smoothing` is kept, and costs vibration.
 #[test]
 fn smoothing_can_be_limited() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = spectra() else { return };
     let spectrum = spectrum(&folder.join(PRINTED[1].0));
     let free = choose(Target::Spectrum(&spectrum), &Criterion::default()).unwrap();
     let limit = 0.1e-3;

@@ -1,7 +1,6 @@
 //! A machine stepped from outside goes where it goes in one run, however it is stepped, and so does a copy of it.
 
-mod common;
-
+use crate::common;
 use common::random::{self, Dry};
 use proptest::prelude::*;
 

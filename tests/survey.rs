@@ -1,7 +1,6 @@
 //! What a survey says of logs: of measured ones, and of a simulated one with a known fault.
 
-mod common;
-
+use crate::common;
 use std::f64::consts::TAU;
 use taut::case::{Case, TEMPLATE};
 use taut::log::{Log, Output, Quantity, Severity, Survey};
@@ -213,10 +212,11 @@ fn steps_and_noise_are_measured() {
 /// What is said of the machines whose logs are published; nothing of it is a wrong suspicion.
 #[test]
 fn measured_data_of_others() {
-    let Some(data) = common::shared("data") else {
-        eprintln!("skipped: ../shared/data is not there");
+    let files = ["pendulepi/february.csv", "emps/estimation.mat", "ced/DATAUNIF.csv", "ced/DATAPRBS.csv"];
+    if common::data::data(files).is_none() {
         return;
-    };
+    }
+    let data = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("data");
     let machine = &TEMPLATE[..TEMPLATE.find("[[experiment]]").unwrap()];
     for log in [
         r#"file = "pendulepi/february.csv", time = "time_us", input = "pwm", cart_position = "position", units = { time = "us" }, scale = { input = "12/255" }, split = "pwm", where = { column = "pwm", is = [-250, -50, 50, 100] }"#,

@@ -1,9 +1,9 @@
 //! Sweeps: the same rows however they are split, distributions, designs, metrics, sensitivity indices.
 
-mod common;
 #[path = "sweep/gantry.rs"]
 mod gantry;
 
+use crate::common;
 use taut::case::{Case, Sampling};
 use taut::metrics::Meter;
 use taut::solve::{Bench, Flow, Solver, stream_observed};
@@ -268,7 +268,7 @@ fn blocks_for_indices_mix_two_samples() {
 #[test]
 fn a_bench_shows_what_a_stream_shows() {
     let mut bench = Bench::default();
-    let mut compared = 0;
+    let (mut compared, mut least) = (0, 12);
     for file in [
         "sollmann-jouaneh/table4.toml",
         "laser-gantry/laser-gantry.toml",
@@ -276,7 +276,12 @@ fn a_bench_shows_what_a_stream_shows() {
         "emps/asymmetric.toml",
         "two-mass/two-mass.toml",
     ] {
-        let case = Case::read(format!("{}/stages/{file}", env!("CARGO_MANIFEST_DIR"))).unwrap();
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("stages").join(file);
+        if !common::data::of_case(&path) {
+            least -= 2;
+            continue;
+        }
+        let case = Case::read(path).unwrap();
         for share in [0.0, 0.15] {
             let mut stage = case.stage.clone();
             stage.cart.mass *= 1.0 + share;
@@ -294,7 +299,7 @@ fn a_bench_shows_what_a_stream_shows() {
             }
         }
     }
-    assert!(compared >= 12, "{compared}");
+    assert!(compared >= least, "{compared}");
 }
 
 /// NumPy's figures, from whole trajectories: `authorities/metrics.py`.

@@ -1,7 +1,6 @@
 //! The paper's Table 3 with its fixed steps: the formulas have their order, and the friction is the printed one.
 
-mod common;
-
+use crate::common;
 use common::experiment;
 use taut::case::Experiment;
 use taut::friction::Friction;

@@ -14,7 +14,7 @@ use taut::files::{Inputs, write_atomically};
 use taut::fit::{Posterior, Profile, check, fit, posterior, profiles};
 use taut::json;
 use taut::linear::{Analysis, GantryAnalysis};
-use taut::posterior::Effort;
+use taut::nuts::Effort;
 use taut::solve::{Choice, Flow, Kind, Method};
 
 /// Draws that tune a chain.

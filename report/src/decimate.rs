@@ -9,7 +9,7 @@
 /// ```
 /// let x: Vec<f64> = (0..10_000).map(f64::from).collect();
 /// let y: Vec<f64> = x.iter().map(|&x| if x == 7777.0 { 1.0 } else { 0.0 }).collect();
-/// let (xs, ys) = taut::report::decimate(&x, &y, 200);
+/// let (xs, ys) = taut_report::decimate(&x, &y, 200);
 /// assert!(ys.len() <= 200 && ys.contains(&1.0));
 /// ```
 pub fn decimate(x: &[f64], y: &[f64], n: usize) -> (Vec<f64>, Vec<f64>) {

@@ -5,7 +5,7 @@ use super::svg::Colour;
 /// One or more panels above a common x axis.
 ///
 /// ```
-/// use taut::report::{Axis, Figure, Panel};
+/// use taut_report::{Axis, Figure, Panel};
 /// let (time, position) = ([0.0, 0.1, 0.2], [0.0, 0.01, 0.03]);
 /// let figure = Figure::new("Cart", Axis::new("Time", "s"))
 ///     .panel(Panel::new(Axis::new("Position", "m").shown_as("mm", 1e3)).line("x", &time, &position))

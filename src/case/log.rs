@@ -13,6 +13,7 @@ use crate::stage::{EncoderPlace, Stage};
 /// Keys of the table beside its quantities.
 const KEYS: &[&str] = &[
     "file",
+    "fetch",
     "input",
     "reference",
     "units",
@@ -34,6 +35,7 @@ pub(super) fn logs(field: &Field, stage: &Stage, folder: &Folder, driven: bool) 
     table.check_keys(&keys, &[])?;
     let file = table.required("file", "file = \"...\" with the path of the log")?;
     let path = folder.path.join(file.text()?);
+    let fetch = table.optional("fetch").map(|field| field.text()).transpose()?;
     let sources = Sources::new(&table, stage)?;
 
     let input = sources.source("input", field.input_unit)?;
@@ -93,7 +95,10 @@ pub(super) fn logs(field: &Field, stage: &Stage, folder: &Folder, driven: bool) 
         split: table.optional("split").map(|field| column(&field)).transpose()?,
         dialect,
     };
-    let runs = mapping.read()?;
+    let runs = mapping.read().map_err(|error| match fetch {
+        Some(line) if !path.exists() => error.next(format!("`{line}` fetches it")),
+        _ => error,
+    })?;
     folder.read.borrow_mut().push(InputFile { path, place: file.node.span.clone() });
     Ok(runs)
 }

@@ -14,7 +14,7 @@
 
 use super::least_squares::{Bounds, Differences, Residuals};
 use crate::chance::uniform;
-use crate::posterior::{Draws, Effort, LogDensity, Watch, sample};
+use crate::nuts::{Draws, Effort, LogDensity, Watch, sample};
 use nalgebra::{DMatrix, DVector};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;

@@ -4,12 +4,10 @@
 //! all logs at once. The recipe is [`fit`]; before it, [`check`] says what the logs can determine.
 
 mod check;
-#[cfg(feature = "posterior")]
 mod density;
 mod drawn;
 mod identify;
 pub mod least_squares;
-#[cfg(feature = "posterior")]
 mod posterior;
 mod problem;
 mod profile;
@@ -21,7 +19,6 @@ pub use check::{Check, Proposal, check};
 pub use drawn::{drawn, machines};
 pub use identify::{Group, Identifiability, LIMIT};
 pub use least_squares::Ending;
-#[cfg(feature = "posterior")]
 pub use posterior::{Credible, EFFECTIVE, Posterior, R_HAT, posterior};
 pub use problem::{Problem, Stop};
 pub use profile::{Profile, profiles};

@@ -13,7 +13,7 @@ use super::run::{Extra, Nuisance, Run};
 use super::uncertainty::{Covariance, inverse_of_square};
 use crate::case::{Case, Plan, Prior, file_name};
 use crate::error::{Error, Result};
-use crate::posterior::{Draws, Effort, Watch};
+use crate::nuts::{Draws, Effort, Watch};
 use crate::trajectory::{Column, Trajectory};
 use nalgebra::DMatrix;
 
@@ -23,7 +23,7 @@ pub const R_HAT: f64 = 1.01;
 /// Effective draws below which nothing counts as converged.
 pub const EFFECTIVE: f64 = 400.0;
 
-/// Share of the draws whose path may go wrong.
+/// Share of divergent transitions that is passed over.
 const DIVERGING: f64 = 0.01;
 
 /// What was drawn, and whether to believe it.
@@ -64,11 +64,13 @@ pub struct Credible {
 
 /// Draws from the posterior of the parameters of `plan` about `fit`, which was made of the same case and plan.
 ///
-/// `watch` sees how many draws are made, and may end it early. Errors: a fit that was interrupted, priors outside the bounds.
+/// `watch` sees how many draws are made, and may end it early. Errors: a fit that was interrupted, an estimate that is not
+/// determined, priors outside the bounds.
 pub fn posterior(case: &Case, plan: &Plan, fit: &Fit, effort: Effort, watch: &Watch) -> Result<Posterior> {
     if matches!(fit.ending, Ending::Interrupted | Ending::Failed) {
         return Err(Error::new("draws begin at a fit that has ended, and this one has not").next("fit it again"));
     }
+    refuse_undetermined(fit)?;
     let mut problem = Problem::new(case, plan)?;
     for &(quantity, deviation) in &fit.noise {
         problem.weigh(quantity, deviation, true);
@@ -110,6 +112,18 @@ pub fn posterior(case: &Case, plan: &Plan, fit: &Fit, effort: Effort, watch: &Wa
     Ok(Posterior { variables, globals: problem.globals(), draws, inflation, fixed_slopes: fixed })
 }
 
+/// Draws of what the logs do not determine would wander between its bounds for as long as one waits.
+fn refuse_undetermined(fit: &Fit) -> Result<()> {
+    let undetermined = |estimate: &&super::Estimate| estimate.error.is_some_and(f64::is_infinite);
+    let names: Vec<&str> = fit.estimates.iter().filter(undetermined).map(|estimate| &*estimate.name).collect();
+    if names.is_empty() {
+        return Ok(());
+    }
+    let are = if names.len() == 1 { "is" } else { "are" };
+    Err(Error::new(format!("no posterior: {} {are} not determined by these logs", names.join(", ")))
+        .next("take it out of fit.free, or add a log that determines it; `taut check` proposes some"))
+}
+
 impl Posterior {
     /// Why it does not count as converged; empty if it does.
     pub fn doubts(&self) -> Vec<String> {
@@ -136,7 +150,7 @@ impl Posterior {
         }
         let all = self.count() as f64;
         if self.draws.divergences as f64 > DIVERGING * all {
-            doubts.push(format!("{} of {all} paths went wrong", self.draws.divergences));
+            doubts.push(format!("{} of {all} transitions were divergent", self.draws.divergences));
         }
         doubts
     }

@@ -9,7 +9,6 @@ mod gantry;
 mod gantry_modes;
 mod modes;
 mod moves;
-#[cfg(feature = "posterior")]
 mod posterior;
 mod result_schema;
 mod simulation;
@@ -21,7 +20,6 @@ pub use gantry::{GantrySimulated, GantrySimulation, gantry_metrics};
 pub use gantry_modes::gantry_modes;
 pub use modes::modes;
 pub use moves::{Moved, moves};
-#[cfg(feature = "posterior")]
 pub use posterior::posterior;
 pub use result_schema::{identity, schema, schemas};
 pub use simulation::{Band, Event, Metrics, Simulated, Simulation, load_unit};

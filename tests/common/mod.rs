@@ -1,20 +1,17 @@
-//! What several tests share: the paper's machine, and where the reference data lie.
+//! What several tests share: the paper's machine, and and measurements of others.
 #![allow(dead_code)]
 
+pub mod chance;
+pub mod data;
+pub mod document;
+pub mod logged;
 pub mod random;
+pub mod wrong;
 
-use std::path::PathBuf;
 use taut::case::{Experiment, Initial};
 use taut::friction::Friction;
 use taut::signal::Signal;
 use taut::stage::{Amplifier, AmplifierMode, Belt, Cart, Motor, Pulley, Stage};
-
-/// The folder of data that are read in place, beside the repository or where `TAUT_SHARED` says; `None` where it is absent.
-pub fn shared(folder: &str) -> Option<PathBuf> {
-    let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared");
-    let path = std::env::var_os("TAUT_SHARED").map_or_else(beside, PathBuf::from).join(folder);
-    path.is_dir().then_some(path)
-}
 
 /// A stage with the paper's motor and radius.
 pub fn paper_stage(stiffness: [f64; 3], inertia: f64, pulley: Friction, cart: Friction) -> Stage {

@@ -1,9 +1,12 @@
 //! The project's own chores: `cargo xtask test` checks all that can be checked, `cargo xtask python` the Python package alone,
-//! `cargo xtask hunt` looks for what is wrong with larger means.
+//! `cargo xtask data` fetches other people's measurements, `cargo xtask hunt` looks for what is wrong with larger means.
 
+mod data;
 mod hunt;
+mod ignored;
 mod python;
 
+use ignored::Ignored;
 use std::io::{BufRead, BufReader};
 use std::process::{Command, ExitCode, Stdio};
 use std::time::Instant;
@@ -51,6 +54,7 @@ fn main() -> ExitCode {
     let done = match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["test"] => test(&STEPS),
         ["python"] => test(&[PYTHON]),
+        ["data", ref words @ ..] => data::run(words),
         ["hunt", ref words @ ..] => match hunt::Hunt::new(words) {
             Ok(hunt) => hunt.run(),
             Err(told) => {
@@ -59,7 +63,7 @@ fn main() -> ExitCode {
             }
         },
         _ => {
-            eprintln!("usage: cargo xtask test | cargo xtask python | {}", hunt::USAGE);
+            eprintln!("usage: cargo xtask test | cargo xtask python | {} | {}", data::USAGE, hunt::USAGE);
             return ExitCode::from(2);
         }
     };
@@ -80,21 +84,22 @@ fn test(steps: &[Step]) -> Result<(), String> {
             return Err(format!("{component} is missing; `rustup component add {component}` installs it"));
         }
     }
+    data::before_tests()?;
     let begin = Instant::now();
-    let mut counts = Counts::default();
+    let (mut counts, ignored) = (Counts::default(), Ignored::new()?);
     for step in steps {
         let command = step.command();
         println!("== {}: cargo {command}", step.what);
         let begin = Instant::now();
-        let succeeded = step.run(&mut counts)?;
+        let succeeded = step.run(&mut counts, &ignored)?;
         println!("== {}: {:.1} s", step.what, begin.elapsed().as_secs_f64());
         if !succeeded {
-            counts.show();
+            counts.show(&ignored.tests());
             return Err(format!("failed: {}; to repeat it alone: cargo {command}", step.what));
         }
     }
     println!("\nall steps succeeded in {:.1} s", begin.elapsed().as_secs_f64());
-    counts.show();
+    counts.show(&ignored.tests());
     Ok(())
 }
 
@@ -108,11 +113,11 @@ impl Step {
     }
 
     /// Whether it succeeds; the tests in it are counted.
-    fn run(&self, counts: &mut Counts) -> Result<bool, String> {
+    fn run(&self, counts: &mut Counts, ignored: &Ignored) -> Result<bool, String> {
         match self.work {
             Work::Cargo(words, variables) => {
                 let mut command = cargo(words);
-                command.envs(variables.iter().copied());
+                command.envs(variables.iter().copied()).env(ignored::VARIABLE, ignored.file());
                 run(command, counts)
             }
             Work::Python => python::test(counts),
@@ -147,6 +152,7 @@ fn cargo(arguments: &[&str]) -> Command {
 struct Counts {
     passed: u64,
     failed: u64,
+    ignored: u64,
 }
 
 impl Counts {
@@ -162,10 +168,19 @@ impl Counts {
         };
         self.passed += count(" passed");
         self.failed += count(" failed");
+        self.ignored += count(" ignored") + count(" skipped");
     }
 
-    fn show(&self) {
-        println!("{} passed, {} failed", self.passed, self.failed);
+    /// Shows them, and the tests that did nothing for want of a file, which their programs count as passed.
+    fn show(&self, wanting: &[String]) {
+        wanting.iter().for_each(|line| println!("ignored: {line}"));
+        let count = wanting.len() as u64;
+        println!(
+            "{} passed, {} failed, {} ignored",
+            self.passed.saturating_sub(count),
+            self.failed,
+            self.ignored + count
+        );
     }
 }
 
@@ -180,6 +195,6 @@ mod tests {
         counts.take("test result: FAILED. 3 passed; 2 failed; 0 ignored; 0 measured; 0 filtered out");
         counts.take("test the_word_passed; ... ok");
         counts.take("1 failed, 38 passed, 1 skipped in 4.56s");
-        assert_eq!(counts, Counts { passed: 53, failed: 3 });
+        assert_eq!(counts, Counts { passed: 53, failed: 3, ignored: 2 });
     }
 }

@@ -35,7 +35,7 @@ pub fn test(counts: &mut Counts) -> Result<bool, String> {
     tests.env("TAUT_PROGRAM", target.join("debug").join(format!("taut{}", std::env::consts::EXE_SUFFIX)));
     tests.env("MPLBACKEND", "agg").env("PYTHONDONTWRITEBYTECODE", "1");
     // The program that results are compared with, as the tests of the workspace build it: after those there is nothing left to do.
-    let program = crate::cargo(&["test", "--workspace", "--no-run", "--test", "commands"]);
+    let program = crate::cargo(&["test", "--workspace", "--no-run", "--test", "all"]);
     for command in [install, types, program, tests] {
         if !crate::run(command, counts)? {
             return Ok(false);
@@ -92,7 +92,7 @@ fn program(environment: &Path, name: &str) -> PathBuf {
 }
 
 /// Where cargo builds.
-fn target() -> PathBuf {
+pub fn target() -> PathBuf {
     let given = std::env::var_os("CARGO_TARGET_DIR").map(PathBuf::from);
     std::path::absolute(given.unwrap_or_else(|| "target".into())).unwrap_or_else(|_| "target".into())
 }

@@ -9,7 +9,7 @@ use std::fmt::Write;
 use taut::Result;
 use taut::case::{Case, Plan};
 use taut::fit::{Credible, Fit, Posterior, posterior};
-use taut::posterior::Effort;
+use taut::nuts::Effort;
 use taut_report::{Callout, Cell, Page, Table};
 
 /// Draws that tune a chain.

@@ -20,7 +20,7 @@ pub fn on(k: usize) -> bool {
 ";
 
 /// What the library is built with.
-const FEATURES: &str = "json,parquet,posterior";
+const FEATURES: &str = "json,parquet";
 
 /// Memory that a program of tests may take, KiB: a change may make a loop that collects for ever.
 const MEMORY: u64 = 12 << 20;
@@ -30,10 +30,12 @@ pub struct Tree {
     root: PathBuf,
 }
 
-/// A program of tests.
+/// A program of tests, or one module of it.
 pub struct Program {
     pub name: String,
     path: PathBuf,
+    /// The tests whose names contain this.
+    filter: String,
     root: PathBuf,
     /// How long it takes without a change.
     took: Duration,
@@ -56,13 +58,10 @@ impl Tree {
         let here = std::env::current_dir().map_err(|error| error.to_string())?;
         let root = here.join("target/mutants/taut");
         let _ = fs::remove_dir_all(&root);
-        // Data that some tests read stand beside the repository.
+        // Data that some tests read are not in the list of files.
         #[cfg(unix)]
-        if let Ok(shared) = here.join("../shared").canonicalize() {
-            let made = fs::create_dir_all(&root).and_then(|()| {
-                let link = here.join("target/mutants/shared");
-                if link.exists() { Ok(()) } else { std::os::unix::fs::symlink(shared, link) }
-            });
+        if let Ok(data) = here.join("data").canonicalize() {
+            let made = fs::create_dir_all(&root).and_then(|()| std::os::unix::fs::symlink(data, root.join("data")));
             made.map_err(|error| format!("target/mutants: {error}"))?;
         }
         let listed = Command::new("git").args(["ls-files", "-z", "--cached"]).output();
@@ -172,18 +171,25 @@ impl Tree {
     /// Builds the programs of tests of these names, and runs each without a change.
     pub fn programs<'a>(&self, names: impl Iterator<Item = &'a str>) -> Result<Vec<Program>, String> {
         let names: BTreeSet<&str> = names.collect();
-        let tests: Vec<&str> = names.iter().filter(|name| **name != "lib").flat_map(|name| ["--test", *name]).collect();
-        let words: Vec<&str> = ["test", "--no-run", "--lib"].into_iter().chain(tests).collect();
+        let words = ["test", "--no-run", "--lib", "--test", "all"];
         let output = self.cargo(&words).output().map_err(|error| format!("cargo cannot be started: {error}"))?;
-        let mut programs = Vec::new();
+        let (mut library, mut all) = (None, None);
         for line in String::from_utf8_lossy(&output.stdout).lines() {
             let Ok(message) = serde_json::from_str::<serde_json::Value>(line) else { continue };
             let Some(path) = message["executable"].as_str() else { continue };
             let is_library = message["target"]["kind"][0] == "lib";
-            let name = if is_library { "lib" } else { message["target"]["name"].as_str().unwrap_or_default() };
-            let path = PathBuf::from(path);
+            *if is_library { &mut library } else { &mut all } = Some(PathBuf::from(path));
+        }
+        let (Some(library), Some(all)) = (library, all) else {
+            return Err(format!("the tests of the copy in {} cannot be built", self.root.display()));
+        };
+        let mut programs = Vec::new();
+        for name in names {
+            let (path, filter) =
+                if name == "lib" { (library.clone(), String::new()) } else { (all.clone(), format!("{name}::")) };
             let took = Duration::from_secs(600);
-            let mut program = Program { name: name.into(), path, root: self.root.clone(), took, failing: Vec::new() };
+            let (root, failing) = (self.root.clone(), Vec::new());
+            let mut program = Program { name: name.into(), path, filter, root, took, failing };
             program.leave_out_failing();
             let begin = Instant::now();
             if program.run(0) != Ended::Well {
@@ -196,10 +202,7 @@ impl Tree {
             }
             programs.push(program);
         }
-        match programs.len() == names.len() {
-            true => Ok(programs),
-            false => Err(format!("only {} of {} programs of tests are built", programs.len(), names.len())),
-        }
+        Ok(programs)
     }
 }
 
@@ -222,6 +225,7 @@ impl Program {
         let mut command = Command::new("sh");
         let limited = format!("ulimit -v {MEMORY} 2>/dev/null; exec \"$0\" \"$@\"");
         command.args(["-c", &limited]).arg(&self.path).args(["--test-threads", "2"]).current_dir(&self.root);
+        command.args(Some(&self.filter).filter(|filter| !filter.is_empty()));
         command.args(self.failing.iter().flat_map(|name| ["--skip", name]));
         command.env("TAUT_MUTANT", k.to_string()).env("RUST_BACKTRACE", "0").env("CARGO_MANIFEST_DIR", &self.root);
         command.stdin(Stdio::null());

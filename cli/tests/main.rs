@@ -1,0 +1,28 @@
+//! All tests of the program in one program, which is linked once: `cargo test --package taut-cli --test all fit::` runs those of `fit.rs`.
+
+mod commands;
+mod common_options;
+mod documents;
+mod endings;
+mod faults;
+mod fit;
+mod gantry;
+mod outputs;
+mod paper;
+mod schemas;
+mod shape;
+mod sweep;
+
+/// A file that is no module here would not be run, and nobody would notice.
+#[test]
+fn every_file_of_tests_is_run() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        let Some(name) = name.strip_suffix(".rs").filter(|name| *name != "main") else { continue };
+        assert!(
+            include_str!("main.rs").lines().any(|line| line == format!("mod {name};")),
+            "tests/main.rs lacks mod {name};"
+        );
+    }
+}

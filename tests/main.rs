@@ -1,0 +1,59 @@
+//! All tests of the library in one program, which is linked once: `cargo test --package taut --test all fit::` runs those of `fit.rs`.
+
+mod authorities;
+mod bad_cases;
+mod bad_logs;
+mod bombs;
+mod case;
+mod case_documentation;
+mod case_mutations;
+mod combinations;
+mod common;
+mod control;
+mod cost;
+mod definitions;
+mod definitions_control;
+mod elements;
+mod fit;
+mod gantry;
+mod gantry_laws;
+mod general;
+mod hard;
+mod instant;
+mod laws;
+mod linear;
+mod logs;
+mod lugre;
+mod measure;
+mod merged;
+mod metrics;
+mod moves;
+mod parameters;
+mod posterior;
+mod published;
+mod quantity;
+mod reference;
+
+mod rounding;
+mod rows;
+mod shape;
+mod stages;
+mod stepping;
+mod survey;
+mod sweep;
+mod table3;
+mod tune;
+
+/// A file that is no module here would not be run, and nobody would notice.
+#[test]
+fn every_file_of_tests_is_run() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        let Some(name) = name.strip_suffix(".rs").filter(|name| *name != "main") else { continue };
+        assert!(
+            include_str!("main.rs").lines().any(|line| line == format!("mod {name};")),
+            "tests/main.rs lacks mod {name};"
+        );
+    }
+}
