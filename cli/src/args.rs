@@ -136,11 +136,12 @@ pub enum KindName {
 /// file that repeats the run.
 ///
 /// A length, a force or a time on the command line is written as in the case file: "0.5 kg", 0.1ms, "24 V".
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Clone, clap::Args)]
 #[command(after_help = SIMULATE)]
 pub struct Simulate {
-    /// The case file; - is standard input
-    pub case: PathBuf,
+    /// The case file; - is standard input. Several are run one after the other, each into a folder of its own name in --out
+    #[arg(required = true)]
+    pub cases: Vec<PathBuf>,
     /// Run only the experiment of this name, as often as needed
     #[arg(long = "experiment", value_name = "NAME")]
     pub experiments: Vec<String>,

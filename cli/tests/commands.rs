@@ -382,3 +382,22 @@ fn modes_of_the_papers_machine() {
         assert!(text(&run.get_output().stderr).contains(told), "{wrong:?}");
     }
 }
+
+#[test]
+fn several_cases_are_simulated_one_after_the_other() {
+    let folder = TempDir::new().unwrap();
+    let stages = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages");
+    let cases = ["h-frame/h-frame.toml", "core-xy/core-xy.toml", "printer-axis/printer-axis.toml"];
+    let cases: Vec<String> = cases.iter().map(|case| stages.join(case).display().to_string()).collect();
+    let run = |more: &[&str]| taut(folder.path()).arg("simulate").args(&cases).args(more).output().unwrap();
+    let done = run(&["--out", "out", "--no-report"]);
+    assert!(done.status.success(), "{done:?}");
+    for name in ["h-frame", "core-xy", "printer-axis"] {
+        assert!(folder.path().join("out").join(name).join("summary.json").exists(), "{name}");
+    }
+    let refused = run(&["--json"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(text(&refused.stderr).contains("name one case"));
+    let same = taut(folder.path()).args(["simulate", &cases[0], &cases[0], "--out", "out"]).output().unwrap();
+    assert!(text(&same.stderr).contains("another case has the same name"), "{same:?}");
+}

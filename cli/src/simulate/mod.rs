@@ -16,7 +16,10 @@ use crate::command::{Finished, Remark, Report};
 use crate::failure::{Failure, Outcome, Status};
 use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
+use crate::terminal;
 use run::{Run, Setting};
+use std::ffi::OsStr;
+use std::path::Path;
 use taut::case::{Case, Opened};
 use taut::json::{self, Simulation};
 use taut::solve::{self, Ending, Solver};
@@ -26,24 +29,60 @@ use taut::{Error, Result};
 /// What a user gets by writing it.
 const ADVICE: &str = "add --out DIR for files and a report";
 
-/// Reads the case, simulates, measures, reports.
+/// Reads the cases, simulates, measures, reports.
 pub fn run(args: &Simulate) -> Outcome {
-    match args.common.open(&args.case)? {
-        Opened::Axis(case) => axis(args, &case),
-        Opened::Gantry(case) => gantry::run(args, &case),
+    let [path] = &args.cases[..] else { return several(args) };
+    one(args, path)
+}
+
+fn one(args: &Simulate, path: &Path) -> Outcome {
+    match args.common.open(path)? {
+        Opened::Axis(case) => axis(args, path, &case),
+        Opened::Gantry(case) => gantry::run(args, path, &case),
     }
 }
 
-fn axis(args: &Simulate, case: &Case) -> Outcome {
+/// One case after the other, each into a folder of its own; the gravest end is that of all.
+fn several(args: &Simulate) -> Outcome {
+    if args.common.json {
+        let error = Error::new("the summaries of several cases are not one JSON").in_file("--json");
+        return Err(error.next("name one case; or take --out, which writes a summary for each").into());
+    }
+    let mut names: Vec<&OsStr> = Vec::new();
+    for path in &args.cases {
+        let name = path.file_stem().unwrap_or_default();
+        if args.common.out.is_some() && names.contains(&name) {
+            let error = Error::new("another case has the same name, and would be written into the same folder").in_file(path);
+            return Err(error.next("simulate it by itself, with an --out of its own").into());
+        }
+        names.push(name);
+    }
+    let mut all = Status::Done;
+    for (k, (path, name)) in args.cases.iter().zip(names).enumerate() {
+        if k > 0 && !args.common.quiet {
+            terminal::show("\n");
+        }
+        let mut own = args.clone();
+        own.common.out = args.common.out.as_ref().map(|out| out.join(name));
+        match one(&own, path)? {
+            Status::Done => {}
+            Status::Incomplete => all = Status::Incomplete,
+            interrupted @ Status::Interrupted(_) => return Ok(interrupted),
+        }
+    }
+    Ok(all)
+}
+
+fn axis(args: &Simulate, path: &Path, case: &Case) -> Outcome {
     let common = &args.common;
     let solver = args.solver(&case.stage)?;
-    let experiments = case.experiments_named(&args.case, &args.experiments)?;
+    let experiments = case.experiments_named(path, &args.experiments)?;
     if args.as_measured {
-        measurable(case, solver, args)?;
+        measurable(case, solver, path)?;
     }
-    let machines = machines(case, args)?;
+    let machines = machines(case, args, path)?;
     let inputs = || {
-        let mut inputs = folder::inputs(&args.case, case);
+        let mut inputs = folder::inputs(path, case);
         args.draws.iter().for_each(|file| inputs.add(file));
         inputs
     };
@@ -100,20 +139,20 @@ fn names(
 }
 
 /// The machines of --draws.
-fn machines(case: &Case, args: &Simulate) -> Result<Vec<Stage>> {
+fn machines(case: &Case, args: &Simulate, path: &Path) -> Result<Vec<Stage>> {
     let Some(file) = &args.draws else { return Ok(Vec::new()) };
     let plan = case.fit.as_ref().ok_or_else(|| {
         Error::new("this case does not say which parameters were drawn")
-            .in_file(&args.case)
+            .in_file(path)
             .next("use --draws with the fitted.toml of the same folder, or with the case that was fitted")
     })?;
     Ok(band::chosen(taut::fit::machines(case, plan, file)?, args.machines))
 }
 
 /// Refuses to log what nobody measures, and what would not be the run.
-fn measurable(case: &Case, solver: Solver, args: &Simulate) -> Result<()> {
+fn measurable(case: &Case, solver: Solver, path: &Path) -> Result<()> {
     if case.stage.encoder.is_none() && case.measurement.is_none() {
-        return Err(Error::new("--as-measured: this case does not say how it is measured").in_file(&args.case).next(
+        return Err(Error::new("--as-measured: this case does not say how it is measured").in_file(path).next(
             "add [encoder] with for example at = \"motor\" and lines = 512, \
              or [measurement] with a quantity such as motor_current = { step = \"10 mA\" }",
         ));

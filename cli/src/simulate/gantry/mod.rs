@@ -14,6 +14,7 @@ use crate::failure::{Failure, Outcome};
 use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
 use run::{Run, Setting};
+use std::path::Path;
 use taut::case::GantryCase;
 use taut::json::{self, GantrySimulation};
 use taut::solve::Solver;
@@ -21,7 +22,7 @@ use taut::{Error, Result};
 use taut_report::{Picture, gantry_drawing};
 
 /// Simulates, measures, reports.
-pub fn run(args: &Simulate, case: &GantryCase) -> Outcome {
+pub fn run(args: &Simulate, path: &Path, case: &GantryCase) -> Outcome {
     refuse(args)?;
     let common = &args.common;
     let mechanism = case.gantry.mechanism();
@@ -29,7 +30,7 @@ pub fn run(args: &Simulate, case: &GantryCase) -> Outcome {
     let experiments = case.experiments_named(&args.experiments)?;
     let brought = folder::brought_of(&case.files).into_values();
     let files = names(args, brought, experiments.iter().map(|one| one.file_name()));
-    let folder = Folder::wanted(common, || folder::inputs_of(&args.case, &case.files), files)?;
+    let folder = Folder::wanted(common, || folder::inputs_of(path, &case.files), files)?;
     let interrupt = Interrupt::listen();
     let setting = Setting { args, case, mechanism: &mechanism, solver, folder: folder.as_ref(), interrupt: &interrupt };
 
