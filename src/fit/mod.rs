@@ -9,6 +9,7 @@ mod density;
 mod drawn;
 mod identify;
 pub mod least_squares;
+mod noise;
 #[cfg(feature = "posterior")]
 mod posterior;
 mod problem;

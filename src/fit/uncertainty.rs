@@ -1,11 +1,14 @@
-//! How far the truth may be from an estimate: covariance, with what the residuals of a log remember taken into account.
+//! How far the truth may be from an estimate: the covariance, for the noise that the residuals show.
 //!
-//! For white residuals the covariance is s² (JᵀJ)⁻¹. Residuals that are alike from sample to sample tell less than their
-//! number says; then it is (JᵀJ)⁻¹ S (JᵀJ)⁻¹ with Newey and West's (1987) S = Σ_l w_l Σ_t g_t g_{t+l}ᵀ over the products
-//! g_t = J_tᵀ r_t, Bartlett weights and Andrews' (1991) bandwidth. Of both variances the greater one holds.
+//! For white residuals it is s² (JᵀJ)⁻¹. Residuals that are alike from sample to sample tell less than their number says: with the
+//! covariance Σ of the noise it is (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹, for every Σ that the residuals allow ([`super::noise`]).
 
+use super::noise;
 use super::problem::Problem;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
+
+/// Standard deviations that 95 % of a normal distribution keep to.
+const NORMAL: f64 = 1.959_963_985;
 
 /// Covariance of the variables that are free, in their order; none if they are not determined.
 pub struct Covariance {
@@ -17,7 +20,7 @@ pub struct Covariance {
     pub deviation: f64,
     /// Independent values minus variables.
     pub freedom: usize,
-    /// How many standard errors a 95 % interval reaches to each side.
+    /// How many standard errors a 95 % interval reaches to each side; few degrees of freedom are in the standard errors.
     pub reach: f64,
 }
 
@@ -33,40 +36,30 @@ impl Covariance {
         let inverse = inverse_of_square(&columns)?;
         let white = &inverse * (deviation * deviation);
 
-        let mut sum = DMatrix::zeros(free.len(), free.len());
-        let mut coloured = false;
-        let (mut lagged, mut counting) = (0.0, 0.0);
-        let mut first = 0;
-        for run in &problem.runs {
-            let n = run.time.len();
-            for output in 0..run.seen.len() {
-                let rows: Vec<usize> =
-                    (0..n).filter(|&k| run.seen[output].weights[k] > 0.0).map(|k| first + output * n + k).collect();
-                let memory = memory_of(residuals, &rows);
-                let own = run.independent(output);
-                let lags = bandwidth(memory, own as usize);
-                coloured |= lags > 0;
-                lagged += lags as f64;
-                counting += own;
-                add_products(&mut sum, &columns, residuals, &rows, lags);
-            }
-            first += run.rows();
+        // Globals by the noise that the residuals show; what belongs to one run is wider by as much as they are on the whole.
+        let globals = free.iter().filter(|&&j| j < problem.globals()).count();
+        let spreads = noise::spreads(problem, residuals, jacobian, &free, &inverse);
+        let mut own = DMatrix::zeros(globals, globals);
+        for spread in &spreads {
+            own += &spread.covariance;
         }
-        let matrix = if coloured {
-            let grown = counted / freedom;
-            let robust = &inverse * sum * &inverse * grown;
-            // Correlations as with white residuals, variances the greater ones.
-            let factor: Vec<f64> = (0..free.len()).map(|j| (robust[(j, j)] / white[(j, j)]).max(1.0).sqrt()).collect();
-            DMatrix::from_fn(free.len(), free.len(), |i, j| white[(i, j)] * factor[i] * factor[j])
-        } else {
-            white
-        };
-        // How far an interval reaches with a covariance summed over the share b of the lags (Kiefer and Vogelsang 2005, for
-        // Bartlett weights), instead of 1.96.
-        let b: f64 = if counting > 0.0 { lagged / counting } else { 0.0 };
-        let wider = (1.96 + 2.9694 * b + 0.416 * b.powi(2) - 0.5324 * b.powi(3)) / 1.96;
-        let reach = student(freedom.round() as usize) * wider;
-        Some(Self { free, matrix, deviation, freedom: freedom.round() as usize, reach })
+        let half: Vec<f64> = (0..globals)
+            .map(|j| spreads.iter().map(|spread| spread.half_width(j).powi(2)).sum::<f64>().sqrt())
+            .collect();
+        let factor: Vec<f64> =
+            (0..globals).map(|j| (half[j] / NORMAL / white[(j, j)].sqrt()).max(f64::MIN_POSITIVE)).collect();
+        let rest = factor.iter().map(|f| f * f).sum::<f64>() / globals.max(1) as f64;
+        let rest = if spreads.is_empty() || globals == 0 { 1.0 } else { rest.sqrt() };
+        let matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| {
+            if i < globals && j < globals && !spreads.is_empty() {
+                let correlation = own[(i, j)] / (own[(i, i)] * own[(j, j)]).sqrt();
+                (half[i] / NORMAL) * (half[j] / NORMAL) * correlation
+            } else {
+                let of = |j: usize| if j < globals && !spreads.is_empty() { factor[j] } else { rest };
+                white[(i, j)] * of(i) * of(j)
+            }
+        });
+        Some(Self { free, matrix, deviation, freedom: freedom.round() as usize, reach: NORMAL })
     }
 
     /// Standard deviation of variable `j`; none for one at a bound.
@@ -116,47 +109,12 @@ pub fn memory_of(residuals: &[f64], rows: &[usize]) -> f64 {
     if own > 0.0 { next / own } else { 0.0 }
 }
 
-/// Lags to sum over for residuals with this correlation of neighbours; none where it may be chance.
-fn bandwidth(memory: f64, n: usize) -> usize {
-    if n < 4 || memory.abs() < 2.0 / (n as f64).sqrt() {
-        return 0;
-    }
-    let rho = memory.clamp(-0.99, 0.99);
-    // α(1) = 4 ρ² / ((1 − ρ)² (1 + ρ)²), bandwidth 1.1447 (α n)^{1/3}
-    let alpha = 4.0 * rho * rho / ((1.0 - rho).powi(2) * (1.0 + rho).powi(2));
-    let width = 1.1447 * (alpha * n as f64).cbrt();
-    (width.ceil() as usize).clamp(1, n / 3)
-}
-
-/// Adds Σ_l w_l Σ_t (g_t g_{t+l}ᵀ + its transpose).
-fn add_products(sum: &mut DMatrix<f64>, jacobian: &DMatrix<f64>, residuals: &[f64], rows: &[usize], lags: usize) {
-    let p = jacobian.ncols();
-    let mut products = DMatrix::zeros(p, rows.len());
-    for (t, &row) in rows.iter().enumerate() {
-        for j in 0..p {
-            products[(j, t)] = jacobian[(row, j)] * residuals[row];
-        }
-    }
-    // Only variables that this run moves.
-    let moved: Vec<usize> = (0..p).filter(|&j| products.row(j).iter().any(|v| *v != 0.0)).collect();
-    // Bartlett-weighted sums by Σ_l w_l γ_l = (1/(L+1)) Σ over windows of (window sum)², the same thing in one pass.
-    let width = lags + 1;
-    let mut window = DVector::<f64>::zeros(moved.len());
-    for end in 0..rows.len() + width - 1 {
-        for (i, &j) in moved.iter().enumerate() {
-            if end < rows.len() {
-                window[i] += products[(j, end)];
-            }
-            if end >= width {
-                window[i] -= products[(j, end - width)];
-            }
-        }
-        for (a, &i) in moved.iter().enumerate() {
-            for (b, &j) in moved.iter().enumerate() {
-                sum[(i, j)] += window[a] * window[b] / width as f64;
-            }
-        }
-    }
+/// The share of Student's t beyond ± `t`: by the normal distribution of a t that is made normal (D. L. Wallace 1959), to about 1e-3
+/// of itself from three degrees of freedom on.
+pub(super) fn student_share(t: f64, freedom: f64) -> f64 {
+    let n = freedom.max(1.0);
+    let z = (8.0 * n + 1.0) / (8.0 * n + 3.0) * (n * (t * t / n).ln_1p()).sqrt();
+    libm::erfc(z / std::f64::consts::SQRT_2)
 }
 
 /// The value below which Student's t stays with 97.5 %, for so many degrees of freedom (Hill's expansion, to 1e-3 from 3 on).
