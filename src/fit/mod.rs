@@ -4,6 +4,7 @@
 //! all logs at once. The recipe is [`fit`]; before it, [`check`] says what the logs can determine.
 
 mod check;
+mod combinations;
 #[cfg(feature = "posterior")]
 mod density;
 mod drawn;
@@ -14,21 +15,25 @@ mod noise;
 mod posterior;
 mod problem;
 mod profile;
+mod proposals;
 mod regression;
 mod run;
 mod uncertainty;
 
-pub use check::{Check, Proposal, check};
+pub use check::{Check, check};
+pub use combinations::Combination;
 pub use drawn::{drawn, machines};
-pub use identify::{Group, Identifiability, LIMIT};
+pub use identify::{Group, Identifiability, LIMIT, MODEL, SHOWS};
 pub use least_squares::Ending;
 #[cfg(feature = "posterior")]
 pub use posterior::{Credible, EFFECTIVE, Posterior, R_HAT, posterior};
 pub use problem::{Problem, Stop};
+pub use proposals::Proposal;
 pub use profile::{Profile, profiles};
 pub use regression::{Balance, regression};
 pub use run::{Extra, Nuisance, Run, Seen};
 pub use uncertainty::{Covariance, inverse_of_square, student};
+use uncertainty::Judged;
 
 use crate::case::{Case, Given, Plan};
 use crate::chance;
@@ -37,7 +42,7 @@ use crate::log::Quantity;
 use crate::parameter::{self, Field, Parameter, named, values};
 use crate::solve::{Bench, Flow};
 use crate::stage::Stage;
-use least_squares::{Minimum, Options, Residuals, minimise};
+use least_squares::{Differences, Minimum, Options, Residuals, minimise};
 use nalgebra::DVector;
 use problem::{ROUNDING, extent};
 use rand_pcg::Pcg64;
@@ -177,19 +182,42 @@ pub struct Score {
 ///
 /// `watch` sees the cost after each step; `stop` ends the search, which then gives the best so far.
 pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f64) -> Flow) -> Result<Fit> {
+    let found = search(case, plan, stop, watch)?;
+    let judged = found.judged();
+    Ok(result(found, judged.as_ref()))
+}
+
+/// Where a search ended.
+struct Searched<'a> {
+    problem: Problem<'a>,
+    best: Minimum,
+    /// Deviation of each quantity's residuals.
+    noise: Vec<(Quantity, f64)>,
+    starts: Vec<f64>,
+    work: Work,
+}
+
+impl Searched<'_> {
+    /// What the logs tell there; none if numbers fail.
+    fn judged(&self) -> Option<Judged> {
+        let Minimum { residuals, jacobian, x, at_bound, .. } = &self.best;
+        Judged::new(&self.problem, residuals, jacobian, x, at_bound)
+    }
+}
+
+/// The search of a fit, and of a check.
+fn search<'a>(
+    case: &Case,
+    plan: &Plan,
+    stop: Option<Stop<'a>>,
+    watch: &mut dyn FnMut(f64) -> Flow,
+) -> Result<Searched<'a>> {
     let mut problem = Problem::new(case, plan)?.stopped_by(stop);
     let bounds = problem.bounds();
-    // What the logs determine is asked for the noise that they show; the fit itself begins with weights that it can revise.
-    check::weigh_by_noise(&mut problem);
-    let (jacobian, x) = check::sensitivities(&mut problem)?;
-    if let Some(found) = Identifiability::new(&problem, &jacobian, &x, 1.0) {
-        refuse(&problem, &found)?;
-    }
-    problem.weigh_first();
 
     let mut watch = |_: &[f64], cost: f64| watch(cost);
     let mut work = Work::default();
-    let mut search = |problem: &mut Problem, x: &[f64], options: &Options| {
+    let mut descend = |problem: &mut Problem, x: &[f64], options: &Options| {
         let options = Options { rounding: problem.rounding(), ..*options };
         let minimum = minimise(problem, x, &bounds, &options, &mut watch);
         work.iterations += minimum.iterations;
@@ -198,7 +226,7 @@ pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f
     };
     let whole = Options::default();
     let start = first_guess(&mut problem);
-    let mut best = search(&mut problem, &start, &whole);
+    let mut best = descend(&mut problem, &start, &whole);
     if best.ending == Ending::Failed {
         return Err(Error::new("the model does not get through these logs with the values of the case file")
             .next("run `taut simulate` on the case to see why, or start from other values"));
@@ -210,9 +238,9 @@ pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f
             break;
         }
         let x = elsewhere(&problem, &mut random);
-        let trial = search(&mut problem, &x, &Options { iterations: TRIAL_ITERATIONS, tolerance: 0.1, ..whole });
+        let trial = descend(&mut problem, &x, &Options { iterations: TRIAL_ITERATIONS, tolerance: 0.1, ..whole });
         let near = trial.cost < 1.2 * best.cost;
-        let trial = if near && trial.ending != Ending::Failed { search(&mut problem, &trial.x, &whole) } else { trial };
+        let trial = if near && trial.ending != Ending::Failed { descend(&mut problem, &trial.x, &whole) } else { trial };
         starts.push(trial.cost);
         if trial.cost < best.cost {
             best = trial;
@@ -245,7 +273,7 @@ pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f
                 break;
             }
         }
-        best = search(&mut problem, &best.x.clone(), &options);
+        best = descend(&mut problem, &best.x.clone(), &options);
     }
     if problem.is_stopped() {
         best.ending = Ending::Interrupted;
@@ -253,8 +281,56 @@ pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f
     if noise.is_empty() {
         noise = noise_of(&problem, &best, plan.huber);
     }
+    let options = Options {
+        huber: if plan.huber { HUBER } else { f64::INFINITY },
+        rounding: problem.rounding(),
+        ..whole
+    };
+    if best.ending != Ending::Interrupted {
+        hold_undetermined(&mut problem, &mut best, &options, &mut watch, &mut work);
+    }
     work.simulations = problem.simulations;
-    Ok(result(&problem, &best, noise, starts, work))
+    Ok(Searched { problem, best, noise, starts, work })
+}
+
+/// Where a direction is not determined, the search ended anywhere along it: it is repeated with the parameter that moves most along it
+/// held where the case has it, and the point that this leads to is as good.
+fn hold_undetermined(
+    problem: &mut Problem,
+    best: &mut Minimum,
+    options: &Options,
+    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
+    work: &mut Work,
+) {
+    let none = vec![false; best.x.len()];
+    let lead = |best: &Minimum, problem: &Problem| {
+        Judged::new(problem, &best.residuals, &best.jacobian, &best.x, &none).map(|judged| judged.identifiability.leads)
+    };
+    let Some(leads) = lead(best, problem).filter(|leads| !leads.is_empty()) else { return };
+    let start = problem.start();
+    let (open, mut bounds) = (problem.bounds(), problem.bounds());
+    let mut x = best.x.clone();
+    for &j in &leads {
+        (bounds.low[j], bounds.high[j]) = (start[j], start[j]);
+        x[j] = start[j];
+    }
+    // Where the others begin does not matter, as long as the held ones are far from where they were.
+    let from = [x, start];
+    for from in from {
+        let found = minimise(problem, &from, &bounds, options, watch);
+        work.iterations += found.iterations;
+        work.evaluations += found.evaluations;
+        if matches!(found.ending, Ending::Failed | Ending::Interrupted) || found.cost > best.cost * 1.01 + 1e-300 {
+            continue;
+        }
+        let whole = problem.jacobian(&found.x, &found.residuals, &open, &Differences::Central);
+        if let Some(jacobian) = whole {
+            let mut at_bound = found.at_bound.clone();
+            leads.iter().for_each(|&j| at_bound[j] = false);
+            *best = Minimum { jacobian, at_bound, ..found };
+        }
+        return;
+    }
 }
 
 impl Fit {
@@ -412,18 +488,6 @@ fn first_guess(problem: &mut Problem) -> Vec<f64> {
     if cost(&guess) < cost(&start) { guess } else { start }
 }
 
-/// Refuses what the logs do not determine, with the choices there are.
-fn refuse(problem: &Problem, found: &Identifiability) -> Result<()> {
-    let Some(group) = found.groups.first() else { return Ok(()) };
-    let mut told = group.words.clone();
-    for other in &found.groups[1..] {
-        told = format!("{told}; {}", other.words);
-    }
-    let choices: Vec<String> = found.groups.iter().flat_map(|group| found.choices(problem, group)).collect();
-    Err(Error::new(format!("these logs do not determine all that is searched for: {told}"))
-        .next(format!("{}; `taut check` says what another experiment would tell", choices.join("; or "))))
-}
-
 /// A point within the bounds, near enough to the start to be a machine of its kind: within a factor of ten, or for what may
 /// be zero, between zero and three times its start.
 fn elsewhere(problem: &Problem, random: &mut Pcg64) -> Vec<f64> {
@@ -486,21 +550,22 @@ fn noise_of(problem: &Problem, at: &Minimum, robust: bool) -> Vec<(Quantity, f64
 }
 
 /// Everything that is told of a minimum.
-fn result(problem: &Problem, best: &Minimum, noise: Vec<(Quantity, f64)>, starts: Vec<f64>, work: Work) -> Fit {
-    let covariance = Covariance::new(problem, &best.residuals, &best.jacobian, &best.at_bound);
-    let deviation = (2.0 * best.cost / (problem.independent() - problem.variables() as f64).max(1.0)).sqrt();
-    let identifiability = Identifiability::new(problem, &best.jacobian, &best.x, deviation);
+fn result(found: Searched, judged: Option<&Judged>) -> Fit {
+    let Searched { problem, best, noise, starts, work } = &found;
     let bounds = problem.bounds();
-    let t = covariance.as_ref().map_or(student(1), |c| c.reach);
+    let covariance = judged.map(|judged| &judged.covariance);
+    let identifiability = judged.map(|judged| judged.identifiability.clone());
+    let t = covariance.map_or(student(1), |c| c.reach);
     let determined = |j: usize| identifiability.as_ref().is_some_and(|found| found.error[j].is_finite());
-    let error = |j: usize| match &covariance {
+    let error = |j: usize| match covariance {
         Some(covariance) if j >= problem.globals() || determined(j) => covariance.error(j),
         _ if best.at_bound[j] => None,
         _ => Some(f64::INFINITY),
     };
     // All variables without their bounds, where one is at its bound.
     let beyond = if best.at_bound.contains(&true) {
-        let free = Covariance::new(problem, &best.residuals, &best.jacobian, &vec![false; best.at_bound.len()]);
+        let free = vec![false; best.at_bound.len()];
+        let free = Judged::new(problem, &best.residuals, &best.jacobian, &best.x, &free);
         // d = −(JᵀJ)⁻¹ Jᵀ r
         let step = inverse_of_square(&best.jacobian)
             .map(|inverse| -inverse * best.jacobian.tr_mul(&DVector::from_column_slice(&best.residuals)));
@@ -517,8 +582,8 @@ fn result(problem: &Problem, best: &Minimum, noise: Vec<(Quantity, f64)>, starts
             Some(e) if e.is_finite() => Some([end(x - t * e), end(x + t * e)]),
             Some(_) => Some([f64::NEG_INFINITY, f64::INFINITY]),
             // Where it would be without its bound, but no further off than a standard error.
-            None => beyond.as_ref().filter(|_| determined(j)).map(|(covariance, step)| {
-                let e = covariance.error(j).unwrap_or(f64::INFINITY);
+            None => beyond.as_ref().filter(|(judged, _)| judged.identifiability.error[j].is_finite()).map(|(judged, step)| {
+                let e = judged.covariance.error(j).unwrap_or(f64::INFINITY);
                 let x = x + step[j].clamp(-e, e);
                 [end(x - t * e), end(x + t * e)]
             }),
@@ -558,7 +623,7 @@ fn result(problem: &Problem, best: &Minimum, noise: Vec<(Quantity, f64)>, starts
     }
     let n = problem.globals();
     let correlation = (0..n)
-        .map(|i| (0..n).map(|j| covariance.as_ref().and_then(|c| c.correlation(i, j)).unwrap_or(f64::NAN)).collect())
+        .map(|i| (0..n).map(|j| covariance.and_then(|c| c.correlation(i, j)).unwrap_or(f64::NAN)).collect())
         .collect();
     let stage = problem.stage_at(&best.x);
     let mut logs = Vec::new();
@@ -599,17 +664,17 @@ fn result(problem: &Problem, best: &Minimum, noise: Vec<(Quantity, f64)>, starts
         stage,
         estimates,
         correlation,
-        noise,
+        noise: noise.clone(),
         logs,
         identifiability,
         point: best.x.clone(),
         ending: best.ending,
         decrement: best.decrement,
         cost: best.cost,
-        starts,
+        starts: starts.clone(),
         values: problem.counted(),
         variables: problem.variables(),
-        work,
+        work: *work,
     }
 }
 

@@ -16,7 +16,7 @@
 
 use super::problem::Problem;
 use super::uncertainty::student_share;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// Most blocks of rows into which the values of one quantity are taken together.
 const BLOCKS: usize = 700;
@@ -76,8 +76,8 @@ struct Told {
 
 /// What noise of one quantity makes of the parameters.
 pub(super) struct Spread {
-    /// Variances of the globals with their weights.
-    variances: Vec<(f64, Vec<f64>)>,
+    /// Covariances of the globals with their weights.
+    parts: Vec<(f64, DMatrix<f64>)>,
     freedom: f64,
     /// Mean covariance.
     pub covariance: DMatrix<f64>,
@@ -88,18 +88,20 @@ pub(super) struct Spread {
 }
 
 impl Spread {
-    /// Half of the 95 % interval of global `j`: what all kinds of noise leave with 5 % together.
-    pub fn half_width(&self, j: usize) -> f64 {
-        let most = self.variances.iter().map(|(_, v)| v[j]).fold(0.0, f64::max).sqrt();
+    /// Half of the 95 % interval of Σ c_j δ_j: what all kinds of noise leave with 5 % together.
+    pub fn half_width(&self, combination: &DVector<f64>) -> f64 {
+        let variance = |own: &DMatrix<f64>| (own * combination).dot(combination).max(0.0);
+        let variances: Vec<(f64, f64)> = self.parts.iter().map(|(weight, own)| (*weight, variance(own))).collect();
+        let most = variances.iter().map(|(_, v)| *v).fold(0.0, f64::max).sqrt();
         if most <= 0.0 || !most.is_finite() {
             return most;
         }
         let beyond = |c: f64| -> f64 {
             let outside = |v: f64| if v > 0.0 { student_share(c / v.sqrt(), self.freedom) } else { 0.0 };
-            self.variances.iter().map(|(weight, v)| weight * outside(v[j])).sum()
+            variances.iter().map(|(weight, v)| weight * outside(*v)).sum()
         };
         let (mut low, mut high) = (0.0, 20.0 * most);
-        for _ in 0..60 {
+        for _ in 0..40 {
             let middle = 0.5 * (low + high);
             if beyond(middle) > 0.05 { low = middle } else { high = middle }
         }
@@ -107,18 +109,22 @@ impl Spread {
     }
 }
 
-/// The spread that the noise of each quantity makes; `inverse` = (JᵀJ)⁻¹ of the columns `free`, globals first.
+/// Half of the 95 % interval of a combination for the noise of all quantities.
+pub(super) fn half_width(spreads: &[Spread], combination: &DVector<f64>) -> f64 {
+    spreads.iter().map(|spread| spread.half_width(combination).powi(2)).sum::<f64>().sqrt()
+}
+
+/// The spread that the noise of each quantity makes of the first columns of a Jacobian, which concern all runs; the others concern one.
 pub(super) fn spreads(
     problem: &Problem,
     residuals: &[f64],
     jacobian: &DMatrix<f64>,
-    free: &[usize],
+    globals: usize,
     inverse: &DMatrix<f64>,
 ) -> Vec<Spread> {
-    let globals = free.iter().filter(|&&j| j < problem.globals()).count();
     let quantities = problem.quantities();
     let one = |quantity| {
-        let series = series(problem, quantity, residuals, jacobian, free, globals);
+        let series = series(problem, quantity, residuals, jacobian, globals);
         Estimate { series, globals }.spread(inverse)
     };
     quantities.into_iter().filter_map(one).collect()
@@ -130,7 +136,6 @@ fn series(
     quantity: crate::log::Quantity,
     residuals: &[f64],
     jacobian: &DMatrix<f64>,
-    free: &[usize],
     globals: usize,
 ) -> Vec<Series> {
     let mut all = Vec::new();
@@ -148,8 +153,8 @@ fn series(
         let n = run.time.len();
         let first = problem.first_row(index) + output * n;
         let rows: Vec<usize> = (0..n).filter(|&k| seen.weights[k] > 0.0).collect();
-        let is_moved = |c: &usize| rows.iter().any(|&k| jacobian[(first + k, free[*c])] != 0.0);
-        let mut moved: Vec<usize> = (globals..free.len()).filter(is_moved).collect();
+        let is_moved = |c: &usize| rows.iter().any(|&k| jacobian[(first + k, *c)] != 0.0);
+        let mut moved: Vec<usize> = (globals..jacobian.ncols()).filter(is_moved).collect();
         let own = moved.len();
         moved.extend((0..globals).filter(is_moved));
         let mut series = Series { own, rows: Vec::new(), gain: Vec::new(), time: Vec::new(), moved };
@@ -159,7 +164,7 @@ fn series(
         for (place, &k) in rows.iter().enumerate() {
             let w = seen.weights[k] / most;
             for (sum, &c) in block.iter_mut().zip(&series.moved) {
-                *sum += w * jacobian[(first + k, free[c])];
+                *sum += w * jacobian[(first + k, c)];
             }
             block[wide - 1] += w * residuals[first + k];
             information += w * w;
@@ -188,7 +193,7 @@ struct Estimate {
 impl Estimate {
     fn spread(&self, inverse: &DMatrix<f64>) -> Option<Spread> {
         let blocks: usize = self.series.iter().map(|series| series.time.len()).sum();
-        if blocks < 8 {
+        if blocks < 4 {
             return None;
         }
         let told = self.told();
@@ -203,7 +208,7 @@ impl Estimate {
         let white = inverse.view((0, 0), (self.globals, self.globals)).into_owned();
         let mut known: Vec<(f64, f64, DMatrix<f64>)> = Vec::new();
         let mut covariance = DMatrix::zeros(self.globals, self.globals);
-        let mut variances = Vec::new();
+        let mut parts = Vec::new();
         for one in &told {
             let mut own = &white * 1.0;
             for slow in &one.slow {
@@ -217,10 +222,12 @@ impl Estimate {
             own *= one.white;
             let weight = (one.weight - best).exp() / total;
             covariance += &own * weight;
-            variances.push((weight, (0..self.globals).map(|j| own[(j, j)]).collect()));
+            if weight > 1e-5 {
+                parts.push((weight, own));
+            }
         }
         let first = &told[0];
-        Some(Spread { variances, freedom: first.freedom, covariance, slow: first.slow.clone(), white: first.white })
+        Some(Spread { parts, freedom: first.freedom, covariance, slow: first.slow.clone(), white: first.white })
     }
 
     /// All kinds of noise that are tried, with their likelihoods.
@@ -270,7 +277,7 @@ impl Estimate {
                 }
             }
         }
-        if best(&more).is_some_and(|(weight, _)| weight > top + SECOND - share.abs() * 0.0) {
+        if best(&more).is_some_and(|(weight, _)| weight > top + SECOND) {
             told.extend(more);
         }
         told

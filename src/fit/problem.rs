@@ -29,7 +29,6 @@ pub struct Problem<'a> {
     /// Simulated runs so far.
     pub simulations: u64,
     units: Vec<Scale>,
-    typical: Vec<f64>,
     /// Whether to end the work.
     stop: Option<Stop<'a>>,
 }
@@ -108,7 +107,6 @@ impl<'a> Problem<'a> {
         }
         let mut problem = Self {
             units: parameters.iter().map(|parameter| scale(&stage, parameter, &runs)).collect(),
-            typical: parameters.iter().map(|parameter| typical(&stage, parameter, &runs)).collect(),
             stage,
             parameters,
             shared: Vec::new(),
@@ -344,10 +342,14 @@ impl<'a> Problem<'a> {
         self.units[j].slope(value)
     }
 
-    /// What counts as a change by 100 %, in the variable: of what may be zero, by its value or what is much of it.
-    pub fn whole(&self, j: usize, x: f64) -> f64 {
+    /// What counts as a change by 100 %, in the variable, of a machine like `stage`: of what may be zero, its value or what is much of it.
+    pub fn whole(&self, stage: &Stage, j: usize, x: f64) -> f64 {
         match self.units.get(j) {
-            Some(Scale::Linear(unit)) => x.abs().max(self.typical[j] / unit),
+            Some(Scale::Linear(unit)) => {
+                let typical = typical(stage, &self.parameters[j], &self.runs);
+                // Of what has no size by nature, the value itself, or where it started.
+                typical.map_or(if x == 0.0 { 1.0 } else { x.abs() }, |typical| x.abs().max(typical / unit))
+            }
             _ => 1.0,
         }
     }
@@ -471,12 +473,13 @@ fn scale(stage: &Stage, parameter: &Free, runs: &[Run]) -> Scale {
     } else if parameter.start != 0.0 {
         Scale::Linear(parameter.start.abs())
     } else {
-        Scale::Linear(typical(stage, parameter, runs))
+        Scale::Linear(typical(stage, parameter, runs).unwrap_or(1.0))
     }
 }
 
-/// What is much of a quantity that may be zero: of friction a tenth of what the motor gives at the greatest input.
-fn typical(stage: &Stage, parameter: &Free, runs: &[Run]) -> f64 {
+/// What is much of a quantity that may be zero: of friction a tenth of what the motor gives at the greatest input; none where that
+/// depends on the machine alone, as the gain of an amplifier, which has whatever unit its input has.
+fn typical(stage: &Stage, parameter: &Free, runs: &[Run]) -> Option<f64> {
     let most = runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
     let motor = &stage.motor;
     let per_unit = match stage.amplifier.mode {
@@ -503,9 +506,9 @@ fn typical(stage: &Stage, parameter: &Free, runs: &[Run]) -> f64 {
         "rad" => 0.01,
         "H" => 1e-3 * motor.resistance,
         _ if parameter.high.is_finite() && parameter.high < 1e14 => 0.1 * parameter.high.abs().max(parameter.low.abs()),
-        _ => 1.0,
+        _ => return None,
     };
-    if unit > 0.0 && unit.is_finite() { unit } else { 1.0 }
+    Some(if unit > 0.0 && unit.is_finite() { unit } else { 1.0 })
 }
 
 impl Residuals for Problem<'_> {

@@ -3,9 +3,10 @@
 //! For white residuals it is s² (JᵀJ)⁻¹. Residuals that are alike from sample to sample tell less than their number says: with the
 //! covariance Σ of the noise it is (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹, for every Σ that the residuals allow ([`super::noise`]).
 
-use super::noise;
+use super::identify::{Directions, Identifiability};
+use super::noise::{self, Spread, half_width};
 use super::problem::Problem;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// Standard deviations that 95 % of a normal distribution keep to.
 const NORMAL: f64 = 1.959_963_985;
@@ -24,42 +25,125 @@ pub struct Covariance {
     pub reach: f64,
 }
 
-impl Covariance {
-    /// At a minimum with these residuals and this Jacobian, its variables at bounds left out.
-    pub fn new(problem: &Problem, residuals: &[f64], jacobian: &DMatrix<f64>, at_bound: &[bool]) -> Option<Self> {
-        let free: Vec<usize> = (0..at_bound.len()).filter(|&j| !at_bound[j]).collect();
-        let counted = problem.independent();
-        let freedom = (counted - free.len() as f64).max(1.0);
+/// What logs tell at a point: what is determined, and how well.
+pub(super) struct Judged {
+    pub identifiability: Identifiability,
+    pub covariance: Covariance,
+    /// By how much slow noise makes errors greater than white noise of the same size would.
+    pub inflation: f64,
+    /// The slow noises of each quantity, by its place among the problem's.
+    pub spreads: Vec<Spread>,
+}
+
+impl Judged {
+    /// At `x` with these residuals and this Jacobian, the variables that are `held` left out; none if numbers fail.
+    pub fn new(
+        problem: &Problem,
+        residuals: &[f64],
+        jacobian: &DMatrix<f64>,
+        x: &[f64],
+        held: &[bool],
+    ) -> Option<Self> {
+        let globals = problem.globals();
+        let free: Vec<usize> = (0..held.len()).filter(|&j| !held[j]).collect();
+        let own: Vec<usize> = free.iter().copied().filter(|&j| j < globals).collect();
+        let directions = Directions::new(problem, jacobian, x, &own)?;
+        let alive = directions.alive;
+        let freedom = (problem.independent() - free.len() as f64).max(1.0);
         let squares: f64 = residuals.iter().map(|r| r * r).sum();
         let deviation = (squares / freedom).sqrt();
-        let columns = jacobian.select_columns(&free);
-        let inverse = inverse_of_square(&columns)?;
-        let white = &inverse * (deviation * deviation);
 
-        // Globals by the noise that the residuals show; what belongs to one run is wider by as much as they are on the whole.
-        let globals = free.iter().filter(|&&j| j < problem.globals()).count();
-        let spreads = noise::spreads(problem, residuals, jacobian, &free, &inverse);
-        let mut own = DMatrix::zeros(globals, globals);
-        for spread in &spreads {
-            own += &spread.covariance;
-        }
-        let half: Vec<f64> = (0..globals)
-            .map(|j| spreads.iter().map(|spread| spread.half_width(j).powi(2)).sum::<f64>().sqrt())
-            .collect();
-        let factor: Vec<f64> =
-            (0..globals).map(|j| (half[j] / NORMAL / white[(j, j)].sqrt()).max(f64::MIN_POSITIVE)).collect();
-        let rest = factor.iter().map(|f| f * f).sum::<f64>() / globals.max(1) as f64;
-        let rest = if spreads.is_empty() || globals == 0 { 1.0 } else { rest.sqrt() };
-        let matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| {
-            if i < globals && j < globals && !spreads.is_empty() {
-                let correlation = own[(i, j)] / (own[(i, i)] * own[(j, j)]).sqrt();
-                (half[i] / NORMAL) * (half[j] / NORMAL) * correlation
-            } else {
-                let of = |j: usize| if j < globals && !spreads.is_empty() { factor[j] } else { rest };
-                white[(i, j)] * of(i) * of(j)
+        // Along the directions, of which a column each can be inverted whatever the logs tell.
+        let mut turned = DMatrix::zeros(globals, alive);
+        for i in 0..alive {
+            for j in 0..globals {
+                turned[(j, i)] = directions.whole[j] * directions.v[(j, i)];
             }
+        }
+        let locals: Vec<usize> = free.iter().copied().filter(|&j| j >= globals).collect();
+        let mut columns = DMatrix::zeros(jacobian.nrows(), alive + locals.len());
+        columns.columns_mut(0, alive).copy_from(&(jacobian.columns(0, globals) * &turned));
+        for (place, &j) in locals.iter().enumerate() {
+            columns.set_column(alive + place, &jacobian.column(j));
+        }
+        // What belongs to one run and does not show there is known beforehand or not at all.
+        let shown: Vec<usize> =
+            (0..columns.ncols()).filter(|&c| c < alive || columns.column(c).iter().any(|v| *v != 0.0)).collect();
+        let columns = columns.select_columns(&shown);
+        let inverse = inverse_of_square(&columns)?;
+        let spreads = noise::spreads(problem, residuals, &columns, alive, &inverse);
+        let error = |c: &[f64]| half_width(&spreads, &DVector::from_column_slice(c)) / NORMAL;
+        let off: Vec<f64> =
+            (0..alive).map(|i| error(&(0..alive).map(|k| f64::from(k == i)).collect::<Vec<_>>())).collect();
+        let identifiability = Identifiability::told(problem, &directions, x, deviation, &off, &error);
+
+        // Each variable by itself; their correlations are those of the mean of all kinds of noise.
+        let mut middle = DMatrix::zeros(alive, alive);
+        for spread in &spreads {
+            middle += &spread.covariance;
+        }
+        let middle = &turned * middle * turned.transpose();
+        let each: Vec<f64> = (0..globals)
+            .map(|j| error(&(0..alive).map(|i| turned[(j, i)]).collect::<Vec<_>>()))
+            .collect();
+        let white = &turned * inverse.view((0, 0), (alive, alive)) * turned.transpose() * (deviation * deviation);
+        let wider: Vec<f64> = own.iter().map(|&j| each[j] / white[(j, j)].sqrt()).filter(|f| f.is_finite()).collect();
+        let inflation = if wider.is_empty() {
+            1.0
+        } else {
+            (wider.iter().map(|f| f.ln()).sum::<f64>() / wider.len() as f64).exp()
+        };
+        let place_of = |j: usize| {
+            let place = locals.iter().position(|&own| own == j)? + alive;
+            shown.iter().position(|&c| c == place)
+        };
+        let places: Vec<Option<usize>> = free.iter().map(|&j| if j < globals { None } else { place_of(j) }).collect();
+        let matrix = DMatrix::from_fn(free.len(), free.len(), |a, b| match (places[a], places[b]) {
+            (None, None) if free[a] < globals && free[b] < globals => {
+                let (i, j) = (free[a], free[b]);
+                let correlation = middle[(i, j)] / (middle[(i, i)] * middle[(j, j)]).sqrt();
+                each[i] * each[j] * if i == j { 1.0 } else { correlation }
+            }
+            (Some(a), Some(b)) => inverse[(a, b)] * (deviation * inflation).powi(2),
+            _ if a == b => f64::INFINITY,
+            _ => 0.0,
         });
-        Some(Self { free, matrix, deviation, freedom: freedom.round() as usize, reach: NORMAL })
+        let covariance = Covariance { free, matrix, deviation, freedom: freedom.round() as usize, reach: NORMAL };
+        Some(Self { identifiability, covariance, inflation, spreads })
+    }
+}
+
+impl Judged {
+    /// What the residuals are like, in words.
+    pub fn slow_words(&self, problem: &Problem) -> String {
+        let quantities = problem.quantities();
+        let shown = |value: f64, unit| crate::number::engineering(value, unit, 2).replace('\u{a0}', " ");
+        let mut told = Vec::new();
+        for (spread, quantity) in self.spreads.iter().zip(&quantities) {
+            let own: Vec<String> = spread.slow.iter().map(|slow| shown(slow.time, "s")).collect();
+            if !own.is_empty() {
+                told.push(format!("{} over {}", quantity.name(), own.join(" and ")));
+            }
+        }
+        match told.is_empty() {
+            true => "which is as good as independent from sample to sample".into(),
+            false => format!(
+                "which is alike over time ({}): errors are {:.1} times those of independent residuals",
+                told.join(", "),
+                self.inflation
+            ),
+        }
+    }
+}
+
+impl Covariance {
+    /// At a minimum with these residuals and this Jacobian, its variables at bounds left out; none where they are not determined.
+    pub fn new(problem: &Problem, residuals: &[f64], jacobian: &DMatrix<f64>, at_bound: &[bool]) -> Option<Self> {
+        let free: Vec<usize> = (0..at_bound.len()).filter(|&j| !at_bound[j]).collect();
+        inverse_of_square(&jacobian.select_columns(&free))?;
+        // The directions do not depend on where the point is but for the sizes of what may be zero.
+        let x = problem.start();
+        Some(Judged::new(problem, residuals, jacobian, &x, at_bound)?.covariance)
     }
 
     /// Standard deviation of variable `j`; none for one at a bound.
