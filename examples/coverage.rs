@@ -48,8 +48,10 @@ enum Fault {
     Cogging(f64, f64, f64),
     /// White noise that grows with speed: rad at rest, rad per rad/s.
     Uneven(f64, f64),
-    /// Friction drifts along the log by this share to each side, with white noise, rad.
+    /// Friction drifts along each log by this share to each side, with white noise, rad.
     Drift(f64, f64),
+    /// The same, up in some and down in others.
+    DriftEither(f64, f64),
     /// Each log has a friction of its own, off by this share, with white noise.
     Campaigns(f64, f64),
     /// Breakaway over Coulomb friction, Stribeck velocity, m/s, white noise.
@@ -80,6 +82,8 @@ const CELLS: &[Cell] = &[
     Cell { name: "the same + white 10 mrad; 4 s", logs: LONG, fault: Fault::First(5e-3, 0.02, 10e-3) },
     Cell { name: "first order 5 mrad, 100 ms + white 10 mrad; 4 s", logs: LONG, fault: Fault::First(5e-3, 0.1, 10e-3) },
     Cell { name: "friction drifts by ±10 %, white 1 mrad; four logs", logs: FOUR, fault: Fault::Drift(0.1, 1e-3) },
+    Cell { name: "friction drifts by ±10 % up or down, white 1 mrad; four logs", logs: FOUR, fault: Fault::DriftEither(0.1, 1e-3) },
+    Cell { name: "friction drifts by ±10 %, white 10 mrad; four logs", logs: FOUR, fault: Fault::Drift(0.1, 10e-3) },
     Cell { name: "friction differs by ±10 % from log to log, white 1 mrad; four logs", logs: FOUR, fault: Fault::Campaigns(0.1, 1e-3) },
     Cell { name: "Stribeck in truth, white 1 mrad; 4 s", logs: LONG, fault: Fault::Stribeck(1.5, 0.03, 1e-3) },
     Cell { name: "Stribeck in truth, white 1 mrad; four logs", logs: FOUR, fault: Fault::Stribeck(1.5, 0.03, 1e-3) },
@@ -117,7 +121,7 @@ impl Fault {
     /// What it adds to the angle `phi` with this speed.
     fn add(self, phi: &[f64], chance: &mut Chance) -> Vec<f64> {
         let n = phi.len();
-        let mut first = |deviation: f64, time: f64, chance: &mut Chance| -> Vec<f64> {
+        let first = |deviation: f64, time: f64, chance: &mut Chance| -> Vec<f64> {
             let decay = (-EVERY / time).exp();
             let mut x = deviation * chance.normal();
             (0..n)
@@ -132,7 +136,7 @@ impl Fault {
         let mut white = 0.0;
         let add = |added: &mut Vec<f64>, other: Vec<f64>| added.iter_mut().zip(other).for_each(|(a, b)| *a += b);
         match self {
-            Fault::White(deviation) | Fault::Drift(_, deviation) | Fault::Campaigns(_, deviation) | Fault::Stribeck(_, _, deviation) => {
+            Fault::White(deviation) | Fault::Drift(_, deviation) | Fault::DriftEither(_, deviation) | Fault::Campaigns(_, deviation) | Fault::Stribeck(_, _, deviation) => {
                 white = deviation;
             }
             Fault::First(deviation, time, beside) => {
@@ -203,12 +207,13 @@ fn recorded(cell: &Cell, truth: [f64; 3], chance: &mut Chance) -> Case {
             k = next;
         }
         let mut angle = Vec::with_capacity(count + 1);
-        let parts = if matches!(cell.fault, Fault::Drift(..)) { PARTS } else { 1 };
+        let parts = if matches!(cell.fault, Fault::Drift(..) | Fault::DriftEither(..)) { PARTS } else { 1 };
         let mut initial = Initial::default();
+        let sign = if matches!(cell.fault, Fault::DriftEither(..)) { chance.normal().signum() } else { 1.0 };
         for part in 0..parts {
             let (begin, end) = (count * part / parts, count * (part + 1) / parts);
             let off = match cell.fault {
-                Fault::Drift(off, _) => off * ((2 * part + 1) as f64 / parts as f64 - 1.0),
+                Fault::Drift(off, _) | Fault::DriftEither(off, _) => sign * off * ((2 * part + 1) as f64 / parts as f64 - 1.0),
                 _ => share.get(place).copied().unwrap_or(0.0),
             };
             let mut stage = case.stage.clone();
@@ -409,7 +414,7 @@ fn main() -> ExitCode {
         let mut found = found.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
         let n = found.machines as f64;
         let share = |count: usize| format!("{:.1} %", 100.0 * count as f64 / n);
-        let mut middle = |values: &mut Vec<f64>| {
+        let middle = |values: &mut Vec<f64>| {
             values.sort_by(f64::total_cmp);
             values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
         };

@@ -32,7 +32,7 @@ pub struct Check {
 pub fn check(case: &Case, plan: &Plan) -> Result<Check> {
     let found = search(case, plan, None, &mut |_| Flow::Continue)?;
     let numbers = || Error::new("the sensitivities of these logs are no numbers");
-    let judged = found.judged().ok_or_else(numbers)?;
+    let judged = found.judged(case, plan).ok_or_else(numbers)?;
     let identifiability = judged.identifiability.clone();
     let choices = identifiability.groups.iter().map(|group| identifiability.choices(&found.problem, group)).collect();
     let experiments = proposals(&found, &judged);

@@ -18,6 +18,7 @@ mod profile;
 mod proposals;
 mod regression;
 mod run;
+mod sub_records;
 mod uncertainty;
 
 pub use check::{Check, check};
@@ -32,6 +33,7 @@ pub use proposals::Proposal;
 pub use profile::{Profile, profiles};
 pub use regression::{Balance, regression};
 pub use run::{Extra, Nuisance, Run, Seen};
+pub use sub_records::Disagreement;
 pub use uncertainty::{Covariance, inverse_of_square, student};
 use uncertainty::Judged;
 
@@ -73,6 +75,8 @@ pub struct Fit {
     pub logs: Vec<LogFit>,
     /// What the logs determine at the estimates.
     pub identifiability: Option<Identifiability>,
+    /// Parts of the logs that say otherwise than the whole, by more than noise would make of it.
+    pub disagreement: Option<Disagreement>,
     /// The variables of the search where it ended.
     pub point: Vec<f64>,
     /// How the search ended.
@@ -183,7 +187,7 @@ pub struct Score {
 /// `watch` sees the cost after each step; `stop` ends the search, which then gives the best so far.
 pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f64) -> Flow) -> Result<Fit> {
     let found = search(case, plan, stop, watch)?;
-    let judged = found.judged();
+    let judged = found.judged(case, plan);
     Ok(result(found, judged.as_ref()))
 }
 
@@ -198,10 +202,14 @@ struct Searched<'a> {
 }
 
 impl Searched<'_> {
-    /// What the logs tell there; none if numbers fail.
-    fn judged(&self) -> Option<Judged> {
+    /// What the logs tell there, and whether their parts agree; none if numbers fail.
+    fn judged(&self, case: &Case, plan: &Plan) -> Option<Judged> {
         let Minimum { residuals, jacobian, x, at_bound, .. } = &self.best;
-        Judged::new(&self.problem, residuals, jacobian, x, at_bound)
+        let mut judged = Judged::new(&self.problem, residuals, jacobian, x, at_bound)?;
+        if let Some(disagreement) = sub_records::disagreement(case, plan, self, &judged) {
+            judged.widen(disagreement);
+        }
+        Some(judged)
     }
 }
 
@@ -667,6 +675,7 @@ fn result(found: Searched, judged: Option<&Judged>) -> Fit {
         noise: noise.clone(),
         logs,
         identifiability,
+        disagreement: judged.and_then(|judged| judged.disagreement.clone()),
         point: best.x.clone(),
         ending: best.ending,
         decrement: best.decrement,

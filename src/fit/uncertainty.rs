@@ -6,6 +6,7 @@
 use super::identify::{Directions, Identifiability};
 use super::noise::{self, Spread, half_width};
 use super::problem::Problem;
+use super::sub_records::Disagreement;
 use nalgebra::{DMatrix, DVector};
 
 /// Standard deviations that 95 % of a normal distribution keep to.
@@ -33,6 +34,8 @@ pub(super) struct Judged {
     pub inflation: f64,
     /// The slow noises of each quantity, by its place among the problem's.
     pub spreads: Vec<Spread>,
+    /// Parts of the logs that say otherwise.
+    pub disagreement: Option<Disagreement>,
 }
 
 impl Judged {
@@ -109,11 +112,22 @@ impl Judged {
             _ => 0.0,
         });
         let covariance = Covariance { free, matrix, deviation, freedom: freedom.round() as usize, reach: NORMAL };
-        Some(Self { identifiability, covariance, inflation, spreads })
+        Some(Self { identifiability, covariance, inflation, spreads, disagreement: None })
     }
 }
 
 impl Judged {
+    /// Adds what parts of the logs say otherwise.
+    pub fn widen(&mut self, disagreement: Disagreement) {
+        let globals = disagreement.added.nrows();
+        for (a, &i) in self.covariance.free.iter().enumerate().filter(|(_, i)| **i < globals) {
+            for (b, &j) in self.covariance.free.iter().enumerate().filter(|(_, j)| **j < globals) {
+                self.covariance.matrix[(a, b)] += disagreement.added[(i, j)];
+            }
+        }
+        self.disagreement = Some(disagreement);
+    }
+
     /// What the residuals are like, in words.
     pub fn slow_words(&self, problem: &Problem) -> String {
         let quantities = problem.quantities();
