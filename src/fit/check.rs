@@ -3,7 +3,7 @@
 use super::identify::Identifiability;
 use super::proposals::{Proposal, proposals};
 use super::regression::{Balance, regression};
-use super::{Fit, result, search};
+use super::{Fit, search, told};
 use crate::case::{Case, Plan};
 use crate::error::{Error, Result};
 use crate::log::Survey;
@@ -46,7 +46,7 @@ pub fn check(case: &Case, plan: &Plan) -> Result<Check> {
         .collect();
     let noise_words = format!("for what the best model leaves ({}), {}", noise.join(", "), judged.slow_words(&found.problem));
     let balance = regression(&found.problem);
-    let fit = result(found, Some(&judged));
+    let fit = told(case, plan, &found, Some(&judged));
     Ok(Check {
         balance,
         logs: case.experiments.iter().filter_map(|e| Some(Survey::new(e.log.as_ref()?, &case.stage))).collect(),

@@ -8,6 +8,7 @@ mod combinations;
 #[cfg(feature = "posterior")]
 mod density;
 mod drawn;
+mod findings;
 mod identify;
 pub mod least_squares;
 mod noise;
@@ -24,6 +25,7 @@ mod uncertainty;
 pub use check::{Check, check};
 pub use combinations::Combination;
 pub use drawn::{drawn, machines};
+pub use findings::{Finding, Grade};
 pub use identify::{Group, Identifiability, LIMIT, MODEL, SHOWS};
 pub use least_squares::Ending;
 #[cfg(feature = "posterior")]
@@ -63,7 +65,7 @@ const TRIAL_ITERATIONS: usize = 12;
 /// What a fit found.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// The machine with the estimates.
+    /// The machine with the estimates; what is not determined is what the case says.
     pub stage: Stage,
     /// The estimates: free parameters, then what all logs share.
     pub estimates: Vec<Estimate>,
@@ -77,6 +79,8 @@ pub struct Fit {
     pub identifiability: Option<Identifiability>,
     /// Parts of the logs that say otherwise than the whole, by more than noise would make of it.
     pub disagreement: Option<Disagreement>,
+    /// What is to be known of logs and search before the estimates are used, warnings first.
+    pub findings: Vec<Finding>,
     /// The variables of the search where it ended.
     pub point: Vec<f64>,
     /// How the search ended.
@@ -188,7 +192,14 @@ pub struct Score {
 pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f64) -> Flow) -> Result<Fit> {
     let found = search(case, plan, stop, watch)?;
     let judged = found.judged(case, plan);
-    Ok(result(found, judged.as_ref()))
+    Ok(told(case, plan, &found, judged.as_ref()))
+}
+
+/// The result, and what is to be known of it.
+fn told(case: &Case, plan: &Plan, found: &Searched, judged: Option<&Judged>) -> Fit {
+    let mut fit = result(found, judged);
+    fit.findings = findings::findings(case, plan, found, &fit);
+    fit
 }
 
 /// Where a search ended.
@@ -341,7 +352,39 @@ fn hold_undetermined(
     }
 }
 
+impl Estimate {
+    /// Whether the logs tell it, or it is at a bound.
+    pub fn is_determined(&self) -> bool {
+        self.at_bound || self.error.is_some_and(f64::is_finite)
+    }
+}
+
 impl Fit {
+    /// Whether all that is searched for is determined and nothing warns.
+    pub fn is_reliable(&self) -> bool {
+        self.is_complete() && self.warnings().next().is_none()
+    }
+
+    /// Whether all that is searched for is determined.
+    pub fn is_complete(&self) -> bool {
+        self.estimates.iter().all(Estimate::is_determined)
+    }
+
+    /// What makes the result not to be relied on.
+    pub fn warnings(&self) -> impl Iterator<Item = &Finding> {
+        self.findings.iter().filter(|finding| finding.grade == Grade::Warning)
+    }
+
+    /// Whether the search ended at a minimum within the bounds, and nothing warns.
+    pub fn is_converged(&self) -> bool {
+        self.ending == Ending::Converged && !self.estimates.iter().any(|estimate| estimate.at_bound) && self.is_reliable()
+    }
+
+    /// What is determined of parameters that are not.
+    pub fn combinations(&self) -> impl Iterator<Item = &Combination> {
+        self.identifiability.iter().flat_map(|found| &found.groups).flat_map(|group| &group.combinations)
+    }
+
     /// What is to be changed in the text so that `key` is `value`.
     fn changes(&self, case: &Case, key: &str, value: f64) -> Vec<String> {
         let Some(row) = named(key) else { return Vec::new() };
@@ -365,7 +408,8 @@ impl Fit {
     /// The text of the case with the estimates in place of what they were, and a table of how well they are known. Paths in
     /// it are those of `case`; `name` stands in messages.
     pub fn case_text(&self, case: &Case, name: &Path) -> Result<String> {
-        let sets = || self.estimates.iter().flat_map(|estimate| &estimate.sets);
+        let known = |estimate: &&Estimate| estimate.is_determined();
+        let sets = || self.estimates.iter().filter(known).flat_map(|estimate| &estimate.sets);
         let text = without_other_forms(&case.text, sets().map(|(key, _)| key.as_str()));
         let mut changes: Vec<String> = sets().flat_map(|(key, value)| self.changes(case, key, *value)).collect();
         let read = |changes: &[String]| {
@@ -399,7 +443,7 @@ impl Fit {
             let mut put = |key: &str, value: f64| {
                 row.insert(key, toml_edit::Value::from(value));
             };
-            put("value", estimate.value);
+            put("value", if estimate.is_determined() { estimate.value } else { estimate.start });
             match (estimate.error, estimate.interval) {
                 (Some(error), Some([low, high])) if error.is_finite() => {
                     put("error", error);
@@ -416,6 +460,14 @@ impl Fit {
                 }
             }
             table.insert(&estimate.name, toml_edit::value(row));
+        }
+        for combination in self.combinations() {
+            let mut row = toml_edit::InlineTable::new();
+            let [low, high] = combination.interval;
+            for (key, value) in [("value", combination.value), ("error", combination.error), ("low", low), ("high", high)] {
+                row.insert(key, toml_edit::Value::from(value));
+            }
+            table.insert(&combination.name, toml_edit::value(row));
         }
         document.insert("uncertainty", toml_edit::Item::Table(table));
         Ok(document.to_string())
@@ -558,8 +610,8 @@ fn noise_of(problem: &Problem, at: &Minimum, robust: bool) -> Vec<(Quantity, f64
 }
 
 /// Everything that is told of a minimum.
-fn result(found: Searched, judged: Option<&Judged>) -> Fit {
-    let Searched { problem, best, noise, starts, work } = &found;
+fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
+    let Searched { problem, best, noise, starts, work } = found;
     let bounds = problem.bounds();
     let covariance = judged.map(|judged| &judged.covariance);
     let identifiability = judged.map(|judged| judged.identifiability.clone());
@@ -634,6 +686,12 @@ fn result(found: Searched, judged: Option<&Judged>) -> Fit {
         .map(|i| (0..n).map(|j| covariance.and_then(|c| c.correlation(i, j)).unwrap_or(f64::NAN)).collect())
         .collect();
     let stage = problem.stage_at(&best.x);
+    // What is not determined stays what the case says.
+    let start = problem.start();
+    let undetermined = |j: usize| identifiability.as_ref().is_some_and(|found| found.error[j].is_infinite());
+    let kept: Vec<f64> =
+        (0..best.x.len()).map(|j| if j < problem.globals() && undetermined(j) { start[j] } else { best.x[j] }).collect();
+    let written = problem.stage_at(&kept);
     let mut logs = Vec::new();
     let mut sums: Vec<(Nuisance, f64, usize)> = Vec::new();
     for (index, run) in problem.runs.iter().enumerate() {
@@ -669,13 +727,14 @@ fn result(found: Searched, judged: Option<&Judged>) -> Fit {
         logs.push(compared(run, &stage, &extras, Vec::new()));
     }
     Fit {
-        stage,
+        stage: written,
         estimates,
         correlation,
         noise: noise.clone(),
         logs,
         identifiability,
         disagreement: judged.and_then(|judged| judged.disagreement.clone()),
+        findings: Vec::new(),
         point: best.x.clone(),
         ending: best.ending,
         decrement: best.decrement,

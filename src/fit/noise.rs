@@ -83,8 +83,6 @@ pub(super) struct Spread {
     pub covariance: DMatrix<f64>,
     /// The most likely slow noises.
     pub slow: Vec<Slow>,
-    /// Variance of the white noise beside them.
-    pub white: f64,
 }
 
 impl Spread {
@@ -227,7 +225,7 @@ impl Estimate {
             }
         }
         let first = &told[0];
-        Some(Spread { parts, freedom: first.freedom, covariance, slow: first.slow.clone(), white: first.white })
+        Some(Spread { parts, freedom: first.freedom, covariance, slow: first.slow.clone() })
     }
 
     /// All kinds of noise that are tried, with their likelihoods.

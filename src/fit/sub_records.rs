@@ -24,10 +24,10 @@ const WINDOWS: f64 = 6.0;
 const SAMPLES: f64 = 100.0;
 
 /// Residuals that make errors less than so many times those of white noise hide no other model.
-const COLOURED: f64 = 1.3;
+const COLOURED: f64 = 1.1;
 
 /// Standard errors by which the windows may be off the whole, and the windows off each other.
-const OFF: f64 = 2.6;
+const OFF: f64 = 2.3;
 
 /// What parts of the logs say otherwise than the whole.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,7 +100,7 @@ pub(super) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &
         return None;
     }
     let wider = (student(windows - 1) / student(1_000_000)).powi(2);
-    // (|d| + h)² ≤ 2 (d² + h²), d being as far as an interval reaches.
-    let added = (&shift * shift.transpose() / student(1_000_000).powi(2) + between * wider) * 2.0;
+    // (|d| + h)² ≤ 2 (d² + h²), d being as far as an interval reaches; and windows are still long enough for half as much again.
+    let added = (&shift * shift.transpose() / student(1_000_000).powi(2) + between * wider) * 3.0;
     Some(Disagreement { windows, length, off, added })
 }
