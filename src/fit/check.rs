@@ -34,7 +34,6 @@ pub fn check(case: &Case, plan: &Plan) -> Result<Check> {
     let numbers = || Error::new("the sensitivities of these logs are no numbers");
     let judged = found.judged(case, plan).ok_or_else(numbers)?;
     let identifiability = judged.identifiability.clone();
-    let choices = identifiability.groups.iter().map(|group| identifiability.choices(&found.problem, group)).collect();
     let experiments = proposals(&found, &judged);
     let noise: Vec<String> = found
         .noise
@@ -51,7 +50,7 @@ pub fn check(case: &Case, plan: &Plan) -> Result<Check> {
         balance,
         logs: case.experiments.iter().filter_map(|e| Some(Survey::new(e.log.as_ref()?, &case.stage))).collect(),
         identifiability,
-        choices,
+        choices: fit.choices.clone(),
         noise_words,
         experiments,
         fit,

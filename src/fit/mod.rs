@@ -77,6 +77,8 @@ pub struct Fit {
     pub logs: Vec<LogFit>,
     /// What the logs determine at the estimates.
     pub identifiability: Option<Identifiability>,
+    /// What to do about each group of parameters that is not determined.
+    pub choices: Vec<Vec<String>>,
     /// Parts of the logs that say otherwise than the whole, by more than noise would make of it.
     pub disagreement: Option<Disagreement>,
     /// What is to be known of logs and search before the estimates are used, warnings first.
@@ -380,6 +382,16 @@ impl Fit {
         self.ending == Ending::Converged && !self.estimates.iter().any(|estimate| estimate.at_bound) && self.is_reliable()
     }
 
+    /// How it ended, for files: `converged` only where it is.
+    pub fn ending_word(&self) -> &'static str {
+        match self.ending {
+            Ending::Converged if self.estimates.iter().any(|estimate| estimate.at_bound) => "at_bound",
+            Ending::Converged if !self.is_complete() => "not_determined",
+            Ending::Converged if !self.is_reliable() => "doubtful",
+            ending => ending.word(),
+        }
+    }
+
     /// What is determined of parameters that are not.
     pub fn combinations(&self) -> impl Iterator<Item = &Combination> {
         self.identifiability.iter().flat_map(|found| &found.groups).flat_map(|group| &group.combinations)
@@ -435,7 +447,7 @@ impl Fit {
         let mut table = toml_edit::Table::new();
         let how = format!(
             "\n# How well the fit knows its estimates: SI units, standard errors, 95 % intervals. How it ended: {}.\n",
-            self.ending.word()
+            self.ending_word()
         );
         table.decor_mut().set_prefix(how);
         for estimate in &self.estimates {
@@ -732,6 +744,10 @@ fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         correlation,
         noise: noise.clone(),
         logs,
+        choices: identifiability
+            .iter()
+            .flat_map(|found| found.groups.iter().map(|group| found.choices(problem, group)))
+            .collect(),
         identifiability,
         disagreement: judged.and_then(|judged| judged.disagreement.clone()),
         findings: Vec::new(),

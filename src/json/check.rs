@@ -27,12 +27,10 @@ pub fn check(case: &Case, found: &Check) -> Value {
             "equations": b.equations,
         })),
         "singular_values": known.singular.iter().map(|s| number(*s)).collect::<Vec<_>>(),
-        "not_determined": known.groups.iter().zip(&found.choices).map(|(group, choices)| json!({
-            "parameters": group.members.iter().map(|&j| &known.names[j]).collect::<Vec<_>>(),
-            "combinations_determined": group.determined,
-            "words": group.words,
-            "choices": choices,
-        })).collect::<Vec<_>>(),
+        "not_determined": known.groups.iter().zip(&found.choices)
+            .map(|(own, choices)| super::fit::group(known, own, choices))
+            .collect::<Vec<_>>(),
+        "findings": found.fit.findings.iter().map(super::fit::finding).collect::<Vec<_>>(),
         "logs": found.logs.iter().map(|log| json!({
             "name": log.log,
             "samples": log.timing.samples,
