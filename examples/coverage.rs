@@ -76,30 +76,56 @@ const CELLS: &[Cell] = &[
     Cell { name: "white 10 mrad; 1.5 s", logs: SHORT, fault: Fault::White(10e-3) },
     Cell { name: "first order 5 mrad, 20 ms; 1.5 s", logs: SHORT, fault: Fault::First(5e-3, 0.02, 0.0) },
     Cell { name: "the same + white 10 mrad; 1.5 s", logs: SHORT, fault: Fault::First(5e-3, 0.02, 10e-3) },
-    Cell { name: "first order 5 mrad, 100 ms + white 10 mrad; 1.5 s", logs: SHORT, fault: Fault::First(5e-3, 0.1, 10e-3) },
+    Cell {
+        name: "first order 5 mrad, 100 ms + white 10 mrad; 1.5 s",
+        logs: SHORT,
+        fault: Fault::First(5e-3, 0.1, 10e-3),
+    },
     Cell { name: "white 10 mrad; 4 s", logs: LONG, fault: Fault::White(10e-3) },
     Cell { name: "first order 5 mrad, 20 ms; 4 s", logs: LONG, fault: Fault::First(5e-3, 0.02, 0.0) },
     Cell { name: "the same + white 10 mrad; 4 s", logs: LONG, fault: Fault::First(5e-3, 0.02, 10e-3) },
     Cell { name: "first order 5 mrad, 100 ms + white 10 mrad; 4 s", logs: LONG, fault: Fault::First(5e-3, 0.1, 10e-3) },
     Cell { name: "friction drifts by ±10 %, white 1 mrad; four logs", logs: FOUR, fault: Fault::Drift(0.1, 1e-3) },
-    Cell { name: "friction drifts by ±10 % up or down, white 1 mrad; four logs", logs: FOUR, fault: Fault::DriftEither(0.1, 1e-3) },
+    Cell {
+        name: "friction drifts by ±10 % up or down, white 1 mrad; four logs",
+        logs: FOUR,
+        fault: Fault::DriftEither(0.1, 1e-3),
+    },
     Cell { name: "friction drifts by ±10 %, white 10 mrad; four logs", logs: FOUR, fault: Fault::Drift(0.1, 10e-3) },
-    Cell { name: "friction differs by ±10 % from log to log, white 1 mrad; four logs", logs: FOUR, fault: Fault::Campaigns(0.1, 1e-3) },
+    Cell {
+        name: "friction differs by ±10 % from log to log, white 1 mrad; four logs",
+        logs: FOUR,
+        fault: Fault::Campaigns(0.1, 1e-3),
+    },
     Cell { name: "Stribeck in truth, white 1 mrad; 4 s", logs: LONG, fault: Fault::Stribeck(1.5, 0.03, 1e-3) },
     Cell { name: "Stribeck in truth, white 1 mrad; four logs", logs: FOUR, fault: Fault::Stribeck(1.5, 0.03, 1e-3) },
     Cell { name: "counts of 12 mrad; 4 s", logs: LONG, fault: Fault::Counts(4.0) },
-    Cell { name: "first order 3 mrad, 10 ms and 200 ms + white 5 mrad; 4 s", logs: LONG, fault: Fault::Two(3e-3, 0.01, 3e-3, 0.2, 5e-3) },
-    Cell { name: "swings at 8 Hz, 5 mrad, 100 ms + white 5 mrad; 4 s", logs: LONG, fault: Fault::Swinging(5e-3, 8.0, 0.1, 5e-3) },
+    Cell {
+        name: "first order 3 mrad, 10 ms and 200 ms + white 5 mrad; 4 s",
+        logs: LONG,
+        fault: Fault::Two(3e-3, 0.01, 3e-3, 0.2, 5e-3),
+    },
+    Cell {
+        name: "swings at 8 Hz, 5 mrad, 100 ms + white 5 mrad; 4 s",
+        logs: LONG,
+        fault: Fault::Swinging(5e-3, 8.0, 0.1, 5e-3),
+    },
     Cell { name: "random walk 5 mrad in 1 s + white 5 mrad; 4 s", logs: LONG, fault: Fault::Walk(5e-3, 5e-3) },
     Cell { name: "mean of 20, 5 mrad; 4 s", logs: LONG, fault: Fault::Mean(20, 5e-3) },
-    Cell { name: "cogging 3 mrad, 5 in a turn + white 3 mrad; 4 s", logs: LONG, fault: Fault::Cogging(3e-3, 5.0, 3e-3) },
+    Cell {
+        name: "cogging 3 mrad, 5 in a turn + white 3 mrad; 4 s",
+        logs: LONG,
+        fault: Fault::Cogging(3e-3, 5.0, 3e-3),
+    },
     Cell { name: "white 2 mrad + 1 mrad per rad/s; 4 s", logs: LONG, fault: Fault::Uneven(2e-3, 1e-3) },
 ];
 
 /// The inputs that a log may have: value and how long, s.
 fn input(log: &str) -> (&'static [(f64, f64)], f64) {
     match log {
-        "steps" => (&[(5.0, 0.4), (0.0, 0.3), (-8.0, 0.35), (0.0, 0.3), (3.0, 0.6), (-3.0, 0.6), (8.0, 0.3), (-5.0, 0.3)], 4.0),
+        "steps" => {
+            (&[(5.0, 0.4), (0.0, 0.3), (-8.0, 0.35), (0.0, 0.3), (3.0, 0.6), (-3.0, 0.6), (8.0, 0.3), (-5.0, 0.3)], 4.0)
+        }
         "slow" => (&[(3.0, 0.6), (0.0, 0.2), (-3.0, 0.6), (4.0, 0.3), (0.0, 0.2), (-4.0, 0.3)], 3.0),
         _ => (&[(5.0, 0.25), (0.0, 0.25), (-5.0, 0.25)], 1.5),
     }
@@ -136,7 +162,11 @@ impl Fault {
         let mut white = 0.0;
         let add = |added: &mut Vec<f64>, other: Vec<f64>| added.iter_mut().zip(other).for_each(|(a, b)| *a += b);
         match self {
-            Fault::White(deviation) | Fault::Drift(_, deviation) | Fault::DriftEither(_, deviation) | Fault::Campaigns(_, deviation) | Fault::Stribeck(_, _, deviation) => {
+            Fault::White(deviation)
+            | Fault::Drift(_, deviation)
+            | Fault::DriftEither(_, deviation)
+            | Fault::Campaigns(_, deviation)
+            | Fault::Stribeck(_, _, deviation) => {
                 white = deviation;
             }
             Fault::First(deviation, time, beside) => {
@@ -213,7 +243,9 @@ fn recorded(cell: &Cell, truth: [f64; 3], chance: &mut Chance) -> Case {
         for part in 0..parts {
             let (begin, end) = (count * part / parts, count * (part + 1) / parts);
             let off = match cell.fault {
-                Fault::Drift(off, _) | Fault::DriftEither(off, _) => sign * off * ((2 * part + 1) as f64 / parts as f64 - 1.0),
+                Fault::Drift(off, _) | Fault::DriftEither(off, _) => {
+                    sign * off * ((2 * part + 1) as f64 / parts as f64 - 1.0)
+                }
                 _ => share.get(place).copied().unwrap_or(0.0),
             };
             let mut stage = case.stage.clone();
@@ -239,7 +271,8 @@ fn recorded(cell: &Cell, truth: [f64; 3], chance: &mut Chance) -> Case {
             let mut experiment = pattern.clone();
             (experiment.input, experiment.initial, experiment.every) = (input, initial, EVERY);
             experiment.until = (end - begin) as f64 * EVERY;
-            let run = simulate(&stage, &experiment, Solver::of(&stage)).unwrap_or_else(|error| panic!("{error}")).trajectory;
+            let run =
+                simulate(&stage, &experiment, Solver::of(&stage)).unwrap_or_else(|error| panic!("{error}")).trajectory;
             let column = |name: &str| run.get(name).unwrap_or_else(|| panic!("no column {name}"));
             let last = |name: &str| *column(name).last().unwrap_or(&0.0);
             angle.extend_from_slice(&column("drive_angle")[usize::from(part > 0)..]);
@@ -350,7 +383,9 @@ fn one(cell: &Cell, seed: u64, found: &Mutex<Found>) {
         return;
     };
     for (j, estimate) in fitted.estimates.iter().enumerate() {
-        let Some([low, high]) = estimate.interval.filter(|ends| ends.iter().all(|end| end.is_finite())) else { continue };
+        let Some([low, high]) = estimate.interval.filter(|ends| ends.iter().all(|end| end.is_finite())) else {
+            continue;
+        };
         found.there[j] += 1;
         found.held[j] += usize::from(low <= truth[j] && truth[j] <= high);
         found.relative[j].push(0.5 * (high - low) / truth[j]);
@@ -423,7 +458,11 @@ fn main() -> ExitCode {
                 let own = middle(&mut found.wide[j]);
                 let relative = middle(&mut found.relative[j]);
                 let off = (found.off[j].iter().map(|e| e * e).sum::<f64>() / found.off[j].len().max(1) as f64).sqrt();
-                if own.is_nan() { format!("{:.2} % ({:.2} %)", 100.0 * relative, 196.0 * off) } else { format!("{own:.2}") }
+                if own.is_nan() {
+                    format!("{:.2} % ({:.2} %)", 100.0 * relative, 196.0 * off)
+                } else {
+                    format!("{own:.2}")
+                }
             })
             .collect();
         let lost = 3 * found.machines - found.there.iter().sum::<usize>();

@@ -266,7 +266,12 @@ fn main() -> ExitCode {
         let is_good = codes.is_empty();
         good &= if is_good { warned == 0 } else { warned == seeds };
         let share = |count: u64| format!("{count} of {seeds}");
-        println!("| {name} | {} | {} | {} |", if is_good { "–".into() } else { share(found) }, share(warned), share(silent));
+        println!(
+            "| {name} | {} | {} | {} |",
+            if is_good { "–".into() } else { share(found) },
+            share(warned),
+            share(silent)
+        );
     }
     if good { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }

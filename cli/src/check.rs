@@ -39,9 +39,14 @@ fn text(case: &Case, found: &Check) -> String {
         let left = 100.0 * found.unexplained;
         let _ = writeln!(
             text,
-            "  {} equations, of whose torque {left:.1} % is left; a first guess, not a fit",
-            found.equations
+            "  {} equations, of whose torque {left:.1} % is left: {}; a first guess, not a fit",
+            found.equations,
+            found.words()
         );
+    }
+    let own = |finding: &&taut::fit::Finding| finding.log.is_none() || finding.code == "unexplained";
+    for finding in found.fit.findings.iter().filter(own) {
+        let _ = write!(text, "\n{finding}\n");
     }
     let _ = write!(text, "\n{}\n", bold("How well each parameter would be known, all others free"));
     let known = &found.identifiability;
@@ -64,6 +69,15 @@ fn text(case: &Case, found: &Check) -> String {
     }
     for (group, choices) in known.groups.iter().zip(&found.choices) {
         let _ = write!(text, "\n{}\n  {}\n", bold("Not determined"), group.words);
+        for combination in &group.combinations {
+            let shown = table::value(combination.value, &combination.unit, 5);
+            let _ = writeln!(
+                text,
+                "  {} = {shown} ± {}",
+                combination.name,
+                table::value(combination.error, &combination.unit, 2)
+            );
+        }
         for choice in choices {
             let _ = writeln!(text, "  - {choice}");
         }

@@ -43,7 +43,8 @@ pub fn check(case: &Case, plan: &Plan) -> Result<Check> {
             format!("{} {sigma}", quantity.name())
         })
         .collect();
-    let noise_words = format!("for what the best model leaves ({}), {}", noise.join(", "), judged.slow_words(&found.problem));
+    let noise_words =
+        format!("for what the best model leaves ({}), {}", noise.join(", "), judged.slow_words(&found.problem));
     let balance = regression(&found.problem);
     let fit = told(case, plan, &found, Some(&judged));
     Ok(Check {

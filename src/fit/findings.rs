@@ -155,8 +155,7 @@ fn of_delay(plan: &Plan, problem: &Problem) -> Option<Finding> {
     if plan.nuisance.delay != Scope::Off || plan.closed_loop {
         return None;
     }
-    let left: Vec<f64> =
-        (0..=LATEST).map_while(|late| Some(regression_late(problem, late)?.unexplained)).collect();
+    let left: Vec<f64> = (0..=LATEST).map_while(|late| Some(regression_late(problem, late)?.unexplained)).collect();
     let late = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]))?;
     if late < LATE || left[late] > 0.6 * left[0] || left[0] < 0.03 {
         return None;
@@ -272,7 +271,9 @@ impl Balance {
     pub fn words(&self) -> &'static str {
         match self.unexplained {
             left if left < 0.1 => "a rigid axis with viscous and Coulomb friction explains these logs",
-            left if left < 0.3 => "a rigid axis explains most: the rest is noise in derivatives, elasticity, or another friction",
+            left if left < 0.3 => {
+                "a rigid axis explains most: the rest is noise in derivatives, elasticity, or another friction"
+            }
             left if left < 0.7 => "much is left: look for a delay, for elasticity, or for another friction",
             _ => "it explains next to nothing: look at units, signs and columns first",
         }

@@ -92,7 +92,8 @@ impl Identifiability {
         names.extend(problem.shared.iter().map(|extra| extra.what.name().to_string()));
         let sensitivity = norms.iter().map(|norm| norm / deviation / rows.sqrt()).collect();
         let least = shows(problem) * rows.sqrt();
-        let lost: Vec<usize> = (0..v.ncols()).filter(|&i| i >= *alive || singular[i] < least || off[i] > LIMIT).collect();
+        let lost: Vec<usize> =
+            (0..v.ncols()).filter(|&i| i >= *alive || singular[i] < least || off[i] > LIMIT).collect();
         let goes_with = |j: usize| lost.iter().map(|&i| v[(j, i)].powi(2)).sum::<f64>().sqrt();
         let error = (0..n)
             .map(|j| {
@@ -267,6 +268,9 @@ impl Directions {
     /// From a Jacobian of `problem` at `x` for these of what concerns all runs, the others held; none if numbers fail.
     pub fn new(problem: &Problem, jacobian: &DMatrix<f64>, x: &[f64], which: &[usize]) -> Option<Self> {
         let globals = problem.globals();
+        if which.is_empty() {
+            return None;
+        }
         let columns: Vec<usize> = which.iter().copied().chain(globals..jacobian.ncols()).collect();
         let mut own = projected(&jacobian.select_columns(&columns), which.len())?;
         let stage = problem.stage_at(x);
@@ -313,7 +317,8 @@ fn leads(v: &DMatrix<f64>, lost: &[usize]) -> Vec<usize> {
         };
         leads.push(lead);
         // Turn the rest so that the lead moves along this column alone.
-        let best = (column..hidden.ncols()).max_by(|&a, &b| hidden[(lead, a)].abs().total_cmp(&hidden[(lead, b)].abs()));
+        let best =
+            (column..hidden.ncols()).max_by(|&a, &b| hidden[(lead, a)].abs().total_cmp(&hidden[(lead, b)].abs()));
         hidden.swap_columns(column, best.unwrap_or(column));
         for other in column + 1..hidden.ncols() {
             let factor = hidden[(lead, other)] / hidden[(lead, column)];

@@ -31,13 +31,13 @@ pub use least_squares::Ending;
 #[cfg(feature = "posterior")]
 pub use posterior::{Credible, EFFECTIVE, Posterior, R_HAT, posterior};
 pub use problem::{Problem, Stop};
-pub use proposals::Proposal;
 pub use profile::{Profile, profiles};
+pub use proposals::Proposal;
 pub use regression::{Balance, regression};
 pub use run::{Extra, Nuisance, Run, Seen};
 pub use sub_records::Disagreement;
-pub use uncertainty::{Covariance, inverse_of_square, student};
 use uncertainty::Judged;
+pub use uncertainty::{Covariance, inverse_of_square, student};
 
 use crate::case::{Case, Given, Plan};
 use crate::chance;
@@ -261,7 +261,8 @@ fn search<'a>(
         let x = elsewhere(&problem, &mut random);
         let trial = descend(&mut problem, &x, &Options { iterations: TRIAL_ITERATIONS, tolerance: 0.1, ..whole });
         let near = trial.cost < 1.2 * best.cost;
-        let trial = if near && trial.ending != Ending::Failed { descend(&mut problem, &trial.x, &whole) } else { trial };
+        let trial =
+            if near && trial.ending != Ending::Failed { descend(&mut problem, &trial.x, &whole) } else { trial };
         starts.push(trial.cost);
         if trial.cost < best.cost {
             best = trial;
@@ -302,11 +303,8 @@ fn search<'a>(
     if noise.is_empty() {
         noise = noise_of(&problem, &best, plan.huber);
     }
-    let options = Options {
-        huber: if plan.huber { HUBER } else { f64::INFINITY },
-        rounding: problem.rounding(),
-        ..whole
-    };
+    let options =
+        Options { huber: if plan.huber { HUBER } else { f64::INFINITY }, rounding: problem.rounding(), ..whole };
     if best.ending != Ending::Interrupted {
         hold_undetermined(&mut problem, &mut best, &options, &mut watch, &mut work);
     }
@@ -379,7 +377,9 @@ impl Fit {
 
     /// Whether the search ended at a minimum within the bounds, and nothing warns.
     pub fn is_converged(&self) -> bool {
-        self.ending == Ending::Converged && !self.estimates.iter().any(|estimate| estimate.at_bound) && self.is_reliable()
+        self.ending == Ending::Converged
+            && !self.estimates.iter().any(|estimate| estimate.at_bound)
+            && self.is_reliable()
     }
 
     /// How it ended, for files: `converged` only where it is.
@@ -476,7 +476,9 @@ impl Fit {
         for combination in self.combinations() {
             let mut row = toml_edit::InlineTable::new();
             let [low, high] = combination.interval;
-            for (key, value) in [("value", combination.value), ("error", combination.error), ("low", low), ("high", high)] {
+            for (key, value) in
+                [("value", combination.value), ("error", combination.error), ("low", low), ("high", high)]
+            {
                 row.insert(key, toml_edit::Value::from(value));
             }
             table.insert(&combination.name, toml_edit::value(row));
@@ -654,11 +656,13 @@ fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
             Some(e) if e.is_finite() => Some([end(x - t * e), end(x + t * e)]),
             Some(_) => Some([f64::NEG_INFINITY, f64::INFINITY]),
             // Where it would be without its bound, but no further off than a standard error.
-            None => beyond.as_ref().filter(|(judged, _)| judged.identifiability.error[j].is_finite()).map(|(judged, step)| {
-                let e = judged.covariance.error(j).unwrap_or(f64::INFINITY);
-                let x = x + step[j].clamp(-e, e);
-                [end(x - t * e), end(x + t * e)]
-            }),
+            None => beyond.as_ref().filter(|(judged, _)| judged.identifiability.error[j].is_finite()).map(
+                |(judged, step)| {
+                    let e = judged.covariance.error(j).unwrap_or(f64::INFINITY);
+                    let x = x + step[j].clamp(-e, e);
+                    [end(x - t * e), end(x + t * e)]
+                },
+            ),
         };
         estimates.push(Estimate {
             name: parameter.name.clone(),
@@ -701,8 +705,9 @@ fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
     // What is not determined stays what the case says.
     let start = problem.start();
     let undetermined = |j: usize| identifiability.as_ref().is_some_and(|found| found.error[j].is_infinite());
-    let kept: Vec<f64> =
-        (0..best.x.len()).map(|j| if j < problem.globals() && undetermined(j) { start[j] } else { best.x[j] }).collect();
+    let kept: Vec<f64> = (0..best.x.len())
+        .map(|j| if j < problem.globals() && undetermined(j) { start[j] } else { best.x[j] })
+        .collect();
     let written = problem.stage_at(&kept);
     let mut logs = Vec::new();
     let mut sums: Vec<(Nuisance, f64, usize)> = Vec::new();

@@ -210,7 +210,8 @@ impl Estimate {
         for one in &told {
             let mut own = &white * 1.0;
             for slow in &one.slow {
-                let place = known.iter().position(|(time, frequency, _)| (*time, *frequency) == (slow.time, slow.frequency));
+                let place =
+                    known.iter().position(|(time, frequency, _)| (*time, *frequency) == (slow.time, slow.frequency));
                 let place = place.unwrap_or_else(|| {
                     known.push((slow.time, slow.frequency, self.slow_part(&influence, slow)));
                     known.len() - 1
@@ -263,7 +264,9 @@ impl Estimate {
                 }
             }
         }
-        let best = |told: &[Told]| told.iter().max_by(|a, b| a.weight.total_cmp(&b.weight)).map(|one| (one.weight, one.slow.clone()));
+        let best = |told: &[Told]| {
+            told.iter().max_by(|a, b| a.weight.total_cmp(&b.weight)).map(|one| (one.weight, one.slow.clone()))
+        };
         let Some((top, first)) = best(&told) else { return told };
         // Beside the best of them a second one.
         let mut more = Vec::new();

@@ -58,7 +58,13 @@ fn cart_noise(problem: &Problem, noise: &[(Quantity, f64)]) -> f64 {
 }
 
 const IDEAS: &[Idea] = &[
-    Idea { name: "the same inputs again, the other way round", measured: same, change: |_| {}, reversed: true, is_there: turns_round },
+    Idea {
+        name: "the same inputs again, the other way round",
+        measured: same,
+        change: |_| {},
+        reversed: true,
+        is_there: turns_round,
+    },
     Idea {
         name: "an encoder at the cart, as fine as the one there is (to 10 µm where there is none)",
         measured: |problem, noise| with(noise, Quantity::CartPosition, cart_noise(problem, noise)),
@@ -219,13 +225,7 @@ fn with_rows(
 }
 
 /// What is measured of run `index` with the idea, in standard deviations; none where the model does not reach its end.
-fn answer(
-    problem: &Problem,
-    idea: &Idea,
-    measured: &[(Quantity, f64)],
-    index: usize,
-    x: &[f64],
-) -> Option<Vec<f64>> {
+fn answer(problem: &Problem, idea: &Idea, measured: &[(Quantity, f64)], index: usize, x: &[f64]) -> Option<Vec<f64>> {
     let run = &problem.runs[index];
     let mut stage = problem.stage_at(x);
     (idea.change)(&mut stage);

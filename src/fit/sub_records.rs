@@ -11,10 +11,10 @@
 //!
 //! and with the whole logs by d. If either is more than noise makes of it, intervals are widened by both.
 
+use super::Searched;
 use super::least_squares::{Ending, Options, minimise};
 use super::problem::Problem;
 use super::uncertainty::{Judged, inverse_of_square, student};
-use super::Searched;
 use crate::case::{Case, Plan};
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector};

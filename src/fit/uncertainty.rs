@@ -86,16 +86,12 @@ impl Judged {
             middle += &spread.covariance;
         }
         let middle = &turned * middle * turned.transpose();
-        let each: Vec<f64> = (0..globals)
-            .map(|j| error(&(0..alive).map(|i| turned[(j, i)]).collect::<Vec<_>>()))
-            .collect();
+        let each: Vec<f64> =
+            (0..globals).map(|j| error(&(0..alive).map(|i| turned[(j, i)]).collect::<Vec<_>>())).collect();
         let white = &turned * inverse.view((0, 0), (alive, alive)) * turned.transpose() * (deviation * deviation);
         let wider: Vec<f64> = own.iter().map(|&j| each[j] / white[(j, j)].sqrt()).filter(|f| f.is_finite()).collect();
-        let inflation = if wider.is_empty() {
-            1.0
-        } else {
-            (wider.iter().map(|f| f.ln()).sum::<f64>() / wider.len() as f64).exp()
-        };
+        let inflation =
+            if wider.is_empty() { 1.0 } else { (wider.iter().map(|f| f.ln()).sum::<f64>() / wider.len() as f64).exp() };
         let place_of = |j: usize| {
             let place = locals.iter().position(|&own| own == j)? + alive;
             shown.iter().position(|&c| c == place)

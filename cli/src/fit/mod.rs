@@ -85,7 +85,8 @@ pub fn run(args: &Args) -> Outcome {
     let took = begin.elapsed();
     let json = json::text(&json::fit(&case, &found.fit, &found.profiles, found.drawn.as_ref().map(json::posterior)));
     let mut written = Vec::new();
-    if let Some(folder) = &folder {
+    let held_back = found.fit.warnings().next().is_some() && !args.anyway;
+    if let Some(folder) = folder.as_ref().filter(|_| !held_back) {
         written = write(args, folder, &case, &found, &json).map_err(Failure::work)?;
         folder.place()?;
     }
@@ -97,6 +98,7 @@ pub fn run(args: &Args) -> Outcome {
     Ok(match (interrupt.signal(), found.fit.ending) {
         (Some(signal), _) => Status::Interrupted(signal),
         (None, _) if found.drawn.is_some_and(|drawn| !drawn.doubts().is_empty()) => Status::Incomplete,
+        (None, _) if !found.fit.is_reliable() => Status::Incomplete,
         (None, Ending::Converged | Ending::Stalled) => Status::Done,
         (None, _) => Status::Incomplete,
     })

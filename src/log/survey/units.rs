@@ -355,7 +355,9 @@ fn expected(log: &Log, stage: &Stage) -> Option<Expected> {
     }
     let most = log.input.iter().fold(0.0_f64, |most, u| most.max((stage.amplifier.gain * u).abs()));
     let free = match stage.amplifier.mode {
-        AmplifierMode::Voltage if motor.back_emf_constant > 0.0 => most * r / (motor.back_emf_constant * motor.gear_ratio),
+        AmplifierMode::Voltage if motor.back_emf_constant > 0.0 => {
+            most * r / (motor.back_emf_constant * motor.gear_ratio)
+        }
         _ => speed,
     };
     (speed > 1e-3 * free && speed > 0.0).then_some(Expected { speed, acceleration })
