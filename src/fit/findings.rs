@@ -157,7 +157,7 @@ fn of_delay(plan: &Plan, problem: &Problem) -> Option<Finding> {
     }
     let left: Vec<f64> = (0..=LATEST).map_while(|late| Some(regression_late(problem, late)?.unexplained)).collect();
     let late = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]))?;
-    if late < LATE || left[late] > 0.6 * left[0] || left[0] < 0.03 {
+    if late < LATE || left[late] > 0.75 * left[0] || left[0] - left[late] < 0.03 {
         return None;
     }
     let time = plain(late as f64 * problem.runs[0].interval(), "s");

@@ -19,7 +19,7 @@ pub const LIMIT: f64 = 1.0;
 pub const SHOWS: f64 = 0.2;
 
 /// The same as a share of how far the values range.
-pub const MODEL: f64 = 5e-5;
+pub const MODEL: f64 = 2e-4;
 
 /// A parameter of which this much goes with a combination that is not determined is not determined either.
 const SHARE: f64 = 0.05;

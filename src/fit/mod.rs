@@ -234,12 +234,12 @@ fn search<'a>(
     watch: &mut dyn FnMut(f64) -> Flow,
 ) -> Result<Searched<'a>> {
     let mut problem = Problem::new(case, plan)?.stopped_by(stop);
-    let bounds = problem.bounds();
 
     let mut watch = |_: &[f64], cost: f64| watch(cost);
     let mut work = Work::default();
     let mut descend = |problem: &mut Problem, x: &[f64], options: &Options| {
         let options = Options { rounding: problem.rounding(), ..*options };
+        let bounds = problem.bounds();
         let minimum = minimise(problem, x, &bounds, &options, &mut watch);
         work.iterations += minimum.iterations;
         work.evaluations += minimum.evaluations;
@@ -284,6 +284,7 @@ fn search<'a>(
         let before = first_weight(&problem);
         for &(quantity, deviation) in &fresh {
             problem.weigh(quantity, deviation, true);
+            problem.doubt_starts(quantity, deviation);
         }
         let alike = fresh.len() == 1 && !plan.huber && !told_beforehand(&problem, &fresh) && uniform(&problem);
         noise = fresh;

@@ -266,6 +266,25 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// A first value is no better than any other: what is known of starts beforehand is as uncertain as this deviation of a position.
+    pub(super) fn doubt_starts(&mut self, quantity: Quantity, deviation: f64) {
+        let r = self.stage.pulley_radius;
+        for run in &mut self.runs {
+            let Some(first) = run.seen.iter().find(|seen| is_position(seen.quantity)) else { continue };
+            if first.quantity != quantity {
+                continue;
+            }
+            let deviation = deviation * if quantity == Quantity::CartPosition { 1.0 } else { r };
+            for extra in run.extras.iter_mut().filter(|extra| extra.what == Nuisance::StartPosition) {
+                if let Some(known) = &mut extra.known {
+                    *known = known.max(deviation);
+                    let room = 6.0 * *known;
+                    (extra.low, extra.high) = (extra.low.min(extra.start - room), extra.high.max(extra.start + room));
+                }
+            }
+        }
+    }
+
     /// Residuals that are rounding, with the present weights: of each quantity `ROUNDING` of how far it ranges.
     pub fn rounding(&self) -> f64 {
         let seen = self.runs.iter().flat_map(|run| &run.seen);

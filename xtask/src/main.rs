@@ -1,5 +1,5 @@
 //! The project's own chores: `cargo xtask test` checks all that can be checked, `cargo xtask python` the Python package alone,
-//! `cargo xtask hunt` looks for what is wrong with larger means.
+//! `cargo xtask hunt` looks for what is wrong with larger means, `cargo xtask coverage` and `cargo xtask faults` make the tables of docs/fit.md.
 
 mod hunt;
 mod python;
@@ -51,6 +51,8 @@ fn main() -> ExitCode {
     let done = match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["test"] => test(&STEPS),
         ["python"] => test(&[PYTHON]),
+        ["coverage", ref words @ ..] => example("coverage", words),
+        ["faults", ref words @ ..] => example("faults", words),
         ["hunt", ref words @ ..] => match hunt::Hunt::new(words) {
             Ok(hunt) => hunt.run(),
             Err(told) => {
@@ -59,7 +61,10 @@ fn main() -> ExitCode {
             }
         },
         _ => {
-            eprintln!("usage: cargo xtask test | cargo xtask python | {}", hunt::USAGE);
+            eprintln!(
+                "usage: cargo xtask test | cargo xtask python | cargo xtask coverage [...] | cargo xtask faults [...] | {}",
+                hunt::USAGE
+            );
             return ExitCode::from(2);
         }
     };
@@ -69,6 +74,17 @@ fn main() -> ExitCode {
             eprintln!("\nxtask: {told}");
             ExitCode::FAILURE
         }
+    }
+}
+
+/// Runs an example of the library that makes a table, with these words.
+fn example(name: &str, words: &[&str]) -> Result<(), String> {
+    let mut command = cargo(&["run", "--release", "--quiet", "--package", "taut", "--no-default-features"]);
+    command.args(["--example", name, "--"]).args(words);
+    match command.status() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(_) => Err(format!("{name} found what should not be")),
+        Err(error) => Err(format!("cargo cannot be started: {error}")),
     }
 }
 

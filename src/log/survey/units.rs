@@ -9,6 +9,9 @@ use crate::stage::{AmplifierMode, Stage};
 /// Measured and expected may differ by this factor without a suspicion: the machine's parameters may be rough.
 const ROUGH: f64 = 30.0;
 
+/// An output of no more different values may be an input.
+const MOST_SWITCHED: usize = 40;
+
 /// An input that gives less than this part of the friction does not move a machine, however rough its parameters.
 const IDLE: f64 = 5.0;
 
@@ -72,10 +75,9 @@ fn swapped_note(log: &Log, channels: &[Channel]) -> Option<Note> {
     if input.levels < 50 || jumpy(&log.input) {
         return None;
     }
-    let (output, channel) =
-        log.outputs.iter().zip(&channels[1..]).find(|(output, channel)| {
-            (2..=8).contains(&channel.levels) && jumpy(&output.values) && channel.missing == 0
-        })?;
+    let (output, channel) = log.outputs.iter().zip(&channels[1..]).find(|(output, channel)| {
+        (2..=MOST_SWITCHED).contains(&channel.levels) && jumpy(&output.values) && channel.missing == 0
+    })?;
     let name = output.quantity.name();
     let text = format!(
         "it has {} values only and jumps between them, as an input does, while the input takes {} or more: are the two columns swapped?",
