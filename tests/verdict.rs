@@ -140,7 +140,7 @@ fn what_is_determined_beside_what_is_not_keeps_its_interval() {
         let words: Vec<&str> = combination.name.split(' ').collect();
         let factor: f64 = words[2].parse().unwrap();
         let r = case.stage.pulley_radius;
-        assert!((factor / (r * r) - 1.0).abs() < 0.05, "{}", combination.name);
+        assert!((factor / (r * r) - 1.0).abs() < 0.1, "{}", combination.name);
         let truth = case.stage.drive_pulley.friction.forward.viscous + factor * 24.0;
         let [low, high] = combination.interval;
         assert!(low < truth && truth < high && high - low < 0.05 * truth, "{low} {truth} {high}: {combination:?}");

@@ -22,7 +22,7 @@ pub const SHOWS: f64 = 0.2;
 pub const MODEL: f64 = 2e-4;
 
 /// A parameter of which this much goes with a combination that is not determined is not determined either.
-const SHARE: f64 = 0.05;
+const SHARE: f64 = 0.1;
 
 /// Singular values below this share of the greatest are rounding: differences are good to about 1e-9 of the largest column.
 const ROUNDING: f64 = 1e-8;
