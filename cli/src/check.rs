@@ -52,9 +52,15 @@ fn text(case: &Case, found: &Check) -> String {
     let known = &found.identifiability;
     let wide = known.names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
     for (j, name) in known.names.iter().enumerate() {
-        let error = match known.error[j] {
-            e if e.is_finite() => format!("to {:.2} %", 100.0 * e),
-            _ => "not at all".into(),
+        // The interval of the fit, and so what `taut fit` says.
+        let estimate = &found.fit.estimates[j];
+        let error = match estimate.error {
+            Some(e) if e.is_finite() && estimate.value != 0.0 => {
+                format!("to {:.2} %", 100.0 * (e / estimate.value).abs())
+            }
+            Some(e) if e.is_finite() => format!("to {}", table::value(e, estimate.unit, 2)),
+            None => "at its bound".into(),
+            Some(_) => "not at all".into(),
         };
         let _ = writeln!(text, "  {name:<wide$}  {error}");
     }

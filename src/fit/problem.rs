@@ -13,6 +13,9 @@ use nalgebra::DMatrix;
 /// Share of how far a quantity ranges that numbers in files and solvers may be off by.
 pub(super) const ROUNDING: f64 = 1e-10;
 
+/// Noise of first order that keeps to itself for 30 samples is so many times what neighbouring values differ by.
+const SHARED: f64 = 5.0;
+
 /// What is searched for, in which logs.
 #[derive(Clone)]
 pub struct Problem<'a> {
@@ -266,7 +269,8 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// A first value is no better than any other: what is known of starts beforehand is as uncertain as this deviation of a position.
+    /// A first value is no better than any other: what is known of starts beforehand is as uncertain as this deviation of a position, as far
+    /// as noise that neighbouring values share can be more than what they differ by; beyond that it is the model that is off, and not the value.
     pub(super) fn doubt_starts(&mut self, quantity: Quantity, deviation: f64) {
         let r = self.stage.pulley_radius;
         for run in &mut self.runs {
@@ -277,7 +281,8 @@ impl<'a> Problem<'a> {
             let deviation = deviation * if quantity == Quantity::CartPosition { 1.0 } else { r };
             for extra in run.extras.iter_mut().filter(|extra| extra.what == Nuisance::StartPosition) {
                 if let Some(known) = &mut extra.known {
-                    *known = known.max(deviation);
+                    // Its unit is what neighbouring values differ by.
+                    *known = known.max(deviation.min(SHARED * extra.unit));
                     let room = 6.0 * *known;
                     (extra.low, extra.high) = (extra.low.min(extra.start - room), extra.high.max(extra.start + room));
                 }

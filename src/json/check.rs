@@ -13,7 +13,9 @@ pub fn check(case: &Case, found: &Check) -> Value {
         "complete": known.complete(),
         "parameters": known.names.iter().enumerate().map(|(j, name)| json!({
             "name": name,
-            "relative_error": number(known.error[j]),
+            "relative_error": number(found.fit.estimates.get(j).map_or(known.error[j], |estimate| {
+                estimate.error.map_or(known.error[j], |error| (error / estimate.value).abs())
+            })),
             "determined": known.error[j].is_finite(),
             "sensitivity": number(known.sensitivity[j]),
         })).collect::<Vec<_>>(),
