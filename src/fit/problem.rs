@@ -13,6 +13,9 @@ use nalgebra::DMatrix;
 /// Share of how far a quantity ranges that numbers in files and solvers may be off by.
 pub(super) const ROUNDING: f64 = 1e-10;
 
+/// A delay that is known to so many samples is known.
+const LATE: f64 = 10.0;
+
 /// Noise of first order that keeps to itself for 30 samples is so many times what neighbouring values differ by.
 const SHARED: f64 = 5.0;
 
@@ -374,7 +377,12 @@ impl<'a> Problem<'a> {
                 // Of what has no size by nature, the value itself, or where it started.
                 typical.map_or(if x == 0.0 { 1.0 } else { x.abs() }, |typical| x.abs().max(typical / unit))
             }
-            _ => 1.0,
+            Some(Scale::Log(_)) => 1.0,
+            None => match self.shared[j - self.parameters.len()].what {
+                // Its unit is a sample's interval, to which few logs tell a delay.
+                Nuisance::Delay => LATE,
+                _ => 1.0,
+            },
         }
     }
 
