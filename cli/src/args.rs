@@ -323,6 +323,9 @@ pub struct Fit {
     /// Also draw from the posterior, with the priors in [fit.priors]: intervals where those of the fit are too simple
     #[arg(long)]
     pub posterior: bool,
+    /// Write the results although something warns that they are not to be relied on
+    #[arg(long)]
+    pub anyway: bool,
     /// Draws of each chain that are kept
     #[arg(long, value_name = "N", default_value_t = 1000, requires = "posterior", value_parser = count)]
     pub draws: usize,
@@ -340,6 +343,8 @@ Examples:
   taut fit axis.toml --posterior --draws 2000 --out fitted
   taut simulate fitted/fitted.toml --draws fitted/posterior.csv --out band
 
+Lines that begin with `warning:` say what makes a result not to be relied on: the exit status is 1, and nothing is written without --anyway.
+What is not determined is ± ∞ and keeps its value in fitted.toml; the exit status is 1, too.
 Ctrl-C ends a fit early: the best so far is written and said not to be converged, with exit status 130.";
 
 /// Recommend an input shaper, from a measured spectrum or from a model.

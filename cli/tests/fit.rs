@@ -65,15 +65,21 @@ fn a_fit_its_posterior_and_the_band_of_its_machines() {
     assert!(names.iter().any(|name| name.contains("band")), "{names:?}");
 }
 
+/// `fit` refused with status 2 what `check` called determined in part, and said nothing of the rest.
 #[test]
-fn what_is_not_determined_ends_with_status_2_and_what_to_do() {
+fn what_is_not_determined_ends_with_status_1_and_keeps_its_value() {
     let folder = with_a_log();
     let free = "fit.free=[\"drive_pulley.friction.viscous\", \"cart.friction.viscous\"]";
     let output = taut(folder.path()).args(["fit", "mine.toml", "--out", "found", "--set", free]).output().unwrap();
-    assert_eq!(output.status.code(), Some(2));
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert!(told.contains("B₁ + r² b + B₂ + K_t K_e/R") && told.contains("next: fix one"), "{told}");
-    assert!(!folder.path().join("found/fitted.toml").exists());
+    assert_eq!(output.status.code(), Some(1));
+    let told = String::from_utf8(output.stdout).unwrap();
+    assert!(told.contains("B₁ + r² b + B₂ + K_t K_e/R") && told.contains("- fix one"), "{told}");
+    assert!(told.contains("± ∞") && told.contains("drive_pulley.friction.viscous + "), "{told}");
+    let fit = json(folder.path(), "found/fit.json");
+    assert_eq!((&fit["converged"], &fit["ending"]), (&Value::Bool(false), &Value::from("not_determined")));
+    assert_eq!(fit["not_determined"][0]["combinations"].as_array().unwrap().len(), 1, "{fit}");
+    let text = std::fs::read_to_string(folder.path().join("found/fitted.toml")).unwrap();
+    assert!(text.contains("known = \"not determined\""), "{text}");
     let output = taut(folder.path()).args(["check", "mine.toml", "--json", "--set", free]).output().unwrap();
     assert_eq!(output.status.code(), Some(0));
     let value: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -83,4 +89,24 @@ fn what_is_not_determined_ends_with_status_2_and_what_to_do() {
     assert_eq!(value["logs"][0]["samples"], 1001);
     let notes = value["logs"][0]["notes"].as_array().unwrap();
     assert!(notes.iter().any(|note| note["severity"] == "warning"), "{notes:?}");
+}
+
+/// A flipped sign "converged" with status 0; what warns is written with --anyway alone.
+#[test]
+fn a_fit_that_warns_writes_nothing_unless_told() {
+    let folder = with_a_log();
+    let flipped = "experiment.2.log.scale={ drive_angle = -1 }";
+    let run = |more: &[&str]| {
+        let arguments = ["fit", "mine.toml", "--out", "found", "--no-report", "--set", flipped];
+        taut(folder.path()).args(arguments).args(more).output().unwrap()
+    };
+    let output = run(&[]);
+    assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stderr));
+    let told = String::from_utf8(output.stdout).unwrap();
+    assert!(told.lines().any(|line| line.starts_with("warning: ") && line.contains("against")), "{told}");
+    assert!(told.contains("--anyway") && !told.contains("\nconverged"), "{told}");
+    assert!(!folder.path().join("found/fitted.toml").exists());
+    let output = run(&["--anyway"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(folder.path().join("found/fitted.toml").exists());
 }

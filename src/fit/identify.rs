@@ -1,10 +1,11 @@
 //! What logs can tell: the sensitivity of all outputs to each parameter, and the combinations that change nothing.
 //!
 //! With J the derivatives of the weighted outputs with respect to relative changes of the parameters, and what else is
-//! fitted along projected out, J = U S Vᵀ: moving the parameters along vᵢ by one changes the outputs by sᵢ standard deviations,
-//! so 1/sᵢ is how far off that combination may be. Where that is more than [`LIMIT`], or where the outputs move by less than
-//! [`SHOWS`], it is not determined.
+//! fitted along projected out, J = U S Vᵀ: along vᵢ the outputs change by sᵢ standard deviations of white noise. How far off that
+//! combination may be, the noise that the residuals show says ([`super::noise`]); where that is more than [`LIMIT`], or where the
+//! outputs move by less than a machine shows ([`SHOWS`], [`MODEL`]), it is not determined.
 
+use super::combinations::{self, Combination};
 use super::problem::Problem;
 use crate::parameter::{Arm, Free, Sum, named, value};
 use nalgebra::{DMatrix, SVD};
@@ -12,14 +13,19 @@ use nalgebra::{DMatrix, SVD};
 /// Relative standard error from which on a combination counts as not determined.
 pub const LIMIT: f64 = 1.0;
 
-/// Root mean square, in standard deviations of the noise, of what a change by 100 % makes of a value: below that a combination
+/// Root mean square, as a share of what the converter rounds, of what a change by 100 % makes of a value: below that a combination
 /// counts as not determined however many values there are. Averages of thousands of values would tell it of a machine that is the
 /// model to a fraction of what one value shows, and no machine is.
 pub const SHOWS: f64 = 0.2;
 
-/// From this share of it in what is not determined a parameter counts as not determined: a change of the combination by 100 %
-/// that takes more than 10 % of the parameter with it.
-const SHARE: f64 = 0.01;
+/// The same as a share of how far the values range.
+pub const MODEL: f64 = 2e-4;
+
+/// A parameter of which this much goes with a combination that is not determined is not determined either.
+const SHARE: f64 = 0.1;
+
+/// Singular values below this share of the greatest are rounding: differences are good to about 1e-9 of the largest column.
+const ROUNDING: f64 = 1e-8;
 
 /// Iterations of a singular value decomposition before it is given up.
 const MOST_SWEEPS: usize = 10_000;
@@ -37,6 +43,8 @@ pub struct Identifiability {
     pub error: Vec<f64>,
     /// Groups of parameters of which only fewer combinations are determined.
     pub groups: Vec<Group>,
+    /// One parameter for each direction that is not determined: the one that moves most along it.
+    pub leads: Vec<usize>,
 }
 
 /// Parameters that the logs do not tell apart.
@@ -48,6 +56,8 @@ pub struct Group {
     pub determined: usize,
     /// What can be said in words and numbers.
     pub words: String,
+    /// The sums, ratios and products of them that are determined, as far as they have a name.
+    pub combinations: Vec<Combination>,
 }
 
 impl Identifiability {
@@ -56,49 +66,67 @@ impl Identifiability {
         self.groups.is_empty()
     }
 
-    /// From a Jacobian of `problem` at `x`, with residuals of this deviation; none if numbers fail.
+    /// From a Jacobian of `problem` at `x`, for white noise of this deviation; none if numbers fail.
     pub fn new(problem: &Problem, jacobian: &DMatrix<f64>, x: &[f64], deviation: f64) -> Option<Self> {
-        let globals = problem.globals();
-        let mut own = projected(jacobian, globals)?;
+        let all: Vec<usize> = (0..problem.globals()).collect();
+        let directions = Directions::new(problem, jacobian, x, &all)?;
+        let deviation = deviation.max(f64::MIN_POSITIVE);
+        let off: Vec<f64> = directions.singular.iter().map(|s| deviation / s).collect();
+        let of = |c: &[f64]| c.iter().zip(&off).map(|(c, off)| (c * off).powi(2)).sum::<f64>().sqrt();
+        Some(Self::told(problem, &directions, x, deviation, &off, &of))
+    }
+
+    /// For the noise that the residuals show: `off` is the relative standard error along each direction, `of` that of a combination of
+    /// directions.
+    pub(super) fn told(
+        problem: &Problem,
+        directions: &Directions,
+        x: &[f64],
+        deviation: f64,
+        off: &[f64],
+        of: &dyn Fn(&[f64]) -> f64,
+    ) -> Self {
+        let Directions { v, singular, norms, alive, rows, .. } = directions;
+        let n = v.nrows();
         let mut names: Vec<String> = problem.parameters.iter().map(|parameter| parameter.name.clone()).collect();
         names.extend(problem.shared.iter().map(|extra| extra.what.name().to_string()));
-        for (j, &x) in x.iter().enumerate().take(globals) {
-            own.column_mut(j).scale_mut(problem.whole(j, x) / deviation.max(f64::MIN_POSITIVE));
-        }
-        let rows = problem.counted().max(1) as f64;
-        let sensitivity = (0..globals).map(|j| own.column(j).norm() / rows.sqrt()).collect();
-        // Of a simulation that was ended early there are no numbers, and the decomposition would panic.
-        if own.iter().any(|entry| !entry.is_finite()) {
-            return None;
-        }
-        let svd = SVD::try_new(own, false, true, 1e-15, MOST_SWEEPS)?;
-        let v = svd.v_t.as_ref()?.transpose();
-        let singular: Vec<f64> = svd.singular_values.iter().copied().collect();
-        let most = singular.iter().copied().fold(0.0, f64::max);
-        // Differences are good to about 1e-9 of the largest column.
-        let floor = 1e-8 * most;
-        let least = f64::max(1.0 / LIMIT, SHOWS * rows.sqrt());
-        let lost: Vec<usize> = (0..globals).filter(|&i| !(singular[i] > floor && singular[i] > least)).collect();
-        let mut error = Vec::new();
-        for j in 0..globals {
-            let hidden: f64 = lost.iter().map(|&i| v[(j, i)].powi(2)).sum();
-            let told = (0..globals).filter(|&i| singular[i] > floor);
-            let squares: f64 = told.map(|i| (v[(j, i)] / singular[i]).powi(2)).sum();
-            error.push(if hidden > SHARE { f64::INFINITY } else { squares.sqrt() });
-        }
-        let mut result = Self { names, sensitivity, singular, error, groups: Vec::new() };
-        result.groups = result.grouped(problem, &v, &lost, x);
-        Some(result)
+        let sensitivity = norms.iter().map(|norm| norm / deviation / rows.sqrt()).collect();
+        let least = shows(problem) * rows.sqrt();
+        let lost: Vec<usize> =
+            (0..v.ncols()).filter(|&i| i >= *alive || singular[i] < least || off[i] > LIMIT).collect();
+        let goes_with = |j: usize| lost.iter().map(|&i| v[(j, i)].powi(2)).sum::<f64>().sqrt();
+        let error = (0..n)
+            .map(|j| {
+                // Along what is lost no further than by all of it.
+                let row: Vec<f64> = (0..*alive)
+                    .map(|i| if lost.contains(&i) { v[(j, i)] * (LIMIT / off[i]).min(1.0) } else { v[(j, i)] })
+                    .collect();
+                if goes_with(j) > SHARE { f64::INFINITY } else { of(&row) }
+            })
+            .collect();
+        let singular = singular.iter().map(|s| s / deviation).collect();
+        let mut result = Self { names, sensitivity, singular, error, groups: Vec::new(), leads: leads(v, &lost) };
+        result.groups = result.grouped(problem, directions, &lost, x, of);
+        result
     }
 
     /// Parameters connected by lost directions, each group with what is left of it.
-    fn grouped(&self, problem: &Problem, v: &DMatrix<f64>, lost: &[usize], x: &[f64]) -> Vec<Group> {
+    fn grouped(
+        &self,
+        problem: &Problem,
+        directions: &Directions,
+        lost: &[usize],
+        x: &[f64],
+        of: &dyn Fn(&[f64]) -> f64,
+    ) -> Vec<Group> {
         let n = self.names.len();
+        let v = &directions.v;
         let hidden = |i: usize, j: usize| lost.iter().map(|&d| v[(i, d)] * v[(j, d)]).sum::<f64>();
+        let is_hidden = |j: usize| self.error[j].is_infinite();
         let mut groups = Vec::new();
         let mut seen = vec![false; n];
         for start in 0..n {
-            if seen[start] || hidden(start, start) <= SHARE {
+            if seen[start] || !is_hidden(start) {
                 continue;
             }
             let mut members = vec![start];
@@ -107,7 +135,7 @@ impl Identifiability {
             while next < members.len() {
                 let i = members[next];
                 for (j, seen) in seen.iter_mut().enumerate() {
-                    if !*seen && hidden(j, j) > SHARE && hidden(i, j).abs() > SHARE {
+                    if !*seen && is_hidden(j) && hidden(i, j).abs() > SHARE * SHARE {
                         *seen = true;
                         members.push(j);
                     }
@@ -118,7 +146,12 @@ impl Identifiability {
             let gone = members.iter().map(|&j| hidden(j, j)).sum::<f64>().round() as usize;
             let determined = members.len().saturating_sub(gone.max(1));
             let words = self.words(problem, &members, determined, &hidden, x);
-            groups.push(Group { members, determined, words });
+            let combinations = if determined == 0 {
+                Vec::new()
+            } else {
+                combinations::of(problem, directions, &self.names, &members, lost, x, of)
+            };
+            groups.push(Group { members, determined, words, combinations });
         }
         groups
     }
@@ -158,7 +191,7 @@ impl Identifiability {
                 .enumerate()
                 .map(|(a, &j)| {
                     let value = problem.value(j, x[j]);
-                    left[(a, best)] / (problem.slope(j, value) * problem.whole(j, x[j]))
+                    left[(a, best)] / (problem.slope(j, value) * problem.whole(&stage, j, x[j]))
                 })
                 .collect();
             let parameters: Vec<&Free> = members.iter().map(|&j| &problem.parameters[j]).collect();
@@ -215,6 +248,99 @@ impl Identifiability {
     }
 }
 
+/// The directions in which the parameters move, by how much they show.
+pub(super) struct Directions {
+    /// Each a column, in relative changes.
+    pub v: DMatrix<f64>,
+    /// Singular values in the weights of the problem, falling.
+    pub singular: Vec<f64>,
+    /// Norm of each parameter's own column.
+    norms: Vec<f64>,
+    /// How many of them are more than rounding.
+    pub alive: usize,
+    /// A change by 100 %, in the variable of each.
+    pub whole: Vec<f64>,
+    /// Values that count.
+    rows: f64,
+}
+
+impl Directions {
+    /// From a Jacobian of `problem` at `x` for these of what concerns all runs, the others held; none if numbers fail.
+    pub fn new(problem: &Problem, jacobian: &DMatrix<f64>, x: &[f64], which: &[usize]) -> Option<Self> {
+        let globals = problem.globals();
+        if which.is_empty() {
+            return None;
+        }
+        let columns: Vec<usize> = which.iter().copied().chain(globals..jacobian.ncols()).collect();
+        let mut own = projected(&jacobian.select_columns(&columns), which.len())?;
+        let stage = problem.stage_at(x);
+        let whole: Vec<f64> = (0..globals).map(|j| problem.whole(&stage, j, x[j])).collect();
+        for (column, &j) in which.iter().enumerate() {
+            own.column_mut(column).scale_mut(whole[j]);
+        }
+        // Of a simulation that was ended early there are no numbers, and the decomposition would panic.
+        if own.iter().any(|entry| !entry.is_finite()) {
+            return None;
+        }
+        let mut norms = vec![0.0; globals];
+        for (column, &j) in which.iter().enumerate() {
+            norms[j] = own.column(column).norm();
+        }
+        let svd = SVD::try_new(own, false, true, 1e-15, MOST_SWEEPS)?;
+        let order = svd.v_t.as_ref()?.transpose();
+        let mut singular: Vec<f64> = svd.singular_values.iter().copied().collect();
+        let mut v = DMatrix::zeros(globals, which.len());
+        for (row, &j) in which.iter().enumerate() {
+            for i in 0..order.ncols() {
+                v[(j, i)] = order[(row, i)];
+            }
+        }
+        singular.resize(which.len(), 0.0);
+        let most = singular.iter().copied().fold(0.0, f64::max);
+        let alive = singular.iter().filter(|s| **s > ROUNDING * most).count();
+        Some(Self { v, singular, norms, alive, whole, rows: problem.counted().max(1) as f64 })
+    }
+}
+
+/// For each of the lost directions a parameter of its own that moves much along it: by elimination with the greatest pivots.
+fn leads(v: &DMatrix<f64>, lost: &[usize]) -> Vec<usize> {
+    let mut hidden = v.select_columns(lost);
+    let mut leads = Vec::new();
+    for column in 0..hidden.ncols() {
+        let size = |j: usize| hidden.view((j, column), (1, hidden.ncols() - column)).norm();
+        let Some(lead) = (0..hidden.nrows())
+            .filter(|j| !leads.contains(j))
+            .max_by(|&a, &b| size(a).total_cmp(&size(b)))
+            .filter(|&j| size(j) > 1e-6)
+        else {
+            break;
+        };
+        leads.push(lead);
+        // Turn the rest so that the lead moves along this column alone.
+        let best =
+            (column..hidden.ncols()).max_by(|&a, &b| hidden[(lead, a)].abs().total_cmp(&hidden[(lead, b)].abs()));
+        hidden.swap_columns(column, best.unwrap_or(column));
+        for other in column + 1..hidden.ncols() {
+            let factor = hidden[(lead, other)] / hidden[(lead, column)];
+            for j in 0..hidden.nrows() {
+                let away = factor * hidden[(j, column)];
+                hidden[(j, other)] -= away;
+            }
+        }
+    }
+    leads
+}
+
+/// The least root mean square of a value's change, in its weights, that a machine shows.
+fn shows(problem: &Problem) -> f64 {
+    let seen = problem.runs.iter().flat_map(|run| &run.seen);
+    let of = |seen: &super::run::Seen| {
+        let weight = seen.weights.iter().copied().fold(0.0, f64::max);
+        weight * (SHOWS * seen.step / 12f64.sqrt()).max(MODEL * super::problem::extent(&seen.values))
+    };
+    seen.map(of).filter(|least| *least > 0.0).fold(f64::INFINITY, f64::min).min(1e300)
+}
+
 /// Columns of the first `n` variables without what the others can do.
 fn projected(jacobian: &DMatrix<f64>, n: usize) -> Option<DMatrix<f64>> {
     let all = jacobian.ncols();
@@ -238,7 +364,7 @@ fn sum_with(key: &str) -> Option<Sum> {
 }
 
 /// A sum over the bodies that these weights are, in symbols and numbers.
-fn sum_of(stage: &crate::stage::Stage, parameters: &[&Free], weights: &[f64]) -> Option<String> {
+pub(super) fn sum_of(stage: &crate::stage::Stage, parameters: &[&Free], weights: &[f64]) -> Option<String> {
     // Each one's keys must be parts of one sum.
     let sum = sum_with(&parameters.first()?.keys.first()?.0)?;
     let mut parts = Vec::new();
@@ -290,7 +416,7 @@ fn sum_of(stage: &crate::stage::Stage, parameters: &[&Free], weights: &[f64]) ->
     Some(format!("{} = {} {unit}", parts.join(" + "), crate::quantity::rounded(total)))
 }
 
-fn listed(names: &[&str]) -> String {
+pub(super) fn listed(names: &[&str]) -> String {
     match names {
         [] => String::new(),
         [one] => one.to_string(),

@@ -4,26 +4,36 @@
 //! all logs at once. The recipe is [`fit`]; before it, [`check`] says what the logs can determine.
 
 mod check;
+mod combinations;
 mod density;
 mod drawn;
+mod findings;
 mod identify;
 pub mod least_squares;
+mod noise;
 mod posterior;
 mod problem;
 mod profile;
+mod proposals;
 mod regression;
 mod run;
+mod sub_records;
 mod uncertainty;
 
-pub use check::{Check, Proposal, check};
+pub use check::{Check, check};
+pub use combinations::Combination;
 pub use drawn::{drawn, machines};
-pub use identify::{Group, Identifiability, LIMIT};
+pub use findings::{Finding, Grade};
+pub use identify::{Group, Identifiability, LIMIT, MODEL, SHOWS};
 pub use least_squares::Ending;
 pub use posterior::{Credible, EFFECTIVE, Posterior, R_HAT, posterior};
 pub use problem::{Problem, Stop};
 pub use profile::{Profile, profiles};
+pub use proposals::Proposal;
 pub use regression::{Balance, regression};
 pub use run::{Extra, Nuisance, Run, Seen};
+pub use sub_records::Disagreement;
+use uncertainty::Judged;
 pub use uncertainty::{Covariance, inverse_of_square, student};
 
 use crate::case::{Case, Given, Plan};
@@ -33,7 +43,7 @@ use crate::log::Quantity;
 use crate::parameter::{self, Field, Parameter, named, values};
 use crate::solve::{Bench, Flow};
 use crate::stage::Stage;
-use least_squares::{Minimum, Options, Residuals, minimise};
+use least_squares::{Differences, Minimum, Options, Residuals, minimise};
 use nalgebra::DVector;
 use problem::{ROUNDING, extent};
 use rand_pcg::Pcg64;
@@ -52,7 +62,7 @@ const TRIAL_ITERATIONS: usize = 12;
 /// What a fit found.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// The machine with the estimates.
+    /// The machine with the estimates; what is not determined is what the case says.
     pub stage: Stage,
     /// The estimates: free parameters, then what all logs share.
     pub estimates: Vec<Estimate>,
@@ -64,6 +74,12 @@ pub struct Fit {
     pub logs: Vec<LogFit>,
     /// What the logs determine at the estimates.
     pub identifiability: Option<Identifiability>,
+    /// What to do about each group of parameters that is not determined.
+    pub choices: Vec<Vec<String>>,
+    /// Parts of the logs that say otherwise than the whole, by more than noise would make of it.
+    pub disagreement: Option<Disagreement>,
+    /// What is to be known of logs and search before the estimates are used, warnings first.
+    pub findings: Vec<Finding>,
     /// The variables of the search where it ended.
     pub point: Vec<f64>,
     /// How the search ended.
@@ -173,20 +189,54 @@ pub struct Score {
 ///
 /// `watch` sees the cost after each step; `stop` ends the search, which then gives the best so far.
 pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f64) -> Flow) -> Result<Fit> {
-    let mut problem = Problem::new(case, plan)?.stopped_by(stop);
-    let bounds = problem.bounds();
-    // What the logs determine is asked for the noise that they show; the fit itself begins with weights that it can revise.
-    check::weigh_by_noise(&mut problem);
-    let (jacobian, x) = check::sensitivities(&mut problem)?;
-    if let Some(found) = Identifiability::new(&problem, &jacobian, &x, 1.0) {
-        refuse(&problem, &found)?;
+    let found = search(case, plan, stop, watch)?;
+    let judged = found.judged(case, plan);
+    Ok(told(case, plan, &found, judged.as_ref()))
+}
+
+/// The result, and what is to be known of it.
+fn told(case: &Case, plan: &Plan, found: &Searched, judged: Option<&Judged>) -> Fit {
+    let mut fit = result(found, judged);
+    fit.findings = findings::findings(case, plan, found, &fit);
+    fit
+}
+
+/// Where a search ended.
+struct Searched<'a> {
+    problem: Problem<'a>,
+    best: Minimum,
+    /// Deviation of each quantity's residuals.
+    noise: Vec<(Quantity, f64)>,
+    starts: Vec<f64>,
+    work: Work,
+}
+
+impl Searched<'_> {
+    /// What the logs tell there, and whether their parts agree; none if numbers fail.
+    fn judged(&self, case: &Case, plan: &Plan) -> Option<Judged> {
+        let Minimum { residuals, jacobian, x, at_bound, .. } = &self.best;
+        let mut judged = Judged::new(&self.problem, residuals, jacobian, x, at_bound)?;
+        if let Some(disagreement) = sub_records::disagreement(case, plan, self, &judged) {
+            judged.widen(disagreement);
+        }
+        Some(judged)
     }
-    problem.weigh_first();
+}
+
+/// The search of a fit, and of a check.
+fn search<'a>(
+    case: &Case,
+    plan: &Plan,
+    stop: Option<Stop<'a>>,
+    watch: &mut dyn FnMut(f64) -> Flow,
+) -> Result<Searched<'a>> {
+    let mut problem = Problem::new(case, plan)?.stopped_by(stop);
 
     let mut watch = |_: &[f64], cost: f64| watch(cost);
     let mut work = Work::default();
-    let mut search = |problem: &mut Problem, x: &[f64], options: &Options| {
+    let mut descend = |problem: &mut Problem, x: &[f64], options: &Options| {
         let options = Options { rounding: problem.rounding(), ..*options };
+        let bounds = problem.bounds();
         let minimum = minimise(problem, x, &bounds, &options, &mut watch);
         work.iterations += minimum.iterations;
         work.evaluations += minimum.evaluations;
@@ -194,7 +244,7 @@ pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f
     };
     let whole = Options::default();
     let start = first_guess(&mut problem);
-    let mut best = search(&mut problem, &start, &whole);
+    let mut best = descend(&mut problem, &start, &whole);
     if best.ending == Ending::Failed {
         return Err(Error::new("the model does not get through these logs with the values of the case file")
             .next("run `taut simulate` on the case to see why, or start from other values"));
@@ -206,9 +256,10 @@ pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f
             break;
         }
         let x = elsewhere(&problem, &mut random);
-        let trial = search(&mut problem, &x, &Options { iterations: TRIAL_ITERATIONS, tolerance: 0.1, ..whole });
+        let trial = descend(&mut problem, &x, &Options { iterations: TRIAL_ITERATIONS, tolerance: 0.1, ..whole });
         let near = trial.cost < 1.2 * best.cost;
-        let trial = if near && trial.ending != Ending::Failed { search(&mut problem, &trial.x, &whole) } else { trial };
+        let trial =
+            if near && trial.ending != Ending::Failed { descend(&mut problem, &trial.x, &whole) } else { trial };
         starts.push(trial.cost);
         if trial.cost < best.cost {
             best = trial;
@@ -230,6 +281,7 @@ pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f
         let before = first_weight(&problem);
         for &(quantity, deviation) in &fresh {
             problem.weigh(quantity, deviation, true);
+            problem.doubt_starts(quantity, deviation);
         }
         let alike = fresh.len() == 1 && !plan.huber && !told_beforehand(&problem, &fresh) && uniform(&problem);
         noise = fresh;
@@ -241,7 +293,7 @@ pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f
                 break;
             }
         }
-        best = search(&mut problem, &best.x.clone(), &options);
+        best = descend(&mut problem, &best.x.clone(), &options);
     }
     if problem.is_stopped() {
         best.ending = Ending::Interrupted;
@@ -249,11 +301,100 @@ pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f
     if noise.is_empty() {
         noise = noise_of(&problem, &best, plan.huber);
     }
+    let options =
+        Options { huber: if plan.huber { HUBER } else { f64::INFINITY }, rounding: problem.rounding(), ..whole };
+    if best.ending != Ending::Interrupted {
+        hold_undetermined(&mut problem, &mut best, &options, &mut watch, &mut work);
+    }
     work.simulations = problem.simulations;
-    Ok(result(&problem, &best, noise, starts, work))
+    Ok(Searched { problem, best, noise, starts, work })
+}
+
+/// Where a direction is not determined, the search ended anywhere along it: it is repeated with the parameter that moves most along it
+/// held where the case has it, and the point that this leads to is as good.
+fn hold_undetermined(
+    problem: &mut Problem,
+    best: &mut Minimum,
+    options: &Options,
+    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
+    work: &mut Work,
+) {
+    let none = vec![false; best.x.len()];
+    let lead = |best: &Minimum, problem: &Problem| {
+        Judged::new(problem, &best.residuals, &best.jacobian, &best.x, &none).map(|judged| judged.identifiability.leads)
+    };
+    let Some(leads) = lead(best, problem).filter(|leads| !leads.is_empty()) else { return };
+    let start = problem.start();
+    let (open, mut bounds) = (problem.bounds(), problem.bounds());
+    let mut x = best.x.clone();
+    for &j in &leads {
+        (bounds.low[j], bounds.high[j]) = (start[j], start[j]);
+        x[j] = start[j];
+    }
+    // Where the others begin does not matter, as long as the held ones are far from where they were.
+    let from = [x, start];
+    for from in from {
+        let found = minimise(problem, &from, &bounds, options, watch);
+        work.iterations += found.iterations;
+        work.evaluations += found.evaluations;
+        if matches!(found.ending, Ending::Failed | Ending::Interrupted) || found.cost > best.cost * 1.01 + 1e-300 {
+            continue;
+        }
+        let whole = problem.jacobian(&found.x, &found.residuals, &open, &Differences::Central);
+        if let Some(jacobian) = whole {
+            let mut at_bound = found.at_bound.clone();
+            leads.iter().for_each(|&j| at_bound[j] = false);
+            *best = Minimum { jacobian, at_bound, ..found };
+        }
+        return;
+    }
+}
+
+impl Estimate {
+    /// Whether the logs tell it, or it is at a bound.
+    pub fn is_determined(&self) -> bool {
+        self.at_bound || self.error.is_some_and(f64::is_finite)
+    }
 }
 
 impl Fit {
+    /// Whether all that is searched for is determined and nothing warns.
+    pub fn is_reliable(&self) -> bool {
+        self.is_complete() && self.warnings().next().is_none()
+    }
+
+    /// Whether all that is searched for is determined.
+    pub fn is_complete(&self) -> bool {
+        self.estimates.iter().all(Estimate::is_determined)
+    }
+
+    /// What makes the result not to be relied on.
+    pub fn warnings(&self) -> impl Iterator<Item = &Finding> {
+        self.findings.iter().filter(|finding| finding.grade == Grade::Warning)
+    }
+
+    /// Whether the search ended at a minimum within the bounds, and nothing warns.
+    pub fn is_converged(&self) -> bool {
+        self.ending == Ending::Converged
+            && !self.estimates.iter().any(|estimate| estimate.at_bound)
+            && self.is_reliable()
+    }
+
+    /// How it ended, for files: `converged` only where it is.
+    pub fn ending_word(&self) -> &'static str {
+        match self.ending {
+            Ending::Converged if self.estimates.iter().any(|estimate| estimate.at_bound) => "at_bound",
+            Ending::Converged if !self.is_complete() => "not_determined",
+            Ending::Converged if !self.is_reliable() => "doubtful",
+            ending => ending.word(),
+        }
+    }
+
+    /// What is determined of parameters that are not.
+    pub fn combinations(&self) -> impl Iterator<Item = &Combination> {
+        self.identifiability.iter().flat_map(|found| &found.groups).flat_map(|group| &group.combinations)
+    }
+
     /// What is to be changed in the text so that `key` is `value`.
     fn changes(&self, case: &Case, key: &str, value: f64) -> Vec<String> {
         let Some(row) = named(key) else { return Vec::new() };
@@ -277,7 +418,8 @@ impl Fit {
     /// The text of the case with the estimates in place of what they were, and a table of how well they are known. Paths in
     /// it are those of `case`; `name` stands in messages.
     pub fn case_text(&self, case: &Case, name: &Path) -> Result<String> {
-        let sets = || self.estimates.iter().flat_map(|estimate| &estimate.sets);
+        let known = |estimate: &&Estimate| estimate.is_determined();
+        let sets = || self.estimates.iter().filter(known).flat_map(|estimate| &estimate.sets);
         let text = without_other_forms(&case.text, sets().map(|(key, _)| key.as_str()));
         let mut changes: Vec<String> = sets().flat_map(|(key, value)| self.changes(case, key, *value)).collect();
         let read = |changes: &[String]| {
@@ -303,7 +445,7 @@ impl Fit {
         let mut table = toml_edit::Table::new();
         let how = format!(
             "\n# How well the fit knows its estimates: SI units, standard errors, 95 % intervals. How it ended: {}.\n",
-            self.ending.word()
+            self.ending_word()
         );
         table.decor_mut().set_prefix(how);
         for estimate in &self.estimates {
@@ -311,7 +453,7 @@ impl Fit {
             let mut put = |key: &str, value: f64| {
                 row.insert(key, toml_edit::Value::from(value));
             };
-            put("value", estimate.value);
+            put("value", if estimate.is_determined() { estimate.value } else { estimate.start });
             match (estimate.error, estimate.interval) {
                 (Some(error), Some([low, high])) if error.is_finite() => {
                     put("error", error);
@@ -328,6 +470,16 @@ impl Fit {
                 }
             }
             table.insert(&estimate.name, toml_edit::value(row));
+        }
+        for combination in self.combinations() {
+            let mut row = toml_edit::InlineTable::new();
+            let [low, high] = combination.interval;
+            for (key, value) in
+                [("value", combination.value), ("error", combination.error), ("low", low), ("high", high)]
+            {
+                row.insert(key, toml_edit::Value::from(value));
+            }
+            table.insert(&combination.name, toml_edit::value(row));
         }
         document.insert("uncertainty", toml_edit::Item::Table(table));
         Ok(document.to_string())
@@ -408,18 +560,6 @@ fn first_guess(problem: &mut Problem) -> Vec<f64> {
     if cost(&guess) < cost(&start) { guess } else { start }
 }
 
-/// Refuses what the logs do not determine, with the choices there are.
-fn refuse(problem: &Problem, found: &Identifiability) -> Result<()> {
-    let Some(group) = found.groups.first() else { return Ok(()) };
-    let mut told = group.words.clone();
-    for other in &found.groups[1..] {
-        told = format!("{told}; {}", other.words);
-    }
-    let choices: Vec<String> = found.groups.iter().flat_map(|group| found.choices(problem, group)).collect();
-    Err(Error::new(format!("these logs do not determine all that is searched for: {told}"))
-        .next(format!("{}; `taut check` says what another experiment would tell", choices.join("; or "))))
-}
-
 /// A point within the bounds, near enough to the start to be a machine of its kind: within a factor of ten, or for what may
 /// be zero, between zero and three times its start.
 fn elsewhere(problem: &Problem, random: &mut Pcg64) -> Vec<f64> {
@@ -482,21 +622,22 @@ fn noise_of(problem: &Problem, at: &Minimum, robust: bool) -> Vec<(Quantity, f64
 }
 
 /// Everything that is told of a minimum.
-fn result(problem: &Problem, best: &Minimum, noise: Vec<(Quantity, f64)>, starts: Vec<f64>, work: Work) -> Fit {
-    let covariance = Covariance::new(problem, &best.residuals, &best.jacobian, &best.at_bound);
-    let deviation = (2.0 * best.cost / (problem.independent() - problem.variables() as f64).max(1.0)).sqrt();
-    let identifiability = Identifiability::new(problem, &best.jacobian, &best.x, deviation);
+fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
+    let Searched { problem, best, noise, starts, work } = found;
     let bounds = problem.bounds();
-    let t = covariance.as_ref().map_or(student(1), |c| c.reach);
+    let covariance = judged.map(|judged| &judged.covariance);
+    let identifiability = judged.map(|judged| judged.identifiability.clone());
+    let t = covariance.map_or(student(1), |c| c.reach);
     let determined = |j: usize| identifiability.as_ref().is_some_and(|found| found.error[j].is_finite());
-    let error = |j: usize| match &covariance {
+    let error = |j: usize| match covariance {
         Some(covariance) if j >= problem.globals() || determined(j) => covariance.error(j),
         _ if best.at_bound[j] => None,
         _ => Some(f64::INFINITY),
     };
     // All variables without their bounds, where one is at its bound.
     let beyond = if best.at_bound.contains(&true) {
-        let free = Covariance::new(problem, &best.residuals, &best.jacobian, &vec![false; best.at_bound.len()]);
+        let free = vec![false; best.at_bound.len()];
+        let free = Judged::new(problem, &best.residuals, &best.jacobian, &best.x, &free);
         // d = −(JᵀJ)⁻¹ Jᵀ r
         let step = inverse_of_square(&best.jacobian)
             .map(|inverse| -inverse * best.jacobian.tr_mul(&DVector::from_column_slice(&best.residuals)));
@@ -513,11 +654,13 @@ fn result(problem: &Problem, best: &Minimum, noise: Vec<(Quantity, f64)>, starts
             Some(e) if e.is_finite() => Some([end(x - t * e), end(x + t * e)]),
             Some(_) => Some([f64::NEG_INFINITY, f64::INFINITY]),
             // Where it would be without its bound, but no further off than a standard error.
-            None => beyond.as_ref().filter(|_| determined(j)).map(|(covariance, step)| {
-                let e = covariance.error(j).unwrap_or(f64::INFINITY);
-                let x = x + step[j].clamp(-e, e);
-                [end(x - t * e), end(x + t * e)]
-            }),
+            None => beyond.as_ref().filter(|(judged, _)| judged.identifiability.error[j].is_finite()).map(
+                |(judged, step)| {
+                    let e = judged.covariance.error(j).unwrap_or(f64::INFINITY);
+                    let x = x + step[j].clamp(-e, e);
+                    [end(x - t * e), end(x + t * e)]
+                },
+            ),
         };
         estimates.push(Estimate {
             name: parameter.name.clone(),
@@ -554,9 +697,16 @@ fn result(problem: &Problem, best: &Minimum, noise: Vec<(Quantity, f64)>, starts
     }
     let n = problem.globals();
     let correlation = (0..n)
-        .map(|i| (0..n).map(|j| covariance.as_ref().and_then(|c| c.correlation(i, j)).unwrap_or(f64::NAN)).collect())
+        .map(|i| (0..n).map(|j| covariance.and_then(|c| c.correlation(i, j)).unwrap_or(f64::NAN)).collect())
         .collect();
     let stage = problem.stage_at(&best.x);
+    // What is not determined stays what the case says.
+    let start = problem.start();
+    let undetermined = |j: usize| identifiability.as_ref().is_some_and(|found| found.error[j].is_infinite());
+    let kept: Vec<f64> = (0..best.x.len())
+        .map(|j| if j < problem.globals() && undetermined(j) { start[j] } else { best.x[j] })
+        .collect();
+    let written = problem.stage_at(&kept);
     let mut logs = Vec::new();
     let mut sums: Vec<(Nuisance, f64, usize)> = Vec::new();
     for (index, run) in problem.runs.iter().enumerate() {
@@ -592,20 +742,26 @@ fn result(problem: &Problem, best: &Minimum, noise: Vec<(Quantity, f64)>, starts
         logs.push(compared(run, &stage, &extras, Vec::new()));
     }
     Fit {
-        stage,
+        stage: written,
         estimates,
         correlation,
-        noise,
+        noise: noise.clone(),
         logs,
+        choices: identifiability
+            .iter()
+            .flat_map(|found| found.groups.iter().map(|group| found.choices(problem, group)))
+            .collect(),
         identifiability,
+        disagreement: judged.and_then(|judged| judged.disagreement.clone()),
+        findings: Vec::new(),
         point: best.x.clone(),
         ending: best.ending,
         decrement: best.decrement,
         cost: best.cost,
-        starts,
+        starts: starts.clone(),
         values: problem.counted(),
         variables: problem.variables(),
-        work,
+        work: *work,
     }
 }
 

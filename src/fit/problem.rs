@@ -13,6 +13,12 @@ use nalgebra::DMatrix;
 /// Share of how far a quantity ranges that numbers in files and solvers may be off by.
 pub(super) const ROUNDING: f64 = 1e-10;
 
+/// A delay that is known to so many samples is known.
+const LATE: f64 = 10.0;
+
+/// Noise of first order that keeps to itself for 30 samples is so many times what neighbouring values differ by.
+const SHARED: f64 = 5.0;
+
 /// What is searched for, in which logs.
 #[derive(Clone)]
 pub struct Problem<'a> {
@@ -29,7 +35,6 @@ pub struct Problem<'a> {
     /// Simulated runs so far.
     pub simulations: u64,
     units: Vec<Scale>,
-    typical: Vec<f64>,
     /// Whether to end the work.
     stop: Option<Stop<'a>>,
 }
@@ -108,7 +113,6 @@ impl<'a> Problem<'a> {
         }
         let mut problem = Self {
             units: parameters.iter().map(|parameter| scale(&stage, parameter, &runs)).collect(),
-            typical: parameters.iter().map(|parameter| typical(&stage, parameter, &runs)).collect(),
             stage,
             parameters,
             shared: Vec::new(),
@@ -268,6 +272,27 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// A first value is no better than any other: what is known of starts beforehand is as uncertain as this deviation of a position, as far
+    /// as noise that neighbouring values share can be more than what they differ by; beyond that it is the model that is off, and not the value.
+    pub(super) fn doubt_starts(&mut self, quantity: Quantity, deviation: f64) {
+        let r = self.stage.pulley_radius;
+        for run in &mut self.runs {
+            let Some(first) = run.seen.iter().find(|seen| is_position(seen.quantity)) else { continue };
+            if first.quantity != quantity {
+                continue;
+            }
+            let deviation = deviation * if quantity == Quantity::CartPosition { 1.0 } else { r };
+            for extra in run.extras.iter_mut().filter(|extra| extra.what == Nuisance::StartPosition) {
+                if let Some(known) = &mut extra.known {
+                    // Its unit is what neighbouring values differ by.
+                    *known = known.max(deviation.min(SHARED * extra.unit));
+                    let room = 6.0 * *known;
+                    (extra.low, extra.high) = (extra.low.min(extra.start - room), extra.high.max(extra.start + room));
+                }
+            }
+        }
+    }
+
     /// Residuals that are rounding, with the present weights: of each quantity `ROUNDING` of how far it ranges.
     pub fn rounding(&self) -> f64 {
         let seen = self.runs.iter().flat_map(|run| &run.seen);
@@ -344,11 +369,20 @@ impl<'a> Problem<'a> {
         self.units[j].slope(value)
     }
 
-    /// What counts as a change by 100 %, in the variable: of what may be zero, by its value or what is much of it.
-    pub fn whole(&self, j: usize, x: f64) -> f64 {
+    /// What counts as a change by 100 %, in the variable, of a machine like `stage`: of what may be zero, its value or what is much of it.
+    pub fn whole(&self, stage: &Stage, j: usize, x: f64) -> f64 {
         match self.units.get(j) {
-            Some(Scale::Linear(unit)) => x.abs().max(self.typical[j] / unit),
-            _ => 1.0,
+            Some(Scale::Linear(unit)) => {
+                let typical = typical(stage, &self.parameters[j], &self.runs);
+                // Of what has no size by nature, the value itself, or where it started.
+                typical.map_or(if x == 0.0 { 1.0 } else { x.abs() }, |typical| x.abs().max(typical / unit))
+            }
+            Some(Scale::Log(_)) => 1.0,
+            None => match self.shared[j - self.parameters.len()].what {
+                // Its unit is a sample's interval, to which few logs tell a delay.
+                Nuisance::Delay => LATE,
+                _ => 1.0,
+            },
         }
     }
 
@@ -471,12 +505,13 @@ fn scale(stage: &Stage, parameter: &Free, runs: &[Run]) -> Scale {
     } else if parameter.start != 0.0 {
         Scale::Linear(parameter.start.abs())
     } else {
-        Scale::Linear(typical(stage, parameter, runs))
+        Scale::Linear(typical(stage, parameter, runs).unwrap_or(1.0))
     }
 }
 
-/// What is much of a quantity that may be zero: of friction a tenth of what the motor gives at the greatest input.
-fn typical(stage: &Stage, parameter: &Free, runs: &[Run]) -> f64 {
+/// What is much of a quantity that may be zero: of friction a tenth of what the motor gives at the greatest input; none where that
+/// depends on the machine alone, as the gain of an amplifier, which has whatever unit its input has.
+fn typical(stage: &Stage, parameter: &Free, runs: &[Run]) -> Option<f64> {
     let most = runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
     let motor = &stage.motor;
     let per_unit = match stage.amplifier.mode {
@@ -503,9 +538,9 @@ fn typical(stage: &Stage, parameter: &Free, runs: &[Run]) -> f64 {
         "rad" => 0.01,
         "H" => 1e-3 * motor.resistance,
         _ if parameter.high.is_finite() && parameter.high < 1e14 => 0.1 * parameter.high.abs().max(parameter.low.abs()),
-        _ => 1.0,
+        _ => return None,
     };
-    if unit > 0.0 && unit.is_finite() { unit } else { 1.0 }
+    Some(if unit > 0.0 && unit.is_finite() { unit } else { 1.0 })
 }
 
 impl Residuals for Problem<'_> {

@@ -48,12 +48,17 @@ pub struct Balance {
 
 /// The balance over all logs of a problem; none where they hold no positions on an even raster, or do not move enough.
 pub fn regression(problem: &Problem) -> Option<Balance> {
+    regression_late(problem, 0)
+}
+
+/// The same with the inputs so many rows later than logged.
+pub(super) fn regression_late(problem: &Problem, late: usize) -> Option<Balance> {
     let noise = problem.noise();
     let mut rows: Vec<[f64; 5]> = Vec::new();
     for run in problem.runs.iter().filter(|run| run.is_even()) {
         let seen = run.seen.iter().position(|seen| is_position(seen.quantity) && !seen.absolute);
         if let Some(output) = seen {
-            add(run, output, &problem.stage, noise.of(run.seen[output].quantity), &mut rows);
+            add(run, output, &problem.stage, noise.of(run.seen[output].quantity), late, &mut rows);
         }
     }
     let n = rows.len();
@@ -78,7 +83,7 @@ pub fn regression(problem: &Problem) -> Option<Balance> {
 }
 
 /// Adds the equations of one output of a run: φ̈, φ̇, sgn φ̇, 1 and the torque.
-fn add(run: &Run, output: usize, stage: &Stage, noise: f64, rows: &mut Vec<[f64; 5]>) {
+fn add(run: &Run, output: usize, stage: &Stage, noise: f64, late: usize, rows: &mut Vec<[f64; 5]>) {
     let seen = &run.seen[output];
     let (n, h) = (run.fitted_rows.min(run.time.len()), run.interval());
     let to_angle = if seen.quantity == Quantity::CartPosition { 1.0 / stage.pulley_radius } else { 1.0 };
@@ -102,7 +107,7 @@ fn add(run: &Run, output: usize, stage: &Stage, noise: f64, rows: &mut Vec<[f64;
     for (k, [speed, acceleration]) in derivatives.iter().enumerate() {
         let row = k + margin;
         let (speed, acceleration) = (speed * to_angle, acceleration * to_angle);
-        let given = amplifier.gain * run.logged[row];
+        let given = amplifier.gain * run.logged[row.saturating_sub(late)];
         let clipped = |value: f64, limit: Option<f64>| limit.map_or(value, |limit| value.clamp(-limit, limit));
         // τ_M = η n K_t i, i = (V − K_e n φ̇)/R
         let current = match amplifier.mode {

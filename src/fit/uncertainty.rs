@@ -1,11 +1,16 @@
-//! How far the truth may be from an estimate: covariance, with what the residuals of a log remember taken into account.
+//! How far the truth may be from an estimate: the covariance, for the noise that the residuals show.
 //!
-//! For white residuals the covariance is s² (JᵀJ)⁻¹. Residuals that are alike from sample to sample tell less than their
-//! number says; then it is (JᵀJ)⁻¹ S (JᵀJ)⁻¹ with Newey and West's (1987) S = Σ_l w_l Σ_t g_t g_{t+l}ᵀ over the products
-//! g_t = J_tᵀ r_t, Bartlett weights and Andrews' (1991) bandwidth. Of both variances the greater one holds.
+//! For white residuals it is s² (JᵀJ)⁻¹. Residuals that are alike from sample to sample tell less than their number says: with the
+//! covariance Σ of the noise it is (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹, for every Σ that the residuals allow ([`super::noise`]).
 
+use super::identify::{Directions, Identifiability};
+use super::noise::{self, Spread, half_width};
 use super::problem::Problem;
+use super::sub_records::Disagreement;
 use nalgebra::{DMatrix, DVector};
+
+/// Standard deviations that 95 % of a normal distribution keep to.
+const NORMAL: f64 = 1.959_963_985;
 
 /// Covariance of the variables that are free, in their order; none if they are not determined.
 pub struct Covariance {
@@ -17,56 +22,138 @@ pub struct Covariance {
     pub deviation: f64,
     /// Independent values minus variables.
     pub freedom: usize,
-    /// How many standard errors a 95 % interval reaches to each side.
+    /// How many standard errors a 95 % interval reaches to each side; few degrees of freedom are in the standard errors.
     pub reach: f64,
 }
 
-impl Covariance {
-    /// At a minimum with these residuals and this Jacobian, its variables at bounds left out.
-    pub fn new(problem: &Problem, residuals: &[f64], jacobian: &DMatrix<f64>, at_bound: &[bool]) -> Option<Self> {
-        let free: Vec<usize> = (0..at_bound.len()).filter(|&j| !at_bound[j]).collect();
-        let counted = problem.independent();
-        let freedom = (counted - free.len() as f64).max(1.0);
+/// What logs tell at a point: what is determined, and how well.
+pub(super) struct Judged {
+    pub identifiability: Identifiability,
+    pub covariance: Covariance,
+    /// By how much slow noise makes errors greater than white noise of the same size would.
+    pub inflation: f64,
+    /// The slow noises of each quantity, by its place among the problem's.
+    pub spreads: Vec<Spread>,
+    /// Parts of the logs that say otherwise.
+    pub disagreement: Option<Disagreement>,
+}
+
+impl Judged {
+    /// At `x` with these residuals and this Jacobian, the variables that are `held` left out; none if numbers fail.
+    pub fn new(
+        problem: &Problem,
+        residuals: &[f64],
+        jacobian: &DMatrix<f64>,
+        x: &[f64],
+        held: &[bool],
+    ) -> Option<Self> {
+        let globals = problem.globals();
+        let free: Vec<usize> = (0..held.len()).filter(|&j| !held[j]).collect();
+        let own: Vec<usize> = free.iter().copied().filter(|&j| j < globals).collect();
+        let directions = Directions::new(problem, jacobian, x, &own)?;
+        let alive = directions.alive;
+        let freedom = (problem.independent() - free.len() as f64).max(1.0);
         let squares: f64 = residuals.iter().map(|r| r * r).sum();
         let deviation = (squares / freedom).sqrt();
-        let columns = jacobian.select_columns(&free);
-        let inverse = inverse_of_square(&columns)?;
-        let white = &inverse * (deviation * deviation);
 
-        let mut sum = DMatrix::zeros(free.len(), free.len());
-        let mut coloured = false;
-        let (mut lagged, mut counting) = (0.0, 0.0);
-        let mut first = 0;
-        for run in &problem.runs {
-            let n = run.time.len();
-            for output in 0..run.seen.len() {
-                let rows: Vec<usize> =
-                    (0..n).filter(|&k| run.seen[output].weights[k] > 0.0).map(|k| first + output * n + k).collect();
-                let memory = memory_of(residuals, &rows);
-                let own = run.independent(output);
-                let lags = bandwidth(memory, own as usize);
-                coloured |= lags > 0;
-                lagged += lags as f64;
-                counting += own;
-                add_products(&mut sum, &columns, residuals, &rows, lags);
+        // Along the directions, of which a column each can be inverted whatever the logs tell.
+        let mut turned = DMatrix::zeros(globals, alive);
+        for i in 0..alive {
+            for j in 0..globals {
+                turned[(j, i)] = directions.whole[j] * directions.v[(j, i)];
             }
-            first += run.rows();
         }
-        let matrix = if coloured {
-            let grown = counted / freedom;
-            let robust = &inverse * sum * &inverse * grown;
-            // Correlations as with white residuals, variances the greater ones.
-            let factor: Vec<f64> = (0..free.len()).map(|j| (robust[(j, j)] / white[(j, j)]).max(1.0).sqrt()).collect();
-            DMatrix::from_fn(free.len(), free.len(), |i, j| white[(i, j)] * factor[i] * factor[j])
-        } else {
-            white
+        let locals: Vec<usize> = free.iter().copied().filter(|&j| j >= globals).collect();
+        let mut columns = DMatrix::zeros(jacobian.nrows(), alive + locals.len());
+        columns.columns_mut(0, alive).copy_from(&(jacobian.columns(0, globals) * &turned));
+        for (place, &j) in locals.iter().enumerate() {
+            columns.set_column(alive + place, &jacobian.column(j));
+        }
+        // What belongs to one run and does not show there is known beforehand or not at all.
+        let shown: Vec<usize> =
+            (0..columns.ncols()).filter(|&c| c < alive || columns.column(c).iter().any(|v| *v != 0.0)).collect();
+        let columns = columns.select_columns(&shown);
+        let inverse = inverse_of_square(&columns)?;
+        let spreads = noise::spreads(problem, residuals, &columns, alive, &inverse);
+        let error = |c: &[f64]| half_width(&spreads, &DVector::from_column_slice(c)) / NORMAL;
+        let off: Vec<f64> =
+            (0..alive).map(|i| error(&(0..alive).map(|k| f64::from(k == i)).collect::<Vec<_>>())).collect();
+        let identifiability = Identifiability::told(problem, &directions, x, deviation, &off, &error);
+
+        // Each variable by itself; their correlations are those of the mean of all kinds of noise.
+        let mut middle = DMatrix::zeros(alive, alive);
+        for spread in &spreads {
+            middle += &spread.covariance;
+        }
+        let middle = &turned * middle * turned.transpose();
+        let each: Vec<f64> =
+            (0..globals).map(|j| error(&(0..alive).map(|i| turned[(j, i)]).collect::<Vec<_>>())).collect();
+        let white = &turned * inverse.view((0, 0), (alive, alive)) * turned.transpose() * (deviation * deviation);
+        let wider: Vec<f64> = own.iter().map(|&j| each[j] / white[(j, j)].sqrt()).filter(|f| f.is_finite()).collect();
+        let inflation =
+            if wider.is_empty() { 1.0 } else { (wider.iter().map(|f| f.ln()).sum::<f64>() / wider.len() as f64).exp() };
+        let place_of = |j: usize| {
+            let place = locals.iter().position(|&own| own == j)? + alive;
+            shown.iter().position(|&c| c == place)
         };
-        // How far an interval reaches with a covariance summed over the share b of the lags (Kiefer and Vogelsang 2005, for
-        // Bartlett weights), instead of 1.96.
-        let b: f64 = if counting > 0.0 { lagged / counting } else { 0.0 };
-        let wider = (1.96 + 2.9694 * b + 0.416 * b.powi(2) - 0.5324 * b.powi(3)) / 1.96;
-        let reach = student(freedom.round() as usize) * wider;
-        Some(Self { free, matrix, deviation, freedom: freedom.round() as usize, reach })
+        let places: Vec<Option<usize>> = free.iter().map(|&j| if j < globals { None } else { place_of(j) }).collect();
+        let matrix = DMatrix::from_fn(free.len(), free.len(), |a, b| match (places[a], places[b]) {
+            (None, None) if free[a] < globals && free[b] < globals => {
+                let (i, j) = (free[a], free[b]);
+                let correlation = middle[(i, j)] / (middle[(i, i)] * middle[(j, j)]).sqrt();
+                each[i] * each[j] * if i == j { 1.0 } else { correlation }
+            }
+            (Some(a), Some(b)) => inverse[(a, b)] * (deviation * inflation).powi(2),
+            _ if a == b => f64::INFINITY,
+            _ => 0.0,
+        });
+        let covariance = Covariance { free, matrix, deviation, freedom: freedom.round() as usize, reach: NORMAL };
+        Some(Self { identifiability, covariance, inflation, spreads, disagreement: None })
+    }
+}
+
+impl Judged {
+    /// Adds what parts of the logs say otherwise.
+    pub fn widen(&mut self, disagreement: Disagreement) {
+        let globals = disagreement.added.nrows();
+        for (a, &i) in self.covariance.free.iter().enumerate().filter(|(_, i)| **i < globals) {
+            for (b, &j) in self.covariance.free.iter().enumerate().filter(|(_, j)| **j < globals) {
+                self.covariance.matrix[(a, b)] += disagreement.added[(i, j)];
+            }
+        }
+        self.disagreement = Some(disagreement);
+    }
+
+    /// What the residuals are like, in words.
+    pub fn slow_words(&self, problem: &Problem) -> String {
+        let quantities = problem.quantities();
+        let shown = |value: f64, unit| crate::number::engineering(value, unit, 2).replace('\u{a0}', " ");
+        let mut told = Vec::new();
+        for (spread, quantity) in self.spreads.iter().zip(&quantities) {
+            let own: Vec<String> = spread.slow.iter().map(|slow| shown(slow.time, "s")).collect();
+            if !own.is_empty() {
+                told.push(format!("{} over {}", quantity.name(), own.join(" and ")));
+            }
+        }
+        match told.is_empty() {
+            true => "which is as good as independent from sample to sample".into(),
+            false => format!(
+                "which is alike over time ({}): errors are {:.1} times those of independent residuals",
+                told.join(", "),
+                self.inflation
+            ),
+        }
+    }
+}
+
+impl Covariance {
+    /// At a minimum with these residuals and this Jacobian, its variables at bounds left out; none where they are not determined.
+    pub fn new(problem: &Problem, residuals: &[f64], jacobian: &DMatrix<f64>, at_bound: &[bool]) -> Option<Self> {
+        let free: Vec<usize> = (0..at_bound.len()).filter(|&j| !at_bound[j]).collect();
+        inverse_of_square(&jacobian.select_columns(&free))?;
+        // The directions do not depend on where the point is but for the sizes of what may be zero.
+        let x = problem.start();
+        Some(Judged::new(problem, residuals, jacobian, &x, at_bound)?.covariance)
     }
 
     /// Standard deviation of variable `j`; none for one at a bound.
@@ -116,47 +203,12 @@ pub fn memory_of(residuals: &[f64], rows: &[usize]) -> f64 {
     if own > 0.0 { next / own } else { 0.0 }
 }
 
-/// Lags to sum over for residuals with this correlation of neighbours; none where it may be chance.
-fn bandwidth(memory: f64, n: usize) -> usize {
-    if n < 4 || memory.abs() < 2.0 / (n as f64).sqrt() {
-        return 0;
-    }
-    let rho = memory.clamp(-0.99, 0.99);
-    // α(1) = 4 ρ² / ((1 − ρ)² (1 + ρ)²), bandwidth 1.1447 (α n)^{1/3}
-    let alpha = 4.0 * rho * rho / ((1.0 - rho).powi(2) * (1.0 + rho).powi(2));
-    let width = 1.1447 * (alpha * n as f64).cbrt();
-    (width.ceil() as usize).clamp(1, n / 3)
-}
-
-/// Adds Σ_l w_l Σ_t (g_t g_{t+l}ᵀ + its transpose).
-fn add_products(sum: &mut DMatrix<f64>, jacobian: &DMatrix<f64>, residuals: &[f64], rows: &[usize], lags: usize) {
-    let p = jacobian.ncols();
-    let mut products = DMatrix::zeros(p, rows.len());
-    for (t, &row) in rows.iter().enumerate() {
-        for j in 0..p {
-            products[(j, t)] = jacobian[(row, j)] * residuals[row];
-        }
-    }
-    // Only variables that this run moves.
-    let moved: Vec<usize> = (0..p).filter(|&j| products.row(j).iter().any(|v| *v != 0.0)).collect();
-    // Bartlett-weighted sums by Σ_l w_l γ_l = (1/(L+1)) Σ over windows of (window sum)², the same thing in one pass.
-    let width = lags + 1;
-    let mut window = DVector::<f64>::zeros(moved.len());
-    for end in 0..rows.len() + width - 1 {
-        for (i, &j) in moved.iter().enumerate() {
-            if end < rows.len() {
-                window[i] += products[(j, end)];
-            }
-            if end >= width {
-                window[i] -= products[(j, end - width)];
-            }
-        }
-        for (a, &i) in moved.iter().enumerate() {
-            for (b, &j) in moved.iter().enumerate() {
-                sum[(i, j)] += window[a] * window[b] / width as f64;
-            }
-        }
-    }
+/// The share of Student's t beyond ± `t`: by the normal distribution of a t that is made normal (D. L. Wallace 1959), to about 1e-3
+/// of itself from three degrees of freedom on.
+pub(super) fn student_share(t: f64, freedom: f64) -> f64 {
+    let n = freedom.max(1.0);
+    let z = (8.0 * n + 1.0) / (8.0 * n + 3.0) * (n * (t * t / n).ln_1p()).sqrt();
+    libm::erfc(z / std::f64::consts::SQRT_2)
 }
 
 /// The value below which Student's t stays with 97.5 %, for so many degrees of freedom (Hill's expansion, to 1e-3 from 3 on).

@@ -13,7 +13,9 @@ pub fn check(case: &Case, found: &Check) -> Value {
         "complete": known.complete(),
         "parameters": known.names.iter().enumerate().map(|(j, name)| json!({
             "name": name,
-            "relative_error": number(known.error[j]),
+            "relative_error": number(found.fit.estimates.get(j).map_or(known.error[j], |estimate| {
+                estimate.error.map_or(known.error[j], |error| (error / estimate.value).abs())
+            })),
             "determined": known.error[j].is_finite(),
             "sensitivity": number(known.sensitivity[j]),
         })).collect::<Vec<_>>(),
@@ -21,18 +23,16 @@ pub fn check(case: &Case, found: &Check) -> Value {
             "inertia_kg_m2": b.inertia,
             "viscous_N_m_s_rad": b.viscous,
             "coulomb_N_m": b.coulomb,
-            "load_N_m": b.load,
+            "load_N_m": -b.load,
             "errors": b.errors,
             "unexplained": b.unexplained,
             "equations": b.equations,
         })),
         "singular_values": known.singular.iter().map(|s| number(*s)).collect::<Vec<_>>(),
-        "not_determined": known.groups.iter().zip(&found.choices).map(|(group, choices)| json!({
-            "parameters": group.members.iter().map(|&j| &known.names[j]).collect::<Vec<_>>(),
-            "combinations_determined": group.determined,
-            "words": group.words,
-            "choices": choices,
-        })).collect::<Vec<_>>(),
+        "not_determined": known.groups.iter().zip(&found.choices)
+            .map(|(own, choices)| super::fit::group(known, own, choices))
+            .collect::<Vec<_>>(),
+        "findings": found.fit.findings.iter().map(super::fit::finding).collect::<Vec<_>>(),
         "logs": found.logs.iter().map(|log| json!({
             "name": log.log,
             "samples": log.timing.samples,

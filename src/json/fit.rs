@@ -2,7 +2,7 @@
 
 use super::number;
 use crate::case::Case;
-use crate::fit::{Ending, Fit, Profile, Score};
+use crate::fit::{Combination, Finding, Fit, Group, Identifiability, Profile, Score};
 use serde_json::{Value, json};
 
 fn score(score: Option<Score>) -> Value {
@@ -28,6 +28,33 @@ fn profile(profile: &Profile) -> Value {
     })
 }
 
+/// What is to be known before a result is used.
+pub(super) fn finding(finding: &Finding) -> Value {
+    json!({ "grade": finding.grade.word(), "code": finding.code, "log": finding.log, "text": finding.text })
+}
+
+/// A combination that is determined of parameters that are not.
+fn combination(combination: &Combination) -> Value {
+    json!({
+        "name": combination.name,
+        "unit": combination.unit,
+        "value": number(combination.value),
+        "standard_error": number(combination.error),
+        "interval_95": combination.interval.map(number),
+    })
+}
+
+/// Parameters that the logs do not tell apart, and what to do about them.
+pub(super) fn group(known: &Identifiability, group: &Group, choices: &[String]) -> Value {
+    json!({
+        "parameters": group.members.iter().map(|&j| &known.names[j]).collect::<Vec<_>>(),
+        "combinations_determined": group.determined,
+        "combinations": group.combinations.iter().map(combination).collect::<Vec<_>>(),
+        "words": group.words,
+        "choices": choices,
+    })
+}
+
 /// Estimates and how the logs are met; `profiles` are those that were made and `posterior` is what was drawn, if anything was.
 pub fn fit(case: &Case, fit: &Fit, profiles: &[Profile], posterior: Option<Value>) -> Value {
     let parameters: Vec<Value> = fit
@@ -40,7 +67,7 @@ pub fn fit(case: &Case, fit: &Fit, profiles: &[Profile], posterior: Option<Value
                 "value": number(e.value),
                 "standard_error": e.error.map_or(Value::Null, number),
                 "interval_95": e.interval.map_or(Value::Null, |[low, high]| json!([number(low), number(high)])),
-                "determined": e.error.is_some_and(f64::is_finite),
+                "determined": e.is_determined(),
                 "at_bound": e.at_bound,
                 "start": number(e.start),
                 "bounds": [number(e.bounds[0]), number(e.bounds[1])],
@@ -73,17 +100,30 @@ pub fn fit(case: &Case, fit: &Fit, profiles: &[Profile], posterior: Option<Value
         .collect();
     let correlation: Vec<Vec<Value>> =
         fit.correlation.iter().map(|row| row.iter().map(|v| number(*v)).collect()).collect();
+    let not_determined: Vec<Value> = fit
+        .identifiability
+        .iter()
+        .flat_map(|known| known.groups.iter().zip(&fit.choices).map(|(own, choices)| group(known, own, choices)))
+        .collect();
     json!({
         "title": case.title,
         "version": env!("CARGO_PKG_VERSION"),
-        "ending": fit.ending.word(),
-        "converged": fit.ending == Ending::Converged,
+        "ending": fit.ending_word(),
+        "converged": fit.is_converged(),
+        "reliable": fit.is_reliable(),
+        "findings": fit.findings.iter().map(finding).collect::<Vec<_>>(),
         "last_step_standard_errors": number(fit.decrement),
         "cost": number(fit.cost),
         "starts": fit.starts.iter().map(|cost| number(*cost)).collect::<Vec<_>>(),
         "values": fit.values,
         "variables": fit.variables,
         "parameters": parameters,
+        "not_determined": not_determined,
+        "disagreement": fit.disagreement.as_ref().map(|found| json!({
+            "windows": found.windows,
+            "length_s": number(found.length),
+            "standard_errors": found.off.iter().map(|off| number(*off)).collect::<Vec<_>>(),
+        })),
         "correlation": correlation,
         "residual_deviation": fit.noise.iter().map(|(quantity, deviation)| json!({
             "quantity": quantity.name(), "unit": quantity.unit(), "value": number(*deviation),

@@ -1,5 +1,6 @@
 //! The project's own chores: `cargo xtask test` checks all that can be checked, `cargo xtask python` the Python package alone,
-//! `cargo xtask data` fetches other people's measurements, `cargo xtask hunt` looks for what is wrong with larger means.
+//! `cargo xtask data` fetches other people's measurements, `cargo xtask hunt` looks for what is wrong with larger means,
+//! `cargo xtask coverage` and `cargo xtask faults` make the tables of docs/fit.md.
 
 mod data;
 mod hunt;
@@ -55,6 +56,8 @@ fn main() -> ExitCode {
         ["test"] => test(&STEPS),
         ["python"] => test(&[PYTHON]),
         ["data", ref words @ ..] => data::run(words),
+        ["coverage", ref words @ ..] => example("coverage", words),
+        ["faults", ref words @ ..] => example("faults", words),
         ["hunt", ref words @ ..] => match hunt::Hunt::new(words) {
             Ok(hunt) => hunt.run(),
             Err(told) => {
@@ -63,7 +66,11 @@ fn main() -> ExitCode {
             }
         },
         _ => {
-            eprintln!("usage: cargo xtask test | cargo xtask python | {} | {}", data::USAGE, hunt::USAGE);
+            eprintln!(
+                "usage: cargo xtask test | cargo xtask python | cargo xtask coverage [...] | cargo xtask faults [...] | {} | {}",
+                data::USAGE,
+                hunt::USAGE
+            );
             return ExitCode::from(2);
         }
     };
@@ -73,6 +80,17 @@ fn main() -> ExitCode {
             eprintln!("\nxtask: {told}");
             ExitCode::FAILURE
         }
+    }
+}
+
+/// Runs an example of the library that makes a table, with these words.
+fn example(name: &str, words: &[&str]) -> Result<(), String> {
+    let mut command = cargo(&["run", "--release", "--quiet", "--package", "taut", "--no-default-features"]);
+    command.args(["--example", name, "--"]).args(words);
+    match command.status() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(_) => Err(format!("{name} found what should not be")),
+        Err(error) => Err(format!("cargo cannot be started: {error}")),
     }
 }
 

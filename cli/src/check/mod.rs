@@ -10,7 +10,7 @@ use crate::folder::{self, Folder};
 use crate::terminal::bold;
 use std::fmt::Write;
 use taut::case::Case;
-use taut::fit::{Balance, Check, check};
+use taut::fit::{Balance, Check, Estimate, check};
 use taut::json;
 use taut::log::{Severity, Survey};
 
@@ -47,9 +47,14 @@ fn text(case: &Case, found: &Check) -> String {
         let left = 100.0 * found.unexplained;
         let _ = writeln!(
             text,
-            "  {} equations, of whose torque {left:.1} % is left; a first guess, not a fit",
-            found.equations
+            "  {} equations, of whose torque {left:.1} % is left: {}; a first guess, not a fit",
+            found.equations,
+            found.words()
         );
+    }
+    let own = |finding: &&taut::fit::Finding| finding.log.is_none() || finding.code == "unexplained";
+    for finding in found.fit.findings.iter().filter(own) {
+        let _ = write!(text, "\n{finding}\n");
     }
     let _ = write!(text, "\n{}\n", bold("How well each parameter would be known, all others free"));
     let known = &found.identifiability;
@@ -68,6 +73,15 @@ fn text(case: &Case, found: &Check) -> String {
     }
     for (group, choices) in known.groups.iter().zip(&found.choices) {
         let _ = write!(text, "\n{}\n  {}\n", bold("Not determined"), group.words);
+        for combination in &group.combinations {
+            let shown = table::value(combination.value, &combination.unit, 5);
+            let _ = writeln!(
+                text,
+                "  {} = {shown} ± {}",
+                combination.name,
+                table::value(combination.error, &combination.unit, 2)
+            );
+        }
         for choice in choices {
             let _ = writeln!(text, "  - {choice}");
         }
@@ -81,18 +95,26 @@ fn text(case: &Case, found: &Check) -> String {
     text
 }
 
-/// Each parameter with its standard error in words.
+/// Each parameter with its standard error in words: that of the fit, and so what `taut fit` says.
 fn shares(found: &Check) -> impl Iterator<Item = (String, String)> {
-    let known = &found.identifiability;
-    known.names.iter().zip(&known.error).map(|(name, error)| match error.is_finite() {
-        true => (name.clone(), format!("to {:.2} %", 100.0 * error)),
-        false => (name.clone(), "not at all".into()),
-    })
+    let told = |(name, estimate): (&String, &Estimate)| {
+        let error = match estimate.error {
+            Some(e) if e.is_finite() && estimate.value != 0.0 => {
+                format!("to {:.2} %", 100.0 * (e / estimate.value).abs())
+            }
+            Some(e) if e.is_finite() => format!("to {}", table::value(e, estimate.unit, 2)),
+            None => "at its bound".into(),
+            Some(_) => "not at all".into(),
+        };
+        (name.clone(), error)
+    };
+    found.identifiability.names.iter().zip(&found.fit.estimates).map(told)
 }
 
 /// What the balance of torques gives, each with its unit, value and standard error.
 fn regression(found: &Balance) -> impl Iterator<Item = (&'static str, &'static str, f64, f64)> {
-    let values = [found.inertia, found.viscous, found.coulomb, found.load];
+    // As `cart.load` counts it: positive towards larger x, where the motor has less to bring up.
+    let values = [found.inertia, found.viscous, found.coulomb, -found.load];
     let names = [("inertia", "kg m^2"), ("viscous", "N m s/rad"), ("Coulomb", "N m"), ("load", "N m")];
     let rows = names.into_iter().zip(values).zip(found.errors);
     rows.map(|(((name, unit), value), error)| (name, unit, value, error))

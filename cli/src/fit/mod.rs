@@ -47,7 +47,13 @@ pub fn run(args: &Args) -> Outcome {
     let took = begin.elapsed();
     let fit = &found.fit;
     let json = json::fit(&case, fit, &found.profiles, found.drawn.as_ref().map(json::posterior));
-    let advice = "add --out DIR for fitted.toml, fit.json and a report";
+    // A folder that is left here leaves nothing behind.
+    let held_back = fit.warnings().next().is_some() && !args.anyway;
+    let folder = folder.filter(|_| !held_back);
+    let advice = match common.out.is_some() {
+        true => "something warns; --anyway writes it all the same",
+        false => "add --out DIR for fitted.toml, fit.json and a report",
+    };
     let mut finished = Finished::new("fit", ("fit.json", json::text(&json)), table::text(&case, &found, took), advice);
     if let Some(folder) = &folder {
         let text = fit.case_text(&case, &args.case)?;
@@ -64,9 +70,10 @@ pub fn run(args: &Args) -> Outcome {
         let told = "interrupted before the first draw: there is no posterior";
         finished.remarks.push(Remark::Error(told.into()));
     }
-    finished.status = match (interrupt.signal(), found.fit.ending) {
+    finished.status = match (interrupt.signal(), fit.ending) {
         (Some(signal), _) => Status::Interrupted(signal),
-        (None, _) if found.drawn.is_some_and(|drawn| !drawn.doubts().is_empty()) => Status::Incomplete,
+        (None, _) if found.drawn.as_ref().is_some_and(|drawn| !drawn.doubts().is_empty()) => Status::Incomplete,
+        (None, _) if !fit.is_reliable() => Status::Incomplete,
         (None, Ending::Converged | Ending::Stalled) => Status::Done,
         (None, _) => Status::Incomplete,
     };

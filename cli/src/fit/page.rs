@@ -2,7 +2,7 @@
 
 use super::{Found, figures, posterior, table};
 use taut::case::Case;
-use taut::fit::{Ending, Fit, Profile};
+use taut::fit::{Fit, Grade, Profile};
 use taut_report::{Callout, Cell, Page, Table};
 
 /// The page; `text` is the case with the estimates.
@@ -10,8 +10,12 @@ pub fn page(case: &Case, found: &Found, text: &str) -> Page {
     let fit = &found.fit;
     let mut page = Page::new(case.title.clone()).subtitle("Parameters from logs.");
     page.section("How it ended");
-    let kind = if fit.ending == Ending::Converged { Callout::Holds } else { Callout::Fails };
-    page.callout(kind, fit.ending.word().replace('_', " "), format!("{}.", table::ending(fit)));
+    let kind = if fit.is_converged() { Callout::Holds } else { Callout::Fails };
+    page.callout(kind, fit.ending_word().replace('_', " "), format!("{}.", table::ending(fit)));
+    for finding in &fit.findings {
+        let kind = if finding.grade == Grade::Warning { Callout::Fails } else { Callout::Note };
+        page.callout(kind, finding.grade.word(), finding.to_string());
+    }
     page.prose(format!(
         "{} values, {} variables, {} steps, {} simulated logs.",
         fit.values, fit.variables, fit.work.iterations, fit.work.simulations

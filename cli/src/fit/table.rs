@@ -13,11 +13,30 @@ pub fn text(case: &Case, found: &Found, took: Duration) -> String {
     let fit = &found.fit;
     let mut text = format!("{}\n", bold(&case.title));
     let _ = writeln!(text, "{}", ending(fit));
+    for finding in &fit.findings {
+        let _ = writeln!(text, "{finding}");
+    }
     let _ = write!(text, "\n{}\n", bold("Parameters"));
     let wide = fit.estimates.iter().map(|e| e.name.chars().count()).max().unwrap_or(0).max(10);
     for estimate in &fit.estimates {
         let [value, error, interval] = words(estimate);
         let _ = writeln!(text, "  {:<wide$}  {value:>14} ± {error:<10} {interval}", estimate.name);
+    }
+    if !fit.is_complete() {
+        let known = fit.identifiability.iter().flat_map(|known| &known.groups).zip(&fit.choices);
+        for (group, choices) in known {
+            let _ = write!(text, "\n{}\n  {}\n", bold("Not determined"), group.words);
+            for combination in &group.combinations {
+                let [low, high] = combination.interval.map(|end| value(end, &combination.unit, 5));
+                let shown = value(combination.value, &combination.unit, 5);
+                let error = value(combination.error, &combination.unit, 2);
+                let _ = writeln!(text, "  {} = {shown} ± {error}  95 %: {low} to {high}", combination.name);
+            }
+            for choice in choices {
+                let _ = writeln!(text, "  - {choice}");
+            }
+        }
+        let _ = writeln!(text, "  what is not determined keeps its value of the case file in fitted.toml");
     }
     let names = crooked(&found.profiles);
     if !names.is_empty() {
@@ -55,6 +74,13 @@ pub fn crooked(profiles: &[Profile]) -> Vec<&str> {
 /// How the search ended, in a sentence.
 pub fn ending(fit: &Fit) -> String {
     let mut text = match fit.ending {
+        Ending::Converged if !fit.is_converged() => {
+            format!(
+                "ended where another step would move the estimates by {:.1e} standard errors: {}",
+                fit.decrement,
+                fit.ending_word().replace('_', " ")
+            )
+        }
         Ending::Converged => {
             format!("converged: another step would move the estimates by {:.1e} standard errors", fit.decrement)
         }

@@ -52,7 +52,8 @@ fn several(args: &Simulate) -> Outcome {
     for path in &args.cases {
         let name = path.file_stem().unwrap_or_default();
         if args.common.out.is_some() && names.contains(&name) {
-            let error = Error::new("another case has the same name, and would be written into the same folder").in_file(path);
+            let error =
+                Error::new("another case has the same name, and would be written into the same folder").in_file(path);
             return Err(error.next("simulate it by itself, with an --out of its own").into());
         }
         names.push(name);

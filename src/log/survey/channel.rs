@@ -10,6 +10,9 @@ const OUTLYING: f64 = 10.0;
 /// The shortest run at an extreme value that may be a limit, samples.
 const CLIPPED: usize = 5;
 
+/// Inputs of no more different values only switch.
+const MOST_SWITCHED: usize = 30;
+
 /// One column of a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
@@ -33,8 +36,8 @@ pub struct Channel {
     pub noise: f64,
     /// Samples that stand out from their neighbours.
     pub outliers: Vec<Outlier>,
-    /// A run at an extreme value that it reached abruptly.
-    pub clipped: Option<Clipped>,
+    /// The longest runs at the least and at the greatest value, where it reached that abruptly.
+    pub clipped: Vec<Clipped>,
     /// Jumps by a full turn, where the column may be an angle that wraps.
     pub wraps: usize,
     /// How many different values there are, counted up to 1000.
@@ -85,7 +88,7 @@ impl Channel {
             step: step(&sorted, present.len()),
             noise: noise(values),
             outliers: Vec::new(),
-            clipped: None,
+            clipped: Vec::new(),
             wraps: 0,
             levels: sorted.len().min(1000),
         };
@@ -145,23 +148,47 @@ impl Channel {
         (1..values.len() - 1).filter(far).map(outlier).collect()
     }
 
-    /// The longest run at an extreme that was reached abruptly.
-    fn find_clipped(&self, values: &[f64], time: &[f64]) -> Option<Clipped> {
-        if self.name == "input" || self.levels < 10 {
-            return None;
-        }
+    /// The longest run at each extreme that was reached abruptly.
+    fn find_clipped(&self, values: &[f64], time: &[f64]) -> Vec<Clipped> {
         const REACH: usize = 5;
+        if self.name == "input" {
+            return self.find_flat(values, time);
+        }
+        if self.levels < 10 || values.len() <= REACH {
+            return Vec::new();
+        }
         let slope = |k: usize| (values[k] - values[k - REACH]).abs();
         let steepest = quantile(&(REACH..values.len()).map(slope).collect::<Vec<_>>(), 0.95);
         let tolerance = 1e-9 * self.span();
-        [self.least, self.greatest]
-            .into_iter()
-            .filter_map(|value| {
-                let (samples, first) = longest_run(values, |x| (x - value).abs() <= tolerance);
-                let abrupt = first >= REACH && slope(first) > (0.3 * steepest).max(6.0 * self.resolution());
-                (samples >= CLIPPED && abrupt).then(|| Clipped { value, at: time[first], samples })
-            })
-            .max_by_key(|clipped| clipped.samples)
+        let at = |value: f64| {
+            let (samples, first) = longest_run(values, |x| (x - value).abs() <= tolerance);
+            let abrupt = first >= REACH && slope(first) > (0.3 * steepest).max(6.0 * self.resolution());
+            (samples >= CLIPPED && abrupt).then(|| Clipped { value, at: time[first], samples })
+        };
+        [self.least, self.greatest].into_iter().filter_map(at).collect()
+    }
+
+    /// Where an input that takes many values stays at its extreme, far longer than anywhere else: one that only switches does so by nature.
+    fn find_flat(&self, values: &[f64], time: &[f64]) -> Vec<Clipped> {
+        let tolerance = 1e-9 * self.span();
+        let is_extreme = |x: f64| (x - self.least).abs() <= tolerance || (x - self.greatest).abs() <= tolerance;
+        let (mut held, mut usual) = (0, 0);
+        for same in values.chunk_by(|a, b| (a - b).abs() <= tolerance) {
+            if same.len() >= CLIPPED && !is_extreme(same[0]) {
+                held += same.len();
+            } else if !is_extreme(same[0]) {
+                usual += same.len();
+            }
+        }
+        // A staircase, or a sequence of levels.
+        if self.levels < MOST_SWITCHED || held * 4 > usual {
+            return Vec::new();
+        }
+        let at = |value: f64| {
+            let (samples, first) = longest_run(values, |x| (x - value).abs() <= tolerance);
+            (samples >= CLIPPED && value != 0.0).then(|| Clipped { value, at: time[first], samples })
+        };
+        [self.least, self.greatest].into_iter().filter_map(at).collect()
     }
 
     /// Its extent in a line.
@@ -211,17 +238,18 @@ impl Channel {
                 format!("{} samples have no value ({share}), at most {run} in a row, from {at} on", self.missing),
             );
         }
-        if let Some(clipped) = self.clipped {
-            let Clipped { value: limit, at, samples } = clipped;
+        for &Clipped { value: limit, at, samples } in &self.clipped {
             let what = match output {
                 Some(output) if is_position(output.quantity) => "an end stop, or the end of its sensor",
-                _ => "the limit of its sensor, perhaps",
+                Some(_) => "the limit of its sensor, perhaps",
+                None => "it was limited there, and what was logged may not be what the motor had",
             };
+            let reached = if output.is_some() { ", reached abruptly" } else { "" };
             note(
                 "saturation",
                 Severity::Warning,
                 format!(
-                    "it stands at its extreme of {} for {samples} samples from {} on, reached abruptly: {what}",
+                    "it stands at its extreme of {} for {samples} samples from {} on{reached}: {what}",
                     value(limit),
                     seconds(at)
                 ),

@@ -106,6 +106,7 @@ impl Survey {
                 "neither a position nor a speed was measured: only the electrical side can be fitted",
             )),
         }
+        notes.extend(motion.as_ref().and_then(|motion| motion.across_gaps(log, &timing)));
         notes.extend(units::notes(log, stage, &channels, motion.as_ref()));
         notes.sort_by_key(|note| std::cmp::Reverse(note.severity));
         Self { log: log.name.clone(), timing, channels, motion, notes }

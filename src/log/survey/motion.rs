@@ -17,6 +17,9 @@ const STEADY: f64 = 0.03;
 /// It begins where its first samples change by less than this share from one half to the other.
 const SETTLED: f64 = 0.005;
 
+/// Fewest missing samples of a gap that a fit would go astray in.
+const FEWEST_MISSING: usize = 3;
+
 /// Fewest samples of a steady speed.
 const SHORTEST: usize = 20;
 
@@ -132,6 +135,29 @@ impl Motion {
             }
         }
         steady
+    }
+
+    /// A gap in motion, or over a change of the input: a model that is put through the log does not know what was fed in there.
+    pub(super) fn across_gaps(&self, log: &Log, timing: &Timing) -> Option<Note> {
+        let wide = log.input.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
+        let moving = |k: usize| self.speed.get(k).is_some_and(|v| v.abs() > SLOW * self.peak_speed);
+        let mut bad = timing.gaps.iter().filter(|gap| gap.missing >= FEWEST_MISSING).filter(|gap| {
+            let k = log.time.partition_point(|t| *t <= gap.at);
+            let changes = k > 0 && k < log.len() && (log.input[k] - log.input[k - 1]).abs() > 0.01 * wide;
+            self.moves && (changes || moving(k.saturating_sub(1)) || moving(k))
+        });
+        let first = bad.next()?;
+        let others = match bad.count() {
+            0 => String::new(),
+            n => format!(" and in {n} more"),
+        };
+        let text = format!(
+            "it moves, or its input changes, in the gap of {} after {}{others}, and a fit would go on as if nothing had been fed in but \
+             what was before it: cut the log there, with from and to",
+            shown(first.length, "s"),
+            shown(first.at, "s")
+        );
+        Some(Note::new("gap-in-motion", Severity::Suspicion, text))
     }
 
     /// How many speeds among the steady ones differ by more than a tenth.

@@ -9,6 +9,15 @@ use crate::stage::{AmplifierMode, Stage};
 /// Measured and expected may differ by this factor without a suspicion: the machine's parameters may be rough.
 const ROUGH: f64 = 30.0;
 
+/// An output of no more different values may be an input.
+const MOST_SWITCHED: usize = 40;
+
+/// An input that gives less than this part of the friction does not move a machine, however rough its parameters.
+const IDLE: f64 = 5.0;
+
+/// Accelerations so many times what the machine would do are no machine's.
+const HASTY: f64 = 12.0;
+
 /// Largest voltage and current that a drive of this kind takes.
 const MOST_VOLTS: f64 = 800.0;
 const MOST_AMPERES: f64 = 300.0;
@@ -66,10 +75,9 @@ fn swapped_note(log: &Log, channels: &[Channel]) -> Option<Note> {
     if input.levels < 50 || jumpy(&log.input) {
         return None;
     }
-    let (output, channel) =
-        log.outputs.iter().zip(&channels[1..]).find(|(output, channel)| {
-            (2..=8).contains(&channel.levels) && jumpy(&output.values) && channel.missing == 0
-        })?;
+    let (output, channel) = log.outputs.iter().zip(&channels[1..]).find(|(output, channel)| {
+        (2..=MOST_SWITCHED).contains(&channel.levels) && jumpy(&output.values) && channel.missing == 0
+    })?;
     let name = output.quantity.name();
     let text = format!(
         "it has {} values only and jumps between them, as an input does, while the input takes {} or more: are the two columns swapped?",
@@ -216,15 +224,16 @@ fn confused(quantity: Quantity, ratio: f64) -> Option<&'static str> {
     units.iter().filter(|(_, f)| distance(*f) < 1.2).min_by(|a, b| distance(a.1).total_cmp(&distance(b.1))).map(|u| u.0)
 }
 
-/// The largest speed, against what the machine of the case would do.
+/// The largest speed and acceleration, against what the machine of the case would do.
 fn magnitude(log: &Log, stage: &Stage, motion: &Motion) -> Option<Note> {
-    let expected = expected_speed(log, stage)? / lever(motion.quantity, stage);
-    let ratio = motion.peak_speed / expected;
-    if (1.0 / ROUGH..ROUGH).contains(&ratio) {
-        return None;
-    }
+    let lever = lever(motion.quantity, stage);
     let (name, unit) = (motion.quantity.name(), motion.unit());
-    let (is, would) = (shown(motion.peak_speed, unit), shown(expected, unit));
+    let Some(expected) = expected(log, stage) else { return idle(log, stage, motion) };
+    let ratio = motion.peak_speed * lever / expected.speed;
+    if (1.0 / ROUGH..ROUGH).contains(&ratio) {
+        return hasty(log, motion, expected.acceleration / lever);
+    }
+    let (is, would) = (shown(motion.peak_speed, unit), shown(expected.speed / lever, unit));
     let times = if ratio > 1.0 { format!("{ratio:.0} times") } else { format!("1/{:.0} of", 1.0 / ratio) };
     let next = match confused(motion.quantity, ratio) {
         Some(unit) => format!("is the column in {unit}? then say units = {{ {name} = \"{unit}\" }}"),
@@ -237,50 +246,123 @@ fn magnitude(log: &Log, stage: &Stage, motion: &Motion) -> Option<Note> {
     Some(Note::new("unit", Severity::Suspicion, text).on(name))
 }
 
-/// The largest speed of the cart, m/s, by the machine as one rigid mass; none if it would hardly move.
-fn expected_speed(log: &Log, stage: &Stage) -> Option<f64> {
+/// A log that moves with an input that would not move the machine of the case.
+fn idle(log: &Log, stage: &Stage, motion: &Motion) -> Option<Note> {
+    let most = log.input.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
+    if most == 0.0 {
+        return None;
+    }
+    let force = drive(stage).force * (stage.amplifier.gain * most).abs();
+    let coulomb = resistance(stage).1;
+    if force * IDLE > coulomb {
+        return None;
+    }
+    let text = format!(
+        "it reaches {} at most, which gives {} against {} of friction: the machine of the case would not move, and {} does; is its unit right?",
+        shown(most, input_unit(stage)),
+        shown(force, "N"),
+        shown(coulomb, "N"),
+        motion.quantity.name()
+    );
+    Some(Note::new("unit", Severity::Suspicion, text).on("input"))
+}
+
+/// Accelerations that no machine of this kind has, at speeds that it may have: times that pass too quickly.
+fn hasty(log: &Log, motion: &Motion, expected: f64) -> Option<Note> {
+    let half = (log.len() / 200).clamp(2, 25);
+    let rate = |k: usize| {
+        let (a, b) = (k - half, k + half);
+        (motion.speed[b] - motion.speed[a]).abs() / (log.time[b] - log.time[a])
+    };
+    if log.len() < 4 * half {
+        return None;
+    }
+    let rates: Vec<f64> = (half..log.len() - half).map(rate).filter(|rate| rate.is_finite()).collect();
+    let (most, usual) = (quantile(&rates, 0.995), quantile(&rates, 0.5));
+    // What noise makes of a derivative is there all the time.
+    if most < HASTY * expected || usual > 0.2 * most {
+        return None;
+    }
+    let unit = format!("{}^2", motion.unit());
+    let times = (most / expected).sqrt();
+    let text = format!(
+        "it accelerates by up to {}, {:.0} times what the machine of the case would do with this input: do the times pass some {times:.0} times too \
+         quickly? then say what they are in, or time = {{ every = \"...\" }}",
+        shown(most, &unit),
+        most / expected
+    );
+    Some(Note::new("time-unit", Severity::Suspicion, text).on(motion.quantity.name()))
+}
+
+/// What the motor does at the cart: force per volt or ampere, and what its back-EMF brakes, N s/m.
+struct Drive {
+    force: f64,
+    brake: f64,
+}
+
+fn drive(stage: &Stage) -> Drive {
+    let (motor, r) = (&stage.motor, stage.pulley_radius);
+    let per_ampere = motor.torque_constant * motor.gear_ratio * motor.gear_efficiency / r;
+    match stage.amplifier.mode {
+        AmplifierMode::Current => Drive { force: per_ampere, brake: 0.0 },
+        AmplifierMode::Voltage => {
+            let force = per_ampere / motor.resistance;
+            Drive { force, brake: force * motor.back_emf_constant * motor.gear_ratio / r }
+        }
+    }
+}
+
+/// Viscous and Coulomb friction of all bodies at the cart, N s/m and N.
+fn resistance(stage: &Stage) -> (f64, f64) {
+    let (cart, r) = (&stage.cart.friction.forward, stage.pulley_radius);
+    let pulleys = [&stage.drive_pulley.friction.forward, &stage.idler_pulley.friction.forward];
+    let viscous = cart.viscous + pulleys.iter().map(|side| side.viscous).sum::<f64>() / (r * r);
+    (viscous, cart.coulomb + pulleys.iter().map(|side| side.coulomb).sum::<f64>() / r)
+}
+
+/// The largest speed and acceleration of the cart, m/s and m/s².
+struct Expected {
+    speed: f64,
+    acceleration: f64,
+}
+
+/// What the machine does as one rigid mass; none if it would hardly move.
+fn expected(log: &Log, stage: &Stage) -> Option<Expected> {
     let r = stage.pulley_radius;
     let (motor, cart) = (&stage.motor, &stage.cart);
-    let (k_t, k_e, n) = (motor.torque_constant, motor.back_emf_constant, motor.gear_ratio);
     let pulleys = [&stage.drive_pulley, &stage.idler_pulley];
     let mass = cart.mass
         + pulleys.iter().map(|pulley| pulley.inertia).sum::<f64>() / (r * r)
-        + motor.rotor_inertia * (n / r).powi(2);
-    let viscous = cart.friction.forward.viscous
-        + pulleys.iter().map(|pulley| pulley.friction.forward.viscous).sum::<f64>() / (r * r);
-    let coulomb =
-        cart.friction.forward.coulomb + pulleys.iter().map(|pulley| pulley.friction.forward.coulomb).sum::<f64>() / r;
-    let force_per_ampere = k_t * n * motor.gear_efficiency / r;
-    let (mut v, mut peak) = (0.0_f64, 0.0_f64);
+        + motor.rotor_inertia * (motor.gear_ratio / r).powi(2);
+    let (viscous, coulomb) = resistance(stage);
+    let drive = drive(stage);
+    let slope = viscous + drive.brake;
+    let (mut v, mut speed, mut acceleration) = (0.0_f64, 0.0_f64, 0.0_f64);
     for k in 1..log.len() {
         let dt = log.time[k] - log.time[k - 1];
-        let u = stage.amplifier.gain * log.input[k - 1];
         // F = K i − b v, and with a voltage i = (u − K_e n v / r) / R
-        let (force, slope) = match stage.amplifier.mode {
-            AmplifierMode::Current => (force_per_ampere * u, viscous),
-            AmplifierMode::Voltage => {
-                let per_volt = force_per_ampere / motor.resistance;
-                (per_volt * u, viscous + per_volt * k_e * n / r)
-            }
-        };
+        let force = drive.force * stage.amplifier.gain * log.input[k - 1];
         let driven = force.abs() > coulomb || v != 0.0;
         let direction = if v == 0.0 { force.signum() } else { v.signum() };
         if driven {
             let net = force - direction * coulomb;
+            acceleration = acceleration.max((net - slope * v).abs() / mass);
             let next = match slope > 0.0 {
                 true => net / slope + (v - net / slope) * (-slope * dt / mass).exp(),
                 false => v + net * dt / mass,
             };
             v = if v != 0.0 && next * v < 0.0 { 0.0 } else { next };
         }
-        peak = peak.max(v.abs());
+        speed = speed.max(v.abs());
     }
     let most = log.input.iter().fold(0.0_f64, |most, u| most.max((stage.amplifier.gain * u).abs()));
     let free = match stage.amplifier.mode {
-        AmplifierMode::Voltage if k_e > 0.0 => most * r / (k_e * n),
-        _ => peak,
+        AmplifierMode::Voltage if motor.back_emf_constant > 0.0 => {
+            most * r / (motor.back_emf_constant * motor.gear_ratio)
+        }
+        _ => speed,
     };
-    (peak > 1e-3 * free && peak > 0.0).then_some(peak)
+    (speed > 1e-3 * free && speed > 0.0).then_some(Expected { speed, acceleration })
 }
 
 /// Whether it moves against its input.

@@ -1,0 +1,481 @@
+//! How often 95 % intervals hold the truth: machines with random friction and mass, logs with a disturbance that is known, a fit each.
+//!
+//! `cargo xtask coverage [--machines N] [--seed N] [--threads N] [--cell WORDS]...` prints a table.
+
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+use std::f64::consts::TAU;
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use taut::case::{Case, Initial, Plan, TEMPLATE};
+use taut::chance::normal;
+use taut::fit::least_squares::{Differences, Residuals};
+use taut::fit::{Problem, fit, inverse_of_square};
+use taut::friction::{Law, Shape};
+use taut::log::{Log, Output, Quantity};
+use taut::signal::{Hold, Signal};
+use taut::solve::{Flow, Solver, simulate};
+
+/// What is fitted.
+const KEYS: [&str; 3] = ["cart.friction.viscous", "cart.friction.coulomb", "cart.mass"];
+
+/// Counts of the encoder in a turn.
+const COUNTS: f64 = 2048.0;
+
+/// Between samples, s.
+const EVERY: f64 = 1e-3;
+
+/// Parts into which a log is cut where friction drifts along it.
+const PARTS: usize = 20;
+
+/// What is wrong with the angle, or with the machine.
+#[derive(Clone, Copy)]
+enum Fault {
+    /// White noise, rad.
+    White(f64),
+    /// First order: rad, s; and white noise beside it, rad.
+    First(f64, f64, f64),
+    /// Two of them: rad, s, rad, s; and white noise.
+    Two(f64, f64, f64, f64, f64),
+    /// Swings: rad, Hz, s; and white noise.
+    Swinging(f64, f64, f64, f64),
+    /// A random walk of so much in a second, rad; and white noise.
+    Walk(f64, f64),
+    /// A mean of white noise over so many samples, rad.
+    Mean(usize, f64),
+    /// A pulley out of centre: rad, times in a turn; and white noise.
+    Cogging(f64, f64, f64),
+    /// White noise that grows with speed: rad at rest, rad per rad/s.
+    Uneven(f64, f64),
+    /// Friction drifts along each log by this share to each side, with white noise, rad.
+    Drift(f64, f64),
+    /// The same, up in some and down in others.
+    DriftEither(f64, f64),
+    /// Each log has a friction of its own, off by this share, with white noise.
+    Campaigns(f64, f64),
+    /// Breakaway over Coulomb friction, Stribeck velocity, m/s, white noise.
+    Stribeck(f64, f64, f64),
+    /// Only counts, so many of the encoder's at once.
+    Counts(f64),
+}
+
+/// A kind of machine with its logs.
+struct Cell {
+    name: &'static str,
+    /// Logs, by name.
+    logs: &'static [&'static str],
+    fault: Fault,
+}
+
+const SHORT: &[&str] = &["there and back"];
+const LONG: &[&str] = &["steps"];
+const FOUR: &[&str] = &["there and back", "steps", "slow", "there and back"];
+
+const CELLS: &[Cell] = &[
+    Cell { name: "white 10 mrad; 1.5 s", logs: SHORT, fault: Fault::White(10e-3) },
+    Cell { name: "first order 5 mrad, 20 ms; 1.5 s", logs: SHORT, fault: Fault::First(5e-3, 0.02, 0.0) },
+    Cell { name: "the same + white 10 mrad; 1.5 s", logs: SHORT, fault: Fault::First(5e-3, 0.02, 10e-3) },
+    Cell {
+        name: "first order 5 mrad, 100 ms + white 10 mrad; 1.5 s",
+        logs: SHORT,
+        fault: Fault::First(5e-3, 0.1, 10e-3),
+    },
+    Cell { name: "white 10 mrad; 4 s", logs: LONG, fault: Fault::White(10e-3) },
+    Cell { name: "first order 5 mrad, 20 ms; 4 s", logs: LONG, fault: Fault::First(5e-3, 0.02, 0.0) },
+    Cell { name: "the same + white 10 mrad; 4 s", logs: LONG, fault: Fault::First(5e-3, 0.02, 10e-3) },
+    Cell { name: "first order 5 mrad, 100 ms + white 10 mrad; 4 s", logs: LONG, fault: Fault::First(5e-3, 0.1, 10e-3) },
+    Cell { name: "friction drifts by ±10 %, white 1 mrad; four logs", logs: FOUR, fault: Fault::Drift(0.1, 1e-3) },
+    Cell {
+        name: "friction drifts by ±10 % up or down, white 1 mrad; four logs",
+        logs: FOUR,
+        fault: Fault::DriftEither(0.1, 1e-3),
+    },
+    Cell { name: "friction drifts by ±10 %, white 10 mrad; four logs", logs: FOUR, fault: Fault::Drift(0.1, 10e-3) },
+    Cell {
+        name: "friction differs by ±10 % from log to log, white 1 mrad; four logs",
+        logs: FOUR,
+        fault: Fault::Campaigns(0.1, 1e-3),
+    },
+    Cell { name: "Stribeck in truth, white 1 mrad; 4 s", logs: LONG, fault: Fault::Stribeck(1.5, 0.03, 1e-3) },
+    Cell { name: "Stribeck in truth, white 1 mrad; four logs", logs: FOUR, fault: Fault::Stribeck(1.5, 0.03, 1e-3) },
+    Cell { name: "counts of 12 mrad; 4 s", logs: LONG, fault: Fault::Counts(4.0) },
+    Cell {
+        name: "first order 3 mrad, 10 ms and 200 ms + white 5 mrad; 4 s",
+        logs: LONG,
+        fault: Fault::Two(3e-3, 0.01, 3e-3, 0.2, 5e-3),
+    },
+    Cell {
+        name: "swings at 8 Hz, 5 mrad, 100 ms + white 5 mrad; 4 s",
+        logs: LONG,
+        fault: Fault::Swinging(5e-3, 8.0, 0.1, 5e-3),
+    },
+    Cell { name: "random walk 5 mrad in 1 s + white 5 mrad; 4 s", logs: LONG, fault: Fault::Walk(5e-3, 5e-3) },
+    Cell { name: "mean of 20, 5 mrad; 4 s", logs: LONG, fault: Fault::Mean(20, 5e-3) },
+    Cell {
+        name: "cogging 3 mrad, 5 in a turn + white 3 mrad; 4 s",
+        logs: LONG,
+        fault: Fault::Cogging(3e-3, 5.0, 3e-3),
+    },
+    Cell { name: "white 2 mrad + 1 mrad per rad/s; 4 s", logs: LONG, fault: Fault::Uneven(2e-3, 1e-3) },
+];
+
+/// The inputs that a log may have: value and how long, s.
+fn input(log: &str) -> (&'static [(f64, f64)], f64) {
+    match log {
+        "steps" => {
+            (&[(5.0, 0.4), (0.0, 0.3), (-8.0, 0.35), (0.0, 0.3), (3.0, 0.6), (-3.0, 0.6), (8.0, 0.3), (-5.0, 0.3)], 4.0)
+        }
+        "slow" => (&[(3.0, 0.6), (0.0, 0.2), (-3.0, 0.6), (4.0, 0.3), (0.0, 0.2), (-4.0, 0.3)], 3.0),
+        _ => (&[(5.0, 0.25), (0.0, 0.25), (-5.0, 0.25)], 1.5),
+    }
+}
+
+struct Chance(Pcg64);
+
+impl Chance {
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * ((self.0.next_u64() >> 11) as f64 * 2f64.powi(-53))
+    }
+
+    fn normal(&mut self) -> f64 {
+        normal(&mut self.0)
+    }
+}
+
+impl Fault {
+    /// What it adds to the angle `phi` with this speed.
+    fn add(self, phi: &[f64], chance: &mut Chance) -> Vec<f64> {
+        let n = phi.len();
+        let first = |deviation: f64, time: f64, chance: &mut Chance| -> Vec<f64> {
+            let decay = (-EVERY / time).exp();
+            let mut x = deviation * chance.normal();
+            (0..n)
+                .map(|_| {
+                    let own = x;
+                    x = decay * x + deviation * (1.0 - decay * decay).sqrt() * chance.normal();
+                    own
+                })
+                .collect()
+        };
+        let mut added = vec![0.0; n];
+        let mut white = 0.0;
+        let add = |added: &mut Vec<f64>, other: Vec<f64>| added.iter_mut().zip(other).for_each(|(a, b)| *a += b);
+        match self {
+            Fault::White(deviation)
+            | Fault::Drift(_, deviation)
+            | Fault::DriftEither(_, deviation)
+            | Fault::Campaigns(_, deviation)
+            | Fault::Stribeck(_, _, deviation) => {
+                white = deviation;
+            }
+            Fault::First(deviation, time, beside) => {
+                add(&mut added, first(deviation, time, chance));
+                white = beside;
+            }
+            Fault::Two(a, quick, b, slow, beside) => {
+                add(&mut added, first(a, quick, chance));
+                add(&mut added, first(b, slow, chance));
+                white = beside;
+            }
+            Fault::Swinging(deviation, frequency, time, beside) => {
+                let (a, b) = (first(deviation, time, chance), first(deviation, time, chance));
+                let angle = |k: usize| TAU * frequency * k as f64 * EVERY;
+                add(&mut added, (0..n).map(|k| a[k] * angle(k).cos() + b[k] * angle(k).sin()).collect());
+                white = beside;
+            }
+            Fault::Walk(deviation, beside) => {
+                let mut x = 0.0;
+                for added in &mut added {
+                    x += deviation * EVERY.sqrt() * chance.normal();
+                    *added += x;
+                }
+                white = beside;
+            }
+            Fault::Mean(count, deviation) => {
+                let raw: Vec<f64> = (0..n + count).map(|_| chance.normal()).collect();
+                let scale = deviation / (count as f64).sqrt();
+                add(&mut added, raw.windows(count).take(n).map(|w| scale * w.iter().sum::<f64>()).collect());
+            }
+            Fault::Cogging(deviation, times, beside) => {
+                let phase = chance.between(0.0, TAU);
+                add(&mut added, phi.iter().map(|phi| deviation * (times * phi + phase).sin()).collect());
+                white = beside;
+            }
+            Fault::Uneven(rest, slope) => {
+                for k in 0..n {
+                    let speed = (phi[(k + 1).min(n - 1)] - phi[k.saturating_sub(1)]) / (2.0 * EVERY);
+                    added[k] += (rest + slope * speed.abs()) * chance.normal();
+                }
+            }
+            Fault::Counts(_) => {}
+        }
+        added.iter_mut().for_each(|a| *a += white * chance.normal());
+        added
+    }
+}
+
+/// The case with the logs of a machine, and the variance of the angle's error where it is one of noise.
+fn recorded(cell: &Cell, truth: [f64; 3], chance: &mut Chance) -> Case {
+    let mut case = Case::from_text("axis.toml", TEMPLATE).unwrap_or_else(|error| panic!("{error}"));
+    let pattern = case.experiments[0].clone();
+    case.experiments.clear();
+    let mut share: Vec<f64> = Vec::new();
+    if let Fault::Campaigns(off, _) = cell.fault {
+        share = cell.logs.iter().map(|_| chance.between(-off, off)).collect();
+        let mean = share.iter().sum::<f64>() / share.len() as f64;
+        share.iter_mut().for_each(|s| *s -= mean);
+    }
+    for (place, name) in cell.logs.iter().enumerate() {
+        let (pieces, until) = input(name);
+        let count = (until / EVERY).round() as usize;
+        let mut voltage = vec![0.0; count + 1];
+        let mut k = 0;
+        for (value, lasts) in pieces {
+            let next = k + (lasts / EVERY).round() as usize;
+            voltage[k..next.min(count + 1)].fill(*value);
+            k = next;
+        }
+        let mut angle = Vec::with_capacity(count + 1);
+        let parts = if matches!(cell.fault, Fault::Drift(..) | Fault::DriftEither(..)) { PARTS } else { 1 };
+        let mut initial = Initial::default();
+        let sign = if matches!(cell.fault, Fault::DriftEither(..)) { chance.normal().signum() } else { 1.0 };
+        for part in 0..parts {
+            let (begin, end) = (count * part / parts, count * (part + 1) / parts);
+            let off = match cell.fault {
+                Fault::Drift(off, _) | Fault::DriftEither(off, _) => {
+                    sign * off * ((2 * part + 1) as f64 / parts as f64 - 1.0)
+                }
+                _ => share.get(place).copied().unwrap_or(0.0),
+            };
+            let mut stage = case.stage.clone();
+            stage.cart.mass = truth[2];
+            let friction = &mut stage.cart.friction;
+            for side in [&mut friction.forward, &mut friction.backward] {
+                side.viscous = truth[0] * (1.0 + off);
+                side.coulomb = truth[1] * (1.0 + off);
+                side.breakaway = side.coulomb;
+                if let Fault::Stribeck(ratio, ..) = cell.fault {
+                    side.breakaway = ratio * side.coulomb;
+                }
+            }
+            if let Fault::Stribeck(_, velocity, _) = cell.fault {
+                friction.law = Law::Stribeck { velocity, shape: Shape::Gaussian };
+            }
+            let rows = begin..=end;
+            let input = Signal::Sampled {
+                times: rows.clone().map(|k| (k - begin) as f64 * EVERY).collect(),
+                values: voltage[rows].to_vec(),
+                hold: Hold::Zero,
+            };
+            let mut experiment = pattern.clone();
+            (experiment.input, experiment.initial, experiment.every) = (input, initial, EVERY);
+            experiment.until = (end - begin) as f64 * EVERY;
+            let run =
+                simulate(&stage, &experiment, Solver::of(&stage)).unwrap_or_else(|error| panic!("{error}")).trajectory;
+            let column = |name: &str| run.get(name).unwrap_or_else(|| panic!("no column {name}"));
+            let last = |name: &str| *column(name).last().unwrap_or(&0.0);
+            angle.extend_from_slice(&column("drive_angle")[usize::from(part > 0)..]);
+            initial = Initial {
+                drive_angle: last("drive_angle"),
+                drive_speed: last("drive_speed"),
+                cart_position: last("cart_position"),
+                cart_speed: last("cart_speed"),
+                idler_angle: last("idler_angle"),
+                idler_speed: last("idler_speed"),
+                motor_current: 0.0,
+            };
+        }
+        let added = cell.fault.add(&angle, chance);
+        let step = TAU / COUNTS * if let Fault::Counts(times) = cell.fault { times } else { 1.0 };
+        let values = angle.iter().zip(added).map(|(phi, off)| step * ((phi + off) / step).round()).collect();
+        let time: Vec<f64> = (0..=count).map(|k| k as f64 * EVERY).collect();
+        let log = Log {
+            name: format!("{name} {place}"),
+            file: Default::default(),
+            time: time.clone(),
+            input: voltage.clone(),
+            hold: Hold::Zero,
+            reference: None,
+            outputs: vec![Output { quantity: Quantity::DriveAngle, absolute: false, values }],
+        };
+        let mut experiment = pattern.clone();
+        (experiment.name, experiment.until, experiment.every) = (log.name.clone(), until, EVERY);
+        experiment.input = Signal::Sampled { times: time, values: voltage, hold: Hold::Zero };
+        experiment.log = Some(Arc::new(log));
+        case.experiments.push(experiment);
+    }
+    case
+}
+
+/// Half-widths of the intervals that noise of first order would have if it were known; none for other faults.
+fn known(cell: &Cell, case: &Case, plan: &Plan, truth: [f64; 3]) -> Option<[f64; 3]> {
+    let (slow, white) = match cell.fault {
+        Fault::White(white) => (None, white),
+        Fault::First(deviation, time, white) => (Some((deviation, time)), white),
+        _ => return None,
+    };
+    let mut case = case.clone();
+    let friction = &mut case.stage.cart.friction;
+    for side in [&mut friction.forward, &mut friction.backward] {
+        (side.viscous, side.coulomb, side.breakaway) = (truth[0], truth[1], truth[1]);
+    }
+    case.stage.cart.mass = truth[2];
+    let mut problem = Problem::new(&case, plan).ok()?;
+    let weight = problem.runs[0].seen[0].weights[0];
+    let x = problem.start();
+    let mut residuals = vec![0.0; problem.rows()];
+    if !problem.evaluate(&x, &mut residuals) {
+        return None;
+    }
+    let bounds = problem.bounds();
+    let jacobian = problem.jacobian(&x, &residuals, &bounds, &Differences::Central)?;
+    let inverse = inverse_of_square(&jacobian)?;
+    let influence = &jacobian * inverse;
+    let step = TAU / COUNTS;
+    let white = white * white + step * step / 12.0;
+    Some(std::array::from_fn(|j| {
+        let mut sum = 0.0;
+        for (index, run) in problem.runs.iter().enumerate() {
+            let first = problem.first_row(index);
+            let rows = first..first + run.time.len();
+            let mut state = 0.0;
+            for row in rows {
+                let w = influence[(row, j)] * weight;
+                sum += w * w * white;
+                if let Some((deviation, time)) = slow {
+                    sum += deviation * deviation * (w * w + 2.0 * w * state);
+                    state = (state + w) * (-EVERY / time).exp();
+                }
+            }
+        }
+        1.96 * sum.sqrt() * problem.slope(j, truth[j])
+    }))
+}
+
+/// What came of the fits of a cell.
+#[derive(Default)]
+struct Found {
+    machines: usize,
+    /// Intervals that hold the truth, of the parameters and of the force at tested speeds.
+    held: [usize; 4],
+    /// Intervals there are.
+    there: [usize; 3],
+    /// Half-widths over those of a known covariance.
+    wide: [Vec<f64>; 3],
+    /// Half-widths as a part of the value, and errors.
+    relative: [Vec<f64>; 3],
+    off: [Vec<f64>; 3],
+    refused: usize,
+}
+
+fn one(cell: &Cell, seed: u64, found: &Mutex<Found>) {
+    let mut chance = Chance(Pcg64::seed_from_u64(seed));
+    let truth = [chance.between(10.0, 35.0), chance.between(0.1, 1.5), chance.between(0.2, 1.0)];
+    let case = recorded(cell, truth, &mut chance);
+    let plan = Plan { free: KEYS.iter().map(|key| key.to_string()).collect(), ..Plan::default() };
+    let fitted = fit(&case, &plan, None, &mut |_| Flow::Continue);
+    let known = known(cell, &case, &plan, truth);
+    let mut found = found.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    found.machines += 1;
+    let Ok(fitted) = fitted else {
+        found.refused += 1;
+        return;
+    };
+    for (j, estimate) in fitted.estimates.iter().enumerate() {
+        let Some([low, high]) = estimate.interval.filter(|ends| ends.iter().all(|end| end.is_finite())) else {
+            continue;
+        };
+        found.there[j] += 1;
+        found.held[j] += usize::from(low <= truth[j] && truth[j] <= high);
+        found.relative[j].push(0.5 * (high - low) / truth[j]);
+        found.off[j].push((estimate.value - truth[j]) / truth[j]);
+        if let Some(known) = known {
+            found.wide[j].push(0.5 * (high - low) / known[j]);
+        }
+    }
+    // Force F = C + b v at the steady speeds of 3, 5 and 8 V, with its standard error from the covariance.
+    let (b, c) = (&fitted.estimates[0], &fitted.estimates[1]);
+    if let (Some(sb), Some(sc)) = (b.error, c.error) {
+        let correlation = fitted.correlation[0][1];
+        let speeds = [0.12, 0.22, 0.35];
+        let inside = speeds.iter().filter(|&&v| {
+            let off = (c.value - truth[1]) + v * (b.value - truth[0]);
+            let variance = sc * sc + 2.0 * v * correlation * sb * sc + v * v * sb * sb;
+            off.abs() <= 1.96 * variance.sqrt()
+        });
+        found.held[3] += inside.count();
+    }
+}
+
+fn main() -> ExitCode {
+    let (mut machines, mut seed, mut threads, mut only) = (2000, 1, 2, Vec::new());
+    let mut words = std::env::args().skip(1);
+    while let Some(word) = words.next() {
+        let value = words.next();
+        let number = value.as_deref().and_then(|value| value.parse::<u64>().ok());
+        match (word.as_str(), number, value) {
+            ("--machines", Some(n), _) => machines = n,
+            ("--seed", Some(n), _) => seed = n,
+            ("--threads", Some(n), _) => threads = n,
+            ("--cell", _, Some(value)) => only.push(value),
+            _ => {
+                eprintln!("usage: cargo xtask coverage [--machines N] [--seed N] [--threads N] [--cell WORDS]...");
+                return ExitCode::from(2);
+            }
+        }
+    }
+    println!("| disturbance; log | viscous | Coulomb | mass | force | half-width | without an interval |");
+    println!("|---|---|---|---|---|---|---|");
+    for (place, cell) in CELLS.iter().enumerate() {
+        if !only.is_empty() && !only.iter().any(|words| cell.name.contains(words.as_str())) {
+            continue;
+        }
+        let found = Mutex::new(Found::default());
+        let next = AtomicU64::new(0);
+        std::thread::scope(|scope| {
+            for _ in 0..threads {
+                scope.spawn(|| {
+                    loop {
+                        let k = next.fetch_add(1, Ordering::Relaxed);
+                        if k >= machines {
+                            return;
+                        }
+                        one(cell, seed.wrapping_mul(1_000_003) + 100_000 * place as u64 + k, &found);
+                    }
+                });
+            }
+        });
+        let mut found = found.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let n = found.machines as f64;
+        let share = |count: usize| format!("{:.1} %", 100.0 * count as f64 / n);
+        let middle = |values: &mut Vec<f64>| {
+            values.sort_by(f64::total_cmp);
+            values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+        };
+        let wide: Vec<String> = (0..3)
+            .map(|j| {
+                let own = middle(&mut found.wide[j]);
+                let relative = middle(&mut found.relative[j]);
+                let off = (found.off[j].iter().map(|e| e * e).sum::<f64>() / found.off[j].len().max(1) as f64).sqrt();
+                if own.is_nan() {
+                    format!("{:.2} % ({:.2} %)", 100.0 * relative, 196.0 * off)
+                } else {
+                    format!("{own:.2}")
+                }
+            })
+            .collect();
+        let lost = 3 * found.machines - found.there.iter().sum::<usize>();
+        println!(
+            "| {} | {} | {} | {} | {:.1} % | {} | {:.1} % |",
+            cell.name,
+            share(found.held[0]),
+            share(found.held[1]),
+            share(found.held[2]),
+            100.0 * found.held[3] as f64 / (3.0 * n),
+            wide.join(", "),
+            100.0 * lost as f64 / (3.0 * n)
+        );
+    }
+    ExitCode::SUCCESS
+}

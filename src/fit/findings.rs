@@ -1,0 +1,281 @@
+//! What is to be known of a fit before its numbers are used: faults of the logs, and of the search, in two grades.
+
+use super::least_squares::Ending;
+use super::problem::Problem;
+use super::regression::{Balance, regression_late};
+use super::run::is_position;
+use super::{Fit, Searched};
+use crate::case::{Case, Plan, Scope};
+use crate::log::{Note, Severity, Survey};
+use crate::number::engineering;
+use crate::solve::Bench;
+use crate::stage::AmplifierMode;
+
+/// Standard errors that a kink may promise and not keep.
+const KINK: f64 = 2.0;
+
+/// Below this share of what was seen a model explains nothing, %.
+const POOR: f64 = 50.0;
+
+/// K_t and K_e of one motor are the same number in SI units: so far apart they are not.
+const MOTOR: f64 = 1.5;
+
+/// Correlation of what the model does and what was seen, below which it goes the other way.
+const OPPOSITE: f64 = -0.5;
+
+/// Most rows by which an input may be late and be found so, and the fewest that are told.
+const LATEST: usize = 40;
+const LATE: usize = 3;
+
+/// How much something matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Grade {
+    /// Good to know.
+    Note,
+    /// The result is not to be relied on.
+    Warning,
+}
+
+impl Grade {
+    /// The first word of the line.
+    pub fn word(self) -> &'static str {
+        match self {
+            Grade::Note => "note",
+            Grade::Warning => "warning",
+        }
+    }
+}
+
+/// Something to be known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// How much it matters.
+    pub grade: Grade,
+    /// What it is about, in a word for programs.
+    pub code: &'static str,
+    /// The log it is about; none if it is about the fit.
+    pub log: Option<String>,
+    /// In a sentence.
+    pub text: String,
+}
+
+impl std::fmt::Display for Finding {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let log = self.log.as_ref().map(|log| format!("{log}: ")).unwrap_or_default();
+        write!(f, "{}: {log}{}", self.grade.word(), self.text)
+    }
+}
+
+/// All there is to say, warnings first.
+pub(super) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit) -> Vec<Finding> {
+    let mut all = of_logs(case, plan, &found.problem);
+    all.extend(of_delay(plan, &found.problem));
+    all.extend(of_search(fit));
+    all.extend(of_motor(case, fit));
+    all.extend(of_residuals(fit));
+    all.sort_by_key(|finding| std::cmp::Reverse(finding.grade));
+    all
+}
+
+fn finding(grade: Grade, code: &'static str, text: String) -> Finding {
+    Finding { grade, code, log: None, text }
+}
+
+/// What the survey of each log found.
+fn of_logs(case: &Case, plan: &Plan, problem: &Problem) -> Vec<Finding> {
+    let mut all = Vec::new();
+    for experiment in &case.experiments {
+        let Some(log) = &experiment.log else { continue };
+        let opposite = opposite(problem, &experiment.name);
+        for note in Survey::new(log, &case.stage).notes {
+            if note.severity == Severity::Fact {
+                continue;
+            }
+            let mut grade = grade(&note, case, plan);
+            // Above a resonance a cart goes against its motor, and so does the model.
+            if note.code == "sign" && note.text.contains("against its input") && opposite == Some(false) {
+                grade = Grade::Note;
+            }
+            let column = note.column.map(|column| format!("{column}: ")).unwrap_or_default();
+            let text = format!("{column}{}", note.text);
+            all.push(Finding { grade, code: note.code, log: Some(experiment.name.clone()), text });
+        }
+        let told = all.iter().any(|one: &Finding| one.code == "sign" && one.log.as_ref() == Some(&experiment.name));
+        if opposite == Some(true) && !told {
+            let text = "it moves against what the model does with the values of the case: swapped wires, or a sign; \
+                        say scale = { input = -1 }, or -1 for the outputs";
+            let log = Some(experiment.name.clone());
+            all.push(Finding { grade: Grade::Warning, code: "sign", log, text: text.into() });
+        }
+    }
+    all
+}
+
+fn grade(note: &Note, case: &Case, plan: &Plan) -> Grade {
+    match (note.severity, note.code) {
+        (Severity::Suspicion, _) | (_, "still") => Grade::Warning,
+        (_, "saturation") if case.stage.travel.is_none() || note.column == Some("input") => Grade::Warning,
+        (_, "outliers") if !plan.huber => Grade::Warning,
+        _ => Grade::Note,
+    }
+}
+
+/// Whether a log moves against what the model does at the start; none where neither can be said.
+fn opposite(problem: &Problem, name: &str) -> Option<bool> {
+    let (x, mut worst) = (problem.start(), None);
+    for (index, run) in problem.runs.iter().enumerate().filter(|(_, run)| run.name == name) {
+        let Some(seen) = run.seen.iter().find(|seen| is_position(seen.quantity) && !seen.absolute) else { continue };
+        let mut column = vec![Vec::new()];
+        let extras = problem.extras_of(index, &x);
+        if !run.predict(&mut Bench::default(), &problem.stage_at(&x), &extras, &[seen.quantity], &mut column) {
+            continue;
+        }
+        let far = (run.time.len() / 50).max(1);
+        let (mut aa, mut ab, mut bb) = (0.0, 0.0, 0.0);
+        for k in far..run.time.len() {
+            let (a, b) = (column[0][k] - column[0][k - far], seen.values[k] - seen.values[k - far]);
+            if b.is_finite() {
+                (aa, ab, bb) = (aa + a * a, ab + a * b, bb + b * b);
+            }
+        }
+        let correlation = ab / (aa * bb).sqrt();
+        if correlation.is_finite() {
+            worst = Some(worst.map_or(correlation, |worst: f64| worst.min(correlation)));
+        }
+    }
+    match worst {
+        Some(correlation) if correlation < OPPOSITE => Some(true),
+        Some(correlation) if correlation > -OPPOSITE => Some(false),
+        _ => None,
+    }
+}
+
+/// Whether the logs answer their inputs late.
+fn of_delay(plan: &Plan, problem: &Problem) -> Option<Finding> {
+    if plan.nuisance.delay != Scope::Off || plan.closed_loop {
+        return None;
+    }
+    let left: Vec<f64> = (0..=LATEST).map_while(|late| Some(regression_late(problem, late)?.unexplained)).collect();
+    let late = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]))?;
+    if late < LATE || left[late] > 0.75 * left[0] || left[0] - left[late] < 0.03 {
+        return None;
+    }
+    let time = plain(late as f64 * problem.runs[0].interval(), "s");
+    let text = format!(
+        "the logs answer their input about {time} late: with that, {:.0} % of the torque is unexplained instead of {:.0} %; \
+         say nuisance = {{ delay = \"shared\" }} in [fit]",
+        100.0 * left[late],
+        100.0 * left[0]
+    );
+    Some(finding(Grade::Warning, "delay", text))
+}
+
+/// How the search ended.
+fn of_search(fit: &Fit) -> Vec<Finding> {
+    let mut all = Vec::new();
+    match fit.ending {
+        Ending::Stalled if fit.decrement > KINK => all.push(finding(
+            Grade::Warning,
+            "slope",
+            format!(
+                "the search ended on a slope that promises {:.1} standard errors and that no step fulfils: not the minimum, or no minimum",
+                fit.decrement
+            ),
+        )),
+        Ending::Stalled => all.push(finding(
+            Grade::Note,
+            "kink",
+            format!(
+                "ended at a kink, where sticks and slips change their order: its slope promises {:.1} standard errors",
+                fit.decrement
+            ),
+        )),
+        Ending::OutOfIterations => {
+            all.push(finding(Grade::Warning, "steps", "the search was not at its end when its steps were used up".into()));
+        }
+        Ending::Converged | Ending::Interrupted | Ending::Failed => {}
+    }
+    for estimate in fit.estimates.iter().filter(|estimate| estimate.at_bound) {
+        let zero = estimate.value == 0.0 && estimate.bounds[0] == 0.0;
+        let value = plain(estimate.value, estimate.unit);
+        let text = match zero {
+            true => format!("{} is zero: the logs would have it below, which it cannot be", estimate.name),
+            false => format!("{} ended at its bound of {value}: the logs would have it beyond", estimate.name),
+        };
+        all.push(finding(if zero { Grade::Note } else { Grade::Warning }, "bound", text));
+    }
+    if let Some(found) = &fit.disagreement {
+        let names: Vec<String> = fit
+            .estimates
+            .iter()
+            .zip(&found.off)
+            .filter(|(_, off)| **off > 2.0)
+            .map(|(estimate, off)| format!("{} by {off:.1}", estimate.name))
+            .collect();
+        let text = format!(
+            "{} windows of {} disagree with the whole logs by more than noise, in standard errors of it: {}; something drifts, or \
+             the laws are others; the intervals are widened by that",
+            found.windows,
+            plain(found.length, "s"),
+            names.join(", ")
+        );
+        all.push(finding(Grade::Note, "disagreement", text));
+    }
+    all
+}
+
+/// Whether K_t and K_e can be those of one motor.
+fn of_motor(case: &Case, fit: &Fit) -> Option<Finding> {
+    let motor = &fit.stage.motor;
+    let (k_t, k_e) = (motor.torque_constant, motor.back_emf_constant);
+    if case.stage.amplifier.mode != AmplifierMode::Voltage || k_t <= 0.0 || k_e <= 0.0 {
+        return None;
+    }
+    let ratio = k_t / k_e;
+    if (1.0 / MOTOR..MOTOR).contains(&ratio) {
+        return None;
+    }
+    let text = format!(
+        "K_t = {} and K_e = {} are one number of one motor in SI units, and here {} times apart: tie them, or look for what else \
+         brakes or drives (the gain, the resistance, friction)",
+        plain(k_t, "N m/A"),
+        plain(k_e, "V s/rad"),
+        crate::quantity::rounded((10.0 * ratio.max(1.0 / ratio)).round() / 10.0)
+    );
+    Some(finding(Grade::Warning, "motor", text))
+}
+
+/// Logs that the model does not explain.
+fn of_residuals(fit: &Fit) -> Vec<Finding> {
+    let mut all = Vec::new();
+    for log in fit.logs.iter().filter(|log| !log.held_out) {
+        for output in &log.outputs {
+            let Some(score) = output.fitted.filter(|score| score.percent < POOR) else { continue };
+            let text = format!(
+                "{}: the model explains {:.0} % of it only: look at the units, signs and columns of this log, and at what the model lacks",
+                output.quantity.name(),
+                score.percent.max(0.0)
+            );
+            all.push(Finding { grade: Grade::Warning, code: "unexplained", log: Some(log.name.clone()), text });
+        }
+    }
+    all
+}
+
+fn plain(value: f64, unit: &str) -> String {
+    engineering(value, unit, 4).replace(['\u{a0}', '\u{202f}'], " ").replace('−', "-")
+}
+
+impl Balance {
+    /// What it means that so much of the torque is left.
+    pub fn words(&self) -> &'static str {
+        match self.unexplained {
+            left if left < 0.1 => "a rigid axis with viscous and Coulomb friction explains these logs",
+            left if left < 0.3 => {
+                "a rigid axis explains most: the rest is noise in derivatives, elasticity, or another friction"
+            }
+            left if left < 0.7 => "much is left: look for a delay, for elasticity, or for another friction",
+            _ => "it explains next to nothing: look at units, signs and columns first",
+        }
+    }
+}
