@@ -4,7 +4,7 @@ use crate::common::chance;
 use crate::common::logged;
 use chance::Chance;
 use logged::logged;
-use taut::case::{Case, Plan, TEMPLATE};
+use taut::case::{Case, Nuisances, Plan, Scope, TEMPLATE};
 use taut::control::{Loop, Rows, Standard, stream};
 use taut::design;
 use taut::fit::least_squares::{Bounds, Ending, Options, Residuals, minimise};
@@ -152,6 +152,24 @@ fn a_machine_is_found_again() {
     let text = found.case_text(&case, "axis.toml".as_ref()).unwrap();
     let again = Case::from_text("fitted.toml", &text).unwrap();
     assert!((again.stage.cart.mass - found.estimates[2].value).abs() < 1e-12, "{text}");
+}
+
+/// The offset of a current that all logs share was shown in volts.
+#[test]
+fn a_shared_offset_of_the_input_has_the_unit_of_what_the_amplifier_commands() {
+    let current = [
+        "amplifier.mode=current",
+        "experiment.0.input={ pulse = 1, for = 0.25 }",
+        "experiment.1.input={ pulse = 1.5, for = 0.25 }",
+    ];
+    for (changes, unit) in [(&current[..], "A"), (&[], "V")] {
+        let case = recorded(changes, 3, 1e-3);
+        let nuisance = Nuisances { input_offset: Scope::Shared, ..Nuisances::default() };
+        let found = fit(&case, &Plan { nuisance, ..plan(&["cart.mass"]) }, None, &mut |_| Flow::Continue).unwrap();
+        let offset = found.estimates.iter().find(|estimate| estimate.name == "input_offset").unwrap();
+        assert_eq!(offset.unit, unit);
+        assert!(offset.value.abs() < 0.1, "{}", offset.value);
+    }
 }
 
 /// Whatever was fitted, and however the file has it: the file that is written is the machine that was found.

@@ -43,6 +43,7 @@ mod survey;
 mod sweep;
 mod table3;
 mod tune;
+mod verdict;
 
 /// A file that is no module here would not be run, and nobody would notice.
 #[test]

@@ -681,7 +681,9 @@ fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         let unit = match extra.what {
             Nuisance::Delay => "s",
             Nuisance::InputGain => "",
-            _ => "V",
+            Nuisance::InputOffset => problem.stage.amplifier.mode.unit(),
+            // Each log has its own: they are never shared.
+            Nuisance::StartPosition | Nuisance::StartSpeed | Nuisance::Bias(_) => "",
         };
         estimates.push(Estimate {
             name: extra.what.name().to_string(),
