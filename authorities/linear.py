@@ -1,6 +1,6 @@
 """Poles, zeros, gains and responses of 200 random stages: by python-control with SLICOT, and in 60-digit numbers.
 
-The matrices are written here from eq. (1)-(4) and (16)-(18), with what the paper does not have (inductance, rotor, a gear that gives way,
+The matrices are written here from eq. (1)-(4) and (16)-(18), with what the paper does not have (inductance, rotor, a compliant gear,
 a current loop, belt damping, reduced belts, a Stribeck curve) added by hand; nothing of taut is used. mpmath takes numerators and
 denominators as polynomials; python-control gets the same system in 64-bit numbers, in stretches and balanced, which is what it needs.
 

@@ -46,7 +46,7 @@ impl Stage {
             (amplifier.voltage_limit.is_some(), "a voltage limit"),
             (amplifier.current_limit.is_some(), "a current limit"),
             (amplifier.bandwidth.is_some(), "a current loop of finite bandwidth"),
-            (self.motor.gear_play.is_some(), "a gear that gives way"),
+            (self.motor.gear_play.is_some(), "a compliant gear"),
             (self.belt.pretension.is_some(), "spans that go slack"),
             (self.belt.model != BeltModel::Elastic, "a reduced model of the belt"),
             (self.cart.constant_force() != 0.0, "a constant force on the cart"),

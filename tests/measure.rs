@@ -35,7 +35,7 @@ fn ideal(quantity: Quantity) -> Channel {
 
 #[test]
 fn an_ideal_recorder_shows_the_run_to_the_last_bit() {
-    // With a gear that gives way, so that there is a rotor to look at.
+    // With a compliant gear, so that there is a rotor to look at.
     let mut setting = case(&["motor.rotor_inertia=4e-6", "motor.gear_stiffness=300"]);
     setting.0.encoder = None;
     setting.1.channels = Quantity::ALL.map(ideal).to_vec();

@@ -256,7 +256,7 @@ fn keys_that_cannot_be_free_say_what_can() {
         ),
         (&whole, "cart.friction.along.factor.1", "allowed: cart.friction.along.0.factor to"),
         (&whole, "drive_pulley.friction.static", "next: it follows from coulomb and stribeck.force: name one of these"),
-        (&whole, "motor.gear_efficiency", "next: a gear that gives way has none: name gear_damping"),
+        (&whole, "motor.gear_efficiency", "next: a compliant gear has none: name gear_damping"),
         (&plain, "belt.spans.1", "next: name one of these, or give modulus, section and spans instead of stiffness"),
         (&plain, "travel.max", "next: give it one to start from, such as max = \"0.3 m\" in travel"),
     ] {

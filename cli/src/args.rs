@@ -246,8 +246,8 @@ best gains so far, with exit status 130.";
 /// Run a case many times with its parameters varied.
 ///
 /// Prints how each key figure is spread and which parameters it depends on. With --out FILE it writes a row for each run, as Parquet
-/// (units in its metadata) or CSV; with --out DIR also a summary, a report and plots. The same command goes on where an
-/// interrupted or killed one was. Rows are the same, bit for bit, on any number of threads.
+/// (units in its metadata) or CSV; with --out DIR also a summary, a report and plots. The same command resumes an
+/// interrupted or killed one. Rows are the same, bit for bit, on any number of threads.
 #[derive(Debug, clap::Args)]
 #[command(after_help = SWEEP, mut_arg("out", |out| out.value_name("FILE or DIR").help(
     "The file of the rows (ends in .parquet or .csv), or the folder for it, a summary, a report and plots"
@@ -449,7 +449,7 @@ pub enum AxisName {
 pub enum MotorName {
     /// It follows its command, as a stepper motor or a stiff position loop makes it
     Held,
-    /// It gives way, as with a commanded voltage or current
+    /// It is free, as with a commanded voltage or current
     Free,
 }
 

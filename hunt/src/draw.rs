@@ -29,7 +29,7 @@ pub enum Kind {
     Limits,
     /// A gear that loses power.
     Losses,
-    /// A gear that gives way.
+    /// A compliant gear.
     Play,
     /// Spans that go slack.
     Slack,

@@ -274,7 +274,7 @@ impl Builder<'_> {
         }
     }
 
-    /// What a gear that gives way does to the belt.
+    /// What a compliant gear does to the belt.
     fn gear_force(&mut self) -> Option<Form> {
         let twist = Form::state(ROTOR[0]) - way(0);
         let rate = Form::state(ROTOR[1]) - speed(0);

@@ -47,7 +47,7 @@ pub struct Flanks {
     pub damping: Double,
 }
 
-/// What a gear that gives way is.
+/// What a compliant gear is.
 #[derive(Debug, Clone, Copy)]
 pub enum Play {
     /// Without backlash both flanks always touch: stiffness, damping.
@@ -94,7 +94,7 @@ pub struct Machine {
     pub inductance: Double,
     /// Efficiency of the gear.
     pub efficiency: Double,
-    /// A gear that gives way.
+    /// A compliant gear.
     pub play: Option<Play>,
     /// Whether the input commands the current.
     pub current_mode: bool,
@@ -215,7 +215,7 @@ impl Machine {
     }
 }
 
-/// The gear, where it gives way.
+/// The gear, where it is compliant.
 fn play(stage: &Stage, taken: Taken, r: Double) -> Option<Play> {
     let play = stage.motor.gear_play?;
     let r2 = r * r;

@@ -53,13 +53,13 @@ pub(super) fn motor(table: &Table) -> Result<Motor> {
     })
 }
 
-/// A gear that gives way: `gear_stiffness`, and `backlash` and `gear_damping` with it.
+/// A compliant gear: `gear_stiffness`, and `backlash` and `gear_damping` with it.
 fn gear_play(table: &Table) -> Result<Option<GearPlay>> {
     let Some(stiffness) = table.optional("gear_stiffness") else {
         return match ["backlash", "gear_damping"].into_iter().find_map(|key| table.optional(key)) {
             None => Ok(None),
             Some(field) => Err(field
-                .fail("this needs a gear that gives way, so that rotor and drive pulley can turn against each other")
+                .fail("this needs a compliant gear, so that rotor and drive pulley can turn against each other")
                 .next("add for example gear_stiffness = \"300 N m/rad\"")),
         };
     };

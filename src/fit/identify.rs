@@ -196,7 +196,7 @@ impl Identifiability {
                 .collect();
             let parameters: Vec<&Free> = members.iter().map(|&j| &problem.parameters[j]).collect();
             if let Some(sum) = sum_of(&stage, &parameters, &weights) {
-                return format!("of {} only {sum} is determined", listed(&names));
+                return format!("of {} only the combination {sum} is identifiable", listed(&names));
             }
         }
         let combinations = if determined == 1 { "1 combination".into() } else { format!("{determined} combinations") };

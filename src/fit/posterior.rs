@@ -35,7 +35,7 @@ pub struct Posterior {
     pub globals: usize,
     /// The draws, SI.
     pub draws: Draws,
-    /// What the logarithm of the likelihood was divided by, for residuals that remember.
+    /// What the logarithm of the likelihood was divided by, for autocorrelated residuals.
     pub inflation: f64,
     /// Whether the slopes along a path were those at the fit.
     pub fixed_slopes: bool,
@@ -174,7 +174,7 @@ impl Posterior {
     }
 }
 
-/// What the covariance of the fit grows by for residuals that remember, at most, and the variance of weighted residuals.
+/// What the covariance of the fit grows by for autocorrelated residuals, at most, and the variance of weighted residuals.
 fn inflation(problem: &Problem, residuals: &[f64], jacobian: &DMatrix<f64>, at: &[f64], bounds: &Bounds) -> (f64, f64) {
     let held: Vec<bool> = (0..at.len()).map(|j| at[j] <= bounds.low[j] || at[j] >= bounds.high[j]).collect();
     let squares: f64 = residuals.iter().map(|r| r * r).sum();

@@ -127,7 +127,7 @@ impl Bottom {
                     return None;
                 }
                 start = found.x;
-                // A linear model's cost grows by ½ (Δx/unit)², Δx = errors × off: in errors, whatever the residuals remember.
+                // A linear model's cost grows by ½ (Δx/unit)², Δx = errors × off: in errors, whatever the residuals are autocorrelated.
                 let grown = (2.0 * (found.cost - self.cost)).max(0.0).sqrt() * unit / off;
                 points.push((problem.value(j, x), grown, errors.abs()));
             }

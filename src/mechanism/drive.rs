@@ -17,7 +17,7 @@ pub struct Motor {
     pub gear_ratio: f64,
     /// Gear efficiency η: the part of the power that passes, whichever side drives.
     pub gear_efficiency: f64,
-    /// A gear that gives way, so that the rotor is an inertia of its own; none for one that is stiff and without play.
+    /// A compliant gear, so that the rotor is an inertia of its own; none for one that is stiff and without play.
     pub gear_play: Option<GearPlay>,
 }
 

@@ -37,14 +37,14 @@ impl Mechanism {
         if forward == torque_positive { eta } else { 1.0 / eta }
     }
 
-    /// The spring that a drive's gear is, where it gives way.
+    /// The spring that a drive's gear is, where it is compliant.
     pub(super) fn gear_spring(&self, drive: usize) -> Option<usize> {
         let drive = &self.drives[drive];
         let is_gear = |arms: &[(usize, f64)]| arms.iter().any(|&(body, _)| body == drive.shaft);
         drive.has_rotor().then(|| self.springs.iter().position(|spring| is_gear(&spring.arms))).flatten()
     }
 
-    /// Whether the torque through a gear that gives way is positive.
+    /// Whether the torque through a compliant gear is positive.
     pub(super) fn is_gear_torque_positive(&self, drive: usize, spring: usize, mode: &Mode) -> bool {
         match (self.springs[spring].law, mode.contact[spring]) {
             (SpringLaw::Gap { .. }, Contact::Low | Contact::LowLoose) => false,
@@ -79,7 +79,7 @@ impl Mechanism {
         load + Form::constant(self.bodies[body].force)
     }
 
-    /// By what the torque of a spring on a body is multiplied: 1, but 1/e for a rotor behind a gear that gives way and loses power.
+    /// By what the torque of a spring on a body is multiplied: 1, but 1/e for a rotor behind a compliant gear and loses power.
     fn gear_share(&self, body: usize, spring: usize, forward: bool, mode: &Mode) -> f64 {
         let is_behind = |drive: &usize| {
             let part = &self.drives[*drive];

@@ -171,7 +171,7 @@ pub struct Drive {
     pub current: Label,
     /// The body behind the gear.
     pub pulley: usize,
-    /// The body that the motor's shaft turns with: the pulley, or a rotor of its own where the gear gives way.
+    /// The body that the motor's shaft turns with: the pulley, or a rotor of its own where the gear is compliant.
     pub shaft: usize,
     /// The motor.
     pub motor: Motor,

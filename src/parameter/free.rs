@@ -451,7 +451,7 @@ fn not_there(machine: &dyn Numbers, key: &str, row: &Parameter) -> Error {
             "name one of these, or give modulus, section and spans instead of stiffness".into()
         }
         _ if name.starts_with("static") => "it follows from coulomb and stribeck.force: name one of these".into(),
-        _ if row.key == "motor.gear_efficiency" => "a gear that gives way has none: name gear_damping".into(),
+        _ if row.key == "motor.gear_efficiency" => "a compliant gear has none: name gear_damping".into(),
         _ if parent.ends_with(".along") => {
             "give along to start from, such as along = [[\"0 m\", 1], [\"0.1 m\", 1.5]]".into()
         }

@@ -7,7 +7,7 @@
 //!  span 1  (  r   −1             )     r φ₁ − x
 //!  span 2  (       1   −r        )     x − r φ₃
 //!  span 3  ( −r         r        )     r φ₃ − r φ₁
-//!  gear    ( −1              1   )     φ_r − φ₁, where it gives way
+//!  gear    ( −1              1   )     φ_r − φ₁, where it is compliant
 //!  travel  (       1             )     x
 //! ```
 
@@ -21,7 +21,7 @@ pub const DRIVE: usize = 0;
 pub const CART: usize = 1;
 /// Number of the idler pulley.
 pub const IDLER: usize = 2;
-/// Number of the rotor, where the gear gives way.
+/// Number of the rotor, where the gear is compliant.
 pub const ROTOR: usize = 3;
 /// Number of bodies with friction of their own.
 pub const BODIES: usize = 3;
@@ -159,7 +159,7 @@ impl Stage {
         (arm != 0.0).then_some(follows)
     }
 
-    /// A gear that gives way.
+    /// A compliant gear.
     fn gear(&self) -> Option<Spring> {
         let play = self.motor.gear_play?;
         let half = 0.5 * play.backlash;

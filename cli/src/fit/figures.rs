@@ -39,7 +39,7 @@ pub fn overlay(log: &LogFit, output: &OutputFit) -> Figure {
     figure
 }
 
-/// How residuals remember: their correlation over lags.
+/// The autocorrelation of residuals over lags.
 pub fn memory(log: &LogFit, output: &OutputFit) -> Option<Figure> {
     let rows = if log.held_out { 0..output.seen.len() } else { 0..log.fitted_rows };
     let residual: Vec<f64> = rows.map(|k| output.model[k] - output.seen[k]).filter(|r| r.is_finite()).collect();
@@ -55,7 +55,7 @@ pub fn memory(log: &LogFit, output: &OutputFit) -> Option<Figure> {
     let at: Vec<f64> = (0..=lags).map(|lag| lag as f64 * interval).collect();
     let chance = 1.96 / (n as f64).sqrt();
     Some(
-        Figure::new(format!("{}: what residuals remember", log.name), Axis::new("Lag", "s"))
+        Figure::new(format!("{}: autocorrelation of residuals", log.name), Axis::new("Lag", "s"))
             .panel(
                 Panel::new(Axis::new("Autocorrelation", ""))
                     .line("", &at, &correlation)

@@ -64,7 +64,7 @@ fn profiles(page: &mut Page, profiles: &[Profile]) {
     }
     page.subsection("Profiles");
     page.prose(match table::crooked(profiles) {
-        names if names.is_empty() => "Each parameter held off its estimate and all others fitted anew: the logs get worse as an interval to both sides says.".to_string(),
+        names if names.is_empty() => "Each parameter held off its estimate and all others fitted anew: the cost grows as the intervals say, to both sides.".to_string(),
         names => format!(
             "Each parameter held off its estimate and all others fitted anew. Not as a linear model has it: {}; `--posterior` makes intervals that do not need that.",
             names.join(", ")

@@ -41,7 +41,7 @@ fn effort(drawn: &Posterior) -> String {
     let slopes = if drawn.fixed_slopes { "slopes of the fit" } else { "slopes measured at each place" };
     let memory = match drawn.inflation {
         factor if factor > 1.0 + 1e-3 => {
-            format!("; residuals remember, so the logarithm of the likelihood is divided by {factor:.2}")
+            format!("; residuals are autocorrelated, so the logarithm of the likelihood is divided by {factor:.2}")
         }
         _ => String::new(),
     };

@@ -65,7 +65,7 @@ pub fn pole(root: Root) -> (String, String) {
         Root::Pair { frequency, damping } => (
             format!("{} Hz ({} rad/s)", plain(frequency / (2.0 * PI)), plain(frequency)),
             format!(
-                "damping {}, {} {}, swings at {} Hz",
+                "damping {}, {} {}, damped frequency {} Hz",
                 plain(damping),
                 if damping >= 0.0 { "time constant" } else { "grows in" },
                 time(root),

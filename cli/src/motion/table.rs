@@ -41,7 +41,7 @@ pub fn controller(design: &Design, stage: &Stage) -> String {
         words.push(format!("shaper of {} impulses", design.shaper.len()));
     }
     let timing = format!("every {}", time(design.every));
-    words.push(if design.delay > 0.0 { format!("{timing}, {} late", time(design.delay)) } else { timing });
+    words.push(if design.delay > 0.0 { format!("{timing}, delay {}", time(design.delay)) } else { timing });
     words.push(match stage.encoder.map(|encoder| encoder.at) {
         None => "measured exactly at the motor".into(),
         Some(at) => {
@@ -54,7 +54,7 @@ pub fn controller(design: &Design, stage: &Stage) -> String {
                 EncoderPlace::DrivePulley => "drive pulley",
                 EncoderPlace::Cart => "cart",
             };
-            format!("counts of {} at the {place}", length(step))
+            format!("encoder resolution {} at the {place}", length(step))
         }
     });
     words.join(", ")
@@ -102,7 +102,7 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
         ("peak force", format!("{} in span {force_span} at {}", value(force.value, "N"), time(force.time))),
         ("current", format!("at most {}, {} rms", value(figures.current.0.value, "A"), value(figures.current.1, "A"))),
         ("voltage", format!("at most {}, {} rms", value(figures.voltage.0.value, "V"), value(figures.voltage.1, "V"))),
-        ("limited", held),
+        ("saturated", held),
         ("energy", format!("{} in, {} back", value(figures.energy.0, "J"), value(figures.energy.1, "J"))),
     ];
     if let Structure::SlidingMode(gains) = &tried.design.structure {

@@ -1,4 +1,4 @@
-//! Finished rows, in chunks: each a file that appears whole, so that a sweep goes on where it was left.
+//! Finished rows, in chunks: each a file that appears whole, so that an interrupted sweep resumes.
 //!
 //! Beside the file of the rows stands a folder `….parts` with a manifest, which says of which sweep these parts are, and a file for
 //! each chunk: its columns one after another as doubles, little end first. The folder goes when the rows are written.

@@ -70,7 +70,7 @@ pub fn slow(analysis: &GantryAnalysis) -> impl Iterator<Item = Root> {
 pub fn elastic(analysis: &GantryAnalysis, mechanism: &Mechanism, mode: &ElasticMode) -> [String; 4] {
     let damping = match mode.damped {
         Some(root @ Root::Pair { damping, .. }) => format!(
-            "damping {}, time constant {}, swings at {} Hz",
+            "damping {}, time constant {}, damped frequency {} Hz",
             engineering_ascii(damping, "", 4),
             engineering_ascii(root.time_constant(), "s", 4),
             engineering_ascii(root.damped_hertz().unwrap_or(0.0), "", 5)
