@@ -14,7 +14,7 @@ const SLIMMEST: f64 = 0.3;
 /// Paths and a map in a plane, both of whose ways are lengths at one scale.
 ///
 /// ```
-/// use taut::report::{Axis, Plane, Series};
+/// use taut_report::{Axis, Plane, Series};
 /// let ways = || (Axis::new("Cart y", "m").shown_as("mm", 1e3), Axis::new("Bridge x", "m").shown_as("mm", 1e3));
 /// let (across, up) = ways();
 /// let plane = Plane::new("The way of the cart", across, up).path(Series::new("", vec![0.0, 0.1], vec![0.0, 0.05]));
