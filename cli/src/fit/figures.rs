@@ -1,10 +1,30 @@
 //! Model and log side by side.
 
-use taut::fit::{Estimate, LogFit, OutputFit, Posterior, Profile};
+use taut::fit::{Estimate, Fit, LogFit, OutputFit, Posterior, Profile};
+use taut::log::Quantity;
 use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// Logs drawn; the numbers of the rest are in the tables.
 pub const MOST_LOGS: usize = 12;
+
+/// The logs that are drawn: those whose residuals are largest beside what the fit takes as their deviation, the worst first.
+pub fn worst(fit: &Fit) -> Vec<&LogFit> {
+    let mut logs: Vec<(f64, &LogFit)> = fit.logs.iter().map(|log| (misfit(log, &fit.noise), log)).collect();
+    logs.sort_by(|a, b| b.0.total_cmp(&a.0));
+    logs.into_iter().take(MOST_LOGS).map(|(_, log)| log).collect()
+}
+
+/// The largest RMSE of a log's outputs, each over the deviation of its quantity; infinite where the model does not reach the end.
+fn misfit(log: &LogFit, noise: &[(Quantity, f64)]) -> f64 {
+    if !log.complete {
+        return f64::INFINITY;
+    }
+    let relative = log.outputs.iter().flat_map(|output| {
+        let deviation = noise.iter().find(|(quantity, _)| *quantity == output.quantity).map_or(1.0, |(_, d)| *d);
+        [output.fitted, output.held_out].into_iter().flatten().map(move |score| score.rmse / deviation)
+    });
+    relative.filter(|value| !value.is_nan()).fold(0.0, f64::max)
+}
 
 /// A quantity's axis, in a unit that suits it.
 fn axis(output: &OutputFit, label: &str) -> Axis {
