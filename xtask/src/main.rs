@@ -1,6 +1,7 @@
 //! The project's own chores: `cargo xtask test` checks all that can be checked, `cargo xtask python` the Python package alone,
-//! `cargo xtask hunt` looks for what is wrong with larger means.
+//! `cargo xtask browser` the reports alone, `cargo xtask hunt` looks for what is wrong with larger means.
 
+mod browser;
 mod hunt;
 mod python;
 
@@ -20,10 +21,12 @@ enum Work {
     Cargo(&'static [&'static str], &'static [(&'static str, &'static str)]),
     /// The Python package's own chain of commands.
     Python,
+    /// Reports in a browser.
+    Browser,
 }
 
 /// In this order, the quickest to fail first.
-const STEPS: [Step; 7] = [
+const STEPS: [Step; 8] = [
     step("formatting", &["fmt", "--all", "--check"]),
     step("lints", &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]),
     step(
@@ -37,10 +40,13 @@ const STEPS: [Step; 7] = [
     // Unit tests, integration tests and the examples in the documentation.
     step("tests", &["test", "--workspace", "--no-fail-fast"]),
     step("examples", &["build", "--workspace", "--examples"]),
+    BROWSER,
     PYTHON,
 ];
 
 const PYTHON: Step = Step { what: "the Python package", work: Work::Python };
+
+const BROWSER: Step = Step { what: "reports in a browser", work: Work::Browser };
 
 const fn step(what: &'static str, command: &'static [&'static str]) -> Step {
     Step { what, work: Work::Cargo(command, &[]) }
@@ -51,6 +57,7 @@ fn main() -> ExitCode {
     let done = match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["test"] => test(&STEPS),
         ["python"] => test(&[PYTHON]),
+        ["browser"] => test(&[BROWSER]),
         ["hunt", ref words @ ..] => match hunt::Hunt::new(words) {
             Ok(hunt) => hunt.run(),
             Err(told) => {
@@ -59,7 +66,7 @@ fn main() -> ExitCode {
             }
         },
         _ => {
-            eprintln!("usage: cargo xtask test | cargo xtask python | {}", hunt::USAGE);
+            eprintln!("usage: cargo xtask test | cargo xtask browser | cargo xtask python | {}", hunt::USAGE);
             return ExitCode::from(2);
         }
     };
@@ -104,6 +111,7 @@ impl Step {
         match self.work {
             Work::Cargo(words, _) => words.join(" "),
             Work::Python => "xtask python".into(),
+            Work::Browser => "xtask browser".into(),
         }
     }
 
@@ -116,6 +124,7 @@ impl Step {
                 run(command, counts)
             }
             Work::Python => python::test(counts),
+            Work::Browser => browser::test(counts),
         }
     }
 }

@@ -92,7 +92,7 @@ fn program(environment: &Path, name: &str) -> PathBuf {
 }
 
 /// Where cargo builds.
-fn target() -> PathBuf {
+pub fn target() -> PathBuf {
     let given = std::env::var_os("CARGO_TARGET_DIR").map(PathBuf::from);
     std::path::absolute(given.unwrap_or_else(|| "target".into())).unwrap_or_else(|_| "target".into())
 }
