@@ -558,7 +558,8 @@ class Plot {
     if (!this.isInside(spot)) { this.hideValues(); return; }
     this.drag = {spot, view: {x: this.view.x, y: this.view.y.slice()}, pans: event.shiftKey};
     try { this.svg.setPointerCapture(event.pointerId); } catch { /* a synthetic pointer */ }
-    if (event.pointerType === "mouse") event.preventDefault();
+    if (event.pointerType !== "mouse") return;
+    event.preventDefault();
     this.stage.focus({preventScroll: true});
   }
 
