@@ -41,11 +41,12 @@ pub(crate) fn json(figure: &Figure) -> String {
         .collect();
     let layouts = WIDTHS.map(|width| layout(&Layout::new(figure, (&x, &ys), width, 8.0)));
     format!(
-        "{{\"x\":{{{},\"range\":[{},{}]}},\"ratio\":{},\"marks\":{},\"panels\":[{}],\"layouts\":[{}],\"arrays\":[{}]}}",
+        "{{\"x\":{{{},\"range\":[{},{}]}},\"ratio\":{},\"part\":{},\"marks\":{},\"panels\":[{}],\"layouts\":[{}],\"arrays\":[{}]}}",
         axis(&figure.x, x.degrees),
         number(x.lo),
         number(x.hi),
         number(ratio(figure, &x, &ys).unwrap_or(f64::NAN)),
+        figure.view.is_some(),
         marks(&figure.verticals, figure.x.factor),
         panels.join(","),
         layouts.join(","),

@@ -1,7 +1,7 @@
 //! The places of everything in a figure: plot areas, ticks with their texts, legends. The picture and `plot.js` use the same ones.
 
 use super::axis::{Scale, in_range};
-use super::figure::{Axis, Figure, Panel, Series};
+use super::figure::{Axis, Figure, Panel, Series, Style};
 use super::svg::{fit, text_width};
 
 /// Room to the right of the plot areas.
@@ -57,7 +57,9 @@ pub(crate) fn scales(figure: &Figure) -> (Scale, Vec<Scale>) {
     let ends = figure.view.map(|(from, to)| [from, to]);
     let xs = figure.panels.iter().flat_map(|p| &p.series).flat_map(shown).map(|(x, _)| x);
     let xs = xs.chain(figure.verticals.iter().map(|m| m.at).filter(|at| seen(*at))).chain(ends.into_iter().flatten());
-    let mut x = Scale::covering(xs.map(|v| v * figure.x.factor), figure.x.log, !figure.equal);
+    // A curve may begin and end at the frame; a cross there would be half a cross.
+    let crosses = figure.panels.iter().flat_map(|p| &p.series).any(|s| s.style == Style::Crosses);
+    let mut x = Scale::covering(xs.map(|v| v * figure.x.factor), figure.x.log, !figure.equal && !crosses);
     x.degrees = is_degrees(&figure.x);
     let ys = figure.panels.iter().map(|p| {
         let values = p.series.iter().flat_map(shown).map(|(_, y)| y);

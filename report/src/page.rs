@@ -263,7 +263,7 @@ impl Page {
                 div.figtitle { span { (figure.title) } button type="button" { "Reset zoom" } }
                 div.stage tabindex="0" role="group" aria-label=(figure.title) { (PreEscaped(svg)) }
                 script type="application/json" { (PreEscaped(embed::json(figure))) }
-                @if !figure.caption.is_empty() { figcaption { (figure.caption) } }
+                @if !figure.caption.is_empty() { figcaption { (words(&figure.caption)) } }
             }
         });
     }
@@ -284,7 +284,7 @@ impl Page {
             figure.drawing {
                 div.figtitle { span { (plane.title) } }
                 div.scroll { (PreEscaped(svg)) }
-                @if !plane.caption.is_empty() { figcaption { (plane.caption) } }
+                @if !plane.caption.is_empty() { figcaption { (words(&plane.caption)) } }
             }
         });
     }
@@ -295,7 +295,7 @@ impl Page {
         self.push(html! {
             figure.drawing {
                 div.scroll { (PreEscaped(strip_style(svg))) }
-                @if !caption.0.is_empty() { figcaption { (caption) } }
+                @if !caption.0.is_empty() { figcaption { (words(caption)) } }
             }
         });
     }
@@ -320,8 +320,7 @@ impl Page {
 
     /// The same of what people read: numbers stay beside their units.
     fn push_words(&mut self, markup: Markup) {
-        self.body.push_str(&together::numbers_and_units(&markup.into_string()));
-        self.body.push('\n');
+        self.push(words(markup));
     }
 
     /// The whole file. Nothing in it asks for another.
@@ -362,6 +361,11 @@ impl Page {
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         write_atomically(path, self.html())
     }
+}
+
+/// Numbers stay beside their units.
+fn words(text: impl Render) -> Markup {
+    PreEscaped(together::numbers_and_units(&text.render().into_string()))
 }
 
 /// The script without its indentation and without the lines that are remarks.

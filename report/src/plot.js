@@ -271,7 +271,9 @@ class Plot {
     for (const [value] of L.xTicks)
       out += svgLine(this.across(value), P.top, this.across(value), bottom, "grid", 'stroke-width="1"');
     out += this.verticals(P, i === 0);
-    const box = [L.left, P.top - 2, L.wide, P.height + 4].map(pixels);
+    // Where all is shown nothing has to be cut off, and marks at the frame have room.
+    const room = this.view.x === this.home.x && !this.spec.part ? 5 : 0;
+    const box = [L.left - room, P.top - 2, L.wide + 2 * room, P.height + 4].map(pixels);
     out += `<svg x="${box[0]}" y="${box[1]}" width="${box[2]}" height="${box[3]}" viewBox="${box.join(" ")}">`;
     P.panel.series.forEach((series, k) => {
       if (!this.hidden.has(i + "." + k)) out += this.curve(series, P);

@@ -17,7 +17,7 @@ const SPECTRA: [&str; 2] =
     ["target/browser/resonances_x_20210701_223821.csv", "target/browser/resonances_x_20210821_152037.csv"];
 
 /// The reports that are looked at: a name, and the command that makes it.
-const REPORTS: [(&str, &[&str]); 11] = [
+const REPORTS: [(&str, &[&str]); 12] = [
     ("simulate", &["simulate", "stages/sollmann-jouaneh/table4.toml"]),
     // More rows than a page holds.
     ("long", &["simulate", "stages/sollmann-jouaneh/table4.toml", "--set", "experiment.0.every=0.05ms"]),
@@ -29,6 +29,7 @@ const REPORTS: [(&str, &[&str]); 11] = [
     ("sweep", &["sweep", "stages/sollmann-jouaneh/table4.toml", "--runs", "200", "--vary", "all=20%"]),
     ("shape", &["shape", "stages/printer-axis/printer-axis.toml"]),
     ("spectra", &["shape", SPECTRA[0], SPECTRA[1]]),
+    ("paper", &["paper"]),
     ("fit", &["fit", "stages/sollmann-jouaneh/identification/linear-5v.toml"]),
 ];
 
@@ -55,8 +56,7 @@ pub fn test(counts: &mut Counts) -> Result<bool, String> {
     let taut = target.join("debug").join(format!("taut{}", std::env::consts::EXE_SUFFIX));
     for (name, words) in REPORTS {
         let folder = reports.join(name);
-        let made =
-            Command::new(&taut).args(words).arg("--quiet").arg("--out").arg(&folder).stdout(Stdio::null()).status();
+        let made = Command::new(&taut).args(words).arg("--out").arg(&folder).stdout(Stdio::null()).status();
         if !made.is_ok_and(|status| status.success()) {
             return Err(format!("taut {} makes no report", words.join(" ")));
         }

@@ -31,7 +31,7 @@ pub fn page(case: &Case, found: &Found, text: &str) -> Page {
             fit.logs.len() - figures::MOST_LOGS
         ));
     }
-    for log in figures::worst(fit) {
+    for log in figures::worst(&fit.logs, &fit.noise) {
         for output in &log.outputs {
             page.figure(&figures::overlay(log, output));
             if let Some(figure) = figures::memory(log, output) {
