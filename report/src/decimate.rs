@@ -70,6 +70,8 @@ impl Bucket {
 /// points it was allowed.
 #[derive(Debug, Clone)]
 pub struct Decimator {
+    /// Every sample, while there are few.
+    whole: Option<Whole>,
     limit: usize,
     /// Samples per bucket.
     width: usize,
@@ -79,6 +81,14 @@ pub struct Decimator {
     buckets: Vec<Extremes>,
     open: Extremes,
     filled: usize,
+}
+
+/// Samples as they came, and how many there may be.
+#[derive(Debug, Clone)]
+struct Whole {
+    most: usize,
+    x: Vec<f64>,
+    y: Vec<f64>,
 }
 
 /// A bucket that remembers the points themselves: (number, x, y).
@@ -112,6 +122,7 @@ impl Decimator {
     /// A decimator that gives at most `n` points (at least 8).
     pub fn new(n: usize) -> Self {
         Self {
+            whole: None,
             limit: (n.max(8) - 2) / 2,
             width: 1,
             seen: 0,
@@ -123,8 +134,31 @@ impl Decimator {
         }
     }
 
+    /// Keeps every sample as long as there are no more than `most`: evenly spaced ones are smaller on a page than the
+    /// uneven rest of a thinned curve, and finer.
+    pub fn whole_up_to(mut self, most: usize) -> Self {
+        self.whole = Some(Whole { most, x: Vec::new(), y: Vec::new() });
+        self
+    }
+
     /// The next samples.
     pub fn push(&mut self, x: &[f64], y: &[f64]) {
+        let coming = x.len().min(y.len());
+        match self.whole.take() {
+            Some(mut whole) if whole.x.len() + coming <= whole.most => {
+                whole.x.extend_from_slice(&x[..coming]);
+                whole.y.extend_from_slice(&y[..coming]);
+                self.whole = Some(whole);
+            }
+            Some(whole) => {
+                self.thin(&whole.x, &whole.y);
+                self.thin(x, y);
+            }
+            None => self.thin(x, y),
+        }
+    }
+
+    fn thin(&mut self, x: &[f64], y: &[f64]) {
         for (&x, &y) in x.iter().zip(y) {
             self.first.get_or_insert((x, y));
             self.last = Some((x, y));
@@ -161,11 +195,14 @@ impl Decimator {
 
     /// How many samples came in.
     pub fn seen(&self) -> usize {
-        self.seen
+        self.whole.as_ref().map_or(self.seen, |whole| whole.x.len())
     }
 
-    /// The points so far: first, last, and every bucket's extremes.
+    /// The points so far: all, or first, last, and every bucket's extremes.
     pub fn points(&self) -> (Vec<f64>, Vec<f64>) {
+        if let Some(whole) = &self.whole {
+            return (whole.x.clone(), whole.y.clone());
+        }
         let mut points: Vec<(usize, f64, f64)> = Vec::with_capacity(2 * self.buckets.len() + 4);
         points.extend(self.first.map(|(x, y)| (0, x, y)));
         for bucket in self.buckets.iter().chain([&self.open]) {
@@ -198,6 +235,13 @@ mod tests {
             let mut stream = Decimator::new(n);
             x.chunks(block).zip(y.chunks(block)).for_each(|(x, y)| stream.push(x, y));
             let (xt, yt) = stream.points();
+            let mut patient = Decimator::new(n).whole_up_to(200);
+            x.chunks(block).zip(y.chunks(block)).for_each(|(x, y)| patient.push(x, y));
+            let bits = |v: &[f64]| -> Vec<u64> { v.iter().map(|v| v.to_bits()).collect() };
+            let (xw, yw) = patient.points();
+            let whole = if y.len() <= 200 { (&x, &y) } else { (&xt, &yt) };
+            prop_assert_eq!((bits(&xw), bits(&yw)), (bits(whole.0), bits(whole.1)));
+            prop_assert_eq!(patient.seen(), y.len());
             for (xs, ys) in [(&xs, &ys), (&xt, &yt)] {
                 prop_assert!(xs.len() <= n && xs.len() == ys.len());
                 prop_assert_eq!(extremes(ys), extremes(&y));

@@ -1,13 +1,19 @@
 //! A figure's data as `plot.js` reads them: exact enough to zoom by a million, small enough for twenty plots.
 
 use super::decimate::decimate;
-use super::figure::{Axis, Figure, Marker, Style};
-use super::plot::{panel_height, scales};
-use super::svg::Colour;
+use super::figure::{Axis, Figure, Marker, Panel, Series, Style};
+use super::layout::{Layout, ratio, scales};
+use super::svg::{self, Colour};
 use std::fmt::Write;
 
-/// Points of one curve that a page carries; longer curves are decimated.
+/// Points of one unevenly spaced curve that a page carries; longer curves are decimated.
 const LIMIT: usize = 6000;
+
+/// Points of an evenly spaced curve: without places they weigh half.
+const EVEN_LIMIT: usize = 2 * LIMIT;
+
+/// Widths in pixels for which a page has places; between two of them the plot areas of the narrower one are stretched.
+const WIDTHS: [f64; 4] = [300.0, 420.0, 560.0, 740.0];
 
 /// The figure as JSON that may stand in a script element.
 ///
@@ -17,51 +23,95 @@ const LIMIT: usize = 6000;
 pub(crate) fn json(figure: &Figure) -> String {
     let (x, ys) = scales(figure);
     let mut arrays = Arrays::default();
-    let mut panels = String::new();
-    for (i, (panel, y)) in figure.panels.iter().zip(&ys).enumerate() {
-        let mut series = String::new();
-        for (k, s) in panel.series.iter().enumerate() {
-            let (xs, ys) = decimate(&s.x, &s.y, LIMIT);
-            let style = match s.style {
-                Style::Solid => "solid",
-                Style::Dashed => "dashed",
-                Style::Dotted => "dotted",
-                Style::Points => "points",
-            };
-            let _ = write!(
-                series,
-                "{}{{\"name\":{},\"x\":{},\"y\":{},\"style\":\"{style}\",\"colour\":\"{}\"}}",
-                if k == 0 { "" } else { "," },
-                text(&s.name),
-                arrays.index(xs, figure.x.factor),
-                arrays.index(ys, panel.y.factor),
-                colour(s.colour)
-            );
-        }
-        let _ = write!(
-            panels,
-            "{}{{{},\"height\":{},\"range\":[{},{}],\"marks\":{},\"series\":[{series}]}}",
-            if i == 0 { "" } else { "," },
-            axis(&panel.y),
-            panel_height(figure, panel),
-            number(y.lo),
-            number(y.hi),
-            marks(&panel.horizontals, panel.y.factor)
-        );
-    }
+    let panels: Vec<String> = figure
+        .panels
+        .iter()
+        .zip(&ys)
+        .map(|(panel, y)| {
+            let series: Vec<String> = panel.series.iter().map(|s| series(s, figure, panel, &mut arrays)).collect();
+            format!(
+                "{{{},\"range\":[{},{}],\"marks\":{},\"series\":[{}]}}",
+                axis(&panel.y, y.degrees),
+                number(y.lo),
+                number(y.hi),
+                marks(&panel.horizontals, panel.y.factor),
+                series.join(",")
+            )
+        })
+        .collect();
+    let layouts = WIDTHS.map(|width| layout(&Layout::new(figure, (&x, &ys), width, 8.0)));
     format!(
-        "{{\"x\":{{{},\"range\":[{},{}]}},\"marks\":{},\"panels\":[{panels}],\"arrays\":[{}]}}",
-        axis(&figure.x),
+        "{{\"x\":{{{},\"range\":[{},{}]}},\"ratio\":{},\"part\":{},\"marks\":{},\"panels\":[{}],\"layouts\":[{}],\"arrays\":[{}]}}",
+        axis(&figure.x, x.degrees),
         number(x.lo),
         number(x.hi),
+        number(ratio(figure, &x, &ys).unwrap_or(f64::NAN)),
+        figure.view.is_some(),
         marks(&figure.verticals, figure.x.factor),
+        panels.join(","),
+        layouts.join(","),
         arrays.done.iter().map(|(_, text)| text.as_str()).collect::<Vec<_>>().join(",")
     )
 }
 
-fn axis(axis: &Axis) -> String {
+/// One curve; where it is thinned, from how many samples.
+fn series(s: &Series, figure: &Figure, panel: &Panel, arrays: &mut Arrays) -> String {
+    let samples = s.x.len().min(s.y.len());
+    let even = samples <= EVEN_LIMIT && spacing(&s.x[..samples]).is_some();
+    let (xs, ys) = decimate(&s.x, &s.y, if even { EVEN_LIMIT } else { LIMIT });
+    let style = match s.style {
+        Style::Solid => "solid",
+        Style::Dashed => "dashed",
+        Style::Dotted => "dotted",
+        Style::Points => "points",
+        Style::Crosses => "crosses",
+        Style::Rings => "rings",
+    };
+    let all = samples.max(s.thinned_from);
+    let of = if all > xs.len() { format!(",\"of\":{all}") } else { String::new() };
+    format!(
+        "{{\"name\":{},\"x\":{},\"y\":{},\"style\":\"{style}\",\"colour\":\"{}\"{of}}}",
+        text(&s.name),
+        arrays.index(xs, figure.x.factor),
+        arrays.index(ys, panel.y.factor),
+        colour(s.colour)
+    )
+}
+
+/// The places of one width. Lengths go to a tenth of a pixel, ticks as value and text, entries of a legend as number of the
+/// series, left end, base line, width and name.
+fn layout(layout: &Layout) -> String {
+    let pixels = |v: f64| svg::n((10.0 * v).round() / 10.0);
+    let ticks = |ticks: &[(f64, String)]| -> String {
+        ticks.iter().map(|(v, t)| format!("[{},{}]", number(*v), text(t))).collect::<Vec<_>>().join(",")
+    };
+    let panels = layout.panels.iter().map(|place| {
+        let legend = place
+            .legend
+            .iter()
+            .map(|e| format!("[{},{},{},{},{}]", e.series, pixels(e.x), pixels(e.y), pixels(e.width), text(&e.name)));
+        format!(
+            "{{\"top\":{},\"height\":{},\"heading\":{},\"ticks\":[{}],\"legend\":[{}]}}",
+            pixels(place.top),
+            pixels(place.height),
+            pixels(place.heading),
+            ticks(&place.ticks),
+            legend.collect::<Vec<_>>().join(",")
+        )
+    });
+    format!(
+        "{{\"width\":{},\"height\":{},\"left\":{},\"ticks\":[{}],\"panels\":[{}]}}",
+        layout.width,
+        pixels(layout.height),
+        pixels(layout.left),
+        ticks(&layout.x_ticks),
+        panels.collect::<Vec<_>>().join(",")
+    )
+}
+
+fn axis(axis: &Axis, degrees: bool) -> String {
     let (label, unit, heading) = (text(&axis.label), text(&axis.unit), text(&axis.heading()));
-    format!("\"label\":{label},\"unit\":{unit},\"heading\":{heading},\"log\":{}", axis.log)
+    format!("\"label\":{label},\"unit\":{unit},\"heading\":{heading},\"log\":{},\"degrees\":{degrees}", axis.log)
 }
 
 fn marks(markers: &[Marker], factor: f64) -> String {
@@ -97,17 +147,10 @@ impl Arrays {
 
 fn encode(values: &[f64]) -> String {
     let n = values.len();
-    let (lo, hi) = values
-        .iter()
-        .filter(|v| v.is_finite())
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), &v| (lo.min(v), hi.max(v)));
-    if lo <= hi && values.iter().all(|v| v.is_finite()) {
-        let step = if n > 1 { (values[n - 1] - values[0]) / (n - 1) as f64 } else { 0.0 };
-        let even = |(i, v): (usize, &f64)| (values[0] + i as f64 * step - v).abs() <= 1e-12 * (hi - lo);
-        if values.iter().enumerate().all(even) {
-            return format!("{{\"n\":{n},\"o\":{},\"s\":{}}}", number(values[0]), number(step));
-        }
+    if let Some(step) = spacing(values) {
+        return format!("{{\"n\":{n},\"o\":{},\"s\":{}}}", number(values[0]), number(step));
     }
+    let (lo, hi) = least_and_greatest(values);
     const TOP: f64 = 4294967294.0; // the value above is the gap
     let (lo, unit) = if lo <= hi { (lo, (hi / TOP - lo / TOP).max(f64::MIN_POSITIVE)) } else { (0.0, 1.0) };
     let bytes: Vec<u8> = values
@@ -118,6 +161,20 @@ fn encode(values: &[f64]) -> String {
         })
         .collect();
     format!("{{\"n\":{n},\"o\":{},\"s\":{},\"d\":\"{}\"}}", number(lo), number(unit), base64(&bytes))
+}
+
+/// The step from each value to the next, if it is the same everywhere.
+fn spacing(values: &[f64]) -> Option<f64> {
+    let (lo, hi) = least_and_greatest(values);
+    let (first, last) = (*values.first()?, *values.last()?);
+    let step = if values.len() > 1 { (last - first) / (values.len() - 1) as f64 } else { 0.0 };
+    let even = |(i, v): (usize, &f64)| (first + i as f64 * step - v).abs() <= 1e-12 * (hi - lo);
+    values.iter().enumerate().all(even).then_some(step)
+}
+
+fn least_and_greatest(values: &[f64]) -> (f64, f64) {
+    let finite = values.iter().filter(|v| v.is_finite());
+    finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), &v| (lo.min(v), hi.max(v)))
 }
 
 fn base64(bytes: &[u8]) -> String {

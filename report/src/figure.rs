@@ -24,6 +24,10 @@ pub struct Figure {
     pub panels: Vec<Panel>,
     /// Vertical lines through all panels: "voltage off".
     pub verticals: Vec<Marker>,
+    /// Whether a unit is as long upward as to the right, as a circle needs it; of figures with one panel.
+    pub equal: bool,
+    /// The part of the x axis that is shown first, in the units of the data; the rest is reached by zooming out.
+    pub view: Option<(f64, f64)>,
 }
 
 /// What an axis measures.
@@ -65,6 +69,8 @@ pub struct Series {
     pub style: Style,
     /// In which colour.
     pub colour: Colour,
+    /// Samples that it was thinned out from; 0 if these are all.
+    pub thinned_from: usize,
 }
 
 /// How a curve is drawn.
@@ -79,6 +85,20 @@ pub enum Style {
     Dotted,
     /// Points alone, for measurements.
     Points,
+    /// Crosses, for poles and for a place to note.
+    Crosses,
+    /// Open circles, for zeros and for what begins.
+    Rings,
+}
+
+impl Style {
+    /// Whether it shows points by themselves, not a line through them.
+    pub(crate) fn is_symbol(self) -> bool {
+        match self {
+            Style::Points | Style::Crosses | Style::Rings => true,
+            Style::Solid | Style::Dashed | Style::Dotted => false,
+        }
+    }
 }
 
 /// A line across the plot with a word to it.
@@ -118,12 +138,18 @@ impl Axis {
 impl Series {
     /// A solid blue line.
     pub fn new(name: impl Into<String>, x: impl Into<Vec<f64>>, y: impl Into<Vec<f64>>) -> Self {
-        Self { name: name.into(), x: x.into(), y: y.into(), style: Style::Solid, colour: Colour::Blue }
+        Self { name: name.into(), x: x.into(), y: y.into(), style: Style::Solid, colour: Colour::Blue, thinned_from: 0 }
     }
 
     /// Draws it that way.
     pub fn style(mut self, style: Style) -> Self {
         self.style = style;
+        self
+    }
+
+    /// Says that it was thinned out from so many samples.
+    pub fn thinned_from(mut self, samples: usize) -> Self {
+        self.thinned_from = if samples > self.x.len() { samples } else { 0 };
         self
     }
 
@@ -168,7 +194,15 @@ impl Panel {
 impl Figure {
     /// A figure without panels.
     pub fn new(title: impl Into<String>, x: Axis) -> Self {
-        Self { title: title.into(), caption: String::new(), x, panels: Vec::new(), verticals: Vec::new() }
+        Self {
+            title: title.into(),
+            caption: String::new(),
+            x,
+            panels: Vec::new(),
+            verticals: Vec::new(),
+            equal: false,
+            view: None,
+        }
     }
 
     /// Sets the caption.
@@ -186,6 +220,18 @@ impl Figure {
     /// Adds a vertical line through all panels.
     pub fn vertical(mut self, at: f64, label: impl Into<String>) -> Self {
         self.verticals.push(Marker { at, label: label.into() });
+        self
+    }
+
+    /// Makes a unit as long upward as to the right.
+    pub fn equal(mut self) -> Self {
+        self.equal = true;
+        self
+    }
+
+    /// Shows this part of the x axis first.
+    pub fn view(mut self, from: f64, to: f64) -> Self {
+        self.view = Some((from, to)).filter(|_| from < to);
         self
     }
 

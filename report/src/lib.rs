@@ -28,12 +28,14 @@ mod embed;
 pub mod equations;
 pub mod figure;
 mod gantry;
+mod layout;
 pub mod page;
 mod picture;
 mod plane;
 mod plot;
 mod raster;
 mod svg;
+mod together;
 
 pub use decimate::{Decimator, decimate};
 pub use drawing::stage_drawing;

@@ -3,7 +3,7 @@
 use super::figure::Figure;
 use super::plane::Plane;
 use super::svg::PALETTE;
-use super::{embed, plot};
+use super::{embed, layout, plot, together};
 use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 use std::fmt::Write;
 use std::path::Path;
@@ -21,6 +21,32 @@ pub struct Page {
     body: String,
     contents: Vec<(String, String)>,
     figures: usize,
+    axes: Vec<SharedAxis>,
+}
+
+/// An x axis that figures of a page have in common: they are zoomed together.
+#[derive(Debug, Clone, PartialEq)]
+struct SharedAxis {
+    heading: String,
+    log: bool,
+    range: (f64, f64),
+}
+
+impl SharedAxis {
+    /// The axis of a figure; none where a zoom of x is one of y, too.
+    fn of(figure: &Figure) -> Option<Self> {
+        let (x, _) = layout::scales(figure);
+        let (heading, log, range) = (figure.x.heading(), figure.x.log, (x.lo, x.hi));
+        (!figure.equal && !heading.is_empty()).then_some(Self { heading, log, range })
+    }
+
+    /// Whether it measures the same over about the same range: runs of quite different lengths are zoomed apart.
+    fn is_as(&self, other: &Self) -> bool {
+        let bend = |v: f64| if self.log { v.ln() } else { v };
+        let [a, b, c, d] = [self.range.0, self.range.1, other.range.0, other.range.1].map(bend);
+        let near = 0.25 * (b - a).max(d - c);
+        self.heading == other.heading && self.log == other.log && (a - c).abs() <= near && (b - d).abs() <= near
+    }
 }
 
 /// What a callout or a badge says about a statement.
@@ -146,8 +172,9 @@ impl Table {
 impl Render for Table {
     fn render(&self) -> Markup {
         html! {
-            div.scroll { table {
-                @if !self.caption.is_empty() { caption { (self.caption) } }
+            // Above what scrolls, so that it can be read whatever the width.
+            @if !self.caption.is_empty() { p.caption { (self.caption) } }
+            div.scroll { table aria-label=[Some(&self.caption).filter(|caption| !caption.is_empty())] {
                 thead { tr {
                     @for (i, (heading, unit)) in self.headings.iter().enumerate() {
                         th scope="col" class=[self.numeric(i).then_some("num")] {
@@ -198,7 +225,7 @@ impl Page {
 
     /// A paragraph.
     pub fn prose(&mut self, text: impl Render) {
-        self.push(html! { p { (text) } });
+        self.push_words(html! { p { (text) } });
     }
 
     /// Anything else, as it is.
@@ -208,17 +235,17 @@ impl Page {
 
     /// A table.
     pub fn table(&mut self, table: &Table) {
-        self.push(table.render());
+        self.push_words(table.render());
     }
 
     /// Terms and what they mean or amount to.
     pub fn definitions<T: Render, D: Render>(&mut self, pairs: impl IntoIterator<Item = (T, D)>) {
-        self.push(html! { dl { @for (term, text) in pairs { dt { (term) } dd { (text) } } } });
+        self.push_words(html! { dl { @for (term, text) in pairs { dt { (term) } dd { (text) } } } });
     }
 
     /// A statement with its verdict: the badge, what was stated, and what was found.
     pub fn callout(&mut self, kind: Callout, head: impl Render, text: impl Render) {
-        self.push(html! {
+        self.push_words(html! {
             div class={ "callout " (kind.class()) } {
                 p.head { (kind.badge(kind.word())) (head) }
                 p { (text) }
@@ -230,14 +257,24 @@ impl Page {
     pub fn figure(&mut self, figure: &Figure) {
         self.figures += 1;
         let svg = strip_style(&plot::svg(figure, false));
+        let axis = SharedAxis::of(figure).map(|axis| self.shared(axis));
         self.push(html! {
-            figure.plot {
+            figure.plot data-axis=[axis] {
                 div.figtitle { span { (figure.title) } button type="button" { "Reset zoom" } }
-                div.stage tabindex="0" { (PreEscaped(svg)) }
+                div.stage tabindex="0" role="group" aria-label=(figure.title) { (PreEscaped(svg)) }
                 script type="application/json" { (PreEscaped(embed::json(figure))) }
-                @if !figure.caption.is_empty() { figcaption { (figure.caption) } }
+                @if !figure.caption.is_empty() { figcaption { (words(&figure.caption)) } }
             }
         });
+    }
+
+    /// The number of an axis, among those of figures before if one of them is the same.
+    fn shared(&mut self, axis: SharedAxis) -> usize {
+        let known = self.axes.iter().position(|known| known.is_as(&axis));
+        known.unwrap_or_else(|| {
+            self.axes.push(axis);
+            self.axes.len() - 1
+        })
     }
 
     /// A plane, with its title and caption.
@@ -247,7 +284,7 @@ impl Page {
             figure.drawing {
                 div.figtitle { span { (plane.title) } }
                 div.scroll { (PreEscaped(svg)) }
-                @if !plane.caption.is_empty() { figcaption { (plane.caption) } }
+                @if !plane.caption.is_empty() { figcaption { (words(&plane.caption)) } }
             }
         });
     }
@@ -258,7 +295,7 @@ impl Page {
         self.push(html! {
             figure.drawing {
                 div.scroll { (PreEscaped(strip_style(svg))) }
-                @if !caption.0.is_empty() { figcaption { (caption) } }
+                @if !caption.0.is_empty() { figcaption { (words(caption)) } }
             }
         });
     }
@@ -279,6 +316,11 @@ impl Page {
     fn push(&mut self, markup: Markup) {
         self.body.push_str(&markup.into_string());
         self.body.push('\n');
+    }
+
+    /// The same of what people read: numbers stay beside their units.
+    fn push_words(&mut self, markup: Markup) {
+        self.push(words(markup));
     }
 
     /// The whole file. Nothing in it asks for another.
@@ -308,7 +350,7 @@ impl Page {
                         (PreEscaped(&self.body))
                         @if let Some(footer) = &self.footer { footer { (footer) } }
                     }
-                    @if self.figures > 0 { script { (PreEscaped(include_str!("plot.js"))) } }
+                    @if self.figures > 0 { script { (PreEscaped(script())) } }
                 }
             }
         };
@@ -319,6 +361,17 @@ impl Page {
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         write_atomically(path, self.html())
     }
+}
+
+/// Numbers stay beside their units.
+fn words(text: impl Render) -> Markup {
+    PreEscaped(together::numbers_and_units(&text.render().into_string()))
+}
+
+/// The script without its indentation and without the lines that are remarks.
+fn script() -> String {
+    let lines = include_str!("plot.js").lines().map(str::trim_start);
+    lines.filter(|line| !line.is_empty() && !line.starts_with("//")).flat_map(|line| [line, "\n"]).collect()
 }
 
 /// The palette as variables for both themes, paper always light, and the classes that pictures use.

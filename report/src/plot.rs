@@ -2,88 +2,50 @@
 
 use super::axis::{Scale, in_range};
 use super::decimate::decimate;
-use super::figure::{Figure, Marker, Panel, Series, Style};
+use super::figure::{Figure, Marker, Series, Style};
+use super::layout::{Layout, Place, RIGHT, scales, within};
 use super::svg::{self, Anchor, Svg, n, text_width};
 use std::fmt::Write;
 
 const WIDTH: f64 = 760.0;
-const RIGHT: f64 = 16.0;
-const LEGEND_ROW: f64 = 19.0;
-
-/// The scales of a figure: x, and y of each panel; in shown units.
-pub(crate) fn scales(figure: &Figure) -> (Scale, Vec<Scale>) {
-    let series = || figure.panels.iter().flat_map(|p| &p.series);
-    let x = series()
-        .flat_map(|s| s.x.iter().zip(&s.y).map(|(x, _)| x))
-        .chain(figure.verticals.iter().map(|m| &m.at))
-        .map(|v| v * figure.x.factor);
-    let ys = figure.panels.iter().map(|p| {
-        let values = p.series.iter().flat_map(|s| s.x.iter().zip(&s.y).map(|(_, y)| y));
-        let values = values.chain(p.horizontals.iter().map(|m| &m.at)).map(|v| v * p.y.factor);
-        Scale::covering(values, p.y.log, false)
-    });
-    (Scale::covering(x, figure.x.log, true), ys.collect())
-}
-
-/// Height of a panel's plot area in pixels.
-pub(crate) fn panel_height(figure: &Figure, panel: &Panel) -> f64 {
-    let base = if figure.panels.len() > 1 { 150.0 } else { 270.0 };
-    base * if panel.weight.is_finite() { panel.weight.clamp(0.2, 5.0) } else { 1.0 }
-}
 
 /// The whole picture, with the title in it or without.
 pub(crate) fn svg(figure: &Figure, with_title: bool) -> String {
     let (x, ys) = scales(figure);
-    let ticks: Vec<_> = figure
-        .panels
-        .iter()
-        .zip(&ys)
-        .map(|(p, y)| y.ticks((panel_height(figure, p) / 40.0).round() as usize))
-        .collect();
-    let widest = ticks.iter().flatten().map(|(_, t)| text_width(t, 12.0, false)).fold(0.0, f64::max);
-    let left = (widest + 16.0).max(44.0);
-    let width = WIDTH - left - RIGHT;
-
-    // First everything's place from top to bottom, then the drawing.
-    let mut top = if with_title && !figure.title.is_empty() { 40.0 } else { 8.0 };
-    let marked = figure.verticals.iter().any(|m| !m.label.is_empty());
-    let mut places = Vec::new();
-    for (i, panel) in figure.panels.iter().enumerate() {
-        let legend = legend(panel, left, width);
-        let rows = legend.last().map_or(0, |l| l.row) + 1;
-        top += rows as f64 * LEGEND_ROW + 6.0 + if i == 0 && marked { 15.0 } else { 0.0 };
-        let height = panel_height(figure, panel);
-        places.push((top, height, legend));
-        top += height + if i + 1 < figure.panels.len() { 16.0 } else { 0.0 };
-    }
-    let total = top + 48.0;
-
-    let mut out = Svg::new(WIDTH, total);
+    let titled = with_title && !figure.title.is_empty();
+    let layout = Layout::new(figure, (&x, &ys), WIDTH, if titled { 40.0 } else { 8.0 });
+    let (left, width) = (layout.left, layout.wide);
+    let mut out = Svg::new(WIDTH, layout.height);
     out.margin = if with_title { 12.0 } else { 0.0 };
-    if with_title && !figure.title.is_empty() {
+    if titled {
         let title = svg::fit(&figure.title, 15.5, width);
         out.text((left, 20.0), 15.0, Anchor::Start, svg::INK, " font-weight=\"600\"", &title);
     }
-    let x_ticks = x.ticks((width / 90.0).round() as usize);
     let across = |v: f64| left + width * x.place(v);
-    for (i, (((panel, y), ticks), (top, height, legend))) in
-        figure.panels.iter().zip(&ys).zip(&ticks).zip(&places).enumerate()
-    {
-        let (top, height, last) = (*top, *height, i + 1 == figure.panels.len());
+    for (i, ((panel, y), place)) in figure.panels.iter().zip(&ys).zip(&layout.panels).enumerate() {
+        let &Place { top, height, ref ticks, heading, .. } = place;
         let up = |v: f64| top + height * (1.0 - y.place(v));
-        let lift = if i == 0 && marked { 15.0 } else { 0.0 };
-        draw_legend(&mut out, panel, legend, top - lift);
+        out.text((left, heading), 13.0, Anchor::Start, svg::INK, "", &panel.y.heading());
+        legend(&mut out, &panel.series, place);
         for (v, text) in ticks {
             let at = up(*v);
             out.line((left, at), (left + width, at), svg::GRID, 1.0);
             out.text((left - 8.0, at + 4.2), 12.0, Anchor::End, svg::GREY, "", text);
         }
-        for (v, _) in &x_ticks {
+        for (v, _) in &layout.x_ticks {
             out.line((across(*v), top), (across(*v), top + height), svg::GRID, 1.0);
         }
-        markers(&mut out, figure, i == 0, &across, (left, left + width), (top, height));
+        markers(&mut out, figure, i == 0, &across, (&x, left, left + width), (top, height));
+        // Curves end at the frame where only a part of them is shown.
+        let clipped = figure.view.is_some();
+        if clipped {
+            out.open_window((left, top - 2.0), (width, height + 4.0));
+        }
         for series in &panel.series {
             curve(&mut out, series, (figure.x.factor, panel.y.factor), (&x, y), &across, &up, width);
+        }
+        if clipped {
+            out.close_window();
         }
         for Marker { at, label } in &panel.horizontals {
             let at = up(at * panel.y.factor);
@@ -93,61 +55,36 @@ pub(crate) fn svg(figure: &Figure, with_title: bool) -> String {
             out.text((left + width - 4.0, base), 12.0, Anchor::End, svg::MARK, "", label);
         }
         out.line((left, top + height), (left + width, top + height), svg::AXIS, 1.2);
-        if last {
-            for (v, text) in &x_ticks {
-                let at = across(*v);
-                out.line((at, top + height), (at, top + height + 4.0), svg::AXIS, 1.2);
-                out.text((at, top + height + 18.0), 12.0, Anchor::Middle, svg::GREY, "", text);
-            }
-            let heading = figure.x.heading();
-            out.text((left + width / 2.0, top + height + 38.0), 13.0, Anchor::Middle, svg::INK, "", &heading);
-        }
+    }
+    if let Some(last) = layout.panels.last() {
+        x_axis(&mut out, figure, &layout, &across, last.top + last.height);
     }
     out.finish(if figure.title.is_empty() { "Figure" } else { &figure.title })
 }
 
-/// One entry of a legend: which series, where, in which row.
-struct Entry {
-    series: usize,
-    x: f64,
-    row: usize,
-}
-
-/// Places the legend behind the axis heading, in as many rows as it needs.
-fn legend(panel: &Panel, left: f64, width: f64) -> Vec<Entry> {
-    let start = left + text_width(&panel.y.heading(), 13.0, false) * 1.06 + 22.0;
-    let (mut x, mut row) = (start, 0);
-    let mut entries = Vec::new();
-    for (i, series) in panel.series.iter().enumerate().filter(|(_, s)| !s.name.is_empty()) {
-        let needed = 26.0 + text_width(&series.name, 12.5, false) + 18.0;
-        if x + needed > left + width + 18.0 && x > left {
-            x = left;
-            row += 1;
-        }
-        entries.push(Entry { series: i, x, row });
-        x += needed;
+/// Ticks and heading below the last panel.
+fn x_axis(out: &mut Svg, figure: &Figure, layout: &Layout, across: &dyn Fn(f64) -> f64, bottom: f64) {
+    for (v, text) in &layout.x_ticks {
+        let at = across(*v);
+        out.line((at, bottom), (at, bottom + 4.0), svg::AXIS, 1.2);
+        let wide = text_width(text, 12.0, false);
+        let middle = within(at, wide, layout.width) + 0.5 * wide;
+        out.text((middle, bottom + 18.0), 12.0, Anchor::Middle, svg::GREY, "", text);
     }
-    entries
+    let middle = layout.left + layout.wide / 2.0;
+    out.text((middle, bottom + 38.0), 13.0, Anchor::Middle, svg::INK, "", &figure.x.heading());
 }
 
-fn draw_legend(out: &mut Svg, panel: &Panel, legend: &[Entry], top: f64) {
-    let rows = legend.last().map_or(0, |l| l.row);
-    let base = |row: usize| top - 10.0 - (rows - row) as f64 * LEGEND_ROW;
-    let heading = panel.y.heading();
-    let left = legend.iter().find(|e| e.row == 0).map_or(0.0, |e| e.x);
-    // The heading stands where the legend left room for it.
-    let heading_left = left - (text_width(&heading, 13.0, false) * 1.06 + 22.0);
-    let heading_left = if legend.is_empty() { 44.0 } else { heading_left };
-    out.text((heading_left, base(0)), 13.0, Anchor::Start, svg::INK, "", &heading);
-    for entry in legend {
-        let series = &panel.series[entry.series];
-        let y = base(entry.row) - 4.3;
-        let paint = series.colour.paint();
-        match series.style {
-            Style::Points => out.circle((entry.x + 10.0, y), 2.6, paint, paint, 0.0),
-            style => out.path(&format!("M{} {}h20", n(entry.x), n(y)), paint, 2.0, dash(style)),
+fn legend(out: &mut Svg, series: &[Series], place: &Place) {
+    for entry in &place.legend {
+        let &Series { style, colour, .. } = &series[entry.series];
+        let (y, paint) = (entry.y - 4.3, colour.paint());
+        if style.is_symbol() {
+            symbols(out, style, &[(entry.x + 10.0, y)], paint);
+        } else {
+            out.path(&format!("M{} {}h20", n(entry.x), n(y)), paint, 2.0, dash(style));
         }
-        out.text((entry.x + 26.0, base(entry.row)), 12.5, Anchor::Start, svg::INK, "", &series.name);
+        out.text((entry.x + 26.0, entry.y), 12.5, Anchor::Start, svg::INK, "", &entry.name);
     }
 }
 
@@ -157,17 +94,18 @@ fn markers(
     figure: &Figure,
     labelled: bool,
     across: &dyn Fn(f64) -> f64,
-    (left, right): (f64, f64),
+    (scale, left, right): (&Scale, f64, f64),
     (top, height): (f64, f64),
 ) {
-    let mut sorted: Vec<_> = figure.verticals.iter().filter(|m| m.at.is_finite()).collect();
+    let shown = |at: f64| at.is_finite() && (-1e-6..=1.0 + 1e-6).contains(&scale.place(at * figure.x.factor));
+    let mut sorted: Vec<_> = figure.verticals.iter().filter(|m| shown(m.at)).collect();
     sorted.sort_by(|a, b| a.at.total_cmp(&b.at));
     let mut free = left - 20.0;
     for Marker { at, label } in sorted {
         let at = across(at * figure.x.factor);
         dashed(out, (at, top), (at, top + height));
         let wide = text_width(label, 12.0, false);
-        let start = (at - wide / 2.0).clamp(left, (right - wide).max(left));
+        let start = (at - wide / 2.0).clamp(left, (right + RIGHT - 2.0 - wide).max(left));
         if labelled && start >= free {
             out.text((start, top - 5.0), 12.0, Anchor::Start, svg::MARK, "", label);
             free = start + wide + 8.0;
@@ -182,10 +120,25 @@ fn dashed(out: &mut Svg, from: (f64, f64), to: (f64, f64)) {
 
 fn dash(style: Style) -> &'static str {
     match style {
-        Style::Solid | Style::Points => "",
+        Style::Solid | Style::Points | Style::Crosses | Style::Rings => "",
         Style::Dashed => " stroke-dasharray=\"7 4\"",
         Style::Dotted => " stroke-dasharray=\"0.1 4\" stroke-linecap=\"round\"",
     }
+}
+
+/// Points by themselves, as one path; of a curve they are drawn as strokes, so that thousands weigh little.
+fn symbols(out: &mut Svg, style: Style, points: &[(f64, f64)], paint: &svg::Paint) {
+    let mut d = String::new();
+    for (x, y) in points {
+        let (x, y) = (n1(*x), n1(*y));
+        let _ = match style {
+            Style::Crosses => write!(d, "M{x} {y}m-4-4l8 8m0-8l-8 8"),
+            Style::Rings => write!(d, "M{x} {y}m-4 0a4 4 0 1 0 8 0a4 4 0 1 0-8 0"),
+            Style::Points | Style::Solid | Style::Dashed | Style::Dotted => write!(d, "M{x} {y}h0"),
+        };
+    }
+    let width = if matches!(style, Style::Crosses | Style::Rings) { 1.6 } else { 4.4 };
+    out.path(&d, paint, width, " stroke-linecap=\"round\"");
 }
 
 fn curve(
@@ -201,19 +154,16 @@ fn curve(
     let paint = series.colour.paint();
     let points = x.iter().zip(&y).map(|(&x, &y)| {
         let (x, y) = (x * fx, y * fy);
-        // The scales cover all that is shown, so nothing needs to be clipped.
         let shown = in_range(x) && in_range(y) && (!sx.log || x > 0.0) && (!sy.log || y > 0.0);
         shown.then(|| (across(x), up(y)))
     });
     let points: Vec<Option<(f64, f64)>> = points.collect();
-    let mut d = String::new();
-    if series.style == Style::Points {
-        for (x, y) in points.into_iter().flatten() {
-            let _ = write!(d, "M{} {}h0", n1(x), n1(y));
-        }
-        out.path(&d, paint, 4.4, " stroke-linecap=\"round\"");
+    if series.style.is_symbol() {
+        let points: Vec<(f64, f64)> = points.into_iter().flatten().collect();
+        symbols(out, series.style, &points, paint);
         return;
     }
+    let mut d = String::new();
     for run in points.split(Option::is_none).filter(|run| !run.is_empty()) {
         let run: Vec<(f64, f64)> = run.iter().flatten().copied().collect();
         for (i, (x, y)) in thin(&run).into_iter().enumerate() {

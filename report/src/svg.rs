@@ -181,6 +181,20 @@ impl Svg {
         let _ = write!(self.body, "<path d=\"{d}\" stroke=\"{colour}\" stroke-width=\"{}\"/>", n(width));
     }
 
+    /// Begins a part of which only what lies in this rectangle is shown.
+    pub fn open_window(&mut self, at: (f64, f64), size: (f64, f64)) {
+        let [x, y, wide, high] = [at.0, at.1, size.0, size.1].map(n);
+        let _ = write!(
+            self.body,
+            "<svg x=\"{x}\" y=\"{y}\" width=\"{wide}\" height=\"{high}\" viewBox=\"{x} {y} {wide} {high}\">"
+        );
+    }
+
+    /// Ends it.
+    pub fn close_window(&mut self) {
+        self.body.push_str("</svg>");
+    }
+
     /// An arrow from `from` to `to`, its point at `to`.
     pub fn arrow(&mut self, from: (f64, f64), to: (f64, f64), paint: &Paint, width: f64) {
         let head = 5.0 + 1.6 * width;

@@ -65,10 +65,12 @@ fn figures() -> Vec<Figure> {
             .horizontal(f64::NAN, "nowhere")
     };
     let mut all = vec![Figure::new("", Axis::new("", ""))];
-    for style in [Style::Solid, Style::Dashed, Style::Dotted, Style::Points] {
+    for style in [Style::Solid, Style::Dashed, Style::Dotted, Style::Points, Style::Crosses, Style::Rings] {
         for (x, y) in [(&t[..], &y[..]), (&t, &gaps), (&[], &[]), (&[1.0], &[2.0]), (&odd, &odd), (&t[..5], &y[..2])] {
             let figure = Figure::new(NASTY, Axis::new("Time", "s")).caption(NASTY);
-            all.push(figure.panel(panel(x, y, style)).panel(panel(y, x, style)).vertical(0.25, NASTY));
+            all.push(figure.clone().panel(panel(y, x, style)).equal().vertical(0.25, NASTY));
+            let two = figure.panel(panel(x, y, style)).panel(panel(y, x, style)).vertical(0.25, NASTY);
+            all.extend([two.clone().view(0.2, 0.4), two.clone().view(-1.0, f64::INFINITY), two]);
         }
         let log = Figure::new("log", Axis::new("Frequency", "Hz").logarithmic());
         all.push(log.panel(Panel::new(Axis::new("Gain", "").logarithmic()).line("G", &t, &y).weight(f64::NAN)));
@@ -181,4 +183,106 @@ fn twenty_plots_of_two_thousand_points_stay_small() {
         page.figure(&Figure::new("", Axis::new("Time", "s")).panel(Panel::new(Axis::new("", "m")).line("y", &t, &y)));
     }
     assert!(page.html().len() < 500_000, "{}", page.html().len());
+}
+
+/// What stands in the attribute `name` of the elements `tag`.
+fn attributes(svg: &str, tag: &str, name: &str) -> Vec<String> {
+    let document = Document::parse(svg).unwrap();
+    let found = document.descendants().filter(|n| n.tag_name().name() == tag);
+    found.filter_map(|n| n.attribute(name).map(str::to_string)).collect()
+}
+
+/// Nyquist's curve had axes of different units, and the circle around −1 was an ellipse.
+#[test]
+fn a_circle_is_round_where_axes_are_equal() {
+    let angle = |k: i32| f64::from(k) * std::f64::consts::TAU / 360.0;
+    let (x, y): (Vec<f64>, Vec<f64>) = (0..=360).map(|k| (angle(k).cos(), angle(k).sin())).unzip();
+    let circle = Figure::new("", Axis::new("Re", "")).panel(Panel::new(Axis::new("Im", "")).line("", &x, &y));
+    let sides = |figure: &Figure| {
+        let path = attributes(&figure.svg(), "path", "d").into_iter().max_by_key(String::len).unwrap();
+        let numbers: Vec<f64> = path.split(['M', 'L', ' ']).filter_map(|word| word.parse().ok()).collect();
+        let side = |k: usize| {
+            let values = || numbers.iter().skip(k).step_by(2).copied();
+            values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min)
+        };
+        side(0) / side(1)
+    };
+    assert!(sides(&circle) > 2.0, "{}", sides(&circle));
+    assert!((sides(&circle.clone().equal()) - 1.0).abs() < 0.005, "{}", sides(&circle.equal()));
+}
+
+/// Sensitivity was shown from 10 µHz, and its peak stood in a few pixels at the right.
+#[test]
+fn what_is_shown_first_can_be_a_part() {
+    let x: Vec<f64> = (0..=1000).map(|k| 10f64.powf(-5.0 + 8.0 * f64::from(k) / 1000.0)).collect();
+    let y: Vec<f64> = x.iter().map(|x| if *x < 1.0 { 1e6 } else { 1.0 + 1.0 / x }).collect();
+    let axis = || Axis::new("Frequency", "Hz").logarithmic();
+    let figure = Figure::new("", axis()).panel(Panel::new(Axis::new("|S|", "")).line("", &x, &y)).view(1.0, 1e3);
+    let texts = figure.svg();
+    assert!(texts.contains(">1000<") && !texts.contains(">0.01<") && !texts.contains("10⁶"), "{texts}");
+    let mut page = Page::new("");
+    page.figure(&figure);
+    assert!(page.html().contains("\"range\":[1e0,1e3]"));
+    // All of the curve is there for who zooms out.
+    assert!(page.html().contains("\"n\":1001"));
+}
+
+/// "10000" at the end of a frequency axis was cut at the edge of the picture.
+#[test]
+fn the_last_tick_is_not_cut() {
+    let (x, y) = ([10.0, 10_000.0], [0.0, 1.0]);
+    let figure = Figure::new("", Axis::new("Frequency", "Hz").logarithmic());
+    let svg = figure.panel(Panel::new(Axis::new("Gain", "")).line("", &x, &y)).svg();
+    let document = Document::parse(&svg).unwrap();
+    let last = document.descendants().find(|n| n.text() == Some("10000")).unwrap();
+    let text = last.ancestors().find(|n| n.tag_name().name() == "text").unwrap();
+    let middle: f64 = text.attribute("x").unwrap().parse().unwrap();
+    assert_eq!(text.attribute("text-anchor"), Some("middle"));
+    assert!(middle + 18.0 <= 760.0, "{middle}");
+}
+
+#[test]
+fn figures_over_the_same_axis_are_zoomed_together() {
+    let figure = |label: &str, to: f64| {
+        Figure::new("", Axis::new(label, "s")).panel(Panel::new(Axis::new("", "")).line("", &[0.0, to], &[0.0, 1.0]))
+    };
+    let mut page = Page::new("");
+    for figure in
+        [figure("Time", 1.0), figure("Lag", 1.0), figure("Time", 1.1), figure("Time", 9.0), figure("Time", 1.0).equal()]
+    {
+        page.figure(&figure);
+    }
+    let html = page.html();
+    let axes: Vec<&str> =
+        html.split("<figure class=\"plot\"").skip(1).map(|rest| rest.split('>').next().unwrap()).collect();
+    assert_eq!(axes, [" data-axis=\"0\"", " data-axis=\"1\"", " data-axis=\"0\"", " data-axis=\"2\"", ""]);
+}
+
+/// Sections were not finer when zoomed: every curve of more than 1500 rows had been thinned out.
+#[test]
+fn evenly_spaced_samples_are_embedded_whole_and_thinning_is_said() {
+    let json = |rows: u32| {
+        let t: Vec<f64> = (0..rows).map(|i| f64::from(i) * 1e-3).collect();
+        let y: Vec<f64> = t.iter().map(|t| (99.0 * t).sin()).collect();
+        let mut page = Page::new("");
+        page.figure(&Figure::new("", Axis::new("Time", "s")).panel(Panel::new(Axis::new("", "m")).line("y", &t, &y)));
+        page.html()
+    };
+    let html = json(12_000);
+    assert!(html.contains("\"n\":12000") && !html.contains("\"of\":"));
+    let html = json(50_000);
+    assert!(html.contains("\"of\":50000") && html.contains("\"n\":6000"));
+    // A whole curve of twice the points weighs no more than a thinned one.
+    assert!(json(12_000).len() <= html.len() + 100, "{} {}", json(12_000).len(), html.len());
+}
+
+#[test]
+fn poles_are_crosses_and_zeros_are_circles() {
+    let panel = Panel::new(Axis::new("Im", ""));
+    let panel = panel.series(Series::new("poles", [1.0], [2.0]).style(Style::Crosses));
+    let svg = Figure::new("", Axis::new("Re", ""))
+        .panel(panel.series(Series::new("zeros", [2.0], [1.0]).style(Style::Rings)))
+        .svg();
+    // One in the legend, one in the plot.
+    assert_eq!((svg.matches("l8 8").count(), svg.matches("a4 4").count()), (2, 4));
 }

@@ -240,6 +240,7 @@ fn log() -> Value {
     let columns = || json!({ "type": "object" });
     let mut own = vec![
         ("file", json!({ "type": "string" })),
+        ("fetch", described(json!({ "type": "string" }), "The command that brings the file where it is not there")),
         ("time", any(vec![column(), table("experiment.log.time", &[])])),
         ("input", column()),
         ("reference", column()),

@@ -1,7 +1,8 @@
 //! The project's own chores: `cargo xtask test` checks all that can be checked, `cargo xtask python` the Python package alone,
-//! `cargo xtask data` fetches other people's measurements, `cargo xtask hunt` looks for what is wrong with larger means,
-//! `cargo xtask coverage` and `cargo xtask faults` make the tables of docs/fit.md.
+//! `cargo xtask browser` the reports alone, `cargo xtask data` fetches other people's measurements, `cargo xtask hunt` looks for what is
+//! wrong with larger means, `cargo xtask coverage` and `cargo xtask faults` make the tables of docs/fit.md.
 
+mod browser;
 mod data;
 mod hunt;
 mod ignored;
@@ -24,10 +25,12 @@ enum Work {
     Cargo(&'static [&'static str], &'static [(&'static str, &'static str)]),
     /// The Python package's own chain of commands.
     Python,
+    /// Reports in a browser.
+    Browser,
 }
 
 /// In this order, the quickest to fail first.
-const STEPS: [Step; 7] = [
+const STEPS: [Step; 8] = [
     step("formatting", &["fmt", "--all", "--check"]),
     step("lints", &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]),
     step(
@@ -41,10 +44,13 @@ const STEPS: [Step; 7] = [
     // Unit tests, integration tests and the examples in the documentation.
     step("tests", &["test", "--workspace", "--no-fail-fast"]),
     step("examples", &["build", "--workspace", "--examples"]),
+    BROWSER,
     PYTHON,
 ];
 
 const PYTHON: Step = Step { what: "the Python package", work: Work::Python };
+
+const BROWSER: Step = Step { what: "reports in a browser", work: Work::Browser };
 
 const fn step(what: &'static str, command: &'static [&'static str]) -> Step {
     Step { what, work: Work::Cargo(command, &[]) }
@@ -55,6 +61,7 @@ fn main() -> ExitCode {
     let done = match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["test"] => test(&STEPS),
         ["python"] => test(&[PYTHON]),
+        ["browser"] => test(&[BROWSER]),
         ["data", ref words @ ..] => data::run(words),
         ["coverage", ref words @ ..] => example("coverage", words),
         ["faults", ref words @ ..] => example("faults", words),
@@ -67,7 +74,8 @@ fn main() -> ExitCode {
         },
         _ => {
             eprintln!(
-                "usage: cargo xtask test | cargo xtask python | cargo xtask coverage [...] | cargo xtask faults [...] | {} | {}",
+                "usage: cargo xtask test | cargo xtask browser | cargo xtask python | cargo xtask coverage [...] | \
+                 cargo xtask faults [...] | {} | {}",
                 data::USAGE,
                 hunt::USAGE
             );
@@ -127,6 +135,7 @@ impl Step {
         match self.work {
             Work::Cargo(words, _) => words.join(" "),
             Work::Python => "xtask python".into(),
+            Work::Browser => "xtask browser".into(),
         }
     }
 
@@ -139,6 +148,7 @@ impl Step {
                 run(command, counts)
             }
             Work::Python => python::test(counts),
+            Work::Browser => browser::test(counts),
         }
     }
 }

@@ -1,10 +1,30 @@
 //! Model and log side by side.
 
 use taut::fit::{Estimate, LogFit, OutputFit, Posterior, Profile};
+use taut::log::Quantity;
 use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// Logs drawn; the numbers of the rest are in the tables.
 pub const MOST_LOGS: usize = 12;
+
+/// The logs that are drawn: those whose residuals are largest beside what the fit takes as their deviation, the worst first.
+pub fn worst<'a>(logs: &'a [LogFit], noise: &[(Quantity, f64)]) -> Vec<&'a LogFit> {
+    let mut logs: Vec<(f64, &LogFit)> = logs.iter().map(|log| (misfit(log, noise), log)).collect();
+    logs.sort_by(|a, b| b.0.total_cmp(&a.0));
+    logs.into_iter().take(MOST_LOGS).map(|(_, log)| log).collect()
+}
+
+/// The largest RMSE of a log's outputs, each over the deviation of its quantity; infinite where the model does not reach the end.
+fn misfit(log: &LogFit, noise: &[(Quantity, f64)]) -> f64 {
+    if !log.complete {
+        return f64::INFINITY;
+    }
+    let relative = log.outputs.iter().flat_map(|output| {
+        let deviation = noise.iter().find(|(quantity, _)| *quantity == output.quantity).map_or(1.0, |(_, d)| *d);
+        [output.fitted, output.held_out].into_iter().flatten().map(move |score| score.rmse / deviation)
+    });
+    relative.filter(|value| !value.is_nan()).fold(0.0, f64::max)
+}
 
 /// A quantity's axis, in a unit that suits it.
 fn axis(output: &OutputFit, label: &str) -> Axis {
@@ -119,4 +139,43 @@ pub fn histogram(drawn: &Posterior, j: usize, estimate: Option<&Estimate>) -> Op
         .vertical(to, "97.5 %")
         .caption("How the draws are spread, and the normal distribution that the fit stands for.");
     Some(figure)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use taut::fit::Score;
+
+    /// A log of angle and current, met with these errors; held out if `held`.
+    fn log(name: &str, [angle, current]: [f64; 2], held: bool) -> LogFit {
+        let output = |quantity, rmse| {
+            let score = Some(Score { count: 9, rmse, worst: rmse, percent: 90.0, memory: 0.0 });
+            let (fitted, held_out) = if held { (None, score) } else { (score, None) };
+            OutputFit { quantity, seen: Vec::new(), model: Vec::new(), fitted, held_out }
+        };
+        LogFit {
+            name: name.into(),
+            window: 0,
+            held_out: held,
+            time: Vec::new(),
+            fitted_rows: 0,
+            outputs: vec![output(Quantity::DriveAngle, angle), output(Quantity::MotorCurrent, current)],
+            extras: Vec::new(),
+            complete: true,
+        }
+    }
+
+    /// Of 42 logs the first twelve were drawn, and those that were met badly were not seen.
+    #[test]
+    fn the_worst_logs_are_drawn() {
+        let noise = [(Quantity::DriveAngle, 1e-3), (Quantity::MotorCurrent, 0.1)];
+        let mut logs: Vec<LogFit> = (0..20).map(|k| log(&format!("even {k}"), [1e-3, 0.1], false)).collect();
+        logs.push(log("angle", [2e-3, 0.1], false));
+        logs.push(log("current", [1e-3, 0.3], false));
+        logs.push(log("held out", [1e-2, 0.1], true));
+        logs.push(LogFit { complete: false, ..log("broken off", [1e-3, 0.1], false) });
+        let drawn: Vec<&str> = worst(&logs, &noise).iter().map(|log| log.name.as_str()).collect();
+        assert_eq!(drawn.len(), MOST_LOGS);
+        assert_eq!(drawn[..5], ["broken off", "held out", "current", "angle", "even 0"]);
+    }
 }

@@ -27,16 +27,21 @@ pub fn page(case: &Case, found: &Found, text: &str) -> Page {
         posterior::section(&mut page, fit, drawn);
     }
     logs(&mut page, fit);
-    for log in fit.logs.iter().take(figures::MOST_LOGS) {
+    if fit.logs.len() > figures::MOST_LOGS {
+        page.prose(format!(
+            "The {} logs that the model meets worst, by RMSE over the deviation of their residuals, the worst first; the other {} are in the table \
+             above.",
+            figures::MOST_LOGS,
+            fit.logs.len() - figures::MOST_LOGS
+        ));
+    }
+    for log in figures::worst(&fit.logs, &fit.noise) {
         for output in &log.outputs {
             page.figure(&figures::overlay(log, output));
             if let Some(figure) = figures::memory(log, output) {
                 page.figure(&figure);
             }
         }
-    }
-    if fit.logs.len() > figures::MOST_LOGS {
-        page.prose(format!("{} more logs are in the table above.", fit.logs.len() - figures::MOST_LOGS));
     }
     page.section("The case with the estimates");
     page.embed("fitted.toml", text);

@@ -108,18 +108,18 @@ fn roots(analysis: &Analysis) -> Figure {
         values.iter().map(|v| (squeeze(v.re), squeeze(v.im))).unzip()
     };
     let mut panel = Panel::new(Axis::new("Im s as sgn · lg(2 |Im|)", "")).weight(1.4);
-    let mut add = |name: String, values: &[Complex<f64>], colour| {
+    let mut add = |name: String, values: &[Complex<f64>], colour, style| {
         let (x, y) = points(values);
         let panel_now = std::mem::replace(&mut panel, Panel::new(Axis::new("", "")));
-        panel = panel_now.series(Series::new(name, x, y).style(Style::Points).colour(colour));
+        panel = panel_now.series(Series::new(name, x, y).style(style).colour(colour));
     };
     let wanted = [("drive_angle", Colour::Blue), ("cart_position", Colour::Green), ("span1_force", Colour::Amber)];
     if let Some(transfer) = analysis.transfers.first() {
-        add("poles".into(), &transfer.poles, Colour::Vermillion);
+        add("poles".into(), &transfer.poles, Colour::Vermillion, Style::Crosses);
     }
     for (name, colour) in wanted {
         if let Some(index) = analysis.system.output(name) {
-            add(format!("zeros of {}", words(name)), &analysis.transfers[index].zeros.values, colour);
+            add(format!("zeros of {}", words(name)), &analysis.transfers[index].zeros.values, colour, Style::Rings);
         }
     }
     Figure::new("Poles and zeros", Axis::new("Re s as sgn · lg(2 |Re|), 1/s", ""))

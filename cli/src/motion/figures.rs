@@ -1,13 +1,11 @@
 //! The plots of a move.
 
 use super::Done;
+use crate::simulate::curves::decimator;
 use crate::simulate::plots::Named;
 use taut::stage::Stage;
 use taut::trajectory::Trajectory;
 use taut_report::{Axis, Colour, Decimator, Figure, Panel, Series, Style};
-
-/// Points that a curve keeps.
-const POINTS: usize = 3000;
 
 /// Columns that are shown; what ends on an angle or its speed is shown at the belt.
 const COLUMNS: [&str; 11] = [
@@ -35,8 +33,8 @@ pub struct Curves {
 impl Curves {
     /// No points yet.
     pub fn new(stage: &Stage) -> Self {
-        let thinned = COLUMNS.iter().map(|_| Decimator::new(POINTS)).collect();
-        Self { radius: stage.pulley_radius, thinned, following: Decimator::new(POINTS), scratch: Vec::new() }
+        let thinned = COLUMNS.iter().map(|_| decimator()).collect();
+        Self { radius: stage.pulley_radius, thinned, following: decimator(), scratch: Vec::new() }
     }
 
     /// Takes the next rows.
@@ -72,7 +70,7 @@ pub fn figures(done: &Done) -> Vec<Named> {
         lines.iter().zip(looks).fold(Panel::new(axis), |panel, (&(column, name), (colour, style))| {
             let (x, y) = curves.get(column);
             let name = if lines.len() > 1 { name } else { "" };
-            panel.series(Series::new(name, x, y).colour(colour).style(style))
+            panel.series(Series::new(name, x, y).colour(colour).style(style).thinned_from(curves.following.seen()))
         })
     };
     let millimetres = |name: &'static str| Axis::new(name, "m").shown_as("mm", 1e3);

@@ -7,6 +7,14 @@ use taut_report::Decimator;
 /// Points that a curve keeps: more than a plot has pixels.
 const POINTS: usize = 3000;
 
+/// Rows up to which a curve keeps every one of them: evenly spaced they weigh half, and a zoom finds them all.
+const WHOLE: usize = 12_000;
+
+/// Thins out one curve as its rows come.
+pub fn decimator() -> Decimator {
+    Decimator::new(POINTS).whole_up_to(WHOLE)
+}
+
 /// A curve: its name, and the columns that it is a sum of, each with its weight.
 pub type Source = (String, Vec<(String, f64)>);
 
@@ -62,7 +70,7 @@ pub struct Samples {
 impl Samples {
     /// No samples yet.
     pub fn new(stage: &Stage) -> Self {
-        Self { radius: stage.pulley_radius, thinned: LOGGED.iter().map(|_| Decimator::new(POINTS)).collect() }
+        Self { radius: stage.pulley_radius, thinned: LOGGED.iter().map(|_| decimator()).collect() }
     }
 
     /// Takes the next rows of the log.
@@ -97,7 +105,7 @@ impl Curves {
 
     /// The same of these curves.
     pub fn of(sources: Vec<Source>) -> Self {
-        let thinned = sources.iter().map(|_| Decimator::new(POINTS)).collect();
+        let thinned = sources.iter().map(|_| decimator()).collect();
         Self { sources, thinned, scratch: Vec::new() }
     }
 
@@ -120,6 +128,11 @@ impl Curves {
             };
             thinned.push(time, sum);
         }
+    }
+
+    /// Rows that the curves stand for.
+    pub fn rows(&self) -> usize {
+        self.thinned.iter().map(Decimator::seen).max().unwrap_or(0)
     }
 
     /// Times and values of the curve called `name`; none if the run has no such quantity.

@@ -1,8 +1,9 @@
 //! `taut simulate`: runs the experiments of a case, and says what they show.
 
 mod band;
-mod curves;
+pub mod curves;
 mod gantry;
+mod marks;
 mod page;
 pub mod plots;
 mod rows;

@@ -1,6 +1,7 @@
 //! The plots of a run.
 
 use super::curves::{Curves, Samples};
+use super::marks;
 use super::run::Run;
 use taut::case::Case;
 use taut::stage::AmplifierMode;
@@ -28,16 +29,21 @@ pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
         .caption("What the motor gets, and the current it draws.");
 
     let bodies = [("drive", "drive pulley r φ₁"), ("cart", "cart x"), ("idler", "idler pulley r φ₃")];
+    let events = &run.outcome.events;
+    let marked = |panel: Panel, names: [&str; 3]| marks::marked(panel, events, &names.map(|name| curves.get(name)));
+    let position = plot.measured(millimetres(), &bodies, &["drive_angle", "cart_position"]).weight(2.0);
     let positions = figure("positions")
-        .panel(plot.measured(millimetres(), &bodies, &["drive_angle", "cart_position"]).weight(2.0))
+        .panel(marked(position, ["drive", "cart", "idler"]))
         .panel(plot.panel(Axis::new("r φ₁ − x", "m").shown_as("µm", 1e6), &[("stretch 1", "r φ₁ − x")]))
         .caption(
             "Positions along the belt, and by how much an encoder at the drive pulley misses the cart. \
-             The three positions nearly coincide: zoom in to see them part.",
+             The three positions nearly coincide: zoom in to see them part. Where a body sticks and slips is marked.",
         );
     let speeds = [("drive speed", "drive pulley r φ̇₁"), ("cart speed", "cart ẋ"), ("idler speed", "idler pulley r φ̇₃")];
+    let speed = Axis::new("Speed", "m/s").shown_as("mm/s", 1e3);
+    let speed = plot.measured(speed, &speeds, &["drive_speed", "cart_speed"]);
     let speeds = figure("speeds")
-        .panel(plot.measured(Axis::new("Speed", "m/s").shown_as("mm/s", 1e3), &speeds, &["drive_speed", "cart_speed"]))
+        .panel(marked(speed, ["drive speed", "cart speed", "idler speed"]))
         .caption("Speeds along the belt.");
     let spans = [("stretch 1", "span 1"), ("stretch 2", "span 2"), ("stretch 3", "span 3")];
     let stretch = figure("stretch").panel(plot.panel(Axis::new("Stretch", "m").shown_as("µm", 1e6), &spans)).caption(
@@ -102,7 +108,12 @@ impl Plot<'_> {
         for (i, (curve, name)) in curves.iter().enumerate() {
             if let Some((x, y)) = self.curves.get(curve) {
                 let name = if curves.len() > 1 { *name } else { "" };
-                panel = panel.series(Series::new(name, x, y).colour(colours[i % 3]).style(styles[i % 3]));
+                panel = panel.series(
+                    Series::new(name, x, y)
+                        .colour(colours[i % 3])
+                        .style(styles[i % 3])
+                        .thinned_from(self.curves.rows()),
+                );
             }
         }
         panel

@@ -1,6 +1,7 @@
 //! Nyquist's curve, sensitivity, and the moves before and after.
 
 use super::Work;
+use crate::simulate::curves::decimator;
 use crate::simulate::plots::Named;
 use std::f64::consts::PI;
 use taut::Result;
@@ -9,13 +10,13 @@ use taut::control::feedback::Feedback;
 use taut::control::{Loop, Rows, Standard, stream};
 use taut::solve::{Flow, Solver};
 use taut::tune::{Corner, Verdict, loops};
-use taut_report::{Axis, Colour, Decimator, Figure, Panel, Series, Style};
-
-/// Points that a curve keeps.
-const POINTS: usize = 2000;
+use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// What is drawn of L beyond this would hide the point −1.
 const FAR: f64 = 3.0;
+
+/// |S| is shown from this part of the frequency of its lowest peak: below, it only falls.
+const BELOW_PEAK: f64 = 30.0;
 
 /// All of them, with names for files.
 pub fn all(work: &Work) -> Result<Vec<(String, Figure)>> {
@@ -39,6 +40,7 @@ fn frequency(work: &Work) -> Result<Vec<Named>> {
     let mut nyquist = Panel::new(Axis::new("Im L", "")).weight(2.2);
     let mut sensitivity = Panel::new(Axis::new("|S|", "").logarithmic()).weight(1.2);
     let mut complementary = Panel::new(Axis::new("|T|", "").logarithmic());
+    let (mut peak, mut last) = (f64::INFINITY, 0.0);
     for (name, verdict, corner, colour, style) in curves {
         let feedback = Feedback::new(&verdict.design, &work.case.stage)?;
         let plant = tuned.family.plant(corner, &verdict.design, &feedback.corners())?;
@@ -50,6 +52,8 @@ fn frequency(work: &Work) -> Result<Vec<Named>> {
         nyquist = nyquist.series(Series::new(name, re, im).colour(colour).style(style));
         let s: Vec<f64> = open.iter().map(|l| (l.position + 1.0).inv().norm().max(1e-4)).collect();
         let t: Vec<f64> = open.iter().map(|l| (l.position / (l.position + 1.0)).norm().max(1e-4)).collect();
+        peak = hertz.iter().zip(&s).max_by(|a, b| a.1.total_cmp(b.1)).map_or(peak, |(hertz, _)| peak.min(*hertz));
+        last = hertz.last().map_or(last, |hertz| hertz.max(last));
         sensitivity = sensitivity.series(Series::new(name, hertz.clone(), s).colour(colour).style(style));
         complementary = complementary.series(Series::new("", hertz, t).colour(colour).style(style));
     }
@@ -59,12 +63,13 @@ fn frequency(work: &Work) -> Result<Vec<Named>> {
     let (x, y): (Vec<f64>, Vec<f64>) =
         (0..=180).map(|k| (-1.0 + circle(k).cos() / limit, circle(k).sin() / limit)).unzip();
     nyquist = nyquist.series(Series::new(format!("Ms = {limit}"), x, y).colour(Colour::Green).style(Style::Dotted));
+    nyquist = nyquist.series(Series::new("−1", [-1.0], [0.0]).colour(Colour::Ink).style(Style::Crosses));
     sensitivity = sensitivity.horizontal(limit, "limit");
     complementary = complementary.horizontal(work.tuning.complementary, "limit");
     Ok(vec![
         (
             "nyquist",
-            Figure::new("Nyquist's curve of the sampled loop", Axis::new("Re L", "")).panel(nyquist).caption(
+            Figure::new("Nyquist's curve of the sampled loop", Axis::new("Re L", "")).panel(nyquist).equal().caption(
                 "L broken at the measured position, up to half the sampling rate. No curve may enter the circle around −1.",
             ),
         ),
@@ -73,6 +78,7 @@ fn frequency(work: &Work) -> Result<Vec<Named>> {
             Figure::new("Sensitivity", Axis::new("Frequency", "Hz").logarithmic())
                 .panel(sensitivity)
                 .panel(complementary)
+                .view(peak / BELOW_PEAK, last)
                 .caption("S = 1/(1 + L) and T = L/(1 + L), on the axis as the file has it and on the worst."),
         ),
     ])
@@ -90,7 +96,7 @@ fn moved(work: &Work, motion: &Move) -> Result<Figure> {
         let mut controller = Standard::new(design, stage)?;
         let profile = motion.profile.clone().shaped(&design.shaper);
         let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
-        let (mut x, mut u) = (Decimator::new(POINTS), Decimator::new(POINTS));
+        let (mut x, mut u) = (decimator(), decimator());
         stream(stage, &mut controller, &Loop::of(design), &profile, &rows, Solver::of(stage), false, &mut |block| {
             let column = |name: &str| block.get(name).unwrap_or(&[]);
             x.push(column("time"), column("cart_error"));

@@ -1,6 +1,7 @@
 //! The plots of a gantry's run.
 
 use super::super::curves::{Curves, Source, Way};
+use super::super::marks;
 use super::super::plots::Named;
 use super::run::Run;
 use taut::case::GantryCase;
@@ -39,7 +40,9 @@ pub fn figures(case: &GantryCase, run: &Run) -> Vec<Named> {
         let mut panel = Panel::new(axis);
         for (k, (curve, name)) in names.iter().enumerate() {
             if let Some((x, y)) = curves.get(curve) {
-                panel = panel.series(Series::new(*name, x, y).colour(colours[k % 4]).style(styles[k % 4]));
+                panel = panel.series(
+                    Series::new(*name, x, y).colour(colours[k % 4]).style(styles[k % 4]).thinned_from(curves.rows()),
+                );
             }
         }
         panel
@@ -61,21 +64,27 @@ pub fn figures(case: &GantryCase, run: &Run) -> Vec<Named> {
         .panel(two(Axis::new("Current", "A"), "current"))
         .caption("What the motors get, and the currents they draw.");
 
+    // Bodies two and three are bridge and cart; a pulley is at no place of its own.
+    let marked = |panel: Panel, [bridge, cart]: [&str; 2]| {
+        marks::marked(panel, &run.outcome.events, &[None, None, curves.get(bridge), curves.get(cart)])
+    };
+    let position = panel(
+        Axis::new("Position", "m").shown_as("mm", 1e3),
+        &[("bridge_position", "bridge x"), ("cart_position", "cart y")],
+    );
     let positions = figure("positions")
-        .panel(panel(
-            Axis::new("Position", "m").shown_as("mm", 1e3),
-            &[("bridge_position", "bridge x"), ("cart_position", "cart y")],
-        ).weight(1.6))
+        .panel(marked(position, ["bridge_position", "cart_position"]).weight(1.6))
         .panel(panel(Axis::new("Drives − true", "m").shown_as("µm", 1e6), &[("x error", "x"), ("y error", "y")]))
         .caption(
             "Where bridge and cart are, and by how much the drives miss them: x and y as the angles of the pulleys say, with belts that \
-             do not stretch, minus what they are.",
+             do not stretch, minus what they are. Where bridge and cart stick and slip is marked.",
         );
+    let speed = panel(
+        Axis::new("Speed", "m/s").shown_as("mm/s", 1e3),
+        &[("bridge_speed", "bridge ẋ"), ("cart_speed", "cart ẏ")],
+    );
     let speeds = figure("speeds")
-        .panel(panel(
-            Axis::new("Speed", "m/s").shown_as("mm/s", 1e3),
-            &[("bridge_speed", "bridge ẋ"), ("cart_speed", "cart ẏ")],
-        ))
+        .panel(marked(speed, ["bridge_speed", "cart_speed"]))
         .panel(two(Axis::new("Pulleys", "rad/s"), "speed"))
         .caption("Speeds of bridge and cart, and of the drive pulleys.");
     let spans: Vec<(String, &str)> =
