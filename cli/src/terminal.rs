@@ -179,7 +179,7 @@ mod tests {
         assert_eq!(at(24, "  name    one two three four\n"), "  name    one two three\n          four\n");
         assert_eq!(at(20, "a sentence without any gap\n"), "a sentence without\n    any gap\n");
         assert_eq!(at(12, "averyveryverylongword and more\n"), "averyveryverylongword\n    and more\n");
-        assert_eq!(at(14, "  name  1.5 m, 2.25 mm\n"), "  name  1.5 m,\n        2.25 mm\n");
+        assert_eq!(at(16, "  name  1.5 m, 2.25 mm\n"), "  name  1.5 m,\n        2.25 mm\n");
         assert_eq!(visible("\u{1b}[1mbold\u{1b}[0m R\u{302}"), 6);
     }
 }
