@@ -11,6 +11,7 @@ mod moves;
 #[cfg(feature = "posterior")]
 mod posterior;
 mod simulation;
+mod tune;
 
 pub use check::check;
 pub use fit::fit;
@@ -21,6 +22,7 @@ pub use moves::{Moved, moves};
 #[cfg(feature = "posterior")]
 pub use posterior::posterior;
 pub use simulation::{Band, Event, Metrics, Simulated, Simulation, load_unit};
+pub use tune::tuned;
 
 use crate::metrics::Peak;
 use crate::solve::Ending;
