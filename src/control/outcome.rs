@@ -179,7 +179,7 @@ fn run(
     figures.limited = sampled.held_back;
     figures.restlessness = sampled.turns as f64 / metrics.end.max(f64::MIN_POSITIVE);
     let samples = (sampled.samples, sampled.limited);
-    let swing = sampled.rest.swing();
+    let swing = sampled.at_rest.swing();
     Ok(MoveRun { figures, metrics, outcome, samples, kept: sampled.kept.unwrap_or_default(), swing })
 }
 

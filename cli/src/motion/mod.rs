@@ -15,7 +15,7 @@ use figures::Curves;
 use std::fmt::Write;
 use std::path::Path;
 use taut::case::{Case, Move};
-use taut::control::trouble::{Trouble, trouble};
+use taut::control::trouble::{self, Trouble};
 use taut::control::{Loop, MoveRun, Rows, Standard, Worst, stream, worst};
 use taut::design::Design;
 use taut::files::write_atomically;
@@ -160,7 +160,7 @@ fn one<'a>(
         Some(share) => worst(&case.stage, design, motion, share, solver, &|| interrupt.signal().is_some())?,
         None => None,
     };
-    let trouble = trouble(stage, design, &run, motion.profile.target());
+    let trouble = trouble::trouble(stage, design, &run, motion.profile.target());
     Ok(Done { motion, run, curves, worst, trouble, files })
 }
 
