@@ -28,7 +28,7 @@ pub fn tuned(case: &Case, tuning: &Tuning, tuned: &Tuned) -> Value {
             "left_out": tuned.family.left_out(tuned.family.machines.len()),
         },
         "standard_moves": case.moves.is_empty(),
-        "undamped_belt": tuned.undamped,
+        "undamped_mode_Hz": tuned.undamped,
         "began_with_Hz": tuned.placed,
         "holds": tuned.holds,
         "rounds": tuned.work.0,
@@ -54,6 +54,7 @@ fn margins(m: &Margins) -> Value {
         "bandwidth_Hz": number(m.bandwidth / (2.0 * PI)),
         "tracking_bandwidth_Hz": number(m.tracking / (2.0 * PI)),
         "disturbance": number(m.disturbance),
+        "following": number(m.following),
     })
 }
 

@@ -149,6 +149,8 @@ pub struct Margins {
     /// √(1/π ∫ |S G/ω|² dω) from 2π 0.1 Hz on: root of the integral over time of the squared cart position, m √s, after a step of 1 V or 1 A
     /// at the command.
     pub disturbance: f64,
+    /// √(1/π ∫ |S/ω|² dω) from 2π 0.1 Hz on, √s: the same of the error after a step of 1 m of the reference, per metre, without feed-forward.
+    pub following: f64,
 }
 
 impl Margins {
@@ -175,7 +177,8 @@ impl Margins {
     /// Those of a loop that is not stable.
     fn spoil(&mut self) {
         (self.sensitivity, self.complementary) = (f64::INFINITY, f64::INFINITY);
-        (self.gain, self.phase, self.disturbance) = (1.0, 0.0, f64::INFINITY);
+        (self.gain, self.phase) = (1.0, 0.0);
+        (self.disturbance, self.following) = (f64::INFINITY, f64::INFINITY);
         (self.bandwidth, self.tracking) = (f64::NAN, f64::NAN);
     }
 
@@ -290,7 +293,8 @@ impl<'a> Curve<'a> {
             crossover: f64::NAN,
             bandwidth: f64::NAN,
             tracking: f64::NAN,
-            disturbance: self.disturbance(),
+            disturbance: self.squared(&|open| open.pushed.norm_sqr()),
+            following: self.squared(&|open| (open.position + 1.0).inv().norm_sqr()),
         };
         for pair in self.points.windows(2) {
             let [(_, was), (_, is)] = [pair[0], pair[1]];
@@ -387,10 +391,10 @@ impl<'a> Curve<'a> {
         if low.1.abs() < high.1.abs() { low.0 } else { high.0 }
     }
 
-    /// √(1/π ∫ |S G_x/ω|² dω), by trapezia on the logarithm of ω.
-    fn disturbance(&self) -> f64 {
+    /// √(1/π ∫ v/ω² dω) of a squared magnitude v, by trapezia on the logarithm of ω.
+    fn squared(&self, value: &dyn Fn(&Open) -> f64) -> f64 {
         let slowest = 2.0 * PI * SLOWEST;
-        let part = |(omega, open): &(f64, Open)| open.pushed.norm_sqr() / omega;
+        let part = |(omega, open): &(f64, Open)| value(open) / omega;
         let sum: f64 = self
             .points
             .windows(2)

@@ -63,8 +63,8 @@ pub struct Tuned {
     pub holds: bool,
     /// Rounds, and designs that were tried; none of an evaluation.
     pub work: (usize, usize),
-    /// Whether the belt has no damping at all.
-    pub undamped: bool,
+    /// The first mode of a belt that has no damping at all, Hz.
+    pub undamped: Option<f64>,
     /// Whether gains were looked for, and not judged alone.
     pub searched: bool,
 }
@@ -125,18 +125,17 @@ pub fn tune(case: &Case, tuning: &Tuning, stop: &dyn Fn() -> bool) -> Result<Tun
             "allow a larger tune.sensitivity and tune.complementary, a smaller spread, or give it another structure",
         ));
     };
-    let bars = is_good.then_some(&before);
     let (after, choices) = match cost {
         Cost::Disturbance => (work.verdict(&best.design)?, Vec::new()),
         Cost::Moves | Cost::Squares | Cost::Peak => {
             let leading = work.verdict(&best.design)?;
             let some = some_of(&leading);
-            let archive = work.by_moves(&finalists, &some, cost, bars.map(|before| before.on(&some)).as_deref())?;
-            work.chosen(&archive, &some, cost, bars, leading)?
+            let archive = work.by_moves(&finalists, &some, cost, &before.on(&some))?;
+            work.chosen(&archive, &some, cost, &before, leading)?
         }
     };
     // What is no better stays as it was.
-    let after = if bars.is_some() && compare(&before, &after) != Judgement::Better { before.clone() } else { after };
+    let after = if is_good && compare(&before, &after) != Judgement::Better { before.clone() } else { after };
     Ok(ended(&work, before, after, choices, placed))
 }
 
@@ -163,32 +162,31 @@ fn some_of(verdict: &Verdict) -> Vec<usize> {
 }
 
 impl Work<'_> {
-    /// The design that is best by the objective over all machines, and what other balances choose.
+    /// The design that is best by the objective over all machines, one that makes no move worse before any other; and what other balances
+    /// choose.
     fn chosen(
         &mut self,
         archive: &[work::Tried],
         some: &[usize],
         cost: Cost,
-        bars: Option<&Verdict>,
+        before: &Verdict,
         leading: Verdict,
     ) -> Result<(Verdict, Vec<Choice>)> {
-        let figures = bars.map(|before| before.on(some));
+        let figures = before.on(some);
+        let rank = |verdict: &Verdict| (compare(before, verdict) == Judgement::Worse, verdict.objective);
+        let is_better = |one: &Verdict, other: &Verdict| rank(one) < rank(other);
         let mut after = leading;
         let mut choices: Vec<Choice> = Vec::new();
-        for place in [1, 0, 2] {
+        for (place, bars) in [(1, Some(&figures[..])), (1, None), (0, None), (2, None)] {
             let balance = &BALANCES[place];
-            let Some(design) = self.best_of(archive, cost, balance, figures.as_deref(), TRIES)? else { continue };
+            let Some(design) = self.best_of(archive, cost, balance, bars, TRIES)? else { continue };
             let known = choices.iter().find(|choice| choice.design == design).map(|c| (c.objective, c.worst.clone()));
             let (value, worst) = match known {
                 Some(known) => known,
                 None => {
                     let verdict = self.verdict(&design)?;
                     let own = (verdict.objective, verdict.at_worst());
-                    let is_allowed =
-                        |verdict: &Verdict| bars.is_none_or(|bars| compare(bars, verdict) != Judgement::Worse);
-                    // Whatever the balance was: what is better over all machines is taken.
-                    let is_better = verdict.objective < after.objective || !is_allowed(&after);
-                    if is_allowed(&verdict) && is_better {
+                    if is_better(&verdict, &after) {
                         after = verdict;
                     }
                     own
@@ -196,9 +194,25 @@ impl Work<'_> {
             };
             choices.push(Choice { name: balance.name, design, objective: value, worst, chosen: false });
         }
+        // Of each balance the last: that without bars.
+        choices.reverse();
+        let mut names = Vec::new();
+        choices.retain(|choice| {
+            let is_new = !names.contains(&choice.name);
+            names.push(choice.name);
+            is_new
+        });
         choices.sort_by_key(|choice| BALANCES.iter().position(|balance| balance.name == choice.name));
+        let own = before.design.filters.len();
+        let whole = after.design.clone();
+        let after = self.pruned(after, own, &|was, is| !rank(is).0 || rank(was).0)?;
         for choice in &mut choices {
-            choice.chosen = choice.design == after.design;
+            choice.chosen = choice.design == whole;
+        }
+        if choices.iter().all(|choice| !choice.chosen) || whole != after.design {
+            choices.retain(|choice| !choice.chosen);
+            let (design, worst) = (after.design.clone(), after.at_worst());
+            choices.push(Choice { name: "chosen", design, objective: after.objective, worst, chosen: true });
         }
         Ok((after, choices))
     }
@@ -211,6 +225,7 @@ fn ended(work: &Work, before: Verdict, after: Verdict, choices: Vec<Choice>, pla
     let forced = (judgement == Judgement::Worse && breaks && work.excess(&after.worst) <= 1.0)
         .then(|| forced(work.family, &after, work.tuning));
     let belt = &work.case.stage.belt;
+    let is_undamped = belt.model != BeltModel::Rigid && belt.damping.iter().all(|damping| *damping == 0.0);
     Tuned {
         judgement,
         forced,
@@ -220,7 +235,7 @@ fn ended(work: &Work, before: Verdict, after: Verdict, choices: Vec<Choice>, pla
         moves: work.moves.to_vec(),
         holds: work.excess(&after.worst) <= 1.0,
         work: (work.rounds, work.tried),
-        undamped: belt.model != BeltModel::Rigid && belt.damping.iter().all(|damping| *damping == 0.0),
+        undamped: work.modes().ok().and_then(|(modes, _)| modes.first().copied()).filter(|_| is_undamped),
         before,
         after,
         searched: true,

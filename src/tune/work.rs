@@ -1,4 +1,4 @@
-//! The search: many designs by what a step of force does to the cart within the limits, which needs no run; the best of them by moves.
+//! The search: many designs by what steps of command and reference do within the limits, which needs no run; the best of them by moves.
 
 use super::family::Family;
 use super::gains::{self, rounded, searched, shaped};
@@ -6,6 +6,7 @@ use super::margins::{Margins, Plant};
 use super::objective::{AtWorst, BALANCES, Balance, look_at_all, objective};
 use super::rules::{layouts, starts};
 use super::search::minimise;
+use super::verdict::Verdict;
 use crate::case::{Case, Cost, Move, Tuning};
 use crate::control::feedback::Feedback;
 use crate::design::Design;
@@ -21,7 +22,7 @@ const ROUNDS: usize = 5;
 
 /// Values that a search without moves, and one with moves, may ask for.
 const VALUES: usize = 130;
-const MOVES: usize = 70;
+const MOVES: usize = 50;
 
 /// Designs that are searched by moves.
 const FINALISTS: usize = 3;
@@ -59,7 +60,7 @@ pub(super) struct Finalist {
     start: Design,
     own: usize,
     powers: Vec<f64>,
-    /// ln of what a step of force does.
+    /// ln of what steps do.
     value: f64,
 }
 
@@ -137,17 +138,18 @@ impl<'a> Work<'a> {
         Ok(false)
     }
 
-    /// How far a design is beyond the limits on the set, and what a step of force does there at worst.
+    /// How far a design is beyond the limits on the set, and what steps of command and reference do there at worst.
     fn on_set(&mut self, design: &Design) -> (f64, f64) {
         self.tried += 1;
         let Ok(feedback) = self.feedback(design) else { return (f64::INFINITY, f64::INFINITY) };
-        let (mut most, mut disturbance) = (0.0_f64, 0.0_f64);
+        let (mut most, mut slow) = (0.0_f64, 0.0_f64);
         for plant in self.set.iter().map(|&place| &self.plants[place]).chain(&self.more) {
             let margins = Margins::roughly(plant, &feedback);
             most = most.max(self.excess(&margins));
-            disturbance = disturbance.max(margins.disturbance);
+            // What a step at the command does, and a step of the reference: the one alone would do without a position gain.
+            slow = slow.max(margins.disturbance * margins.following);
         }
-        ((most / WITHIN - 1.0).max(0.0), disturbance)
+        ((most / WITHIN - 1.0).max(0.0), slow)
     }
 
     /// Modes of the axis that a command swings, each in the middle of where it goes along the travel, Hz; and the first anti-resonance.
@@ -238,7 +240,7 @@ impl<'a> Work<'a> {
         Ok(None)
     }
 
-    /// The best design from a start that keeps the limits, by what a step of force does.
+    /// The best design from a start that keeps the limits, by what steps of command and reference do.
     fn improved(&mut self, start: Design, own: usize) -> Result<Option<Finalist>> {
         let count = searched(&start, own);
         let mut powers = vec![0.0; count];
@@ -249,8 +251,8 @@ impl<'a> Work<'a> {
                 if (self.stop)() {
                     return f64::INFINITY;
                 }
-                let (beyond, disturbance) = self.on_set(&shaped(&start, own, x));
-                if beyond > 0.5 { 1e3 + beyond.min(1e6) } else { disturbance.ln() + STEEP * beyond }
+                let (beyond, slow) = self.on_set(&shaped(&start, own, x));
+                if beyond > 0.5 { 1e3 + beyond.min(1e6) } else { slow.ln() + STEEP * beyond }
             };
             powers = minimise(&powers, 0.3, 1e-3, most, &mut value).x;
             if !self.passes(&rounded(&shaped(&start, own, &powers)))? {
@@ -285,58 +287,80 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Searches by moves from each finalist, on the machines `some`; all that was run and keeps the limits on the set. `before` are figures
-    /// that none may be worse than.
+    /// Searches by moves from the best finalist, on the machines `some`; all that was run and keeps the limits on the set. Then once more from
+    /// where that ended, with no figure worse than those of `before`.
     pub fn by_moves(
         &mut self,
         finalists: &[Finalist],
         some: &[usize],
         cost: Cost,
-        before: Option<&[AtWorst]>,
+        before: &[AtWorst],
     ) -> Result<Vec<Tried>> {
         let mut archive: Vec<Tried> = Vec::new();
-        let mut ranked: Vec<(f64, &Finalist)> = Vec::new();
+        let mut best: Option<(f64, &Finalist)> = None;
         for finalist in finalists {
             let worst = self.run(&finalist.design, some);
-            let value = self.valued(cost, &BALANCES[1], &worst, before);
+            let value = self.valued(cost, &BALANCES[1], &worst, None);
             archive.push(Tried { design: finalist.design.clone(), worst });
-            ranked.push((value, finalist));
+            if best.is_none_or(|(least, _)| value < least) {
+                best = Some((value, finalist));
+            }
         }
-        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for (place, (_, finalist)) in ranked.iter().enumerate().take(2) {
-            let (start, own) = (&finalist.start, finalist.own);
-            let most = if place == 0 { MOVES } else { MOVES / 2 };
-            let mut powers = finalist.powers.clone();
-            for (step, most) in [(0.25, most), (0.1, most / 2)] {
-                let mut value = |x: &[f64]| {
-                    if (self.stop)() {
-                        return f64::INFINITY;
-                    }
-                    let design = rounded(&shaped(start, own, x));
-                    let beyond = self.on_set(&design).0;
-                    if beyond > 0.05 {
-                        return 1e3 + beyond.min(1e6);
-                    }
-                    let worst = self.run(&design, some);
-                    let value = self.valued(cost, &BALANCES[1], &worst, before) + STEEP * beyond;
-                    if beyond == 0.0 {
-                        archive.push(Tried { design, worst });
-                    }
-                    value
-                };
-                powers = minimise(&powers, step, 1e-3, most, &mut value).x;
-            }
+        let Some((_, finalist)) = best else { return Ok(archive) };
+        let (start, own) = (&finalist.start, finalist.own);
+        let mut powers = finalist.powers.clone();
+        for (step, most, bars) in [(0.25, MOVES, None), (0.1, MOVES / 2, None), (0.15, MOVES / 2, Some(before))] {
+            let from = powers.clone();
+            let mut value = |x: &[f64]| {
+                if (self.stop)() {
+                    return f64::INFINITY;
+                }
+                let design = rounded(&shaped(start, own, x));
+                let beyond = self.on_set(&design).0;
+                if beyond > 0.05 {
+                    return 1e3 + beyond.min(1e6);
+                }
+                let worst = self.run(&design, some);
+                let value = self.valued(cost, &BALANCES[1], &worst, bars) + STEEP * beyond;
+                if beyond == 0.0 {
+                    archive.push(Tried { design, worst });
+                }
+                value
+            };
+            powers = minimise(&powers, step, 1e-3, most, &mut value).x;
             if self.passes(&rounded(&shaped(start, own, &powers)))? {
-                powers = self.pulled(start, own, &finalist.powers, &powers)?;
+                powers = self.pulled(start, own, &from, &powers)?;
+                let design = rounded(&shaped(start, own, &powers));
+                let worst = self.run(&design, some);
+                archive.push(Tried { design, worst });
             }
-            let design = rounded(&shaped(start, own, &powers));
-            let worst = self.run(&design, some);
-            archive.push(Tried { design, worst });
             if (self.stop)() {
                 break;
             }
         }
         Ok(archive)
+    }
+
+    /// A design without those of its added filters, from number `own` on, without which the limits hold and it is as good: `is_as_good` is
+    /// asked with what it was and is.
+    pub fn pruned(
+        &mut self,
+        mut verdict: Verdict,
+        own: usize,
+        is_as_good: &dyn Fn(&Verdict, &Verdict) -> bool,
+    ) -> Result<Verdict> {
+        for place in (own..verdict.design.filters.len()).rev() {
+            let mut design = verdict.design.clone();
+            design.filters.remove(place);
+            if self.passes(&design)? {
+                continue;
+            }
+            let other = self.verdict(&design)?;
+            if other.objective <= verdict.objective + PAYS && is_as_good(&verdict, &other) {
+                verdict = other;
+            }
+        }
+        Ok(verdict)
     }
 
     /// ln J, and what figures are worse than before.

@@ -250,12 +250,9 @@ pub fn text(work: &Work) -> String {
     rows(&mut text, "At worst", &margins(&before.worst, &after.worst));
     let _ = writeln!(text, "  before: {}", tuned.family.words(&before.corner));
     let _ = writeln!(text, "  after: {}", tuned.family.words(&after.corner));
-    if tuned.undamped {
-        let _ = writeln!(
-            text,
-            "note: the belt has no damping; Ms is limited by an undamped mode at {}",
-            hertz(after.worst.at)
-        );
+    if let Some(mode) = tuned.undamped {
+        let told = "the belt has no damping: what limits Ms near its modes, from";
+        let _ = writeln!(text, "note: {told} {mode:.0} Hz on, is an undamped mode; give belt.damping if it is known");
     }
     rows(&mut text, "Moves", &moves(work));
     let objective =
