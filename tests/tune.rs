@@ -148,7 +148,6 @@ fn a_placed_loop_swings_as_asked() {
     // |T| of a PD loop on M s² + d s: (2ζ′ω s + ω²)/(s² + 2ζω s + ω²), ζ′ what K_d gives of ζ
     let rigid = Rigid::of(&case.stage);
     let Structure::Pid(gains) = &design.structure else { panic!() };
-    let filters: Vec<Biquad> = design.filters.iter().map(|filter| Biquad::new(filter, design.every)).collect();
     let (g, w) = (rigid.force_per_command(), 2.0 * PI * hertz);
     let most = (0..20_000)
         .map(|k| {
@@ -223,6 +222,7 @@ fn the_constraint_is_met_by_a_dense_sweep() {
     assert!(tuned.holds, "{:?}", tuned.after.worst);
     let design = &tuned.after.design;
     let Structure::Pid(gains) = &design.structure else { panic!() };
+    let filters: Vec<Biquad> = design.filters.iter().map(|filter| Biquad::new(filter, design.every)).collect();
     for corner in [&tuned.after.corner, &tuned.family.nominal()] {
         let mut stage = tuned.family.stage_at(corner);
         stage.belt.follows_cart = true;

@@ -248,7 +248,7 @@ impl Family {
     ) -> Result<(Corner, Margins)> {
         let corners = feedback.corners();
         let look = |corner: &Corner| -> Result<(f64, Margins)> {
-            let margins = Margins::roughly(&self.plant(corner, design, &corners)?, feedback);
+            let margins = Margins::of(&self.plant(corner, design, &corners)?, feedback);
             let value = badness(&margins);
             Ok((if value.is_nan() { f64::INFINITY } else { value }, margins))
         };

@@ -20,7 +20,7 @@ pub struct Gain {
     pub unit: &'static str,
     /// Its value.
     pub value: f64,
-    /// Whether a search changes it; a current loop's gains follow from its placement alone.
+    /// Whether a search changes it.
     pub searched: bool,
 }
 
@@ -148,8 +148,8 @@ fn fields(design: &mut Design) -> Vec<(&'static str, &mut f64, bool)> {
                 ("controller.cascade.filter", &mut cascade.filter, true),
             ];
             if let Some(inner) = &mut cascade.current {
-                all.push(("controller.cascade.current.proportional", &mut inner.proportional, false));
-                all.push(("controller.cascade.current.integral", &mut inner.integral, false));
+                all.push(("controller.cascade.current.proportional", &mut inner.proportional, true));
+                all.push(("controller.cascade.current.integral", &mut inner.integral, true));
             }
             all
         }

@@ -2,12 +2,15 @@
 
 use super::placement::{first, place};
 use crate::control::compensation::Rigid;
-use crate::design::{Design, Filter, Pid, Structure};
+use crate::design::{Design, Filter, Pid, StateFeedback, Structure};
 use crate::stage::{AmplifierMode, Stage};
 use std::f64::consts::PI;
 
 /// Damping ratios of placements beside that of the file.
 const DAMPINGS: [f64; 2] = [0.6, 1.0];
+
+/// Shares of the disturbance that a Kalman filter expects.
+const SLOWER: [f64; 2] = [0.3, 0.1];
 
 /// A notch that is added: its depth and width.
 const DEPTH: f64 = 0.1;
@@ -16,7 +19,7 @@ const WIDTH: f64 = 0.7;
 /// Most notches, those of the file with them.
 const NOTCHES: usize = 2;
 
-/// Starts for a design: placements about `bandwidth` (Hz), and for a PID Skogestad's rule. State feedback begins with its own weights.
+/// Starts for a design: placements about `bandwidth` (Hz), and for a PID Skogestad's rule. State feedback begins with its own weights and slower filters.
 pub fn starts(
     design: &Design,
     stage: &Stage,
@@ -29,8 +32,12 @@ pub fn starts(
     let mut all: Vec<(Design, Option<f64>)> =
         dampings.filter_map(|damping| Some((place(design, stage, hertz, damping)?, Some(hertz)))).collect();
     all.extend(simc(design, stage).map(|design| (design, None)));
-    if all.is_empty() {
-        all.push((design.clone(), None));
+    if let Structure::StateFeedback(weights) = &design.structure {
+        // A slower filter of the same regulator.
+        all.extend(SLOWER.map(|share| {
+            let weights = StateFeedback { disturbance: share * weights.disturbance, ..*weights };
+            (Design { structure: Structure::StateFeedback(weights), ..design.clone() }, None)
+        }));
     }
     all
 }

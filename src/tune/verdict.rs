@@ -148,7 +148,8 @@ impl Work<'_> {
             let (profile, solver) = (&motion.profile, Solver::of(stage));
             let own = closed_loop(&Setup { stage, model: stage, design, profile, until, window, solver })?;
             let at_worst = AtWorst::of(&seen, left_out);
-            let slowest = seen.iter().position(|one| one.settles == at_worst.settles.0).unwrap_or_default();
+            let slowest =
+                (0..seen.len()).max_by(|&a, &b| seen[a].settles.total_cmp(&seen[b].settles)).unwrap_or_default();
             moves.push(MoveVerdict {
                 name: motion.name.clone(),
                 cart: own.figures.cart,

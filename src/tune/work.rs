@@ -22,7 +22,7 @@ const ROUNDS: usize = 5;
 
 /// Values that a search without moves, and one with moves, may ask for.
 const VALUES: usize = 130;
-const MOVES: usize = 50;
+const MOVES: usize = 44;
 
 /// Designs that are searched by moves.
 const FINALISTS: usize = 3;
@@ -297,48 +297,68 @@ impl<'a> Work<'a> {
         before: &[AtWorst],
     ) -> Result<Vec<Tried>> {
         let mut archive: Vec<Tried> = Vec::new();
-        let mut best: Option<(f64, &Finalist)> = None;
+        let mut ranked: Vec<(f64, &Finalist)> = Vec::new();
         for finalist in finalists {
             let worst = self.run(&finalist.design, some);
-            let value = self.valued(cost, &BALANCES[1], &worst, None);
+            ranked.push((self.valued(cost, &BALANCES[1], &worst, None), finalist));
             archive.push(Tried { design: finalist.design.clone(), worst });
-            if best.is_none_or(|(least, _)| value < least) {
-                best = Some((value, finalist));
+        }
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // From the best two, and on from the better one.
+        let mut best: Option<(f64, &Finalist, Vec<f64>)> = None;
+        for (_, finalist) in ranked.into_iter().take(2) {
+            let step = (0.25, MOVES, None);
+            let (value, powers) = self.moved(finalist, &finalist.powers, some, cost, step, &mut archive)?;
+            if best.as_ref().is_none_or(|(least, ..)| value < *least) {
+                best = Some((value, finalist, powers));
             }
         }
-        let Some((_, finalist)) = best else { return Ok(archive) };
-        let (start, own) = (&finalist.start, finalist.own);
-        let mut powers = finalist.powers.clone();
-        for (step, most, bars) in [(0.25, MOVES, None), (0.1, MOVES / 2, None), (0.15, MOVES / 2, Some(before))] {
-            let from = powers.clone();
-            let mut value = |x: &[f64]| {
-                if (self.stop)() {
-                    return f64::INFINITY;
-                }
-                let design = rounded(&shaped(start, own, x));
-                let beyond = self.on_set(&design).0;
-                if beyond > 0.05 {
-                    return 1e3 + beyond.min(1e6);
-                }
-                let worst = self.run(&design, some);
-                let value = self.valued(cost, &BALANCES[1], &worst, bars) + STEEP * beyond;
-                if beyond == 0.0 {
-                    archive.push(Tried { design, worst });
-                }
-                value
-            };
-            powers = minimise(&powers, step, 1e-3, most, &mut value).x;
-            if self.passes(&rounded(&shaped(start, own, &powers)))? {
-                powers = self.pulled(start, own, &from, &powers)?;
-                let design = rounded(&shaped(start, own, &powers));
-                let worst = self.run(&design, some);
-                archive.push(Tried { design, worst });
-            }
-            if (self.stop)() {
-                break;
+        let Some((_, finalist, mut powers)) = best else { return Ok(archive) };
+        for step in [(0.1, MOVES / 2, None), (0.15, MOVES / 2, Some(before))] {
+            if !(self.stop)() {
+                powers = self.moved(finalist, &powers, some, cost, step, &mut archive)?.1;
             }
         }
         Ok(archive)
+    }
+
+    /// One search by moves: its step, how many designs it may try, and figures that none may be worse than. Its value, and the powers.
+    fn moved(
+        &mut self,
+        finalist: &Finalist,
+        from: &[f64],
+        some: &[usize],
+        cost: Cost,
+        (step, most, bars): (f64, usize, Option<&[AtWorst]>),
+        archive: &mut Vec<Tried>,
+    ) -> Result<(f64, Vec<f64>)> {
+        let (start, own) = (&finalist.start, finalist.own);
+        let mut value = |x: &[f64]| {
+            if (self.stop)() {
+                return f64::INFINITY;
+            }
+            let design = rounded(&shaped(start, own, x));
+            let beyond = self.on_set(&design).0;
+            if beyond > 0.05 {
+                return 1e3 + beyond.min(1e6);
+            }
+            let worst = self.run(&design, some);
+            let value = self.valued(cost, &BALANCES[1], &worst, bars) + STEEP * beyond;
+            if beyond == 0.0 {
+                archive.push(Tried { design, worst });
+            }
+            value
+        };
+        let found = minimise(from, step, 1e-3, most, &mut value);
+        let (mut value, mut powers) = (found.value, found.x);
+        if self.passes(&rounded(&shaped(start, own, &powers)))? {
+            powers = self.pulled(start, own, from, &powers)?;
+            let design = rounded(&shaped(start, own, &powers));
+            let worst = self.run(&design, some);
+            value = self.valued(cost, &BALANCES[1], &worst, bars);
+            archive.push(Tried { design, worst });
+        }
+        Ok((value, powers))
     }
 
     /// A design without those of its added filters, from number `own` on, without which the limits hold and it is as good: `is_as_good` is
@@ -407,6 +427,7 @@ fn slower(design: &Design, own: usize, stage: &crate::stage::Stage, factor: f64)
         "controller.pid.integral" => 3.0,
         "controller.pid.derivative" | "controller.cascade.position" | "controller.cascade.speed" => 1.0,
         "controller.cascade.speed_integral" => 2.0,
+        "controller.cascade.current.proportional" | "controller.cascade.current.integral" => 0.5,
         _ => 0.0,
     };
     match design.structure {
