@@ -24,6 +24,7 @@ mod laws;
 mod linear;
 mod logs;
 mod lugre;
+mod margins;
 mod measure;
 mod merged;
 mod metrics;

@@ -8,11 +8,12 @@ use std::path::Path;
 use taut::case::{Case, Cost, Tuning};
 use taut::control::compensation::Rigid;
 use taut::control::feedback::Feedback;
+use taut::control::filter::Biquad;
 use taut::control::{Controller, Seen, Setup, Standard, closed_loop};
 use taut::design::{Design, Structure};
 use taut::signal::profile::Reference;
 use taut::solve::{Ending, Solver};
-use taut::tune::{Corner, Family, Margins, Plant, hunting, minimise, place, tune};
+use taut::tune::{Corner, Family, Judgement, Margins, Plant, evaluate, hunting, minimise, place, tune};
 
 fn case(name: &str, changes: &[&str]) -> Case {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
@@ -216,11 +217,12 @@ fn stability_is_that_of_a_run() {
 #[test]
 fn the_constraint_is_met_by_a_dense_sweep() {
     let case = case("pid.toml", &[]);
-    let tuning = Tuning { cost: Some(Cost::Bandwidth), sensitivity: 1.7, loads: vec![0.0, 0.2], ..Tuning::default() };
+    let tuning = Tuning { cost: Some(Cost::Disturbance), sensitivity: 1.7, loads: vec![0.0, 0.2], ..Tuning::default() };
     let tuned = tune(&case, &tuning, &|| false).unwrap();
     assert!(tuned.holds, "{:?}", tuned.after.worst);
     let design = &tuned.after.design;
     let Structure::Pid(gains) = &design.structure else { panic!() };
+    let filters: Vec<Biquad> = design.filters.iter().map(|filter| Biquad::new(filter, design.every)).collect();
     for corner in [&tuned.after.corner, &tuned.family.nominal()] {
         let mut stage = tuned.family.stage_at(corner);
         stage.belt.follows_cart = true;
@@ -245,7 +247,8 @@ fn the_constraint_is_met_by_a_dense_sweep() {
             let c = one * gains.proportional
                 + one * gains.integral * t / (one - one / z)
                 + (one - one / z) * gains.derivative / ((one - one / z) * time + t);
-            most = most.max((one + c * y).norm().recip());
+            let filtered = filters.iter().fold(c, |product, filter| product * filter.at(z));
+            most = most.max((one + filtered * y).norm().recip());
         }
         assert!(most <= 1.7 * (1.0 + 1e-3), "{most}");
         if *corner == tuned.after.corner {
@@ -254,14 +257,18 @@ fn the_constraint_is_met_by_a_dense_sweep() {
     }
 }
 
-/// No axis drawn at random is worse than the worst that was found, by more than 1 %, and each settles in a run.
+/// No axis drawn at random is worse than the worst corner that was found, by more than 1 %, and each settles in a run.
 #[test]
 fn the_worst_axis_is_worse_than_random_ones() {
     for name in ["pid.toml", "cascade.toml", "lqi.toml"] {
         let case = case(name, &[]);
-        let tuning = Tuning { cost: Some(Cost::Bandwidth), loads: vec![0.0, 0.3], ..Tuning::default() };
-        let tuned = tune(&case, &tuning, &|| false).unwrap();
-        assert!(tuned.holds, "{name}: {:?}", tuned.after.worst);
+        let limits = Tuning { sensitivity: 1.5, complementary: 1.5, ..Tuning::default() };
+        let tuning = Tuning { cost: Some(Cost::Disturbance), loads: vec![0.0, 0.3], ..limits };
+        let found = tune(&case, &tuning, &|| false).unwrap();
+        assert!(found.holds, "{name}: {:?}", found.after.worst);
+        let case = Case { controller: Some(found.after.design), ..case };
+        let tuning = Tuning { corners: true, ..tuning };
+        let tuned = evaluate(&case, &tuning).unwrap();
         let family: &Family = &tuned.family;
         let design = &tuned.after.design;
         let feedback = Feedback::new(design, &case.stage).unwrap();
@@ -326,17 +333,61 @@ fn hunting_is_found_where_there_is_stiction() {
     assert_eq!(hunting(&smooth.stage, smooth.controller.as_ref().unwrap()).unwrap(), None);
 }
 
-/// The search makes the cost smaller, the text reads back to the same gains, and remarks are still there.
+/// With its defaults `taut tune` made the project's own machines worse (17 to 28 µm, 24 to 7 axes that settle) and said in green that the
+/// limits hold. Now a move is worse only where the limits force it, which is said; the text reads back to the same gains, remarks left alone.
 #[test]
-fn a_tuned_case_is_better_and_reads_back() {
+fn no_move_gets_worse_unless_a_limit_forces_it() {
     let case = case("pid-elastic.toml", &[]);
-    let tuning = Tuning { cost: Some(Cost::Squares), ..Tuning::default() };
-    let tuned = tune(&case, &tuning, &|| false).unwrap();
-    assert!(tuned.holds);
+    let tuned = tune(&case, &Tuning::default(), &|| false).unwrap();
+    assert!(tuned.holds, "{:?}", tuned.after.worst);
+    assert!(tuned.before.worst.excess(1.8, 1.8) > 1.0, "{:?}", tuned.before.worst);
+    let is_worse = tuned
+        .before
+        .moves
+        .iter()
+        .zip(&tuned.after.moves)
+        .any(|(was, is)| is.at_worst.error.0 > was.at_worst.error.0 * (1.0 + 1e-6) || is.settled.0 < was.settled.0);
+    if is_worse {
+        let forced = tuned.forced.expect("what forces it");
+        assert!(tuned.judgement == Judgement::Worse && forced.mode > 0.0, "{forced:?}");
+    }
     let text = tuned.case_text(&case, Path::new("tuned.toml")).unwrap();
     let again = Case::from_text("tuned.toml", &text).unwrap();
     assert_eq!(again.controller.as_ref(), Some(&tuned.after.design));
     assert!(text.contains("# Table 2; weighed (2.3.2)"));
+    // From gains that keep the limits on, no figure may become worse at all.
+    let next = tune(&again, &Tuning::default(), &|| false).unwrap();
+    assert_ne!(next.judgement, Judgement::Worse);
+    let judged = evaluate(&again, &Tuning::default()).unwrap();
+    assert_eq!(judged.before.objective, tuned.after.objective);
+}
+
+/// K_t and K_e of a motor are one number in SI units; a family in which one is 20 % more and the other 20 % less cannot exist.
+#[test]
+fn what_is_one_number_by_nature_varies_as_one() {
+    let known = |name: &str, value: f64| format!("\"{name}\" = {{ low = {}, high = {} }}\n", 0.9 * value, 1.1 * value);
+    let table: String = [
+        ("motor.torque_constant", 3.898305e-3),
+        ("motor.back_emf_constant", 3.898305e-3),
+        ("drive_pulley.inertia", 6.3e-5),
+        ("idler_pulley.inertia", 6.3e-5),
+        ("cart.mass", 0.362),
+    ]
+    .map(|(name, value)| known(name, value))
+    .concat();
+    let text = format!("{}\n[uncertainty]\n{table}", case("pid.toml", &[]).text);
+    let case = Case::from_text("known.toml", &text).unwrap_or_else(|error| panic!("{error}"));
+    let family = Family::of(&case, &Tuning::default()).unwrap();
+    let mut masses = Vec::new();
+    for corner in &family.machines {
+        let stage = family.stage_at(corner);
+        let motor = &stage.motor;
+        assert!((motor.torque_constant / motor.back_emf_constant - 1.0).abs() < 1e-12, "{motor:?}");
+        assert!((stage.drive_pulley.inertia / stage.idler_pulley.inertia - 1.0).abs() < 1e-12);
+        masses.push(stage.cart.mass / 0.362);
+    }
+    let (low, high) = masses.iter().fold((1.0_f64, 1.0_f64), |(low, high), m| (low.min(*m), high.max(*m)));
+    assert!(low > 0.8 && low < 0.93 && high < 1.2 && high > 1.07, "{low} {high}");
 }
 
 #[test]

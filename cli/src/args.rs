@@ -212,11 +212,11 @@ Examples:
   taut move axis.toml --set controller.delay=1ms --json | jq .moves[0].cart_error
   taut move stages/sollmann-jouaneh/controllers/*.toml --spread 20%";
 
-/// Find the gains of the controller in a case, good for the worst axis it may meet.
+/// Find gains and filters for the controller in a case, good for the machines that it may meet
 ///
-/// Places the gains by bandwidth and damping, then makes the cost in [tune] small while the sampled loop keeps its limits of
-/// sensitivity with every parameter off, every load and all along the travel. Prints gains, margins, the worst axis, cart
-/// errors and limit cycles before and after.
+/// Makes settling, cart error and current of the moves small, at worst over a family of machines (parameters off, loads, places), while
+/// the sampled loop keeps its limits of sensitivity there. Says in its first line whether the moves became better or worse. Prints gains,
+/// margins, moves and limit cycles before and after.
 #[derive(Debug, clap::Args)]
 #[command(after_help = TUNE, mut_arg("out", |out| out.value_name("FILE or DIR").help(
     "The case file to write (ends in .toml), or the folder for it, a summary, a report and plots"
@@ -224,9 +224,18 @@ Examples:
 pub struct Tune {
     /// The case file; - is standard input
     pub case: PathBuf,
-    /// Write the gains into the case file itself
+    /// Write the gains into the case file itself, unless they make a move worse
     #[arg(long, conflicts_with = "out")]
     pub in_place: bool,
+    /// With --in-place: write them even if they make a move worse
+    #[arg(long, requires = "in_place")]
+    pub anyway: bool,
+    /// Judge the gains of the file without a search
+    #[arg(long, conflicts_with_all = ["in_place", "out"])]
+    pub evaluate: bool,
+    /// Let all parameters be at their worst ends at once, and leave no axis out
+    #[arg(long)]
+    pub corners: bool,
     /// Let each parameter of the axis be off by this share, whatever the file says: 20%
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub spread: Option<f64>,
@@ -239,9 +248,10 @@ Examples:
   taut tune stages/sollmann-jouaneh/controllers/pid.toml --out tuned
   taut tune axis.toml --set tune.sensitivity=1.6 --set 'tune.load=[0, \"1 kg\"]' --out axis-tuned.toml
   taut tune axis.toml --set tune.cost=none --set tune.bandwidth=8Hz
+  taut tune axis.toml --evaluate --json | jq .before.objective
 
-Exit status 1: no search could keep the limits on the worst axis. Ctrl-C ends a search early with the
-best gains so far, with exit status 130.";
+Exit status 1: a move became worse than with the gains of the file (the limits may force that), or the limits
+do not hold. Ctrl-C ends a search early with the best gains so far, with exit status 130.";
 
 /// Run a case many times with its parameters varied.
 ///

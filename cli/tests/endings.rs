@@ -1,4 +1,4 @@
-//! Runs that somebody ends: Ctrl-C, and a reader who has seen enough.
+//! Runs that somebody ends: Ctrl-C, and a reader who has seen enough; and results that are not to be relied on.
 #![cfg(unix)]
 
 use std::fs;
@@ -70,5 +70,49 @@ fn a_closed_pipe_is_no_error() {
         let output = child.wait_with_output().unwrap();
         assert!(output.status.success(), "{args:?}: {output:?}");
         assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
+fn bundled(folder: &Path, name: &str) -> PathBuf {
+    let case = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/sollmann-jouaneh/controllers").join(name);
+    fs::copy(case, folder.join(name)).unwrap();
+    folder.join(name)
+}
+
+/// A loop that stood at its limit in 3014 of 3201 samples was reported like any other, with exit status 0.
+#[test]
+fn an_unstable_move_is_called_unstable() {
+    let folder = TempDir::new().unwrap();
+    bundled(folder.path(), "pid.toml");
+    let mut command = taut(folder.path());
+    command.args(["move", "pid.toml", "--json", "--set", "controller.pid.proportional=30 V/mm"]);
+    let output = command.output().unwrap();
+    let (data, told) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("warning: the move \"short fast\" is not to be relied on: the loop is unstable"), "{told}");
+    assert!(told.contains(" Hz") && data.contains("\"kind\": \"unstable\"") && data.contains("frequency_Hz"), "{told}");
+    let output = taut(folder.path()).args(["move", "pid.toml", "--quiet"]).output().unwrap();
+    assert_eq!((output.status.code(), output.stderr.len()), (Some(0), 0));
+}
+
+/// `taut tune` wrote gains that made every move worse, and said in green that the limits hold.
+#[test]
+fn worse_gains_are_called_worse_and_written_in_place_only_if_told() {
+    let folder = TempDir::new().unwrap();
+    let path = bundled(folder.path(), "pid.toml");
+    let before = fs::read_to_string(&path).unwrap();
+    let soft = ["tune", "pid.toml", "--set", "tune.cost=none", "--set", "tune.bandwidth=1Hz", "--in-place"];
+    let output = taut(folder.path()).args(soft).output().unwrap();
+    let (shown, told) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(shown.starts_with("WORSE than the gains of the file: short fast errs "), "{shown}");
+    assert!(told.contains("error: the case file is as it was"), "{told}");
+    assert_eq!(fs::read_to_string(&path).unwrap(), before);
+    assert_eq!(taut(folder.path()).args(soft).arg("--anyway").output().unwrap().status.code(), Some(1));
+    assert_ne!(fs::read_to_string(&path).unwrap(), before);
+    let output = taut(folder.path()).args(["tune", "pid.toml", "--evaluate", "--json"]).output().unwrap();
+    let data = String::from_utf8(output.stdout).unwrap();
+    for key in ["\"schema\": \"taut/tune/1\"", "\"verdict\": \"unchanged\"", "\"forced_by\": null", "\"objective\""] {
+        assert!(data.contains(key), "{key}: {data}");
     }
 }

@@ -293,7 +293,7 @@ fn tune_is_killed() {
 
 #[test]
 fn tune_in_place_is_killed() {
-    let command = format!("tune pid.toml {TUNING} --in-place").leak();
+    let command = format!("tune pid.toml {TUNING} --in-place --anyway").leak();
     Writer::new(command, "", "--set tune.damping=0.7").reading("pid.toml", "controllers/pid.toml").withstands_kills(9);
 }
 
@@ -321,7 +321,7 @@ fn writers() -> [(Writer, &'static str); 8] {
         (table4("shape table4.toml --out out"), "out"),
         (table4("sweep table4.toml --runs 200 --vary all=20% --out out"), "out"),
         (pid(&format!("tune pid.toml {TUNING} --out out")), "out"),
-        (pid(&format!("tune pid.toml {TUNING} --in-place")), "."),
+        (pid(&format!("tune pid.toml {TUNING} --in-place --anyway")), "."),
     ]
 }
 

@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 use taut::case::{Case, Experiment, GantryCase, GantryExperiment, InputFile};
+use taut::control::trouble::{Trouble, trouble};
 use taut::control::{Loop, MoveRun, Rows, Standard, Worst, stream, worst};
 use taut::json::{self, GantrySimulated, GantrySimulation, Moved, Simulated, Simulation};
 use taut::metrics::{GantryMeter, GantryMetrics, Meter, Metrics};
@@ -410,12 +411,27 @@ pub fn simulation<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<
 /// What `taut move --json` prints of these runs.
 #[pyfunction]
 pub fn moves<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound<'py, PyAny>> {
+    let troubles: Vec<Option<Trouble>> = runs
+        .iter()
+        .map(|run| match &run.what {
+            What::Move { case, index, run: moved, .. } => {
+                let design = case.controller.as_ref()?;
+                trouble(&case.stage, design, moved, case.moves[*index].profile.target())
+            }
+            What::Experiment { .. } | What::Gantry { .. } => None,
+        })
+        .collect();
     let told: Vec<Moved> = runs
         .iter()
-        .filter_map(|run| match &run.what {
-            What::Move { case, index, run: moved, worst, .. } => {
-                Some(Moved { motion: &case.moves[*index], run: moved, worst: worst.as_ref(), files: &[] })
-            }
+        .zip(&troubles)
+        .filter_map(|(run, trouble)| match &run.what {
+            What::Move { case, index, run: moved, worst, .. } => Some(Moved {
+                motion: &case.moves[*index],
+                run: moved,
+                worst: worst.as_ref(),
+                trouble: trouble.as_ref(),
+                files: &[],
+            }),
             What::Experiment { .. } | What::Gantry { .. } => None,
         })
         .collect();

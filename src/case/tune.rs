@@ -25,13 +25,15 @@ pub struct Tuning {
     pub loads: Vec<f64>,
     /// Places along the travel that are looked at.
     pub places: usize,
+    /// Whether all parameters may be at their ends at once, and no axis is left out.
+    pub corners: bool,
 }
 
 impl Default for Tuning {
-    /// What holds where the file says nothing: the cart's squared error made small with Ms ≤ 1.8.
+    /// What holds where the file says nothing: the moves made good with Ms ≤ 1.8.
     fn default() -> Self {
         Self {
-            cost: Some(Cost::Squares),
+            cost: Some(Cost::Moves),
             bandwidth: None,
             damping: 0.8,
             sensitivity: 1.8,
@@ -39,6 +41,7 @@ impl Default for Tuning {
             spread: None,
             loads: vec![0.0],
             places: 7,
+            corners: false,
         }
     }
 }
@@ -46,21 +49,24 @@ impl Default for Tuning {
 /// What is made small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cost {
+    /// Of all moves: time until the cart settles, its largest error, and the current, each at worst.
+    Moves,
     /// Root of the mean square of the cart's error over all moves.
     Squares,
     /// Its largest magnitude.
     Peak,
-    /// The bandwidth, made large.
-    Bandwidth,
+    /// What a disturbance does to the cart, without moves.
+    Disturbance,
 }
 
 impl Cost {
     /// As in the case file.
     pub fn word(self) -> &'static str {
         match self {
+            Cost::Moves => "moves",
             Cost::Squares => "squares",
             Cost::Peak => "peak",
-            Cost::Bandwidth => "bandwidth",
+            Cost::Disturbance => "disturbance",
         }
     }
 }
@@ -93,20 +99,20 @@ pub(super) fn tuning(root: &Table, design: Option<&Design>, moves: &[Move]) -> R
     }
     let default = Tuning::default();
     let words = [
+        ("moves", Some(Cost::Moves)),
         ("squares", Some(Cost::Squares)),
         ("peak", Some(Cost::Peak)),
-        ("bandwidth", Some(Cost::Bandwidth)),
+        ("disturbance", Some(Cost::Disturbance)),
         ("none", None),
     ];
     let cost = match table.optional("cost") {
-        None if moves.is_empty() => Some(Cost::Bandwidth),
         None => default.cost,
         Some(field) => {
             let cost = field.choice(&words)?;
             if moves.is_empty() && matches!(cost, Some(Cost::Squares | Cost::Peak)) {
                 return Err(field
                     .fail("there is no move whose error could be made small")
-                    .next("add [[move]], or write cost = \"bandwidth\""));
+                    .next("add [[move]], or write cost = \"moves\" for a set that suits the axis"));
             }
             cost
         }
@@ -118,8 +124,7 @@ pub(super) fn tuning(root: &Table, design: Option<&Design>, moves: &[Move]) -> R
             .next("leave it out: the search begins at the weights of the file"));
     }
     if cost.is_none() && bandwidth.is_none() {
-        let next =
-            if placed { "add for example bandwidth = \"8 Hz\"" } else { "write for example cost = \"bandwidth\"" };
+        let next = if placed { "add for example bandwidth = \"8 Hz\"" } else { "write for example cost = \"moves\"" };
         return Err(field.fail("without a cost the gains follow from a bandwidth, which is not said").next(next));
     }
     Ok(Some(Tuning {
@@ -137,6 +142,7 @@ pub(super) fn tuning(root: &Table, design: Option<&Design>, moves: &[Move]) -> R
             }
         },
         places: table.number("places")? as usize,
+        corners: false,
     }))
 }
 

@@ -24,10 +24,11 @@ pub mod spectrum;
 mod spread;
 mod standard;
 pub mod state_feedback;
+pub mod trouble;
 mod welch;
 
+pub(crate) use outcome::follow;
 pub use outcome::{Deviation, Figures, MoveRun, Rows, Setup, close, closed_loop, stream};
-pub(crate) use outcome::{follow, tracking};
 pub use sampled::{Controller, Loop, Sample, Seen, measures_cart};
 pub use spread::{Worst, spread, worst};
 pub use standard::Standard;

@@ -2,6 +2,7 @@
 
 use super::sampled::{Controller, Loop, Sample, Sampled};
 use super::standard::Standard;
+use super::trouble::Swing;
 use crate::case::{Experiment, Initial};
 use crate::design::Design;
 use crate::error::{Error, Result};
@@ -65,6 +66,8 @@ pub struct MoveRun {
     pub samples: (u64, u64),
     /// The samples, if asked for.
     pub kept: Vec<Sample>,
+    /// What the command does after the profile.
+    pub swing: Swing,
 }
 
 /// Everything that a closed loop needs.
@@ -94,23 +97,6 @@ pub fn closed_loop(setup: &Setup) -> Result<MoveRun> {
     close(setup.stage, &mut controller, &timing, &profile, setup.until, setup.window, setup.solver)
 }
 
-/// How a design tracks a profile, and nothing else: what a search looks at thousands of times. Between the ends of what is held the
-/// error is taken for a cubic.
-pub(crate) fn tracking(setup: &Setup) -> Result<(solve::Ending, Deviation)> {
-    let mut controller = Standard::new(setup.design, setup.model)?;
-    let profile = setup.profile.clone().shaped(&setup.design.shaper);
-    let timing = Loop::of(setup.design);
-    let experiment = at_rest(setup.stage, &profile, setup.until, timing.every.min(setup.until));
-    let mut sampled = Sampled::new(setup.stage, &mut controller, timing, &profile, false);
-    let mut tracker = Tracker { profile: &profile, squares: 0.0, error: Deviation::default() };
-    let sink = &mut |_: &Trajectory| Flow::Continue;
-    let observer = Some(&mut tracker as &mut dyn Observe);
-    let mut run = solve::Run::new(setup.stage, &experiment, setup.solver, Detail::None, observer, sink)?;
-    sampled.drive(&mut run, experiment.until);
-    let outcome = run.finish();
-    Ok((outcome.ending, Deviation { rms: (tracker.squares / setup.until).sqrt(), ..tracker.error }))
-}
-
 /// A run from rest at the start of a profile, without an input of its own.
 fn at_rest(stage: &Stage, profile: &Profile, until: f64, every: f64) -> Experiment {
     let start = profile.start();
@@ -123,38 +109,6 @@ fn at_rest(stage: &Stage, profile: &Profile, until: f64, every: f64) -> Experime
         initial: Initial { drive_angle: angle, cart_position: start, idler_angle: angle, ..Initial::default() },
         log: None,
     }
-}
-
-/// Gathers the cart's error from the ends of gaps.
-struct Tracker<'a> {
-    profile: &'a Profile,
-    squares: f64,
-    error: Deviation,
-}
-
-impl Observe for Tracker<'_> {
-    fn pass(&mut self, gap: &Gap) -> bool {
-        let error = |time: f64, reading: &solve::Reading| {
-            let y = self.profile.at(time);
-            (reading[reading::CART_POSITION] - y.position, reading[reading::CART_SPEED] - y.speed)
-        };
-        let (h, end) = (gap.length, gap.begin + gap.length);
-        let ((a, from), (b, to)) = (error(gap.begin, gap.from), error(end, gap.to));
-        // Hermite's cubic in the middle, and Simpson's rule.
-        let middle = 0.5 * (a + b) + 0.125 * h * (from - to);
-        self.squares += h / 6.0 * (a * a + 4.0 * middle * middle + b * b);
-        for (value, time) in [(a, gap.begin), (middle, gap.begin + 0.5 * h), (b, end)] {
-            if value.abs() > self.error.peak.value.abs() {
-                self.error.peak = Peak { value, time };
-            }
-        }
-        self.error.last = b;
-        false
-    }
-
-    fn see(&mut self, _: &Curve) {}
-
-    fn end(&mut self, _: f64, _: &State, _: &Mode) {}
 }
 
 /// Runs any controller along a profile, from rest at its start, for `until` s; the cart has settled within `window` (m) of its target.
@@ -225,7 +179,8 @@ fn run(
     figures.limited = sampled.held_back;
     figures.restlessness = sampled.turns as f64 / metrics.end.max(f64::MIN_POSITIVE);
     let samples = (sampled.samples, sampled.limited);
-    Ok(MoveRun { figures, metrics, outcome, samples, kept: sampled.kept.unwrap_or_default() })
+    let swing = sampled.at_rest.swing();
+    Ok(MoveRun { figures, metrics, outcome, samples, kept: sampled.kept.unwrap_or_default(), swing })
 }
 
 /// Puts the controller of a design, made for `model`, through an experiment along a reference that is shaped already; its input is not

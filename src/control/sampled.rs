@@ -1,5 +1,6 @@
 //! The loop closed: samples, counts, delay and limit between a controller and the axis.
 
+use super::trouble::Rest;
 use crate::error::{Error, Result};
 use crate::mechanism::State;
 use crate::quantity::rounded;
@@ -112,6 +113,8 @@ pub(super) struct Sampled<'a> {
     /// End of the run, s.
     until: f64,
     pub(super) samples: u64,
+    /// The command after the profile.
+    pub(super) at_rest: Rest,
     pub(super) kept: Option<Vec<Sample>>,
 }
 
@@ -149,6 +152,7 @@ impl<'a> Sampled<'a> {
             way: 0.0,
             until: f64::INFINITY,
             samples: 0,
+            at_rest: Rest::new(f64::INFINITY, f64::INFINITY),
             kept: keep.then(Vec::new),
         }
     }
@@ -158,6 +162,7 @@ impl Sampled<'_> {
     /// For a run that ends there: what is held then is held no longer.
     pub(super) fn until(mut self, until: f64) -> Self {
         self.until = until;
+        self.at_rest = Rest::new(self.profile.end(), until);
         self
     }
 
@@ -214,6 +219,7 @@ impl Sampled<'_> {
         let given = limit.map_or(asked, |limit| asked.clamp(-limit, limit));
         self.controller.limited(given);
         self.samples += 1;
+        self.at_rest.see(time, given);
         if given != asked {
             self.limited += 1;
             self.held_back += every.min(self.until - time).max(0.0);

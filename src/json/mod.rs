@@ -12,6 +12,7 @@ mod moves;
 mod posterior;
 mod result_schema;
 mod simulation;
+mod tune;
 
 pub use case_schema::case_schema;
 pub use check::check;
@@ -23,6 +24,7 @@ pub use moves::{Moved, moves};
 pub use posterior::posterior;
 pub use result_schema::{identity, schema, schemas};
 pub use simulation::{Band, Event, Metrics, Simulated, Simulation, load_unit};
+pub use tune::tuned;
 
 use crate::metrics::Peak;
 use crate::solve::Ending;

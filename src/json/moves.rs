@@ -2,6 +2,7 @@
 
 use super::{ending, peak};
 use crate::case::Move;
+use crate::control::trouble::Trouble;
 use crate::control::{Deviation, Loop, MoveRun, Worst};
 use serde_json::{Value, json};
 
@@ -14,6 +15,8 @@ pub struct Moved<'a> {
     pub run: &'a MoveRun,
     /// What comes of it on axes that are not what the controller takes them for.
     pub worst: Option<&'a Worst>,
+    /// What is wrong with its loop.
+    pub trouble: Option<&'a Trouble>,
     /// Its files.
     pub files: &'a [String],
 }
@@ -63,6 +66,9 @@ fn motion(done: &Moved) -> Value {
         "samples": run.samples.0,
         "limited_samples": run.samples.1,
         "events": run.outcome.events.len(),
+        "trouble": done.trouble.map(|trouble| json!({
+            "kind": trouble.kind.word(), "frequency_Hz": trouble.frequency, "cause": trouble.cause, "words": trouble.words,
+        })),
     });
     if let (Some(worst), Value::Object(object)) = (done.worst, &mut value) {
         object.insert(

@@ -2,7 +2,7 @@
 
 use super::margins::{Margins, Plant};
 use crate::case::{Case, Tuning};
-use crate::chance::uniform;
+use crate::chance::{normal_quantile, uniform};
 use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::Result;
@@ -16,6 +16,12 @@ use rand_pcg::rand_core::SeedableRng;
 /// Share by which parameters are off where nothing else is said.
 pub const SPREAD: f64 = 0.2;
 
+/// Axes that are drawn, beside the axis of the file with each load.
+pub const MACHINES: usize = 40;
+
+/// Share of the axes that a figure at worst leaves out at its bad end: the other end of the central 95 %.
+const LEFT_OUT: f64 = 0.025;
+
 /// Rounds of the search for the worst axis.
 const ROUNDS: usize = 6;
 
@@ -23,7 +29,7 @@ const ROUNDS: usize = 6;
 const DRAWS: usize = 16;
 
 /// A change of a corner.
-type Step = Box<dyn Fn(&Corner) -> Corner>;
+type Step<'a> = Box<dyn Fn(&Corner) -> Corner + 'a>;
 
 /// A parameter that is not known exactly.
 #[derive(Debug, Clone)]
@@ -35,14 +41,24 @@ pub struct Unknown {
     /// The most.
     pub high: f64,
     free: Free,
+    /// The first of those that it varies with: the two constants of one motor, both pulleys.
+    with: usize,
 }
 
 impl Unknown {
     /// Its value: `low` for −1, `high` for 1, what it is taken for at 0.
     fn value(&self, off: f64) -> f64 {
         let end = if off < 0.0 { self.low } else { self.high };
-        self.free.start + off.abs() * (end - self.free.start)
+        let value = self.free.start + off.abs() * (end - self.free.start);
+        // Draws of a fit go beyond the ends of its interval, but never through zero.
+        if self.free.start > 0.0 { value.max(1e-3 * self.free.start) } else { value }
     }
+}
+
+/// What a parameter varies with: K_t and K_e of one motor are one number in SI units, and pulleys of one make are alike.
+fn kin(name: &str) -> String {
+    let first = name.split(" = ").next().unwrap_or(name);
+    first.replace("back_emf_constant", "torque_constant").replace("idler_pulley.", "drive_pulley.")
 }
 
 /// One of the axes.
@@ -69,6 +85,10 @@ pub struct Family {
     pub places: Vec<f64>,
     /// Loads, kg.
     pub loads: Vec<f64>,
+    /// The axis of the file with each load, and a Latin hypercube of axes that can be.
+    pub machines: Vec<Corner>,
+    /// Whether all parameters may be at their ends at once.
+    pub corners: bool,
 }
 
 /// Where the uncertainty is from.
@@ -81,11 +101,12 @@ pub enum Source {
 }
 
 impl Family {
-    /// That of a case.
+    /// That of a case. Its machines are a Latin hypercube: within a spread all values are as likely, within the interval of a fit they are
+    /// normal. With `tuning.corners` the worst corner of all intervals joins them.
     pub fn of(case: &Case, tuning: &Tuning) -> Result<Self> {
         let stage = case.stage.clone();
         let keys: Vec<&str> = case.known.iter().flat_map(|known| known.name.split(" = ")).collect();
-        let (unknowns, source) = match tuning.spread {
+        let (mut unknowns, source) = match tuning.spread {
             None if !case.known.is_empty() => {
                 let mut unknowns = Vec::new();
                 // What is fitted along with a log has no key.
@@ -96,18 +117,73 @@ impl Family {
                         .interval
                         .unwrap_or([free.start * (1.0 - SPREAD), free.start * (1.0 + SPREAD)])
                         .map(|end| if free.start > 0.0 { end.max(1e-3 * free.start) } else { end });
-                    unknowns.push(Unknown { name: known.name.clone(), low, high, free });
+                    unknowns.push(Unknown { name: known.name.clone(), low, high, free, with: 0 });
                 }
                 (unknowns, Source::Fit)
             }
             given => {
                 let share = given.unwrap_or(SPREAD);
                 let (low, high) = (1.0 - share, 1.0 + share);
-                let unknown = |free: Free| Unknown { name: free.name.clone(), low, high, free };
+                let unknown = |free: Free| Unknown { name: free.name.clone(), low, high, free, with: 0 };
                 (kinds(&stage).into_iter().map(unknown).collect(), Source::Spread(share))
             }
         };
-        Ok(Self { places: along(case, tuning.places), loads: tuning.loads.clone(), stage, unknowns, source })
+        let names: Vec<String> = unknowns.iter().map(|unknown| kin(&unknown.name)).collect();
+        for (unknown, name) in unknowns.iter_mut().zip(&names) {
+            unknown.with = names.iter().position(|other| other == name).unwrap_or_default();
+        }
+        let (places, loads) = (along(case, tuning.places), tuning.loads.clone());
+        let mut family = Self { places, loads, stage, unknowns, source, machines: Vec::new(), corners: tuning.corners };
+        family.machines = family.drawn(MACHINES);
+        Ok(family)
+    }
+
+    /// The axis of the file with each load, and `count` axes of a Latin hypercube over what is off, loads and places.
+    fn drawn(&self, count: usize) -> Vec<Corner> {
+        let nominal = self.nominal();
+        let mut all: Vec<Corner> = self.loads.iter().map(|&load| Corner { load, ..nominal.clone() }).collect();
+        let mut random = Pcg64::seed_from_u64(15);
+        // A share of each stratum in an order of its own.
+        let mut column = || -> Vec<f64> {
+            let mut order: Vec<usize> = (0..count).collect();
+            for i in (1..count).rev() {
+                order.swap(i, (uniform(&mut random) * (i + 1) as f64) as usize);
+            }
+            order.into_iter().map(|stratum| (stratum as f64 + uniform(&mut random)) / count as f64).collect()
+        };
+        let (at, load) = (column(), column());
+        let off: Vec<Vec<f64>> = self.unknowns.iter().map(|_| column()).collect();
+        let share = |u: f64| match self.source {
+            Source::Spread(_) => 2.0 * u - 1.0,
+            Source::Fit => normal_quantile(u) / normal_quantile(0.975),
+        };
+        let (first, last) = (self.places.first().copied(), self.places.last().copied());
+        let (from, to) = (first.unwrap_or_default(), last.unwrap_or_default());
+        all.extend((0..count).map(|draw| Corner {
+            place: from + at[draw] * (to - from),
+            load: self.loads.get((load[draw] * self.loads.len() as f64) as usize).copied().unwrap_or_default(),
+            off: self.unknowns.iter().map(|unknown| share(off[unknown.with][draw])).collect(),
+        }));
+        all
+    }
+
+    /// How many axes of so many a figure at worst leaves out: none with corners.
+    pub fn left_out(&self, of: usize) -> usize {
+        if self.corners { 0 } else { (LEFT_OUT * of as f64) as usize }
+    }
+
+    /// Sets what is off of an unknown and of all that vary with it.
+    fn put(&self, corner: &mut Corner, unknown: usize, off: f64) {
+        for (other, value) in self.unknowns.iter().zip(&mut corner.off) {
+            if other.with == unknown {
+                *value = off;
+            }
+        }
+    }
+
+    /// The unknowns that vary by themselves.
+    fn leading(&self) -> impl Iterator<Item = usize> {
+        self.unknowns.iter().enumerate().filter(|(place, unknown)| unknown.with == *place).map(|(place, _)| place)
     }
 
     /// The axis as it is taken for, in the middle of its places, with the least load.
@@ -115,20 +191,6 @@ impl Family {
         let middle = self.places.get(self.places.len() / 2).copied().unwrap_or_default();
         let least = self.loads.iter().copied().fold(f64::INFINITY, f64::min);
         Corner { place: middle, load: if least.is_finite() { least } else { 0.0 }, off: vec![0.0; self.unknowns.len()] }
-    }
-
-    /// Corners with one unknown off at a time, and with each load.
-    pub fn singles(&self) -> Vec<Corner> {
-        let nominal = self.nominal();
-        let mut all: Vec<Corner> = self.loads.iter().map(|&load| Corner { load, ..nominal.clone() }).collect();
-        for unknown in 0..self.unknowns.len() {
-            for end in [-1.0, 1.0] {
-                let mut corner = nominal.clone();
-                corner.off[unknown] = end;
-                all.push(corner);
-            }
-        }
-        all
     }
 
     /// The machine at a corner.
@@ -149,12 +211,12 @@ impl Family {
     }
 
     /// Steps to these ends of each unknown, to these places and loads.
-    fn steps(&self, ends: &[f64], places: &[f64], loads: &[f64]) -> Vec<Step> {
-        let mut steps: Vec<Step> = Vec::new();
+    fn steps<'a>(&'a self, ends: &[f64], places: &[f64], loads: &[f64]) -> Vec<Step<'a>> {
+        let mut steps: Vec<Step<'a>> = Vec::new();
         steps.extend(places.iter().map(|&place| moved(move |corner| corner.place = place)));
         steps.extend(loads.iter().map(|&load| moved(move |corner| corner.load = load)));
-        for unknown in 0..self.unknowns.len() {
-            steps.extend(ends.iter().map(|&end| moved(move |corner| corner.off[unknown] = end)));
+        for unknown in self.leading() {
+            steps.extend(ends.iter().map(|&end| moved(move |corner| self.put(corner, unknown, end))));
         }
         steps
     }
@@ -195,15 +257,16 @@ impl Family {
         let start = best.1.0;
         // What each unknown does by itself.
         let mut signs = nominal;
-        for unknown in 0..self.unknowns.len() {
+        for unknown in self.leading() {
             let mut most = start;
             for end in [-1.0, 1.0] {
                 let mut corner = best.0.clone();
                 corner.off = vec![0.0; self.unknowns.len()];
-                corner.off[unknown] = end;
+                self.put(&mut corner, unknown, end);
                 let (value, _) = look(&corner)?;
                 if value > most * (1.0 + 1e-9) {
-                    (most, signs.off[unknown]) = (value, end);
+                    most = value;
+                    self.put(&mut signs, unknown, end);
                 }
             }
         }
@@ -220,8 +283,12 @@ impl Family {
             let corner = Corner {
                 place: pick(&self.places, share()).unwrap_or_default(),
                 load: pick(&self.loads, share()).unwrap_or_default(),
-                off: self.unknowns.iter().map(|_| if share() < 0.5 { -1.0 } else { 1.0 }).collect(),
+                off: vec![0.0; self.unknowns.len()],
             };
+            let mut corner = corner;
+            for unknown in self.leading() {
+                self.put(&mut corner, unknown, if share() < 0.5 { -1.0 } else { 1.0 });
+            }
             let found = look(&corner)?;
             if other.as_ref().is_none_or(|(_, most)| found.0 > most.0) {
                 other = Some((corner, found));
@@ -238,7 +305,8 @@ impl Family {
         // Seldom the worst lies between the ends.
         let between = self.steps(&[-0.75, -0.5, -0.25, 0.25, 0.5, 0.75], &halves(&self.places), &halves(&self.loads));
         best = climb(best, &between, 2, &look)?;
-        Ok((best.0, best.1.1))
+        let margins = Margins::of(&self.plant(&best.0, design, &corners)?, feedback);
+        Ok((best.0, margins))
     }
 }
 
@@ -279,7 +347,7 @@ fn halves(values: &[f64]) -> Vec<f64> {
 }
 
 /// A corner with one thing changed.
-fn moved(change: impl Fn(&mut Corner) + 'static) -> Step {
+fn moved<'a>(change: impl Fn(&mut Corner) + 'a) -> Step<'a> {
     Box::new(move |corner| {
         let mut other = corner.clone();
         change(&mut other);

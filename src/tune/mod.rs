@@ -1,40 +1,44 @@
-//! Gains for a structure: from bandwidth and damping, then by a search that makes a cost small while the sensitivity of the sampled loop
-//! stays within its limits on the worst axis that parameters, loads and places along the travel can make.
+//! Gains and filters for a structure, by the moves they make: settling, error and current at worst over a family of machines that can be,
+//! while the sensitivity of the sampled loop stays within its limits there.
 //!
-//! The recipe is [`tune`]. What it finds is rounded to four digits, and everything it says holds for the rounded gains.
+//! The recipe is [`tune`]; [`evaluate`] judges without a search. What is found is rounded to four digits, and everything that is said
+//! holds for the rounded gains.
 
 mod family;
 mod gains;
 mod hunting;
 mod margins;
+mod moves;
+mod objective;
 mod placement;
+mod rules;
 mod search;
+mod verdict;
+mod work;
 
-pub use family::{Corner, Family, SPREAD, Source, Unknown};
+pub use family::{Corner, Family, MACHINES, SPREAD, Source, Unknown};
 pub use gains::{Gain, gains};
 pub use hunting::{Hunt, hunting};
-pub use margins::{Margins, Open, Plant, loops};
+pub use margins::{Answer, Margins, Open, Plant, loops};
+pub use objective::{AtWorst, BALANCES, Balance, Seen, look, objective};
 pub use placement::{first, place};
 pub use search::{Found, minimise};
+pub use verdict::{Forced, Judgement, Limit, MoveVerdict, Verdict};
 
 use crate::case::{Case, Cost, Move, Tuning};
 use crate::control::feedback::Feedback;
-use crate::control::{Deviation, Setup, closed_loop, tracking};
 use crate::design::Design;
 use crate::error::{Error, Result};
-use crate::linear::{Operation, travel};
-use crate::solve::{Ending, Solver};
-use crate::stage::Stage;
+use crate::stage::BeltModel;
 use std::path::Path;
+use verdict::{compare, forced};
+use work::Work;
 
-/// Rounds of search, each with the worst axis for the gains of the one before.
-const ROUNDS: usize = 6;
+/// Machines that moves are run on while searching, the axis of the file with them.
+const SOME: usize = 4;
 
-/// Values that a round may ask for.
-const VALUES: usize = 160;
-
-/// Share of the limits that a search keeps to, so that rounding does not pass them.
-const WITHIN: f64 = 0.995;
+/// Designs of each balance that are looked at before none is taken.
+const TRIES: usize = 6;
 
 /// What a tuning found.
 #[derive(Debug, Clone)]
@@ -43,46 +47,49 @@ pub struct Tuned {
     pub before: Verdict,
     /// As it was tuned.
     pub after: Verdict,
-    /// Bandwidth that the search began with, Hz; none where it began with weights.
+    /// What became of it.
+    pub judgement: Judgement,
+    /// The limit that makes it worse, where one does.
+    pub forced: Option<Forced>,
+    /// The choices between stiff and gentle, what was chosen among them.
+    pub choices: Vec<Choice>,
+    /// Bandwidth that the search began with, Hz; none where it began with weights, or did not search.
     pub placed: Option<f64>,
     /// The axes that were looked at.
     pub family: Family,
-    /// Whether the limits of sensitivity hold on the worst of them.
+    /// The moves, those of the file or a standard set.
+    pub moves: Vec<Move>,
+    /// Whether the limits of sensitivity hold at worst.
     pub holds: bool,
-    /// Rounds, and designs that were tried.
+    /// Rounds, and designs that were tried; none of an evaluation.
     pub work: (usize, usize),
+    /// The first mode of a belt that has no damping at all, Hz.
+    pub undamped: Option<f64>,
+    /// Whether gains were looked for, and not judged alone.
+    pub searched: bool,
 }
 
-/// What a controller does on the axis and on the worst of its family.
+/// A design that is best by some balance between error and current.
 #[derive(Debug, Clone)]
-pub struct Verdict {
+pub struct Choice {
+    /// "stiff", "balanced" or "gentle".
+    pub name: &'static str,
     /// The controller.
     pub design: Design,
-    /// Its margins on the axis as it is taken for.
-    pub nominal: Margins,
-    /// The axis on which its sensitivity is furthest beyond its limits, or nearest to them.
-    pub corner: Corner,
-    /// The margins there.
-    pub worst: Margins,
-    /// Its moves.
-    pub moves: Vec<MoveVerdict>,
-    /// Its limit cycle at rest, if there is one.
-    pub hunt: Option<Hunt>,
+    /// ln J by the balance of the search.
+    pub objective: f64,
+    /// Its moves at worst.
+    pub worst: Vec<AtWorst>,
+    /// Whether this is what was chosen.
+    pub chosen: bool,
 }
 
-/// What a controller does in a move.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MoveVerdict {
-    /// Its name.
-    pub name: String,
-    /// x − y on the axis as it is taken for.
-    pub cart: Deviation,
-    /// Until the cart settles, s, if it does.
-    pub settling: Option<f64>,
-    /// Largest |x − y| on any of the axes with one thing off, with a load, or at the worst corner, m; and which.
-    pub worst: (f64, String),
-    /// Axes on which it settles, and all of them.
-    pub settled: (usize, usize),
+/// Judges the controller of a case as it is.
+pub fn evaluate(case: &Case, tuning: &Tuning) -> Result<Tuned> {
+    let (design, family, moves) = beginning(case, tuning)?;
+    let work = Work::new(case, &family, tuning, &moves, design, &|| false)?;
+    let before = work.verdict(design)?;
+    Ok(Tuned { searched: false, ..ended(&work, before.clone(), before, Vec::new(), None) })
 }
 
 /// Tunes the controller of a case; `stop` is asked now and then, and ends a search early with the best so far.
@@ -97,27 +104,142 @@ pub struct MoveVerdict {
 /// # Ok::<(), taut::Error>(())
 /// ```
 pub fn tune(case: &Case, tuning: &Tuning, stop: &dyn Fn() -> bool) -> Result<Tuned> {
+    let (design, family, moves) = beginning(case, tuning)?;
+    let mut work = Work::new(case, &family, tuning, &moves, design, stop)?;
+    let before = work.verdict(design)?;
+    let Some(cost) = tuning.cost else {
+        let (swing, bandwidth) = (work.modes()?.1, tuning.bandwidth);
+        let hertz = bandwidth.unwrap_or(first(design, swing));
+        let placed = place(design, &case.stage, hertz, tuning.damping).unwrap_or(design.clone());
+        let after = work.verdict(&gains::rounded(&placed))?;
+        return Ok(ended(&work, before, after, Vec::new(), Some(hertz)));
+    };
+    let is_good = work.excess(&before.worst) <= 1.0;
+    let (finalists, placed) = work.screened(design, is_good)?;
+    let Some(best) = finalists.first() else {
+        return Err(Error::new(format!(
+            "no gains of this structure that were tried keep Ms within {} and Mt within {} over the family",
+            tuning.sensitivity, tuning.complementary
+        ))
+        .next(
+            "allow a larger tune.sensitivity and tune.complementary, a smaller spread, or give it another structure",
+        ));
+    };
+    let (after, choices) = match cost {
+        Cost::Disturbance => (work.verdict(&best.design)?, Vec::new()),
+        Cost::Moves | Cost::Squares | Cost::Peak => {
+            let leading = work.verdict(&best.design)?;
+            let some = some_of(&leading);
+            let archive = work.by_moves(&finalists, &some, cost, &before.on(&some))?;
+            work.chosen(&archive, &some, cost, &before, leading)?
+        }
+    };
+    // What is no better stays as it was.
+    let after = if is_good && compare(&before, &after) != Judgement::Better { before.clone() } else { after };
+    Ok(ended(&work, before, after, choices, placed))
+}
+
+/// The controller, the family and the moves of a case.
+fn beginning<'a>(case: &'a Case, tuning: &Tuning) -> Result<(&'a Design, Family, Vec<Move>)> {
     let design = case.controller.as_ref().ok_or_else(|| {
         Error::new("this case has no controller to tune")
             .next("add [controller] with every and for example pid = { proportional = \"2 V/mm\" }")
     })?;
     Feedback::new(design, &case.stage)?;
-    let mut tuning = tuning.clone();
-    if case.moves.is_empty() && tuning.cost.is_some() {
-        tuning.cost = Some(Cost::Bandwidth);
+    Ok((design, Family::of(case, tuning)?, moves::of(case, design)?))
+}
+
+/// The machines that are worst in some figure of a design, and the axis of the file.
+fn some_of(verdict: &Verdict) -> Vec<usize> {
+    let mut some = vec![0];
+    let ranked = verdict.moves.iter().flat_map(|one| [one.at_worst.error.1, one.slowest]);
+    for place in ranked {
+        if !some.contains(&place) && some.len() < SOME {
+            some.push(place);
+        }
     }
-    let family = Family::of(case, &tuning)?;
-    let mut work = Work { case, family: &family, tuning: &tuning, set: Vec::new(), axes: Vec::new(), tried: 0, stop };
-    let before = work.verdict(design)?;
-    let (start, placed) = work.start(design)?;
-    let (found, rounds) = match tuning.cost {
-        Some(cost) => work.search(start, cost)?,
-        None => (gains::rounded(&start), 0),
-    };
-    let after = work.verdict(&found)?;
-    let holds = after.worst.excess(tuning.sensitivity, tuning.complementary) <= 1.0;
-    let work = (rounds, work.tried);
-    Ok(Tuned { before, after, placed, holds, work, family })
+    some
+}
+
+impl Work<'_> {
+    /// The design that is best by the objective over all machines, one that makes no move worse before any other; and what other balances
+    /// choose.
+    fn chosen(
+        &mut self,
+        archive: &[work::Tried],
+        some: &[usize],
+        cost: Cost,
+        before: &Verdict,
+        leading: Verdict,
+    ) -> Result<(Verdict, Vec<Choice>)> {
+        let figures = before.on(some);
+        let rank = |verdict: &Verdict| (compare(before, verdict) == Judgement::Worse, verdict.objective);
+        let is_better = |one: &Verdict, other: &Verdict| rank(one) < rank(other);
+        let mut after = leading;
+        let mut choices: Vec<Choice> = Vec::new();
+        for (place, bars) in [(1, Some(&figures[..])), (1, None), (0, None), (2, None)] {
+            let balance = &BALANCES[place];
+            let Some(design) = self.best_of(archive, cost, balance, bars, TRIES)? else { continue };
+            let known = choices.iter().find(|choice| choice.design == design).map(|c| (c.objective, c.worst.clone()));
+            let (value, worst) = match known {
+                Some(known) => known,
+                None => {
+                    let verdict = self.verdict(&design)?;
+                    let own = (verdict.objective, verdict.at_worst());
+                    if is_better(&verdict, &after) {
+                        after = verdict;
+                    }
+                    own
+                }
+            };
+            choices.push(Choice { name: balance.name, design, objective: value, worst, chosen: false });
+        }
+        // Of each balance the last: that without bars.
+        choices.reverse();
+        let mut names = Vec::new();
+        choices.retain(|choice| {
+            let is_new = !names.contains(&choice.name);
+            names.push(choice.name);
+            is_new
+        });
+        choices.sort_by_key(|choice| BALANCES.iter().position(|balance| balance.name == choice.name));
+        let own = before.design.filters.len();
+        let whole = after.design.clone();
+        let after = self.pruned(after, own, &|was, is| !rank(is).0 || rank(was).0)?;
+        for choice in &mut choices {
+            choice.chosen = choice.design == whole;
+        }
+        if choices.iter().all(|choice| !choice.chosen) || whole != after.design {
+            choices.retain(|choice| !choice.chosen);
+            let (design, worst) = (after.design.clone(), after.at_worst());
+            choices.push(Choice { name: "chosen", design, objective: after.objective, worst, chosen: true });
+        }
+        Ok((after, choices))
+    }
+}
+
+/// All of it, told.
+fn ended(work: &Work, before: Verdict, after: Verdict, choices: Vec<Choice>, placed: Option<f64>) -> Tuned {
+    let judgement = compare(&before, &after);
+    let breaks = work.excess(&before.worst) > 1.0;
+    let forced = (judgement == Judgement::Worse && breaks && work.excess(&after.worst) <= 1.0)
+        .then(|| forced(work.family, &after, work.tuning));
+    let belt = &work.case.stage.belt;
+    let is_undamped = belt.model != BeltModel::Rigid && belt.damping.iter().all(|damping| *damping == 0.0);
+    Tuned {
+        judgement,
+        forced,
+        choices,
+        placed,
+        family: work.family.clone(),
+        moves: work.moves.to_vec(),
+        holds: work.excess(&after.worst) <= 1.0,
+        work: (work.rounds, work.tried),
+        undamped: work.modes().ok().and_then(|(modes, _)| modes.first().copied()).filter(|_| is_undamped),
+        before,
+        after,
+        searched: true,
+    }
 }
 
 impl Tuned {
@@ -128,245 +250,24 @@ impl Tuned {
         gains(&self.before.design, &self.family.stage).into_iter().map(|gain| (gain.clone(), now(gain.key))).collect()
     }
 
+    /// The filters of the command as the case file has them, before and after, where they are not the same.
+    pub fn filters(&self) -> Option<[String; 2]> {
+        let [before, after] = [&self.before, &self.after].map(|verdict| &verdict.design.filters);
+        (before != after).then(|| [before, after].map(|filters| gains::filters_text(filters)))
+    }
+
     /// The text of the case with the tuned gains, its remarks left alone; `name` stands in messages.
     pub fn case_text(&self, case: &Case, name: &Path) -> Result<String> {
-        let changes: Vec<String> =
+        let mut changes: Vec<String> =
             self.changes().into_iter().map(|(gain, value)| format!("{}={value} {}", gain.key, gain.unit)).collect();
+        if let Some([_, after]) = self.filters() {
+            changes.push(format!("controller.filters={after}"));
+        }
         let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-        Ok(Case::from_text_with(name, &case.text, &changes)?.text)
-    }
-}
-
-/// A tuning on its way.
-struct Work<'a> {
-    case: &'a Case,
-    family: &'a Family,
-    tuning: &'a Tuning,
-    /// Axes on which the limits have to hold while searching.
-    set: Vec<Plant>,
-    /// Axes that moves are run on.
-    axes: Vec<Stage>,
-    tried: usize,
-    stop: &'a dyn Fn() -> bool,
-}
-
-impl Work<'_> {
-    fn feedback(&self, design: &Design) -> Result<Feedback> {
-        Feedback::new(design, &self.case.stage)
-    }
-
-    fn excess(&self, margins: &Margins) -> f64 {
-        margins.excess(self.tuning.sensitivity, self.tuning.complementary)
-    }
-
-    /// The worst corner for a design, and its margins.
-    fn worst(&self, design: &Design) -> Result<(Corner, Margins)> {
-        self.family.worst(design, &self.feedback(design)?, &|margins| self.excess(margins))
-    }
-
-    /// Largest share of the limits on the axes of the search.
-    fn on_set(&self, feedback: &Feedback) -> f64 {
-        self.set.iter().map(|plant| self.excess(&Margins::of(plant, feedback))).fold(0.0, f64::max)
-    }
-
-    /// Gains to begin with, which keep the limits where there is a search to follow.
-    fn start(&mut self, design: &Design) -> Result<(Design, Option<f64>)> {
-        let nominal = self.family.nominal();
-        let corners = self.feedback(design)?.corners();
-        for &place in [self.family.places.first(), self.family.places.last()].into_iter().flatten() {
-            for &load in &self.family.loads {
-                let corner = Corner { place, load, ..nominal.clone() };
-                self.set.push(self.family.plant(&corner, design, &corners)?);
-            }
+        let read = Case::from_text_with(name, &case.text, &changes)?;
+        match read.controller.as_ref() == Some(&self.after.design) {
+            true => Ok(read.text),
+            false => Err(Error::new("the gains that were found do not read back as what they are").in_file(name)),
         }
-        let mut stage = self.case.stage.clone();
-        stage.belt.follows_cart |= stage.belt.make.is_some();
-        let swings = travel(&stage, Operation::default(), &self.family.places)?;
-        let swing = swings.iter().filter_map(|place| place.undamped_antiresonances.first().copied()).reduce(f64::min);
-        let mut bandwidth = self.tuning.bandwidth.unwrap_or(first(design, swing));
-        let placed = |bandwidth: f64| place(design, &self.case.stage, bandwidth, self.tuning.damping);
-        let asked = bandwidth;
-        if self.tuning.cost.is_none() {
-            return Ok((placed(bandwidth).unwrap_or(design.clone()), Some(bandwidth)));
-        }
-        loop {
-            // Weights that count less make a softer loop.
-            let soft = bandwidth / asked;
-            let weights = || gains::softer(design, &self.case.stage, soft);
-            let trial = placed(bandwidth).unwrap_or_else(weights);
-            self.tried += 1;
-            let fits = match self.feedback(&trial) {
-                Ok(feedback) if self.on_set(&feedback) <= WITHIN => {
-                    let (corner, margins) = self.worst(&trial)?;
-                    let fits = self.excess(&margins) <= 1.0;
-                    if !fits {
-                        self.set.push(self.family.plant(&corner, design, &corners)?);
-                    }
-                    fits
-                }
-                Ok(_) => false,
-                // At first the weights of the file: what is wrong with them is to be told.
-                Err(error) if soft == 1.0 => return Err(error),
-                Err(_) => false,
-            };
-            if fits {
-                let bandwidth = placed(bandwidth).map(|_| bandwidth);
-                return Ok((trial, bandwidth));
-            }
-            bandwidth *= 0.85;
-            if bandwidth < 1e-4 * asked || (self.stop)() {
-                return Err(Error::new(format!(
-                    "no gains of this structure keep Ms within {} and Mt within {} on every axis",
-                    self.tuning.sensitivity, self.tuning.complementary
-                ))
-                .next("allow a larger tune.sensitivity and tune.complementary, a smaller spread, or give it another structure"));
-            }
-        }
-    }
-
-    /// Makes the cost small from gains that keep the limits; returns what keeps them too, and the rounds.
-    fn search(&mut self, start: Design, cost: Cost) -> Result<(Design, usize)> {
-        self.axes = self.run_axes(&start)?;
-        let corners = self.feedback(&start)?.corners();
-        let dimension = gains(&start, &self.case.stage).iter().filter(|gain| gain.searched).count();
-        let (mut x, mut safe) = (vec![0.0; dimension], vec![0.0; dimension]);
-        let mut rounds = 0;
-        let keeps = |work: &Self, x: &[f64]| -> Result<Option<Corner>> {
-            let (corner, margins) = work.worst(&gains::rounded(&gains::scaled(&start, x)))?;
-            Ok((work.excess(&margins) > 1.0).then_some(corner))
-        };
-        while rounds < ROUNDS && !(self.stop)() {
-            rounds += 1;
-            if rounds == 1 {
-                x = self.scan(&start, dimension, cost);
-            }
-            // Again from where it ended, with a smaller simplex: it may have collapsed at a limit.
-            for (step, most) in [(0.3, VALUES), (0.1, VALUES / 2)] {
-                let mut value = |x: &[f64]| self.value(&gains::scaled(&start, x), cost);
-                x = minimise(&x, step, 1e-3, most, &mut value).x;
-            }
-            match keeps(self, &x)? {
-                None => {
-                    safe = x;
-                    break;
-                }
-                Some(corner) => self.set.push(self.family.plant(&corner, &start, &corners)?),
-            }
-            if rounds == ROUNDS {
-                // As far towards it as the limits allow.
-                let (mut near, mut far) = (0.0, 1.0);
-                for _ in 0..8 {
-                    let part = 0.5 * (near + far);
-                    let between: Vec<f64> = x.iter().map(|x| part * x).collect();
-                    if keeps(self, &between)?.is_none() {
-                        near = part;
-                    } else {
-                        far = part;
-                    }
-                }
-                safe = x.iter().map(|x| near * x).collect();
-            }
-        }
-        Ok((gains::rounded(&gains::scaled(&start, &safe)), rounds))
-    }
-
-    /// The best of a coarse grid about `start`: a simplex that runs into a limit goes no further along it.
-    fn scan(&mut self, start: &Design, dimension: usize, cost: Cost) -> Vec<f64> {
-        let steps = [-0.6, 0.0, 0.6];
-        let point = |number: usize| (0..dimension).map(|j| steps[number / 3usize.pow(j as u32) % 3]).collect();
-        let points = (0..3usize.pow(dimension as u32)).map(point);
-        let valued = points.map(|x: Vec<f64>| (self.value(&gains::scaled(start, &x), cost), x)).collect::<Vec<_>>();
-        let best = valued.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-        best.map_or(vec![0.0; dimension], |(_, x)| x)
-    }
-
-    /// What the search makes small: the logarithm of the cost, and what goes beyond the limits.
-    fn value(&mut self, design: &Design, cost: Cost) -> f64 {
-        if (self.stop)() {
-            return f64::INFINITY;
-        }
-        self.tried += 1;
-        let Ok(feedback) = self.feedback(design) else { return f64::INFINITY };
-        let beyond = (self.on_set(&feedback) / WITHIN - 1.0).max(0.0);
-        if beyond > 0.3 {
-            // Too far for moves to say anything.
-            return 1e3 + beyond.min(1e6);
-        }
-        let cost = match cost {
-            Cost::Bandwidth => {
-                let least = |plant: &Plant| Margins::of(plant, &feedback).bandwidth;
-                1.0 / self.set.iter().map(least).fold(f64::INFINITY, f64::min)
-            }
-            cost => self.axes.iter().map(|axis| self.error(axis, design, cost)).fold(0.0, f64::max),
-        };
-        // Steep enough that no cost is worth it.
-        let value = cost.ln() + 30.0 * beyond;
-        if value.is_nan() { f64::INFINITY } else { value }
-    }
-
-    /// The cart's error over all moves on an axis, m.
-    fn error(&self, axis: &Stage, design: &Design, cost: Cost) -> f64 {
-        let (mut peak, mut squares, mut time) = (0.0_f64, 0.0, 0.0);
-        for motion in &self.case.moves {
-            let Ok((Ending::Complete, cart)) = tracking(&self.setup(axis, design, motion)) else {
-                return f64::INFINITY;
-            };
-            peak = peak.max(cart.peak.value.abs());
-            squares += cart.rms.powi(2) * motion.until;
-            time += motion.until;
-        }
-        if cost == Cost::Peak { peak } else { (squares / time).sqrt() }
-    }
-
-    fn setup<'s>(&'s self, stage: &'s Stage, design: &'s Design, motion: &'s Move) -> Setup<'s> {
-        let (until, window, solver) = (motion.until, motion.window, Solver::of(stage));
-        Setup { stage, model: &self.case.stage, design, profile: &motion.profile, until, window, solver }
-    }
-
-    /// The axes that moves are run on while searching: each load, and the one with a single thing off that is worst for `design`.
-    fn run_axes(&self, design: &Design) -> Result<Vec<Stage>> {
-        let singles = self.family.singles();
-        let (loads, others) = singles.split_at(self.family.loads.len());
-        let mut axes: Vec<Stage> = loads.iter().map(|corner| self.family.stage_at(corner)).collect();
-        let errors = others.iter().map(|corner| {
-            let stage = self.family.stage_at(corner);
-            let error = self.error(&stage, design, Cost::Squares);
-            (stage, error)
-        });
-        axes.extend(errors.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(stage, _)| stage));
-        Ok(axes)
-    }
-
-    /// What a design does.
-    fn verdict(&self, design: &Design) -> Result<Verdict> {
-        let feedback = self.feedback(design)?;
-        let nominal = Margins::of(&self.family.plant(&self.family.nominal(), design, &feedback.corners())?, &feedback);
-        let (corner, worst) = self.worst(design)?;
-        let mut axes = self.family.singles();
-        axes.push(corner.clone());
-        let mut moves = Vec::new();
-        for motion in &self.case.moves {
-            let own = closed_loop(&self.setup(&self.case.stage, design, motion))?;
-            let mut most = (own.figures.cart.peak.value.abs(), "as the file has it".to_string());
-            let mut settled = 0;
-            for corner in &axes {
-                let run = closed_loop(&self.setup(&self.family.stage_at(corner), design, motion))?;
-                let complete = run.outcome.ending == Ending::Complete;
-                settled += usize::from(complete && run.figures.settling.is_some());
-                let error = if complete { run.figures.cart.peak.value.abs() } else { f64::INFINITY };
-                if error > most.0 {
-                    most = (error, self.family.words(corner));
-                }
-            }
-            moves.push(MoveVerdict {
-                name: motion.name.clone(),
-                cart: own.figures.cart,
-                settling: own.figures.settling.filter(|_| own.outcome.ending == Ending::Complete),
-                worst: most,
-                settled: (settled, axes.len()),
-            });
-        }
-        let hunt = if nominal.stable { hunting(&self.case.stage, design)? } else { None };
-        Ok(Verdict { design: design.clone(), nominal, corner, worst, moves, hunt })
     }
 }

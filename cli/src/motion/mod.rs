@@ -15,6 +15,7 @@ use figures::Curves;
 use std::fmt::Write;
 use std::path::Path;
 use taut::case::{Case, Move};
+use taut::control::trouble::{self, Trouble};
 use taut::control::{Loop, MoveRun, Rows, Standard, Worst, stream, worst};
 use taut::design::Design;
 use taut::files::write_atomically;
@@ -30,13 +31,21 @@ pub struct Done<'a> {
     pub curves: Option<Curves>,
     /// With parameters wrong by a share: the largest cart error (m), and how many of how many settle.
     pub worst: Option<Worst>,
+    /// What is wrong with its loop.
+    pub trouble: Option<Trouble>,
     pub files: Vec<String>,
 }
 
 impl Done<'_> {
     /// What the summary says of it.
     fn told(&self) -> Moved<'_> {
-        Moved { motion: self.motion, run: &self.run, worst: self.worst.as_ref(), files: &self.files }
+        Moved {
+            motion: self.motion,
+            run: &self.run,
+            worst: self.worst.as_ref(),
+            trouble: self.trouble.as_ref(),
+            files: &self.files,
+        }
     }
 }
 
@@ -151,7 +160,8 @@ fn one<'a>(
         Some(share) => worst(&case.stage, design, motion, share, solver, &|| interrupt.signal().is_some())?,
         None => None,
     };
-    Ok(Done { motion, run, curves, worst, files })
+    let trouble = trouble::trouble(stage, design, &run, motion.profile.target());
+    Ok(Done { motion, run, curves, worst, trouble, files })
 }
 
 /// The controller's samples as CSV.
@@ -167,13 +177,18 @@ fn write_samples(folder: &Folder, name: &str, case: &Case, run: &MoveRun) -> Res
     Ok(name)
 }
 
-/// How it ended, and a word about every move that did not reach its end.
+/// How it ended, and a word about every move that did not reach its end or whose loop is not to be relied on.
 fn status(tried: &[Tried], interrupt: &Interrupt) -> (Status, Vec<Remark>) {
     let early = |done: &Done| {
         let told = early_end(&done.run.outcome.ending)?;
         Some(Remark::Error(format!("the move \"{}\" {told}", done.motion.name)))
     };
-    let remarks: Vec<Remark> = tried.iter().flat_map(|tried| &tried.done).filter_map(early).collect();
+    let unwell = |done: &Done| {
+        let words = &done.trouble.as_ref()?.words;
+        Some(Remark::Warning(format!("the move \"{}\" is not to be relied on: {words}", done.motion.name)))
+    };
+    let all = || tried.iter().flat_map(|tried| &tried.done);
+    let remarks: Vec<Remark> = all().filter_map(early).chain(all().filter_map(unwell)).collect();
     let status = match interrupt.signal() {
         Some(signal) => Status::Interrupted(signal),
         None if remarks.is_empty() => Status::Done,

@@ -117,6 +117,9 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
             ),
         ));
     }
+    if let Some(trouble) = &done.trouble {
+        lines.push((trouble.kind.word(), trouble.words.clone()));
+    }
     if let Some(worst) = &done.worst {
         let words = format!(
             "cart error at most {} ({}), {} at the end; {} of {} settle",

@@ -21,7 +21,7 @@ const BELOW_PEAK: f64 = 30.0;
 /// All of them, with names for files.
 pub fn all(work: &Work) -> Result<Vec<(String, Figure)>> {
     let mut figures: Vec<(String, Figure)> = frequency(work)?.into_iter().map(|(n, f)| (n.to_string(), f)).collect();
-    for motion in &work.case.moves {
+    for motion in &work.tuned.moves {
         figures.push((format!("{}-before-and-after", motion.file_name()), moved(work, motion)?));
     }
     Ok(figures)

@@ -1,21 +1,21 @@
 //! `taut tune`: gains for the structure that a case names, good for the worst axis.
 
 mod figures;
-mod json;
 mod page;
 mod table;
 
 use crate::args::Tune as Args;
-use crate::command::{self, Finished, Report};
+use crate::command::{self, Finished, Remark, Report};
 use crate::failure::{Failure, Outcome, Status};
 use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use crate::terminal;
 use std::path::{Path, PathBuf};
-use taut::case::{Case, Cost, Tuning};
+use taut::case::{Case, Tuning};
 use taut::files::{Inputs, write_atomically};
-use taut::tune::{Tuned, tune};
+use taut::json;
+use taut::tune::{Judgement, Tuned, evaluate, tune};
 use taut::{Error, Result};
 
 /// Where the results go.
@@ -46,7 +46,8 @@ pub fn run(args: &Args) -> Outcome {
         progress.tick();
         interrupt.signal().is_some()
     };
-    let tuned = match (tune(&case, &tuning, &stop), interrupt.signal()) {
+    let found = if args.evaluate { evaluate(&case, &tuning) } else { tune(&case, &tuning, &stop) };
+    let tuned = match (found, interrupt.signal()) {
         (Ok(tuned), _) => tuned,
         // What was looked at so far says nothing about the rest.
         (Err(_), Some(signal)) => {
@@ -59,13 +60,20 @@ pub fn run(args: &Args) -> Outcome {
     progress.clear();
     let work = Work { case: &case, tuning: &tuning, tuned: &tuned };
     let text = tuned.case_text(&case, &args.case)?;
-    let advice = "add --out FILE.toml, --out DIR or --in-place";
-    let mut finished = Finished::new("tune", ("tune.json", json::text(&work)), table::text(&work), advice);
+    let advice = if args.evaluate { "" } else { "add --out FILE.toml, --out DIR or --in-place" };
+    let data = json::text(&json::tuned(&case, &tuning, &tuned));
+    let mut finished = Finished::new("tune", ("tune.json", data), table::text(&work), advice);
+    finished.remarks = remarks(&work);
     finished.status = match interrupt.signal() {
         Some(signal) => Status::Interrupted(signal),
-        None if tuned.holds => Status::Done,
+        None if tuned.holds && tuned.judgement != Judgement::Worse => Status::Done,
         None => Status::Incomplete,
     };
+    if args.in_place && tuned.judgement == Judgement::Worse && !args.anyway {
+        let told = "the case file is as it was: the gains that were found make moves worse; --anyway writes them";
+        finished.remarks.push(Remark::Error(told.into()));
+        return finished.finish(common, None);
+    }
     let folder = match target {
         Target::Nowhere => None,
         Target::File(path) => {
@@ -88,13 +96,22 @@ pub fn run(args: &Args) -> Outcome {
     finished.finish(common, folder)
 }
 
+/// What makes the result less than it seems.
+fn remarks(work: &Work) -> Vec<Remark> {
+    let tuned = work.tuned;
+    let mut remarks = Vec::new();
+    if !tuned.after.nominal.stable {
+        let told = "the loop is not stable on the axis as the file has it";
+        remarks.push(Remark::Warning(format!("{told}: it swings at {}", table::hertz(tuned.after.nominal.at))));
+    }
+    remarks
+}
+
 /// What the file says, with what the command line says.
 fn tuning(args: &Args, case: &Case) -> Tuning {
     let mut tuning = case.tune.clone().unwrap_or_default();
-    if case.moves.is_empty() && tuning.cost.is_some() {
-        tuning.cost = Some(Cost::Bandwidth);
-    }
     tuning.spread = args.spread.or(tuning.spread);
+    tuning.corners = args.corners;
     tuning
 }
 

@@ -2,6 +2,7 @@
 
 use super::Work;
 use super::table::{self, Row};
+use taut::tune::Judgement;
 use taut_report::{Callout, Cell, Figure, Page, Table};
 
 /// The page; `text` is the tuned case.
@@ -9,18 +10,23 @@ pub fn page(work: &Work, text: &str, figures: &[(String, Figure)]) -> Page {
     let tuned = work.tuned;
     let structure = tuned.after.design.structure.name();
     let mut page = Page::new(work.case.title.clone()).subtitle(format!("Tuned: {structure}. {}.", table::goal(work)));
-    let (kind, head) = match tuned.holds {
-        true => (Callout::Holds, "The limits hold"),
-        false => (Callout::Fails, "The limits do not hold"),
+    let (kind, head) = match (tuned.holds, tuned.judgement) {
+        (false, _) => (Callout::Fails, "The limits do not hold"),
+        (true, Judgement::Worse) => (Callout::Fails, "Within the limits the moves are worse than before"),
+        (true, Judgement::Better) => (Callout::Holds, "The moves are better, and the limits hold"),
+        (true, Judgement::Unchanged) => (Callout::Holds, "The gains of the file stay; the limits hold"),
     };
     let worst = tuned.family.words(&tuned.after.corner);
-    page.callout(kind, head, format!("Over {}. The worst axis: {worst}.", table::family(work)));
+    page.callout(kind, head, format!("{}. Over {}.", table::verdict(work), table::family(work)));
+    if let Some(told) = table::given(work) {
+        page.prose(told);
+    }
     page.section("Gains");
     page.table(&rows(&table::gains(work)));
     page.section("Margins");
     page.subsection("The axis as the file has it");
     page.table(&rows(&table::margins(&tuned.before.nominal, &tuned.after.nominal)));
-    page.subsection("The worst axis");
+    page.subsection("At worst");
     page.table(&rows(&table::margins(&tuned.before.worst, &tuned.after.worst)));
     page.prose(format!("Before: {}. After: {worst}.", tuned.family.words(&tuned.before.corner)));
     for (_, figure) in figures.iter().take(2) {
@@ -32,6 +38,14 @@ pub fn page(work: &Work, text: &str, figures: &[(String, Figure)]) -> Page {
         for (_, figure) in figures.iter().skip(2) {
             page.figure(figure);
         }
+    }
+    if !tuned.choices.is_empty() {
+        page.section("Choices");
+        let mut all = table::CHOICES.into_iter().fold(Table::new(""), |table, heading| table.column(heading, ""));
+        for row in table::choices(work) {
+            all.row(row.into_iter().map(Cell::from));
+        }
+        page.table(&all);
     }
     page.section("Limit cycles at rest");
     page.table(&rows(&[("Hunting".into(), table::hunt(&tuned.before.hunt), table::hunt(&tuned.after.hunt))]));

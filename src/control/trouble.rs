@@ -1,0 +1,187 @@
+//! What is wrong with a closed loop, as its model and its run show: not stable, at its limit, howling.
+
+use super::feedback::Feedback;
+use super::outcome::MoveRun;
+use crate::design::Design;
+use crate::linear::{Operation, travel};
+use crate::stage::{AmplifierMode, Stage};
+use crate::tune::{Margins, Plant};
+use std::f64::consts::PI;
+
+/// Share of the samples at the limit from which on a command counts as saturated.
+const SATURATED: f64 = 0.5;
+
+/// Share of the limit by which the command of a howling loop swings to either side at rest, and cycles that it does so.
+const LOUD: f64 = 0.25;
+const CYCLES: f64 = 4.0;
+
+/// Growth of that swing from the first half of the rest to the second from which on it grows, and the least share of the limit.
+const GROWS: f64 = 1.5;
+const LEAST: f64 = 0.02;
+
+/// Distance of a frequency from a mode's, as a share, within which it is that mode's.
+const NEAR: f64 = 0.2;
+
+/// Half of what the command goes to and fro after the profile.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Swing {
+    /// In the first half of the rest, V or A.
+    pub early: f64,
+    /// In the second.
+    pub late: f64,
+    /// In the second, Hz; 0 where it does not go to and fro.
+    pub frequency: f64,
+    /// How often it does so there.
+    pub cycles: f64,
+}
+
+/// Gathers a [`Swing`].
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rest {
+    from: f64,
+    middle: f64,
+    early: (f64, f64),
+    late: (f64, f64),
+    below: bool,
+    upward: (f64, f64, u64),
+}
+
+impl Rest {
+    pub fn new(from: f64, until: f64) -> Self {
+        let none = (f64::INFINITY, f64::NEG_INFINITY);
+        Self { from, middle: 0.5 * (from + until), early: none, late: none, below: false, upward: (0.0, 0.0, 0) }
+    }
+
+    /// A command that was given at a sample.
+    pub fn see(&mut self, time: f64, given: f64) {
+        if time < self.from {
+            return;
+        }
+        let wider = |(low, high): (f64, f64)| (low.min(given), high.max(given));
+        if time < self.middle {
+            self.early = wider(self.early);
+            return;
+        }
+        self.late = wider(self.late);
+        // Upward through the middle of what it went through before, with a band about it.
+        let (low, high) = self.early;
+        let (level, band) = (0.5 * (low + high), 0.2 * 0.5 * (high - low));
+        if given < level - band {
+            self.below = true;
+        } else if given > level + band && self.below {
+            self.below = false;
+            let (first, _, count) = self.upward;
+            self.upward = (if count == 0 { time } else { first }, time, count + 1);
+        }
+    }
+
+    pub fn swing(&self) -> Swing {
+        let half = |(low, high): (f64, f64)| if high > low { 0.5 * (high - low) } else { 0.0 };
+        let (first, last, count) = self.upward;
+        let cycles = count.saturating_sub(1) as f64;
+        let frequency = if last > first { cycles / (last - first) } else { 0.0 };
+        Swing { early: half(self.early), late: half(self.late), frequency, cycles }
+    }
+}
+
+/// What is wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// The sampled loop has poles outside the unit circle, or its swing grows.
+    Unstable,
+    /// The command stands at its limit most of the time.
+    Saturated,
+    /// The command swings at rest.
+    Howling,
+}
+
+impl Kind {
+    /// In a word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Unstable => "unstable",
+            Self::Saturated => "saturated",
+            Self::Howling => "howling",
+        }
+    }
+}
+
+/// A loop that is not to be relied on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trouble {
+    /// What it is.
+    pub kind: Kind,
+    /// At which frequency it swings, Hz, where it does.
+    pub frequency: Option<f64>,
+    /// Why, in words.
+    pub cause: String,
+    /// All of it in a sentence.
+    pub words: String,
+}
+
+/// What is wrong with a move that was run to `target`, m; none if nothing is.
+pub fn trouble(stage: &Stage, design: &Design, run: &MoveRun, target: f64) -> Option<Trouble> {
+    let model = unstable(stage, design, target);
+    let (swing, (limited, samples)) = (run.swing, run.samples);
+    let limit = limit(stage, design).unwrap_or(f64::INFINITY);
+    let loud = swing.late > LOUD * limit && swing.cycles >= CYCLES;
+    let grows = swing.late > GROWS * swing.early && swing.late > LEAST * limit && limit.is_finite();
+    let is_saturated = samples > 0 && limited as f64 > SATURATED * samples as f64;
+    let seen = (swing.frequency > 0.0).then_some(swing.frequency);
+    let (kind, frequency) = match model {
+        Some(hertz) => (Kind::Unstable, Some(hertz)),
+        None if grows && swing.cycles >= CYCLES => (Kind::Unstable, seen),
+        None if is_saturated => (Kind::Saturated, seen),
+        None if loud => (Kind::Howling, seen),
+        None => return None,
+    };
+    let cause = cause(stage, design, kind, frequency, target);
+    let at = frequency.map_or(String::new(), |hertz| format!(" at {hertz:.1} Hz"));
+    let what = match kind {
+        Kind::Unstable => format!("the loop is unstable and swings{at}"),
+        Kind::Saturated if frequency.is_some() => format!("the command is saturated and swings{at}"),
+        Kind::Saturated => "the command is saturated".into(),
+        Kind::Howling => format!("the loop howls{at}"),
+    };
+    let held = if limited > 0 { format!("; {limited} of {samples} samples at the limit") } else { String::new() };
+    Some(Trouble { kind, frequency, words: format!("{what}: {cause}{held}"), cause })
+}
+
+/// Where the sampled loop swings, Hz, if it is not stable; none too for structures that are not linear.
+fn unstable(stage: &Stage, design: &Design, place: f64) -> Option<f64> {
+    let feedback = Feedback::new(design, stage).ok()?;
+    let plant = Plant::of(stage, place, design, &feedback.corners()).ok()?;
+    let margins = Margins::of(&plant, &feedback);
+    (!margins.stable).then_some(margins.at / (2.0 * PI))
+}
+
+fn limit(stage: &Stage, design: &Design) -> Option<f64> {
+    let amplifier = match stage.amplifier.mode {
+        AmplifierMode::Voltage => stage.amplifier.voltage_limit,
+        AmplifierMode::Current => stage.amplifier.current_limit,
+    };
+    let amplifier = amplifier.map(|limit| limit / stage.amplifier.gain.abs());
+    [design.limit, amplifier].into_iter().flatten().reduce(f64::min)
+}
+
+fn cause(stage: &Stage, design: &Design, kind: Kind, frequency: Option<f64>, place: f64) -> String {
+    let Some(hertz) = frequency else {
+        return match kind {
+            Kind::Saturated => "the move asks for more than the limit of the command allows".into(),
+            Kind::Unstable | Kind::Howling => "its gains are too high".into(),
+        };
+    };
+    let places = travel(stage, Operation::default(), &[place]).unwrap_or_default();
+    let mut modes = places.iter().flat_map(|place| place.undamped_resonances.iter().copied());
+    if let Some(mode) = modes.find(|mode| (mode / hertz).ln().abs() < NEAR) {
+        return format!(
+            "the mode of the axis at {mode:.1} Hz is driven by the controller; a lower gain, a low-pass or a notch there"
+        );
+    }
+    let late = design.delay + 0.5 * design.every;
+    // Delay and hold turn the phase by 360° f late.
+    if 360.0 * hertz * late > 20.0 {
+        return format!("too much gain for a delay of {:.2} ms, half a sample with it", 1e3 * late);
+    }
+    "too much integral or too little derivative gain for this axis".into()
+}

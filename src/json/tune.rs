@@ -1,0 +1,131 @@
+//! A tuned controller: `taut tune --json`, `tune.json`.
+
+use super::number;
+use crate::case::{Case, Move, Tuning};
+use crate::tune::{AtWorst, Choice, Margins, MoveVerdict, Tuned, Verdict, gains};
+use serde_json::{Value, json};
+use std::f64::consts::PI;
+
+/// What was found for a case; numbers to the last bit, null for what is infinite.
+pub fn tuned(case: &Case, tuning: &Tuning, tuned: &Tuned) -> Value {
+    let change = |(gain, after): (crate::tune::Gain, f64)| json!({ "key": gain.key, "unit": gain.unit, "before": gain.value, "after": after });
+    let filters = tuned.filters().map(|[before, after]| json!({ "before": before, "after": after }));
+    let forced = tuned
+        .forced
+        .map(|forced| json!({ "limit": forced.limit.word(), "mode_Hz": number(forced.mode), "place_m": forced.place }));
+    json!({
+        "schema": "taut/tune/1",
+        "title": case.title,
+        "version": env!("CARGO_PKG_VERSION"),
+        "structure": tuned.after.design.structure.name(),
+        "verdict": tuned.judgement.word(),
+        "forced_by": forced,
+        "cost": tuning.cost.map_or("none", |cost| cost.word()),
+        "limits": { "sensitivity": tuning.sensitivity, "complementary": tuning.complementary },
+        "family": {
+            "machines": tuned.family.machines.len(),
+            "corners": tuned.family.corners,
+            "left_out": tuned.family.left_out(tuned.family.machines.len()),
+        },
+        "standard_moves": case.moves.is_empty(),
+        "undamped_mode_Hz": tuned.undamped,
+        "began_with_Hz": tuned.placed,
+        "holds": tuned.holds,
+        "rounds": tuned.work.0,
+        "designs": tuned.work.1,
+        "gains": tuned.changes().into_iter().map(change).collect::<Vec<_>>(),
+        "filters": filters,
+        "before": verdict(tuned, &tuned.before),
+        "after": verdict(tuned, &tuned.after),
+        "pareto": tuned.choices.iter().map(|one| choice(tuned, one)).collect::<Vec<_>>(),
+    })
+}
+
+fn margins(m: &Margins) -> Value {
+    json!({
+        "stable": m.stable,
+        "sensitivity": number(m.sensitivity),
+        "sensitivity_at_Hz": number(m.at / (2.0 * PI)),
+        "complementary": number(m.complementary),
+        "complementary_at_Hz": number(m.complementary_at / (2.0 * PI)),
+        "gain_margin": number(m.gain),
+        "phase_margin_rad": number(m.phase),
+        "crossover_Hz": number(m.crossover / (2.0 * PI)),
+        "bandwidth_Hz": number(m.bandwidth / (2.0 * PI)),
+        "tracking_bandwidth_Hz": number(m.tracking / (2.0 * PI)),
+        "disturbance": number(m.disturbance),
+        "following": number(m.following),
+    })
+}
+
+/// J itself, not its logarithm.
+fn objective(logarithm: f64) -> Value {
+    number(logarithm.exp())
+}
+
+fn at_worst(one: &AtWorst, axes: usize) -> serde_json::Map<String, Value> {
+    let (settles, is_settled) = one.settles;
+    let Value::Object(object) = json!({
+        "cart_error_m": number(one.error.0),
+        "rms_error_m": number(one.rms),
+        "settling_s": is_settled.then_some(settles),
+        "rms_current_A": number(one.current),
+        "settled": one.settled,
+        "axes": axes,
+    }) else {
+        return serde_json::Map::new();
+    };
+    object
+}
+
+fn motion(m: &MoveVerdict) -> Value {
+    let mut worst = at_worst(&m.at_worst, m.settled.1);
+    worst.insert("axis".into(), json!(m.worst.1.replace('\u{a0}', " ")));
+    json!({
+        "name": m.name,
+        "cart_error": { "peak_m": m.cart.peak.value, "rms_m": m.cart.rms, "last_m": m.cart.last },
+        "settling_s": m.settling,
+        "rms_current_A": number(m.current),
+        "worst": worst,
+    })
+}
+
+fn verdict(tuned: &Tuned, verdict: &Verdict) -> Value {
+    let (family, corner) = (&tuned.family, &verdict.corner);
+    let off = |(unknown, off): (&crate::tune::Unknown, &f64)| (unknown.name.clone(), json!(off));
+    let off: serde_json::Map<String, Value> = family.unknowns.iter().zip(&corner.off).map(off).collect();
+    json!({
+        "objective": objective(verdict.objective),
+        "nominal": margins(&verdict.nominal),
+        "worst": {
+            "margins": margins(&verdict.worst),
+            "place_m": corner.place,
+            "load_kg": corner.load,
+            "off": off,
+            "words": family.words(corner).replace('\u{a0}', " "),
+        },
+        "unstable": { "axes": verdict.unstable.0, "of": verdict.unstable.1 },
+        "moves": verdict.moves.iter().map(motion).collect::<Vec<_>>(),
+        "hunting": verdict.hunt.as_ref().map(|hunt| json!({
+            "amplitude_m": hunt.amplitude, "period_s": hunt.period, "needs": hunt.needs, "watched_s": hunt.watched,
+        })),
+    })
+}
+
+fn choice(tuned: &Tuned, choice: &Choice) -> Value {
+    let gain = |gain: crate::tune::Gain| json!({ "key": gain.key, "unit": gain.unit, "value": gain.value });
+    let axes = tuned.after.moves.first().map_or(0, |one| one.settled.1);
+    let one = |(motion, worst): (&Move, &AtWorst)| {
+        let mut object = at_worst(worst, axes);
+        object.insert("name".into(), json!(motion.name));
+        Value::Object(object)
+    };
+    json!({
+        "name": choice.name,
+        "chosen": choice.chosen,
+        "objective": objective(choice.objective),
+        "gains": gains(&choice.design, &tuned.family.stage).into_iter().map(gain).collect::<Vec<_>>(),
+        "filters": choice.design.filters.len(),
+        "worst": tuned.moves.iter().zip(&choice.worst).map(one).collect::<Vec<_>>(),
+    })
+}

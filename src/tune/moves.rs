@@ -1,0 +1,90 @@
+//! The moves that a controller is judged by, and the current that they ask for.
+
+use crate::case::{Case, Move};
+use crate::control::compensation::{Compensation, Rigid};
+use crate::control::measures_cart;
+use crate::design::{Design, FeedForward};
+use crate::error::Result;
+use crate::signal::profile::{Leg, Limits, Profile};
+use crate::stage::{AmplifierMode, Stage};
+
+/// Share of what the command's limit allows of speed and of force that a standard move takes.
+const SPEED: f64 = 0.5;
+const FORCE: f64 = 0.5;
+
+/// Speed (m/s) and acceleration (m/s²) of standard moves where nothing is limited, and at most.
+const MODEST: (f64, f64) = (0.2, 2.0);
+const MOST: (f64, f64) = (5.0, 50.0);
+
+/// Way of the short move where there is no travel, m, and shares of a travel.
+const SHORT: f64 = 0.02;
+const SHARES: [f64; 2] = [0.1, 0.7];
+
+/// Half of the window of standard moves in encoder counts, and at least, m.
+const COUNTS: f64 = 5.0;
+const WINDOW: f64 = 50e-6;
+
+/// The moves of a case; where it has none a standard set: a short and a long move as quick as travel and limits allow, and a slow
+/// reversal.
+pub fn of(case: &Case, design: &Design) -> Result<Vec<Move>> {
+    if case.moves.is_empty() { standard(&case.stage, design) } else { Ok(case.moves.clone()) }
+}
+
+/// Short, long, and a slow reversal.
+fn standard(stage: &Stage, design: &Design) -> Result<Vec<Move>> {
+    let (speed, acceleration) = limits(stage, design);
+    let travel = stage.travel.map(|travel| (travel.min, travel.max - travel.min));
+    let (from, way) = travel
+        .map_or((0.0, [SHORT, 10.0 * SHORT]), |(min, length)| (min + 0.1 * length, SHARES.map(|share| share * length)));
+    let (jerk, quick) = (60.0 * acceleration, 8000.0 * acceleration);
+    let limits = Limits { speed, acceleration, jerk: Some(jerk), snap: Some(quick) };
+    let slow = Limits { speed: 0.04 * speed, acceleration: 0.04 * acceleration, jerk: Some(0.04 * jerk), snap: None };
+    let back = 0.25 * way[0];
+    let legs = [
+        ("short", vec![Leg::To(from + way[0], limits)]),
+        ("long", vec![Leg::To(from + way[1], limits)]),
+        ("slow reversal", vec![Leg::To(from + back, slow), Leg::To(from, slow)]),
+    ];
+    let count = stage.encoder.map_or(0.0, |encoder| {
+        let length = if measures_cart(stage) { 1.0 } else { stage.pulley_radius };
+        length / encoder.counts_per_unit(stage.motor.gear_ratio)
+    });
+    let one = |(name, legs): (&str, Vec<Leg>)| {
+        let profile = Profile::new(from, &legs)?;
+        let until = (profile.end() + 0.3).max(1.3 * profile.end());
+        Ok(Move { name: name.into(), until, every: design.every, window: WINDOW.max(COUNTS * count), profile })
+    };
+    legs.into_iter().map(one).collect()
+}
+
+/// Speed (m/s) and acceleration (m/s²) that leave room below the limits of controller and amplifier.
+fn limits(stage: &Stage, design: &Design) -> (f64, f64) {
+    let rigid = Rigid::of(stage);
+    let amplifier = match stage.amplifier.mode {
+        AmplifierMode::Voltage => stage.amplifier.voltage_limit.map(|limit| limit / stage.amplifier.gain.abs()),
+        AmplifierMode::Current => stage.amplifier.current_limit.map(|limit| limit / stage.amplifier.gain.abs()),
+    };
+    let Some(limit) = [design.limit, amplifier].into_iter().flatten().reduce(f64::min) else { return MODEST };
+    let dry = rigid.coulomb[0];
+    let push = |speed: f64| rigid.command(dry + rigid.viscous[0] * speed, 0.0, speed).abs();
+    // The command grows in a straight line with speed.
+    let per_speed = push(1.0) - push(0.0);
+    let speed = (SPEED * limit - push(0.0)) / per_speed.max(f64::MIN_POSITIVE);
+    let speed = if speed > 0.0 { speed.min(MOST.0) } else { 0.1 * MODEST.0 };
+    let force = FORCE * (limit * rigid.force_per_command().abs() - dry - rigid.viscous[0] * speed);
+    let acceleration = (force / rigid.mass).min(MOST.1);
+    (speed, if acceleration > 0.0 { acceleration } else { 0.1 * MODEST.1 })
+}
+
+/// Root mean square over the run of the current that a move asks of the axis as the file has it, A.
+pub fn asked(stage: &Stage, motion: &Move) -> f64 {
+    let compensation = Compensation::new(stage, &FeedForward::NONE);
+    let count = 1000;
+    let end = motion.profile.end();
+    let square = |k: i32| {
+        let y = motion.profile.at(end * (f64::from(k) + 0.5) / f64::from(count));
+        (compensation.needed(&y).force[0] / compensation.rigid.force_per_ampere).powi(2)
+    };
+    let mean = (0..count).map(square).sum::<f64>() / f64::from(count) * end / motion.until;
+    if mean > 0.0 && mean.is_finite() { mean.sqrt() } else { 1.0 }
+}

@@ -1,0 +1,150 @@
+//! How good a controller is: its moves on all axes of the family, in one number.
+//!
+//! Of each move three figures count, each on the axis that is the worst one for it once the bad end of the central 95 % is left out:
+//! the largest error E of the cart, the time S from the end of the profile until the cart stays within its window w, and the root mean
+//! square I of the current. With the duration D of the profile, the current I₀ that it asks of the axis as the file has it, and M moves
+//!
+//! ```text
+//! ln J = 1/M Σ [ a_e ln(1 + E/w) + a_s ln(1 + S/D) + a_i ln(I/I₀) ]
+//! ```
+//!
+//! An axis on which the cart is not within its window at the end of the run, t_end, but away by e, has S = (t_end − D)(1 + ln(1 + e/w)).
+
+use super::family::{Corner, Family};
+use crate::case::{Cost, Move};
+use crate::control::{Setup, closed_loop};
+use crate::design::Design;
+use crate::error::Result;
+use crate::solve::{Ending, Solver};
+use crate::stage::Stage;
+
+/// How much each figure counts: a_e, a_s, a_i.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Balance {
+    /// In a word.
+    pub name: &'static str,
+    /// Of the largest error.
+    pub error: f64,
+    /// Of the time until the cart settles.
+    pub settling: f64,
+    /// Of the current.
+    pub current: f64,
+}
+
+/// What the table of choices has; the second is the objective.
+pub const BALANCES: [Balance; 3] = [
+    Balance { name: "stiff", error: 1.0, settling: 1.0, current: 0.1 },
+    Balance { name: "balanced", error: 1.0, settling: 1.0, current: 1.0 },
+    Balance { name: "gentle", error: 1.0, settling: 1.0, current: 10.0 },
+];
+
+/// What a move shows on one axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Seen {
+    /// Largest |x − y|, m; infinite where the run does not reach its end.
+    pub error: f64,
+    /// Root mean square of x − y, m.
+    pub rms: f64,
+    /// From the end of the profile until the cart settles, s.
+    pub settling: Option<f64>,
+    /// S, s.
+    pub settles: f64,
+    /// Root mean square of the current, A.
+    pub current: f64,
+}
+
+/// A move on one axis.
+pub fn look(stage: &Stage, model: &Stage, design: &Design, motion: &Move) -> Result<Seen> {
+    let (until, window, solver) = (motion.until, motion.window, Solver::of(stage));
+    let run = closed_loop(&Setup { stage, model, design, profile: &motion.profile, until, window, solver })?;
+    let figures = run.figures;
+    if run.outcome.ending != Ending::Complete {
+        return Ok(Seen {
+            error: f64::INFINITY,
+            rms: f64::INFINITY,
+            settling: None,
+            settles: f64::INFINITY,
+            current: f64::INFINITY,
+        });
+    }
+    let left = (until - motion.profile.end()).max(motion.profile.end() * 1e-3);
+    let away = left * (1.0 + (figures.final_cart_error.abs() / window).ln_1p());
+    Ok(Seen {
+        error: figures.cart.peak.value.abs(),
+        rms: figures.cart.rms,
+        settling: figures.settling,
+        settles: figures.settling.unwrap_or(away),
+        current: figures.current.1,
+    })
+}
+
+/// A move on several axes at worst.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AtWorst {
+    /// E, m, and the place of its axis in the list.
+    pub error: (f64, usize),
+    /// Root mean square of the error, m.
+    pub rms: f64,
+    /// S, s; and whether the cart settles on that axis.
+    pub settles: (f64, bool),
+    /// I, A.
+    pub current: f64,
+    /// Axes on which the cart settles.
+    pub settled: usize,
+}
+
+impl AtWorst {
+    /// With so many axes left out of each figure.
+    pub fn of(seen: &[Seen], left_out: usize) -> Self {
+        let worst = |of: &dyn Fn(&Seen) -> f64| {
+            let mut all: Vec<(f64, usize)> = seen.iter().map(of).enumerate().map(|(i, v)| (sure(v), i)).collect();
+            all.sort_by(|a, b| b.0.total_cmp(&a.0));
+            all.get(left_out.min(all.len().saturating_sub(1))).copied().unwrap_or((f64::INFINITY, 0))
+        };
+        let settles = worst(&|one| one.settles);
+        Self {
+            error: worst(&|one| one.error),
+            rms: worst(&|one| one.rms).0,
+            settles: (settles.0, seen.get(settles.1).is_some_and(|one| one.settling.is_some())),
+            current: worst(&|one| one.current).0,
+            settled: seen.iter().filter(|one| one.settling.is_some()).count(),
+        }
+    }
+}
+
+/// What is no number is as bad as can be.
+fn sure(value: f64) -> f64 {
+    if value.is_nan() { f64::INFINITY } else { value }
+}
+
+/// ln J of moves whose currents I₀ are `asked`.
+pub fn objective(cost: Cost, balance: &Balance, moves: &[Move], asked: &[f64], worst: &[AtWorst]) -> f64 {
+    let of = |((motion, asked), worst): ((&Move, &f64), &AtWorst)| {
+        let error = (worst.error.0 / motion.window).ln_1p();
+        match cost {
+            Cost::Squares => (worst.rms / motion.window).ln_1p(),
+            Cost::Peak => error,
+            Cost::Moves | Cost::Disturbance => {
+                let duration = motion.profile.end().max(f64::MIN_POSITIVE);
+                balance.error * error
+                    + balance.settling * (worst.settles.0 / duration).ln_1p()
+                    + balance.current * (worst.current / asked).ln()
+            }
+        }
+    };
+    let sum: f64 = moves.iter().zip(asked).zip(worst).map(of).sum();
+    sure(sum / moves.len().max(1) as f64)
+}
+
+/// Every move on each of these axes, by move and axis.
+pub fn look_at_all(
+    family: &Family,
+    corners: &[Corner],
+    model: &Stage,
+    design: &Design,
+    moves: &[Move],
+) -> Result<Vec<Vec<Seen>>> {
+    let stages: Vec<Stage> = corners.iter().map(|corner| family.stage_at(corner)).collect();
+    let of = |motion: &Move| stages.iter().map(|stage| look(stage, model, design, motion)).collect();
+    moves.iter().map(of).collect()
+}

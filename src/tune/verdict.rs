@@ -1,0 +1,206 @@
+//! What a controller does over the family, and whether one is better than another.
+
+use super::family::{Corner, Family};
+use super::hunting::{Hunt, hunting};
+use super::margins::Margins;
+use super::objective::{AtWorst, BALANCES, Seen, look_at_all, objective};
+use super::work::{Work, mode_at};
+use crate::case::{Cost, Tuning};
+use crate::control::{Deviation, Setup, closed_loop};
+use crate::design::Design;
+use crate::error::Result;
+use crate::linear::{Operation, travel};
+use crate::solve::{Ending, Solver};
+
+/// By what share a figure may differ and be the same.
+const SAME: f64 = 1e-6;
+
+/// What a controller does on the axis of the file and at worst over the family.
+#[derive(Debug, Clone)]
+pub struct Verdict {
+    /// The controller.
+    pub design: Design,
+    /// Its margins on the axis as it is taken for.
+    pub nominal: Margins,
+    /// The axis on which its sensitivity is furthest beyond its limits, or nearest to them, once the bad end is left out.
+    pub corner: Corner,
+    /// The margins there.
+    pub worst: Margins,
+    /// Axes on which it is not stable, and all of them.
+    pub unstable: (usize, usize),
+    /// ln J.
+    pub objective: f64,
+    /// Its moves.
+    pub moves: Vec<MoveVerdict>,
+    /// Its limit cycle at rest, if there is one.
+    pub hunt: Option<Hunt>,
+}
+
+/// What a controller does in a move.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MoveVerdict {
+    /// Its name.
+    pub name: String,
+    /// x − y on the axis as it is taken for.
+    pub cart: Deviation,
+    /// Until the cart settles, s, if it does.
+    pub settling: Option<f64>,
+    /// Root mean square of the current, A.
+    pub current: f64,
+    /// |x − y| at worst, m; and on which axis.
+    pub worst: (f64, String),
+    /// Axes on which it settles, and all of them.
+    pub settled: (usize, usize),
+    /// All figures at worst.
+    pub at_worst: AtWorst,
+    /// The axis that takes longest to settle, by its place in the list.
+    pub(super) slowest: usize,
+    seen: Vec<Seen>,
+}
+
+/// What became of a controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Judgement {
+    /// No figure of its moves is worse, and the objective or the limits are better.
+    Better,
+    /// It is the same.
+    Unchanged,
+    /// It settles on fewer axes, later, or errs more, in some move.
+    Worse,
+}
+
+impl Judgement {
+    /// In a word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Better => "better",
+            Self::Unchanged => "unchanged",
+            Self::Worse => "worse",
+        }
+    }
+}
+
+/// A limit of the margins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Limit {
+    /// M_s.
+    Sensitivity,
+    /// M_t.
+    Complementary,
+}
+
+impl Limit {
+    /// As in the case file.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Sensitivity => "sensitivity",
+            Self::Complementary => "complementary",
+        }
+    }
+}
+
+/// What keeps the gains from being as they were.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Forced {
+    /// The limit that is reached.
+    pub limit: Limit,
+    /// Where, Hz: the mode of the axis that stands there, or the top itself.
+    pub mode: f64,
+    /// Cart position, m.
+    pub place: f64,
+}
+
+impl Verdict {
+    /// Its moves at worst.
+    pub(super) fn at_worst(&self) -> Vec<AtWorst> {
+        self.moves.iter().map(|one| one.at_worst).collect()
+    }
+
+    /// Its moves at worst on some of the machines alone.
+    pub(super) fn on(&self, some: &[usize]) -> Vec<AtWorst> {
+        let pick =
+            |one: &MoveVerdict| some.iter().filter_map(|&place| one.seen.get(place).copied()).collect::<Vec<_>>();
+        self.moves.iter().map(|one| AtWorst::of(&pick(one), 0)).collect()
+    }
+}
+
+impl Work<'_> {
+    /// What a design does.
+    pub fn verdict(&self, design: &Design) -> Result<Verdict> {
+        let feedback = self.feedback(design)?;
+        let corners = feedback.corners();
+        let nominal = Margins::of(&self.family.plant(&self.family.nominal(), design, &corners)?, &feedback);
+        let (place, mut worst, unstable) = self.limits(design)?;
+        let mut machines = self.family.machines.clone();
+        let mut corner = machines[place].clone();
+        if self.family.corners {
+            let (found, margins) = self.family.worst(design, &feedback, &|margins| self.excess(margins))?;
+            if self.excess(&margins) >= self.excess(&worst) {
+                (corner, worst) = (found.clone(), margins);
+            }
+            machines.push(found);
+        }
+        let all = look_at_all(self.family, &machines, &self.case.stage, design, self.moves)?;
+        let left_out = self.family.left_out(machines.len());
+        let mut moves = Vec::new();
+        for (motion, seen) in self.moves.iter().zip(all) {
+            let (stage, until, window) = (&self.case.stage, motion.until, motion.window);
+            let (profile, solver) = (&motion.profile, Solver::of(stage));
+            let own = closed_loop(&Setup { stage, model: stage, design, profile, until, window, solver })?;
+            let at_worst = AtWorst::of(&seen, left_out);
+            let slowest =
+                (0..seen.len()).max_by(|&a, &b| seen[a].settles.total_cmp(&seen[b].settles)).unwrap_or_default();
+            moves.push(MoveVerdict {
+                name: motion.name.clone(),
+                cart: own.figures.cart,
+                settling: own.figures.settling.filter(|_| own.outcome.ending == Ending::Complete),
+                current: own.figures.current.1,
+                worst: (at_worst.error.0, self.family.words(&machines[at_worst.error.1])),
+                settled: (at_worst.settled, machines.len()),
+                at_worst,
+                slowest,
+                seen,
+            });
+        }
+        let hunt = if nominal.stable { hunting(&self.case.stage, design)? } else { None };
+        let figures: Vec<AtWorst> = moves.iter().map(|one| one.at_worst).collect();
+        let cost = self.tuning.cost.unwrap_or(Cost::Moves);
+        let value = objective(cost, &BALANCES[1], self.moves, &self.asked, &figures);
+        let unstable = (unstable, self.family.machines.len());
+        Ok(Verdict { design: design.clone(), nominal, corner, worst, unstable, objective: value, moves, hunt })
+    }
+}
+
+/// Whether a controller is better than the one before: not if any figure of a move is worse.
+pub(super) fn compare(before: &Verdict, after: &Verdict) -> Judgement {
+    if before.design == after.design {
+        return Judgement::Unchanged;
+    }
+    let is_worse = |(was, is): (&MoveVerdict, &MoveVerdict)| {
+        let (was, is) = (&was.at_worst, &is.at_worst);
+        is.settled < was.settled
+            || is.error.0 > was.error.0 * (1.0 + SAME)
+            || is.settles.0 > was.settles.0 * (1.0 + SAME) + SAME
+            || !is.error.0.is_finite() && was.error.0.is_finite()
+    };
+    if before.moves.iter().zip(&after.moves).any(is_worse) {
+        return Judgement::Worse;
+    }
+    let holds_more = after.worst.sensitivity < before.worst.sensitivity * (1.0 - SAME);
+    if after.objective < before.objective - SAME || holds_more { Judgement::Better } else { Judgement::Unchanged }
+}
+
+/// The limit that a design has come to.
+pub(super) fn forced(family: &Family, after: &Verdict, tuning: &Tuning) -> Forced {
+    let worst = &after.worst;
+    let is_sensitivity = worst.sensitivity / tuning.sensitivity >= worst.complementary / tuning.complementary;
+    let (limit, omega) = match is_sensitivity {
+        true => (Limit::Sensitivity, worst.at),
+        false => (Limit::Complementary, worst.complementary_at),
+    };
+    let mut stage = family.stage_at(&after.corner);
+    stage.belt.follows_cart |= stage.belt.make.is_some();
+    let there = travel(&stage, Operation::default(), &[after.corner.place]).unwrap_or_default();
+    let modes: Vec<f64> = there.iter().flat_map(|place| place.undamped_resonances.iter().copied()).collect();
+    Forced { limit, mode: mode_at(omega, &modes), place: after.corner.place }
+}

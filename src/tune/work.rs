@@ -1,0 +1,448 @@
+//! The search: many designs by what steps of command and reference do within the limits, which needs no run; the best of them by moves.
+
+use super::family::Family;
+use super::gains::{self, rounded, searched, shaped};
+use super::margins::{Margins, Plant};
+use super::objective::{AtWorst, BALANCES, Balance, look_at_all, objective};
+use super::rules::{layouts, starts};
+use super::search::minimise;
+use super::verdict::Verdict;
+use crate::case::{Case, Cost, Move, Tuning};
+use crate::control::feedback::Feedback;
+use crate::design::Design;
+use crate::error::Result;
+use crate::linear::{Operation, travel};
+use std::f64::consts::PI;
+
+/// Share of the limits that a search on the grid keeps to: tops between its points and rounding are in the rest.
+const WITHIN: f64 = 0.98;
+
+/// Rounds of a search, each with the axis that passed a limit in the one before.
+const ROUNDS: usize = 5;
+
+/// Values that a search without moves, and one with moves, may ask for.
+const VALUES: usize = 130;
+const MOVES: usize = 44;
+
+/// Designs that are searched by moves.
+const FINALISTS: usize = 3;
+
+/// Share by which filters that are added have to make the cost smaller.
+const PAYS: f64 = 0.02;
+
+/// Weight of what is beyond a limit, and of what a figure is worse than before, in ln J.
+const STEEP: f64 = 30.0;
+
+/// A tuning on its way.
+pub(super) struct Work<'a> {
+    pub case: &'a Case,
+    pub family: &'a Family,
+    pub tuning: &'a Tuning,
+    pub moves: &'a [Move],
+    /// I₀ of each move, A.
+    pub asked: Vec<f64>,
+    /// Of all machines of the family.
+    pub plants: Vec<Plant>,
+    /// Machines on which the limits have to hold while searching.
+    set: Vec<usize>,
+    /// Of a corner that is none of the machines.
+    more: Vec<Plant>,
+    pub tried: usize,
+    pub rounds: usize,
+    pub stop: &'a dyn Fn() -> bool,
+}
+
+/// A design that keeps the limits, as it is found.
+#[derive(Debug, Clone)]
+pub(super) struct Finalist {
+    pub design: Design,
+    /// What it was made from, number of filters that were there, and the powers that lead to it.
+    start: Design,
+    own: usize,
+    powers: Vec<f64>,
+    /// ln of what steps do.
+    value: f64,
+}
+
+/// A design that was run.
+#[derive(Debug, Clone)]
+pub(super) struct Tried {
+    pub design: Design,
+    pub worst: Vec<AtWorst>,
+}
+
+impl<'a> Work<'a> {
+    pub fn new(
+        case: &'a Case,
+        family: &'a Family,
+        tuning: &'a Tuning,
+        moves: &'a [Move],
+        design: &Design,
+        stop: &'a dyn Fn() -> bool,
+    ) -> Result<Self> {
+        let corners = Feedback::new(design, &case.stage)?.corners();
+        let plant = |corner| family.plant(corner, design, &corners);
+        let plants = family.machines.iter().map(plant).collect::<Result<Vec<_>>>()?;
+        let asked = moves.iter().map(|motion| super::moves::asked(&case.stage, motion)).collect();
+        Ok(Self {
+            case,
+            family,
+            tuning,
+            moves,
+            asked,
+            plants,
+            set: vec![0],
+            more: Vec::new(),
+            tried: 0,
+            rounds: 0,
+            stop,
+        })
+    }
+
+    pub fn feedback(&self, design: &Design) -> Result<Feedback> {
+        Feedback::new(design, &self.case.stage)
+    }
+
+    pub fn excess(&self, margins: &Margins) -> f64 {
+        margins.excess(self.tuning.sensitivity, self.tuning.complementary)
+    }
+
+    /// The machine on which a design is worst, once the bad end is left out, and its margins; and how many are not stable.
+    pub fn limits(&self, design: &Design) -> Result<(usize, Margins, usize)> {
+        let feedback = self.feedback(design)?;
+        let mut all: Vec<(usize, Margins)> =
+            self.plants.iter().map(|plant| Margins::of(plant, &feedback)).enumerate().collect();
+        let unstable = all.iter().filter(|(_, margins)| !margins.stable).count();
+        all.sort_by(|a, b| self.excess(&b.1).total_cmp(&self.excess(&a.1)));
+        let (place, margins) = all[self.family.left_out(all.len())];
+        Ok((place, margins, unstable))
+    }
+
+    /// Where a design passes a limit, if it does; what is worst joins the set.
+    fn passes(&mut self, design: &Design) -> Result<bool> {
+        let (place, margins, _) = self.limits(design)?;
+        if self.excess(&margins) > 1.0 {
+            if !self.set.contains(&place) {
+                self.set.push(place);
+            }
+            return Ok(true);
+        }
+        if self.family.corners {
+            let feedback = self.feedback(design)?;
+            let (corner, margins) = self.family.worst(design, &feedback, &|margins| self.excess(margins))?;
+            if self.excess(&margins) > 1.0 {
+                self.more.push(self.family.plant(&corner, design, &feedback.corners())?);
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// How far a design is beyond the limits on the set, and what steps of command and reference do there at worst.
+    fn on_set(&mut self, design: &Design) -> (f64, f64) {
+        self.tried += 1;
+        let Ok(feedback) = self.feedback(design) else { return (f64::INFINITY, f64::INFINITY) };
+        let (mut most, mut slow) = (0.0_f64, 0.0_f64);
+        for plant in self.set.iter().map(|&place| &self.plants[place]).chain(&self.more) {
+            let margins = Margins::roughly(plant, &feedback);
+            most = most.max(self.excess(&margins));
+            // What a step at the command does, and a step of the reference: the one alone would do without a position gain.
+            slow = slow.max(margins.disturbance * margins.following);
+        }
+        ((most / WITHIN - 1.0).max(0.0), slow)
+    }
+
+    /// Modes of the axis that a command swings, each in the middle of where it goes along the travel, Hz; and the first anti-resonance.
+    pub fn modes(&self) -> Result<(Vec<f64>, Option<f64>)> {
+        let mut stage = self.case.stage.clone();
+        stage.belt.follows_cart |= stage.belt.make.is_some();
+        let places = travel(&stage, Operation::default(), &self.family.places)?;
+        let swing = places.iter().filter_map(|place| place.undamped_antiresonances.first().copied()).reduce(f64::min);
+        let most = 0.4 / self.design().every;
+        let mut modes = Vec::new();
+        for number in 0.. {
+            let all: Vec<f64> =
+                places.iter().filter_map(|place| place.undamped_resonances.get(number).copied()).collect();
+            let (Some(low), Some(high)) = (all.iter().copied().reduce(f64::min), all.iter().copied().reduce(f64::max))
+            else {
+                break;
+            };
+            let middle = (low * high).sqrt();
+            if middle < most {
+                modes.push(middle);
+            }
+        }
+        Ok((modes, swing))
+    }
+
+    fn design(&self) -> &Design {
+        self.case.controller.as_ref().expect("a tuning has a controller")
+    }
+
+    /// The best designs without a run, the best first: of each layout of filters the best of its starts.
+    pub fn screened(&mut self, given: &Design, is_given_good: bool) -> Result<(Vec<Finalist>, Option<f64>)> {
+        let (modes, swing) = self.modes()?;
+        let mut found: Vec<Finalist> = Vec::new();
+        let mut placed = None;
+        for layout in layouts(given, &modes) {
+            let mut best: Option<(f64, Design)> = None;
+            let mut all = starts(&layout, &self.case.stage, swing, self.tuning.bandwidth, self.tuning.damping);
+            all.push((layout.clone(), None));
+            for (start, hertz) in all {
+                let Some((design, factor)) = self.softened(&start, layout.filters.len())? else { continue };
+                let value = self.on_set(&design).1.ln();
+                placed = placed.or(hertz.map(|hertz| hertz * factor));
+                if best.as_ref().is_none_or(|(least, _)| value < *least) {
+                    best = Some((value, design));
+                }
+                if (self.stop)() {
+                    break;
+                }
+            }
+            if let Some((_, start)) = best {
+                found.extend(self.improved(start, given.filters.len())?);
+            }
+            if (self.stop)() && !found.is_empty() {
+                break;
+            }
+        }
+        // Filters stay where they pay.
+        let plain = found.iter().find(|one| one.design.filters.len() == given.filters.len()).map(|one| one.value);
+        if let Some(plain) = plain {
+            let pays = |one: &Finalist| one.design.filters.len() == given.filters.len() || one.value < plain - PAYS;
+            found.retain(pays);
+        }
+        found.sort_by(|a, b| a.value.total_cmp(&b.value));
+        found.truncate(FINALISTS);
+        if is_given_good {
+            let count = searched(given, given.filters.len());
+            found.push(Finalist {
+                design: given.clone(),
+                start: given.clone(),
+                own: given.filters.len(),
+                powers: vec![0.0; count],
+                value: self.on_set(given).1.ln(),
+            });
+        }
+        Ok((found, placed))
+    }
+
+    /// A start that keeps the limits on all machines: with its loop made slower as long as it does not. And the share of its speed.
+    fn softened(&mut self, start: &Design, own: usize) -> Result<Option<(Design, f64)>> {
+        let mut factor = 1.0;
+        while factor > 1e-3 && !(self.stop)() {
+            let design = rounded(&slower(start, own, &self.case.stage, factor));
+            if self.on_set(&design).0 == 0.0 && !self.passes(&design)? {
+                return Ok(Some((design, factor)));
+            }
+            factor *= 0.8;
+        }
+        Ok(None)
+    }
+
+    /// The best design from a start that keeps the limits, by what steps of command and reference do.
+    fn improved(&mut self, start: Design, own: usize) -> Result<Option<Finalist>> {
+        let count = searched(&start, own);
+        let mut powers = vec![0.0; count];
+        for round in 0..ROUNDS {
+            self.rounds += 1;
+            let most = if round == 0 { VALUES } else { VALUES / 2 };
+            let mut value = |x: &[f64]| {
+                if (self.stop)() {
+                    return f64::INFINITY;
+                }
+                let (beyond, slow) = self.on_set(&shaped(&start, own, x));
+                if beyond > 0.5 { 1e3 + beyond.min(1e6) } else { slow.ln() + STEEP * beyond }
+            };
+            powers = minimise(&powers, 0.3, 1e-3, most, &mut value).x;
+            if !self.passes(&rounded(&shaped(&start, own, &powers)))? {
+                break;
+            }
+            if round + 1 == ROUNDS {
+                powers = self.pulled(&start, own, &vec![0.0; count], &powers)?;
+            }
+        }
+        let design = rounded(&shaped(&start, own, &powers));
+        let value = self.on_set(&design).1.ln();
+        Ok(Some(Finalist { design, start, own, powers, value }))
+    }
+
+    /// As far from what keeps the limits towards what does not as they allow.
+    fn pulled(&mut self, start: &Design, own: usize, from: &[f64], to: &[f64]) -> Result<Vec<f64>> {
+        let between = |part: f64| -> Vec<f64> { from.iter().zip(to).map(|(a, b)| a + part * (b - a)).collect() };
+        let (mut near, mut far) = (0.0, 1.0);
+        for _ in 0..7 {
+            let part = 0.5 * (near + far);
+            if self.passes(&rounded(&shaped(start, own, &between(part))))? { far = part } else { near = part }
+        }
+        Ok(between(near))
+    }
+
+    /// What a design does on these machines.
+    fn run(&self, design: &Design, some: &[usize]) -> Vec<AtWorst> {
+        let corners: Vec<_> = some.iter().map(|&place| self.family.machines[place].clone()).collect();
+        match look_at_all(self.family, &corners, &self.case.stage, design, self.moves) {
+            Ok(all) => all.iter().map(|seen| AtWorst::of(seen, 0)).collect(),
+            Err(_) => Vec::new(),
+        }
+    }
+
+    /// Searches by moves from the best finalist, on the machines `some`; all that was run and keeps the limits on the set. Then once more from
+    /// where that ended, with no figure worse than those of `before`.
+    pub fn by_moves(
+        &mut self,
+        finalists: &[Finalist],
+        some: &[usize],
+        cost: Cost,
+        before: &[AtWorst],
+    ) -> Result<Vec<Tried>> {
+        let mut archive: Vec<Tried> = Vec::new();
+        let mut ranked: Vec<(f64, &Finalist)> = Vec::new();
+        for finalist in finalists {
+            let worst = self.run(&finalist.design, some);
+            ranked.push((self.valued(cost, &BALANCES[1], &worst, None), finalist));
+            archive.push(Tried { design: finalist.design.clone(), worst });
+        }
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // From the best two, and on from the better one.
+        let mut best: Option<(f64, &Finalist, Vec<f64>)> = None;
+        for (_, finalist) in ranked.into_iter().take(2) {
+            let step = (0.25, MOVES, None);
+            let (value, powers) = self.moved(finalist, &finalist.powers, some, cost, step, &mut archive)?;
+            if best.as_ref().is_none_or(|(least, ..)| value < *least) {
+                best = Some((value, finalist, powers));
+            }
+        }
+        let Some((_, finalist, mut powers)) = best else { return Ok(archive) };
+        for step in [(0.1, MOVES / 2, None), (0.15, MOVES / 2, Some(before))] {
+            if !(self.stop)() {
+                powers = self.moved(finalist, &powers, some, cost, step, &mut archive)?.1;
+            }
+        }
+        Ok(archive)
+    }
+
+    /// One search by moves: its step, how many designs it may try, and figures that none may be worse than. Its value, and the powers.
+    fn moved(
+        &mut self,
+        finalist: &Finalist,
+        from: &[f64],
+        some: &[usize],
+        cost: Cost,
+        (step, most, bars): (f64, usize, Option<&[AtWorst]>),
+        archive: &mut Vec<Tried>,
+    ) -> Result<(f64, Vec<f64>)> {
+        let (start, own) = (&finalist.start, finalist.own);
+        let mut value = |x: &[f64]| {
+            if (self.stop)() {
+                return f64::INFINITY;
+            }
+            let design = rounded(&shaped(start, own, x));
+            let beyond = self.on_set(&design).0;
+            if beyond > 0.05 {
+                return 1e3 + beyond.min(1e6);
+            }
+            let worst = self.run(&design, some);
+            let value = self.valued(cost, &BALANCES[1], &worst, bars) + STEEP * beyond;
+            if beyond == 0.0 {
+                archive.push(Tried { design, worst });
+            }
+            value
+        };
+        let found = minimise(from, step, 1e-3, most, &mut value);
+        let (mut value, mut powers) = (found.value, found.x);
+        if self.passes(&rounded(&shaped(start, own, &powers)))? {
+            powers = self.pulled(start, own, from, &powers)?;
+            let design = rounded(&shaped(start, own, &powers));
+            let worst = self.run(&design, some);
+            value = self.valued(cost, &BALANCES[1], &worst, bars);
+            archive.push(Tried { design, worst });
+        }
+        Ok((value, powers))
+    }
+
+    /// A design without those of its added filters, from number `own` on, without which the limits hold and it is as good: `is_as_good` is
+    /// asked with what it was and is.
+    pub fn pruned(
+        &mut self,
+        mut verdict: Verdict,
+        own: usize,
+        is_as_good: &dyn Fn(&Verdict, &Verdict) -> bool,
+    ) -> Result<Verdict> {
+        for place in (own..verdict.design.filters.len()).rev() {
+            let mut design = verdict.design.clone();
+            design.filters.remove(place);
+            if self.passes(&design)? {
+                continue;
+            }
+            let other = self.verdict(&design)?;
+            if other.objective <= verdict.objective + PAYS && is_as_good(&verdict, &other) {
+                verdict = other;
+            }
+        }
+        Ok(verdict)
+    }
+
+    /// ln J, and what figures are worse than before.
+    pub fn valued(&self, cost: Cost, balance: &Balance, worst: &[AtWorst], before: Option<&[AtWorst]>) -> f64 {
+        if worst.len() != self.moves.len() {
+            return f64::INFINITY;
+        }
+        let mut value = objective(cost, balance, self.moves, &self.asked, worst);
+        for (is, was) in worst.iter().zip(before.unwrap_or_default()) {
+            value += STEEP * (is.error.0 / was.error.0).ln().max(0.0);
+            value += (is.settles.0 - was.settles.0).max(0.0) * STEEP / was.settles.0.max(0.05);
+        }
+        if value.is_nan() { f64::INFINITY } else { value }
+    }
+
+    /// The designs of an archive that are best by each balance and keep the limits, at most `tries` looked at for each.
+    pub fn best_of(
+        &mut self,
+        archive: &[Tried],
+        cost: Cost,
+        balance: &Balance,
+        before: Option<&[AtWorst]>,
+        tries: usize,
+    ) -> Result<Option<Design>> {
+        let mut ranked: Vec<(f64, &Tried)> =
+            archive.iter().map(|tried| (self.valued(cost, balance, &tried.worst, before), tried)).collect();
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (value, tried) in ranked.into_iter().take(tries) {
+            if value.is_finite() && !self.passes(&tried.design)? {
+                return Ok(Some(tried.design.clone()));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// A design with a slower loop: of a PID or a cascade as if time went by more slowly, of state feedback with less weight on errors.
+fn slower(design: &Design, own: usize, stage: &crate::stage::Stage, factor: f64) -> Design {
+    if factor == 1.0 {
+        return design.clone();
+    }
+    let power = |key: &str| match key {
+        "controller.pid.proportional" => 2.0,
+        "controller.pid.integral" => 3.0,
+        "controller.pid.derivative" | "controller.cascade.position" | "controller.cascade.speed" => 1.0,
+        "controller.cascade.speed_integral" => 2.0,
+        "controller.cascade.current.proportional" | "controller.cascade.current.integral" => 0.5,
+        _ => 0.0,
+    };
+    match design.structure {
+        crate::design::Structure::StateFeedback(_) => gains::softer(design, stage, factor),
+        _ => {
+            let all = gains::gains(design, stage).into_iter().filter(|gain| gain.searched);
+            let powers: Vec<f64> = all.map(|gain| power(gain.key) * factor.ln()).collect();
+            shaped(design, own.max(design.filters.len()), &powers)
+        }
+    }
+}
+
+/// Frequency of a top in Hz: of the mode of the axis that is within a fifth of it, or its own.
+pub(super) fn mode_at(omega: f64, modes: &[f64]) -> f64 {
+    let hertz = omega / (2.0 * PI);
+    let near = modes.iter().copied().min_by(|a, b| (a / hertz).ln().abs().total_cmp(&(b / hertz).ln().abs()));
+    near.filter(|mode| (mode / hertz).ln().abs() < 0.2).unwrap_or(hertz)
+}
