@@ -23,7 +23,7 @@ const ROUNDS: usize = 5;
 /// Values that a search without moves may ask for, more for each gain, and those that one with moves may.
 const VALUES: usize = 40;
 const MORE: usize = 24;
-const MOVES: usize = 44;
+const MOVES: usize = 36;
 
 /// Designs that are searched by moves.
 const FINALISTS: usize = 3;
@@ -309,9 +309,9 @@ impl<'a> Work<'a> {
             archive.push(Tried { design: finalist.design.clone(), worst });
         }
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // From the best two, and on from the better one.
+        // From each of the best, and on from where it is best then.
         let mut best: Option<(f64, &Finalist, Vec<f64>)> = None;
-        for (_, finalist) in ranked.into_iter().take(2) {
+        for (_, finalist) in ranked.into_iter().take(FINALISTS) {
             let step = (0.25, MOVES, None);
             let (value, powers) = self.moved(finalist, &finalist.powers, some, cost, step, &mut archive)?;
             if best.as_ref().is_none_or(|(least, ..)| value < *least) {
