@@ -14,13 +14,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 use taut::case::{Case, Experiment, GantryCase, GantryExperiment, InputFile};
-use taut::control::trouble::{Trouble, trouble};
 use taut::control::{Loop, MoveRun, Rows, Standard, Worst, stream, worst};
 use taut::json::{self, GantrySimulated, GantrySimulation, Moved, Simulated, Simulation};
 use taut::metrics::{GantryMeter, GantryMetrics, Meter, Metrics};
 use taut::reduction::Reduction;
 use taut::solve::{self, Course, Detail, Flow, Outcome, Solver};
 use taut::trajectory::{CsvWriter, ParquetWriter, Trajectory};
+use taut::tune::trouble::{Trouble, trouble};
 
 /// An experiment or a move that was run, everything in memory.
 #[pyclass(frozen, module = "taut._native")]

@@ -1,8 +1,8 @@
 //! A move run in closed loop, and what it shows.
 
+use super::rest::Swing;
 use super::sampled::{Controller, Loop, Sample, Sampled};
 use super::standard::Standard;
-use super::trouble::Swing;
 use crate::case::{Experiment, Initial};
 use crate::design::Design;
 use crate::error::{Error, Result};

@@ -1,6 +1,6 @@
 //! The loop closed: samples, counts, delay and limit between a controller and the axis.
 
-use super::trouble::Rest;
+use super::rest::Rest;
 use crate::error::{Error, Result};
 use crate::mechanism::State;
 use crate::quantity::rounded;

@@ -2,8 +2,8 @@
 
 use super::{ending, peak};
 use crate::case::Move;
-use crate::control::trouble::Trouble;
 use crate::control::{Deviation, Loop, MoveRun, Worst};
+use crate::tune::trouble::Trouble;
 use serde_json::{Value, json};
 
 /// What is told of one move that ran.

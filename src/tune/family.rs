@@ -294,6 +294,14 @@ impl Family {
                 other = Some((corner, found));
             }
         }
+        // A notch makes the worst one lie between the ends: there a drawn axis is nearer to it.
+        let mut inner: Option<(Corner, (f64, Margins))> = None;
+        for corner in &self.machines {
+            let found = look(corner)?;
+            if inner.as_ref().is_none_or(|(_, most)| found.0 > most.0) {
+                inner = Some((corner.clone(), found));
+            }
+        }
         let ends = self.steps(&[-1.0, 0.0, 1.0], &self.places, &self.loads);
         best = climb(best, &ends, ROUNDS, &look)?;
         if let Some(other) = other {
@@ -304,7 +312,14 @@ impl Family {
         }
         // Seldom the worst lies between the ends.
         let between = self.steps(&[-0.75, -0.5, -0.25, 0.25, 0.5, 0.75], &halves(&self.places), &halves(&self.loads));
-        best = climb(best, &between, 2, &look)?;
+        let all: Vec<Step> = ends.into_iter().chain(between).collect();
+        if let Some(inner) = inner {
+            let inner = climb(inner, &all, 3, &look)?;
+            if inner.1.0 > best.1.0 {
+                best = inner;
+            }
+        }
+        best = climb(best, &all, 2, &look)?;
         let margins = Margins::of(&self.plant(&best.0, design, &corners)?, feedback);
         Ok((best.0, margins))
     }

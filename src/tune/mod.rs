@@ -13,6 +13,7 @@ mod objective;
 mod placement;
 mod rules;
 mod search;
+pub mod trouble;
 mod verdict;
 mod work;
 

@@ -85,17 +85,17 @@ pub fn layouts(design: &Design, modes: &[f64]) -> Vec<Design> {
         other.filters.extend(filters);
         all.push(other);
     };
+    if !low_pass {
+        add(vec![low]);
+    }
     if let (Some(&one), true) = (modes.first(), room > 0) {
         add(vec![notch(one)]);
-        if !low_pass {
-            add(vec![notch(one), low]);
-        }
         if let (Some(&two), true) = (modes.get(1), room > 1) {
             add(vec![notch(one), notch(two)]);
         }
-    }
-    if !low_pass {
-        add(vec![low]);
+        if !low_pass {
+            add(vec![notch(one), low]);
+        }
     }
     all
 }

@@ -20,9 +20,10 @@ const WITHIN: f64 = 0.98;
 /// Rounds of a search, each with the axis that passed a limit in the one before.
 const ROUNDS: usize = 5;
 
-/// Values that a search without moves, and one with moves, may ask for.
-const VALUES: usize = 130;
-const MOVES: usize = 44;
+/// Values that a search without moves may ask for, more for each gain, and those that one with moves may.
+const VALUES: usize = 40;
+const MORE: usize = 24;
+const MOVES: usize = 36;
 
 /// Designs that are searched by moves.
 const FINALISTS: usize = 3;
@@ -188,6 +189,9 @@ impl<'a> Work<'a> {
             let mut best: Option<(f64, Design)> = None;
             let mut all = starts(&layout, &self.case.stage, swing, self.tuning.bandwidth, self.tuning.damping);
             all.push((layout.clone(), None));
+            // With the gains that were best with fewer filters, too.
+            let least = found.iter().min_by(|a, b| a.value.total_cmp(&b.value));
+            all.extend(least.map(|one| (Design { structure: one.design.structure.clone(), ..layout.clone() }, None)));
             for (start, hertz) in all {
                 let Some((design, factor)) = self.softened(&start, layout.filters.len())? else { continue };
                 let value = self.on_set(&design).1.ln();
@@ -246,7 +250,8 @@ impl<'a> Work<'a> {
         let mut powers = vec![0.0; count];
         for round in 0..ROUNDS {
             self.rounds += 1;
-            let most = if round == 0 { VALUES } else { VALUES / 2 };
+            let values = VALUES + MORE * count;
+            let most = if round == 0 { values } else { values / 2 };
             let mut value = |x: &[f64]| {
                 if (self.stop)() {
                     return f64::INFINITY;
@@ -304,9 +309,9 @@ impl<'a> Work<'a> {
             archive.push(Tried { design: finalist.design.clone(), worst });
         }
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // From the best two, and on from the better one.
+        // From each of the best, and on from where it is best then.
         let mut best: Option<(f64, &Finalist, Vec<f64>)> = None;
-        for (_, finalist) in ranked.into_iter().take(2) {
+        for (_, finalist) in ranked.into_iter().take(FINALISTS) {
             let step = (0.25, MOVES, None);
             let (value, powers) = self.moved(finalist, &finalist.powers, some, cost, step, &mut archive)?;
             if best.as_ref().is_none_or(|(least, ..)| value < *least) {

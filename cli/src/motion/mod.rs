@@ -15,13 +15,13 @@ use figures::Curves;
 use std::fmt::Write;
 use std::path::Path;
 use taut::case::{Case, Move};
-use taut::control::trouble::{self, Trouble};
 use taut::control::{Loop, MoveRun, Rows, Standard, Worst, stream, worst};
 use taut::design::Design;
 use taut::files::write_atomically;
 use taut::json::{self, Moved};
 use taut::solve::{Flow, Solver};
 use taut::trajectory::{CsvWriter, Trajectory};
+use taut::tune::trouble::{self, Trouble};
 use taut::{Error, Result};
 
 /// What is known of a move after it ran.

@@ -1,11 +1,11 @@
 //! What is wrong with a closed loop, as its model and its run show: not stable, at its limit, howling.
 
-use super::feedback::Feedback;
-use super::outcome::MoveRun;
+use super::margins::{Margins, Plant};
+use crate::control::MoveRun;
+use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::linear::{Operation, travel};
 use crate::stage::{AmplifierMode, Stage};
-use crate::tune::{Margins, Plant};
 use std::f64::consts::PI;
 
 /// Share of the samples at the limit from which on a command counts as saturated.
@@ -17,72 +17,10 @@ const CYCLES: f64 = 4.0;
 
 /// Growth of that swing from the first half of the rest to the second from which on it grows, and the least share of the limit.
 const GROWS: f64 = 1.5;
-const LEAST: f64 = 0.02;
+const LEAST: f64 = 0.1;
 
 /// Distance of a frequency from a mode's, as a share, within which it is that mode's.
 const NEAR: f64 = 0.2;
-
-/// Half of what the command goes to and fro after the profile.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Swing {
-    /// In the first half of the rest, V or A.
-    pub early: f64,
-    /// In the second.
-    pub late: f64,
-    /// In the second, Hz; 0 where it does not go to and fro.
-    pub frequency: f64,
-    /// How often it does so there.
-    pub cycles: f64,
-}
-
-/// Gathers a [`Swing`].
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Rest {
-    from: f64,
-    middle: f64,
-    early: (f64, f64),
-    late: (f64, f64),
-    below: bool,
-    upward: (f64, f64, u64),
-}
-
-impl Rest {
-    pub fn new(from: f64, until: f64) -> Self {
-        let none = (f64::INFINITY, f64::NEG_INFINITY);
-        Self { from, middle: 0.5 * (from + until), early: none, late: none, below: false, upward: (0.0, 0.0, 0) }
-    }
-
-    /// A command that was given at a sample.
-    pub fn see(&mut self, time: f64, given: f64) {
-        if time < self.from {
-            return;
-        }
-        let wider = |(low, high): (f64, f64)| (low.min(given), high.max(given));
-        if time < self.middle {
-            self.early = wider(self.early);
-            return;
-        }
-        self.late = wider(self.late);
-        // Upward through the middle of what it went through before, with a band about it.
-        let (low, high) = self.early;
-        let (level, band) = (0.5 * (low + high), 0.2 * 0.5 * (high - low));
-        if given < level - band {
-            self.below = true;
-        } else if given > level + band && self.below {
-            self.below = false;
-            let (first, _, count) = self.upward;
-            self.upward = (if count == 0 { time } else { first }, time, count + 1);
-        }
-    }
-
-    pub fn swing(&self) -> Swing {
-        let half = |(low, high): (f64, f64)| if high > low { 0.5 * (high - low) } else { 0.0 };
-        let (first, last, count) = self.upward;
-        let cycles = count.saturating_sub(1) as f64;
-        let frequency = if last > first { cycles / (last - first) } else { 0.0 };
-        Swing { early: half(self.early), late: half(self.late), frequency, cycles }
-    }
-}
 
 /// What is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -122,18 +60,21 @@ pub struct Trouble {
 /// What is wrong with a move that was run to `target`, m; none if nothing is.
 pub fn trouble(stage: &Stage, design: &Design, run: &MoveRun, target: f64) -> Option<Trouble> {
     let model = unstable(stage, design, target);
-    let (swing, (limited, samples)) = (run.swing, run.samples);
+    let (swing, (samples, limited)) = (run.swing, run.samples);
     let limit = limit(stage, design).unwrap_or(f64::INFINITY);
-    let loud = swing.late > LOUD * limit && swing.cycles >= CYCLES;
-    let grows = swing.late > GROWS * swing.early && swing.late > LEAST * limit && limit.is_finite();
+    let cycles = swing.cycles >= CYCLES;
+    let loud = swing.late > LOUD * limit && cycles;
+    let grows = swing.late > GROWS * swing.early && cycles && (swing.late > LEAST * limit || limit.is_infinite());
     let is_saturated = samples > 0 && limited as f64 > SATURATED * samples as f64;
     let seen = (swing.frequency > 0.0).then_some(swing.frequency);
+    // Dry friction can hold a loop that would swing if everything slid: only what the run shows is told.
+    let swings = is_saturated || grows || swing.late > LEAST * limit && cycles;
     let (kind, frequency) = match model {
-        Some(hertz) => (Kind::Unstable, Some(hertz)),
-        None if grows && swing.cycles >= CYCLES => (Kind::Unstable, seen),
-        None if is_saturated => (Kind::Saturated, seen),
-        None if loud => (Kind::Howling, seen),
-        None => return None,
+        Some(hertz) if swings => (Kind::Unstable, Some(hertz)),
+        _ if grows => (Kind::Unstable, seen),
+        _ if is_saturated => (Kind::Saturated, seen),
+        _ if loud => (Kind::Howling, seen),
+        _ => return None,
     };
     let cause = cause(stage, design, kind, frequency, target);
     let at = frequency.map_or(String::new(), |hertz| format!(" at {hertz:.1} Hz"));
