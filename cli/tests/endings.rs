@@ -49,7 +49,7 @@ fn ctrl_c_keeps_what_there_is_and_leaves_nothing_half_written() {
     assert!(Command::new("kill").arg("-INT").arg(child.id().to_string()).status().unwrap().success());
     let status = child.wait().unwrap();
     assert_eq!(status.code(), Some(130));
-    assert_eq!(names(&out), ["5-v-pulse.csv", "5-v-pulse.events.csv", "case.toml", "summary.json"]);
+    assert_eq!(names(&out), ["5-v-pulse.csv", "5-v-pulse.events.csv", "case.toml", "files.json", "summary.json"]);
     let csv = fs::read_to_string(out.join("5-v-pulse.csv")).unwrap();
     assert!(csv.ends_with('\n') && csv.lines().all(|line| line.split(',').count() == 18));
     let summary: serde_json::Value =

@@ -70,7 +70,11 @@ fn a_fit_its_posterior_and_the_band_of_its_machines() {
 fn what_is_not_determined_ends_with_status_1_and_keeps_its_value() {
     let folder = with_a_log();
     let free = "fit.free=[\"drive_pulley.friction.viscous\", \"cart.friction.viscous\"]";
-    let output = taut(folder.path()).args(["fit", "mine.toml", "--out", "found", "--set", free]).output().unwrap();
+    let output = taut(folder.path())
+        .env("COLUMNS", "1000")
+        .args(["fit", "mine.toml", "--out", "found", "--set", free])
+        .output()
+        .unwrap();
     assert_eq!(output.status.code(), Some(1));
     let told = String::from_utf8(output.stdout).unwrap();
     assert!(told.contains("B₁ + r² b + B₂ + K_t K_e/R") && told.contains("- fix one"), "{told}");

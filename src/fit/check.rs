@@ -31,7 +31,10 @@ pub struct Check {
 /// Looks at the logs of a case: by a fit, whose verdict it gives.
 pub fn check(case: &Case, plan: &Plan) -> Result<Check> {
     let found = search(case, plan, None, &mut |_| Flow::Continue)?;
-    let numbers = || Error::new("the sensitivities of these logs are no numbers");
+    let numbers = || {
+        Error::new("every parameter that is searched for ended at a bound, or the model does not get through the logs: there is no sensitivity to tell")
+            .next("`taut fit` says what it finds wrong with logs and bounds")
+    };
     let judged = found.judged(case, plan).ok_or_else(numbers)?;
     let identifiability = judged.identifiability.clone();
     let experiments = proposals(&found, &judged);
