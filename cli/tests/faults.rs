@@ -431,11 +431,11 @@ fn a_folder_that_is_read_only_stays_as_it_is() {
 /// of three attempts one has to, for the machine may be busy with other things.
 #[track_caller]
 fn ends_at_ctrl_c(folder: &Path, words: &str) {
-    ends_within(folder, words, 1.0);
+    ends_at_ctrl_c_within(folder, words, 1.0);
 }
 
 /// The same within so many seconds.
-fn ends_within(folder: &Path, words: &str, seconds: f64) {
+fn ends_at_ctrl_c_within(folder: &Path, words: &str, seconds: f64) {
     let took = [0.5, 1.0, 0.3].map(|wait| end_at_ctrl_c(folder, words, wait));
     assert!(took.iter().flatten().any(|took| *took < seconds), "{words:?} went on for {took:?} s");
 }
@@ -526,7 +526,7 @@ fn moves_tuning_sweeps_and_the_paper_end_at_ctrl_c() {
     ends_at_ctrl_c(folder.path(), "move pid.toml --out out --no-report --set move.0.until=5000s");
     ends_at_ctrl_c(folder.path(), "move pid.toml --out out --no-report --spread 20% --set move.0.until=300s");
     // It runs the moves of the whole family once with what it found: seconds without the release's optimisation.
-    ends_within(folder.path(), "tune pid.toml --out tuned --no-report", 10.0);
+    ends_at_ctrl_c_within(folder.path(), "tune pid.toml --out tuned --no-report", 10.0);
     ends_at_ctrl_c(folder.path(), "sweep table4.toml --runs 1000000 --vary all=20% --out rows.csv");
     ends_at_ctrl_c(folder.path(), "sweep table4.toml --runs 90000 --vary all=20%");
 }
