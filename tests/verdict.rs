@@ -1,12 +1,7 @@
 //! What `check` and `fit` say of what logs determine, of faults in them, and how far intervals reach.
 
-#[path = "common/chance.rs"]
-mod chance;
-#[path = "common/logged.rs"]
-mod logged;
-
-use chance::Chance;
-use logged::logged;
+use crate::common::chance::Chance;
+use crate::common::logged::logged;
 use std::sync::Arc;
 use taut::case::{Case, Plan, TEMPLATE};
 use taut::fit::{Grade, check, fit};
