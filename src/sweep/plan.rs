@@ -34,7 +34,7 @@ impl Sweep {
     /// let case = GantryCase::read_with("stages/h-frame/h-frame.toml", &plan)?;
     /// let table = Sweep::of_gantry(&case)?.rows(0, 20, &|| false).expect("not stopped");
     /// let positions = table.get("one-motor.final_bridge_position").expect("a column");
-    /// assert!(positions.iter().all(|x| (-0.14..-0.08).contains(x)));
+    /// assert!(positions.iter().all(|x| (-0.1..-0.05).contains(x)));
     /// # Ok::<(), taut::Error>(())
     /// ```
     pub fn of_gantry(case: &GantryCase) -> Result<Self> {
