@@ -19,7 +19,7 @@ use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
 use crate::terminal;
 use run::{Run, Setting};
-use std::ffi::OsStr;
+use std::ffi::OsString;
 use std::path::Path;
 use taut::case::{Case, Opened};
 use taut::json::{self, Simulation};
@@ -49,15 +49,20 @@ fn several(args: &Simulate) -> Outcome {
         let error = Error::new("the summaries of several cases are not one JSON").in_file("--json");
         return Err(error.next("name one case; or take --out, which writes a summary for each").into());
     }
-    let mut names: Vec<&OsStr> = Vec::new();
-    for path in &args.cases {
-        let name = path.file_stem().unwrap_or_default();
-        if args.common.out.is_some() && names.contains(&name) {
-            let error =
-                Error::new("another case has the same name, and would be written into the same folder").in_file(path);
-            return Err(error.next("simulate it by itself, with an --out of its own").into());
+    let stem = |path: &Path| path.file_stem().unwrap_or_default().to_os_string();
+    let mut names: Vec<OsString> = args.cases.iter().map(|path| stem(path)).collect();
+    if (1..names.len()).any(|k| names[..k].contains(&names[k])) {
+        // The folders that they lie in tell them apart: h-frame-follows, core-xy-follows.
+        for (name, path) in names.iter_mut().zip(&args.cases) {
+            let mut whole = path.parent().and_then(Path::file_name).unwrap_or_default().to_os_string();
+            whole.push("-");
+            whole.push(&*name);
+            *name = whole;
         }
-        names.push(name);
+    }
+    if let Some(k) = (1..names.len()).find(|&k| args.common.out.is_some() && names[..k].contains(&names[k])) {
+        let error = Error::new("another case has the same name, and would be written into the same folder");
+        return Err(error.in_file(&args.cases[k]).next("simulate it by itself, with an --out of its own").into());
     }
     let mut all = Status::Done;
     for (k, (path, name)) in args.cases.iter().zip(names).enumerate() {
