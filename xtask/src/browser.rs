@@ -48,7 +48,7 @@ pub fn test(counts: &mut Counts) -> Result<bool, String> {
         written.map_err(|error| format!("{path} cannot be written: {error}"))?;
     }
     // As the tests of the workspace build it: after those there is nothing left to do.
-    let program = crate::cargo(&["test", "--workspace", "--no-run", "--test", "commands"]);
+    let program = crate::cargo(&["test", "--workspace", "--no-run", "--test", "all"]);
     if !crate::run(program, counts)? {
         return Ok(false);
     }
@@ -56,7 +56,8 @@ pub fn test(counts: &mut Counts) -> Result<bool, String> {
     for (name, words) in REPORTS {
         let folder = reports.join(name);
         let made = Command::new(&taut).args(words).arg("--out").arg(&folder).stdout(Stdio::null()).status();
-        if !made.is_ok_and(|status| status.success()) {
+        // A result that is not to be relied on ends with 1, and has a report all the same.
+        if !made.is_ok_and(|status| matches!(status.code(), Some(0 | 1))) || !folder.join("report.html").exists() {
             return Err(format!("taut {} makes no report", words.join(" ")));
         }
     }
