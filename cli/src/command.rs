@@ -8,7 +8,7 @@ use crate::terminal;
 use rayon::prelude::*;
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use taut::case::{Case, Opened};
+use taut::case::{Case, LARGEST_FILE, Opened};
 use taut::files::write_atomically;
 use taut::{Error, Result};
 use taut_report::{Page, Picture};
@@ -35,9 +35,6 @@ pub struct Common {
     #[arg(long, short, conflicts_with = "json")]
     pub quiet: bool,
 }
-
-/// The most that is read of a case from standard input: as much as of a file.
-const MOST_BYTES: u64 = 64 << 20;
 
 impl Common {
     /// Reads the case of either kind at `path`; `-` is standard input.
@@ -73,11 +70,9 @@ pub fn is_standard_input(path: &Path) -> bool {
 
 fn standard_input() -> Result<String> {
     let mut bytes = Vec::new();
-    let read = std::io::stdin().lock().take(MOST_BYTES + 1).read_to_end(&mut bytes);
+    // A little more than a case may have: what is too long is told by its reader, as of a file.
+    let read = std::io::stdin().lock().take(LARGEST_FILE as u64 + 1).read_to_end(&mut bytes);
     read.map_err(|e| Error::new(format!("standard input cannot be read: {e}")).in_file("-"))?;
-    if bytes.len() as u64 > MOST_BYTES {
-        return Err(Error::new("standard input holds more than 64 MB: that is no case file").in_file("-"));
-    }
     String::from_utf8(bytes).map_err(|_| Error::new("standard input is not UTF-8 text").in_file("-"))
 }
 

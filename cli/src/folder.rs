@@ -9,12 +9,21 @@ use std::collections::HashMap;
 use std::ffi::OsStr;
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
-use taut::case::{Case, InputFile};
+use taut::case::{self, InputFile};
 use taut::files::{Batch, Inputs, MARKER, write_atomically};
 use taut::solve::Event;
 use taut::{Error, Result};
 
-/// Where the results go.
+/// Where the results of a command go that may write one file instead of a folder.
+pub enum Target {
+    Nowhere,
+    /// One file: a tuned case, the rows of a sweep.
+    File(PathBuf),
+    /// All files, report and plots.
+    Folder(Folder),
+}
+
+/// A folder of results.
 pub struct Folder {
     root: PathBuf,
     inputs: Inputs,
@@ -22,12 +31,7 @@ pub struct Folder {
 }
 
 /// What a command reads: the case and the files that it names.
-pub fn inputs(path: &Path, case: &Case) -> Inputs {
-    inputs_of(path, &case.files)
-}
-
-/// The same of a case that names these files.
-pub fn inputs_of(path: &Path, files: &[InputFile]) -> Inputs {
+pub fn inputs(path: &Path, files: &[InputFile]) -> Inputs {
     Inputs::new(std::iter::once(path).chain(files.iter().map(|file| file.path.as_path())))
 }
 
@@ -119,21 +123,15 @@ impl Folder {
         Ok(name)
     }
 
-    /// Copies the files that the case's inputs are read from into `inputs/`; returns the text that names them there.
-    pub fn bring_inputs(&self, case: &Case) -> Result<String> {
-        let names = self.bring(&case.files)?;
-        Ok(case.text_with(|file| names.get(&file.path).cloned().unwrap_or_default()))
-    }
-
-    /// Copies these files into `inputs/`; returns their names there.
-    pub fn bring(&self, files: &[InputFile]) -> Result<HashMap<PathBuf, String>> {
-        let names = brought_of(files);
+    /// Copies the files that a case names into `inputs/`; returns its text with their names there.
+    pub fn bring(&self, text: &str, files: &[InputFile]) -> Result<String> {
+        let names = brought(files);
         for (file, name) in &names {
             let bytes = std::fs::read(file).map_err(|e| Error::new(e.to_string()).in_file(file))?;
             self.make("inputs")?;
             write_atomically(self.path(name), bytes)?;
         }
-        Ok(names)
+        Ok(case::text_with(text, files, |file| names.get(&file.path).cloned().unwrap_or_default()))
     }
 
     /// Makes a folder in it.
@@ -144,12 +142,7 @@ impl Folder {
 }
 
 /// The files of a case, and what they are called in a folder of results: as they are, with a number where that is taken.
-pub fn brought(case: &Case) -> HashMap<PathBuf, String> {
-    brought_of(&case.files)
-}
-
-/// The same of these files.
-pub fn brought_of(files: &[InputFile]) -> HashMap<PathBuf, String> {
+pub fn brought(files: &[InputFile]) -> HashMap<PathBuf, String> {
     let mut names: HashMap<PathBuf, String> = HashMap::new();
     for file in files {
         if names.contains_key(&file.path) {
@@ -165,10 +158,10 @@ pub fn brought_of(files: &[InputFile]) -> HashMap<PathBuf, String> {
 }
 
 /// The text of a case for the folder `from`: paths in it lead from there to the same files.
-pub fn leading(case: &Case, from: &Path) -> Result<String> {
-    let ways = case.files.iter().map(|file| Ok((&file.path, between(from, &file.path)?)));
+pub fn leading(text: &str, files: &[InputFile], from: &Path) -> Result<String> {
+    let ways = files.iter().map(|file| Ok((&file.path, between(from, &file.path)?)));
     let ways = ways.collect::<Result<HashMap<_, _>>>()?;
-    Ok(case.text_with(|file| ways.get(&file.path).cloned().unwrap_or_default()))
+    Ok(case::text_with(text, files, |file| ways.get(&file.path).cloned().unwrap_or_default()))
 }
 
 /// The way from a folder to a file, with `/` between the parts.

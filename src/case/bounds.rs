@@ -4,7 +4,7 @@ use super::tree::Source;
 use crate::error::{Error, Result};
 
 /// Largest case file, in bytes; what is longer than that belongs into a CSV file.
-pub(super) const LARGEST_FILE: usize = 16 << 20;
+pub const LARGEST_FILE: usize = 16 << 20;
 
 /// Most that the signs of a file may weigh in all; one of weight 1 stands for about 200 bytes of memory.
 const MOST: usize = 1_500_000;

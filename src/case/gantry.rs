@@ -102,11 +102,6 @@ impl Opened {
             Opened::Gantry(case) => case.sweep.as_ref(),
         }
     }
-
-    /// The text with other names for the files of its inputs; it is to lie where these names lead to them.
-    pub fn text_with(&self, name: impl Fn(&InputFile) -> String) -> String {
-        super::text_with(self.text(), self.files(), name)
-    }
 }
 
 /// Which gantry the file describes; none for an axis.
@@ -205,11 +200,6 @@ impl GantryCase {
     pub fn read_with(path: impl AsRef<Path>, changes: &[&str]) -> Result<Self> {
         let path = path.as_ref();
         Self::from_text_with(path, &super::read_text(path)?, changes)
-    }
-
-    /// The text with other names for the files of its inputs; it is to lie where these names lead to them.
-    pub fn text_with(&self, name: impl Fn(&InputFile) -> String) -> String {
-        super::text_with(&self.text, &self.files, name)
     }
 }
 

@@ -19,6 +19,7 @@ mod template;
 mod tree;
 mod tune;
 
+pub use bounds::LARGEST_FILE;
 pub use fit::{Nuisances, Plan, Prior, Scope, matches};
 pub use gantry::{GantryCase, GantryExperiment, Opened};
 pub use get::Given;
@@ -244,14 +245,10 @@ impl Case {
         let text = source.text.clone();
         Ok(Self { title, stage, measurement, experiments, controller, moves, fit, tune, known, sweep, text, files })
     }
-
-    /// The text with other names for the files of its inputs; it is to lie where these names lead to them.
-    pub fn text_with(&self, name: impl Fn(&InputFile) -> String) -> String {
-        text_with(&self.text, &self.files, name)
-    }
 }
 
-fn text_with(whole: &str, files: &[InputFile], name: impl Fn(&InputFile) -> String) -> String {
+/// The text of a case with other names for the files of its inputs; it is to lie where these names lead to them.
+pub fn text_with(whole: &str, files: &[InputFile], name: impl Fn(&InputFile) -> String) -> String {
     let mut text = String::with_capacity(whole.len());
     let mut end = 0;
     for file in files {

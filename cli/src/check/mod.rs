@@ -22,7 +22,7 @@ pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
     let case = common.case(&args.case)?;
     let plan = case.fit_plan(&args.case)?;
-    let folder = Folder::wanted(common, || folder::inputs(&args.case, &case), ["check.json", "report.html"])?;
+    let folder = Folder::wanted(common, || folder::inputs(&args.case, &case.files), ["check.json", "report.html"])?;
     let found = check(&case, &plan)?;
     let text = text(&case, &found);
     let json = ("check.json", json::text(&json::check(&case, &found)));

@@ -34,9 +34,9 @@ pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
     let case = common.case(&args.case)?;
     let plan = case.fit_plan(&args.case)?;
-    let folder = Folder::wanted(common, || folder::inputs(&args.case, &case), names(args))?;
+    let folder = Folder::wanted(common, || folder::inputs(&args.case, &case.files), names(args))?;
     if let Some(folder) = &folder {
-        folder::leading(&case, folder.root())?;
+        folder::leading(&case.text, &case.files, folder.root())?;
     }
     let interrupt = Interrupt::listen();
     let begin = Instant::now();
@@ -57,7 +57,7 @@ pub fn run(args: &Args) -> Outcome {
     let mut finished = Finished::new("fit", ("fit.json", json::text(&json)), table::text(&case, &found, took), advice);
     if let Some(folder) = &folder {
         let text = fit.case_text(&case, &args.case)?;
-        let text = folder::leading(&Case::from_text(&args.case, &text)?, folder.root())?;
+        let text = folder::leading(&text, &Case::from_text(&args.case, &text)?.files, folder.root())?;
         if let Some(drawn) = &found.drawn {
             write_draws(folder, drawn).map_err(Failure::work)?;
         }

@@ -28,7 +28,7 @@ fn axis(args: &Args, case: &Case) -> Outcome {
     let common = &args.common;
     let analysis = Analysis::of(case, &question(args))?;
     let names = ["modes.json", "frequency-response.csv", "report.html"];
-    let folder = Folder::wanted(common, || folder::inputs(&args.case, case), names)?;
+    let folder = Folder::wanted(common, || folder::inputs(&args.case, &case.files), names)?;
     let advice = "add --out DIR for matrices, frequency response and a report";
     let json = ("modes.json", json::text(&json::modes(&analysis)));
     let mut finished = Finished::new("modes", json, table::text(&analysis), advice);

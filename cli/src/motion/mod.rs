@@ -67,7 +67,7 @@ pub fn run(args: &Args) -> Outcome {
             .into());
     }
     let folder = match (&cases[..], &args.case[..]) {
-        ([case], [path]) => Folder::wanted(common, || folder::inputs(path, case), names(args, case, path)?)?,
+        ([case], [path]) => Folder::wanted(common, || folder::inputs(path, &case.files), names(args, case, path)?)?,
         _ => None,
     };
     let interrupt = Interrupt::listen();
@@ -89,7 +89,7 @@ pub fn run(args: &Args) -> Outcome {
     };
     let mut finished = Finished::new("move", ("summary.json", json), text, advice);
     if let (Some(folder), [tried]) = (&folder, &tried[..]) {
-        let text = folder.bring_inputs(tried.case).map_err(Failure::work)?;
+        let text = folder.bring(&tried.case.text, &tried.case.files).map_err(Failure::work)?;
         if !common.no_report {
             let figures: Vec<_> = tried.done.iter().map(figures::figures).collect();
             let page = page::page(tried, &text, &figures);
@@ -109,7 +109,7 @@ fn names(args: &Args, case: &Case, path: &Path) -> Result<Vec<String>> {
     let tables = moves.iter().flat_map(|one| tables.map(|ending| format!("{}.{ending}", one.file_name())));
     let report = (!args.common.no_report).then(|| "report.html".to_string());
     let common = ["summary.json", "case.toml"].map(str::to_string);
-    Ok(tables.chain(common).chain(report).chain(folder::brought(case).into_values()).collect())
+    Ok(tables.chain(common).chain(report).chain(folder::brought(&case.files).into_values()).collect())
 }
 
 /// A case with its moves as data.

@@ -89,11 +89,11 @@ fn axis(args: &Simulate, path: &Path, case: &Case) -> Outcome {
     }
     let machines = machines(case, args, path)?;
     let inputs = || {
-        let mut inputs = folder::inputs(path, case);
+        let mut inputs = folder::inputs(path, &case.files);
         args.draws.iter().for_each(|file| inputs.add(file));
         inputs
     };
-    let files = names(args, folder::brought(case).into_values(), experiments.iter().map(|one| one.file_name()));
+    let files = names(args, folder::brought(&case.files).into_values(), experiments.iter().map(|one| one.file_name()));
     let folder = Folder::wanted(common, inputs, files)?;
     let interrupt = Interrupt::listen();
     let setting = Setting { args, case, solver, folder: folder.as_ref(), interrupt: &interrupt, machines: &machines };
@@ -109,7 +109,7 @@ fn axis(args: &Simulate, path: &Path, case: &Case) -> Outcome {
     let json = ("summary.json", json::text(&Simulation::new(case, solver, &told)));
     let mut finished = Finished::new("simulate", json, table::text(case, solver, &runs), ADVICE);
     if let Some(folder) = &folder {
-        let text = folder.bring_inputs(case).map_err(Failure::work)?;
+        let text = folder.bring(&case.text, &case.files).map_err(Failure::work)?;
         if !common.no_report {
             let figures: Vec<_> = runs.iter().map(|run| plots::figures(case, run)).collect();
             let page = page::page(case, &text, solver, &runs, &figures);

@@ -1,8 +1,9 @@
 //! What a sweep will take, told before it begins: room on the disk, and time.
 
-use super::options::{PARTS, Target, beside};
+use super::options::{self, PARTS, beside};
 use super::{Work, shown};
 use crate::failure::Failure;
+use crate::folder::Target;
 use crate::terminal;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -21,7 +22,7 @@ const CSV: f64 = 19.0;
 
 /// Says how large the files of a sweep will be and how long it will take, where that is much; refuses what cannot be.
 pub fn told(work: &Work, target: &Target, threads: usize) -> Result<(), Failure> {
-    let Some(rows) = target.rows() else { return Ok(()) };
+    let Some(rows) = options::rows(target) else { return Ok(()) };
     let parquet = rows.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet"));
     let room = Room::of(work.sweep.runs(), work.sweep.columns().len(), if parquet { PARQUET } else { CSV });
     let folder = rows.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));

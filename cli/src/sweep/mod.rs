@@ -14,10 +14,10 @@ mod trajectories;
 use crate::args::Sweep as Args;
 use crate::command::{Finished, Report};
 use crate::failure::{Failure, Outcome, Status};
+use crate::folder::Target;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use crate::terminal;
-use options::Target;
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
 use store::Store;
@@ -42,7 +42,7 @@ pub fn run(args: &Args) -> Outcome {
     let common = options::with_changes(args)?;
     let case = common.open(&args.case)?;
     let sweep = Sweep::of(&case).map_err(|error| error.in_file(&args.case))?;
-    let target = Target::of(args, &case)?;
+    let target = options::target(args, &case)?;
     if args.trajectories {
         trajectories::check(&sweep)?;
     }
@@ -82,8 +82,7 @@ pub fn run(args: &Args) -> Outcome {
     let folder = match target {
         Target::Nowhere | Target::File(_) => None,
         Target::Folder(folder) => {
-            let names = folder.bring(case.files()).map_err(Failure::work)?;
-            let text = case.text_with(|file| names.get(&file.path).cloned().unwrap_or_default());
+            let text = folder.bring(case.text(), case.files()).map_err(Failure::work)?;
             if !common.no_report {
                 let figures = figures::all(&work, &summary);
                 let page = page::page(&work, &summary, &text, &figures);

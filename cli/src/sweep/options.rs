@@ -3,7 +3,7 @@
 use crate::args::Sweep as Args;
 use crate::command::Common;
 use crate::failure::Failure;
-use crate::folder::{self, Folder};
+use crate::folder::{self, Folder, Target};
 use std::path::{Path, PathBuf};
 use taut::case::Opened;
 use taut::files::Inputs;
@@ -45,69 +45,58 @@ const ROWS: &str = if cfg!(feature = "parquet") { "runs.parquet" } else { "runs.
 /// What the folder of the parts is called, behind the name of the file of the rows.
 pub const PARTS: &str = ".parts";
 
-/// Where the results go.
-pub enum Target {
-    Nowhere,
-    /// The rows, as Parquet or CSV.
-    File(PathBuf),
-    /// A folder of rows, summary, case, report and plots.
-    Folder(Folder),
+/// Where `--out` says that the results go; the folder for them is made.
+pub fn target(args: &Args, case: &Opened) -> std::result::Result<Target, Failure> {
+    let inputs = folder::inputs(&args.case, case.files());
+    let target = named(args, case, &inputs)?;
+    if let Some(rows) = rows(&target) {
+        inputs.check(&rows)?;
+        inputs.check(&trajectories(&rows))?;
+        inputs.check_folder(&beside(&rows, PARTS))?;
+    }
+    Ok(target)
 }
 
-impl Target {
-    /// What `--out` says; the folder for it is made.
-    pub fn of(args: &Args, case: &Opened) -> std::result::Result<Self, Failure> {
-        let inputs = folder::inputs_of(&args.case, case.files());
-        let target = Self::named(args, case, &inputs)?;
-        if let Some(rows) = target.rows() {
-            inputs.check(&rows)?;
-            inputs.check(&trajectories(&rows))?;
-            inputs.check_folder(&beside(&rows, PARTS))?;
+fn named(args: &Args, case: &Opened, inputs: &Inputs) -> std::result::Result<Target, Failure> {
+    let Some(out) = &args.common.out else { return Ok(Target::Nowhere) };
+    let ending = out.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    match ending.as_deref() {
+        Some("csv") | Some("parquet") => {
+            if out.is_dir() {
+                return Err(Error::new("this is a folder").in_file(out).next("name a file in it").into());
+            }
+            if !parent.is_dir() {
+                return Err(Error::new(format!("there is no folder {}", parent.display()))
+                    .in_file(out)
+                    .next("make it first, or name another")
+                    .into());
+            }
+            if !cfg!(feature = "parquet") && ending.as_deref() == Some("parquet") {
+                let error = Error::new("this program was built without Parquet").in_file(out);
+                return Err(error.allowed("FILE.csv").into());
+            }
+            Ok(Target::File(out.clone()))
         }
-        Ok(target)
-    }
-
-    fn named(args: &Args, case: &Opened, inputs: &Inputs) -> std::result::Result<Self, Failure> {
-        let Some(out) = &args.common.out else { return Ok(Self::Nowhere) };
-        let ending = out.extension().map(|ending| ending.to_string_lossy().to_lowercase());
-        let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        match ending.as_deref() {
-            Some("csv") | Some("parquet") => {
-                if out.is_dir() {
-                    return Err(Error::new("this is a folder").in_file(out).next("name a file in it").into());
-                }
-                if !parent.is_dir() {
-                    return Err(Error::new(format!("there is no folder {}", parent.display()))
-                        .in_file(out)
-                        .next("make it first, or name another")
-                        .into());
-                }
-                if !cfg!(feature = "parquet") && ending.as_deref() == Some("parquet") {
-                    let error = Error::new("this program was built without Parquet").in_file(out);
-                    return Err(error.allowed("FILE.csv").into());
-                }
-                Ok(Self::File(out.clone()))
-            }
-            Some(other) if !out.is_dir() => Err(Error::new(format!("rows are not written as .{other}"))
-                .in_file("--out")
-                .allowed("FILE.parquet, FILE.csv, or a folder")
-                .into()),
-            _ => {
-                let report = (!args.common.no_report).then(|| "report.html".to_string());
-                let names = [ROWS, "sweep.json", "case.toml"].map(str::to_string).into_iter().chain(report);
-                let names = names.chain(folder::brought_of(case.files()).into_values());
-                Folder::create(out, inputs.clone(), names).map(Self::Folder)
-            }
+        Some(other) if !out.is_dir() => Err(Error::new(format!("rows are not written as .{other}"))
+            .in_file("--out")
+            .allowed("FILE.parquet, FILE.csv, or a folder")
+            .into()),
+        _ => {
+            let report = (!args.common.no_report).then(|| "report.html".to_string());
+            let names = [ROWS, "sweep.json", "case.toml"].map(str::to_string).into_iter().chain(report);
+            let names = names.chain(folder::brought(case.files()).into_values());
+            Folder::create(out, inputs.clone(), names).map(Target::Folder)
         }
     }
+}
 
-    /// The file of the rows.
-    pub fn rows(&self) -> Option<PathBuf> {
-        match self {
-            Self::Nowhere => None,
-            Self::File(path) => Some(path.clone()),
-            Self::Folder(folder) => Some(folder.root().join(ROWS)),
-        }
+/// The file of the rows.
+pub fn rows(target: &Target) -> Option<PathBuf> {
+    match target {
+        Target::Nowhere => None,
+        Target::File(path) => Some(path.clone()),
+        Target::Folder(folder) => Some(folder.root().join(ROWS)),
     }
 }
 

@@ -1,9 +1,10 @@
 //! The files of a sweep.
 
-use super::options::{Target, trajectories};
+use super::options::{self, trajectories};
 use super::store::Store;
 use super::{Work, trajectories};
 use crate::failure::Failure;
+use crate::folder::Target;
 use std::path::{Path, PathBuf};
 use taut::Result;
 #[cfg(feature = "parquet")]
@@ -13,7 +14,7 @@ use taut::trajectory::{CsvWriter, Trajectory};
 /// Writes the rows and what is written beside them; returns the names of those that have their places, or none where it was
 /// interrupted.
 pub fn write(work: &Work, target: &Target, store: &Store) -> std::result::Result<Option<Vec<String>>, Failure> {
-    let Some(rows) = target.rows() else { return Ok(Some(Vec::new())) };
+    let Some(rows) = options::rows(target) else { return Ok(Some(Vec::new())) };
     let mut files = vec![rows.clone()];
     files.extend(work.args.trajectories.then(|| trajectories(&rows)));
     // In a folder all files get their places together.

@@ -4,7 +4,8 @@
 //! each chunk: its columns one after another as doubles, little end first. The folder goes when the rows are written.
 
 use super::Work;
-use super::options::{PARTS, Target, beside};
+use super::options::{self, PARTS, beside};
+use crate::folder::Target;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -50,7 +51,7 @@ impl Store {
     pub fn open(work: &Work, target: &Target, threads: usize) -> Result<Self> {
         let sweep = work.sweep;
         let (headings, runs) = (sweep.columns().to_vec(), sweep.runs());
-        let folder = target.rows().map(|rows| beside(&rows, PARTS));
+        let folder = options::rows(target).map(|rows| beside(&rows, PARTS));
         let mut store = Self { folder, kept: Mutex::default(), headings, runs, chunk: 1 };
         let Some(folder) = store.folder.clone() else {
             store.chunk = chunk(work, threads);

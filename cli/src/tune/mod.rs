@@ -7,25 +7,16 @@ mod table;
 use crate::args::Tune as Args;
 use crate::command::{self, Finished, Remark, Report};
 use crate::failure::{Failure, Outcome, Status};
-use crate::folder::{self, Folder};
+use crate::folder::{self, Folder, Target};
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use crate::terminal;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use taut::case::{Case, Tuning};
 use taut::files::{Inputs, write_atomically};
 use taut::json;
 use taut::tune::{Judgement, Tuned, evaluate, tune};
 use taut::{Error, Result};
-
-/// Where the results go.
-enum Target {
-    Nowhere,
-    /// The case file alone.
-    File(PathBuf),
-    /// A folder of case file, summary, report and plots.
-    Folder(Folder),
-}
 
 /// What was asked for and what came of it.
 pub struct Work<'a> {
@@ -82,7 +73,7 @@ pub fn run(args: &Args) -> Outcome {
             None
         }
         Target::Folder(folder) => {
-            let text = folder.bring_inputs(&Case::from_text(&args.case, &text)?).map_err(Failure::work)?;
+            let text = folder.bring(&text, &Case::from_text(&args.case, &text)?.files).map_err(Failure::work)?;
             if !common.no_report {
                 let figures = figures::all(&work).map_err(Failure::work)?;
                 let page = page::page(&work, &text, &figures);
@@ -125,11 +116,11 @@ fn target(args: &Args, case: &Case) -> std::result::Result<Target, Failure> {
         return Ok(Target::File(args.case.clone()));
     }
     let Some(out) = &args.common.out else { return Ok(Target::Nowhere) };
-    let inputs = folder::inputs(&args.case, case);
+    let inputs = folder::inputs(&args.case, &case.files);
     if !out.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
         let report = (!args.common.no_report).then(|| "report.html".to_string());
         let names = ["tuned.toml", "tune.json"].map(str::to_string).into_iter().chain(report);
-        let names = names.chain(folder::brought(case).into_values());
+        let names = names.chain(folder::brought(&case.files).into_values());
         return Folder::create(out, inputs, names).map(Target::Folder);
     }
     let own = Inputs::new([&args.case]);
@@ -141,7 +132,7 @@ fn target(args: &Args, case: &Case) -> std::result::Result<Target, Failure> {
             .next("name another file, or a folder; --in-place changes the case file itself")
             .into());
     }
-    folder::leading(case, parent(out))?;
+    folder::leading(&case.text, &case.files, parent(out))?;
     Ok(Target::File(out.clone()))
 }
 
@@ -155,5 +146,5 @@ fn moved(text: &str, args: &Args, path: &Path) -> Result<String> {
     if args.in_place {
         return Ok(text.to_string());
     }
-    folder::leading(&Case::from_text(&args.case, text)?, parent(path))
+    folder::leading(text, &Case::from_text(&args.case, text)?.files, parent(path))
 }

@@ -25,7 +25,7 @@ pub fn run(args: &Args, case: &GantryCase) -> Outcome {
     let analysis = GantryAnalysis::of(case)?;
     let map = analysis.map.is_some().then_some("map.csv");
     let names = ["modes.json", "report.html"].into_iter().chain(map);
-    let folder = Folder::wanted(common, || folder::inputs_of(&args.case, &case.files), names)?;
+    let folder = Folder::wanted(common, || folder::inputs(&args.case, &case.files), names)?;
     let advice = "add --out DIR for the modes as data, the map and a report";
     let json = ("modes.json", json::text(&json::gantry_modes(&analysis)));
     let mut finished = Finished::new("modes", json, table::text(&analysis), advice);

@@ -28,9 +28,9 @@ pub fn run(args: &Simulate, path: &Path, case: &GantryCase) -> Outcome {
     let mechanism = case.gantry.mechanism();
     let solver = args.choice().solver_of(&mechanism)?;
     let experiments = case.experiments_named(&args.experiments)?;
-    let brought = folder::brought_of(&case.files).into_values();
+    let brought = folder::brought(&case.files).into_values();
     let files = names(args, brought, experiments.iter().map(|one| one.file_name()));
-    let folder = Folder::wanted(common, || folder::inputs_of(path, &case.files), files)?;
+    let folder = Folder::wanted(common, || folder::inputs(path, &case.files), files)?;
     let interrupt = Interrupt::listen();
     let setting = Setting { args, case, mechanism: &mechanism, solver, folder: folder.as_ref(), interrupt: &interrupt };
 
@@ -45,8 +45,7 @@ pub fn run(args: &Simulate, path: &Path, case: &GantryCase) -> Outcome {
     let json = ("summary.json", json::text(&GantrySimulation::new(case, solver, &told)));
     let mut finished = Finished::new("simulate", json, table::text(case, solver, &runs), ADVICE);
     if let Some(folder) = &folder {
-        let brought = folder.bring(&case.files).map_err(Failure::work)?;
-        let text = case.text_with(|file| brought.get(&file.path).cloned().unwrap_or_default());
+        let text = folder.bring(&case.text, &case.files).map_err(Failure::work)?;
         if !common.no_report {
             finished.report = Some(report(&setting, &text, &runs));
         }
