@@ -3,7 +3,7 @@
 use crate::columns::Columns;
 use crate::error::{Told, guarded, unlocked};
 use crate::interrupt::Interrupt;
-use crate::{modes, runs, value};
+use crate::{logs, modes, runs, value};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -16,6 +16,7 @@ use taut::json;
 use taut::linear::{Analysis, GantryAnalysis};
 use taut::nuts::Effort;
 use taut::solve::{Choice, Flow, Kind, Method};
+use taut::tune::{evaluate, tune};
 
 /// Draws that tune a chain.
 const TUNE: usize = 400;
@@ -191,7 +192,33 @@ impl Case {
         let estimated = Self::from_text(py, self.path.clone(), &text, Vec::new())?;
         let told = guarded(|| json::fit(case, &fit, &profiles, drawn.as_ref().map(json::posterior)))?;
         let draws = drawn.map(|drawn| Columns::of(py, drawn.table())).transpose()?;
-        Ok(Fit { data: value::json(py, &told)?.unbind(), case: Py::new(py, estimated)?, draws })
+        let logs = fit.logs.into_iter().map(|log| logs::met(py, log)).collect::<PyResult<_>>()?;
+        Ok(Fit { data: value::json(py, &told)?.unbind(), case: Py::new(py, estimated)?, draws, logs })
+    }
+
+    /// Tunes the controller, or judges it as it is: what `--json` prints, and the case with the gains that were found.
+    fn tune(
+        &self,
+        py: Python<'_>,
+        spread: Option<f64>,
+        corners: bool,
+        judged: bool,
+    ) -> PyResult<(Py<PyAny>, Py<Case>)> {
+        let case = self.axis(py)?;
+        let mut tuning = case.tune.clone().unwrap_or_default();
+        tuning.spread = spread.or(tuning.spread);
+        tuning.corners = corners;
+        let interrupt = Interrupt::listen();
+        let found = unlocked(py, || match judged {
+            true => evaluate(case, &tuning),
+            false => tune(case, &tuning, &|| interrupt.stop()),
+        });
+        interrupt.finish()?;
+        let tuned = found?.map_err(|error| error.in_file(&self.path)).told(py)?;
+        let text = guarded(|| tuned.case_text(case, &self.path))?.told(py)?;
+        let changed = Self::from_text(py, self.path.clone(), &text, Vec::new())?;
+        let told = guarded(|| json::tuned(case, &tuning, &tuned))?;
+        Ok((value::json(py, &told)?.unbind(), Py::new(py, changed)?))
     }
 
     #[allow(clippy::too_many_arguments)] // each is an option of the command line
@@ -283,6 +310,9 @@ pub struct Fit {
     #[pyo3(get)]
     case: Py<Case>,
     draws: Option<Columns>,
+    /// How each log is met, as dictionaries.
+    #[pyo3(get)]
+    logs: Vec<Py<PyDict>>,
 }
 
 #[pymethods]

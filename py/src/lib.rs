@@ -8,6 +8,7 @@ mod columns;
 mod controller;
 mod error;
 mod interrupt;
+mod logs;
 mod modes;
 mod runs;
 mod sweep;
@@ -24,7 +25,7 @@ mod _native {
     #[pymodule_export]
     use crate::error::{Bug, Error, fail_as_a_bug};
     #[pymodule_export]
-    use crate::runs::{Run, moves, simulation};
+    use crate::runs::{Run, moves, simulation, write};
     #[pymodule_export]
     use crate::sweep::Sweep;
 

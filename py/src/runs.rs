@@ -1,6 +1,5 @@
 //! Runs of experiments and moves.
 
-use crate::case::inputs;
 use crate::columns::{self, Columns};
 use crate::controller::Own;
 use crate::error::{Told, guarded, unlocked};
@@ -9,12 +8,14 @@ use crate::value;
 use pyo3::exceptions::PyRecursionError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
+use serde_json::Value;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
-use taut::case::{Case, Experiment, GantryCase, GantryExperiment, InputFile};
+use taut::case::{Case, Experiment, GantryCase, GantryExperiment};
 use taut::control::{Loop, MoveRun, Rows, Standard, Worst, stream, worst};
+use taut::files::Inputs;
 use taut::json::{self, GantrySimulated, GantrySimulation, Moved, Simulated, Simulation};
 use taut::metrics::{GantryMeter, GantryMetrics, Meter, Metrics};
 use taut::reduction::Reduction;
@@ -113,7 +114,11 @@ impl Run {
         let told = guarded(|| match &self.what {
             What::Experiment { case, metrics, .. } => of_axis(metrics, case),
             What::Gantry { case, metrics, .. } => json::gantry_metrics(metrics, case.gantry.routing),
-            What::Move { case, run, .. } => of_axis(&run.metrics, case),
+            What::Move { case, index, run, worst, .. } => {
+                let moved =
+                    Moved { motion: &case.moves[*index], run, worst: worst.as_ref(), trouble: None, files: &[] };
+                in_closed_loop(of_axis(&run.metrics, case), json::motion(&moved))
+            }
         });
         value::json(py, &told?)
     }
@@ -133,11 +138,37 @@ impl Run {
         value::json(py, &guarded(|| serde_json::to_value(events()).unwrap_or_default())?)
     }
 
-    /// Writes the columns as `taut simulate` does, to .csv or .parquet.
-    fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        let trajectory = self.trajectory(py)?;
-        unlocked(py, || inputs(self.files()).check(&path).and_then(|()| write(&trajectory, &path)))?.told(py)
+    /// Files that the case names, which nothing is written over.
+    #[getter]
+    fn inputs(&self) -> Vec<&Path> {
+        let files = match &self.what {
+            What::Experiment { case, .. } | What::Move { case, .. } => &case.files,
+            What::Gantry { case, .. } => &case.files,
+        };
+        files.iter().map(|file| file.path.as_path()).collect()
     }
+}
+
+/// Writes columns as `taut simulate` does, to .csv or .parquet, but not over one of these files.
+#[pyfunction]
+pub fn write(
+    py: Python<'_>,
+    arrays: &Bound<'_, PyDict>,
+    names: &Bound<'_, PyList>,
+    inputs: Vec<PathBuf>,
+    path: PathBuf,
+) -> PyResult<()> {
+    let trajectory = columns::read(arrays, names)?;
+    unlocked(py, || Inputs::new(inputs).check(&path).and_then(|()| written(&trajectory, &path)))?.told(py)
+}
+
+/// Key figures of a move: those of any run, and those of the loop. What both have is the loop's.
+fn in_closed_loop(mut figures: Value, told: Value) -> Value {
+    if let (Value::Object(figures), Value::Object(told)) = (&mut figures, told) {
+        let about = ["name", "files", "ending", "events", "trouble"];
+        figures.extend(told.into_iter().filter(|(key, _)| !about.contains(&key.as_str())));
+    }
+    figures
 }
 
 impl Run {
@@ -147,21 +178,9 @@ impl Run {
             What::Move { run, .. } => &run.outcome,
         }
     }
-
-    fn files(&self) -> &[InputFile] {
-        match &self.what {
-            What::Experiment { case, .. } | What::Move { case, .. } => &case.files,
-            What::Gantry { case, .. } => &case.files,
-        }
-    }
-
-    /// A copy of the columns, for writers.
-    fn trajectory(&self, py: Python<'_>) -> PyResult<Trajectory> {
-        crate::columns::read(self.columns.arrays.bind(py), self.columns.names.bind(py))
-    }
 }
 
-fn write(trajectory: &Trajectory, path: &Path) -> taut::Result<()> {
+fn written(trajectory: &Trajectory, path: &Path) -> taut::Result<()> {
     match path.extension().and_then(|ending| ending.to_str()) {
         Some("csv") => {
             let mut writer = CsvWriter::create(path)?;

@@ -289,13 +289,18 @@ def test_simulations_with_nonsense(short, tmp_path):
             call = {"solver": solver, option: value}
             allowed(lambda: short.simulate("5 V pulse", **call), told("simulate", **call))
     run, runs = short.simulate("5 V pulse"), short.simulate()
+    table = taut.Table(dict(run), [(name, run.units[name], run.headings[name]) for name in run])
     for value in WRONG:
         allowed(lambda: run[value], told("run[]", value))
         allowed(lambda: runs[value], told("runs[]", value))
         allowed(lambda: run.write(value), told("run.write", value))
         allowed(lambda: run.plot(value), told("run.plot", value))
         allowed(lambda: taut.Run(value), told("Run", value))
-        allowed(lambda: taut.Runs(value, False), told("Runs", value))
+        allowed(lambda: taut.Runs(value), told("Runs", value))
+        allowed(lambda: run.plot(ax=value), told("run.plot", ax=value))
+        allowed(lambda: runs.plot(value), told("runs.plot", value))
+        allowed(lambda: table.plot(value), told("table.plot", value))
+        allowed(lambda: table.plot("cart_speed", value, ax=value), told("table.plot", value))
         allowed(lambda: taut.Table(value, value), told("Table", value))
     for name in "", ".", "x", "x.csv/y.csv", "a\0.csv", "no/such/folder/run.csv", "run.csv", "run.parquet", "run.CSV", "é.csv":
         allowed(lambda: run.write(tmp_path / name), told("run.write", name))
@@ -510,6 +515,18 @@ def test_fits_with_nonsense(case, tmp_path):
         allowed(lambda: fit[value], told("fit[]", value))
 
 
+def test_tunings_and_logs_with_nonsense(short, moving):
+    for value in WRONG:
+        if not isinstance(value, (int, float)):
+            allowed(lambda: moving.tune(spread=value, evaluate=True), told("tune", spread=value))
+        allowed(lambda: short.tune(spread=value), told("tune without a controller", spread=value))
+        allowed(lambda: short.with_log(value, {"t": [0.0, 1.0]}, {"time": "t"}), told("with_log", value))
+        allowed(lambda: short.with_log("log", value, {"time": "t"}), told("with_log", "log", value))
+        allowed(lambda: short.with_log("log", {"t": value}, {"time": "t"}), told("with_log", "log", {"t": value}))
+        allowed(lambda: short.with_log("log", {"t": [0.0, 1.0]}, value), told("with_log", "log", "…", value))
+        allowed(lambda: short.with_log("log", {"t": [0.0, 1.0]}, {"time": value}), told("with_log", "log", "…", {"time": value}))
+
+
 def test_files_that_are_gone_or_something_else(case, tmp_path):
     fitted = logged(case.changed({"experiment.0.until": 0.1}), tmp_path)
     log = tmp_path / "pulse.csv"
@@ -533,7 +550,7 @@ def test_files_that_are_gone_or_something_else(case, tmp_path):
         fitted.save(tmp_path)
 
 
-@pytest.mark.parametrize("what", ["move", "own controller", "spread", "fit", "posterior"])
+@pytest.mark.parametrize("what", ["move", "own controller", "spread", "fit", "posterior", "tune"])
 def test_ctrl_c_ends_what_takes_long(case, moving, tmp_path, what):
     """Within two seconds, and as a KeyboardInterrupt."""
     long = moving.changed({"move.0.until": 1000, "controller.every": "0.1 ms"})
@@ -551,13 +568,15 @@ def test_ctrl_c_ends_what_takes_long(case, moving, tmp_path, what):
         "spread": lambda: moving.changed({"move.0.until": 50}).move("5 mm", spread=0.1),
         "fit": lambda: fitted.fit(),
         "posterior": lambda: drawn.fit(posterior=True, draws=1_000_000),
+        "tune": lambda: moving.tune(),
     }[what]
     timer = threading.Timer(0.5, _thread.interrupt_main)
     timer.start()
     began = time.perf_counter()
     with pytest.raises(KeyboardInterrupt):
         call()
-    assert time.perf_counter() - began < 2.5
+    # A tuning judges what it has before it ends.
+    assert time.perf_counter() - began < (10.0 if what == "tune" else 2.5)
     timer.join()
 
 
@@ -565,9 +584,11 @@ def test_everything_public_is_called_here():
     """A new method has to come into this file."""
     source = pathlib.Path(__file__).read_text(encoding="utf-8")
     called = {
-        "Case": ["changed", "check", "copy", "fit", "get", "modes", "move", "save", "simulate", "sweep", "update"],
+        "Case": [
+            "changed", "check", "copy", "fit", "get", "modes", "move", "save", "simulate", "sweep", "tune", "update", "with_log",
+        ],  # fmt: skip
         "Run": ["plot", "write"],
-        "Table": ["to_arrow", "to_pandas", "to_polars"],
+        "Table": ["plot", "to_arrow", "to_pandas", "to_polars"],
     }
     for name, methods in called.items():
         kind = getattr(taut, name)

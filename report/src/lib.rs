@@ -29,12 +29,16 @@ pub mod equations;
 pub mod figure;
 mod gantry;
 mod layout;
+pub mod modes;
+pub mod motion;
 pub mod page;
 mod picture;
 mod plane;
 mod plot;
 mod raster;
+pub mod simulate;
 mod svg;
+pub mod sweep;
 mod together;
 
 pub use decimate::{Decimator, decimate};

@@ -12,6 +12,7 @@ mod moves;
 mod posterior;
 mod result_schema;
 mod simulation;
+mod sweep;
 mod tune;
 
 pub use case_schema::case_schema;
@@ -20,10 +21,11 @@ pub use fit::fit;
 pub use gantry::{GantrySimulated, GantrySimulation, gantry_metrics};
 pub use gantry_modes::gantry_modes;
 pub use modes::modes;
-pub use moves::{Moved, moves};
+pub use moves::{Moved, motion, moves};
 pub use posterior::posterior;
 pub use result_schema::{identity, schema, schemas};
 pub use simulation::{Band, Event, Metrics, Simulated, Simulation, load_unit};
+pub use sweep::sweep;
 pub use tune::tuned;
 
 use crate::metrics::Peak;

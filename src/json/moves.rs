@@ -38,7 +38,8 @@ fn deviation(deviation: Deviation) -> Value {
     json!({ "peak_m": deviation.peak.value, "time_s": deviation.peak.time, "rms_m": deviation.rms, "last_m": deviation.last })
 }
 
-fn motion(done: &Moved) -> Value {
+/// One of them.
+pub fn motion(done: &Moved) -> Value {
     let (run, figures) = (done.run, &done.run.figures);
     let (word, time) = ending(run.outcome.ending, run.metrics.end);
     let mut value = json!({

@@ -28,12 +28,14 @@ mod plan;
 mod points;
 mod sobol;
 mod statistics;
+mod summary;
 
 pub use distribution::Distribution;
 pub use indices::{Estimate, Index, indices};
 pub use measures::{Figure, Measure, OF_EXPERIMENT, OF_MOVE, OfPart, of_gantry};
 pub use sobol::{DIMENSIONS, Sobol};
 pub use statistics::{SHARES, Spread, rank_correlation};
+pub use summary::{Drawn, Measured, Shown, Summary};
 
 use crate::case::Sampling;
 use crate::error::Result;

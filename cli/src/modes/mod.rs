@@ -1,8 +1,6 @@
 //! `taut modes`: linearises the stage of a case, and says how it swings.
 
-mod figures;
 mod gantry;
-mod page;
 mod table;
 
 use crate::args::{BodyName, HoldName, Modes as Args};
@@ -14,7 +12,7 @@ use std::fmt::Write;
 use taut::case::{Case, Opened};
 use taut::json;
 use taut::linear::{Analysis, Hold, Question};
-use taut::stage::BeltModel;
+use taut_report::modes::{figures, page};
 
 /// Reads the case, linearises, writes, tells.
 pub fn run(args: &Args) -> Outcome {
@@ -36,8 +34,8 @@ fn axis(args: &Args, case: &Case) -> Outcome {
         finished.files.push(("frequency-response.csv".into(), csv(&analysis)));
     }
     if common.reports() {
-        let figures = figures::all(&analysis);
-        let page = page::page(&analysis, &figures);
+        let figures = figures(&analysis);
+        let page = page(&analysis, &figures);
         let pictures = figures.into_iter().map(|(name, figure)| (name.to_string(), figure.into()));
         finished.report = Some(Report { page, pictures: pictures.collect() });
     }
@@ -59,23 +57,6 @@ fn question(args: &Args) -> Question {
         delay: args.delay.unwrap_or(0.0),
         from: args.from,
         to: args.to,
-    }
-}
-
-/// Whether the stiffness or the friction of the stage depends on where the cart is, in words.
-pub fn along(analysis: &Analysis) -> &'static str {
-    let stage = &analysis.case.stage;
-    match (&analysis.travel, stage.belt.make) {
-        _ if stage.belt.model == BeltModel::Rigid => "a rigid belt has no spans that could change with the position",
-        (Some(_), _) => "spans 1 and 2 follow the cart: k = A E / l with the length that is left",
-        (None, Some(_)) => {
-            "the same along the travel: this file's stiffness does not depend on the position \
-                 (belt.follows_cart = true makes spans 1 and 2 follow the cart)"
-        }
-        (None, None) => {
-            "the same along the travel: this file gives the spans' stiffness as such \
-                 (belt.modulus, section, spans and follows_cart = true make them follow the cart)"
-        }
     }
 }
 

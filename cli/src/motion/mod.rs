@@ -1,7 +1,5 @@
 //! `taut move`: runs the moves of a case in closed loop, and says where the cart really is.
 
-mod figures;
-mod page;
 mod table;
 
 use crate::args::Move as Args;
@@ -9,52 +7,19 @@ use crate::command::{Finished, Remark, Report};
 use crate::failure::{Failure, Outcome, Status};
 use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
-use crate::simulate::plots;
-use crate::simulate::table::early_end;
-use figures::Curves;
 use std::fmt::Write;
 use std::path::Path;
 use taut::case::{Case, Move};
-use taut::control::{Loop, MoveRun, Rows, Standard, Worst, stream, worst};
+use taut::control::{Loop, MoveRun, Rows, Standard, stream, worst};
 use taut::design::Design;
 use taut::files::write_atomically;
 use taut::json::{self, Moved};
 use taut::solve::{Flow, Solver};
 use taut::trajectory::{CsvWriter, Trajectory};
-use taut::tune::trouble::{self, Trouble};
+use taut::tune::trouble;
 use taut::{Error, Result};
-
-/// What is known of a move after it ran.
-pub struct Done<'a> {
-    pub motion: &'a Move,
-    pub run: MoveRun,
-    pub curves: Option<Curves>,
-    /// With parameters wrong by a share: the largest cart error (m), and how many of how many settle.
-    pub worst: Option<Worst>,
-    /// What is wrong with its loop.
-    pub trouble: Option<Trouble>,
-    pub files: Vec<String>,
-}
-
-impl Done<'_> {
-    /// What the summary says of it.
-    fn told(&self) -> Moved<'_> {
-        Moved {
-            motion: self.motion,
-            run: &self.run,
-            worst: self.worst.as_ref(),
-            trouble: self.trouble.as_ref(),
-            files: &self.files,
-        }
-    }
-}
-
-/// A case with what came of its moves.
-pub struct Tried<'a> {
-    pub case: &'a Case,
-    pub design: &'a Design,
-    pub done: Vec<Done<'a>>,
-}
+use taut_report::motion::{Curves, Done, Tried, figures, page};
+use taut_report::simulate::{early_end, named};
 
 /// Reads the cases, runs their moves, reports.
 pub fn run(args: &Args) -> Outcome {
@@ -91,10 +56,10 @@ pub fn run(args: &Args) -> Outcome {
     if let (Some(folder), [tried]) = (&folder, &tried[..]) {
         let text = folder.bring(&tried.case.text, &tried.case.files).map_err(Failure::work)?;
         if !common.no_report {
-            let figures: Vec<_> = tried.done.iter().map(figures::figures).collect();
-            let page = page::page(tried, &text, &figures);
+            let figures: Vec<_> = tried.done.iter().map(figures).collect();
+            let page = page(tried, &text, &figures);
             let names = tried.done.iter().map(|done| done.motion.file_name());
-            finished.report = Some(Report { page, pictures: plots::named(names, figures) });
+            finished.report = Some(Report { page, pictures: named(names, figures) });
         }
         finished.files.push(("case.toml".into(), text));
     }

@@ -8,7 +8,7 @@ use taut::solve::{self, Ending, Flow};
 use taut::stage::Stage;
 use taut::trajectory::{Column, CsvWriter, Trajectory};
 use taut::{Error, Result};
-use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
+use taut_report::simulate::Band;
 
 /// Rows that a band has at most: of longer runs every second one, every third, …
 const ROWS: u64 = 10_000;
@@ -25,18 +25,6 @@ const QUANTITIES: [Quantity; 3] = [
     ("drive_travel_minus_cart", "m", |angle, position, r| r * angle - position),
 ];
 
-/// The band of one experiment.
-pub struct Band {
-    /// Times, s.
-    pub time: Vec<f64>,
-    /// By quantity and share: values at these times.
-    pub values: [[Vec<f64>; 3]; 3],
-    /// Machines that it is made of.
-    pub machines: usize,
-    /// Machines that did not reach the end, and are left out.
-    pub failed: usize,
-}
-
 /// Evenly chosen ones of all machines.
 pub fn chosen(mut machines: Vec<Stage>, count: usize) -> Vec<Stage> {
     let all = machines.len();
@@ -52,75 +40,39 @@ pub fn chosen(mut machines: Vec<Stage>, count: usize) -> Vec<Stage> {
     machines
 }
 
-impl Band {
-    /// Runs the experiment with each machine, on all processors; none where it was interrupted.
-    pub fn of(setting: &Setting, machines: &[Stage], experiment: &Experiment) -> Result<Option<Self>> {
-        let every = experiment.samples().div_ceil(ROWS).max(1) as usize;
-        let runs: Vec<Option<[Vec<f64>; 4]>> =
-            machines.par_iter().map(|stage| run(setting, stage, experiment, every)).collect::<Result<_>>()?;
-        if setting.interrupt.signal().is_some() {
-            return Ok(None);
+/// Runs the experiment with each machine, on all processors; none where it was interrupted.
+pub fn of(setting: &Setting, machines: &[Stage], experiment: &Experiment) -> Result<Option<Band>> {
+    let every = experiment.samples().div_ceil(ROWS).max(1) as usize;
+    let runs: Vec<Option<[Vec<f64>; 4]>> =
+        machines.par_iter().map(|stage| run(setting, stage, experiment, every)).collect::<Result<_>>()?;
+    if setting.interrupt.signal().is_some() {
+        return Ok(None);
+    }
+    let whole: Vec<[Vec<f64>; 4]> = runs.into_iter().flatten().collect();
+    let failed = machines.len() - whole.len();
+    let Some(first) = whole.first() else {
+        return Err(Error::new(format!("no machine of the draws reaches the end of \"{}\"", experiment.name))
+            .next("run `taut simulate` without --draws to see what the case does"));
+    };
+    let time = first[0].clone();
+    let values = std::array::from_fn(|q| quantiles(&whole, q + 1, time.len()));
+    Ok(Some(Band { time, values, machines: whole.len(), failed }))
+}
+
+/// Writes it; returns the file's name.
+pub fn write(band: &Band, setting: &Setting, experiment: &Experiment) -> Result<Option<String>> {
+    let Some(folder) = setting.folder else { return Ok(None) };
+    let mut columns = vec![Column { values: band.time.clone(), ..Column::new("time", "s") }];
+    for ((name, unit, _), values) in QUANTITIES.iter().zip(&band.values) {
+        for (end, values) in ["low", "median", "high"].iter().zip(values) {
+            columns.push(Column { values: values.clone(), ..Column::new(format!("{name}_{end}"), *unit) });
         }
-        let whole: Vec<[Vec<f64>; 4]> = runs.into_iter().flatten().collect();
-        let failed = machines.len() - whole.len();
-        let Some(first) = whole.first() else {
-            return Err(Error::new(format!("no machine of the draws reaches the end of \"{}\"", experiment.name))
-                .next("run `taut simulate` without --draws to see what the case does"));
-        };
-        let time = first[0].clone();
-        let values = std::array::from_fn(|q| quantiles(&whole, q + 1, time.len()));
-        Ok(Some(Self { time, values, machines: whole.len(), failed }))
     }
-
-    /// Writes it; returns the file's name.
-    pub fn write(&self, setting: &Setting, experiment: &Experiment) -> Result<Option<String>> {
-        let Some(folder) = setting.folder else { return Ok(None) };
-        let mut columns = vec![Column { values: self.time.clone(), ..Column::new("time", "s") }];
-        for ((name, unit, _), values) in QUANTITIES.iter().zip(&self.values) {
-            for (end, values) in ["low", "median", "high"].iter().zip(values) {
-                columns.push(Column { values: values.clone(), ..Column::new(format!("{name}_{end}"), *unit) });
-            }
-        }
-        let name = format!("{}.band.csv", experiment.file_name());
-        let mut writer = CsvWriter::create(folder.path(&name))?;
-        writer.write(&Trajectory { columns })?;
-        writer.finish()?;
-        Ok(Some(name))
-    }
-
-    /// Below, middle and above of a quantity at the end.
-    pub fn end(&self, quantity: usize) -> [f64; 3] {
-        std::array::from_fn(|share| self.values[quantity][share].last().copied().unwrap_or(f64::NAN))
-    }
-
-    /// Its picture.
-    pub fn figure(&self, experiment: &Experiment) -> Figure {
-        let line = |name: &str, y: Vec<f64>, colour, style| {
-            Series::new(name, self.time.clone(), y).colour(colour).style(style)
-        };
-        let [_, cart, left] = &self.values;
-        let off = |share: usize| cart[share].iter().zip(&cart[1]).map(|(v, middle)| v - middle).collect::<Vec<f64>>();
-        let band = |panel: Panel, low: Vec<f64>, high: Vec<f64>| {
-            panel.series(line("97.5 %", high, Colour::Vermillion, Style::Solid)).series(line(
-                "2.5 %",
-                low,
-                Colour::Green,
-                Style::Solid,
-            ))
-        };
-        let middle = |values: &[Vec<f64>; 3]| line("median", values[1].clone(), Colour::Blue, Style::Dashed);
-        let position = Axis::new("Cart x", "m").shown_as("mm", 1e3);
-        let width = Axis::new("x − median", "m").shown_as("mm", 1e3);
-        let stretch = Axis::new("r φ₁ − x", "m").shown_as("µm", 1e6);
-        Figure::new(format!("{}: band", experiment.name), Axis::new("Time", "s"))
-            .panel(band(Panel::new(position).weight(2.0), cart[0].clone(), cart[2].clone()).series(middle(cart)))
-            .panel(band(Panel::new(width), off(0), off(2)))
-            .panel(band(Panel::new(stretch), left[0].clone(), left[2].clone()).series(middle(left)))
-            .caption(format!(
-                "Between the lines are 95 % of {} machines drawn from the posterior, at every time for itself.",
-                self.machines
-            ))
-    }
+    let name = format!("{}.band.csv", experiment.file_name());
+    let mut writer = CsvWriter::create(folder.path(&name))?;
+    writer.write(&Trajectory { columns })?;
+    writer.finish()?;
+    Ok(Some(name))
 }
 
 /// Time and quantities of one machine, every so many rows; none where it does not reach the end.

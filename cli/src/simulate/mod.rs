@@ -1,16 +1,10 @@
 //! `taut simulate`: runs the experiments of a case, and says what they show.
 
 mod band;
-pub mod curves;
 mod gantry;
-mod marks;
-mod page;
-pub mod plots;
 mod rows;
 mod run;
-pub mod table;
-
-pub use gantry::machine as gantry_machine;
+mod table;
 
 use crate::args::{Format, Simulate};
 use crate::command::{Finished, Remark, Report};
@@ -18,7 +12,7 @@ use crate::failure::{Failure, Outcome, Status};
 use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
 use crate::terminal;
-use run::{Run, Setting};
+use run::Setting;
 use std::ffi::OsString;
 use std::path::Path;
 use taut::case::{Case, Opened};
@@ -26,6 +20,7 @@ use taut::json::{self, Simulation};
 use taut::solve::{self, Ending, Solver};
 use taut::stage::Stage;
 use taut::{Error, Result};
+use taut_report::simulate::{Run, early_end, figures, hidden, named, page};
 
 /// What a user gets by writing it.
 const ADVICE: &str = "add --out DIR for files and a report";
@@ -111,14 +106,17 @@ fn axis(args: &Simulate, path: &Path, case: &Case) -> Outcome {
     if let Some(folder) = &folder {
         let text = folder.bring(&case.text, &case.files).map_err(Failure::work)?;
         if !common.no_report {
-            let figures: Vec<_> = runs.iter().map(|run| plots::figures(case, run)).collect();
-            let page = page::page(case, &text, solver, &runs, &figures);
+            let figures: Vec<_> = runs.iter().map(|run| figures(case, run)).collect();
+            let page = page(case, &text, solver, &runs, &figures);
             let names = runs.iter().map(|run| run.experiment.file_name());
-            finished.report = Some(Report { page, pictures: plots::named(names, figures) });
+            finished.report = Some(Report { page, pictures: named(names, figures) });
         }
         finished.files.push(("case.toml".into(), text));
     }
-    let ended: Vec<Ended> = runs.iter().map(Run::ended).collect();
+    let ended: Vec<Ended> = runs
+        .iter()
+        .map(|run| Ended { name: &run.experiment.name, outcome: &run.outcome, early: early_end(&run.outcome.ending) })
+        .collect();
     (finished.status, finished.remarks) = status(&ended, solver, &interrupt);
     finished.finish(common, folder)
 }
@@ -194,9 +192,9 @@ fn status(runs: &[Ended], solver: Solver, interrupt: &Interrupt) -> (Status, Vec
             };
             remarks.push(Remark::Error(format!("the run \"{name}\" {told}{advice}")));
         }
-        remarks.extend(table::hidden(name, outcome).map(Remark::Warning));
+        remarks.extend(hidden(name, outcome).map(Remark::Warning));
     }
-    let relied = |run: &Ended| run.outcome.ending == Ending::Complete && table::hidden(run.name, run.outcome).is_none();
+    let relied = |run: &Ended| run.outcome.ending == Ending::Complete && hidden(run.name, run.outcome).is_none();
     let status = match interrupt.signal() {
         Some(signal) => Status::Interrupted(signal),
         None if runs.iter().all(relied) => Status::Done,

@@ -1,25 +1,22 @@
 //! One experiment: its rows go to files, meter and plots as they come, and none is kept.
 
-use super::Ended;
-use super::band::Band;
-use super::curves::{Curves, Samples};
+use super::band;
 use super::rows::writers;
-use super::table::early_end;
 use crate::args::Simulate;
 use crate::failure::Failure;
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use taut::Error;
 use taut::case::{Case, Experiment};
-use taut::json::{self, Simulated};
 use taut::measure;
-use taut::metrics::{Meter, Metrics};
+use taut::metrics::Meter;
 use taut::reduction::Reduction;
 use taut::solve::{self, ErrorEstimate, Flow, Solver};
-use taut::stage::{BeltModel, Stage};
+use taut::stage::Stage;
 use taut::trajectory::{CsvWriter, Trajectory};
+use taut_report::simulate::{Curves, Run, Samples};
 
 /// What all runs of a command share.
 pub struct Setting<'a> {
@@ -30,52 +27,6 @@ pub struct Setting<'a> {
     pub interrupt: &'a Interrupt,
     /// Machines drawn from a posterior.
     pub machines: &'a [Stage],
-}
-
-/// What is known of an experiment after it ran.
-pub struct Run<'a> {
-    pub experiment: &'a Experiment,
-    pub outcome: solve::Outcome,
-    pub metrics: Metrics,
-    /// Its curves, where plots are wanted.
-    pub curves: Option<Curves>,
-    /// Its samples, where they and plots are wanted.
-    pub samples: Option<Samples>,
-    /// What the machines of --draws do.
-    pub band: Option<Band>,
-    /// Its model of the belt.
-    pub model: BeltModel,
-    /// How far its model is from the elastic one, where it is a reduced one.
-    pub reduction: Option<Reduction>,
-    /// Its files, as paths within the folder.
-    pub files: Vec<String>,
-    /// How long solving and writing took.
-    pub took: Duration,
-}
-
-impl Run<'_> {
-    /// How it ended.
-    pub fn ended(&self) -> Ended<'_> {
-        Ended { name: &self.experiment.name, outcome: &self.outcome, early: early_end(&self.outcome.ending) }
-    }
-
-    /// What the summary says of it.
-    pub fn told(&self) -> Simulated<'_> {
-        Simulated {
-            experiment: self.experiment,
-            outcome: &self.outcome,
-            metrics: &self.metrics,
-            reduction: self.reduction,
-            band: self.band.as_ref().map(|band| json::Band {
-                machines: band.machines,
-                machines_left_out: band.failed,
-                final_drive_angle_rad: band.end(0),
-                final_cart_position_m: band.end(1),
-                final_drive_travel_minus_cart_m: band.end(2),
-            }),
-            files: &self.files,
-        }
-    }
 }
 
 impl<'a> Setting<'a> {
@@ -129,9 +80,9 @@ impl<'a> Setting<'a> {
         }
         let mut band = None;
         if !self.machines.is_empty() && self.interrupt.signal().is_none() {
-            band = Band::of(self, self.machines, experiment)?;
+            band = band::of(self, self.machines, experiment)?;
             if let Some(band) = &band {
-                files.extend(band.write(self, experiment).map_err(Failure::work)?);
+                files.extend(band::write(band, self, experiment).map_err(Failure::work)?);
             }
         }
         let metrics = meter.finish(&outcome.events);

@@ -1,11 +1,8 @@
 //! `taut sweep`: many runs with parameters varied, which go on where they were left.
 
-mod figures;
 mod forecast;
-mod json;
 mod options;
 mod output;
-mod page;
 mod store;
 mod summary;
 mod table;
@@ -21,10 +18,12 @@ use crate::terminal;
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
 use store::Store;
-use summary::Summary;
+use summary::summary;
 use taut::case::Opened;
+use taut::json;
 use taut::sweep::Sweep;
 use taut::{Error, Result};
+use taut_report::sweep::{figures, page};
 
 /// Most runs that are kept in memory, where nothing is written.
 const MOST_KEPT: u64 = 100_000;
@@ -70,8 +69,8 @@ pub fn run(args: &Args) -> Outcome {
         told_interrupted(&work, &store);
         return Ok(Status::Interrupted(signal));
     }
-    let summary = pool.install(|| Summary::of(&work, &store)).map_err(Failure::work)?;
-    let json = ("sweep.json", json::text(&work, &summary));
+    let summary = pool.install(|| summary(&work, &store)).map_err(Failure::work)?;
+    let json = ("sweep.json", json::text(&json::sweep(&case, &sweep, &summary)));
     let text = table::text(&work, &summary, took, sweep.runs() - before);
     let mut finished = Finished::new("sweep", json, text, "add --out FILE.parquet or --out DIR");
     let Some(written) = output::write(&work, &target, &store)? else {
@@ -84,8 +83,8 @@ pub fn run(args: &Args) -> Outcome {
         Target::Folder(folder) => {
             let text = folder.bring(case.text(), case.files()).map_err(Failure::work)?;
             if !common.no_report {
-                let figures = figures::all(&work, &summary);
-                let page = page::page(&work, &summary, &text, &figures);
+                let figures = figures(&sweep, &summary);
+                let page = page(case.title(), &sweep, &summary, &text, &figures);
                 let pictures = figures.into_iter().map(|(name, figure)| (name, figure.into())).collect();
                 finished.report = Some(Report { page, pictures });
             }

@@ -1,8 +1,6 @@
 //! Nyquist's curve, sensitivity, and the moves before and after.
 
 use super::Work;
-use crate::simulate::curves::decimator;
-use crate::simulate::plots::Named;
 use std::f64::consts::PI;
 use taut::Result;
 use taut::case::Move;
@@ -10,6 +8,7 @@ use taut::control::feedback::Feedback;
 use taut::control::{Loop, Rows, Standard, stream};
 use taut::solve::{Flow, Solver};
 use taut::tune::{Corner, Verdict, loops};
+use taut_report::simulate::{Named, decimator};
 use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// What is drawn of L beyond this would hide the point −1.

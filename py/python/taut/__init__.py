@@ -12,7 +12,7 @@ Mistakes are :class:`taut.Error`, a ``ValueError`` with the text that the comman
 
 from ._native import Bug, Error, Seen, __version__
 from .case import Case, GantryCase, read, template
-from .results import Check, Estimate, Fit, GantryModes, LinearModel, Modes
+from .results import Check, Estimate, Fit, FitLog, GantryModes, LinearModel, Modes, Tuned
 from .runs import Run, Runs
 from .sweeps import sweep, sweep_tables
 from .table import Table
@@ -24,6 +24,7 @@ __all__ = [
     "Error",
     "Estimate",
     "Fit",
+    "FitLog",
     "GantryCase",
     "GantryModes",
     "LinearModel",
@@ -32,6 +33,7 @@ __all__ = [
     "Runs",
     "Seen",
     "Table",
+    "Tuned",
     "__version__",
     "read",
     "sweep",

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
-from typing import Any, Protocol, overload
+from typing import TYPE_CHECKING, Any, Protocol, overload
 
 from . import _checks, _html, _native
+from ._logs import write_log
 from ._toml import change
-from .results import Check, Fit, GantryModes, LinearModel, Modes
+from ._toml import written as toml
+from .results import Check, Fit, FitLog, GantryModes, LinearModel, Modes, Tuned
 from .runs import Run, Runs
 from .sweeps import sweep
 from .table import Table
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 
 class Controller(Protocol):
@@ -153,7 +158,7 @@ class Case:
         names = _checks.names("experiment", [experiment] if isinstance(experiment, str) else experiment)
         how = (_checks.word("solver", solver), _checks.number("tolerance", tolerance), _checks.number("step", step))
         runs = [Run(run) for run in self._native.simulate(names, *how, _checks.word("method", method))]
-        return runs[0] if one else Runs(runs, moved=False)
+        return runs[0] if one else Runs(runs)
 
     def check(self) -> Check:
         """What the logs can tell of the parameters in [fit], before any fit."""
@@ -170,7 +175,40 @@ class Case:
         effort = (_checks.whole("draws", draws, 1), _checks.whole("chains", chains, 1))
         native = self._native.fit(effort if posterior else None, bool(profiles))
         drawn = None if native.draws is None else Table(*native.draws)
-        return Fit(native.data, self._of(native.case), drawn)
+        return Fit(native.data, self._of(native.case), drawn, [FitLog._of(log) for log in native.logs])
+
+    def tune(self, *, spread: float | None = None, corners: bool = False, evaluate: bool = False) -> Tuned:
+        """Finds gains and filters for the case's controller, judged by moves over a family of machines that can exist.
+
+        ``spread`` is by which share parameters may be off (0.1 is 10 %; that of [tune] unless said, 0 for the machine of the file
+        alone); with ``corners`` all of them are off at once in the worst directions. With ``evaluate`` nothing is searched for: the
+        gains of the file are judged. Ctrl-C ends it.
+        """
+        data, case = self._native.tune(_checks.number("spread", spread), bool(corners), bool(evaluate))
+        return Tuned(data, self._of(case))
+
+    def with_log(
+        self,
+        name: str,
+        log: Any,
+        columns: Mapping[str, Any],
+        *,
+        path: str | PathLike[str] | None = None,
+        **settings: Any,
+    ) -> Case:
+        """Another case with one more experiment, whose log is a DataFrame, a Table or a dictionary of arrays.
+
+        ``columns`` says which column is what, as the table ``log`` of a case file does: ``time`` (s), ``input`` (V or A), and what was
+        measured, such as ``drive_angle`` (rad) or ``cart_position`` (m): ``{"time": "t", "input": "u", "drive_angle": "phi"}``.
+        ``settings`` are other keys of that table, such as ``hold="linear"``. The log is written as CSV to ``path``, where the case finds
+        it from then on; without one, to a folder that is removed when Python ends.
+        """
+        written = write_log(log, None if path is None else _checks.path(path), _checks.text("name", name))
+        if not isinstance(columns, Mapping):
+            raise TypeError(f"columns: a dictionary is wanted, and no {type(columns).__name__}")
+        table = {"file": written, **columns, **settings}
+        experiment = f"\n[[experiment]]\nname = {toml(_checks.text('name', name))}\nlog = {toml(table)}\n"
+        return Case(self.text.rstrip("\n") + "\n" + experiment, self.path)
 
     def modes(
         self,
@@ -261,11 +299,39 @@ class Case:
         timing = (_checks.number("every", every), _checks.number("delay", delay), _checks.number("limit", limit))
         share = _checks.number("spread", spread)
         runs = [Run(run) for run in self._native.run_moves(names, controller, timing, share)]
-        return runs[0] if isinstance(move, str) else Runs(runs, moved=True)
+        return runs[0] if isinstance(move, str) else Runs(runs)
 
-    def sweep(self, n: int | None = None, **options: Any) -> Table:
-        """Runs ``n`` machines with parameters varied: :func:`taut.sweep` of this case, with its options."""
-        return sweep(self, n, **options)
+    def sweep(
+        self,
+        n: int | None = None,
+        *,
+        vary: Mapping[str, Any] | None = None,
+        design: str | None = None,
+        seed: int | None = None,
+        indices: bool = False,
+        interval: str | float | None = None,
+        threads: int = 0,
+        client: Client | None = None,
+        chunk: int | None = None,
+    ) -> Table:
+        """Runs ``n`` machines with parameters varied; a row of parameters and key figures for each.
+
+        ``vary`` says by how much, ``{"cart.mass": "20 %"}``; ``design`` is ``random``, ``latin-hypercube``, ``sobol``, ``grid`` or
+        ``one-at-a-time``; ``interval`` (s) is how far apart the rows are that figures are taken from. All of it is told at
+        :func:`taut.sweep`, which this is.
+        """
+        return sweep(
+            self,
+            n,
+            vary=vary,
+            design=design,
+            seed=seed,
+            indices=indices,
+            interval=interval,
+            threads=threads,
+            client=client,
+            chunk=chunk,
+        )
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Case) and (self.text, self.path) == (other.text, other.path)

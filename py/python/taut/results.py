@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _html
+from . import _html, _plots
 from ._optional import needed
 from .table import Table
 
 if TYPE_CHECKING:
     import control
+    import pandas
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from .case import Case
+
+
+def _frame(columns: dict[str, Any]) -> pandas.DataFrame:
+    frame: pandas.DataFrame = needed("pandas", "pandas", "to_pandas()").DataFrame(columns)
+    return frame
 
 
 @dataclass(frozen=True)
@@ -44,6 +53,19 @@ class Check:
         """The combinations that nothing tells apart, in words."""
         return [group["words"] for group in self.data["not_determined"]]
 
+    def to_pandas(self) -> pandas.DataFrame:
+        """A pandas.DataFrame of the parameters and their relative standard errors (1 is 100 %)."""
+        return _frame({"parameter": list(self.errors), "relative_error": list(self.errors.values())})
+
+    def plot(self, *, ax: Axes | None = None) -> Figure:
+        """How well each parameter would be known, as bars; what is not determined reaches the end of the scale."""
+        figure, (axis,) = _plots.panels(ax, 1, height=1 + 0.3 * len(self.errors))
+        known = [100 * error for error in self.errors.values() if np.isfinite(error)]
+        most = 10 * max(known, default=10.0)
+        _plots.bars(axis, list(self.errors), [min(100 * e, most) for e in self.errors.values()], "standard error, % of the value")
+        axis.set_xscale("log")
+        return figure
+
     def __repr__(self) -> str:
         told = "everything determined" if self.complete else "; ".join(self.not_determined)
         return f"<taut.Check {self.data['title']!r}: {told}>"
@@ -67,6 +89,75 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class FitLog:
+    """How a fit meets one log, or one window of it."""
+
+    name: str
+    """The experiment's."""
+    window: int
+    """Which window of it, from 0."""
+    held_out: bool
+    """Whether none of it was fitted."""
+    complete: bool
+    """Whether the model reached its end."""
+    fitted_rows: int
+    """Rows from the first on that were fitted; the others were held out."""
+    time: NDArray[np.float64]
+    """Times of the rows, s."""
+    units: dict[str, str]
+    """The unit of each output."""
+    measured: dict[str, NDArray[np.float64]]
+    """What was measured, by output; NaN where nothing was."""
+    model: dict[str, NDArray[np.float64]]
+    """What the fitted model shows."""
+
+    @classmethod
+    def _of(cls, told: dict[str, Any]) -> FitLog:
+        outputs = told["outputs"]
+        return cls(
+            name=told["name"],
+            window=told["window"],
+            held_out=told["held_out"],
+            complete=told["complete"],
+            fitted_rows=told["fitted_rows"],
+            time=told["time"],
+            units={name: unit for name, (unit, _, _) in outputs.items()},
+            measured={name: measured for name, (_, measured, _) in outputs.items()},
+            model={name: model for name, (_, _, model) in outputs.items()},
+        )
+
+    @property
+    def residuals(self) -> dict[str, NDArray[np.float64]]:
+        """The model minus what was measured, by output."""
+        return {name: self.model[name] - self.measured[name] for name in self.measured}
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A pandas.DataFrame: ``time_s``, and of each output what was measured, the model's, and the residual."""
+        columns: dict[str, Any] = {"time_s": self.time}
+        for name, residual in self.residuals.items():
+            columns |= {f"{name}_measured": self.measured[name], f"{name}_model": self.model[name], f"{name}_residual": residual}
+        return _frame(columns)
+
+    def plot(self, *, ax: Axes | Sequence[Axes] | None = None) -> Figure:
+        """Log and model over time, and the residuals below: two panels for each output, or as many ``ax``."""
+        figure, axes = _plots.panels(ax, 2 * len(self.measured))
+        for k, (name, residual) in enumerate(self.residuals.items()):
+            above, below = axes[2 * k : 2 * k + 2]
+            above.plot(self.time, self.measured[name], label="log", linewidth=1)
+            above.plot(self.time, self.model[name], "--", label="model", linewidth=1)
+            below.plot(self.time, residual, label="model − log", linewidth=1)
+            label = f"{name.replace('_', ' ')}, {self.units[name]}"
+            _plots.finished(above, "", label)
+            _plots.finished(below, "time, s", f"residual, {self.units[name]}")
+        if ax is None:
+            figure.suptitle(self.name)
+        return figure
+
+    def __repr__(self) -> str:
+        return f"<taut.FitLog {self.name!r}: {len(self.time)} rows of {', '.join(self.measured)}>"
+
+
+@dataclass(frozen=True)
 class Fit:
     """Parameters from logs, and how well they are known."""
 
@@ -76,6 +167,43 @@ class Fit:
     """The case with the estimates in it."""
     draws: Table | None
     """Draws from the posterior, if they were asked for: ``chain``, ``draw`` and each parameter."""
+    logs: list[FitLog]
+    """How each log is met: those that were fitted, then those that were held out."""
+
+    @property
+    def residuals(self) -> dict[str, NDArray[np.float64]]:
+        """By output, the residuals (model minus measured, SI units) of all rows that were fitted, one log after the other."""
+        parts: dict[str, list[NDArray[np.float64]]] = {}
+        for log in self.logs:
+            if not log.held_out:
+                for name, residual in log.residuals.items():
+                    parts.setdefault(name, []).append(residual[: log.fitted_rows])
+        return {name: np.concatenate(each) for name, each in parts.items()}
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A pandas.DataFrame of the estimates: value, standard error, interval, unit, and whether at a bound."""
+        each = list(self.estimates.values())
+        low, high = ([None if e.interval_95 is None else e.interval_95[k] for e in each] for k in (0, 1))
+        return _frame(
+            {
+                "parameter": [e.name for e in each],
+                "value": [e.value for e in each],
+                "standard_error": [e.standard_error for e in each],
+                "low_95": low,
+                "high_95": high,
+                "unit": [e.unit for e in each],
+                "at_bound": [e.at_bound for e in each],
+            }
+        )
+
+    def plot(self, log: str | int = 0, *, ax: Axes | Sequence[Axes] | None = None) -> Figure:
+        """One log beside the model, with the residuals: by its number in ``logs``, or the first of this name."""
+        if isinstance(log, str):
+            found = next((one for one in self.logs if one.name == log), None)
+            if found is None:
+                raise KeyError(f"there is no log {log!r}; there are {', '.join(dict.fromkeys(one.name for one in self.logs))}")
+            return found.plot(ax=ax)
+        return self.logs[log].plot(ax=ax)
 
     @property
     def converged(self) -> bool:
@@ -110,6 +238,72 @@ class Fit:
         rows = [(e.name, e.value, e.standard_error, e.unit) for e in self.estimates.values()]
         title = f"{self.data['title']}: {self.data['ending']}"
         return _html.table(title, ("parameter", "value", "standard error", "unit"), rows)
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """A controller that was tuned or judged, and what its moves come to over a family of machines."""
+
+    data: dict[str, Any]
+    """What ``taut tune --json`` prints."""
+    case: Case
+    """The case with the gains that were found."""
+
+    @property
+    def verdict(self) -> str:
+        """``better``, ``unchanged`` or ``worse`` than the gains of the file."""
+        return str(self.data["verdict"])
+
+    @property
+    def forced_by(self) -> dict[str, Any] | None:
+        """The limit that makes it worse (``limit``, ``mode_Hz``, ``place_m``), where one does."""
+        forced: dict[str, Any] | None = self.data["forced_by"]
+        return forced
+
+    @property
+    def gains(self) -> dict[str, tuple[float, float, str]]:
+        """Of each gain: as the file has it, as it was found, and its unit."""
+        return {row["key"]: (row["before"], row["after"], row["unit"]) for row in self.data["gains"]}
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A pandas.DataFrame of the moves: error (m), settling (s) and current (A), as in the file and at worst, before and after."""
+        rows = []
+        for when in ("before", "after"):
+            for move in self.data[when]["moves"]:
+                worst = move["worst"]
+                rows.append(
+                    {
+                        "gains": when,
+                        "move": move["name"],
+                        "cart_error_m": move["cart_error"]["peak_m"],
+                        "settling_s": move["settling_s"],
+                        "rms_current_A": move["rms_current_A"],
+                        "worst_cart_error_m": worst["cart_error_m"],
+                        "worst_settling_s": worst["settling_s"],
+                        "settled": worst["settled"],
+                        "of": worst["axes"],
+                    }
+                )
+        return _frame({key: [row[key] for row in rows] for key in (rows[0] if rows else {})})
+
+    def plot(self, *, ax: Axes | None = None) -> Figure:
+        """The worst cart error of each move over the family, before and after."""
+        figure, (axis,) = _plots.panels(ax, 1, height=3.0)
+        names = [move["name"] for move in self.data["before"]["moves"]]
+        for k, when in enumerate(("before", "after")):
+            errors = [1e3 * (move["worst"]["cart_error_m"] or np.nan) for move in self.data[when]["moves"]]
+            axis.bar(np.arange(len(errors)) + 0.4 * k - 0.2, errors, 0.4, label=when)
+        axis.set_xticks(range(len(names)), names)
+        _plots.finished(axis, "", "cart error at worst, mm")
+        return figure
+
+    def __repr__(self) -> str:
+        gains = ", ".join(f"{key} = {after:.4g} {unit}".strip() for key, (_, after, unit) in self.gains.items())
+        return f"<taut.Tuned {self.data['title']!r}, {self.verdict}: {gains}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(key, *values) for key, values in self.gains.items()]
+        return _html.table(f"{self.data['title']}: {self.verdict}", ("gain", "before", "after", "unit"), rows)
 
 
 @dataclass(frozen=True)
@@ -164,6 +358,26 @@ class Modes:
         """The model as python-control has it: in discrete time if a sample time was given."""
         return (self.discrete or self.model).to_control()
 
+    def to_pandas(self) -> pandas.DataFrame:
+        """A pandas.DataFrame of the responses: ``frequency_Hz``, and magnitude and phase (degrees) of each output."""
+        columns: dict[str, Any] = {"frequency_Hz": self.frequency}
+        for name, (magnitude, phase) in self.responses.items():
+            columns |= {f"{name}_magnitude": magnitude, f"{name}_phase_deg": phase}
+        return _frame(columns)
+
+    def plot(self, output: str | None = None, *, ax: Axes | Sequence[Axes] | None = None) -> Figure:
+        """Bode diagram of one output (the first unless said): magnitude above, phase below, or both into two ``ax``."""
+        name = next(iter(self.responses)) if output is None else output
+        if name not in self.responses:
+            raise KeyError(f"there is no output {name!r}; there are {', '.join(self.responses)}")
+        magnitude, phase = self.responses[name]
+        figure, (above, below) = _plots.panels(ax, 2)
+        above.loglog(self.frequency, magnitude, linewidth=1)
+        below.semilogx(self.frequency, phase, linewidth=1)
+        _plots.finished(above, "", f"{name.replace('_', ' ')}, {self.model.units[name]}/{self.model.units[self.model.inputs[0]]}")
+        _plots.finished(below, "frequency, Hz", "phase, °")
+        return figure
+
     def __repr__(self) -> str:
         found = ", ".join(f"{frequency:.4g} Hz" for frequency in self.resonances)
         return f"<taut.Modes {self.data['title']!r}: {len(self.poles)} poles, resonances at {found or 'none'}>"
@@ -202,6 +416,26 @@ class GantryModes:
             return None
         bridge, cart, hertz = (np.array(found[key]) for key in ("bridge_position_m", "cart_position_m", "elastic_Hz"))
         return bridge, cart, hertz
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A pandas.DataFrame of the elastic modes: frequency (Hz), damping ratio, and how far each body moves at the belt."""
+        rows = self.data["elastic"]
+        bodies = list(dict.fromkeys(body for row in rows for body in row["shape_at_belt"]))
+        columns = {key: [row[key] for row in rows] for key in ("frequency_Hz", "damping_ratio")}
+        return _frame(columns | {body: [row["shape_at_belt"].get(body) for row in rows] for body in bodies})
+
+    def plot(self, mode: int = 0, *, ax: Axes | None = None) -> Figure:
+        """The frequency of an elastic mode over the working area; where it is the same everywhere, all modes as bars."""
+        figure, (axis,) = _plots.panels(ax, 1, height=3.0)
+        area = self.map
+        if area is None:
+            _plots.bars(axis, [f"mode {k}" for k in range(len(self.resonances))], self.resonances, "frequency, Hz")
+            return figure
+        bridge, cart, hertz = area
+        shown = axis.contourf(1e3 * bridge, 1e3 * cart, hertz[mode].T, levels=20)
+        figure.colorbar(shown, ax=axis, label="frequency, Hz")
+        _plots.finished(axis, "bridge, mm", "cart, mm")
+        return figure
 
     def __repr__(self) -> str:
         found = ", ".join(f"{frequency:.4g} Hz" for frequency in self.resonances)

@@ -9,12 +9,41 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _checks, _html, _native
+from . import _checks, _html, _native, _plots
 from ._optional import needed
 from .table import Table
 
 if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+class _Kept:
+    """A run that was pickled: all that it holds, without what the solver has of it."""
+
+    def __init__(self, kept: dict[str, Any], figures: dict[str, Any], events: list[dict[str, Any]], data: dict[str, Any]) -> None:
+        self.names: list[tuple[str, str, str]] = kept["names"]
+        self.arrays: dict[str, NDArray[np.float64]] = kept["arrays"]
+        for array in self.arrays.values():
+            array.setflags(write=False)
+        self.name: str = kept["name"]
+        self.ending: tuple[str, float] = tuple(kept["ending"])
+        self.took: float = kept["took"]
+        self.position_error: float | None = kept["position_error"]
+        self.inputs: list[str] = kept["inputs"]
+        self.data = data
+        self._figures, self._events = figures, events
+
+    def figures(self) -> dict[str, Any]:
+        return self._figures
+
+    def events(self) -> list[dict[str, Any]]:
+        return self._events
+
+
+def _restored(*parts: Any) -> Run:
+    return Run(_Kept(*parts))
 
 
 class Run(Table):
@@ -22,9 +51,9 @@ class Run(Table):
 
     __slots__ = ("_native",)
 
-    def __init__(self, native: _native.Run) -> None:
-        """Made by :meth:`taut.Case.simulate` and :meth:`taut.Case.move`."""
-        if not isinstance(native, _native.Run):
+    def __init__(self, native: _native.Run | _Kept) -> None:
+        """Made by :meth:`taut.Case.simulate` and :meth:`taut.Case.move`; a run that was pickled, by ``pickle``."""
+        if not isinstance(native, (_native.Run, _Kept)):
             raise TypeError(f"runs are made by Case.simulate and Case.move, and not of {type(native).__name__}")
         super().__init__(native.arrays, native.names)
         self._native = native
@@ -51,7 +80,7 @@ class Run(Table):
 
     @property
     def metrics(self) -> dict[str, Any]:
-        """The key figures, as ``taut simulate --json`` has them; keys say their units."""
+        """The key figures, as ``taut simulate --json`` has them, of a move also those of ``taut move --json``; keys say their units."""
         figures: dict[str, Any] = self._native.figures()
         return figures
 
@@ -68,36 +97,46 @@ class Run(Table):
 
     def write(self, path: str | PathLike[str]) -> None:
         """Writes the columns to a ``.csv`` or ``.parquet`` file, as ``taut simulate --out`` does."""
-        self._native.write(_checks.path(path))
+        native = self._native
+        _native.write(native.arrays, native.names, native.inputs, _checks.path(path))
 
-    def plot(self, *columns: str) -> Figure:
+    def plot(self, *columns: str, ax: Axes | Sequence[Axes] | None = None) -> Figure:
         """A matplotlib figure of these columns over time, one panel for each unit.
 
         Without names: where the cart is and should be, its speed, and the voltage; of a gantry also those of the bridge and both drives.
+        ``ax`` is what to draw into: one Axes, or as many as there are units.
         """
         usual = ["reference", "bridge_position", "cart_position", "bridge_speed", "cart_speed"]
         usual += ["voltage", "left_voltage", "right_voltage"]
         names = columns or tuple(name for name in usual if name in self)
-        panels: dict[str, list[str]] = {}
+        units: dict[str, list[str]] = {}
         for name in names:
             own = next((own for own, heading in self.headings.items() if name in (own, heading)), None)
             if own is None:
                 self[name]  # tells what there is
                 continue
-            panels.setdefault(self.units[own], []).append(own)
-        figure: Figure = needed("matplotlib.figure", "matplotlib", "plot()").Figure(
-            figsize=(7, 1 + 2 * len(panels)), layout="constrained"
-        )
-        axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-        for axis, (unit, group) in zip(axes, panels.items()):
+            units.setdefault(self.units[own], []).append(own)
+        figure, axes = _plots.panels(ax, len(units))
+        for axis, (unit, group) in zip(axes, units.items()):
             for name in group:
                 axis.plot(self.time, self[name], label=name.replace("_", " "), linewidth=1)
-            axis.set_ylabel(unit)
-            axis.legend(loc="best", fontsize="small")
-            axis.grid(True, alpha=0.3)
-        axes[-1].set_xlabel("time, s")
-        figure.suptitle(self.name)
+            _plots.finished(axis, "time, s" if axis is axes[-1] else "", unit)
+        if ax is None:
+            figure.suptitle(self.name)
         return figure
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        kept = {name: getattr(self._native, name) for name in ("names", "name", "ending", "took", "position_error", "inputs")}
+        kept["arrays"] = dict(self._native.arrays)
+        return (_restored, (kept, self.metrics, self.events, self._data()))
+
+    def _data(self) -> dict[str, Any]:
+        """What the program prints of this run alone."""
+        if isinstance(self._native, _Kept):
+            return self._native.data
+        told = _native.simulation([self._native])
+        data: dict[str, Any] = _native.moves([self._native]) if told is None else told
+        return data
 
     def __repr__(self) -> str:
         return f"<taut.Run {self.name!r}: {self.rows} rows, {self.ending}, {len(self.events)} events>"
@@ -112,14 +151,13 @@ class Run(Table):
 class Runs(Sequence[Run]):
     """Several runs in the case's order, by number or by name."""
 
-    __slots__ = ("_runs", "_told")
+    __slots__ = ("_runs",)
 
-    def __init__(self, runs: Sequence[Run], moved: bool) -> None:
+    def __init__(self, runs: Sequence[Run]) -> None:
         """Made by :meth:`taut.Case.simulate` and :meth:`taut.Case.move`."""
         self._runs = list(runs)
         if not all(isinstance(run, Run) for run in self._runs):
             raise TypeError("runs are made by Case.simulate and Case.move")
-        self._told = _native.moves if moved else _native.simulation
 
     @overload
     def __getitem__(self, index: int | str) -> Run: ...
@@ -142,8 +180,33 @@ class Runs(Sequence[Run]):
     @property
     def data(self) -> dict[str, Any]:
         """What ``taut simulate --json`` or ``taut move --json`` prints."""
-        data: dict[str, Any] = self._told([run._native for run in self._runs])
-        return data
+        each = [run._data() for run in self._runs]
+        if not each:
+            return {}
+        done = "moves" if "moves" in each[0] else "experiments"
+        return {**each[0], done: [one for data in each for one in data[done]]}
+
+    def plot(self, *columns: str) -> Figure:
+        """The same columns of all runs over each other, one panel for each unit; named as those of :meth:`Run.plot`."""
+        if not self._runs:
+            raise ValueError("there is no run to plot")
+        figure = self._runs[0].plot(*columns)
+        for run in self._runs[1:]:
+            run.plot(*columns, ax=figure.axes)
+        for axis in figure.axes:
+            lines = axis.get_lines()
+            share = len(lines) // len(self._runs)
+            for place, line in enumerate(lines):
+                line.set_label(f"{self._runs[place // share].name}: {line.get_label()}")
+            axis.legend(loc="best", fontsize="small")
+        figure.suptitle("")
+        return figure
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The rows of all runs in one pandas.DataFrame, with the name of each run as the first level of its index."""
+        frames = {run.name: run.to_pandas() for run in self._runs}
+        joined: pandas.DataFrame = needed("pandas", "pandas", "to_pandas()").concat(frames, names=["run", "row"])
+        return joined
 
     def __repr__(self) -> str:
         return "[" + ", ".join(map(repr, self._runs)) + "]"

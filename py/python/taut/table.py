@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _html
+from . import _html, _plots
 from ._optional import needed
 
 if TYPE_CHECKING:
     import pandas
     import polars
     import pyarrow
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 class Table(Mapping[str, NDArray[np.float64]]):
@@ -84,6 +86,20 @@ class Table(Mapping[str, NDArray[np.float64]]):
         """A polars.DataFrame with headings, which hold the units, as columns."""
         frame: polars.DataFrame = needed("polars", "polars", "to_polars()").DataFrame(self._by_heading())
         return frame
+
+    def plot(self, *columns: str, ax: Axes | Sequence[Axes] | None = None) -> Figure:
+        """A histogram of one column, or the second over the first as points; of a sweep, its figures over its parameters."""
+        if len(columns) not in (1, 2):
+            raise TypeError("plot() takes one column for a histogram, or two for points: plot('x', 'y')")
+        figure, (axis,) = _plots.panels(ax, 1, height=3.0)
+        label = [f"{name}, {self.units[name]}".rstrip(", ") if name in self.units else name for name in columns]
+        if len(columns) == 1:
+            axis.hist(self[columns[0]][np.isfinite(self[columns[0]])], bins="auto")
+            _plots.finished(axis, label[0], "rows")
+        else:
+            axis.plot(self[columns[0]], self[columns[1]], ".", markersize=3)
+            _plots.finished(axis, label[0], label[1])
+        return figure
 
     def __repr__(self) -> str:
         return f"<taut.{type(self).__name__}: {self.rows} rows of {', '.join(self.headings.values())}>"

@@ -1,6 +1,5 @@
 //! The same for a gantry: rigid and elastic modes, and the resonances over the working area.
 
-mod page;
 mod table;
 
 use crate::args::Modes as Args;
@@ -11,12 +10,8 @@ use std::fmt::Write;
 use taut::case::GantryCase;
 use taut::json;
 use taut::linear::{GantryAnalysis, ResonanceMap};
-use taut::number::engineering;
 use taut::{Error, Result};
-use taut_report::{Axis, Map, Plane};
-
-/// A plane and its name in file names.
-type Named = (String, Plane);
+use taut_report::modes::gantry::{page, planes};
 
 /// Finds the modes, writes, tells.
 pub fn run(args: &Args, case: &GantryCase) -> Outcome {
@@ -34,7 +29,7 @@ pub fn run(args: &Args, case: &GantryCase) -> Outcome {
     }
     if common.reports() {
         let planes = planes(&analysis);
-        let page = page::page(&analysis, &planes);
+        let page = page(&analysis, &planes);
         let pictures = planes.into_iter().map(|(name, plane)| (name, plane.into())).collect();
         finished.report = Some(Report { page, pictures });
     }
@@ -62,17 +57,6 @@ fn refuse(args: &Args) -> Result<()> {
     }
 }
 
-/// Whether the resonances depend on the place, in words.
-fn over_the_area(analysis: &GantryAnalysis) -> &'static str {
-    match &analysis.map {
-        Some(_) => "the spans follow bridge and cart: k = A E / l with the length that is left",
-        None => {
-            "the same everywhere: in this file the spans' stiffness does not depend on the place \
-             (belt.modulus, section, spans and follows_cart = true make the spans follow bridge and cart)"
-        }
-    }
-}
-
 /// The map, a row for each place.
 fn csv(map: &ResonanceMap) -> String {
     let mut text = String::from("bridge_position_m,cart_position_m");
@@ -90,30 +74,4 @@ fn csv(map: &ResonanceMap) -> String {
         }
     }
     text
-}
-
-/// A map of each elastic mode, seen as the drawing is.
-fn planes(analysis: &GantryAnalysis) -> Vec<Named> {
-    let Some(map) = &analysis.map else { return Vec::new() };
-    let millimetres = |name: &str| Axis::new(name, "m").shown_as("mm", 1e3);
-    let plane = |(k, hertz): (usize, &Vec<Vec<f64>>)| {
-        let [(least, at), (most, to)] = map.range(k);
-        let place = |(x, y): (f64, f64)| format!("x = {}, y = {}", engineering(x, "m", 3), engineering(y, "m", 3));
-        let caption = format!(
-            "Undamped frequency with the bridge at x and the cart at y: from {} at {} to {} at {}.",
-            engineering(least, "Hz", 4),
-            place(at),
-            engineering(most, "Hz", 4),
-            place(to)
-        );
-        let shown = Map {
-            value: Axis::new("Frequency", "Hz"),
-            across: map.cart.clone(),
-            up: map.bridge.clone(),
-            values: hertz.clone(),
-        };
-        let plane = Plane::new(format!("Elastic mode {}", k + 1), millimetres("Cart y"), millimetres("Bridge x"));
-        (format!("elastic-{}", k + 1), plane.map(shown).caption(caption))
-    };
-    map.hertz.iter().enumerate().map(plane).collect()
 }

@@ -1,11 +1,7 @@
 //! The same for a gantry: two drives, a bridge, a cart on it.
 
-mod page;
-mod plots;
 mod run;
 mod table;
-
-pub use table::machine;
 
 use super::{ADVICE, Ended, names, status};
 use crate::args::Simulate;
@@ -13,12 +9,13 @@ use crate::command::{Finished, Report};
 use crate::failure::{Failure, Outcome};
 use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
-use run::{Run, Setting};
+use run::Setting;
 use std::path::Path;
 use taut::case::GantryCase;
 use taut::json::{self, GantrySimulation};
-use taut::solve::Solver;
 use taut::{Error, Result};
+use taut_report::simulate::gantry::{Run, early_end, figures, page, way};
+use taut_report::simulate::named;
 use taut_report::{Picture, gantry_drawing};
 
 /// Simulates, measures, reports.
@@ -51,7 +48,10 @@ pub fn run(args: &Simulate, path: &Path, case: &GantryCase) -> Outcome {
         }
         finished.files.push(("case.toml".into(), text));
     }
-    let ended: Vec<Ended> = runs.iter().map(|run| run.ended(&case.gantry)).collect();
+    let ended: Vec<Ended> = runs
+        .iter()
+        .map(|run| Ended { name: &run.experiment.name, outcome: &run.outcome, early: early_end(run, &case.gantry) })
+        .collect();
     (finished.status, finished.remarks) = status(&ended, solver, &interrupt);
     finished.finish(common, folder)
 }
@@ -59,14 +59,14 @@ pub fn run(args: &Simulate, path: &Path, case: &GantryCase) -> Outcome {
 /// The page and its pictures: the machine, every run over time, and the way of the cart in the plane.
 fn report(setting: &Setting, text: &str, runs: &[Run]) -> Report {
     let case = setting.case;
-    let figures: Vec<_> = runs.iter().map(|run| plots::figures(case, run)).collect();
-    let ways: Vec<_> = runs.iter().map(|run| plots::way(case, run)).collect();
-    let page = page::page(setting, text, runs, &figures, &ways);
+    let figures: Vec<_> = runs.iter().map(|run| figures(case, run)).collect();
+    let ways: Vec<_> = runs.iter().map(|run| way(case, run)).collect();
+    let page = page(case, text, setting.solver, runs, &figures, &ways);
     let names = || runs.iter().map(|run| run.experiment.file_name());
     let mut pictures = vec![("machine".to_string(), Picture::Drawing(gantry_drawing(&case.gantry)))];
     let ways = names().zip(ways).filter_map(|(name, way)| Some((format!("{name}-path"), way?.into())));
     pictures.extend(ways);
-    pictures.extend(super::plots::named(names(), figures));
+    pictures.extend(named(names(), figures));
     Report { page, pictures }
 }
 
@@ -80,9 +80,4 @@ fn refuse(args: &Simulate) -> Result<()> {
         return Ok(());
     };
     Err(Error::new("this is there for a single axis, and not yet for a gantry").in_file(option).next(next))
-}
-
-/// What a solver is called where nothing has to be said of how exact it is.
-fn is_general(solver: Solver) -> bool {
-    matches!(solver, Solver::General { .. })
 }

@@ -1,23 +1,19 @@
 //! One experiment of a gantry: its rows go to files, meter and plots as they come, and none is kept.
 
-use super::super::Ended;
-use super::super::curves::{Curves, Way};
 use super::super::rows::writers;
-use super::{plots, table};
 use crate::args::Simulate;
 use crate::failure::Failure;
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use taut::Error;
 use taut::case::{GantryCase, GantryExperiment};
-use taut::json::GantrySimulated;
 use taut::mechanism::Mechanism;
-use taut::metrics::{GantryMeter, GantryMetrics};
+use taut::metrics::GantryMeter;
 use taut::solve::{self, Course, Detail, ErrorEstimate, Flow, Solver, stream_mechanism};
-use taut::stage::gantry::Gantry;
 use taut::trajectory::Trajectory;
+use taut_report::simulate::gantry::{Run, curves};
 
 /// What all runs of a command share.
 pub struct Setting<'a> {
@@ -29,32 +25,6 @@ pub struct Setting<'a> {
     pub interrupt: &'a Interrupt,
 }
 
-/// What is known of an experiment after it ran.
-pub struct Run<'a> {
-    pub experiment: &'a GantryExperiment,
-    pub outcome: solve::Outcome,
-    pub metrics: GantryMetrics,
-    /// Its curves, and the way of the cart, where plots are wanted.
-    pub curves: Option<(Curves, Way)>,
-    /// Its files, as paths within the folder.
-    pub files: Vec<String>,
-    /// How long solving and writing took.
-    pub took: Duration,
-}
-
-impl Run<'_> {
-    /// What the summary says of it.
-    pub fn told(&self) -> GantrySimulated<'_> {
-        let Run { experiment, outcome, metrics, files, .. } = self;
-        GantrySimulated { experiment, outcome, metrics, files }
-    }
-
-    /// How it ended.
-    pub fn ended(&self, gantry: &Gantry) -> Ended<'_> {
-        Ended { name: &self.experiment.name, outcome: &self.outcome, early: table::early_end(self, gantry) }
-    }
-}
-
 impl<'a> Setting<'a> {
     /// Runs `experiment`.
     pub fn run(&self, experiment: &'a GantryExperiment) -> Result<Run<'a>, Failure> {
@@ -64,7 +34,7 @@ impl<'a> Setting<'a> {
         let mut writers = writers(self.folder, &name, &self.args.format).map_err(Failure::work)?;
         let mut meter = GantryMeter::new(&self.case.gantry);
         let plotted = self.folder.is_some() && !self.args.common.no_report;
-        let mut curves = plotted.then(|| plots::curves(&self.case.gantry));
+        let mut curves = plotted.then(|| curves(&self.case.gantry));
         let progress = Progress::new(&experiment.name, Some(experiment.samples()), self.args.common.quiet);
         let mut trouble: Option<Error> = None;
         let mut estimate = match self.solver {

@@ -1,19 +1,12 @@
-//! The summary for people: a small table for each experiment.
+//! The summary on the terminal: a small table for each experiment.
 
-use super::super::table::{self, accuracy, cost, events, solver_words, speed, time, took, travel, value};
-use super::is_general;
-use super::run::Run;
+use crate::simulate::table::took;
 use crate::terminal::bold;
 use std::fmt::Write;
 use taut::case::GantryCase;
-use taut::metrics::{GantryMetrics, Peak};
-use taut::number::engineering_ascii;
-use taut::solve::{Ending, Solver};
-use taut::stage::gantry::{Gantry, Routing};
-
-/// Lengths (m) and forces (N) up to these are shown as nothing: less than rounding makes of a symmetric motion.
-const LEAST_LENGTH: f64 = 1e-13;
-const LEAST_FORCE: f64 = 1e-9;
+use taut::solve::Solver;
+use taut_report::simulate::gantry::{Run, early_end, lines, machine};
+use taut_report::simulate::solver_words;
 
 /// The text on the terminal.
 pub fn text(case: &GantryCase, solver: Solver, runs: &[Run]) -> String {
@@ -32,90 +25,4 @@ pub fn text(case: &GantryCase, solver: Solver, runs: &[Run]) -> String {
     }
     text.push('\n');
     text
-}
-
-/// What the machine is, in a line.
-pub fn machine(gantry: &Gantry) -> String {
-    let belts = match gantry.routing {
-        Routing::HFrame => "one belt round both drives",
-        Routing::CoreXy => "a belt for each drive",
-    };
-    let short = |value: f64, unit: &str| engineering_ascii(value, unit, 4);
-    let stiffness: Vec<String> = gantry.belts.stiffness.iter().map(|k| short(*k, "N/m")).collect();
-    let follow = if gantry.belts.follows.is_some() { " at x = y = 0, following bridge and cart" } else { "" };
-    format!(
-        "{}, {belts}: bridge {}, cart {}, r = {}, spans {}{follow}",
-        gantry.routing.name(),
-        short(gantry.bridge.mass, "kg"),
-        short(gantry.cart.mass, "kg"),
-        short(gantry.pulley_radius, "m"),
-        stiffness.join(", "),
-    )
-}
-
-/// How a run ended that did not reach its end.
-pub fn early_end(run: &Run, gantry: &Gantry) -> Option<String> {
-    let Ending::LeftTravel { time: at } = run.outcome.ending else { return table::early_end(&run.outcome.ending) };
-    // Whichever is nearer to an end of its travel, or beyond.
-    let [x, y] = run.metrics.final_position;
-    let left = |position: f64, travel: Option<taut::stage::Travel>| {
-        travel.map_or(f64::INFINITY, |travel| (position - travel.min).min(travel.max - position))
-    };
-    let which = if left(x, gantry.bridge.travel) <= left(y, gantry.cart.travel) { "bridge" } else { "cart" };
-    Some(format!("ended at {}: the {which} leaves its travel there, and nothing stops it", time(at)))
-}
-
-/// The key figures of a run with their names.
-pub fn lines(run: &Run, gantry: &Gantry, solver: Solver) -> Vec<(&'static str, String)> {
-    let metrics = &run.metrics;
-    let two = |[bridge, cart]: [String; 2]| format!("bridge {bridge}, cart {cart}");
-    let sides = |[left, right]: [String; 2]| format!("left {left}, right {right}");
-    // What rounding leaves of nothing is nothing.
-    let none = |peak: Peak, unit: &str| peak.value.abs() <= if unit == "N" { LEAST_FORCE } else { LEAST_LENGTH };
-    let at = |peak: Peak, unit: &str, text: String| match none(peak, unit) {
-        true => format!("0 {unit}"),
-        false => format!("{text} at {}", time(peak.time)),
-    };
-    let spans = gantry.routing.spans().iter().zip(&metrics.peak_force).map(|(span, force)| {
-        format!("{} {}", span.name.trim_end_matches(" span"), at(*force, "N", value(force.value, "N")))
-    });
-    let error = |k: usize| {
-        let left = metrics.final_by_drives[k] - metrics.final_position[k];
-        let left = if left.abs() <= LEAST_LENGTH { 0.0 } else { left };
-        match metrics.peak_error[k] {
-            most if none(most, "m") => "0 m".to_string(),
-            most => format!("{}, {} at the end", at(most, "m", value(most.value, "m")), value(left, "m")),
-        }
-    };
-    let place = |metres: f64| travel(if metres.abs() <= LEAST_LENGTH { 0.0 } else { metres });
-    vec![
-        ("final position", two(metrics.final_position.map(place))),
-        ("by the drives", two(metrics.final_by_drives.map(place))),
-        ("peak speed", two(metrics.peak_speed.map(|peak| at(peak, "m/s", speed(peak.value))))),
-        ("peak current", sides(metrics.peak_current.map(|peak| at(peak, "A", value(peak.value, "A"))))),
-        ("peak force", spans.collect::<Vec<_>>().join(", ")),
-        ("drives' error", format!("bridge at most {}; cart at most {}", error(0), error(1))),
-        ("stop time", stop(metrics)),
-        ("events", events(&run.outcome.events, solver)),
-        (
-            "accuracy",
-            match run.outcome.error {
-                None if is_general(solver) => "not estimated".into(),
-                error => accuracy(error, solver),
-            },
-        ),
-        ("cost", cost(run.outcome.cost)),
-    ]
-}
-
-fn stop(metrics: &GantryMetrics) -> String {
-    match metrics.stop_time {
-        Some(0.0) if metrics.events.iter().all(|count| count.total() == 0) => "nothing moved".into(),
-        Some(at) => time(at),
-        None if metrics.bodies_rest => "a rotor still turns at the end".into(),
-        None => {
-            let [bridge, cart] = metrics.final_speed.map(speed);
-            format!("still moving at the end, bridge at {bridge}, cart at {cart}")
-        }
-    }
 }

@@ -1,11 +1,11 @@
 //! The plots of a run.
 
+use super::Run;
 use super::curves::{Curves, Samples};
 use super::marks;
-use super::run::Run;
+use crate::{Axis, Colour, Figure, Panel, Picture, Series, Style};
 use taut::case::Case;
 use taut::stage::AmplifierMode;
-use taut_report::{Axis, Colour, Figure, Panel, Picture, Series, Style};
 
 /// A figure and its name in file names.
 pub type Named = (&'static str, Figure);

@@ -1,11 +1,10 @@
 //! The plots of a move.
 
 use super::Done;
-use crate::simulate::curves::decimator;
-use crate::simulate::plots::Named;
+use crate::simulate::{Named, decimator};
+use crate::{Axis, Colour, Decimator, Figure, Panel, Series, Style};
 use taut::stage::Stage;
 use taut::trajectory::Trajectory;
-use taut_report::{Axis, Colour, Decimator, Figure, Panel, Series, Style};
 
 /// Columns that are shown; what ends on an angle or its speed is shown at the belt.
 const COLUMNS: [&str; 11] = [

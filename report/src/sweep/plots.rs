@@ -1,11 +1,10 @@
 //! Histograms, scatter, sensitivity indices, and the tornado.
 
-use super::Work;
-use super::summary::{Group, Measured, Summary};
-use super::table::short;
+use super::rows::short;
+use crate::{Axis, Colour, Figure, Panel, Series, Style};
 use taut::case::file_name;
 use taut::number::engineering;
-use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
+use taut::sweep::{Measured, Shown, Summary, Sweep};
 
 /// Figures that are drawn of each experiment, where they vary.
 const DRAWN: [&str; 12] = [
@@ -27,7 +26,7 @@ const DRAWN: [&str; 12] = [
 const MOST: usize = 12;
 
 /// All of them, with names for files.
-pub fn all(work: &Work, summary: &Summary) -> Vec<(String, Figure)> {
+pub fn figures(sweep: &Sweep, summary: &Summary) -> Vec<(String, Figure)> {
     let mut figures = Vec::new();
     for group in &summary.groups {
         let drawn = DRAWN.iter().filter_map(|name| group.measures.iter().find(|measured| measured.name == *name));
@@ -38,14 +37,14 @@ pub fn all(work: &Work, summary: &Summary) -> Vec<(String, Figure)> {
                 continue;
             }
             figures.push((format!("{name}-histogram"), histogram(group, measured)));
-            figures.extend(scatter(work, summary, group, measured).map(|figure| (format!("{name}-scatter"), figure)));
+            figures.extend(scatter(sweep, summary, group, measured).map(|figure| (format!("{name}-scatter"), figure)));
             figures.extend(indices(summary, group, measured).map(|figure| (format!("{name}-indices"), figure)));
         }
     }
     figures
 }
 
-fn title(group: &Group, measured: &Measured) -> String {
+fn title(group: &Shown, measured: &Measured) -> String {
     format!("{}: {}", group.name, measured.words)
 }
 
@@ -64,7 +63,7 @@ fn capital(words: &str) -> String {
 }
 
 /// How often each value comes, with the shares of 5, 50 and 95 %.
-fn histogram(group: &Group, measured: &Measured) -> Figure {
+fn histogram(group: &Shown, measured: &Measured) -> Figure {
     let (mut x, mut y) = (Vec::new(), Vec::new());
     let mut figure = Figure::new(title(group, measured), axis(measured));
     if let Some(spread) = &measured.spread {
@@ -87,11 +86,11 @@ fn histogram(group: &Group, measured: &Measured) -> Figure {
 }
 
 /// The figure over the parameter that matters most.
-fn scatter(work: &Work, summary: &Summary, group: &Group, measured: &Measured) -> Option<Figure> {
+fn scatter(sweep: &Sweep, summary: &Summary, group: &Shown, measured: &Measured) -> Option<Figure> {
     let (place, much) = *measured.influence().first()?;
     let parameter = &summary.parameters[place];
     let points = Series::new("", parameter.points.clone(), measured.points.clone()).style(Style::Points);
-    let by = if work.sweep.indices() { "total index" } else { "rank correlation" };
+    let by = if sweep.indices() { "total index" } else { "rank correlation" };
     let caption = format!(
         "{} depends most on {} ({by} {}); up to 1500 runs are shown.",
         capital(&measured.words),
@@ -109,7 +108,7 @@ fn bar((xs, ys): &mut (Vec<f64>, Vec<f64>), from: f64, to: f64, y: f64, half: f6
 }
 
 /// First and total order, with the intervals of the total.
-fn indices(summary: &Summary, group: &Group, measured: &Measured) -> Option<Figure> {
+fn indices(summary: &Summary, group: &Shown, measured: &Measured) -> Option<Figure> {
     let indices = measured.indices.as_ref()?;
     let (mut first, mut total, mut whiskers) = <((_, _), (_, _), (Vec<f64>, Vec<f64>))>::default();
     let mut panel = Panel::new(Axis::new("Parameter, the most important on top", "")).weight(2.0);
@@ -133,7 +132,7 @@ fn indices(summary: &Summary, group: &Group, measured: &Measured) -> Option<Figu
 }
 
 /// One bar for each parameter, from where the figure goes with its first value to where it goes with its last.
-fn tornado(summary: &Summary, group: &Group, measured: &Measured) -> Figure {
+fn tornado(summary: &Summary, group: &Shown, measured: &Measured) -> Figure {
     let (mut up, mut down) = <((_, _), (_, _))>::default();
     let mut panel = Panel::new(Axis::new("Parameter, the most important on top", "")).weight(2.0);
     let shown: Vec<(usize, f64)> = measured.influence().into_iter().take(MOST).collect();

@@ -1,14 +1,15 @@
 //! The report: one HTML file.
 
-use super::summary::Summary;
-use super::{Work, table};
-use taut_report::{Callout, Cell, Figure, Page, Table};
+use super::rows::{endings, influence, influence_heading, number, plan};
+use crate::figure::Figure;
+use crate::page::{Callout, Cell, Page, Table};
+use taut::sweep::{Summary, Sweep};
 
 /// The page; `text` is the case.
-pub fn page(work: &Work, summary: &Summary, text: &str, figures: &[(String, Figure)]) -> Page {
-    let mut page = Page::new(work.case.title()).subtitle(format!("Sweep: {}.", table::plan(work)));
+pub fn page(title: &str, sweep: &Sweep, summary: &Summary, text: &str, figures: &[(String, Figure)]) -> Page {
+    let mut page = Page::new(title).subtitle(format!("Sweep: {}.", plan(sweep)));
     for group in &summary.groups {
-        if let Some(endings) = table::endings(group) {
+        if let Some(endings) = endings(group) {
             page.callout(Callout::Fails, format!("{}: not all runs came to their end", group.name), endings);
         }
     }
@@ -18,7 +19,7 @@ pub fn page(work: &Work, summary: &Summary, text: &str, figures: &[(String, Figu
     for parameter in &summary.parameters {
         let shown = |place: usize| {
             let value = parameter.spread.as_ref().map_or(f64::NAN, |spread| spread.quantiles[place]);
-            Cell::from(table::number(value, &parameter.unit))
+            Cell::from(number(value, &parameter.unit))
         };
         parameters.row([Cell::from(parameter.name.clone()), shown(0), shown(2), shown(4)]);
     }
@@ -27,13 +28,13 @@ pub fn page(work: &Work, summary: &Summary, text: &str, figures: &[(String, Figu
     for group in &summary.groups {
         page.section(&group.name);
         let mut rows = Table::new("").column("Figure", "");
-        for heading in ["5 %", "50 %", "95 %", table::influence_heading(work)] {
+        for heading in ["5 %", "50 %", "95 %", influence_heading(sweep)] {
             rows = rows.column(heading, "");
         }
         for measured in group.measures.iter().filter(|measured| measured.varies()) {
             let Some(spread) = &measured.spread else { continue };
-            let shown = |place: usize| Cell::from(table::number(spread.quantiles[place], measured.unit));
-            let most = Cell::from(table::influence(summary, measured, 3));
+            let shown = |place: usize| Cell::from(number(spread.quantiles[place], measured.unit));
+            let most = Cell::from(influence(summary, measured, 3));
             rows.row([Cell::from(measured.words.to_string()), shown(1), shown(2), shown(3), most]);
         }
         page.table(&rows);

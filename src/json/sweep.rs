@@ -1,27 +1,24 @@
-//! The summary for machines.
+//! A sweep: `taut sweep --json`, `sweep.json`.
 
-use super::Work;
-use super::summary::{Drawn, Group, Measured, Summary};
+use crate::case::Opened;
+use crate::sweep::{Drawn, Estimate, Measured, Shown, Spread, Summary, Sweep};
 use serde_json::{Value, json};
-use taut::sweep::{Estimate, Spread};
 
-/// As JSON; SI units, numbers to the last bit, null for what is no number.
-pub fn text(work: &Work, summary: &Summary) -> String {
-    let sweep = work.sweep;
-    let value = json!({
-        "schema": taut::json::identity("sweep"),
-        "title": work.case.title(),
+/// What all runs of a case show; numbers to the last bit, null for what is no number.
+pub fn sweep(case: &Opened, sweep: &Sweep, summary: &Summary) -> Value {
+    json!({
+        "schema": super::identity("sweep"),
+        "title": case.title(),
         "version": env!("CARGO_PKG_VERSION"),
         "runs": sweep.runs(),
         "design": sweep.sampling().word(),
-        "seed": work.case.sweep().map(|sweep| sweep.seed),
+        "seed": case.sweep().map(|sweep| sweep.seed),
         "indices": sweep.indices(),
         "shares_of_every": summary.every,
         "columns": sweep.columns().iter().map(|column| column.heading()).collect::<Vec<_>>(),
         "parameters": summary.parameters.iter().map(parameter).collect::<Vec<_>>(),
         "experiments": summary.groups.iter().map(|group| of_group(summary, group)).collect::<Vec<_>>(),
-    });
-    taut::json::text(&value)
+    })
 }
 
 fn spread(spread: &Option<Spread>) -> Value {
@@ -38,7 +35,7 @@ fn parameter(drawn: &Drawn) -> Value {
     json!({ "name": drawn.name, "unit": drawn.unit, "spread": spread(&drawn.spread) })
 }
 
-fn of_group(summary: &Summary, group: &Group) -> Value {
+fn of_group(summary: &Summary, group: &Shown) -> Value {
     let endings: serde_json::Map<String, Value> =
         group.endings.iter().map(|(status, count)| (status.words().to_string(), json!(count))).collect();
     json!({

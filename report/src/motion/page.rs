@@ -1,13 +1,14 @@
 //! The report: one HTML file.
 
-use super::{Tried, table};
-use crate::simulate::plots::Named;
-use crate::simulate::table::early_end;
-use taut_report::{Callout, Cell, Page, Table, stage_drawing};
+use super::Tried;
+use super::rows::{controller, lines};
+use crate::drawing::stage_drawing;
+use crate::page::{Callout, Cell, Page, Table};
+use crate::simulate::{Named, early_end};
 
 /// The page; `text` is the case that repeats the moves.
 pub fn page(tried: &Tried, text: &str, figures: &[Vec<Named>]) -> Page {
-    let words = table::controller(tried.design, &tried.case.stage);
+    let words = controller(tried.design, &tried.case.stage);
     let mut page = Page::new(tried.case.title.clone()).subtitle(format!("Moves in closed loop: {words}."));
     page.section("The stage");
     page.drawing(&stage_drawing(&tried.case.stage), "Symbols, values and positive directions.");
@@ -17,7 +18,7 @@ pub fn page(tried: &Tried, text: &str, figures: &[Vec<Named>]) -> Page {
             page.callout(Callout::Fails, "The whole move", format!("This move {told}."));
         }
         let mut rows = Table::new("").column("Quantity", "").column("Value", "");
-        for (name, value) in table::lines(tried, done) {
+        for (name, value) in lines(tried, done) {
             rows.row([Cell::from(name), Cell::from(value.replace('-', "−"))]);
         }
         page.table(&rows);

@@ -1,8 +1,8 @@
 //! Events on curves: where a body begins to stick, and where it slips.
 
+use crate::{Colour, Panel, Series, Style};
 use taut::mechanism::Status;
 use taut::solve::Event;
-use taut_report::{Colour, Panel, Series, Style};
 
 /// Marks of a panel; beyond, they would hide the curves.
 const MOST: usize = 1000;
@@ -54,7 +54,7 @@ fn at(x: &[f64], y: &[f64], time: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use taut_report::Axis;
+    use crate::Axis;
 
     #[test]
     fn a_mark_stands_on_the_curve_of_its_body() {

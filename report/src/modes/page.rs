@@ -1,11 +1,11 @@
 //! The report: one HTML file.
 
-use super::along;
-use super::figures::Named;
-use super::table::{gain, pole, poles, words, z, zeros};
+use super::rows::{along, gain, pole, poles, words, z, zeros};
+use crate::drawing::stage_drawing;
+use crate::page::{Callout, Cell, Page, Table};
+use crate::simulate::Named;
 use taut::linear::Analysis;
 use taut::number::{engineering, engineering_ascii};
-use taut_report::{Callout, Cell, Page, Table, stage_drawing};
 
 /// The page.
 pub fn page(analysis: &Analysis, figures: &[Named]) -> Page {

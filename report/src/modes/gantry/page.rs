@@ -1,12 +1,13 @@
 //! The report: one HTML file.
 
-use super::super::page::printed;
-use super::super::table::pole;
-use super::table::{elastic, rigid, slow};
-use super::{Named, over_the_area};
-use crate::simulate::gantry_machine;
+use super::Named;
+use super::rows::{elastic, over_the_area, rigid, slow};
+use crate::gantry::gantry_drawing;
+use crate::modes::page::printed;
+use crate::modes::rows::pole;
+use crate::page::{Callout, Cell, Page, Table};
+use crate::simulate::gantry::machine;
 use taut::linear::GantryAnalysis;
-use taut_report::{Callout, Cell, Page, Table, gantry_drawing};
 
 /// The page.
 pub fn page(analysis: &GantryAnalysis, planes: &[Named]) -> Page {
@@ -14,7 +15,7 @@ pub fn page(analysis: &GantryAnalysis, planes: &[Named]) -> Page {
     let mechanism = gantry.mechanism();
     let mut page = Page::new(analysis.case.title.clone()).subtitle("How it swings");
     page.section("What was linearised");
-    page.prose(format!("{}.", gantry_machine(gantry)));
+    page.prose(format!("{}.", machine(gantry)));
     page.callout(Callout::Note, "While it slides", analysis.words.join("; "));
     page.drawing(
         &gantry_drawing(gantry),

@@ -1,13 +1,13 @@
 //! The plots of a gantry's run.
 
-use super::super::curves::{Curves, Source, Way};
-use super::super::marks;
-use super::super::plots::Named;
-use super::run::Run;
+use super::Run;
+use crate::simulate::curves::{Curves, Source, Way};
+use crate::simulate::marks;
+use crate::simulate::plots::Named;
+use crate::{Axis, Colour, Figure, Panel, Plane, Series, Style};
 use taut::case::GantryCase;
 use taut::stage::AmplifierMode;
 use taut::stage::gantry::{Gantry, LABELS, Routing};
-use taut_report::{Axis, Colour, Figure, Panel, Plane, Series, Style};
 
 /// The curves that a report shows, and the way of the cart, before the first row.
 pub fn curves(gantry: &Gantry) -> (Curves, Way) {

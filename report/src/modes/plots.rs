@@ -1,14 +1,12 @@
 //! Bode diagram, map of the travel, map of poles and zeros.
 
-use super::table::words;
+use super::rows::words;
+use crate::simulate::Named;
+use crate::{Axis, Colour, Figure, Panel, Series, Style};
 use nalgebra::Complex;
 use std::f64::consts::PI;
 use taut::linear::Analysis;
 use taut::linear::{Place, Root};
-use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
-
-/// A figure and its name in file names.
-pub type Named = (&'static str, Figure);
 
 /// Outputs drawn together, with the name of the figure.
 const GROUPS: [(&str, &str, &[&str]); 3] = [
@@ -18,7 +16,7 @@ const GROUPS: [(&str, &str, &[&str]); 3] = [
 ];
 
 /// All of them.
-pub fn all(analysis: &Analysis) -> Vec<Named> {
+pub fn figures(analysis: &Analysis) -> Vec<Named> {
     let mut figures: Vec<Named> = GROUPS
         .iter()
         .filter_map(|(name, title, outputs)| bode(analysis, title, outputs).map(|figure| (*name, figure)))

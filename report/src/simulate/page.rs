@@ -1,13 +1,14 @@
 //! The report: one HTML file.
 
+use super::Run;
 use super::plots::Named;
-use super::run::Run;
-use super::table::{early_end, lines};
+use super::rows::{early_end, lines};
+use crate::drawing::stage_drawing;
+use crate::page::{Callout, Cell, Page, Table};
 use taut::case::Case;
 use taut::json::load_unit;
 use taut::number;
 use taut::solve::{Event, Solver};
-use taut_report::{Callout, Cell, Page, Table, stage_drawing};
 
 /// Events shown; the rest is in the events' own file.
 const MOST_EVENTS: usize = 200;

@@ -1,8 +1,8 @@
 //! The curves of a run, thinned out as its rows come, so that a plot of any run needs the same memory.
 
+use crate::Decimator;
 use taut::stage::Stage;
 use taut::trajectory::Trajectory;
-use taut_report::Decimator;
 
 /// Points that a curve keeps: more than a plot has pixels.
 const POINTS: usize = 3000;

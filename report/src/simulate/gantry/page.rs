@@ -1,15 +1,27 @@
 //! The report: one HTML file.
 
-use super::super::page::{events, figures_table, how, repeated};
-use super::super::plots::Named;
-use super::run::{Run, Setting};
-use super::table::{early_end, lines, machine};
-use taut_report::{Callout, Page, Plane, gantry_drawing};
+use super::Run;
+use super::rows::{early_end, lines, machine};
+use crate::gantry::gantry_drawing;
+use crate::page::{Callout, Page};
+use crate::plane::Plane;
+use crate::simulate::page::{events, figures_table, how, repeated};
+use crate::simulate::plots::Named;
+use taut::case::GantryCase;
+use taut::mechanism::Mechanism;
+use taut::solve::Solver;
 
 /// The page for these runs; `text` is the case that repeats them.
-pub fn page(setting: &Setting, text: &str, runs: &[Run], figures: &[Vec<Named>], ways: &[Option<Plane>]) -> Page {
-    let case = setting.case;
-    let mut page = Page::new(case.title.clone()).subtitle(how(setting.solver));
+pub fn page(
+    case: &GantryCase,
+    text: &str,
+    solver: Solver,
+    runs: &[Run],
+    figures: &[Vec<Named>],
+    ways: &[Option<Plane>],
+) -> Page {
+    let mechanism = case.gantry.mechanism();
+    let mut page = Page::new(case.title.clone()).subtitle(how(solver));
     page.section("The machine");
     page.prose(format!("{}.", machine(&case.gantry)));
     page.drawing(
@@ -18,10 +30,18 @@ pub fn page(setting: &Setting, text: &str, runs: &[Run], figures: &[Vec<Named>],
          neither inertia nor friction.",
     );
     for ((run, figures), way) in runs.iter().zip(figures).zip(ways) {
-        experiment(&mut page, setting, run, figures, way.as_ref());
+        let setting = Setting { case, mechanism: &mechanism, solver };
+        experiment(&mut page, &setting, run, figures, way.as_ref());
     }
     repeated(&mut page, text);
     page
+}
+
+/// What all runs of a page share.
+struct Setting<'a> {
+    case: &'a GantryCase,
+    mechanism: &'a Mechanism,
+    solver: Solver,
 }
 
 fn experiment(page: &mut Page, setting: &Setting, run: &Run, figures: &[Named], way: Option<&Plane>) {

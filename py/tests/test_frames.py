@@ -1,0 +1,169 @@
+"""What results give to notebooks, to pandas and to matplotlib, and what pickles."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+import taut
+
+STAGE = "stages/sollmann-jouaneh"
+
+
+@pytest.fixture
+def moving(root):
+    return taut.read(root / STAGE / "controllers" / "pid.toml")
+
+
+def test_figures_show_themselves_in_a_notebook(case):
+    pytest.importorskip("matplotlib")
+    # A figure without pyplot is not known to notebooks that have not imported it: it has to bring its own picture.
+    assert case.simulate("5 V pulse").plot()._repr_png_().startswith(b"\x89PNG")
+
+
+def test_every_result_plots_into_axes_of_ones_own(case, root, moving):
+    figures = pytest.importorskip("matplotlib.figure")
+    runs = case.simulate()
+    fit = taut.read(root / STAGE / "identification" / "linear-5v.toml")
+    found, gantry = fit.fit(), taut.read(root / "stages/core-xy/core-xy.toml").modes()
+    sweep = case.sweep(20, vary={"cart.mass": "20 %"})
+    plots = [
+        (1, lambda ax: runs[0].plot("cart_speed", ax=ax)),
+        (3, lambda ax: runs[0].plot(ax=ax)),
+        (1, lambda ax: sweep.plot("cart.mass", ax=ax)),
+        (1, lambda ax: sweep.plot("cart.mass", "5-v-pulse.final_cart_position", ax=ax)),
+        (1, lambda ax: fit.check().plot(ax=ax)),
+        (2, lambda ax: found.plot(ax=ax)),
+        (2, lambda ax: found.logs[0].plot(ax=ax)),
+        (2, lambda ax: case.modes().plot("cart_position", ax=ax)),
+        (1, lambda ax: gantry.plot(ax=ax)),
+        (1, lambda ax: moving.tune(evaluate=True).plot(ax=ax)),
+    ]
+    for count, plot in plots:
+        figure = figures.Figure()
+        axes = figure.subplots(count, 1, squeeze=False)[:, 0]
+        assert plot(list(axes) if count > 1 else axes[0]) is figure
+        assert all(axis.has_data() for axis in axes), plot
+        assert plot(None)._repr_png_()
+    assert len(runs.plot().axes[0].get_lines()) == 2
+    with pytest.raises(ValueError, match="this plot has 3 panels, and 1 axes were given"):
+        runs[0].plot(ax=figures.Figure().subplots())
+    with pytest.raises(TypeError, match="ax: Axes of matplotlib are wanted, and no str"):
+        runs[0].plot(ax="cart_speed")
+    with pytest.raises(KeyError, match="there is no output 'speed'"):
+        case.modes().plot("speed")
+    with pytest.raises(KeyError, match="there is no log '7 V'"):
+        found.plot("7 V")
+    with pytest.raises(TypeError, match="one column for a histogram, or two for points"):
+        sweep.plot()
+
+
+def test_every_result_goes_to_pandas(case, root, moving):
+    pytest.importorskip("pandas")
+    fit = taut.read(root / STAGE / "identification" / "linear-5v.toml")
+    found, tuned, gantry = fit.fit(), moving.tune(evaluate=True), taut.read(root / "stages/core-xy/core-xy.toml").modes()
+    assert list(fit.check().to_pandas()["parameter"]) == list(found.estimates)
+    frame = found.to_pandas().set_index("parameter")
+    assert all(frame.loc[name, "value"] == estimate.value for name, estimate in found.estimates.items())
+    assert case.modes().to_pandas().shape[0] == len(case.modes().frequency)
+    assert list(gantry.to_pandas()["frequency_Hz"]) == gantry.resonances
+    assert list(tuned.to_pandas()["gains"].unique()) == ["before", "after"]
+    runs = case.simulate()
+    joined = runs.to_pandas()
+    assert joined.shape[0] == sum(run.rows for run in runs)
+    assert joined.loc["5 V pulse"]["cart_position_m"].iloc[-1] == runs["5 V pulse"]["cart_position"][-1]
+
+
+def test_a_fit_has_its_samples_and_residuals(root):
+    found = taut.read(root / STAGE / "identification" / "linear-5v.toml").fit()
+    log = found.logs[0]
+    assert log.units == {"drive_angle": "rad"} and len(log.time) == len(log.measured["drive_angle"])
+    residual = log.residuals["drive_angle"]
+    assert np.array_equal(residual, log.model["drive_angle"] - log.measured["drive_angle"])
+    rmse = float(np.sqrt(np.mean(found.residuals["drive_angle"] ** 2)))
+    told = [output for log in found.data["logs"] for output in log["outputs"]]
+    assert rmse == pytest.approx(told[0]["fitted"]["rmse"], rel=1e-9)
+
+
+def test_a_move_has_the_figures_of_its_loop(moving):
+    run = moving.move(moving.moves[0])
+    told = moving.move().data["moves"][0]
+    for key in ("cart_error", "settling_s", "overshoot_m", "rms_current_A", "limited_samples", "window_m"):
+        assert run.metrics[key] == told[key]
+    # And still those of any run.
+    assert run.metrics["final_cart_position_m"] == run["cart_position"][-1]
+
+
+def test_runs_pickle(case, moving, tmp_path):
+    for run in (case.simulate("5 V pulse"), moving.move(moving.moves[0])):
+        for again in (pickle.loads(pickle.dumps(run)), copy.deepcopy(run)):
+            assert repr(again) == repr(run) and again.units == run.units
+            assert all(np.array_equal(again[name], run[name], equal_nan=True) for name in run)
+            assert again.metrics == run.metrics and again.events == run.events
+            assert (again.took, again.position_error) == (run.took, run.position_error)
+            assert not again.time.flags.writeable
+        run.write(tmp_path / "run.csv")
+        again.write(tmp_path / "again.csv")
+        assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "run.csv").read_bytes()
+    runs = case.simulate()
+    assert pickle.loads(pickle.dumps(runs)).data == runs.data
+
+
+@pytest.mark.parametrize("kind", ["pandas", "polars", "arrow", "run", "dict"])
+def test_a_log_in_memory_is_fitted_as_its_file_is(case, kind, tmp_path):
+    run = case.simulate("5 V pulse")
+    if kind != "run" and kind != "dict":
+        pytest.importorskip("pyarrow" if kind == "arrow" else kind)
+    log = {
+        "pandas": lambda: run.to_pandas(),
+        "polars": lambda: run.to_polars(),
+        "arrow": lambda: run.to_arrow(),
+        "run": lambda: run,
+        "dict": lambda: {heading: run[name] for name, heading in run.headings.items()},
+    }[kind]()
+    columns = {"time": "time_s", "input": "voltage_V", "drive_angle": "drive_angle_rad"}
+    path = None if kind == "dict" else tmp_path / "log.csv"
+    logged = case.with_log("logged", log, columns, path=path)
+    assert logged.experiments == [*case.experiments, "logged"] and case.experiments != logged.experiments
+    run.write(tmp_path / "file.csv")
+    text = case.text + f"""
+[[experiment]]
+name = "logged"
+log  = {{ file = {str(tmp_path / "file.csv")!r}, time = "time_s", input = "voltage_V", drive_angle = "drive_angle_rad" }}
+"""
+    free = '\n[fit]\nfree = ["cart.friction.viscous"]\n'
+    one, other = (taut.Case(each + free, "axis.toml").fit() for each in (text, logged.text))
+    assert one["cart.friction.viscous"] == other["cart.friction.viscous"]
+    assert pickle.loads(pickle.dumps(logged)) == logged
+
+
+def test_what_is_no_log_is_told(case, tmp_path):
+    columns = {"time": "t", "input": "u", "drive_angle": "phi"}
+    with pytest.raises(TypeError, match="a DataFrame, a Table or a dictionary of arrays is wanted, and no int"):
+        case.with_log("logged", 3, columns)
+    with pytest.raises(TypeError, match="the column 'u' holds no numbers"):
+        case.with_log("logged", {"t": [0.0], "u": ["high"]}, columns)
+    with pytest.raises(ValueError, match="columns of equal length with at least one row"):
+        case.with_log("logged", {"t": [0.0, 1.0], "u": [1.0]}, columns)
+    with pytest.raises(ValueError, match="has 2 dimensions"):
+        case.with_log("logged", {"t": [[0.0]], "u": [1.0]}, columns)
+    with pytest.raises(TypeError, match="columns: a dictionary is wanted, and no list"):
+        case.with_log("logged", {"t": [0.0]}, ["t"])
+    with pytest.raises(taut.Error, match="there is no column `u`|u"):
+        case.with_log("logged", {"t": [0.0, 1.0], "phi": [0.0, 1.0]}, columns, path=tmp_path / "log.csv")
+
+
+def test_tuning_is_the_command_lines(root, moving):
+    from test_results import program
+
+    told = program(root, "tune", f"{STAGE}/controllers/pid.toml", "--evaluate")
+    tuned = moving.tune(evaluate=True)
+    assert tuned.data == told
+    assert tuned.verdict == "unchanged" and tuned.forced_by is None
+    assert tuned.case["controller"] == moving["controller"]
+    assert all(name in tuned._repr_html_() for name in tuned.gains)
+    with pytest.raises(TypeError, match="spread: a number in SI units is wanted"):
+        moving.tune(spread="10 %")
+    with pytest.raises(taut.Error):
+        taut.Case(taut.template()).tune()

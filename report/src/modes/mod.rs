@@ -1,0 +1,10 @@
+//! Linear analyses as a person sees them.
+
+pub mod gantry;
+mod page;
+mod plots;
+mod rows;
+
+pub use page::page;
+pub use plots::figures;
+pub use rows::{along, gain, pole, poles, words, z, zeros};

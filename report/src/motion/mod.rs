@@ -1,0 +1,54 @@
+//! Moves in closed loop as a person sees them.
+
+mod page;
+mod plots;
+mod rows;
+
+pub use page::page;
+pub use plots::{Curves, figures};
+pub use rows::{controller, length, lines};
+
+use taut::case::{Case, Move};
+use taut::control::{MoveRun, Worst};
+use taut::design::Design;
+use taut::json::Moved;
+use taut::tune::trouble::Trouble;
+
+/// What is known of a move after it ran.
+pub struct Done<'a> {
+    /// What was asked for.
+    pub motion: &'a Move,
+    /// What came of it.
+    pub run: MoveRun,
+    /// Its curves, where plots are wanted.
+    pub curves: Option<Curves>,
+    /// With parameters wrong by a share: the largest cart error (m), and how many of how many settle.
+    pub worst: Option<Worst>,
+    /// What is wrong with its loop.
+    pub trouble: Option<Trouble>,
+    /// Its files, as paths within the folder.
+    pub files: Vec<String>,
+}
+
+impl Done<'_> {
+    /// What the summary says of it.
+    pub fn told(&self) -> Moved<'_> {
+        Moved {
+            motion: self.motion,
+            run: &self.run,
+            worst: self.worst.as_ref(),
+            trouble: self.trouble.as_ref(),
+            files: &self.files,
+        }
+    }
+}
+
+/// A case with what came of its moves.
+pub struct Tried<'a> {
+    /// The case.
+    pub case: &'a Case,
+    /// Its controller.
+    pub design: &'a Design,
+    /// Its moves.
+    pub done: Vec<Done<'a>>,
+}

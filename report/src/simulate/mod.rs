@@ -1,0 +1,67 @@
+//! Runs of experiments as a person sees them: rows of figures, plots, a page.
+
+mod band;
+mod curves;
+pub mod gantry;
+mod marks;
+mod page;
+mod plots;
+mod rows;
+
+pub use band::Band;
+pub use curves::{Curves, Samples, Way, decimator};
+pub use page::page;
+pub use plots::{Named, figures, named};
+pub use rows::{accuracy, cost, early_end, events, hidden, lines, plain, solver_words, speed, time, travel, value};
+
+use std::time::Duration;
+use taut::case::Experiment;
+use taut::json::{self, Simulated};
+use taut::metrics::Metrics;
+use taut::reduction::Reduction;
+use taut::solve;
+use taut::stage::BeltModel;
+
+/// What is known of an experiment after it ran.
+pub struct Run<'a> {
+    /// What was asked for.
+    pub experiment: &'a Experiment,
+    /// Its events, how it ended, what it cost.
+    pub outcome: solve::Outcome,
+    /// Its key figures.
+    pub metrics: Metrics,
+    /// Its curves, where plots are wanted.
+    pub curves: Option<Curves>,
+    /// Its samples, where they and plots are wanted.
+    pub samples: Option<Samples>,
+    /// What the machines of --draws do.
+    pub band: Option<Band>,
+    /// Its model of the belt.
+    pub model: BeltModel,
+    /// How far its model is from the elastic one, where it is a reduced one.
+    pub reduction: Option<Reduction>,
+    /// Its files, as paths within the folder.
+    pub files: Vec<String>,
+    /// How long solving and writing took.
+    pub took: Duration,
+}
+
+impl Run<'_> {
+    /// What the summary says of it.
+    pub fn told(&self) -> Simulated<'_> {
+        Simulated {
+            experiment: self.experiment,
+            outcome: &self.outcome,
+            metrics: &self.metrics,
+            reduction: self.reduction,
+            band: self.band.as_ref().map(|band| json::Band {
+                machines: band.machines,
+                machines_left_out: band.failed,
+                final_drive_angle_rad: band.end(0),
+                final_cart_position_m: band.end(1),
+                final_drive_travel_minus_cart_m: band.end(2),
+            }),
+            files: &self.files,
+        }
+    }
+}

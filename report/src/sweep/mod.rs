@@ -1,0 +1,9 @@
+//! Sweeps as a person sees them.
+
+mod page;
+mod plots;
+mod rows;
+
+pub use page::page;
+pub use plots::figures;
+pub use rows::{endings, influence, influence_heading, number, plan, short};
