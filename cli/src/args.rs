@@ -48,7 +48,7 @@ impl Command {
     /// Whether the result, and an error, is wanted as JSON.
     pub fn json(&self) -> bool {
         match self {
-            Self::Paper(args) => args.json,
+            Self::Paper(args) => args.common.json,
             Self::Simulate(args) => args.common.json,
             Self::Move(args) => args.common.json,
             Self::Tune(args) => args.common.json,
@@ -64,16 +64,13 @@ impl Command {
 
 /// Recompute the paper of Sollmann and Jouaneh (2011): every table, figure and claim.
 ///
-/// Writes report.html, claims.json, each figure as SVG and PNG and its curves as CSV, and prints each claim with its verdict.
+/// Writes report.html, claims.json, each figure as SVG and its curves as CSV into out/paper, or where --out says, and prints each claim
+/// with its verdict.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  taut paper --out out/paper")]
 pub struct Paper {
-    /// The folder to write results into; it is made if it is not there [default: out/paper]
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Print the claims as JSON, the same as in claims.json
-    #[arg(long)]
-    pub json: bool,
+    #[command(flatten)]
+    pub common: Common,
 }
 
 /// Print the JSON Schema of the case file or of a result, so that editors complete and check.

@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 /// One run for all tests, in a folder that does not exist before.
 static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("paper-{}", std::process::id())).join("deep");
-    let output = taut(&["paper", "--out", folder.to_str().unwrap()]);
+    let output = taut(&["paper", "--png", "--out", folder.to_str().unwrap()]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(text.contains("report.html") && text.contains("golden-table4-5V-motor"), "{text}");

@@ -111,6 +111,9 @@ const PID: &str = "stages/sollmann-jouaneh/controllers/pid.toml";
 
 #[test]
 fn results_follow_their_schemas() {
+    let folder = tempfile::tempdir().unwrap();
+    let paper = folder.path().join("paper");
+    let paper = paper.to_str().unwrap();
     let results: &[(&str, &[&str])] = &[
         ("simulate", &["simulate", TABLE4]),
         ("simulate", &["simulate", TABLE4, "--set", "belt.model=two-mass", "--set", "experiment.0.until=1ms"]),
@@ -129,15 +132,16 @@ fn results_follow_their_schemas() {
         ("sweep", &["sweep", "stages/h-frame/h-frame.toml", "--runs", "3", "--vary", "all=10%"]),
         ("shape", &["shape", "stages/printer-axis/printer-axis.toml"]),
         ("error", &["simulate", TABLE4, "--set", "cart.mass=-1 kg"]),
+        ("paper", &["paper", "--no-report", "--out", paper]),
         ("error", &["modes", "none.toml"]),
     ];
     for (name, args) in results {
         follows(name, &json_of(&[args, &["--json"][..]].concat()));
     }
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().to_str().unwrap();
+    let out = folder.path().join("modes");
+    let out = out.to_str().unwrap();
     assert!(taut(&["modes", TABLE4, "--no-report", "--quiet", "--out", out]).status.success());
-    let files = std::fs::read(folder.path().join("files.json")).unwrap();
+    let files = std::fs::read(folder.path().join("modes/files.json")).unwrap();
     follows("files", &serde_json::from_slice(&files).unwrap());
 }
 

@@ -13,6 +13,7 @@ const RESULTS: &[(&str, &str, &str)] = &[
     ("gantry-simulate", "`taut simulate` of a gantry", include_str!("results/gantry-simulate.txt")),
     ("modes", "`taut modes`", include_str!("results/modes.txt")),
     ("move", "`taut move`", include_str!("results/move.txt")),
+    ("paper", "`taut paper`: claims.json", include_str!("results/paper.txt")),
     ("shape", "`taut shape`", include_str!("results/shape.txt")),
     ("simulate", "`taut simulate`", include_str!("results/simulate.txt")),
     ("sweep", "`taut sweep`", include_str!("results/sweep.txt")),
@@ -39,7 +40,10 @@ pub fn schema(name: &str) -> Option<Value> {
     schema["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
     schema["$id"] = json!(identity(name));
     schema["title"] = json!(words);
-    schema["properties"]["schema"] = json!({ "const": identity(name) });
+    // A list has no word of its own.
+    if root.element.is_none() {
+        schema["properties"]["schema"] = json!({ "const": identity(name) });
+    }
     Some(schema)
 }
 

@@ -190,8 +190,7 @@ struct EntryCheck<'a> {
 
 /// All claims as JSON, ending with a line break.
 pub fn json(claims: &[Claim]) -> String {
-    let entries: Vec<Entry> = claims.iter().map(entry).collect();
-    serde_json::to_string_pretty(&entries).expect("numbers and texts are JSON") + "\n"
+    taut::json::text(&claims.iter().map(entry).collect::<Vec<_>>())
 }
 
 fn entry(claim: &Claim) -> Entry<'_> {

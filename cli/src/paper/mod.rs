@@ -20,32 +20,39 @@ mod tables;
 mod words;
 
 use crate::args::Paper;
-use crate::failure::{Failure, Outcome, Status};
+use crate::command::{Common, Finished, Report};
+use crate::failure::{Failure, Outcome};
 use crate::folder::Folder;
-use crate::terminal;
 use claims::{Claim, Kind, Verdict};
 use findings::Findings;
 use plots::Plot;
 use rayon::prelude::*;
 use std::path::Path;
-use taut::Result;
 use taut::files::{Inputs, write_atomically};
+use taut::{Error, Result};
 
 /// Where the results go unless told otherwise.
 const FOLDER: &str = "out/paper";
 
 /// Recomputes the paper, writes report, claims, figures and data, and tells the verdicts on the terminal.
 pub fn run(args: &Paper) -> Outcome {
-    let out = args.out.as_deref().unwrap_or(Path::new(FOLDER));
+    let common = &args.common;
+    if !common.changes.is_empty() {
+        let error = Error::new("the paper's machines have the paper's numbers").in_file("--set");
+        return Err(error.next("change them in a case: taut simulate CASE --set KEY=VALUE").into());
+    }
+    let out = common.out.as_deref().unwrap_or(Path::new(FOLDER));
     // It reads no files.
     let folder = Folder::create(out, Inputs::default(), [""; 0])?;
     let findings = Findings::new().map_err(Failure::work)?;
     let claims = claims(&findings);
     let plots = plots(&findings);
-    write(&folder, &findings, &claims, &plots).map_err(Failure::work)?;
-    folder.place("paper", args.json)?;
-    terminal::show(&if args.json { claims::json(&claims) } else { table(&claims, out) });
-    Ok(Status::Done)
+    let mut finished = Finished::new("paper", ("claims.json", claims::json(&claims)), table(&claims), "");
+    write(&folder, common, &findings, &plots).map_err(Failure::work)?;
+    if !common.no_report {
+        finished.report = Some(Report { page: report::page(&findings, &claims, &plots), pictures: Vec::new() });
+    }
+    finished.finish(common, Some(folder))
 }
 
 /// Every claim: the paper's sentences in its order, then P1 to P10, then independent numbers.
@@ -63,38 +70,37 @@ fn plots(findings: &Findings) -> Vec<Plot> {
     all
 }
 
-/// report.html, claims.json, figures/*.svg, figures/*.png, data/*.csv.
-fn write(folder: &Folder, findings: &Findings, claims: &[Claim], plots: &[Plot]) -> Result<()> {
-    let (figures, data) = (folder.path("figures"), folder.path("data"));
-    ["figures", "data"].into_iter().try_for_each(|name| folder.make(name))?;
+/// The curves as data/*.csv, and figures/*.svg where there is a report, figures/*.png where they are asked for.
+fn write(folder: &Folder, common: &Common, findings: &Findings, plots: &[Plot]) -> Result<()> {
+    let data = folder.path("data");
+    folder.make("data")?;
+    plots.iter().try_for_each(|plot| write_atomically(data.join(format!("{}.csv", plot.file)), plot.csv()))?;
+    if common.no_report {
+        return Ok(());
+    }
+    let figures = folder.path("figures");
+    folder.make("figures")?;
     let stage = &findings.sets.table4.stage;
     let drawings = [
         ("figure-01-02", taut_report::stage_drawing(&findings.sets.table1.stage)),
         ("figure-18", diagrams::drive_pulley(stage)),
         ("figure-19", diagrams::whole(stage)),
     ];
-    let drawn = || {
-        drawings.par_iter().try_for_each(|(name, svg)| picture(&figures, name, svg))?;
-        plots.par_iter().try_for_each(|plot| {
-            write_atomically(data.join(format!("{}.csv", plot.file)), plot.csv())?;
-            picture(&figures, &plot.file, &plot.figure.svg())
-        })
-    };
-    let page = || report::page(findings, claims, plots).write(folder.path("report.html"));
-    let (drawn, page) = rayon::join(drawn, page);
-    drawn?;
-    page?;
-    write_atomically(folder.path("claims.json"), claims::json(claims))
+    drawings.par_iter().try_for_each(|(name, svg)| picture(&figures, name, svg, common.png))?;
+    plots.par_iter().try_for_each(|plot| picture(&figures, &plot.file, &plot.figure.svg(), common.png))
 }
 
-/// An SVG and the PNG of it.
-fn picture(folder: &Path, name: &str, svg: &str) -> Result<()> {
+/// An SVG, and the PNG of it where that is wanted.
+fn picture(folder: &Path, name: &str, svg: &str, png: bool) -> Result<()> {
     write_atomically(folder.join(format!("{name}.svg")), svg)?;
-    write_atomically(folder.join(format!("{name}.png")), taut_report::png(svg, 2.0)?)
+    match png {
+        true => write_atomically(folder.join(format!("{name}.png")), taut_report::png(svg, 2.0)?),
+        false => Ok(()),
+    }
 }
 
 /// What the terminal shows.
-fn table(claims: &[Claim], out: &Path) -> String {
+fn table(claims: &[Claim]) -> String {
     let mut text =
         String::from("Sollmann & Jouaneh, Dynamic modelling of a single-axis belt-drive system (2011), recomputed\n\n");
     let width = claims.iter().map(|c| c.id.len()).max().unwrap_or(0);
@@ -114,5 +120,5 @@ fn table(claims: &[Claim], out: &Path) -> String {
     }
     let count = |v: Verdict| claims.iter().filter(|c| c.verdict() == v).count();
     let counts: Vec<String> = Verdict::ALL.iter().map(|v| format!("{} {}", count(*v), v.word())).collect();
-    text + &format!("{} claims: {}\nreport: {}\n", claims.len(), counts.join(", "), out.join("report.html").display())
+    text + &format!("{} claims: {}\n", claims.len(), counts.join(", "))
 }
