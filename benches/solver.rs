@@ -1,4 +1,4 @@
-//! What the solvers cost: the exact one on the paper's machine, per sample, per event, per edge; the general one per friction law.
+//! The cost of the solvers: of the exact one on the paper's machine, per sample, per event, per edge; of the general one per friction law.
 //!
 //! `cargo bench --package taut`; rivals (SciPy, CVODE) are timed beside it by `authorities/speed.py`.
 

@@ -17,7 +17,7 @@ use taut::log::{Log, Output, Quantity};
 use taut::signal::{Hold, Signal};
 use taut::solve::{Flow, Solver, simulate};
 
-/// What is fitted.
+/// The free parameters.
 const KEYS: [&str; 3] = ["cart.friction.viscous", "cart.friction.coulomb", "cart.mass"];
 
 /// Counts of the encoder in a turn.
@@ -29,7 +29,7 @@ const EVERY: f64 = 1e-3;
 /// Parts into which a log is cut where friction drifts along it.
 const PARTS: usize = 20;
 
-/// What is wrong with the angle, or with the machine.
+/// The error of the angle, or of the machine.
 #[derive(Clone, Copy)]
 enum Fault {
     /// White noise, rad.
@@ -144,7 +144,7 @@ impl Chance {
 }
 
 impl Fault {
-    /// What it adds to the angle `phi` with this speed.
+    /// The error that it adds to the angle `phi` with this speed.
     fn add(self, phi: &[f64], chance: &mut Chance) -> Vec<f64> {
         let n = phi.len();
         let first = |deviation: f64, time: f64, chance: &mut Chance| -> Vec<f64> {
@@ -353,7 +353,7 @@ fn known(cell: &Cell, case: &Case, plan: &Plan, truth: [f64; 3]) -> Option<[f64;
     }))
 }
 
-/// What came of the fits of a cell.
+/// The results of the fits of a cell.
 #[derive(Default)]
 struct Found {
     machines: usize,

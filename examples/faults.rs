@@ -21,7 +21,7 @@ const EVERY: f64 = 1e-3;
 /// Counts of the encoder in a turn.
 const COUNTS: f64 = 2048.0;
 
-/// What is fitted.
+/// The free parameters.
 const KEYS: [&str; 3] = ["cart.friction.viscous", "cart.friction.coulomb", "cart.mass"];
 
 struct Chance(Pcg64);
@@ -32,7 +32,7 @@ impl Chance {
     }
 }
 
-/// What is wrong with a log.
+/// A fault of a log.
 #[derive(Clone, Copy, PartialEq)]
 enum Fault {
     Sign,

@@ -21,7 +21,7 @@ use taut::stage::Stage;
 /// Stribeck curve (`authorities/output/speed.txt`).
 const CART_AT_REST: [f64; 2] = [0.053746653033, 0.053607946139];
 
-/// What is run, and where the cart comes to rest.
+/// A run, and the place where the cart comes to rest.
 struct Problem {
     name: &'static str,
     stage: Stage,
@@ -89,7 +89,7 @@ fn main() {
     }
 }
 
-/// What authorities/cvode.c prints, too.
+/// The same lines that authorities/cvode.c prints.
 fn rows(stage: &Stage, experiment: &Experiment, solver: Solver, calls: u32) {
     let solution = simulate(stage, experiment, solver).expect("the machine is sound");
     println!("{:e} {}", seconds(stage, experiment, solver, calls), solution.outcome.events.len());

@@ -1,4 +1,4 @@
-//! What went wrong, where, with which value, what is allowed, and what to do next.
+//! Errors: what went wrong, where, with which value, what is allowed, and what to do next.
 //!
 //! An [`Error`] is for something a person can correct: a wrong file, a wrong flag, a wrong argument.
 //! A computation that stops early is no error; it has a result that says how it ended.
@@ -16,9 +16,9 @@ pub struct Error {
     pub what: String,
     /// Where it stands, if it stands anywhere.
     pub place: Option<Place>,
-    /// What would be accepted.
+    /// Values that would be accepted.
     pub allowed: Option<String>,
-    /// What to do about it.
+    /// Advice: the next thing to do.
     pub next: Option<String>,
 }
 

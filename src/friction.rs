@@ -16,7 +16,7 @@ pub struct Friction {
     pub forward: Side,
     /// While moving in the negative direction; its values are positive, too.
     pub backward: Side,
-    /// What it does between breakaway and Coulomb friction.
+    /// Its law between breakaway and Coulomb friction.
     pub law: Law,
 }
 
@@ -27,7 +27,7 @@ pub struct Side {
     pub viscous: f64,
     /// Coulomb force F_c (N) or torque τ_c (N m), eq. (15).
     pub coulomb: f64,
-    /// What a body at rest holds before it starts to slide this way; at least `coulomb`.
+    /// The friction that a body at rest overcomes before it starts to slide this way; at least `coulomb`.
     pub breakaway: f64,
 }
 
@@ -85,7 +85,7 @@ impl Friction {
     }
 }
 
-/// What a body is doing, as far as friction is concerned.
+/// The motion of a body, as far as friction is concerned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Motion {
     /// Sliding in the negative direction.

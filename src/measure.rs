@@ -1,4 +1,4 @@
-//! What a recorder makes of a run: encoder counts, and converters with steps, noise and limits, at its own instants.
+//! Logs as a recorder writes them: encoder counts, and converters with steps, noise and limits, at its own instants.
 //!
 //! Sample k is taken at k·T − delay + jitter and recorded as that of time k·T. For it the run is solved on a raster of T/n:
 //! - Without jitter, n ≤ 1000 is chosen so that every instant lies on the raster; then samples are those of the solver.
@@ -134,7 +134,7 @@ struct Recorder<'a> {
     jitter: Pcg64,
     input: &'a Signal,
     devices: Vec<Device>,
-    /// What the devices see before time zero, and what they saw last.
+    /// The values that the devices see before time zero, and those that they saw last.
     before: Vec<f64>,
     last: Vec<f64>,
     /// Rows of the raster taken.
@@ -272,7 +272,7 @@ impl Device {
     }
 }
 
-/// What a converter gives for a value: the nearest step within its range.
+/// The converter's reading of a value: the nearest step within its range.
 fn convert(value: f64, channel: &Channel) -> f64 {
     let range = channel.range.unwrap_or(f64::INFINITY);
     let Some(step) = channel.step else { return value.clamp(-range, range) };

@@ -1,4 +1,4 @@
-//! What a run shows: where it ended, how fast it went, what it put on belt and motor, when it stopped, and how far the
+//! The key figures of a run: where it ended, how fast it went, the load on belt and motor, when it stopped, and how far the
 //! encoder's pulley and the cart were apart.
 //!
 //! A [`Meter`] observes a run as it goes on and keeps nothing of it, so that a run of any length needs the same memory. It sees the motion
@@ -27,7 +27,7 @@ const LATE: f64 = 0.1;
 /// Share of its largest speed up to which a rotor that turns by itself counts as resting.
 const RESTING: f64 = 1e-6;
 
-/// What a steady speed may still change by, relative to itself.
+/// The change of a steady speed that is allowed, relative to itself.
 const STEADY: f64 = 0.01;
 
 /// The key figures of one run. SI units; r is the pulleys' pitch radius, φ₁ the drive pulley's angle, x the cart's position.
@@ -49,7 +49,7 @@ pub struct Metrics {
     pub peak_cart_speed: Peak,
     /// r φ̇₁ of largest magnitude, m/s.
     pub peak_drive_speed: Peak,
-    /// What the cart's speed settles at under constant input; none if no input but zero lasts a fiftieth of the run, or the run ended
+    /// The speed that the cart settles at under constant input; none if no input but zero lasts a fiftieth of the run, or the run ended
     /// before that input did.
     pub steady_speed: Option<SteadySpeed>,
     /// Stretch of spans 1, 2, 3 of largest magnitude, m: r φ₁ − x, x − r φ₃, r φ₃ − r φ₁; negative where the span is
@@ -349,7 +349,7 @@ impl Held {
     }
 }
 
-/// What the cart's speed does at the end of a stretch of constant input.
+/// The cart's speed at the end of a stretch of constant input.
 #[derive(Debug, Clone)]
 struct Plateau {
     held: Held,

@@ -54,7 +54,7 @@ impl Effort {
     }
 }
 
-/// What was drawn.
+/// The draws.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draws {
     /// Values by chain, draw and parameter.

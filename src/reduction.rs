@@ -1,4 +1,4 @@
-//! What a reduced model leaves out: the same experiments on the elastic model of the same machine, side by side.
+//! The error of a reduced model: the same experiments on the elastic model of the same machine, side by side.
 
 use crate::case::Experiment;
 use crate::error::Result;

@@ -1,4 +1,4 @@
-//! What the machine is: motor, amplifier, pulleys, belt, cart, encoder, recorder. Everything in SI units.
+//! The machine: motor, amplifier, pulleys, belt, cart, encoder, recorder. Everything in SI units.
 
 pub mod axis;
 pub mod gantry;
@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 pub struct Stage {
     /// The DC motor and its gear.
     pub motor: Motor,
-    /// What stands between the input and the motor.
+    /// The amplifier between the input and the motor.
     pub amplifier: Amplifier,
     /// Pitch radius r of both pulleys, m.
     pub pulley_radius: f64,
@@ -102,7 +102,7 @@ pub struct Belt {
     pub stiffness: [f64; 3],
     /// Span damping c₁, c₂, c₃, N s/m.
     pub damping: [f64; 3],
-    /// What the stiffness was computed from, where it was not given as such.
+    /// The make that the stiffness was computed from, where it was not given as such.
     pub make: Option<BeltMake>,
     /// Tension T₀ of every span at rest, N. A span whose tension is used up goes slack; none for spans that can push.
     pub pretension: Option<f64>,
@@ -119,7 +119,7 @@ impl Belt {
     }
 }
 
-/// What the belt lets move by itself.
+/// The bodies that the model of the belt lets move by themselves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum BeltModel {
     /// All three inertias: the paper's model.
@@ -149,7 +149,7 @@ pub struct Travel {
     pub min: f64,
     /// Greatest position x, m.
     pub max: f64,
-    /// What stands there; without, a run ends when the cart leaves its travel.
+    /// The end stop there; without, a run ends when the cart leaves its travel.
     pub stop: Option<EndStop>,
 }
 
@@ -162,7 +162,7 @@ pub struct EndStop {
     pub damping: f64,
 }
 
-/// What a belt is made of; gives its stiffness by eq. (11).
+/// The make of a belt; gives its stiffness by eq. (11).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeltMake {
     /// Modulus E, Pa.
@@ -256,7 +256,7 @@ pub struct Measurement {
     pub jitter: f64,
     /// Which noise and jitter; the same seed gives the same ones.
     pub seed: u64,
-    /// What is recorded beside the encoder's counts.
+    /// The quantities that are recorded beside the encoder's counts.
     pub channels: Vec<Channel>,
 }
 
@@ -270,7 +270,7 @@ impl Default for Measurement {
 /// A recorded quantity and its analogue-to-digital converter, all in the quantity's own unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Channel {
-    /// What is recorded.
+    /// The quantity that is recorded.
     pub quantity: Quantity,
     /// Step of the converter; none where it does not round.
     pub step: Option<f64>,
@@ -280,7 +280,7 @@ pub struct Channel {
     pub range: Option<f64>,
 }
 
-/// What can be measured; a recorder takes those up to [`Quantity::CartSpeed`].
+/// Quantities that can be measured; a recorder takes those up to [`Quantity::CartSpeed`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Quantity {
     /// Current of the armature, A.

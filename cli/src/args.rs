@@ -107,7 +107,7 @@ pub struct Man {
 pub struct Init {
     /// The file to write, such as axis.toml
     pub file: PathBuf,
-    /// What it describes
+    /// Kind of machine
     #[arg(long, value_enum, default_value = "axis")]
     pub kind: KindName,
     /// Replace the file if it exists
@@ -417,7 +417,7 @@ pub struct Modes {
     /// Also give the discrete-time model for this sample time
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     pub sample_time: Option<f64>,
-    /// What the input does between samples [default: zero]
+    /// Input between samples [default: zero]
     #[arg(long, value_enum, requires = "sample_time")]
     pub hold: Option<HoldName>,
     /// By how much the input is late, computing time for one [default: 0 s]
@@ -451,7 +451,7 @@ pub enum AxisName {
     Z,
 }
 
-/// What the motor does while the cart vibrates.
+/// State of the motor while the cart vibrates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum MotorName {
     /// It follows its command, as a stepper motor or a stiff position loop makes it
@@ -478,7 +478,7 @@ pub enum BodyName {
     Idler,
 }
 
-/// What the input does between samples.
+/// Input between samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum HoldName {
     /// It stands: what a converter puts out
@@ -527,7 +527,7 @@ impl Simulate {
         self.choice().solver(stage)
     }
 
-    /// What is asked for.
+    /// The solver that is asked for, with its settings.
     pub fn choice(&self) -> Choice {
         let kind = |name: SolverName| match name {
             SolverName::Exact => SolverKind::Exact,

@@ -1,4 +1,4 @@
-//! What every command has in common: its options, how it reads its case, and how it ends.
+//! Shared by all commands: their options, how a case is read, and how a command ends.
 //!
 //! A command is arguments → work → [`Finished`]; [`Finished::finish`] writes, prints and gives the exit status.
 
@@ -76,7 +76,7 @@ fn standard_input() -> Result<String> {
     String::from_utf8(bytes).map_err(|_| Error::new("standard input is not UTF-8 text").in_file("-"))
 }
 
-/// What a command found, to be written and printed.
+/// A result, to be written and printed.
 pub struct Finished {
     /// The command.
     pub command: &'static str,
@@ -90,9 +90,9 @@ pub struct Finished {
     pub report: Option<Report>,
     /// Files outside of the folder that are written already.
     pub written: Vec<String>,
-    /// What a user gets by writing it, where nothing is written: "add --out DIR for …"; empty where nothing can be.
+    /// What to add to the command to keep the result: "add --out DIR for …"; empty where nothing can be kept.
     pub advice: &'static str,
-    /// What is told besides, on standard error.
+    /// Further lines for standard error.
     pub remarks: Vec<Remark>,
     /// How it ended.
     pub status: Status,

@@ -17,13 +17,13 @@ pub enum Status {
 /// The end of a command that has none.
 #[derive(Debug)]
 pub struct Failure {
-    /// What to tell.
+    /// The error itself.
     pub error: Error,
     /// 1 if the work could not be done, 2 if the input was wrong.
     pub status: u8,
 }
 
-/// What a command returns.
+/// The end of a command.
 pub type Outcome = Result<Status, Failure>;
 
 impl Failure {

@@ -30,7 +30,7 @@ pub struct Folder {
     batch: Batch,
 }
 
-/// What a command reads: the case and the files that it names.
+/// The files that a command reads: the case and those that it names.
 pub fn inputs(path: &Path, files: &[InputFile]) -> Inputs {
     Inputs::new(std::iter::once(path).chain(files.iter().map(|file| file.path.as_path())))
 }

@@ -16,7 +16,7 @@ const MOST_BYTES: u64 = 16 << 20;
 /// The word that a list begins with.
 const SCHEMA: &str = "taut/files/1";
 
-/// What a run wrote into a folder.
+/// The files that a run wrote into a folder.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Listing {
     schema: String,
@@ -78,7 +78,7 @@ impl Listing {
         serde_json::from_str(&text).ok().filter(|list: &Self| list.schema == SCHEMA)
     }
 
-    /// What `command` wrote and is there still, but for the files of these names.
+    /// Files that `command` wrote before and that are there still, but for those of these names.
     pub fn left(&self, command: &str, folder: &Path, names: &[PathBuf]) -> Left {
         let mut left = Left::default();
         for entry in self.files.iter().filter(|entry| entry.command == command) {

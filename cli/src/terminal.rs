@@ -1,4 +1,4 @@
-//! What reaches the terminal: errors in one form, colour only where it is seen, and no complaint about a closed pipe.
+//! Output on the terminal: errors in one form, colour only where it is seen, and no complaint about a closed pipe.
 
 use clap::error::ErrorKind;
 use std::fmt::Display;
@@ -140,7 +140,7 @@ pub fn bold(text: &str) -> String {
     paint(io::stdout().is_terminal(), "\u{1b}[1m", text)
 }
 
-/// What clap has to say: help and version are answers, all else is a mistake in the input.
+/// Messages of clap: help and version are answers, all else is a mistake in the input.
 pub fn show_help_or_mistake(told: &clap::Error) -> ExitCode {
     match told.kind() {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {

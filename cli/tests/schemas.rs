@@ -103,7 +103,7 @@ fn follows(name: &str, value: &Value) {
     let mut found = Vec::new();
     faults(value, &schema, &schema, name, &mut found);
     assert!(found.is_empty(), "{name}: {found:#?}");
-    assert_eq!(schema["$id"], json!(format!("taut/{name}/1")));
+    assert_eq!(schema["$id"], json!(format!("urn:taut:{name}:1")));
 }
 
 const TABLE4: &str = "stages/sollmann-jouaneh/table4.toml";
@@ -151,7 +151,7 @@ fn every_schema_is_listed_and_an_unknown_one_is_refused() {
     let names: Vec<&str> = listed.lines().skip(1).filter_map(|line| line.split_whitespace().next()).collect();
     assert!(names.len() >= 10 && names[0] == "case", "{names:?}");
     for name in names {
-        assert_eq!(json_of(&["schema", name])["$id"], json!(format!("taut/{name}/1")));
+        assert_eq!(json_of(&["schema", name])["$id"], json!(format!("urn:taut:{name}:1")));
     }
     let wrong = taut(&["schema", "cases"]);
     assert_eq!(wrong.status.code(), Some(2));

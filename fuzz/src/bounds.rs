@@ -58,7 +58,7 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
-/// What a piece of work took.
+/// Time and memory that a piece of work took.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Taken {
     /// Processor time of its thread.

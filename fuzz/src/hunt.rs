@@ -19,7 +19,7 @@ const MEMORY: usize = 256 << 20;
 /// Failures after which a hunt ends.
 const MOST: usize = 5;
 
-/// What a hunt found.
+/// The result of a hunt.
 #[derive(Debug, Default)]
 pub struct Report {
     /// Inputs tried, and those of them that were read.
@@ -30,7 +30,7 @@ pub struct Report {
     pub most: Taken,
     /// Processor time that all of them took.
     pub time: Duration,
-    /// What is wrong, each with the file that its input is kept in.
+    /// Failures, each with the file that its input is kept in.
     pub failures: Vec<String>,
 }
 
@@ -65,13 +65,13 @@ pub fn hunt(target: &Target, mutations: usize, seed: u64, folder: &Path) -> Repo
     hunt.report
 }
 
-/// What libFuzzer calls before the first input: it ends the program at any panic, also at those that a reader catches and tells as a
+/// Called by libFuzzer before the first input: it ends the program at any panic, also at those that a reader catches and tells as a
 /// damaged file, so [`fuzz`] does that for those that get out.
 pub fn told_once() {
     std::panic::set_hook(Box::new(|panic| eprintln!("{panic}")));
 }
 
-/// What libFuzzer calls with each input.
+/// Called by libFuzzer with each input.
 pub fn fuzz(name: &str, bytes: &[u8]) {
     let Some(target) = crate::target(name) else { return };
     if catch_unwind(|| (target.run)(bytes)).is_err() {

@@ -35,7 +35,7 @@ pub enum Kind {
 pub struct Seed {
     /// Where it comes from.
     pub name: String,
-    /// What stands in it.
+    /// Its content.
     pub bytes: Vec<u8>,
     /// Whether the reader has to take it.
     pub good: bool,

@@ -261,7 +261,7 @@ fn one_line(bytes: &[u8], random: &mut Pcg64) -> Range<usize> {
     start..end
 }
 
-/// What looks like a number.
+/// Places that look like numbers.
 fn numbers(bytes: &[u8]) -> Vec<Range<usize>> {
     let mut found = runs(bytes, |b| b.is_ascii_digit() || matches!(b, b'.' | b'-' | b'e' | b'+'));
     found.retain(|place| bytes[place.clone()].iter().any(u8::is_ascii_digit));

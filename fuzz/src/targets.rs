@@ -41,7 +41,7 @@ pub(crate) fn fitted() -> &'static Case {
     })
 }
 
-/// What an error must be: some words, and not a book.
+/// Checks an error: it has some words, and is not a book.
 fn refused(error: &Error) -> Reached {
     let told = error.to_string();
     assert!(!error.what.is_empty() && told.len() < 20_000, "a message of {} bytes", told.len());
@@ -200,7 +200,7 @@ pub(crate) fn quantity(bytes: &[u8]) -> Reached {
     }
 }
 
-/// What the columns of a log may be called.
+/// Names that the columns of a log may have.
 fn mappings(file: &Path) -> [Mapping; 4] {
     let named = |time: &str, input: &str, output: (Quantity, &str)| {
         let mut mapping = Mapping::new(file, Source::column(time));

@@ -50,7 +50,7 @@ pub enum By {
     General,
 }
 
-/// What a comparison says.
+/// The verdict of a comparison.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Verdict {
     /// Both say the same.
@@ -72,11 +72,11 @@ pub struct Compared {
     pub difference: f64,
     /// How large it may be, m.
     pub allowed: f64,
-    /// What perturbed runs differ by, m, where there were any.
+    /// Difference of perturbed runs, m, where there were any.
     pub spread: Option<f64>,
     /// Changes of bodies that the independent solver saw.
     pub events: usize,
-    /// What it says.
+    /// The verdict.
     pub verdict: Verdict,
 }
 
@@ -240,7 +240,7 @@ impl Pair<'_> {
         (0..cart.len()).map(row).collect()
     }
 
-    /// What is wrong with how it ended.
+    /// The mistake in how it ended.
     fn wrong_end(&self, known: &Run) -> Option<String> {
         let told = || Some(format!("it ends {:?} instead of {:?}", self.run.outcome.ending, known.ending));
         match (self.run.outcome.ending, &known.ending) {

@@ -10,11 +10,11 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 pub struct Double {
     /// The nearest 64-bit number.
     pub high: f64,
-    /// What it lacks.
+    /// The lower part: the rest that `high` lacks.
     pub low: f64,
 }
 
-/// What rounding does to a result, relative to it: 2⁻¹⁰⁴.
+/// Relative error that rounding makes of a result: 2⁻¹⁰⁴.
 pub const ROUNDING: f64 = 5e-32;
 
 /// π.

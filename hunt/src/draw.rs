@@ -8,7 +8,7 @@ pub use random::Random;
 
 use std::fmt::Write;
 
-/// What is counted by itself in the table of a hunt.
+/// Kinds of stages that are counted by themselves in the table of a hunt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// Inertias and stiffnesses far apart.
@@ -82,7 +82,7 @@ impl Kind {
 pub struct Drawn {
     /// The case file.
     pub text: String,
-    /// What it has.
+    /// The kinds that it belongs to.
     pub kinds: Vec<Kind>,
 }
 

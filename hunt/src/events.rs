@@ -1,4 +1,4 @@
-//! What bodies do over time, by two solvers: where they disagree, and whether it matters.
+//! States of bodies over time by two solvers: where they disagree, and whether it matters.
 //!
 //! Moments of events are as sharp as what happens there: a body that comes to rest with next to no force on it does so
 //! at next to any time.
@@ -26,7 +26,7 @@ pub struct Disagreement {
 }
 
 impl Disagreement {
-    /// What it is, for people.
+    /// The event in words.
     pub fn told(&self) -> String {
         let Self { body, from, to, ours, known } = self;
         format!("the {} is {ours:?} instead of {known:?} from {from:e} s to {to:e} s", NAMES[*body])

@@ -1,11 +1,11 @@
-//! What each part does, the linear equations that follow from it, and the conditions under which it goes on.
+//! The states of each part, the linear equations that follow from them, and the conditions under which they go on.
 
 use crate::double::Double;
 use crate::machine::{CURRENT, Ends, Flanks, Machine, Play, ROTOR, SPEED, STATES, WAY};
 use crate::series::{Form, Rates, Row};
 use taut::stage::BeltModel;
 
-/// What a body does.
+/// The motion of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Motion {
     /// Slides in the negative direction.
@@ -40,7 +40,7 @@ pub enum Touch {
     Apart,
 }
 
-/// What every part does.
+/// The state of every part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Mode {
     /// Drive pulley, cart, idler pulley.
@@ -59,7 +59,7 @@ pub struct Mode {
     pub current: Limit,
 }
 
-/// What happens where a condition fails.
+/// The change that follows where a condition fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
     /// The voltage limit.
@@ -85,9 +85,9 @@ pub enum Change {
 /// A condition: it holds while the form is not negative.
 #[derive(Debug, Clone)]
 pub struct Guard {
-    /// What must not become negative.
+    /// The sum that must not become negative.
     pub row: Row,
-    /// What follows where it does.
+    /// The change that follows where it does.
     pub change: Change,
 }
 
@@ -274,7 +274,7 @@ impl Builder<'_> {
         }
     }
 
-    /// What a compliant gear does to the belt.
+    /// The force of a compliant gear on the belt.
     fn gear_force(&mut self) -> Option<Form> {
         let twist = Form::state(ROTOR[0]) - way(0);
         let rate = Form::state(ROTOR[1]) - speed(0);
@@ -284,7 +284,7 @@ impl Builder<'_> {
         }
     }
 
-    /// What an end stop pushes the cart back with.
+    /// The force of an end stop on the cart.
     fn stop_force(&mut self) -> Form {
         match self.machine.ends {
             None => Form::default(),

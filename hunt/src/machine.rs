@@ -30,9 +30,9 @@ pub type State = [Double; STATES];
 pub struct Friction {
     /// Force per speed.
     pub viscous: [Double; 2],
-    /// What resists sliding.
+    /// Friction while it slides.
     pub coulomb: [Double; 2],
-    /// What holds at rest.
+    /// Friction that holds at rest.
     pub breakaway: [Double; 2],
 }
 
@@ -47,7 +47,7 @@ pub struct Flanks {
     pub damping: Double,
 }
 
-/// What a compliant gear is.
+/// The kind of a compliant gear.
 #[derive(Debug, Clone, Copy)]
 pub enum Play {
     /// Without backlash both flanks always touch: stiffness, damping.
@@ -56,7 +56,7 @@ pub enum Play {
     Loose(Flanks),
 }
 
-/// What ends the travel.
+/// The end of the travel.
 #[derive(Debug, Clone, Copy)]
 pub enum Ends {
     /// The run ends there.
@@ -68,7 +68,7 @@ pub enum Ends {
 /// The machine and its start.
 #[derive(Debug, Clone)]
 pub struct Machine {
-    /// What moves by itself.
+    /// The bodies that move by themselves.
     pub model: BeltModel,
     /// Masses of drive pulley, cart, idler pulley.
     pub mass: [Double; 3],
@@ -108,7 +108,7 @@ pub struct Machine {
     pub bandwidth: Option<Double>,
     /// State at time zero.
     pub start: State,
-    /// What the positions given for drive pulley, cart and idler pulley are beyond those of that state: less than a
+    /// Difference between the positions given for drive pulley, cart and idler pulley and those of that state: less than a
     /// strain.
     pub beyond: [Double; 3],
     /// Radius of the pulleys.

@@ -8,7 +8,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 /// Order of the Taylor series.
 pub const ORDER: usize = 32;
 
-/// What rounding has done to a state so far, as a share of the largest value that it had.
+/// Rounding of a state so far, as a share of the largest value that it had.
 const GATHERED: f64 = 1e-27;
 
 /// A linear form of the state, the input, and one.
@@ -236,7 +236,7 @@ pub struct Size {
     pub input: f64,
 }
 
-/// What rounding may have done to each term of a series.
+/// Rounding of each term of a series.
 pub struct Noise {
     states: [[f64; STATES]; ORDER + 1],
     /// Rounding of the states and the input themselves.

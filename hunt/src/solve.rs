@@ -31,9 +31,9 @@ pub struct Event {
     pub time: f64,
     /// 0, 1, 2.
     pub body: usize,
-    /// What it did before.
+    /// The motion before.
     pub from: Motion,
-    /// What it does after.
+    /// The motion after.
     pub to: Motion,
 }
 
@@ -67,7 +67,7 @@ pub struct Numbers<'a> {
     pub machine: Taken<'a>,
     /// Those of the input.
     pub input: Taken<'a>,
-    /// What a state is after each step, as if it were kept in fewer bits.
+    /// The rounding of a state after each step, as if it were kept in fewer bits.
     pub kept: Option<Taken<'a>>,
 }
 

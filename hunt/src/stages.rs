@@ -14,7 +14,7 @@ const GENERAL_EVERY: u64 = 20;
 /// A stage that runs longer is named.
 const LONG: Duration = Duration::from_secs(60);
 
-/// What to hunt.
+/// The hunt that is asked for.
 #[derive(Debug, Clone)]
 pub struct Hunt {
     /// Which stages.
@@ -27,7 +27,7 @@ pub struct Hunt {
     pub threads: usize,
     /// Whether to tell on the way how far it is.
     pub progress: bool,
-    /// What ends it early.
+    /// Ends it early.
     pub stop: Arc<AtomicBool>,
 }
 
@@ -38,9 +38,9 @@ pub struct Outcome {
     pub number: u64,
     /// Its case file.
     pub text: String,
-    /// What it has.
+    /// The kinds that it belongs to.
     pub kinds: Vec<Kind>,
-    /// What the solvers said.
+    /// The answers of the solvers.
     pub compared: Vec<Compared>,
 }
 
@@ -146,7 +146,7 @@ impl Verdict {
         }
     }
 
-    /// What it says beyond that.
+    /// The rest of the finding in words.
     pub fn told(&self) -> &str {
         match self {
             Verdict::Agrees => "",

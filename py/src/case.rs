@@ -117,7 +117,7 @@ impl Case {
         }
     }
 
-    /// What stands under a key, in SI units.
+    /// The value under a key, in SI units.
     fn value<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
         let found = guarded(|| match &self.inner {
             Inner::Axis(case) => case.value(key),
@@ -300,7 +300,7 @@ fn one_of<T: Copy>(what: &str, name: &str, known: &[(&str, T)]) -> PyResult<T> {
     })
 }
 
-/// What a fit found.
+/// The result of a fit.
 #[pyclass(frozen, module = "taut._native")]
 pub struct Fit {
     /// As `--json` has it.

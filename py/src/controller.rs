@@ -6,7 +6,7 @@ use pyo3::intern;
 use pyo3::prelude::*;
 use taut::control::{self, Controller};
 
-/// What a controller knows at a sample. SI units.
+/// Measurements and references that a controller has at a sample. SI units.
 #[pyclass(frozen, get_all, module = "taut")]
 #[derive(Debug, Clone)]
 pub struct Seen {

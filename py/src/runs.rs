@@ -33,7 +33,7 @@ pub struct Run {
     took: f64,
 }
 
-/// What it was.
+/// The kind of run.
 enum What {
     Experiment {
         case: Arc<Case>,
@@ -386,7 +386,7 @@ impl Drop for Inside {
     }
 }
 
-/// What `taut simulate --json` prints of these runs.
+/// The JSON that `taut simulate --json` prints of these runs.
 #[pyfunction]
 pub fn simulation<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound<'py, PyAny>> {
     let axis: Vec<Simulated> = runs
@@ -427,7 +427,7 @@ pub fn simulation<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<
     }
 }
 
-/// What `taut move --json` prints of these runs.
+/// The JSON that `taut move --json` prints of these runs.
 #[pyfunction]
 pub fn moves<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound<'py, PyAny>> {
     let troubles: Vec<Option<Trouble>> = runs

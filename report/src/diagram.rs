@@ -19,7 +19,7 @@ pub struct Diagram {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BlockId(usize);
 
-/// What a block does.
+/// The operation of a block.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Kind {
     /// A signal that comes from outside.

@@ -14,11 +14,11 @@ pub struct BodyEquation {
     pub speed: String,
     /// Symbol of its position: `φ₁`.
     pub position: String,
-    /// What divides the sum.
+    /// The divisor of the sum.
     pub inertia: Inertia,
-    /// What is summed; terms with a gain of zero are not drawn.
+    /// The terms of the sum; those with a gain of zero are not drawn.
     pub terms: Vec<Term>,
-    /// What friction subtracts.
+    /// The friction that is subtracted.
     pub friction: FrictionTerm,
 }
 

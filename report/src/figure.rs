@@ -1,4 +1,4 @@
-//! What a figure shows, said once for SVG, PNG and the page.
+//! A figure as data, said once for SVG, PNG and the page.
 
 use super::svg::Colour;
 
@@ -16,7 +16,7 @@ use super::svg::Colour;
 pub struct Figure {
     /// Stands above the figure.
     pub title: String,
-    /// What there is to see; stands below the figure on a page.
+    /// The caption: stands below the figure on a page.
     pub caption: String,
     /// The x axis, usually time.
     pub x: Axis,
@@ -30,7 +30,7 @@ pub struct Figure {
     pub view: Option<(f64, f64)>,
 }
 
-/// What an axis measures.
+/// The quantity and the scale of an axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     /// The quantity: `Position`.
@@ -106,7 +106,7 @@ impl Style {
 pub struct Marker {
     /// Where, in the units of the data.
     pub at: f64,
-    /// What it marks; may be empty.
+    /// Its label; may be empty.
     pub label: String,
 }
 

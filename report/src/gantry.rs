@@ -52,7 +52,7 @@ pub fn gantry_drawing(gantry: &Gantry) -> String {
     out.finish(&format!("The gantry in plan view, {}: two drive pulleys, belt, bridge and cart", gantry.routing.name()))
 }
 
-/// What is known of bridge or cart.
+/// The numbers of bridge or cart.
 fn slide(slide: &Slide, mass: &str, way: &str) -> Vec<String> {
     let mut lines = vec![format!("{mass} = {}", engineering(slide.mass, "kg", 4))];
     lines.extend(friction(&slide.friction, ["b", "F_c", "F_s"], ["N s/m", "N"]));
@@ -210,7 +210,7 @@ fn zigzag(out: &mut Svg, (x, y): (f64, f64), (to_x, to_y): (f64, f64), belt: &Pa
     out.path(&d, belt, 1.7, "");
 }
 
-/// What a span is called, and its stiffness and damping.
+/// The name of a span, and its stiffness and damping.
 fn label(out: &mut Svg, gantry: &Gantry, span: usize, (x, y): (f64, f64), anchor: Anchor, paint: &Paint) {
     let belts = &gantry.belts;
     let name = gantry.routing.spans()[span].name;

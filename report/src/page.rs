@@ -49,7 +49,7 @@ impl SharedAxis {
     }
 }
 
-/// What a callout or a badge says about a statement.
+/// The verdict of a callout or a badge on a statement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Callout {
     /// It holds.
@@ -206,7 +206,7 @@ impl Page {
         self
     }
 
-    /// What stands at the very end.
+    /// A line at the very end.
     pub fn footer(&mut self, text: impl Render) {
         self.footer = Some(text.render());
     }

@@ -24,7 +24,7 @@ const SLIMMEST: f64 = 0.3;
 pub struct Plane {
     /// Stands above it.
     pub title: String,
-    /// What there is to see.
+    /// The caption.
     pub caption: String,
     /// The axis to the right, and the one upward.
     axes: [Axis; 2],
@@ -36,7 +36,7 @@ pub struct Plane {
 /// Values over a grid of places.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Map {
-    /// What is shown.
+    /// The quantity that is shown.
     pub value: Axis,
     /// Places to the right, rising.
     pub across: Vec<f64>,

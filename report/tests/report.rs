@@ -185,7 +185,7 @@ fn twenty_plots_of_two_thousand_points_stay_small() {
     assert!(page.html().len() < 500_000, "{}", page.html().len());
 }
 
-/// What stands in the attribute `name` of the elements `tag`.
+/// The values of the attribute `name` of the elements `tag`.
 fn attributes(svg: &str, tag: &str, name: &str) -> Vec<String> {
     let document = Document::parse(svg).unwrap();
     let found = document.descendants().filter(|n| n.tag_name().name() == tag);

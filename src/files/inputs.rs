@@ -10,7 +10,7 @@ pub struct Inputs {
     files: Vec<(PathBuf, Identity)>,
 }
 
-/// What a name leads to: the same for all names of a file, be they relative, symbolic or hard links.
+/// The file that a name leads to: the same for all names of it, be they relative, symbolic or hard links.
 #[cfg(unix)]
 type Identity = (u64, u64);
 #[cfg(not(unix))]

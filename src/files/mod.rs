@@ -133,7 +133,7 @@ mod tests {
         assert!(error.next.unwrap().contains("folder"));
     }
 
-    /// What a killed run left under its temporary names stayed for ever, and each later one took the next number.
+    /// Temporary files of a killed run stayed for ever, and each later one took the next number.
     #[cfg(unix)]
     #[test]
     fn temporary_files_of_killed_runs_go_and_those_of_live_ones_stay() {

@@ -1,4 +1,4 @@
-//! What friction does between rest and fast sliding: Stribeck curves, a smooth substitute, bristles.
+//! Friction between rest and fast sliding: Stribeck curves, a smooth substitute, bristles.
 
 use super::Friction;
 use std::f64::consts::{E, SQRT_2};
@@ -161,7 +161,7 @@ impl Friction {
             }
     }
 
-    /// What a body at rest holds before it slides this way: zero for laws that never stick.
+    /// The friction that a body at rest overcomes before it slides this way: zero for laws that never stick.
     pub fn breakaway(&self, forward: bool) -> f64 {
         match self.law {
             Law::Coulomb | Law::Stribeck { .. } => self.side(forward).breakaway,

@@ -7,12 +7,12 @@ use crate::parameter::{self, Fallback, Parameter};
 use crate::stage::Quantity;
 use serde_json::{Map, Value, json};
 
-/// The schema, as JSON Schema draft 2020-12. Its `$id` is `taut/case/1`.
+/// The schema, as JSON Schema draft 2020-12. Its `$id` is `urn:taut:case:1`: editors refuse one that is no whole URI.
 pub fn case_schema() -> Value {
     let mut schema = object(&root());
     let head = json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "$id": "taut/case/1",
+        "$id": super::result_schema::address("case"),
         "title": "A case file of taut",
         "description": "A belt-driven machine in TOML, and what is done with it.",
         "$defs": { "input": input(), "friction": friction("cart.friction"), "pulley_friction": friction("drive_pulley.friction") },

@@ -1,11 +1,11 @@
-//! What logs can tell: `taut check --json`.
+//! The information in logs: `taut check --json`.
 
 use super::number;
 use crate::case::Case;
 use crate::fit::Check;
 use serde_json::{Value, json};
 
-/// What each log shows, how well each parameter would be known, what nothing tells apart.
+/// The findings of each log, how well each parameter would be known, which combinations nothing tells apart.
 pub fn check(case: &Case, found: &Check) -> Value {
     let known = &found.identifiability;
     json!({

@@ -28,7 +28,7 @@ fn profile(profile: &Profile) -> Value {
     })
 }
 
-/// What is to be known before a result is used.
+/// A warning or a note on a result.
 pub(super) fn finding(finding: &Finding) -> Value {
     json!({ "grade": finding.grade.word(), "code": finding.code, "log": finding.log, "text": finding.text })
 }

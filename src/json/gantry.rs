@@ -9,14 +9,14 @@ use crate::stage::gantry::{Gantry, LABELS, Routing};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-/// What is told of one experiment that ran.
+/// One experiment after it ran.
 #[derive(Debug, Clone, Copy)]
 pub struct GantrySimulated<'a> {
-    /// What was run.
+    /// The experiment as the case has it.
     pub experiment: &'a GantryExperiment,
     /// Events, ending and cost.
     pub outcome: &'a Outcome,
-    /// What it shows.
+    /// Its key figures.
     pub metrics: &'a GantryMetrics,
     /// Its files.
     pub files: &'a [String],
@@ -92,7 +92,7 @@ struct MetricsTold {
     event_counts: Vec<CountTold>,
 }
 
-/// What one run shows.
+/// The key figures of one run.
 pub fn gantry_metrics(metrics: &GantryMetrics, routing: Routing) -> Value {
     serde_json::to_value(MetricsTold::of(metrics, routing)).unwrap_or_default()
 }

@@ -6,16 +6,16 @@ use crate::control::{Deviation, Loop, MoveRun, Worst};
 use crate::tune::trouble::Trouble;
 use serde_json::{Value, json};
 
-/// What is told of one move that ran.
+/// One move after it ran.
 #[derive(Debug, Clone, Copy)]
 pub struct Moved<'a> {
-    /// What was asked for.
+    /// The move as the case has it.
     pub motion: &'a Move,
-    /// What came of it.
+    /// Its run.
     pub run: &'a MoveRun,
-    /// What comes of it on axes that are not what the controller takes them for.
+    /// Its run on axes whose parameters the controller does not know.
     pub worst: Option<&'a Worst>,
-    /// What is wrong with its loop.
+    /// The trouble of its loop, where it has one.
     pub trouble: Option<&'a Trouble>,
     /// Its files.
     pub files: &'a [String],

@@ -19,7 +19,7 @@ const RESULTS: &[(&str, &str, &str)] = &[
     ("sweep", "`taut sweep`", include_str!("results/sweep.txt")),
 ];
 
-/// What there are schemas of: names and sentences, the case file first.
+/// The schemas that there are: names and sentences, the case file first.
 pub fn schemas() -> impl Iterator<Item = (&'static str, &'static str)> {
     std::iter::once(("case", "A case file")).chain(RESULTS.iter().map(|(name, words, _)| (*name, *words)))
 }
@@ -38,7 +38,7 @@ pub fn schema(name: &str) -> Option<Value> {
     }
     let mut schema = root.schema();
     schema["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
-    schema["$id"] = json!(identity(name));
+    schema["$id"] = json!(address(name));
     schema["title"] = json!(words);
     // A list has no word of its own.
     if root.element.is_none() {
@@ -50,6 +50,11 @@ pub fn schema(name: &str) -> Option<Value> {
 /// The word that a result of this name begins with.
 pub fn identity(name: &str) -> String {
     format!("taut/{name}/1")
+}
+
+/// The URI of a schema.
+pub(super) fn address(name: &str) -> String {
+    format!("urn:taut:{name}:1")
 }
 
 /// A key and what is below it.

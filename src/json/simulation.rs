@@ -11,18 +11,18 @@ use serde::Serialize;
 /// Events listed; the rest is in the events' own file.
 pub(super) const MOST_EVENTS: usize = 10_000;
 
-/// What is told of one experiment that ran.
+/// One experiment after it ran.
 #[derive(Debug, Clone, Copy)]
 pub struct Simulated<'a> {
-    /// What was run.
+    /// The experiment as the case has it.
     pub experiment: &'a Experiment,
     /// Events, ending and cost.
     pub outcome: &'a Outcome,
-    /// What it shows.
+    /// Its key figures.
     pub metrics: &'a metrics::Metrics,
     /// How far its model is from the elastic one, where it is a reduced one.
     pub reduction: Option<Reduction>,
-    /// What the machines of a posterior do.
+    /// The band of the machines of a posterior.
     pub band: Option<Band>,
     /// Its files.
     pub files: &'a [String],
@@ -104,7 +104,7 @@ pub(super) struct EndingTold {
     time_s: f64,
 }
 
-/// What a run shows.
+/// The key figures of a run.
 #[derive(Debug, Serialize)]
 pub struct Metrics {
     end_time_s: f64,
@@ -171,7 +171,7 @@ pub(super) struct CountTold {
     reversals: u64,
 }
 
-/// What a part of the axis began to do.
+/// A change of what a part of the axis does.
 #[derive(Debug, Serialize)]
 pub struct Event {
     time_s: f64,
@@ -278,7 +278,7 @@ impl EndingTold {
     }
 }
 
-/// What the error of a run's positions was made with.
+/// The basis of the error of a run's positions.
 pub(super) fn error_basis(outcome: &Outcome, solver: Solver) -> Option<&'static str> {
     match (solver, outcome.error) {
         (_, None) => None,

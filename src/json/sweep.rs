@@ -4,7 +4,7 @@ use crate::case::Opened;
 use crate::sweep::{Drawn, Estimate, Measured, Shown, Spread, Summary, Sweep};
 use serde_json::{Value, json};
 
-/// What all runs of a case show; numbers to the last bit, null for what is no number.
+/// The summary of all runs of a case; numbers to the last bit, null for what is no number.
 pub fn sweep(case: &Opened, sweep: &Sweep, summary: &Summary) -> Value {
     json!({
         "schema": super::identity("sweep"),

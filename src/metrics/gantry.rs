@@ -10,7 +10,7 @@ use crate::stage::gantry::{BODIES, Gantry};
 /// Peaks before those of the spans: speeds of bridge and cart, errors of both, currents, speeds of the motors.
 const FIRST_SPAN: usize = 8;
 
-/// What one run of a gantry shows. SI units; x is the bridge's position, y the cart's on it.
+/// The key figures of one run of a gantry. SI units; x is the bridge's position, y the cart's on it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GantryMetrics {
     /// When the run ended, s.

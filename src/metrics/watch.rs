@@ -1,4 +1,4 @@
-//! What any mechanism shows: the peaks of sums of its readings, events by body, and when everything came to rest.
+//! Figures of any mechanism: the peaks of sums of its readings, events by body, and when everything came to rest.
 
 use super::{EventCount, NEWS, Peak, Rotor};
 use crate::friction::Motion;
@@ -23,7 +23,7 @@ pub struct Watch {
     bodies_rest: bool,
 }
 
-/// What was seen.
+/// The figures of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Watched {
     /// When the run ended, s.
@@ -67,7 +67,7 @@ impl Watch {
         }
     }
 
-    /// What was seen of the run whose events these are.
+    /// The figures of the run whose events these are.
     pub fn finish(self, events: &[Event]) -> Watched {
         let mut counts = vec![EventCount::default(); self.bodies];
         for event in events {

@@ -1,4 +1,4 @@
-//! What a chain learns before its draws count: the step, by dual averaging, and the covariance, in windows.
+//! Adaptation of a chain before its draws count: the step, by dual averaging, and the covariance, in windows.
 
 use libm::{exp, log, pow, sqrt};
 use nalgebra::DMatrix;

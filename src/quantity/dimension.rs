@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// What a quantity is, whatever unit it is given in.
+/// The dimension of a quantity, whatever unit it is given in.
 ///
 /// The angle is kept as a fifth dimension, so that `deg` and `rev` convert and `rpm` differs from `Hz`; see
 /// [`read`](super::read) for where it may be left out.
@@ -52,7 +52,7 @@ impl Dimension {
         Self { angle: 0, ..self }
     }
 
-    /// What people call it, with its unit: `a mass (kg)`.
+    /// Its name for people, with its unit: `a mass (kg)`.
     pub fn describe(self) -> String {
         let exact = NAMES.iter().find(|(d, ..)| *d == self);
         let name = exact.or_else(|| NAMES.iter().find(|(d, ..)| d.without_angle() == self && self != Self::NONE));

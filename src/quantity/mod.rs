@@ -28,7 +28,7 @@ pub(crate) const SUCH_AS: &str = "write a number with its unit, such as \"19.4 m
 pub struct Quantity {
     /// The value in SI units.
     pub value: f64,
-    /// What it is.
+    /// Its dimension.
     pub dimension: Dimension,
     /// The unit as it was typed; empty for a pure number.
     pub unit: String,

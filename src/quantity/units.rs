@@ -9,7 +9,7 @@ pub(super) struct Factor {
     pub denominator: u128,
     pub exponent: i32,
     pub pi: i32,
-    /// What did not fit the integers; 1 for every unit anybody types.
+    /// The rest of the factor that did not fit the integers; 1 for every unit anybody types.
     pub rest: f64,
 }
 
@@ -197,7 +197,7 @@ fn find_among(name: &str, prefixes: &[(&str, i32)]) -> Option<(&'static Unit, i3
     })
 }
 
-/// What somebody who typed `name` may have meant.
+/// A unit that somebody who typed `name` may have meant.
 pub(super) fn suggest(name: &str) -> Option<String> {
     const LONGEST: usize = 24;
     if name.chars().count() > LONGEST {

@@ -141,7 +141,7 @@ pub enum Signal {
         times: Vec<f64>,
         /// A value for each.
         values: Vec<f64>,
-        /// What happens between samples.
+        /// The input between samples.
         hold: Hold,
     },
     /// All of these added.
@@ -161,7 +161,7 @@ pub struct Tone {
     pub phase: f64,
 }
 
-/// What a sampled input does between its samples.
+/// A sampled input between its samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Hold {
     /// Holds the last sample (zero-order hold).

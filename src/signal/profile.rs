@@ -9,7 +9,7 @@
 
 use crate::error::{Error, Result};
 
-/// What a move must not exceed. SI units; all above zero.
+/// Limits of a move. SI units; all above zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Speed, m/s.

@@ -28,7 +28,7 @@ pub const BODIES: usize = 3;
 /// Number of spans.
 pub const SPANS: usize = 3;
 
-/// What the bodies are called, by their numbers.
+/// Names of the bodies, by their numbers.
 pub const LABELS: [Label; BODIES] = [
     Label { key: "drive", name: "drive pulley" },
     Label { key: "cart", name: "cart" },

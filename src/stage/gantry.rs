@@ -32,7 +32,7 @@ pub const CART: usize = 3;
 /// Number of bodies with friction of their own.
 pub const BODIES: usize = 4;
 
-/// What the bodies are called, by their numbers.
+/// Names of the bodies, by their numbers.
 pub const LABELS: [Label; BODIES] = [
     Label { key: "left", name: "left pulley" },
     Label { key: "right", name: "right pulley" },
@@ -66,7 +66,7 @@ impl Routing {
         }
     }
 
-    /// What its spans are called: in keys, and for people.
+    /// Names of its spans: in keys, and for people.
     pub fn spans(self) -> &'static [Label] {
         const H_FRAME: [Label; 3] = [
             Label { key: "left_span", name: "left span" },
@@ -85,7 +85,7 @@ impl Routing {
         }
     }
 
-    /// What the drives say of bridge and cart minus what is, each as a sum of stretches of spans, (span, weight):
+    /// The place of bridge and cart by the drives minus the true one, each as a sum of stretches of spans, (span, weight):
     /// r (φ₂ − φ₁)/2 − x = −(s_left + s_right)/2 and −r (φ₁ + φ₂)/2 − y = (s_right − s_left)/2 of the H-frame,
     /// r (φ_A ± φ_B)/2 − (x or y) = (s_A out ± s_B out)/2 of CoreXY.
     pub fn drive_error(self) -> [[(usize, f64); 2]; 2] {
@@ -141,7 +141,7 @@ pub struct Belts {
     pub damping: Vec<f64>,
     /// Tension of every span at rest, N; none for spans that can push.
     pub pretension: Option<f64>,
-    /// What the stiffness is computed from, where it is not given.
+    /// The make that the stiffness is computed from, where it is not given.
     pub make: Option<Make>,
     /// E A, N, and the lengths of the spans with bridge and cart at zero, m, where the spans follow them.
     pub follows: Option<(f64, Vec<f64>)>,
@@ -188,7 +188,7 @@ pub struct Gantry {
     pub routing: Routing,
     /// Motors of the left and right drive.
     pub motors: [Motor; 2],
-    /// What feeds them.
+    /// The amplifiers that feed them.
     pub amplifiers: [Amplifier; 2],
     /// Pitch radius r of both drive pulleys, m.
     pub pulley_radius: f64,

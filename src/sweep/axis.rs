@@ -33,7 +33,7 @@ impl Axis {
         Self { stage, experiments, moves, controller }
     }
 
-    /// What each machine does, and its figures.
+    /// The experiments and moves of each machine, and their figures.
     pub fn groups(&self) -> Vec<Group> {
         let experiments = self.experiments.iter().map(|experiment| Group {
             name: experiment.name.clone(),

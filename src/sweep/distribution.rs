@@ -16,7 +16,7 @@ pub enum Distribution {
         prior: Prior,
         /// Shares of it that lie below and up to the end of what is allowed.
         shares: [f64; 2],
-        /// What is allowed.
+        /// The range that is allowed.
         within: [f64; 2],
     },
 }

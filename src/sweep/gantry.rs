@@ -28,7 +28,7 @@ impl Swept {
         Self { gantry: case.gantry.clone(), experiments, figures: of_gantry(&case.gantry.mechanism()) }
     }
 
-    /// What each machine does, and its figures.
+    /// The experiments of each machine, and their figures.
     pub fn groups(&self) -> Vec<Group> {
         let group = |experiment: &GantryExperiment| Group {
             name: experiment.name.clone(),

@@ -90,7 +90,7 @@ pub const OF_MOVE: &[Measure<MoveRun>] = &[
 /// A key figure of a gantry: of one of its loads, drives, spans or bodies, or of all of it.
 #[derive(Debug, Clone)]
 pub struct OfPart {
-    /// What it is.
+    /// The figure.
     pub figure: Figure,
     /// The place of the part among the others of its role.
     place: usize,

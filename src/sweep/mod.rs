@@ -93,12 +93,12 @@ impl Status {
     }
 }
 
-/// What varies: a number of the machine, and what its value is made from.
+/// A number of the machine that varies, and the distribution of its values.
 #[derive(Debug, Clone)]
 pub struct Parameter {
-    /// What is free.
+    /// The free number.
     pub free: Free,
-    /// What values it takes.
+    /// The distribution of its values.
     pub distribution: Distribution,
 }
 
@@ -150,7 +150,7 @@ pub struct Group {
     pub figures: Vec<Figure>,
 }
 
-/// What is swept: a machine as the case has it, and what it does.
+/// The subject of a sweep: a machine as the case has it, with its experiments and moves.
 #[derive(Debug, Clone)]
 enum Subject {
     Axis(axis::Axis),
@@ -235,7 +235,7 @@ impl Sweep {
         self.runs
     }
 
-    /// What is varied by itself; the parameters of a posterior come besides.
+    /// The parameters that are varied by themselves; those of a posterior come besides.
     pub fn parameters(&self) -> &[Parameter] {
         &self.parameters
     }
@@ -251,7 +251,7 @@ impl Sweep {
         self.indices
     }
 
-    /// What each machine does, in the order of the columns: experiments, then moves.
+    /// The experiments, then the moves of each machine, in the order of the columns.
     pub fn groups(&self) -> &[Group] {
         &self.groups
     }

@@ -14,7 +14,7 @@ use std::sync::Arc;
 const MOST_RUNS: u64 = 1 << 53;
 
 impl Sweep {
-    /// What the `[sweep]` of an axis's case says. Errors: nothing to vary, parameters that exclude each other, more of them than Sobol'
+    /// The sweep that `[sweep]` of an axis's case describes. Errors: nothing to vary, parameters that exclude each other, more of them than Sobol'
     /// points have dimensions, a machine that cannot be run.
     pub fn new(case: &Case) -> Result<Self> {
         let plan = planned(case.sweep.as_ref())?;
@@ -25,7 +25,7 @@ impl Sweep {
         Self::planned(Subject::Axis(axis::Axis::of(case, plan.interval)), plan, draws, &case.known)
     }
 
-    /// What that of a gantry's case says. Errors: as [`Sweep::new`].
+    /// The sweep that a gantry's case describes. Errors: as [`Sweep::new`].
     ///
     /// ```
     /// use taut::case::GantryCase;
@@ -42,7 +42,7 @@ impl Sweep {
         Self::planned(Subject::Gantry(gantry::Swept::of(case, plan.interval)), plan, None, &[])
     }
 
-    /// What that of a case of either kind says.
+    /// The sweep that a case of either kind describes.
     pub fn of(case: &Opened) -> Result<Self> {
         match case {
             Opened::Axis(case) => Self::new(case),
@@ -94,7 +94,7 @@ impl Sweep {
     }
 }
 
-/// What a case says of its sweep.
+/// The sweep of a case.
 fn planned(plan: Option<&Sweeping>) -> Result<&Sweeping> {
     plan.ok_or_else(|| {
         Error::new("this case does not say what is varied")
@@ -107,7 +107,7 @@ fn keys(plan: &Sweeping) -> impl Iterator<Item = &str> {
     plan.vary.iter().flat_map(|(name, _)| name.split(" = "))
 }
 
-/// What is varied by itself, and how.
+/// The numbers that are varied by themselves, and how.
 fn chosen(
     machine: &dyn Numbers,
     known: &[Known],
@@ -159,7 +159,7 @@ fn chosen(
     Ok(chosen)
 }
 
-/// What a parameter may be: the range in the table of parameters, and what the plan says.
+/// The range of a parameter: that in the table of parameters, and that of the plan.
 fn allowed(machine: &dyn Numbers, free: &Free, variation: &Variation) -> [f64; 2] {
     let row = free.keys.first().and_then(|(key, _)| machine.row(key)).filter(|_| !free.name.starts_with("total."));
     let [low, high] = row.map_or([0.0, f64::MAX], |row| [row.range.low, row.range.high]);

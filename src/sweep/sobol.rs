@@ -20,7 +20,7 @@ pub const DIMENSIONS: usize = 64;
 pub struct Sobol {
     /// By dimension and bit of the index: which bits of the coordinate it turns, the highest being one half.
     directions: Vec<[u64; BITS as usize]>,
-    /// What the scrambling of each dimension starts from.
+    /// The seeds of the scrambling of each dimension.
     keys: Vec<u64>,
 }
 

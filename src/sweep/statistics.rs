@@ -1,4 +1,4 @@
-//! What a column of many runs shows: shares, histogram, and what it depends on.
+//! Statistics of a column of many runs: shares, histogram, and which parameters it depends on.
 
 use crate::chance::quantile;
 

@@ -1,4 +1,4 @@
-//! What all runs of a sweep show: how each figure is spread, and what it depends on.
+//! The summary of all runs of a sweep: how each figure is spread, and which parameters it depends on.
 
 use super::{Index, Spread, Status};
 
@@ -26,7 +26,7 @@ pub struct Drawn {
     pub points: Vec<f64>,
 }
 
-/// What one experiment or move shows.
+/// The figures of one experiment or move.
 #[derive(Debug, Clone)]
 pub struct Shown {
     /// Its name.
@@ -40,11 +40,11 @@ pub struct Shown {
 /// One figure of one experiment.
 #[derive(Debug, Clone)]
 pub struct Measured {
-    /// What it is called in columns.
+    /// Its name in columns.
     pub name: String,
     /// SI unit.
     pub unit: &'static str,
-    /// What it is called by people.
+    /// Its name for people.
     pub words: String,
     /// None where no run has it.
     pub spread: Option<Spread>,

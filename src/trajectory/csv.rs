@@ -16,7 +16,7 @@ const CHUNK: usize = 1 << 16;
 pub struct CsvWriter {
     draft: Draft,
     text: Vec<u8>,
-    /// What was written last in each column: inputs and states seldom change from row to row.
+    /// The digits written last in each column: inputs and states seldom change from row to row.
     last: Vec<Digits>,
 }
 

@@ -14,7 +14,7 @@ pub use parquet::ParquetWriter;
 /// One quantity over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
-    /// What it is, in lower case with underscores: `cart_position`.
+    /// Its name, in lower case with underscores: `cart_position`.
     pub name: String,
     /// Its unit as printed: `m`, `rad/s`, `N m`; empty for a pure number.
     pub unit: String,

@@ -23,7 +23,7 @@ pub struct File<'a> {
     sha256: &'a str,
     /// Where it is published.
     url: &'a str,
-    /// What its name ends with in the ZIP archive that the address gives; none where the address gives the file itself.
+    /// The end of its name in the ZIP archive that the address gives; none where the address gives the file itself.
     member: Option<&'a str>,
 }
 
@@ -77,7 +77,7 @@ const FILES: [File; 8] = [
     ),
 ];
 
-/// What became of a file.
+/// The state of a file afterwards.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Done {
     There,

@@ -5,7 +5,7 @@ mod mutants;
 mod readers;
 mod stages;
 
-/// What is asked for.
+/// The hunt that is asked for.
 pub struct Hunt {
     parts: Vec<Part>,
     /// Random stages.

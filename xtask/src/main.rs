@@ -20,7 +20,7 @@ struct Step {
     work: Work,
 }
 
-/// What does a check.
+/// The work of a check.
 enum Work {
     /// A cargo command, with variables of its environment.
     Cargo(&'static [&'static str], &'static [(&'static str, &'static str)]),
@@ -131,7 +131,7 @@ fn test(steps: &[Step]) -> Result<(), String> {
 }
 
 impl Step {
-    /// What to give to cargo to run it alone.
+    /// The words behind `cargo` that run it alone.
     fn command(&self) -> String {
         match self.work {
             Work::Cargo(words, _) => words.join(" "),
@@ -190,7 +190,7 @@ struct Counts {
     passed: u64,
     failed: u64,
     ignored: u64,
-    /// What could not be begun, and what it needs.
+    /// Tests that could not be begun, and what they need.
     left_out: Vec<String>,
 }
 

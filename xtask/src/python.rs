@@ -4,7 +4,7 @@ use crate::Counts;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// What has to be installed, to the digit.
+/// Packages that have to be installed, to the digit.
 const REQUIREMENTS: &str = "py/requirements.txt";
 
 /// The oldest Python that works.

@@ -42,7 +42,7 @@ fn axis(args: &Args, case: &Case) -> Outcome {
     finished.finish(common, folder)
 }
 
-/// What the command line asks.
+/// The question that the command line asks.
 fn question(args: &Args) -> Question {
     Question {
         speed: args.speed,

@@ -39,7 +39,7 @@ pub struct Stiffness {
     pub inches: f64,
     /// From the composite modulus before rounding and the length in inches.
     pub unrounded: f64,
-    /// What half a unit in the last digit of the printed length makes of the stiffness, relative.
+    /// Share by which half a unit in the last digit of the printed length changes the stiffness.
     pub length_rounding: f64,
 }
 
@@ -61,7 +61,7 @@ pub struct Belt {
     pub mass: f64,
     /// The belt's share of the moving mass.
     pub mass_share: f64,
-    /// What teeth of neoprene add to the stiffness of a span that is half toothed, relative.
+    /// Share that teeth of neoprene add to the stiffness of a span that is half toothed.
     pub neoprene_teeth: f64,
 }
 

@@ -7,7 +7,7 @@ use serde::Serialize;
 pub struct Claim {
     /// Its name, for ever.
     pub id: &'static str,
-    /// What kind of statement it is.
+    /// Kind of statement.
     pub kind: Kind,
     /// Section, figure, table or equation.
     pub source: &'static str,
@@ -15,9 +15,9 @@ pub struct Claim {
     pub statement: &'static str,
     /// The numbers; the first is the one that is shown.
     pub checks: Vec<Check>,
-    /// What was found, in a few words with a number; empty where the first number says it.
+    /// The finding in a few words with a number; empty where the first number says it.
     pub found: String,
-    /// What else there is to say; where there are no checks, why not.
+    /// A remark; where there are no checks, the reason.
     pub remark: String,
 }
 
@@ -38,7 +38,7 @@ pub enum Kind {
 /// One number and its rule.
 #[derive(Debug, Clone)]
 pub struct Check {
-    /// What the number is.
+    /// The name of the number.
     pub what: String,
     /// The number, SI.
     pub value: f64,
@@ -55,7 +55,7 @@ pub struct Check {
 pub enum Rule {
     /// Within `tolerance` of `expected`.
     Near {
-        /// What is printed.
+        /// The printed number.
         expected: f64,
         /// How far off it may be.
         tolerance: f64,
@@ -66,7 +66,7 @@ pub enum Rule {
     AtLeast(f64),
 }
 
-/// What becomes of a claim. Computed by [`Claim::verdict`], and by nothing else.
+/// The verdict on a claim. Computed by [`Claim::verdict`], and by nothing else.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Verdict {
     /// Every number holds.
@@ -145,7 +145,7 @@ impl Claim {
         self
     }
 
-    /// What becomes of it.
+    /// The verdict that follows from the checks.
     pub fn verdict(&self) -> Verdict {
         let fails = |decides: bool| self.checks.iter().any(|c| c.decides == decides && !c.rule.holds(c.value));
         if !self.checks.iter().any(|c| c.decides) {

@@ -8,14 +8,14 @@ use super::words::{mm, percent, si, um};
 use taut::number::significant;
 use taut_report::{Axis, Colour, Style};
 
-/// What every caption says where the paper shows a measurement.
+/// A sentence of every caption where the paper shows a measurement.
 const NO_MEASUREMENT: &str = "The paper shows a measured curve beside each: it is not available as data and nothing is drawn in its \
      place.";
 
 /// How much of a run is drawn, s. Its data go on to the end, and nothing happens there any more.
 const SHOWN: f64 = 0.5;
 
-/// What is plotted over time.
+/// The quantity that is plotted over time.
 #[derive(Clone, Copy, PartialEq)]
 enum What {
     Position,

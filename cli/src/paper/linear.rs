@@ -109,7 +109,7 @@ pub fn after_pulse(a: &Matrix, b: &SVector<f64, 6>, volts: f64) -> SVector<f64, 
     state.fixed_rows::<6>(0).into_owned()
 }
 
-/// What the linear model says about the printed matrix, its poles and its modes.
+/// The linear model beside the printed matrix: its poles and its modes.
 pub struct Linear {
     /// Modes of Table 1, of Table 2, and of Table 2 with the viscous friction of Table 4.
     pub modes: [Vec<Oscillation>; 3],

@@ -8,7 +8,7 @@ pub struct Misprint {
     pub prefix: &'static str,
     /// In a few words.
     pub title: &'static str,
-    /// What is wrong or open, and what runs instead.
+    /// The mistake or the open question, and what is used instead.
     pub text: &'static str,
 }
 

@@ -99,7 +99,7 @@ fn picture(folder: &Path, name: &str, svg: &str, png: bool) -> Result<()> {
     }
 }
 
-/// What the terminal shows.
+/// The table on the terminal.
 fn table(claims: &[Claim]) -> String {
     let mut text =
         String::from("Sollmann & Jouaneh, Dynamic modelling of a single-axis belt-drive system (2011), recomputed\n\n");

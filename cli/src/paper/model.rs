@@ -171,7 +171,7 @@ pub fn run(stage: &Stage, experiment: &Experiment, solver: Solver) -> Result<Res
     })
 }
 
-/// What is doubled and halved, one at a time.
+/// The parameter that is doubled and halved, one at a time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
     /// k₁, k₂ and k₃ (figures 6 to 9).

@@ -1,4 +1,4 @@
-//! What the paper prints and cannot mean, and what a close reading adds (P1 to P10).
+//! Misprints of the paper, and the results of a close reading (P1 to P10).
 
 use super::claims::{Claim, Kind, Rule};
 use super::findings::Findings;

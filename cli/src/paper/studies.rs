@@ -21,11 +21,11 @@ pub enum From {
     Table4,
 }
 
-/// What one change does to one response. Relative changes refer to the unchanged run.
+/// The effect of one change on one response. Relative changes refer to the unchanged run.
 pub struct Effect {
     /// Where it starts from.
     pub from: From,
-    /// What is changed.
+    /// The change.
     pub change: Change,
     /// By which factor.
     pub factor: f64,
@@ -158,7 +158,7 @@ pub struct Table3 {
     pub exact: [Vec<f64>; 2],
     /// By how much the exact r φ₁, x or r φ₃ differs at most from its final value after the last body has stopped, m.
     pub exact_creep: f64,
-    /// What a speed at the edge of the band, 0.01 rad/s, makes of half a second, m.
+    /// Distance that the cart goes in half a second at the edge of the band, 0.01 rad/s, m.
     pub band_edge: f64,
     /// Acceleration of the drive pulley at the very start of the 5 V pulse, rad/s²: with sign(0) = 0, and with friction.
     pub start: (f64, f64),
@@ -242,7 +242,7 @@ pub struct Sharing {
     pub adjustment: [f64; 2],
 }
 
-/// What position data of the motor cannot tell (P7), and what the gear would do (P3).
+/// The limits of position data of the motor (P7), and the effect of the gear (P3).
 pub struct Identifiability {
     /// The factor on everything.
     pub factor: f64,

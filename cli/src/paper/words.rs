@@ -68,7 +68,7 @@ pub fn rule(check: &Check) -> String {
     }
 }
 
-/// What was found: in the claim's own words, or its first number.
+/// The finding: in the claim's own words, or its first number.
 pub fn found(claim: &Claim) -> String {
     match claim.checks.first() {
         Some(check) if claim.found.is_empty() => value(check),

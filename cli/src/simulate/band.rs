@@ -1,4 +1,4 @@
-//! What machines drawn from a posterior do: the band that 95 % of them stay in, at every time for itself.
+//! Runs of the machines drawn from a posterior: the band that 95 % of them stay in, at every time for itself.
 
 use super::run::Setting;
 use rayon::prelude::*;

@@ -22,7 +22,7 @@ use taut::stage::Stage;
 use taut::{Error, Result};
 use taut_report::simulate::{Run, early_end, figures, hidden, named, page};
 
-/// What a user gets by writing it.
+/// How to keep the result.
 const ADVICE: &str = "add --out DIR for files and a report";
 
 /// Reads the cases, simulates, measures, reports.

@@ -18,7 +18,7 @@ use taut::stage::Stage;
 use taut::trajectory::{CsvWriter, Trajectory};
 use taut_report::simulate::{Curves, Run, Samples};
 
-/// What all runs of a command share.
+/// Settings that all runs of a command share.
 pub struct Setting<'a> {
     pub args: &'a Simulate,
     pub case: &'a Case,

@@ -1,4 +1,4 @@
-//! What a sweep will take, told before it begins: room on the disk, and time.
+//! The disk space and the time that a sweep will take, told before it begins.
 
 use super::options::{self, PARTS, beside};
 use super::{Work, shown};
@@ -38,7 +38,7 @@ pub fn told(work: &Work, target: &Target, threads: usize) -> Result<(), Failure>
     Ok(())
 }
 
-/// What a sweep takes on the disk.
+/// Disk space of a sweep.
 struct Room {
     runs: u64,
     /// The file of the rows, bytes.
@@ -79,13 +79,13 @@ impl Room {
     }
 }
 
-/// What the files of a folder take, bytes.
+/// Size of the files of a folder, bytes.
 fn size(folder: &Path) -> f64 {
     let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
     files.filter_map(|file| file.metadata().ok()).map(|data| data.len() as f64).sum()
 }
 
-/// What is free on the disk of a folder, bytes; none where the system does not say.
+/// Free space on the disk of a folder, bytes; none where the system does not say.
 #[cfg(unix)]
 fn free(folder: &Path) -> Option<f64> {
     let told = rustix::fs::statvfs(folder).ok()?;

@@ -28,7 +28,7 @@ use taut_report::sweep::{figures, page};
 /// Most runs that are kept in memory, where nothing is written.
 const MOST_KEPT: u64 = 100_000;
 
-/// What was asked for.
+/// A sweep that is asked for.
 pub struct Work<'a> {
     pub args: &'a Args,
     pub case: &'a Opened,

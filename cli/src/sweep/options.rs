@@ -42,7 +42,7 @@ pub fn with_changes(args: &Args) -> Result<Common> {
 /// The file of the rows in a folder of results.
 const ROWS: &str = if cfg!(feature = "parquet") { "runs.parquet" } else { "runs.csv" };
 
-/// What the folder of the parts is called, behind the name of the file of the rows.
+/// Ending of the folder of the parts, behind the name of the file of the rows.
 pub const PARTS: &str = ".parts";
 
 /// Where `--out` says that the results go; the folder for them is made.

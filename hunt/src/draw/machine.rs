@@ -4,7 +4,7 @@ use super::{Draw, Kind, Sizes};
 use std::f64::consts::PI;
 use std::fmt::Write;
 
-/// What the motor takes to move the machine, and what it has.
+/// The scale of forces: those that the motor needs to move the machine, and those that it has.
 pub(super) struct Scale {
     /// Volts or amperes at the amplifier's input.
     pub(super) input: f64,

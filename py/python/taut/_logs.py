@@ -42,7 +42,7 @@ def _columns(log: Any) -> dict[str, NDArray[np.float64]]:
 def _numbers_of(name: str, values: Any) -> NDArray[np.float64]:
     try:
         column = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise TypeError(f"log: the column {name!r} holds no numbers; leave out what is none") from None
     if column.ndim != 1:
         raise ValueError(f"log: the column {name!r} has {column.ndim} dimensions, and no single row of numbers")

@@ -1,4 +1,4 @@
-//! What a linear analysis shows, in words.
+//! A linear analysis in words.
 
 use nalgebra::Complex;
 use std::f64::consts::PI;
@@ -50,7 +50,7 @@ fn plain(value: f64) -> String {
     engineering_ascii(value, "", 5)
 }
 
-/// What an output does in the long run.
+/// The gain of an output in the long run.
 pub fn gain(transfer: &Transfer, unit: &str, input: &str) -> String {
     let (order, gain) = transfer.low_frequency();
     // A unit with a blank or a slash goes in front, so that it cannot be misread.

@@ -14,24 +14,24 @@ use taut::design::Design;
 use taut::json::Moved;
 use taut::tune::trouble::Trouble;
 
-/// What is known of a move after it ran.
+/// A move after it ran.
 pub struct Done<'a> {
-    /// What was asked for.
+    /// The move as the case has it.
     pub motion: &'a Move,
-    /// What came of it.
+    /// Its run.
     pub run: MoveRun,
     /// Its curves, where plots are wanted.
     pub curves: Option<Curves>,
     /// With parameters wrong by a share: the largest cart error (m), and how many of how many settle.
     pub worst: Option<Worst>,
-    /// What is wrong with its loop.
+    /// The trouble of its loop, where it has one.
     pub trouble: Option<Trouble>,
     /// Its files, as paths within the folder.
     pub files: Vec<String>,
 }
 
 impl Done<'_> {
-    /// What the summary says of it.
+    /// The entry of the summary.
     pub fn told(&self) -> Moved<'_> {
         Moved {
             motion: self.motion,

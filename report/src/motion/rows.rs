@@ -1,4 +1,4 @@
-//! What a move shows, in words.
+//! A move in words.
 
 use super::{Done, Tried};
 use crate::simulate::{plain, time, value};
@@ -17,7 +17,7 @@ pub fn length(metres: f64) -> String {
     }
 }
 
-/// What the controller is, in a line.
+/// The controller in a line.
 pub fn controller(design: &Design, stage: &Stage) -> String {
     let mut words = vec![design.structure.name().to_string()];
     match design.feed_forward.model {

@@ -51,7 +51,7 @@ fn of_axis(r: f64) -> Vec<Source> {
     sources.into_iter().map(|(name, terms)| (name.to_string(), owned(terms))).collect()
 }
 
-/// What a log can show over the curves: the column, and whether it is an angle at the drive pulley, or its rate.
+/// Columns of a log that are shown over the curves, and whether it is an angle at the drive pulley, or its rate.
 const LOGGED: [(&str, bool); 6] = [
     ("drive_angle", true),
     ("cart_position", false),

@@ -22,9 +22,9 @@ use taut::reduction::Reduction;
 use taut::solve;
 use taut::stage::BeltModel;
 
-/// What is known of an experiment after it ran.
+/// An experiment after it ran.
 pub struct Run<'a> {
-    /// What was asked for.
+    /// The experiment as the case has it.
     pub experiment: &'a Experiment,
     /// Its events, how it ended, what it cost.
     pub outcome: solve::Outcome,
@@ -34,7 +34,7 @@ pub struct Run<'a> {
     pub curves: Option<Curves>,
     /// Its samples, where they and plots are wanted.
     pub samples: Option<Samples>,
-    /// What the machines of --draws do.
+    /// The band of the machines of --draws.
     pub band: Option<Band>,
     /// Its model of the belt.
     pub model: BeltModel,
@@ -47,7 +47,7 @@ pub struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// What the summary says of it.
+    /// The entry of the summary.
     pub fn told(&self) -> Simulated<'_> {
         Simulated {
             experiment: self.experiment,

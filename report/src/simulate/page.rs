@@ -44,7 +44,7 @@ pub fn repeated(page: &mut Page, text: &str) {
     page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
 }
 
-/// What was found, a row for each figure.
+/// The key figures, a row for each.
 pub fn figures_table(lines: Vec<(&'static str, String)>) -> Table {
     let mut table = Table::new("").column("Quantity", "").column("Value", "");
     for (name, value) in lines {

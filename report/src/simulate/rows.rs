@@ -1,4 +1,4 @@
-//! What a run shows, in words: rows of a name and what is told under it, for page and terminal alike.
+//! A run in words: rows of a name and a value, for page and terminal alike.
 
 use super::Run;
 use super::band::Band;
@@ -216,7 +216,7 @@ pub fn events(events: &[Event], solver: Solver) -> String {
     format!("{}: {}{by_rounding}", events.len(), each.join(", "))
 }
 
-/// What it took to compute.
+/// The cost of computing it.
 pub fn cost(cost: Cost) -> String {
     let work = match cost.evaluations {
         0 if cost.modes == 1 => format!("{} steps, 1 mode", cost.steps),

@@ -1,4 +1,4 @@
-//! What a sweep shows, in words.
+//! A sweep in words.
 
 use taut::case::Sampling;
 use taut::number::engineering;
@@ -30,7 +30,7 @@ pub fn plan(sweep: &Sweep) -> String {
     format!("{} runs{each}: {parameters}, {}{indices}", sweep.runs(), sweep.sampling().word())
 }
 
-/// What the influence of a figure is told by.
+/// The measure of influence that figures are told by.
 pub fn influence_heading(sweep: &Sweep) -> &'static str {
     match (sweep.indices(), sweep.sampling()) {
         (true, _) => "depends most on (S_T)",

@@ -10,7 +10,7 @@ use change::Change;
 use copy::{Ended, Program, Tree};
 use std::time::Instant;
 
-/// What is changed, and the programs of tests that concern it, the quickest to fail first. `lib` are the tests within the library.
+/// The places that are changed, and the programs of tests that concern them, the quickest to fail first. `lib` are the tests within the library.
 const AREAS: [(&str, &[&str]); 4] = [
     ("src/solve", SOLVER),
     ("src/friction", SOLVER),
@@ -64,7 +64,7 @@ pub fn run(count: usize, seed: u64, only: Option<usize>, list: bool) -> Result<(
     Ok(())
 }
 
-/// What the tests noticed.
+/// The score of the tests.
 #[derive(Default)]
 struct Score {
     failed: usize,

@@ -15,7 +15,7 @@ use taut::solve::{self, Course, Detail, ErrorEstimate, Flow, Solver, stream_mech
 use taut::trajectory::Trajectory;
 use taut_report::simulate::gantry::{Run, curves};
 
-/// What all runs of a command share.
+/// Settings that all runs of a command share.
 pub struct Setting<'a> {
     pub args: &'a Simulate,
     pub case: &'a GantryCase,

@@ -1,10 +1,10 @@
-//! What the modes of a gantry are, in words.
+//! The modes of a gantry in words.
 
 use taut::linear::{ElasticMode, GantryAnalysis, RigidMode, Root};
 use taut::mechanism::Mechanism;
 use taut::number::{engineering_ascii, fixed};
 
-/// What a rigid mode is called, and how the pulleys turn in it.
+/// The name of a rigid mode, and how the pulleys turn in it.
 pub fn rigid(analysis: &GantryAnalysis, mechanism: &Mechanism, mode: &RigidMode) -> (&'static str, String) {
     let ways =
         analysis.modes.bodies.iter().zip(&mode.shape).filter(|(body, _)| **body != mode.body).map(|(body, way)| {
@@ -20,7 +20,7 @@ pub fn rigid(analysis: &GantryAnalysis, mechanism: &Mechanism, mode: &RigidMode)
     (body.label.name, format!("per {}: {}", body.kind.units()[0], ways.join(", ")))
 }
 
-/// What damps the rigid modes: the poles that do not swing, integrators apart.
+/// The damping of the rigid modes: the poles that do not swing, integrators apart.
 pub fn slow(analysis: &GantryAnalysis) -> impl Iterator<Item = Root> {
     analysis.modes.poles.iter().copied().filter(|root| matches!(root, Root::Real(_)))
 }

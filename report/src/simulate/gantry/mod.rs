@@ -15,9 +15,9 @@ use taut::json::GantrySimulated;
 use taut::metrics::GantryMetrics;
 use taut::solve;
 
-/// What is known of an experiment after it ran.
+/// An experiment after it ran.
 pub struct Run<'a> {
-    /// What was asked for.
+    /// The experiment as the case has it.
     pub experiment: &'a GantryExperiment,
     /// Its events, how it ended, what it cost.
     pub outcome: solve::Outcome,
@@ -32,7 +32,7 @@ pub struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// What the summary says of it.
+    /// The entry of the summary.
     pub fn told(&self) -> GantrySimulated<'_> {
         let Run { experiment, outcome, metrics, files, .. } = self;
         GantrySimulated { experiment, outcome, metrics, files }

@@ -37,7 +37,7 @@ pub fn page(
     page
 }
 
-/// What all runs of a page share.
+/// Settings that all runs of a page share.
 struct Setting<'a> {
     case: &'a GantryCase,
     mechanism: &'a Mechanism,

@@ -1,4 +1,4 @@
-//! What a run shows, in words: rows of a name and what is told under it.
+//! A run in words: rows of a name and a value.
 
 use super::Run;
 use crate::simulate::rows::{self, accuracy, cost, events, speed, time, travel, value};
@@ -11,7 +11,7 @@ use taut::stage::gantry::{Gantry, Routing};
 const LEAST_LENGTH: f64 = 1e-13;
 const LEAST_FORCE: f64 = 1e-9;
 
-/// What the machine is, in a line.
+/// The machine in a line.
 pub fn machine(gantry: &Gantry) -> String {
     let belts = match gantry.routing {
         Routing::HFrame => "one belt round both drives",

@@ -15,7 +15,7 @@ pub struct Change {
     line: usize,
     /// The function it is in.
     within: String,
-    /// What is changed, in bytes.
+    /// The place of the change, in bytes.
     pub place: Range<usize>,
     was: String,
     will: String,
@@ -129,7 +129,7 @@ impl Finder<'_> {
         self.within.pop();
     }
 
-    /// What the condition of an `if` or a `while` may be instead.
+    /// Replacements of the condition of an `if` or a `while`.
     fn condition(&mut self, condition: &Expr) {
         let text = self.text_of(condition);
         let has_pattern = text.split(|c: char| !c.is_alphanumeric()).any(|word| word == "let");
@@ -152,7 +152,7 @@ fn defaults(kind: &str) -> &'static [&'static str] {
     }
 }
 
-/// What a binary operator may be instead.
+/// Replacements of a binary operator.
 fn others(operator: &BinOp) -> &'static [&'static str] {
     match operator {
         BinOp::Lt(_) => &["<=", ">"],

@@ -19,7 +19,7 @@ pub fn on(k: usize) -> bool {
 }
 ";
 
-/// What the library is built with.
+/// The features that the library is built with.
 const FEATURES: &str = "json,parquet";
 
 /// Memory that a program of tests may take, KiB: a change may make a loop that collects for ever.
