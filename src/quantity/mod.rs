@@ -12,12 +12,16 @@
 
 mod cursor;
 mod dimension;
+mod numeral;
+mod product;
 mod units;
 
 pub use dimension::Dimension;
 
 use crate::error::{Error, Result};
-use cursor::{Cursor, Number, Product};
+use cursor::Cursor;
+use numeral::Number;
+use product::Product;
 use std::f64::consts::PI;
 
 /// The advice for a text that is no quantity at all.
