@@ -1,7 +1,7 @@
 //! Numbers for people: significant digits, engineering prefixes, a true minus sign.
 //!
 //! The plain functions are for prose and drawings (`−12.5 µm`, with a no-break space before the
-//! unit); those called `ascii` are for terminals and files (`-12.5 um`).
+//! unit); those called `typed` are for terminals (`-12.5 µm`).
 
 const MINUS: char = '−';
 const NO_BREAK: char = '\u{a0}';
@@ -30,15 +30,13 @@ pub fn engineering(value: f64, unit: &str, digits: usize) -> String {
     format!("{number}{space}{prefix}{}", pretty_unit(unit).replace(' ', &NO_BREAK.to_string()))
 }
 
-/// As [`engineering`], in ASCII: `-0.7 um`, `0.71 ohm`, `6.3e-5 kg m^2`.
+/// As [`engineering`], for terminals: `-0.7 µm`, `0.71 Ω`, `6.3e-5 kg m²`.
 ///
 /// ```
-/// assert_eq!(taut::number::engineering_ascii(-1.25e-6, "m", 3), "-1.25 um");
+/// assert_eq!(taut::number::engineering_typed(-1.25e-6, "m", 3), "-1.25 µm");
 /// ```
-pub fn engineering_ascii(value: f64, unit: &str, digits: usize) -> String {
-    let (number, prefix) = scaled(value, unit, digits);
-    let text = if unit.is_empty() { number } else { format!("{number} {prefix}{unit}") };
-    ascii(&text)
+pub fn engineering_typed(value: f64, unit: &str, digits: usize) -> String {
+    typed(&engineering(value, unit, digits))
 }
 
 /// `value` with exactly `digits` significant digits, zeros kept: `0.2000`, `−19.04`, `1.50×10⁻⁷`.
@@ -86,28 +84,18 @@ pub fn pretty_unit(unit: &str) -> String {
     out.replace("ohm", "Ω")
 }
 
-/// The same text without characters beyond ASCII, as far as numbers and units go.
-pub fn ascii(text: &str) -> String {
+/// The same text with spaces, minus signs and powers of ten as they are typed, so that a terminal and `grep` find them.
+pub fn typed(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut exponent = false;
     for c in text.replace("×10", "e").chars() {
-        if let Some(i) = "⁰¹²³⁴⁵⁶⁷⁸⁹⁻".chars().position(|s| s == c) {
-            if !exponent && !out.ends_with('e') {
-                out.push('^');
-            }
-            exponent = true;
-            out.push(b"0123456789-"[i] as char);
-            continue;
-        }
-        exponent = false;
-        match c {
-            MINUS => out.push('-'),
-            NO_BREAK | '\u{202f}' => out.push(' '),
-            'µ' | 'μ' => out.push('u'),
-            'Ω' => out.push_str("ohm"),
-            '·' => out.push('*'),
-            '°' => out.push_str("deg"),
-            other => out.push(other),
+        let digit = "⁰¹²³⁴⁵⁶⁷⁸⁹⁻".chars().position(|s| s == c).filter(|_| exponent || out.ends_with('e'));
+        exponent = digit.is_some();
+        match (digit, c) {
+            (Some(i), _) => out.push(b"0123456789-"[i] as char),
+            (None, MINUS) => out.push('-'),
+            (None, NO_BREAK | '\u{202f}') => out.push(' '),
+            (None, other) => out.push(other),
         }
     }
     out
@@ -216,8 +204,8 @@ mod tests {
         assert_eq!(e(f64::NAN, "m", 3), "not a number m");
         assert_eq!(e(5.5626e-6, "m^2", 5), "5.5626×10⁻⁶ m²");
         assert_eq!(e(-0.0, "m", 3), "0 m");
-        assert_eq!(engineering_ascii(6.3e-5, "kg m^2", 2), "6.3e-5 kg m^2");
-        assert_eq!(engineering_ascii(0.71, "Ω", 2), "0.71 ohm");
+        assert_eq!(engineering_typed(6.3e-5, "kg m^2", 2), "6.3e-5 kg m²");
+        assert_eq!(engineering_typed(0.71, "ohm", 2), "0.71 Ω");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::Operation;
 use crate::friction::Law;
 use crate::mechanism::Mechanism;
-use crate::number::engineering_ascii;
+use crate::number::engineering_typed;
 use crate::stage::axis::{BODIES, CART};
 use crate::stage::{BeltModel, Stage};
 
@@ -20,7 +20,7 @@ pub fn assumptions(stage: &Stage, operation: Operation) -> Vec<String> {
     words.extend(sliding(&plant, operation, &moving));
     words.extend(curves(&plant, operation, &moving));
     if stage.cart.along.is_some() && moving.contains(&plant.leader(CART)) {
-        let at = engineering_ascii(operation.position, "m", 4);
+        let at = engineering_typed(operation.position, "m", 4);
         words.push(format!("friction that changes along the travel is taken as it is at x = {at}, and not followed"));
     }
     let amplifier = &stage.amplifier;
@@ -28,7 +28,7 @@ pub fn assumptions(stage: &Stage, operation: Operation) -> Vec<String> {
         words.push("the amplifier is taken within its limits".into());
     }
     if let Some(play) = stage.motor.gear_play.filter(|play| play.backlash > 0.0) {
-        let width = engineering_ascii(play.backlash, "rad", 3);
+        let width = engineering_typed(play.backlash, "rad", 3);
         words.push(format!(
             "the gear is taken with its driving flank in contact; within its play of {width} the motor moves nothing but its rotor"
         ));
@@ -75,14 +75,14 @@ fn sliding(plant: &Mechanism, operation: Operation, moving: &[usize]) -> Option<
         let most = plant.friction(*body).breakaway(operation.speed >= 0.0);
         let [_, _, unit] = plant.bodies[*body].kind.units();
         let name = plant.bodies[*body].label.name;
-        (most > 0.0).then(|| format!("{name} up to {}", engineering_ascii(most, unit, 4)))
+        (most > 0.0).then(|| format!("{name} up to {}", engineering_typed(most, unit, 4)))
     };
     let way = if operation.speed >= 0.0 { "forward" } else { "backward" };
     let holds: Vec<String> = moving.iter().filter_map(breakaway).collect();
     let curve = members(plant, moving).any(|body| plant.bodies[body].friction.law != Law::Coulomb);
     let pace = match operation.speed == 0.0 {
         true => "in the limit of zero speed".to_string(),
-        false => format!("at {}", engineering_ascii(operation.speed.abs(), "m/s", 4)),
+        false => format!("at {}", engineering_typed(operation.speed.abs(), "m/s", 4)),
     };
     Some(match (holds.is_empty(), operation.speed == 0.0) {
         _ if moving.is_empty() => "nothing is left to move but the current and the rotor".into(),
@@ -121,7 +121,7 @@ fn curves(plant: &Mechanism, operation: Operation, moving: &[usize]) -> Vec<Stri
             }
             Law::Stribeck { .. } | Law::Smooth { .. } => {
                 let slope = friction.slope(speed);
-                let told = engineering_ascii(slope, unit, 4);
+                let told = engineering_typed(slope, unit, 4);
                 let falls = if slope < 0.0 { ": it falls with speed, which feeds oscillations" } else { "" };
                 Some(format!("friction of the {name} has the slope {told} at this speed{falls}"))
             }

@@ -4,7 +4,7 @@ use crate::terminal::bold;
 use std::fmt::Write;
 use taut::linear::Analysis;
 use taut::linear::{Discrete, Place, Root};
-use taut::number::{ascii, engineering_ascii};
+use taut::number::{engineering_typed, typed};
 use taut_report::modes::{along, gain, pole, poles, words, z, zeros};
 
 /// Rows of the table of the travel.
@@ -53,12 +53,12 @@ fn travel(text: &mut String, analysis: &Analysis) {
     };
     let list = |values: Vec<f64>| match values.is_empty() {
         true => "none".to_string(),
-        false => format!("{} Hz", values.iter().map(|v| engineering_ascii(*v, "", 4)).collect::<Vec<_>>().join(", ")),
+        false => format!("{} Hz", values.iter().map(|v| engineering_typed(*v, "", 4)).collect::<Vec<_>>().join(", ")),
     };
     let pairs = |roots: &[Root]| list(roots.iter().filter_map(|root| root.hertz()).collect());
     for place in rows {
         let position = if analysis.travel.is_some() {
-            ascii(&format!("{:.1} mm", place.position * 1e3))
+            typed(&format!("{:.1} mm", place.position * 1e3))
         } else {
             "anywhere".into()
         };
@@ -77,9 +77,9 @@ fn discrete(text: &mut String, model: &Discrete) {
     let _ = write!(text, "\n{}\n", bold("Discrete-time model"));
     let late = match model.delay {
         0.0 => String::new(),
-        delay => format!(", input late by {}", engineering_ascii(delay, "s", 5)),
+        delay => format!(", input late by {}", engineering_typed(delay, "s", 5)),
     };
-    let (time, states) = (engineering_ascii(model.sample_time, "s", 5), model.states.len());
+    let (time, states) = (engineering_typed(model.sample_time, "s", 5), model.states.len());
     let _ = writeln!(text, "  sample time {time}, {}{late}; {states} states", model.hold.words());
     let poles: Vec<String> = model.poles().iter().filter(|z| z.im >= 0.0).map(z).collect();
     let _ = writeln!(text, "  poles z = {}", poles.join(", "));

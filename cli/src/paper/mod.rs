@@ -113,7 +113,7 @@ fn table(claims: &[Claim]) -> String {
     for (kind, heading) in groups {
         text += &format!("{heading}\n");
         for claim in claims.iter().filter(|c| c.kind == kind) {
-            let found = taut::number::ascii(&words::found(claim)).replace('×', "x");
+            let found = taut::number::typed(&words::found(claim)).replace('×', "x");
             text += &format!("  {:width$}  {:<23}  {found}\n", claim.id, claim.verdict().word());
         }
         text += "\n";

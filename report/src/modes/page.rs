@@ -5,7 +5,7 @@ use crate::drawing::stage_drawing;
 use crate::page::{Callout, Cell, Page, Table};
 use crate::simulate::Named;
 use taut::linear::Analysis;
-use taut::number::{engineering, engineering_ascii};
+use taut::number::{engineering, engineering_typed};
 
 /// The page.
 pub fn page(analysis: &Analysis, figures: &[Named]) -> Page {
@@ -53,7 +53,7 @@ pub fn page(analysis: &Analysis, figures: &[Named]) -> Page {
         for value in model.poles().iter().filter(|value| value.im >= 0.0) {
             rows.row([
                 Cell::from(printed(&z(value)).replace("+/−", "±")),
-                Cell::from(engineering_ascii(value.norm(), "", 6)),
+                Cell::from(engineering_typed(value.norm(), "", 6)),
             ]);
         }
         page.table(&rows);

@@ -4,7 +4,7 @@ use nalgebra::Complex;
 use std::f64::consts::PI;
 use taut::linear::Analysis;
 use taut::linear::{Root, Transfer};
-use taut::number::engineering_ascii;
+use taut::number::engineering_typed;
 use taut::stage::BeltModel;
 
 /// Of each pole or pair, the slowest first.
@@ -29,8 +29,8 @@ pub fn pole(root: Root) -> (String, String) {
             format!("{} Hz ({} rad/s)", plain(frequency / (2.0 * PI)), plain(frequency)),
             format!(
                 "damping {}, {} {}, damped frequency {} Hz",
-                plain(damping),
-                if damping >= 0.0 { "time constant" } else { "grows in" },
+                plain(shown_damping(damping)),
+                if shown_damping(damping) >= 0.0 { "time constant" } else { "grows in" },
                 time(root),
                 plain(root.damped_hertz().unwrap_or(0.0))
             ),
@@ -38,23 +38,28 @@ pub fn pole(root: Root) -> (String, String) {
     }
 }
 
+/// A damping ratio without the rounding of an undamped mode.
+fn shown_damping(damping: f64) -> f64 {
+    if damping.abs() < 1e-12 { 0.0 } else { damping }
+}
+
 fn time(root: Root) -> String {
     match root.time_constant() {
-        t if t.is_finite() => engineering_ascii(t, "s", 4),
+        t if t.is_finite() && t < 1e12 => engineering_typed(t, "s", 4),
         _ => "infinite".into(),
     }
 }
 
-/// Five digits, in ASCII.
+/// Five digits.
 fn plain(value: f64) -> String {
-    engineering_ascii(value, "", 5)
+    engineering_typed(value, "", 5)
 }
 
 /// The gain of an output in the long run.
 pub fn gain(transfer: &Transfer, unit: &str, input: &str) -> String {
     let (order, gain) = transfer.low_frequency();
     // A unit with a blank or a slash goes in front, so that it cannot be misread.
-    let value = |gain: f64, unit: &str| format!("{} per {input}", engineering_ascii(gain, unit, 5));
+    let value = |gain: f64, unit: &str| format!("{} per {input}", engineering_typed(gain, unit, 5));
     match order {
         _ if transfer.zeros.gain == 0.0 => "the input does not reach it".into(),
         0 => format!("DC gain {}", value(gain, unit)),
@@ -78,7 +83,11 @@ pub fn zeros(transfer: &Transfer) -> String {
         Root::Zero => "0".into(),
         Root::Real(s) => format!("{} 1/s", plain(s)),
         Root::Pair { frequency, damping } => {
-            format!("{} Hz (damping {})", plain(frequency / (2.0 * PI)), engineering_ascii(damping, "", 3))
+            format!(
+                "{} Hz (damping {})",
+                plain(frequency / (2.0 * PI)),
+                engineering_typed(shown_damping(damping), "", 3)
+            )
         }
     };
     Root::of(&transfer.zeros.values).into_iter().map(one).collect::<Vec<_>>().join(", ")
@@ -87,8 +96,8 @@ pub fn zeros(transfer: &Transfer) -> String {
 /// A point of the z plane; of a pair both.
 pub fn z(value: &Complex<f64>) -> String {
     match value.im {
-        0.0 => engineering_ascii(value.re, "", 6),
-        im => format!("{} ± {}j", engineering_ascii(value.re, "", 6), engineering_ascii(im, "", 6)).replace('±', "+/-"),
+        0.0 => engineering_typed(value.re, "", 6),
+        im => format!("{} ± {}j", engineering_typed(value.re, "", 6), engineering_typed(im, "", 6)).replace('±', "+/-"),
     }
 }
 

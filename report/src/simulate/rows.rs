@@ -11,12 +11,12 @@ use taut::stage::BeltModel;
 
 /// A value with its unit for people, spaces and signs as a terminal and `grep` like them.
 pub fn value(value: f64, unit: &str) -> String {
-    number::engineering(value, unit, 5).replace(['\u{a0}', '\u{202f}'], " ").replace('−', "-")
+    number::engineering_typed(value, unit, 5)
 }
 
 /// A number with so many decimals, and never `-0.00`.
 pub fn plain(value: f64, decimals: usize) -> String {
-    number::fixed(value, decimals).replace('−', "-").replace('\u{202f}', " ")
+    number::typed(&number::fixed(value, decimals))
 }
 
 /// A length of travel in mm, far ones in m.
@@ -115,7 +115,7 @@ pub fn lines(run: &Run, solver: Solver) -> Vec<(&'static str, String)> {
 /// By how much positions may be off.
 pub fn accuracy(error: Option<PositionError>, solver: Solver) -> String {
     let Some(error) = error else { return "not estimated".into() };
-    let rounded = number::engineering(error.value, "m", 2).replace(['\u{a0}', '\u{202f}'], " ");
+    let rounded = number::engineering_typed(error.value, "m", 2);
     match solver {
         Solver::Exact => format!("positions within {rounded}, by a bound of rounding"),
         _ => format!("positions within some {rounded}, by a second run with ten times the tolerance"),

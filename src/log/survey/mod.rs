@@ -13,7 +13,7 @@ pub use motion::{Motion, Steady};
 pub use timing::{Gap, Timing};
 
 use super::{Log, Quantity};
-use crate::number::engineering_ascii;
+use crate::number::engineering_typed;
 use crate::stage::Stage;
 use std::fmt;
 
@@ -156,7 +156,7 @@ impl fmt::Display for Survey {
 
 /// A value for messages.
 fn shown(value: f64, unit: &str) -> String {
-    engineering_ascii(value, unit, 4)
+    engineering_typed(value, unit, 4)
 }
 
 fn percent(part: f64) -> String {

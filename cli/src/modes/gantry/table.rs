@@ -3,7 +3,7 @@
 use crate::terminal::bold;
 use std::fmt::Write;
 use taut::linear::{GantryAnalysis, ResonanceMap};
-use taut::number::{ascii, engineering_ascii, fixed};
+use taut::number::{engineering_typed, fixed, typed};
 use taut_report::modes::gantry::{elastic, over_the_area, rigid, slow};
 use taut_report::modes::pole;
 use taut_report::simulate::gantry::machine;
@@ -22,7 +22,7 @@ pub fn text(analysis: &GantryAnalysis) -> String {
     let _ = write!(text, "\n{}\n", bold("Rigid modes"));
     for mode in &analysis.modes.rigid {
         let (name, ways) = rigid(analysis, &mechanism, mode);
-        let _ = writeln!(text, "  {name:<12}{}", ascii(&ways));
+        let _ = writeln!(text, "  {name:<12}{}", typed(&ways));
     }
     for root in slow(analysis) {
         let (value, more) = pole(root);
@@ -31,9 +31,9 @@ pub fn text(analysis: &GantryAnalysis) -> String {
     let _ = write!(text, "\n{}\n", bold("Elastic modes"));
     for mode in &analysis.modes.elastic {
         let [frequency, damping, shape, energy] = elastic(analysis, &mechanism, mode);
-        let _ = writeln!(text, "  {:<12}{}", ascii(&frequency), ascii(&damping));
-        let _ = writeln!(text, "  {:<12}{}", "", ascii(&shape));
-        let _ = writeln!(text, "  {:<12}{}", "", ascii(&energy));
+        let _ = writeln!(text, "  {:<12}{}", typed(&frequency), typed(&damping));
+        let _ = writeln!(text, "  {:<12}{}", "", typed(&shape));
+        let _ = writeln!(text, "  {:<12}{}", "", typed(&energy));
     }
     let _ = write!(text, "\n{}\n", bold("Over the working area"));
     let _ = writeln!(text, "  {}", over_the_area(analysis));
@@ -47,10 +47,10 @@ pub fn text(analysis: &GantryAnalysis) -> String {
 /// The frequencies of each mode at a few places.
 fn area(text: &mut String, map: &ResonanceMap) {
     let picked = |count: usize| (0..PLACES).map(move |k| k * (count - 1) / (PLACES - 1));
-    let place = |metres: f64| ascii(&format!("{} mm", fixed(1e3 * metres, 1)));
+    let place = |metres: f64| typed(&format!("{} mm", fixed(1e3 * metres, 1)));
     for (k, hertz) in map.hertz.iter().enumerate() {
         let [(least, _), (most, _)] = map.range(k);
-        let [least, most] = [least, most].map(|hertz| engineering_ascii(hertz, "", 4));
+        let [least, most] = [least, most].map(|hertz| engineering_typed(hertz, "", 4));
         let _ = writeln!(text, "\n  elastic mode {}, Hz: from {least} to {most}", k + 1);
         let columns: Vec<String> = picked(map.cart.len()).map(|j| format!("{:>11}", place(map.cart[j]))).collect();
         let _ = writeln!(text, "  {:>12}{}", "x \\ y", columns.concat());

@@ -2,7 +2,7 @@
 
 use taut::linear::{ElasticMode, GantryAnalysis, RigidMode, Root};
 use taut::mechanism::Mechanism;
-use taut::number::{engineering_ascii, fixed};
+use taut::number::{engineering_typed, fixed};
 
 /// The name of a rigid mode, and how the pulleys turn in it.
 pub fn rigid(analysis: &GantryAnalysis, mechanism: &Mechanism, mode: &RigidMode) -> (&'static str, String) {
@@ -30,9 +30,9 @@ pub fn elastic(analysis: &GantryAnalysis, mechanism: &Mechanism, mode: &ElasticM
     let damping = match mode.damped {
         Some(root @ Root::Pair { damping, .. }) => format!(
             "damping {}, time constant {}, damped frequency {} Hz",
-            engineering_ascii(damping, "", 4),
-            engineering_ascii(root.time_constant(), "s", 4),
-            engineering_ascii(root.damped_hertz().unwrap_or(0.0), "", 5)
+            engineering_typed(damping, "", 4),
+            engineering_typed(root.time_constant(), "s", 4),
+            engineering_typed(root.damped_hertz().unwrap_or(0.0), "", 5)
         ),
         _ => "damped so much that not every mode swings".into(),
     };
@@ -47,7 +47,7 @@ pub fn elastic(analysis: &GantryAnalysis, mechanism: &Mechanism, mode: &ElasticM
     let energy: Vec<String> =
         shares.map(|(body, share)| format!("{} {} %", name(*body), fixed(100.0 * share, 0))).collect();
     [
-        format!("{} Hz", engineering_ascii(mode.hertz(), "", 5)),
+        format!("{} Hz", engineering_typed(mode.hertz(), "", 5)),
         damping,
         format!("ways at the belt: {}", shape.join(", ")),
         format!("energy: {}", energy.join(", ")),

@@ -3,7 +3,7 @@
 use super::Run;
 use crate::simulate::rows::{self, accuracy, cost, events, speed, time, travel, value};
 use taut::metrics::{GantryMetrics, Peak};
-use taut::number::engineering_ascii;
+use taut::number::engineering_typed;
 use taut::solve::{Ending, Solver};
 use taut::stage::gantry::{Gantry, Routing};
 
@@ -17,7 +17,7 @@ pub fn machine(gantry: &Gantry) -> String {
         Routing::HFrame => "one belt round both drives",
         Routing::CoreXy => "a belt for each drive",
     };
-    let short = |value: f64, unit: &str| engineering_ascii(value, unit, 4);
+    let short = |value: f64, unit: &str| engineering_typed(value, unit, 4);
     let stiffness: Vec<String> = gantry.belts.stiffness.iter().map(|k| short(*k, "N/m")).collect();
     let follow = if gantry.belts.follows.is_some() { " at x = y = 0, following bridge and cart" } else { "" };
     format!(
