@@ -16,6 +16,8 @@ pub struct Equations {
     pub stiffness: [f64; SPRINGS],
     /// Conditions under which these equations hold.
     pub guards: Vec<Guard>,
+    /// All that acts on each body that moves by itself, and on those that move with it, but friction: N or N m.
+    pub load: [Form; BODIES],
 }
 
 impl Mechanism {
@@ -132,6 +134,19 @@ impl Mechanism {
         inertia
     }
 
+    /// Inertias by which springs give to one body what they take from another. A gear that gives way and loses power puts 1/e of its
+    /// torque on the rotor, J_r φ̈_r = τ − T/e, which is e J_r φ̈_r = e τ − T.
+    pub(crate) fn balanced_inertia(&self, equations: &Equations, mode: &Mode) -> [f64; BODIES] {
+        let mut inertia = equations.inertia;
+        for (index, drive) in self.drives.iter().enumerate().filter(|(_, drive)| drive.loses()) {
+            if let Some(spring) = self.gear_spring(index) {
+                let forward = mode.motion[drive.shaft] != Motion::Backward;
+                inertia[drive.shaft] /= self.gear_share(drive.shaft, spring, forward, mode);
+            }
+        }
+        inertia
+    }
+
     /// Inertia that moves with a body, itself included, per unit of its own way.
     pub(crate) fn mass(&self, leader: usize, inertia: &[f64; BODIES]) -> f64 {
         self.followers(leader).map(|b| self.ratio(b).powi(2) * inertia[b]).sum()
@@ -142,11 +157,13 @@ impl Mechanism {
         let mut acceleration = [Form::ZERO; BODIES];
         let inertia = self.inertia(&mode);
         let mut guards = Vec::with_capacity(7);
+        let mut loads = [Form::ZERO; BODIES];
         for body in self.leaders() {
             let speed = Form::speed(body);
             let motion = mode.motion[body];
             let law = self.friction(body);
             let load = self.load(body, motion != Motion::Backward, &mode);
+            loads[body] = load;
             let mass = self.mass(body, &inertia);
             // J φ̈ = load − F_f, with F_f = b v ± F_c                             (15)-(18)
             let sliding = |side: Side, sign: f64| {
@@ -191,7 +208,7 @@ impl Mechanism {
         for (drive, rate) in current_rate.iter_mut().enumerate().take(self.drives.len()) {
             *rate = self.current_rate(drive, &mode);
         }
-        Equations { acceleration, current_rate, inertia, stiffness: self.stiffness_in(&mode), guards }
+        Equations { acceleration, current_rate, inertia, stiffness: self.stiffness_in(&mode), guards, load: loads }
     }
 
     /// Friction force (N) or torque (N m) on a body: what its law gives while it slides, what holds it while it is stuck.

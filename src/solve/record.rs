@@ -47,8 +47,7 @@ pub(crate) struct Recorder<'a> {
     grid: Grid,
     pub(crate) detail: Detail,
     columns: Columns,
-    /// How many numbers a row has, and where the inputs stand.
-    stride: usize,
+    /// Where the inputs stand in a row.
     inputs: [usize; DRIVES],
     /// How many rows there are; those behind the ones that are written out are like the last of them.
     count: usize,
@@ -93,8 +92,7 @@ impl<'a> Recorder<'a> {
             grid,
             detail,
             block: Trajectory { columns: mechanism.columns.iter().filter(shown).map(empty).collect() },
-            columns: Columns::new(mechanism, layout, inputs, detail),
-            stride,
+            columns: Columns::new(mechanism, layout, (stride, inputs), detail),
             inputs,
             count: 0,
             written: 0,
@@ -120,7 +118,7 @@ impl<'a> Recorder<'a> {
     pub(crate) fn segment(&mut self, taken: u64, coordinates: &Coordinates, mode: &Mode) {
         if self.detail != Detail::None && self.taken != Some(taken) {
             self.taken = Some(taken);
-            let sheet = self.sheets.of(&self.mechanism, mode);
+            let sheet = self.sheets.of(&self.mechanism, &self.columns.places, mode);
             self.segments.push(Segment { start: self.count, sheet, coordinates: coordinates.clone() });
         }
     }
@@ -132,12 +130,23 @@ impl<'a> Recorder<'a> {
             self.rows += 1;
             return;
         }
-        debug_assert_eq!(N, self.stride);
+        self.room::<N>()[0] = *row;
+        self.take(1);
+    }
+
+    /// Room for rows up to the end of the block, at least one; [`Recorder::take`] takes those that were put there.
+    #[inline]
+    pub(crate) fn room<const N: usize>(&mut self) -> &mut [[f64; N]] {
         if self.written != self.count {
             self.write_out();
         }
-        self.columns.push(self.count, row);
-        self.count += 1;
+        self.columns.rows(self.count)
+    }
+
+    /// Takes so many rows out of the room for them.
+    #[inline]
+    pub(crate) fn take(&mut self, rows: usize) {
+        self.count += rows;
         self.written = self.count;
         if self.count == BLOCK {
             self.hand_on();
@@ -181,7 +190,9 @@ impl<'a> Recorder<'a> {
             row[self.layout.speed[body]] = inner.speed[body];
         }
         for drive in 0..self.layout.inputs {
-            row[self.layout.current[drive]] = inner.current[drive];
+            if let Some(place) = self.layout.current[drive] {
+                row[place] = inner.current[drive];
+            }
             row[self.inputs[drive]] = input[drive];
         }
         self.push(&row);

@@ -40,16 +40,16 @@ pub(super) struct Sheets {
 
 impl Sheets {
     /// The number of the sheet of a mode, made ready if it is new.
-    pub(super) fn of(&mut self, mechanism: &Mechanism, mode: &Mode) -> usize {
+    pub(super) fn of(&mut self, mechanism: &Mechanism, places: &Places, mode: &Mode) -> usize {
         if let Some(known) = self.sheets.iter().position(|sheet| sheet.mode == *mode) {
             return known;
         }
         let elements = self.elements.iter().position(|elements| same_elements(&elements.mode, mode));
         let elements = elements.unwrap_or_else(|| {
-            self.elements.push(Elements::new(mechanism, mode));
+            self.elements.push(Elements::new(mechanism, places, mode));
             self.elements.len() - 1
         });
-        let friction = (0..mechanism.bodies.len()).map(|body| Held::new(mechanism, body, mode)).collect();
+        let friction = (0..mechanism.bodies.len()).map(|body| Held::new(mechanism, places, body, mode)).collect();
         self.sheets.push(Sheet { mode: *mode, elements, friction });
         self.sheets.len() - 1
     }
@@ -61,8 +61,7 @@ fn same_elements(a: &Mode, b: &Mode) -> bool {
 }
 
 impl Elements {
-    fn new(mechanism: &Mechanism, mode: &Mode) -> Self {
-        let places = Places::of(mechanism);
+    fn new(mechanism: &Mechanism, places: &Places, mode: &Mode) -> Self {
         let springs = 0..mechanism.springs.len();
         let drives = 0..mechanism.drives.len();
         let contact = |spring: usize| {
@@ -83,8 +82,7 @@ impl Elements {
 }
 
 impl Held {
-    fn new(mechanism: &Mechanism, body: usize, mode: &Mode) -> Self {
-        let places = Places::of(mechanism);
+    fn new(mechanism: &Mechanism, places: &Places, body: usize, mode: &Mode) -> Self {
         let law = mechanism.friction(body);
         let sliding = |viscous: f64, dry: f64| Held::Form(Sum::of([(places.speed(body), viscous)], dry));
         match mode.motion[body] {
@@ -98,7 +96,7 @@ impl Held {
                 let loses = |own: usize| drives(own).any(|drive| drive.loses() && !drive.has_rotor());
                 match mechanism.followers(body).any(loses) {
                     true => Held::Between,
-                    false => Held::Form(load(mechanism, &places, body)),
+                    false => Held::Form(load(mechanism, places, body)),
                 }
             }
         }
