@@ -143,6 +143,22 @@ impl Layout {
         row
     }
 
+    /// The same into the places of a vector: lengths as coordinates, speeds and currents.
+    #[inline]
+    pub(crate) fn put(&self, form: &Form, row: &mut [f64]) {
+        for body in 0..self.bodies {
+            row[self.speed[body]] = form.speed[body];
+        }
+        for &(spring, body, weight) in &self.terms {
+            row[self.coordinate[body]] += form.stretch[spring] * weight;
+        }
+        for (place, current) in self.current.iter().zip(form.current) {
+            if let Some(place) = place {
+                row[*place] = current;
+            }
+        }
+    }
+
     /// By how much each spring gets longer per unit of each coordinate: (body in whose place it stands, weight).
     pub(crate) fn weights(&self, spring: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         self.terms.iter().filter(move |term| term.0 == spring).map(|&(_, body, weight)| (body, weight))

@@ -53,15 +53,8 @@ impl Space {
     fn row<const N: usize>(&self, form: &Form) -> [f64; N] {
         let layout = &self.layout;
         let mut row = [0.0; N];
-        let on = layout.on_coordinates(form);
-        for body in 0..layout.bodies() {
-            row[layout.coordinate[body]] = on.position[body];
-            row[layout.speed[body]] = on.speed[body];
-        }
+        layout.put(form, &mut row);
         for drive in 0..layout.inputs {
-            if let Some(place) = layout.current[drive] {
-                row[place] = on.current[drive];
-            }
             row[self.chain(drive, 0)] = form.input[drive];
         }
         row[N - 1] = form.constant;
@@ -208,17 +201,30 @@ impl<const N: usize> Room<N> {
     }
 }
 
+/// Guards side by side.
+#[derive(Clone)]
+struct Beside<const N: usize> {
+    rows: Lanes<N>,
+    /// How fast their values can change: per unit of √(2V), mechanical and magnetic, and of the inputs' rates.
+    mechanical: [f64; LANES],
+    magnetic: [f64; LANES],
+    at_once: [[f64; LANES]; DRIVES],
+}
+
 /// The forms of some rows, side by side.
-fn lanes<const N: usize>(rows: &[[f64; N]]) -> Vec<Lanes<N>> {
-    let beside = |rows: &[[f64; N]]| {
-        std::array::from_fn(|place| std::array::from_fn(|lane| rows.get(lane).map_or(0.0, |row| row[place])))
-    };
-    rows.chunks(LANES).map(beside).collect()
+fn lanes<const N: usize>(rows: &[[f64; N]]) -> impl Iterator<Item = Lanes<N>> + '_ {
+    rows.chunks(LANES).map(|rows| {
+        let mut lanes = [[0.0; LANES]; N];
+        for (lane, row) in rows.iter().enumerate() {
+            lanes.iter_mut().zip(row).for_each(|(place, weight)| place[lane] = *weight);
+        }
+        lanes
+    })
 }
 
 /// The values of forms side by side.
 #[inline(always)]
-fn beside<const N: usize>(lanes: &Lanes<N>, z: &[f64; N]) -> [f64; LANES] {
+fn side_by_side<const N: usize>(lanes: &Lanes<N>, z: &[f64; N]) -> [f64; LANES] {
     let mut sum = [0.0; LANES];
     for (weights, factor) in lanes.iter().zip(z) {
         for (sum, weight) in sum.iter_mut().zip(weights) {
@@ -233,11 +239,7 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     pub(super) mode: Mode,
     pub(super) guards: Vec<Watch<N>>,
     /// The same side by side.
-    beside: Vec<Lanes<N>>,
-    /// How fast their values can change: per unit of √(2V), mechanical and magnetic, and of the inputs' rates.
-    mechanical: Values,
-    magnetic_dual: Values,
-    at_once: [Values; DRIVES],
+    beside: Vec<Beside<N>>,
     /// Whether one of them is the torque of a gear.
     pub(super) has_gear_torque: bool,
     /// What acts on each body but its friction; nothing where a gear loses power, and it is another at rest.
@@ -269,6 +271,8 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     weight_of_current: [f64; DRIVES],
     /// Whether a current moves anything, and the motion that current.
     coupled: bool,
+    /// Currents of the drives.
+    current: [OnceLock<Row<N>>; DRIVES],
     /// What an observer is shown.
     shown: OnceLock<Box<Shown<N>>>,
 }
@@ -394,15 +398,17 @@ impl<const N: usize> ModeMatrices<N> {
         };
         let rows: Vec<[f64; N]> = equations.guards.iter().map(|guard| row_of(&guard.form)).collect();
         let guards = rows.iter().zip(&equations.guards).map(|(row, guard)| Watch::new(row, guard.cause)).collect();
-        let (mut mechanical, mut magnetic_dual, mut at_once) = ([0.0; GUARDS], [0.0; GUARDS], [[0.0; GUARDS]; DRIVES]);
-        for (lane, guard) in equations.guards.iter().enumerate() {
-            let dual = dual(&guard.form);
+        let none = [0.0; LANES];
+        let side = |rows| Beside { rows, mechanical: none, magnetic: none, at_once: [none; DRIVES] };
+        let mut beside: Vec<Beside<N>> = lanes(&rows).map(side).collect();
+        for (index, guard) in equations.guards.iter().enumerate() {
+            let (dual, beside, lane) = (dual(&guard.form), &mut beside[index / LANES], index % LANES);
             // Motion and current pass energy to each other: only their sum is bounded.
-            (mechanical[lane], magnetic_dual[lane]) = match coupled {
+            (beside.mechanical[lane], beside.magnetic[lane]) = match coupled {
                 true => (dual.whole(), 0.0),
                 false => (dual.mechanical, dual.magnetic),
             };
-            (0..DRIVES).for_each(|drive| at_once[drive][lane] = guard.form.input[drive].abs());
+            (0..DRIVES).for_each(|drive| beside.at_once[drive][lane] = guard.form.input[drive].abs());
         }
         let loses = mechanism.drives.iter().any(|drive| drive.loses());
         let load = match loses {
@@ -449,10 +455,7 @@ impl<const N: usize> ModeMatrices<N> {
         Self {
             mode: *mode,
             guards,
-            beside: lanes(&rows),
-            mechanical,
-            magnetic_dual,
-            at_once,
+            beside,
             has_gear_torque: equations.guards.iter().any(|guard| matches!(guard.cause, Cause::GearTorque(_))),
             load,
             forcing,
@@ -467,11 +470,12 @@ impl<const N: usize> ModeMatrices<N> {
             growth,
             inertia,
             stiffness,
-            energy: lanes(&energy),
+            energy: lanes(&energy).collect(),
             magnetic: magnetic_places,
             is_magnetic: magnetic_places.iter().any(|(_, weight)| *weight > 0.0),
             weight_of_current: magnetic,
             coupled,
+            current: [const { OnceLock::new() }; DRIVES],
             shown: OnceLock::new(),
         }
     }
@@ -523,7 +527,7 @@ impl<const N: usize> ModeMatrices<N> {
     #[inline(always)]
     fn values_by_any(&self, z: &[f64; N], value: &mut Values) {
         for (values, lanes) in value.as_chunks_mut().0.iter_mut().zip(&self.beside) {
-            *values = beside(lanes, z);
+            *values = side_by_side(&lanes.rows, z);
         }
     }
 
@@ -547,7 +551,7 @@ impl<const N: usize> ModeMatrices<N> {
     fn size_by_any(&self, y: &[f64; N]) -> Size {
         let mut squares = [0.0; LANES];
         for lanes in &self.energy {
-            let rates = beside(lanes, y);
+            let rates = side_by_side(lanes, y);
             squares.iter_mut().zip(rates).for_each(|(square, rate)| *square += rate * rate);
         }
         let [a, b, c, d, e, f, g, h] = squares;
@@ -575,20 +579,26 @@ impl<const N: usize> ModeMatrices<N> {
             (false, false) => (size.mechanical + push, size.magnetic),
         };
         let (mechanical, magnetic) = (grow * mechanical, grow * magnetic);
-        let lanes = self.beside.len() * LANES;
-        let duals = self.mechanical.iter().zip(&self.magnetic_dual);
-        for (steepness, (by_motion, by_current)) in steepness.iter_mut().zip(duals).take(lanes) {
-            *steepness = by_motion * mechanical + by_current * magnetic;
-        }
-        for (at_once, rate) in self.at_once.iter().zip(rate).filter(|(_, rate)| **rate > 0.0) {
-            let at_once = at_once.iter().take(lanes);
-            steepness.iter_mut().zip(at_once).for_each(|(steepness, at_once)| *steepness += at_once * rate);
+        for (steepness, beside) in steepness.as_chunks_mut().0.iter_mut().zip(&self.beside) {
+            let mut sum = [0.0; LANES];
+            for (lane, sum) in sum.iter_mut().enumerate() {
+                *sum = beside.mechanical[lane] * mechanical + beside.magnetic[lane] * magnetic;
+            }
+            for (at_once, &rate) in beside.at_once.iter().zip(rate).filter(|(_, rate)| **rate > 0.0) {
+                sum.iter_mut().zip(at_once).for_each(|(sum, at_once)| *sum += at_once * rate);
+            }
+            *steepness = sum;
         }
     }
 
     /// What acts on a body but its friction, where no gear loses power.
     pub(super) fn load(&self, body: usize) -> Option<&Row<N>> {
         self.load.get(body)
+    }
+
+    /// Current of a drive, made ready when it is first wanted.
+    pub(super) fn current(&self, mechanism: &Mechanism, space: &Space, drive: usize) -> &Row<N> {
+        self.current[drive].get_or_init(|| Row::new(&space.row(&mechanism.current(drive, &self.mode))))
     }
 
     /// Length of the intervals of a level: h/2^level.

@@ -49,6 +49,10 @@ impl<'a, const N: usize> Run<'a, N> {
     /// The row at or before `time` and how far behind it; next to a row means on it.
     fn locate(&self, time: f64) -> (u64, f64) {
         let (last, h) = (self.grid.even(), self.grid.interval());
+        // The next row, as where samples fall on rows.
+        if self.row < last && self.grid.time(self.row + 1) == time {
+            return (self.row + 1, 0.0);
+        }
         let mut row = ((time / h) as u64).min(last);
         while row > 0 && self.grid.time(row) > time {
             row -= 1;
@@ -273,7 +277,8 @@ impl<const N: usize> Running for Run<'_, N> {
     }
 
     fn current(&self, drive: usize) -> f64 {
-        self.core.value(&self.core.common.mechanism.current(drive, &self.core.common.mode))
+        let common = &self.core.common;
+        self.core.matrices.current(&common.mechanism, &common.space, drive).value(&self.core.z)
     }
 
     fn finish(&mut self, is_at_end: bool) -> Outcome {
