@@ -236,15 +236,14 @@ impl Observe for Meter {
     }
 
     fn see(&mut self, curve: &Curve) {
+        let (lows, highs) = curve.ranges();
         for (q, peak) in self.peaks.iter_mut().enumerate() {
-            let course = curve.of(q);
-            let (low, high) = course.range();
-            if high > peak.value.abs() {
-                let (s, value) = course.greatest(0.0, 1.0);
+            if highs[q] > peak.value.abs() {
+                let (s, value) = curve.of(q).greatest(0.0, 1.0);
                 peak.take(value, curve.begin + s * curve.length);
             }
-            if -low > peak.value.abs() {
-                let (s, value) = course.negative().greatest(0.0, 1.0);
+            if -lows[q] > peak.value.abs() {
+                let (s, value) = curve.of(q).negative().greatest(0.0, 1.0);
                 peak.take(-value, curve.begin + s * curve.length);
             }
         }

@@ -247,18 +247,24 @@ impl<'a> Gauge<'a> {
         larger(&mut self.seen.voltage.0, &v, (0.0, 1.0), curve);
         larger(&mut self.seen.current.0, &i, (0.0, 1.0), curve);
         let h = curve.length;
-        self.squares[2] += h * integral((0.0, 1.0), |s| v.at(s).powi(2));
-        self.squares[3] += h * integral((0.0, 1.0), |s| i.at(s).powi(2));
+        let (volts, amperes) = (at_places(&v), at_places(&i));
+        self.squares[2] += h * product(&volts, &volts);
+        self.squares[3] += h * product(&amperes, &amperes);
         // Energy that goes in and energy that comes back, parted where either changes its sign.
-        let mut seams = vec![0.0];
-        for turning in [v, i].iter().filter(|quantity| !quantity.keeps_its_sign()) {
-            seams.extend(turning.zeros(0.0, 1.0));
-        }
-        seams.push(1.0);
-        seams.sort_by(f64::total_cmp);
-        for pair in seams.windows(2) {
-            let energy = h * integral((pair[0], pair[1]), |s| v.at(s) * i.at(s));
+        let mut count = |energy: f64| {
             if energy > 0.0 { self.seen.energy.0 += energy } else { self.seen.energy.1 -= energy }
+        };
+        if v.keeps_its_sign() && i.keeps_its_sign() {
+            count(h * product(&volts, &amperes));
+        } else {
+            let mut seams = vec![0.0, 1.0];
+            for turning in [v, i].iter().filter(|quantity| !quantity.keeps_its_sign()) {
+                seams.extend(turning.zeros(0.0, 1.0));
+            }
+            seams.sort_by(f64::total_cmp);
+            for pair in seams.windows(2) {
+                count(h * integral((pair[0], pair[1]), |s| v.at(s) * i.at(s)));
+            }
         }
         if self.saturated {
             self.seen.amplifier_limited += h;
@@ -273,8 +279,16 @@ impl<'a> Gauge<'a> {
         let following = Polynomial(std::array::from_fn(|k| error.0[k] + stretch.0[k]));
         larger(&mut self.seen.cart.peak, &error, part, curve);
         larger(&mut self.seen.following.peak, &following, part, curve);
-        self.squares[0] += curve.length * integral(part, |s| following.at(s).powi(2));
-        self.squares[1] += curve.length * integral(part, |s| error.at(s).powi(2));
+        for (sum, quantity) in self.squares.iter_mut().zip([following, error]) {
+            let square = match part {
+                (0.0, 1.0) => {
+                    let values = at_places(&quantity);
+                    product(&values, &values)
+                }
+                _ => integral(part, |s| quantity.at(s).powi(2)),
+            };
+            *sum += curve.length * square;
+        }
     }
 
     /// Where the cart is from its target, once the last stroke and the profile have passed.
@@ -403,6 +417,39 @@ const GAUSS: [(f64, f64); 4] = [
     (0.796_666_477_413_626_7, 0.222_381_034_453_374_48),
     (0.960_289_856_497_536_3, 0.101_228_536_290_376_26),
 ];
+
+/// Powers of the places of that rule on 0..1, by powers and places; and the weights.
+const POWERS: [[f64; PLACES]; TERMS] = {
+    let (mut powers, mut k) = ([[1.0; PLACES]; TERMS], 1);
+    while k < TERMS {
+        let mut j = 0;
+        while j < PLACES {
+            let (x, _) = GAUSS[j / 2];
+            let place = if j % 2 == 0 { 0.5 - 0.5 * x } else { 0.5 + 0.5 * x };
+            powers[k][j] = powers[k - 1][j] * place;
+            j += 1;
+        }
+        k += 1;
+    }
+    powers
+};
+
+const PLACES: usize = 2 * GAUSS.len();
+
+/// The values of a polynomial at the places on 0..1.
+fn at_places(polynomial: &Polynomial) -> [f64; PLACES] {
+    let mut values = [0.0; PLACES];
+    for (c, powers) in polynomial.0.iter().zip(&POWERS) {
+        values.iter_mut().zip(powers).for_each(|(value, power)| *value += c * power);
+    }
+    values
+}
+
+/// The integral over 0..1 of the product of two polynomials, of which these are the values.
+fn product(a: &[f64; PLACES], b: &[f64; PLACES]) -> f64 {
+    let weighted = |(j, (_, w)): (usize, &(f64, f64))| w * (a[2 * j] * b[2 * j] + a[2 * j + 1] * b[2 * j + 1]);
+    0.5 * GAUSS.iter().enumerate().map(weighted).sum::<f64>()
+}
 
 /// The integral over s on a part of 0..1.
 fn integral((from, to): (f64, f64), value: impl Fn(f64) -> f64) -> f64 {

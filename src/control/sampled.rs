@@ -206,10 +206,11 @@ impl Sampled<'_> {
             self.act(time + self.rest);
             return (self.acting, self.clock.times(self.k));
         }
+        let reference = self.profile.at(time);
         let seen = Seen {
             time,
-            reference: self.profile.at(time),
-            ahead: self.profile.at(time + lead),
+            reference,
+            ahead: if lead == 0.0 { reference } else { self.profile.at(time + lead) },
             position: self.sensor.read(state),
             current,
         };

@@ -16,6 +16,8 @@ pub struct Equations {
     pub stiffness: [f64; SPRINGS],
     /// Conditions under which these equations hold.
     pub guards: Vec<Guard>,
+    /// All that acts on each body that moves by itself, and on those that move with it, but friction: N or N m.
+    pub load: [Form; BODIES],
 }
 
 impl Mechanism {
@@ -56,11 +58,29 @@ impl Mechanism {
     /// All forces (N) or torques (N m) on a body, and on those that move with it, except friction, for a body that moves, or
     /// is about to move, forward or backward: the inner brackets of eq. (16)-(18).
     pub fn load(&self, body: usize, forward: bool, mode: &Mode) -> Form {
-        let own = |body| self.own_load(body, forward, mode) * self.ratio(body);
-        self.followers(body).map(own).fold(Form::ZERO, |sum, form| sum + form)
+        self.load_by(&self.forces(mode), body, forward, mode)
     }
 
-    fn own_load(&self, body: usize, forward: bool, mode: &Mode) -> Form {
+    /// Forces of all springs.
+    fn forces(&self, mode: &Mode) -> [Form; SPRINGS] {
+        let mut forces = [Form::ZERO; SPRINGS];
+        for (spring, force) in forces.iter_mut().enumerate().take(self.springs.len()) {
+            *force = self.spring_force(spring, mode);
+        }
+        forces
+    }
+
+    /// The same as [`Mechanism::load`], by the forces of the springs.
+    fn load_by(&self, forces: &[Form; SPRINGS], body: usize, forward: bool, mode: &Mode) -> Form {
+        let mut load = Form::ZERO;
+        for follower in self.followers(body) {
+            let own = self.own_load(forces, follower, forward, mode);
+            load = if self.ratio(follower) == 1.0 { load + own } else { load + own * self.ratio(follower) };
+        }
+        load
+    }
+
+    fn own_load(&self, forces: &[Form; SPRINGS], body: usize, forward: bool, mode: &Mode) -> Form {
         let mut load = Form::ZERO;
         for (index, drive) in self.drives.iter().enumerate().filter(|(_, drive)| drive.shaft == body) {
             // τ_M = e n K_t i                                                   (4) with a gear
@@ -73,7 +93,8 @@ impl Mechanism {
         // −Aᵀ f: for the axis −r f₁ + r f₃ (16), f₁ − f₂ (17), r f₂ − r f₃ (18), f being k₁ (r φ₁ − x) + c₁ (r φ̇₁ − ẋ) and so on
         for (spring, part) in self.springs.iter().enumerate().rev() {
             for &(_, arm) in part.arms.iter().filter(|(other, _)| *other == body) {
-                load = load - self.spring_force(spring, mode) * (arm * self.gear_share(body, spring, forward, mode));
+                let arm = arm * self.gear_share(body, spring, forward, mode);
+                load.subtract(arm, &forces[spring]);
             }
         }
         load + Form::constant(self.bodies[body].force)
@@ -132,6 +153,19 @@ impl Mechanism {
         inertia
     }
 
+    /// Inertias by which springs give to one body what they take from another. A gear that gives way and loses power puts 1/e of its
+    /// torque on the rotor, J_r φ̈_r = τ − T/e, which is e J_r φ̈_r = e τ − T.
+    pub(crate) fn balanced_inertia(&self, equations: &Equations, mode: &Mode) -> [f64; BODIES] {
+        let mut inertia = equations.inertia;
+        for (index, drive) in self.drives.iter().enumerate().filter(|(_, drive)| drive.loses()) {
+            if let Some(spring) = self.gear_spring(index) {
+                let forward = mode.motion[drive.shaft] != Motion::Backward;
+                inertia[drive.shaft] /= self.gear_share(drive.shaft, spring, forward, mode);
+            }
+        }
+        inertia
+    }
+
     /// Inertia that moves with a body, itself included, per unit of its own way.
     pub(crate) fn mass(&self, leader: usize, inertia: &[f64; BODIES]) -> f64 {
         self.followers(leader).map(|b| self.ratio(b).powi(2) * inertia[b]).sum()
@@ -142,11 +176,13 @@ impl Mechanism {
         let mut acceleration = [Form::ZERO; BODIES];
         let inertia = self.inertia(&mode);
         let mut guards = Vec::with_capacity(7);
+        let (forces, mut loads) = (self.forces(&mode), [Form::ZERO; BODIES]);
         for body in self.leaders() {
             let speed = Form::speed(body);
             let motion = mode.motion[body];
             let law = self.friction(body);
-            let load = self.load(body, motion != Motion::Backward, &mode);
+            let load = self.load_by(&forces, body, motion != Motion::Backward, &mode);
+            loads[body] = load;
             let mass = self.mass(body, &inertia);
             // J φ̈ = load − F_f, with F_f = b v ± F_c                             (15)-(18)
             let sliding = |side: Side, sign: f64| {
@@ -163,7 +199,7 @@ impl Mechanism {
                     sliding(law.backward, -1.0)
                 }
                 Motion::Stuck => {
-                    let back = self.load(body, false, &mode);
+                    let back = self.load_by(&forces, body, false, &mode);
                     guards.push(Guard {
                         form: Form::constant(law.forward.breakaway) - load,
                         cause: Cause::BreakForward(body),
@@ -191,7 +227,7 @@ impl Mechanism {
         for (drive, rate) in current_rate.iter_mut().enumerate().take(self.drives.len()) {
             *rate = self.current_rate(drive, &mode);
         }
-        Equations { acceleration, current_rate, inertia, stiffness: self.stiffness_in(&mode), guards }
+        Equations { acceleration, current_rate, inertia, stiffness: self.stiffness_in(&mode), guards, load: loads }
     }
 
     /// Friction force (N) or torque (N m) on a body: what its law gives while it slides, what holds it while it is stuck.

@@ -61,6 +61,18 @@ impl Form {
         Form { constant: value, ..Form::ZERO }
     }
 
+    /// Takes `factor` times another one off.
+    pub(super) fn subtract(&mut self, factor: f64, other: &Form) {
+        fn off<const N: usize>(own: &mut [f64; N], factor: f64, other: &[f64; N]) {
+            own.iter_mut().zip(other).for_each(|(own, other)| *own -= other * factor);
+        }
+        off(&mut self.stretch, factor, &other.stretch);
+        off(&mut self.speed, factor, &other.speed);
+        off(&mut self.current, factor, &other.current);
+        off(&mut self.input, factor, &other.input);
+        self.constant -= other.constant * factor;
+    }
+
     /// Its coefficients with respect to ways, speeds and currents of a whole state.
     pub fn on_state(&self, mechanism: &Mechanism) -> State {
         let mut row = State { position: [0.0; BODIES], speed: self.speed, current: self.current };

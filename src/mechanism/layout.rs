@@ -39,8 +39,8 @@ pub(crate) struct Layout {
     pub(crate) coordinate: [usize; BODIES],
     /// Place of each body's speed.
     pub(crate) speed: [usize; BODIES],
-    /// Place of each drive's current; kept free where the current is no state.
-    pub(crate) current: [usize; DRIVES],
+    /// Place of each drive's current, where it is a state.
+    pub(crate) current: [Option<usize>; DRIVES],
     /// Number of places.
     pub(crate) states: usize,
     /// Number of inputs.
@@ -52,17 +52,21 @@ impl Layout {
     pub(crate) fn new(mechanism: &Mechanism) -> Self {
         let bodies = mechanism.bodies.len();
         let held = mechanism.held_bodies().len();
-        let drives = mechanism.drives.len();
-        let place = |body: usize| 2 * body + if body < held { 0 } else { drives };
+        let (mut current, mut currents) = ([None; DRIVES], 0);
+        for (index, _) in mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.has_current_state()) {
+            current[index] = Some(2 * held + currents);
+            currents += 1;
+        }
+        let place = |body: usize| 2 * body + if body < held { 0 } else { currents };
         let mut layout = Self {
             bodies,
             replaced: Vec::new(),
             terms: Vec::new(),
             coordinate: std::array::from_fn(place),
             speed: std::array::from_fn(|body| place(body) + 1),
-            current: std::array::from_fn(|drive| 2 * held + drive),
-            states: 2 * bodies + drives,
-            inputs: drives,
+            current,
+            states: 2 * bodies + currents,
+            inputs: mechanism.drives.len(),
         };
         // Rows that are taken as coordinates, by the body in whose place they stand.
         let mut taken: [Option<[f64; BODIES]>; BODIES] = [None; BODIES];
@@ -137,6 +141,22 @@ impl Layout {
             row.position[body] += form.stretch[spring] * weight;
         }
         row
+    }
+
+    /// The same into the places of a vector: lengths as coordinates, speeds and currents.
+    #[inline]
+    pub(crate) fn put(&self, form: &Form, row: &mut [f64]) {
+        for body in 0..self.bodies {
+            row[self.speed[body]] = form.speed[body];
+        }
+        for &(spring, body, weight) in &self.terms {
+            row[self.coordinate[body]] += form.stretch[spring] * weight;
+        }
+        for (place, current) in self.current.iter().zip(form.current) {
+            if let Some(place) = place {
+                row[*place] = current;
+            }
+        }
     }
 
     /// By how much each spring gets longer per unit of each coordinate: (body in whose place it stands, weight).

@@ -6,7 +6,6 @@
 
 use crate::friction::Motion;
 use crate::mechanism::{BODIES, Layout, Mode, Replaced, State};
-use std::ops::Range;
 
 /// Parts of the last place by which positions at the start may contradict each other and still mean a belt without strain.
 const LAST_PLACES: f64 = 4.0;
@@ -86,21 +85,26 @@ impl Coordinates {
         state
     }
 
-    /// The ways of a body whose place a length takes, in these rows: `own` has that length, `others` has coordinates, and ways of those
-    /// that are placed already.
-    pub(crate) fn place(&self, replaced: &Replaced, own: &mut [f64], others: &[Vec<f64>; BODIES], rows: Range<usize>) {
+    /// The ways of a body whose place a length takes, row by row: `own` has that length, `others` gives coordinates of bodies, and ways of
+    /// those that are placed already.
+    #[inline(always)]
+    pub(crate) fn place<'v>(&self, replaced: &Replaced, own: &mut [f64], others: impl Fn(usize) -> &'v [f64]) {
         let body = replaced.body;
-        let own = &mut own[rows.clone()];
         if let Some(angle) = self.held[body] {
             own.fill(angle);
             return;
         }
         let begin = if replaced.on_replaced { 0.0 } else { self.strain[body] };
+        let start = if replaced.on_replaced { 0.0 } else { self.start.position[body] };
+        if let [(other, arm)] = replaced.others[..] {
+            let ways = own.iter_mut().zip(others(other));
+            ways.for_each(|(own, way)| *own = start + ((*own - begin) - arm * way) / replaced.own);
+            return;
+        }
         own.iter_mut().for_each(|length| *length -= begin);
         for &(other, arm) in &replaced.others {
-            own.iter_mut().zip(&others[other][rows.clone()]).for_each(|(length, way)| *length -= arm * way);
+            own.iter_mut().zip(others(other)).for_each(|(length, way)| *length -= arm * way);
         }
-        let start = if replaced.on_replaced { 0.0 } else { self.start.position[body] };
         own.iter_mut().for_each(|change| *change = start + *change / replaced.own);
     }
 

@@ -59,11 +59,11 @@ pub(super) trait Engine: Send + Sync {
     /// Where it stands, s.
     fn time(&self) -> f64;
 
-    /// Whether it takes inputs that bend.
-    fn is_smooth(&self) -> bool;
+    /// The highest degree of the inputs that it takes.
+    fn degree(&self) -> usize;
 
-    /// One that does, where this one stands.
-    fn smooth(&self) -> Box<dyn Engine>;
+    /// One that takes inputs of this degree, where this one stands.
+    fn raised(&self, degree: usize) -> Box<dyn Engine>;
 
     /// Takes up new inputs, and what they bring about at once.
     fn take_input(&mut self, pieces: &Pieces);
@@ -93,7 +93,7 @@ pub(super) trait Engine: Send + Sync {
     fn error(&self) -> Option<PositionError>;
 }
 
-/// Makes the exact engine of a mechanism in `start`, its inputs straight.
+/// Makes the exact engine of a mechanism in `start`, its inputs held.
 struct Exact<'s> {
     mechanism: Arc<Mechanism>,
     space: Arc<exact::Space>,
@@ -104,9 +104,9 @@ struct Exact<'s> {
 impl Make for Exact<'_> {
     type Made = Box<dyn Engine>;
 
-    fn make<const R: usize, const C: usize>(self) -> Self::Made {
+    fn make<const N: usize>(self) -> Self::Made {
         let Self { mechanism, space, start, interval } = self;
-        Box::new(exact::Core::<R, C>::new(mechanism, space, start, (interval, f64::INFINITY), vec![]))
+        Box::new(exact::Core::<N>::new(mechanism, space, start, (interval, f64::INFINITY), vec![]))
     }
 }
 
@@ -127,7 +127,7 @@ impl Machine {
         let engine: Box<dyn Engine> = match solver {
             Solver::Exact => {
                 check::piecewise_linear(mechanism)?;
-                let space = Arc::new(exact::Space::new(mechanism, false));
+                let space = Arc::new(exact::Space::new(mechanism, 0));
                 let mechanism = Arc::new(mechanism.seen_from(&space.layout, start));
                 exact::in_kernel(space.size(), Exact { mechanism, space, start, interval })
             }
@@ -177,8 +177,9 @@ impl Machine {
     /// Goes on to `until`, s, and adds the events on the way to `events`. An early end is told, and where it stands then; it goes no further.
     pub fn advance(&mut self, until: f64, events: &mut Vec<Event>) -> std::result::Result<(), Ending> {
         if std::mem::take(&mut self.is_set) {
-            if self.inputs.degree() > 1 && !self.engine.is_smooth() {
-                self.engine = self.engine.smooth();
+            let degree = self.inputs.degree();
+            if degree > self.engine.degree() {
+                self.engine = self.engine.raised(degree);
             }
             let inputs = self.inputs.since(self.time());
             self.engine.take_input(&inputs);

@@ -421,9 +421,9 @@ fn go(
     output: Output,
 ) -> Result<(Outcome, exact::Known)> {
     // Smooth inputs carry their derivatives along.
-    let straight = experiment.input.degree() <= 1;
+    let degree = experiment.input.degree();
     let start = experiment.start(mechanism);
-    let run = Run::of(mechanism, &start, (solver, straight), known, output)?;
+    let run = Run::of(mechanism, &start, (solver, degree), known, output)?;
     Ok(run.along(std::slice::from_ref(&experiment.input)))
 }
 

@@ -116,6 +116,45 @@ impl Curve {
         Self { begin, length, terms }
     }
 
+    /// Bounds of the values of every quantity, from below and above: those of [`Polynomial::range`].
+    pub fn ranges(&self) -> (Reading, Reading) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.ranges_by_avx2() };
+        }
+        self.ranges_by_any()
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn ranges_by_avx2(&self) -> (Reading, Reading) {
+        self.ranges_by_any()
+    }
+
+    #[inline(always)]
+    fn ranges_by_any(&self) -> (Reading, Reading) {
+        let mut b = self.terms;
+        for (b, binomial) in b.iter_mut().zip(BINOMIAL) {
+            b.iter_mut().for_each(|b| *b /= binomial);
+        }
+        for i in 1..TERMS {
+            for k in (i..TERMS).rev() {
+                for q in 0..QUANTITIES {
+                    b[k][q] += b[k - 1][q];
+                }
+            }
+        }
+        let (mut low, mut high) = (b[0], b[0]);
+        for b in &b[1..] {
+            for q in 0..QUANTITIES {
+                low[q] = if b[q] < low[q] { b[q] } else { low[q] };
+                high[q] = if b[q] > high[q] { b[q] } else { high[q] };
+            }
+        }
+        (low, high)
+    }
+
     /// What is read at the share `s` of the length.
     pub fn at(&self, s: f64) -> Reading {
         let mut sum = self.terms[TERMS - 1];

@@ -13,18 +13,78 @@ pub(crate) struct Matrix<const R: usize, const C: usize> {
     column: [[f64; R]; C],
 }
 
-/// Largest ‖A‖ h for which the Taylor series below is used; larger steps come from doubling.
-pub(crate) const SERIES_REACH: f64 = 0.25;
+/// Largest ‖A‖ h for which the matrix exponential is summed as a Taylor series; larger steps come from doubling.
+pub(crate) const EXPONENTIAL_REACH: f64 = 0.25;
 
-/// Order of the Taylor series: 0.25¹³ / 13! is 2e-18 of the leading term.
-pub(crate) const SERIES_ORDER: usize = 12;
+/// Order of that series: 0.25¹³ / 13! is 2e-18 of the leading term.
+const EXPONENTIAL_ORDER: usize = 12;
+
+/// Largest ‖A‖ d for which the state is expanded into a Taylor series over d.
+pub(crate) const SERIES_REACH: f64 = SERIES[SERIES.len() - 1].0;
+
+/// Orders of that series, and the largest ‖A‖ d of each: what is left out is less than 3e-17 of the leading term.
+const SERIES: [(f64, usize); 4] = [(0.25, 12), (0.55, 15), (1.15, 19), (2.0, 23)];
+
+/// Most terms of it.
+pub(crate) const SERIES_TERMS: usize = SERIES[SERIES.len() - 1].1 + 1;
+
+/// The order that ‖A‖ d, at most [`SERIES_REACH`], asks for.
+pub(crate) fn series_order(reach: f64) -> usize {
+    SERIES.iter().find(|(most, _)| reach <= *most).map_or(SERIES_TERMS - 1, |(_, order)| *order)
+}
+
+/// z(s · distance) = Σ term_k sᵏ, k up to `order`.
+#[derive(Clone)]
+pub(crate) struct Series<const C: usize> {
+    pub(crate) terms: [[f64; C]; SERIES_TERMS],
+    pub(crate) order: usize,
+}
+
+impl<const C: usize> Series<C> {
+    /// Room for one.
+    pub(crate) fn room() -> Self {
+        Self { terms: [[0.0; C]; SERIES_TERMS], order: 0 }
+    }
+
+    /// The sum at `s`, added to `z`.
+    pub(crate) fn add_to(&self, z: &mut [f64; C], s: f64) {
+        z.iter_mut().zip(self.change(s)).for_each(|(z, change)| *z += change);
+    }
+
+    /// z(s · distance) − z(0).
+    pub(crate) fn change(&self, s: f64) -> [f64; C] {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.change_by_avx2(s) };
+        }
+        self.change_by_any(s)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn change_by_avx2(&self, s: f64) -> [f64; C] {
+        self.change_by_any(s)
+    }
+
+    #[inline(always)]
+    fn change_by_any(&self, s: f64) -> [f64; C] {
+        let mut sum = [0.0; C];
+        for term in self.terms[1..=self.order].iter().rev() {
+            for (sum, term) in sum.iter_mut().zip(term) {
+                *sum = (*sum + term) * s;
+            }
+        }
+        sum
+    }
+}
 
 /// 1/k!
-const RECIPROCAL_FACTORIAL: [f64; SERIES_ORDER + 1] = {
-    let mut table = [1.0; SERIES_ORDER + 1];
+const RECIPROCAL_FACTORIAL: [f64; EXPONENTIAL_ORDER + 1] = {
+    let mut table = [1.0; EXPONENTIAL_ORDER + 1];
     let mut factorial = 1.0;
     let mut k = 1;
-    while k <= SERIES_ORDER {
+    while k <= EXPONENTIAL_ORDER {
         factorial *= k as f64;
         table[k] = 1.0 / factorial;
         k += 1;
@@ -41,37 +101,36 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         self.column[column][row] = value;
     }
 
-    /// Terms of the Taylor series over `distance` of what moves by this rate: z(s · distance) = Σ term_k sᵏ.
-    pub(crate) fn series(&self, z: &[f64; C], distance: f64) -> [[f64; C]; SERIES_ORDER + 1] {
+    /// The Taylor series over `distance` of what moves by this rate.
+    pub(crate) fn series(&self, z: &[f64; C], distance: f64, order: usize, series: &mut Series<C>) {
+        series.order = order;
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
             // SAFETY: the processor has AVX2.
-            return unsafe { self.series_by_avx2(z, distance) };
+            return unsafe { self.series_by_avx2(z, distance, series) };
         }
-        self.series_by_any(z, distance)
+        self.series_by_any(z, distance, series);
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn series_by_avx2(&self, z: &[f64; C], distance: f64) -> [[f64; C]; SERIES_ORDER + 1] {
-        self.series_by_any(z, distance)
+    fn series_by_avx2(&self, z: &[f64; C], distance: f64, series: &mut Series<C>) {
+        self.series_by_any(z, distance, series);
     }
 
     #[inline(always)]
-    fn series_by_any(&self, z: &[f64; C], distance: f64) -> [[f64; C]; SERIES_ORDER + 1] {
-        let mut terms = [[0.0; C]; SERIES_ORDER + 1];
-        terms[0] = *z;
-        let mut next = self.times(z);
-        for (k, term) in terms.iter_mut().enumerate().skip(1) {
+    fn series_by_any(&self, z: &[f64; C], distance: f64, series: &mut Series<C>) {
+        series.terms[0] = *z;
+        let mut now = *z;
+        for (k, term) in series.terms[..=series.order].iter_mut().enumerate().skip(1) {
             let factor = distance / k as f64;
-            for (term, next) in term.iter_mut().zip(next) {
-                *term = next * factor;
+            let next = if k == 1 { self.times(&now) } else { self.times_moving(&now) };
+            for (now, next) in now.iter_mut().zip(next) {
+                *now = next * factor;
             }
-            if k < SERIES_ORDER {
-                next = self.times_moving(term);
-            }
+            now[R..].fill(0.0);
+            *term = now;
         }
-        terms
     }
 
     /// The product with a vector whose constants are zero.
@@ -103,8 +162,9 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         self.times(z)
     }
 
+    /// The same, compiled into who calls it.
     #[inline(always)]
-    fn times(&self, z: &[f64; C]) -> [f64; R] {
+    pub(crate) fn times(&self, z: &[f64; C]) -> [f64; R] {
         let mut sum = [0.0; R];
         for (column, &factor) in self.column.iter().zip(z) {
             for (s, c) in sum.iter_mut().zip(column) {
@@ -139,6 +199,35 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         }
     }
 
+    /// z ← z + P z for each of `rows`, which take what z is then; `largest` takes the largest magnitudes.
+    pub(crate) fn advance_rows(&self, z: &mut [f64; C], largest: &mut [f64; C], rows: &mut [[f64; C]]) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.advance_rows_by_avx2(z, largest, rows) };
+        }
+        self.advance_rows_by_any(z, largest, rows);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn advance_rows_by_avx2(&self, z: &mut [f64; C], largest: &mut [f64; C], rows: &mut [[f64; C]]) {
+        self.advance_rows_by_any(z, largest, rows);
+    }
+
+    #[inline(always)]
+    fn advance_rows_by_any(&self, z: &mut [f64; C], largest: &mut [f64; C], rows: &mut [[f64; C]]) {
+        let (mut now, mut most) = (*z, *largest);
+        for row in rows {
+            self.advance_by_any(&mut now);
+            for (most, now) in most.iter_mut().zip(&now) {
+                *most = if now.abs() > *most { now.abs() } else { *most };
+            }
+            *row = now;
+        }
+        (*z, *largest) = (now, most);
+    }
+
     /// The matrix of the absolute values of its entries.
     pub(crate) fn absolute(&self) -> Self {
         Self { column: self.column.map(|column| column.map(f64::abs)) }
@@ -170,7 +259,7 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         out
     }
 
-    /// e^{A h} − I for ‖A‖ h ≤ [`SERIES_REACH`], A being `self`.
+    /// e^{A h} − I for ‖A‖ h ≤ [`EXPONENTIAL_REACH`], A being `self`.
     pub(crate) fn exponential(&self, h: f64) -> Self {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
@@ -246,6 +335,24 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The longest series of each order, of a rotation, against sine and cosine.
+    #[test]
+    fn a_longer_series_reaches_farther() {
+        let mut a = Matrix::<2, 2>::zero();
+        a.set(0, 1, 1.0);
+        a.set(1, 0, -1.0);
+        for (reach, order) in SERIES {
+            assert_eq!(series_order(reach), order);
+            let mut series = Series::room();
+            a.series(&[0.0, 1.0], reach, order, &mut series);
+            for s in [0.25, 0.7, 1.0] {
+                let (sine, cosine) = (series.change(s)[0], 1.0 + series.change(s)[1]);
+                assert!((sine - (s * reach).sin()).abs() < 3e-16, "{reach} {s}: {sine}");
+                assert!((cosine - (s * reach).cos()).abs() < 3e-16, "{reach} {s}: {cosine}");
+            }
+        }
+    }
 
     #[test]
     fn rotation_by_doubling() {

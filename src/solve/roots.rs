@@ -1,10 +1,26 @@
 //! The first place in (0, 1] where a polynomial becomes negative.
+//!
+//! Most are told by their coefficients: where c₀ and the negative ones add up to zero or more, Σ c_k sᵏ does not fall; where the coefficients
+//! change their sign once, there is one root above zero (Descartes), and the sign at the end says whether it lies in the interval. What
+//! is left is told by Bernstein coefficients.
 
-use super::propagator::SERIES_ORDER;
+use super::propagator::SERIES_TERMS;
 
-/// Value and derivative of Σ c_k sᵏ.
+/// Value and derivative of Σ c_k sᵏ = E(s²) + s O(s²): the chains of even and odd powers do not wait for each other.
+#[inline(always)]
 fn value_and_slope(c: &[f64], s: f64) -> (f64, f64) {
-    c.iter().rev().fold((0.0, 0.0), |(p, slope), c| (p * s + c, slope * s + p))
+    let q = s * s;
+    let (mut even, mut even_slope, mut odd, mut odd_slope) = (0.0, 0.0, 0.0, 0.0);
+    let pairs = c.chunks_exact(2);
+    if let [last] = pairs.remainder() {
+        even = *last;
+    }
+    for pair in pairs.rev() {
+        (even_slope, even) = (even_slope * q + even, even * q + pair[0]);
+        (odd_slope, odd) = (odd_slope * q + odd, odd * q + pair[1]);
+    }
+    // p = E + s O, p′ = 2 s E′ + O + 2 s² O′
+    (even + s * odd, 2.0 * s * even_slope + odd + 2.0 * q * odd_slope)
 }
 
 /// The first s in (0, 1] at which Σ c_k sᵏ, not negative at 0, turns negative; `None` if it stays.
@@ -13,48 +29,80 @@ pub(crate) fn first_fall(c: &[f64]) -> Option<f64> {
     if c0 < 0.0 {
         return Some(0.0);
     }
-    if c0 >= rest.iter().map(|c| c.abs()).sum() {
+    let least = rest.iter().fold(c0, |sum, &c| sum + if c < 0.0 { c } else { 0.0 });
+    if least >= 0.0 {
         return None;
     }
-    // Bernstein coefficients, b_i = Σ_{k ≤ i} C(i,k)/C(n,k) c_k: the polynomial lies within their hull.
-    let mut b = [0.0; MOST];
-    let n = c.len() - 1;
-    for (i, (b, ratios)) in b.iter_mut().zip(&RATIOS[n]).enumerate().take(n + 1) {
-        for (c, ratio) in c.iter().zip(ratios).take(i + 1) {
-            *b += ratio * c;
+    if c0 > 0.0 {
+        let (mut changes, mut negative) = (0, false);
+        for &c in rest {
+            let changed = if negative { c > 0.0 } else { c < 0.0 };
+            changes += u32::from(changed);
+            negative ^= changed;
+        }
+        if changes == 1 {
+            let end: f64 = c.iter().sum();
+            return (end < 0.0).then(|| polish(c, (0.0, c0), (1.0, end)));
         }
     }
-    search(c, &b[..=n], 0.0, 1.0)
+    // Bernstein coefficients, b_i = Σ_{k ≤ i} C(i,k)/C(n,k) c_k: the polynomial lies within their hull.
+    match c.len() {
+        0..=12 => by_bernstein(c, &RATIOS_12),
+        0..=16 => by_bernstein(c, &RATIOS_16),
+        0..=20 => by_bernstein(c, &RATIOS_20),
+        _ => by_bernstein(c, &RATIOS_24),
+    }
 }
 
-/// Room for the coefficients of a Taylor series.
-const MOST: usize = SERIES_ORDER + 1;
+static RATIOS_12: [[f64; 12]; 12] = ratios();
+static RATIOS_16: [[f64; 16]; 16] = ratios();
+static RATIOS_20: [[f64; 20]; 20] = ratios();
+static RATIOS_24: [[f64; SERIES_TERMS]; SERIES_TERMS] = ratios();
 
-/// C(i,k)/C(n,k), by n, i and k; zero for k above i.
-static RATIOS: [[[f64; MOST]; MOST]; MOST] = {
-    let mut table = [[[0.0; MOST]; MOST]; MOST];
-    let mut n = 0;
-    while n < MOST {
-        let mut i = 0;
-        while i <= n {
-            let (mut ratio, mut k) = (1.0, 0);
-            while k <= i {
-                table[n][i][k] = ratio;
-                ratio *= (i - k) as f64 / if n > k { (n - k) as f64 } else { 1.0 };
-                k += 1;
-            }
-            i += 1;
+/// C(i,k)/C(n,k), by k and i; zero for k above i. A polynomial of fewer coefficients is one of N, too.
+const fn ratios<const N: usize>() -> [[f64; N]; N] {
+    let (n, mut table, mut i) = (N - 1, [[0.0; N]; N], 0);
+    while i < N {
+        let (mut ratio, mut k) = (1.0, 0);
+        while k <= i {
+            table[k][i] = ratio;
+            ratio *= (i - k) as f64 / if n > k { (n - k) as f64 } else { 1.0 };
+            k += 1;
         }
-        n += 1;
+        i += 1;
     }
     table
-};
+}
+
+fn by_bernstein<const N: usize>(c: &[f64], ratios: &[[f64; N]; N]) -> Option<f64> {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        return search(c, &unsafe { bernstein_by_avx2(c, ratios) }, 0.0, 1.0);
+    }
+    search(c, &bernstein(c, ratios), 0.0, 1.0)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn bernstein_by_avx2<const N: usize>(c: &[f64], ratios: &[[f64; N]; N]) -> [f64; N] {
+    bernstein(c, ratios)
+}
+
+#[inline(always)]
+fn bernstein<const N: usize>(c: &[f64], ratios: &[[f64; N]; N]) -> [f64; N] {
+    let mut b = [0.0; N];
+    for (c, ratios) in c.iter().zip(ratios) {
+        b.iter_mut().zip(ratios).for_each(|(b, ratio)| *b += ratio * c);
+    }
+    b
+}
 
 /// Halvings after which a touch is as good as a point: 2⁻⁴⁰ of an interval that is itself a fraction of a swing.
 const NARROWEST: f64 = 1e-12;
 
 /// The first fall within [low, high], on which the Bernstein coefficients are `b`.
-fn search(c: &[f64], b: &[f64], low: f64, high: f64) -> Option<f64> {
+fn search<const N: usize>(c: &[f64], b: &[f64; N], low: f64, high: f64) -> Option<f64> {
     // Descartes: no more zeros than changes of sign, and one if there is one change.
     let mut changes = 0;
     let mut before = 0.0;
@@ -62,32 +110,32 @@ fn search(c: &[f64], b: &[f64], low: f64, high: f64) -> Option<f64> {
         changes += u32::from(before * b < 0.0);
         before = b.signum();
     }
-    let ends_below = b.last().is_some_and(|&b| b < 0.0);
+    let ends_below = b[N - 1] < 0.0;
     if changes == 0 && !ends_below {
         return None;
     }
     if changes <= 1 || high - low < NARROWEST {
         // What only touches within a point is told by the sign at the end.
-        return ends_below.then(|| polish(c, low, high));
+        return ends_below.then(|| polish(c, (low, b[0]), (high, b[N - 1])));
     }
     // de Casteljau: the coefficients of both halves
-    let n = b.len();
-    let (mut left, mut right) = ([0.0; MOST], [0.0; MOST]);
-    right[..n].copy_from_slice(b);
-    for (i, left) in left.iter_mut().enumerate().take(n) {
+    let (mut left, mut right) = ([0.0; N], *b);
+    for (i, left) in left.iter_mut().enumerate() {
         *left = right[0];
-        for j in 0..n - 1 - i {
+        for j in 0..N - 1 - i {
             right[j] = 0.5 * (right[j] + right[j + 1]);
         }
     }
     let middle = 0.5 * (low + high);
     // What is left in `right` runs from the middle outwards, the other way round.
-    search(c, &left[..n], low, middle).or_else(|| search(c, &right[..n], middle, high))
+    search(c, &left, low, middle).or_else(|| search(c, &right, middle, high))
 }
 
-/// Newton's method kept within a bracket whose upper end is negative; halving where it would leave it.
-fn polish(c: &[f64], mut low: f64, mut high: f64) -> f64 {
-    let mut s = 0.5 * (low + high);
+/// Newton's method kept within a bracket whose upper end is negative; halving where it would leave it. It begins where a straight line
+/// between the ends' values falls.
+fn polish(c: &[f64], (mut low, above): (f64, f64), (mut high, below): (f64, f64)) -> f64 {
+    let line = low + (high - low) * (above / (above - below));
+    let mut s = if line > low && line < high { line } else { 0.5 * (low + high) };
     for _ in 0..100 {
         let (p, slope) = value_and_slope(c, s);
         if p < 0.0 {
@@ -113,6 +161,28 @@ mod tests {
         // (s − 0.3)(s − 0.31) falls at 0.3
         let root = first_fall(&[0.3 * 0.31, -0.61, 1.0]).unwrap();
         assert!((root - 0.3).abs() < 1e-14, "{root}");
+    }
+
+    #[test]
+    fn one_change_of_sign_is_one_root() {
+        // e⁻ˢ − 0.5 by its series falls at ln 2, and e⁻ˢ − 0.3 not before 1.
+        let series = |down: f64| -> [f64; 24] {
+            let mut term = 1.0;
+            std::array::from_fn(|k| {
+                let now = if k == 0 { 1.0 - down } else { term };
+                term *= -1.0 / (k + 1) as f64;
+                now
+            })
+        };
+        let root = first_fall(&series(0.5)).unwrap();
+        assert!((root - std::f64::consts::LN_2).abs() < 1e-15, "{root}");
+        assert_eq!(first_fall(&series(0.3)), None);
+        // 1 − 3 s + s⁵: one root in the interval, another beyond it
+        let root = first_fall(&[1.0, -3.0, 0.0, 0.0, 0.0, 1.0]).unwrap();
+        assert!((1.0 - 3.0 * root + root.powi(5)).abs() < 1e-15, "{root}");
+        // 2 − s: at the end it is 1.
+        assert_eq!(first_fall(&[2.0, -1.0]), None);
+        assert_eq!(first_fall(&[0.5, -1.0]), Some(0.5));
     }
 
     #[test]

@@ -81,9 +81,9 @@ struct OfExact<'m, 'a> {
 impl<'a> Make for OfExact<'_, 'a> {
     type Made = Box<dyn Running + 'a>;
 
-    fn make<const R: usize, const C: usize>(self) -> Self::Made {
+    fn make<const N: usize>(self) -> Self::Made {
         let Self { mechanism, space, start, known, output } = self;
-        Box::new(exact::Run::<R, C>::new(mechanism, space, start, known, output))
+        Box::new(exact::Run::<N>::new(mechanism, space, start, known, output))
     }
 }
 
@@ -135,14 +135,14 @@ impl<'a> Run<'a> {
         let mechanism = Arc::new(stage.mechanism());
         check::experiment(&mechanism, experiment)?;
         let start = experiment.start(&mechanism);
-        Self::of(&mechanism, &start, (solver, true), Known::default(), Output { detail, sink, observer })
+        Self::of(&mechanism, &start, (solver, 0), Known::default(), Output { detail, sink, observer })
     }
 
-    /// The same of a mechanism that was checked, with inputs that are smooth or not.
+    /// The same of a mechanism that was checked, with inputs of at most this degree.
     pub(super) fn of(
         mechanism: &Arc<Mechanism>,
         start: &Start,
-        (solver, straight): (Solver, bool),
+        (solver, degree): (Solver, usize),
         known: Known,
         output: Output<'a>,
     ) -> Result<Self> {
@@ -150,7 +150,7 @@ impl<'a> Run<'a> {
         let running: Box<dyn Running + 'a> = match solver {
             Solver::Exact => {
                 check::piecewise_linear(mechanism)?;
-                let space = exact::Space::new(mechanism, !straight);
+                let space = exact::Space::new(mechanism, degree);
                 exact::in_kernel(space.size(), OfExact { mechanism, space, start, known, output: output.within() })
             }
             Solver::General { tolerance } => {
@@ -176,9 +176,9 @@ impl<'a> Run<'a> {
     ) -> Result<Self> {
         check::course(mechanism, course)?;
         let start = Start { state: course.start, until: course.until, every: course.every };
-        let straight = course.inputs.iter().all(|input| input.degree() <= 1);
+        let degree = course.inputs.iter().map(Signal::degree).max().unwrap_or(0);
         let output = Output { detail, sink, observer };
-        Self::of(&Arc::new(mechanism.clone()), &start, (solver, straight), Known::default(), output)
+        Self::of(&Arc::new(mechanism.clone()), &start, (solver, degree), Known::default(), output)
     }
 
     /// Holds these inputs, one for each drive, from now until `until`, s, or to the end of the run; false if something ended it before.

@@ -1,8 +1,10 @@
 //! The project's own chores: `cargo xtask test` checks all that can be checked, `cargo xtask python` the Python package alone,
 //! `cargo xtask browser` the reports alone, `cargo xtask data` fetches other people's measurements, `cargo xtask hunt` looks for what is
-//! wrong with larger means, `cargo xtask coverage` and `cargo xtask faults` make the tables of docs/fit.md.
+//! wrong with larger means, `cargo xtask coverage` and `cargo xtask faults` make the tables of docs/fit.md, `cargo xtask counts` counts the
+//! instructions of standard works.
 
 mod browser;
+mod counts;
 mod data;
 mod hunt;
 mod ignored;
@@ -64,6 +66,7 @@ fn main() -> ExitCode {
         ["python"] => test(&[PYTHON]),
         ["browser"] => test(&[BROWSER]),
         ["data", ref words @ ..] => data::run(words),
+        ["counts", ref words @ ..] => counts::run(words),
         ["coverage", ref words @ ..] => example("coverage", words),
         ["faults", ref words @ ..] => example("faults", words),
         ["hunt", ref words @ ..] => match hunt::Hunt::new(words) {
@@ -76,7 +79,8 @@ fn main() -> ExitCode {
         _ => {
             eprintln!(
                 "usage: cargo xtask test | cargo xtask browser | cargo xtask python | cargo xtask coverage [...] | \
-                 cargo xtask faults [...] | {} | {}",
+                 cargo xtask faults [...] | {} | {} | {}",
+                counts::USAGE,
                 data::USAGE,
                 hunt::USAGE
             );

@@ -1,9 +1,9 @@
 //! What follows when a mode ends: who does what next, and whether that holds.
 
-use super::{Core, ModeMatrices, Watch};
+use super::matrices::{Room, Watch};
+use super::{Core, ModeMatrices};
 use crate::friction::Motion;
 use crate::mechanism::{AmplifierMode, Cause, Limit, Mode, Part, Status, Switch, What};
-use crate::solve::propagator::SERIES_ORDER;
 use crate::solve::{Ending, Event};
 use std::sync::Arc;
 
@@ -24,15 +24,18 @@ const CHANGES_AT_ONCE: usize = 100;
 /// Turns of a body at one instant after which it is taken to rest.
 const TURNS_AT_ONCE: usize = 20;
 
-impl<const R: usize, const C: usize> Core<R, C> {
+impl<const N: usize> Core<N> {
     /// Load on a body at rest that would go forward, or backward (the same unless the gear loses power); what friction
     /// would then take of it; and what rounding may have done to it.
     fn load(&self, body: usize, forward: bool) -> (f64, f64, f64) {
+        let law = self.common.mechanism.friction(body);
+        let resistance = if forward { law.forward.coulomb } else { -law.backward.coulomb };
+        if let Some(row) = self.matrices.load(body) {
+            return (row.value(&self.z), resistance, row.noise(&self.z));
+        }
         let mut mode = self.common.mode;
         self.settle_torques(&mut mode);
         let form = self.common.mechanism.load(body, forward, &mode);
-        let law = self.common.mechanism.friction(body);
-        let resistance = if forward { law.forward.coulomb } else { -law.backward.coulomb };
         (self.value(&form), resistance, self.noise(&form))
     }
 
@@ -102,6 +105,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
             _ if (load - resistance).abs() <= 2.0 * noise => 2,
             _ => 1,
         };
+        self.common.is_fresh = true;
         for follower in self.common.mechanism.followers(body) {
             self.common.mode.motion[follower] = to;
         }
@@ -132,7 +136,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
     fn switch(&mut self, switch: Switch) {
         let before = self.common.mode.status(switch.what());
         // Let go by the motion and not by an edge of the input, a current leaves its limit with no rate of its own.
-        let at_edge = |guard: &Watch<C>| guard.value(&self.z).abs() <= 20.0 * guard.noise(&self.z);
+        let at_edge = |guard: &Watch<N>| guard.value(&self.z).abs() <= 20.0 * guard.noise(&self.z);
         let gently = self.matrices.guards.iter().any(|guard| guard.cause == Cause::Switch(switch) && at_edge(guard));
         self.common.mode.switch(switch);
         self.note(switch.what(), before, 0.0, false);
@@ -142,11 +146,14 @@ impl<const R: usize, const C: usize> Core<R, C> {
                 if side != Limit::Inside {
                     // It stands at its limit, to the last bit.
                     let limit = self.common.mechanism.drives[drive].amplifier.current_limit;
-                    self.z[self.common.space.layout.current[drive]] = side.sign() * limit.unwrap_or(0.0);
+                    if let Some(place) = self.common.space.layout.current[drive] {
+                        self.z[place] = side.sign() * limit.unwrap_or(0.0);
+                    }
                 }
                 self.tolerate(Cause::Switch(switch));
                 if let (Status::Limit(left), true) = (before, side == Limit::Inside && gently) {
                     self.common.fresh[Cause::Switch(Switch::Current(drive, left)).kind()] = 2;
+                    self.common.is_fresh = true;
                 }
             }
             _ => self.tolerate(Cause::Switch(switch)),
@@ -183,6 +190,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
                 // Where rounding moves a part back and forth without a moment passing, it stays where it is.
                 true => (40.0 * noise, 0),
             };
+            self.common.is_fresh = true;
         }
     }
 
@@ -199,7 +207,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
     }
 
     /// A load that passes a breakaway by rounding alone does not break it.
-    fn tolerate_loads(&mut self, law: &ModeMatrices<R, C>) {
+    fn tolerate_loads(&mut self, law: &ModeMatrices<N>) {
         for guard in &law.guards {
             if let Cause::BreakForward(_) | Cause::BreakBackward(_) = guard.cause {
                 let tolerance = &mut self.common.tolerance[guard.cause.kind()];
@@ -208,22 +216,42 @@ impl<const R: usize, const C: usize> Core<R, C> {
         }
     }
 
+    /// The guard that does not hold here; of several, that which is settled first.
+    fn fallen<'l>(&mut self, law: &'l ModeMatrices<N>) -> Option<&'l Watch<N>> {
+        law.values(&self.z, &mut self.room.value);
+        if self.room.value.iter().take(law.guards.len()).all(|&g| g > 0.0) {
+            return None;
+        }
+        self.stand(law);
+        let mut fallen: Option<&Watch<N>> = None;
+        for (lane, guard) in law.guards.iter().enumerate() {
+            let g = self.room.value[lane];
+            let falls = match g != 0.0 || self.common.fresh_order(guard.cause) > 0 {
+                true => g < 0.0,
+                // On the edge: the first term of its series that is more than rounding decides.
+                false => self.falls_from_zero(law, guard),
+            };
+            if falls && fallen.is_none_or(|first| guard.cause.rank() < first.cause.rank()) {
+                fallen = Some(guard);
+            }
+        }
+        fallen
+    }
+
+    /// Whether a guard that is zero falls.
+    fn falls_from_zero(&mut self, law: &ModeMatrices<N>, guard: &Watch<N>) -> bool {
+        let Room { series, coefficients, .. } = &mut *self.room;
+        law.series(&self.z, law.reach(), series);
+        let coefficients = guard.row.along(series, coefficients);
+        let first = law.first_term(guard, coefficients, (&self.z, law.reach()), 1);
+        coefficients.get(first).is_some_and(|&term| term < 0.0)
+    }
+
     /// Changes modes, without time passing, until every guard holds.
     pub(super) fn resolve(&mut self) {
         for _ in 0..CHANGES_AT_ONCE {
             let law = Arc::clone(&self.matrices);
-            let falls = |guard: &Watch<C>| {
-                let g = self.standing(guard);
-                if g != 0.0 || self.fresh_order(guard.cause) > 0 {
-                    return g < 0.0;
-                }
-                // On the edge: the first term of its series that is more than rounding decides.
-                let series = law.series(&self.z, law.reach());
-                let coefficients: [f64; SERIES_ORDER + 1] = std::array::from_fn(|k| guard.value(&series[k]));
-                let first = guard.first_term(&coefficients, &law.sizes(&self.z, law.reach()), 1);
-                coefficients.get(first).is_some_and(|&term| term < 0.0)
-            };
-            let fallen = law.guards.iter().filter(|guard| falls(guard)).min_by_key(|guard| guard.cause.rank());
+            let fallen = self.fallen(&law);
             // What does not depend on bodies is settled: now their loads are known, and to which rounding.
             if self.common.at_edge && fallen.is_none_or(|guard| guard.cause.rank() == BODIES) {
                 self.common.at_edge = false;
@@ -242,8 +270,9 @@ impl<const R: usize, const C: usize> Core<R, C> {
                 None => {
                     // A torque that starts from zero does so whichever way the gear counts as carrying.
                     let of_gears = law.guards.iter().filter(|guard| matches!(guard.cause, Cause::GearTorque(_)));
-                    for torque in of_gears.filter(|torque| torque.is_zero(&self.z)) {
+                    for torque in of_gears.filter(|torque| law.has_gear_torque && torque.is_zero(&self.z)) {
                         self.common.fresh[torque.cause.kind()] = 1;
+                        self.common.is_fresh = true;
                     }
                     if (self.common.handed_on + self.common.events.len()) as f64
                         > f64::min(EVENTS_AT_LEAST + EVENTS_PER_SECOND * self.time(), EVENTS_AT_MOST)

@@ -5,7 +5,7 @@ mod shown;
 use crate::friction::Motion;
 use crate::mechanism::{BODIES, Cause, DRIVES, Form, Layout, Mechanism, Mode, ROUNDING, SPRINGS, State};
 use crate::signal::DEGREE;
-use crate::solve::propagator::{Matrix, SERIES_ORDER, SERIES_REACH};
+use crate::solve::propagator::{EXPONENTIAL_REACH, Matrix, SERIES_REACH, SERIES_TERMS, Series, series_order};
 pub(super) use shown::Shown;
 use std::sync::{Arc, OnceLock};
 
@@ -13,25 +13,25 @@ use std::sync::{Arc, OnceLock};
 #[derive(Debug, Clone)]
 pub(in crate::solve) struct Space {
     pub(in crate::solve) layout: Layout,
-    /// Order of the highest derivative of an input that is carried along: 1 for straight inputs, [`DEGREE`] for smooth ones.
+    /// Order of the highest derivative of an input that is carried along: 0 for held inputs, 1 for straight ones, [`DEGREE`] for smooth ones.
     pub(in crate::solve) highest: usize,
 }
 
 impl Space {
-    pub(in crate::solve) fn new(mechanism: &Mechanism, smooth: bool) -> Self {
-        Self { layout: Layout::new(mechanism), highest: if smooth { DEGREE } else { 1 } }
+    /// That of inputs whose pieces have at most this degree.
+    pub(in crate::solve) fn new(mechanism: &Mechanism, degree: usize) -> Self {
+        Self { layout: Layout::new(mechanism), highest: if degree > 1 { DEGREE } else { degree } }
     }
 
-    /// Places of what moves, and of the constants behind it: those that the kernels have to have room for.
-    pub(in crate::solve) fn size(&self) -> (usize, usize) {
-        (self.layout.states + self.layout.inputs * self.highest, self.layout.inputs + 1)
+    /// Places that there have to be: states, inputs with their derivatives, and a one.
+    pub(in crate::solve) fn size(&self) -> usize {
+        self.layout.states + self.layout.inputs * (self.highest + 1) + 1
     }
 
-    /// Place of the k-th derivative of an input in a vector of which `R` places move: the moving ones behind the states, the highest,
-    /// constant, behind all that moves.
+    /// Place of the k-th derivative of an input.
     #[inline]
-    pub(in crate::solve) fn chain<const R: usize>(&self, input: usize, k: usize) -> usize {
-        if k < self.highest { self.layout.states + input * self.highest + k } else { R + input }
+    pub(in crate::solve) fn chain(&self, input: usize, k: usize) -> usize {
+        self.layout.states + input * (self.highest + 1) + k
     }
 
     /// The state that `z` stands for, in the solver's coordinates.
@@ -43,35 +43,30 @@ impl Space {
             inner.position[body] = z[layout.coordinate[body]];
             inner.speed[body] = z[layout.speed[body]];
         }
-        for drive in 0..layout.inputs {
-            inner.current[drive] = z[layout.current[drive]];
+        for (current, place) in inner.current.iter_mut().zip(layout.current) {
+            *current = place.map_or(0.0, |place| z[place]);
         }
         inner
     }
 
     /// A form as a row of weights on it.
-    fn row<const R: usize, const C: usize>(&self, form: &Form) -> [f64; C] {
+    fn row<const N: usize>(&self, form: &Form) -> [f64; N] {
         let layout = &self.layout;
-        let mut row = [0.0; C];
-        let on = layout.on_coordinates(form);
-        for body in 0..layout.bodies() {
-            row[layout.coordinate[body]] = on.position[body];
-            row[layout.speed[body]] = on.speed[body];
-        }
+        let mut row = [0.0; N];
+        layout.put(form, &mut row);
         for drive in 0..layout.inputs {
-            row[layout.current[drive]] = on.current[drive];
-            row[self.chain::<R>(drive, 0)] = form.input[drive];
+            row[self.chain(drive, 0)] = form.input[drive];
         }
-        row[C - 1] = form.constant;
+        row[N - 1] = form.constant;
         row
     }
 
     /// The inputs in it.
     #[inline]
-    pub(in crate::solve) fn input<const R: usize>(&self, z: &[f64]) -> [f64; DRIVES] {
+    pub(in crate::solve) fn input(&self, z: &[f64]) -> [f64; DRIVES] {
         let mut input = [0.0; DRIVES];
         for (drive, value) in input.iter_mut().enumerate().take(self.layout.inputs) {
-            *value = z[self.chain::<R>(drive, 0)];
+            *value = z[self.chain(drive, 0)];
         }
         input
     }
@@ -94,119 +89,195 @@ pub(in crate::solve) struct Size {
 
 impl Size {
     pub(super) const ZERO: Size = Size { mechanical: 0.0, magnetic: 0.0 };
+
+    /// Of both parts together.
+    fn whole(self) -> f64 {
+        (self.mechanical * self.mechanical + self.magnetic * self.magnetic).sqrt()
+    }
 }
 
-/// A condition of the mode on the vector z.
-pub(in crate::solve) struct Watch<const C: usize> {
+/// A linear form of the vector z.
+pub(in crate::solve) struct Row<const N: usize> {
     /// What counts in it: places in z in ascending order, and their weights. Most others are zero.
-    places: [usize; C],
-    weights: [f64; C],
-    /// How many count; and how many of those move.
-    count: [usize; 2],
-    /// The norm dual to the energy: how much its value can change per unit of √(2V), mechanical and magnetic.
-    dual: Size,
-    /// The magnitudes of its coefficients of the inputs.
-    input: [f64; DRIVES],
-    pub(super) cause: Cause,
+    places: [u8; N],
+    weights: [f64; N],
+    count: usize,
 }
 
-impl<const C: usize> Watch<C> {
-    fn new<const R: usize>(row: &[f64; C], dual: Size, input: [f64; DRIVES], cause: Cause) -> Self {
-        let (mut places, mut weights, mut count) = ([0; C], [0.0; C], [0; 2]);
+impl<const N: usize> Row<N> {
+    fn new(row: &[f64; N]) -> Self {
+        let (mut places, mut weights, mut count) = ([0; N], [0.0; N], 0);
         for (place, weight) in row.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
-            (places[count[0]], weights[count[0]]) = (place, *weight);
-            count[0] += 1;
-            count[1] += usize::from(place < R);
+            (places[count], weights[count]) = (place as u8, *weight);
+            count += 1;
         }
-        Self { places, weights, count, dual, input: input.map(f64::abs), cause }
+        Self { places, weights, count }
     }
 
-    /// By how much it changes at once with the inputs, per unit of time in which they change no faster than this.
-    pub(super) fn at_once(&self, rate: &[f64; DRIVES]) -> f64 {
-        self.input.iter().zip(rate).fold(0.0, |sum, (input, rate)| sum + input * rate)
+    fn terms(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.places.iter().zip(&self.weights).take(self.count).map(|(place, weight)| (usize::from(*place), *weight))
     }
 
     /// Σ w_j z_j, in the order of the places.
-    #[inline(always)]
-    fn sum(&self, count: usize, term: impl Fn(f64, usize) -> f64) -> f64 {
-        self.weights.iter().zip(&self.places).take(count).fold(0.0, |sum, (weight, place)| sum + term(*weight, *place))
+    pub(super) fn value(&self, z: &[f64; N]) -> f64 {
+        self.terms().fold(0.0, |sum, (place, weight)| sum + weight * z[place])
     }
 
-    pub(super) fn value(&self, z: &[f64; C]) -> f64 {
-        self.sum(self.count[0], |weight, place| weight * z[place])
+    /// What rounding may do to its value, the parts of z being of these sizes.
+    pub(super) fn noise(&self, sizes: &[f64; N]) -> f64 {
+        ROUNDING * self.terms().fold(0.0, |sum, (place, weight)| sum + (weight * sizes[place]).abs())
     }
 
-    /// Its value, with what rounding alone may have made negative taken for zero.
-    pub(super) fn standing(&self, z: &[f64; C]) -> f64 {
-        let value = self.value(z);
-        if value < 0.0 && self.is_zero(z) { 0.0 } else { value }
+    /// Its coefficients along a series, as many as it has terms.
+    pub(super) fn along<'c>(&self, series: &Series<N>, room: &'c mut [f64; SERIES_TERMS]) -> &'c mut [f64] {
+        let coefficients = &mut room[..=series.order];
+        coefficients.fill(0.0);
+        for (place, weight) in self.terms() {
+            for (coefficient, term) in coefficients.iter_mut().zip(&series.terms) {
+                *coefficient += weight * term[place];
+            }
+        }
+        coefficients
+    }
+}
+
+/// A condition of the mode on the vector z.
+pub(in crate::solve) struct Watch<const N: usize> {
+    pub(super) row: Row<N>,
+    pub(super) cause: Cause,
+    /// Where its tolerance stands; the speed of a body that stops has none.
+    pub(super) tolerance: usize,
+}
+
+impl<const N: usize> Watch<N> {
+    fn new(row: &[f64; N], cause: Cause) -> Self {
+        let tolerance = if matches!(cause, Cause::Stop(_)) { Cause::KINDS } else { cause.kind() };
+        Self { row: Row::new(row), cause, tolerance }
+    }
+
+    pub(super) fn value(&self, z: &[f64; N]) -> f64 {
+        self.row.value(z)
     }
 
     /// Whether its value is zero but for rounding.
-    pub(super) fn is_zero(&self, z: &[f64; C]) -> bool {
+    pub(super) fn is_zero(&self, z: &[f64; N]) -> bool {
         self.value(z).abs() <= 2.0 * self.noise(z)
     }
 
     /// What rounding may do to its value.
-    pub(super) fn noise(&self, z: &[f64; C]) -> f64 {
-        self.noise_of(z)
-    }
-
-    /// What rounding may do to its value, the parts of z being of these sizes.
-    fn noise_of(&self, sizes: &[f64; C]) -> f64 {
-        ROUNDING * self.sum(self.count[0], |weight, place| (weight * sizes[place]).abs())
-    }
-
-    /// The first coefficient along a series, from `first` on, that is more than rounding; those before it count as zero,
-    /// however many there are. `sizes` are those of [`ModeMatrices::sizes`].
-    pub(super) fn first_term(&self, coefficients: &[f64], sizes: &[[f64; C]; SERIES_ORDER + 1], first: usize) -> usize {
-        let counts = |k: &usize| coefficients[*k].abs() > 2.0 * self.noise_of(&sizes[*k]);
-        (first..coefficients.len()).find(counts).unwrap_or(coefficients.len())
-    }
-
-    /// Its rate of change, `y` being ż.
-    pub(super) fn slope<const R: usize>(&self, y: &[f64; R]) -> f64 {
-        self.sum(self.count[1], |weight, place| weight * y[place])
+    pub(super) fn noise(&self, z: &[f64; N]) -> f64 {
+        self.row.noise(z)
     }
 }
 
-/// Coordinates that a length is made of, at most: bodies, less those that stand in others' places.
-const MOST_TERMS: usize = 2;
+/// Linear forms side by side, by the places of z.
+type Lanes<const N: usize> = [[f64; LANES]; N];
+
+/// Forms that are computed side by side.
+const LANES: usize = 8;
+
+/// Room for the guards of a mode: two for each body, five for each drive, two for each spring.
+const GUARDS: usize = (2 * BODIES + 5 * DRIVES + 2 * SPRINGS).next_multiple_of(LANES);
+
+/// One number for each guard of a mode.
+pub(super) type Values = [f64; GUARDS];
+
+/// Room for what looks at the guards need.
+#[derive(Clone)]
+pub(super) struct Room<const N: usize> {
+    pub(super) value: Values,
+    pub(super) steepness: Values,
+    pub(super) slope: Values,
+    pub(super) bend: Values,
+    pub(super) series: Series<N>,
+    pub(super) coefficients: [f64; SERIES_TERMS],
+}
+
+impl<const N: usize> Room<N> {
+    pub(super) fn new() -> Self {
+        let none = [0.0; GUARDS];
+        let (series, coefficients) = (Series::room(), [0.0; SERIES_TERMS]);
+        Self { value: none, steepness: none, slope: none, bend: none, series, coefficients }
+    }
+}
+
+/// Guards side by side.
+#[derive(Clone)]
+struct Beside<const N: usize> {
+    rows: Lanes<N>,
+    /// How fast their values can change: per unit of √(2V), mechanical and magnetic, and of the inputs' rates.
+    mechanical: [f64; LANES],
+    magnetic: [f64; LANES],
+    at_once: [[f64; LANES]; DRIVES],
+}
+
+/// The forms of some rows, side by side.
+fn lanes<const N: usize>(rows: &[[f64; N]]) -> impl Iterator<Item = Lanes<N>> + '_ {
+    rows.chunks(LANES).map(|rows| {
+        let mut lanes = [[0.0; LANES]; N];
+        for (lane, row) in rows.iter().enumerate() {
+            lanes.iter_mut().zip(row).for_each(|(place, weight)| place[lane] = *weight);
+        }
+        lanes
+    })
+}
+
+/// The values of forms side by side.
+#[inline(always)]
+fn side_by_side<const N: usize>(lanes: &Lanes<N>, z: &[f64; N]) -> [f64; LANES] {
+    let mut sum = [0.0; LANES];
+    for (weights, factor) in lanes.iter().zip(z) {
+        for (sum, weight) in sum.iter_mut().zip(weights) {
+            *sum += weight * factor;
+        }
+    }
+    sum
+}
 
 /// The equations of one mode, ż = A z, and what follows from them.
-pub(in crate::solve) struct ModeMatrices<const R: usize, const C: usize> {
+pub(in crate::solve) struct ModeMatrices<const N: usize> {
     pub(super) mode: Mode,
-    pub(super) guards: Vec<Watch<C>>,
+    pub(super) guards: Vec<Watch<N>>,
+    /// The same side by side.
+    beside: Vec<Beside<N>>,
+    /// Whether one of them is the torque of a gear.
+    pub(super) has_gear_torque: bool,
+    /// What acts on each body but its friction; nothing where a gear loses power, and it is another at rest.
+    load: Vec<Row<N>>,
     /// |b|: how fast √(2V) of ż can grow per unit of |u̇|.
     pub(super) forcing: [f64; DRIVES],
-    /// Halvings of the interval until the Taylor series serves.
+    /// A bound of ‖A‖, 1/s.
+    speed: f64,
+    /// Halvings of the interval until a Taylor series tells the state, and until one tells the matrix exponential.
+    pub(super) coarsest: usize,
     pub(super) finest: usize,
     h: f64,
     /// A bound of the fastest undamped swing, rad/s.
     pub(super) swing: f64,
     /// Where ways are counted from.
     origin: [f64; BODIES],
-    rate: Matrix<R, C>,
-    steps: Vec<OnceLock<Box<Matrix<R, C>>>>,
+    rate: Matrix<N, N>,
+    steps: Vec<OnceLock<Matrix<N, N>>>,
     /// Rate at which √V may grow by itself; zero for most machines.
     growth: f64,
     inertia: [f64; BODIES],
     stiffness: [f64; SPRINGS],
-    /// Inertias, by the places of the speeds that move.
-    kinetic: Vec<(usize, f64)>,
-    /// Stiffnesses, and what the lengths are in terms of the coordinates: places and weights, those that are not there of no weight.
-    elastic: Vec<(f64, [(usize, f64); MOST_TERMS])>,
-    /// Weight of each (di/dt)² in 2V, by the places of the currents.
-    magnetic: Vec<(usize, f64)>,
+    /// Forms of which the squares of their rates add up to the mechanical part of 2V.
+    energy: Vec<Lanes<N>>,
+    /// Weight of each (di/dt)² in 2V, by the places of the currents; and whether there is any.
+    magnetic: [(usize, f64); DRIVES],
+    is_magnetic: bool,
     /// The same by the drives.
     weight_of_current: [f64; DRIVES],
     /// Whether a current moves anything, and the motion that current.
     coupled: bool,
+    /// Currents of the drives.
+    current: [OnceLock<Row<N>>; DRIVES],
     /// What an observer is shown.
-    shown: OnceLock<Box<Shown<C>>>,
+    shown: OnceLock<Box<Shown<N>>>,
 }
 
-impl<const R: usize, const C: usize> ModeMatrices<R, C> {
+impl<const N: usize> ModeMatrices<N> {
     /// Those of a mode and an interval, among those that are known, or new ones, which are added; and whether they are new.
     pub(super) fn of(
         known: &mut Vec<Arc<Self>>,
@@ -245,9 +316,9 @@ impl<const R: usize, const C: usize> ModeMatrices<R, C> {
         equations.guards.iter_mut().map(|guard| &mut guard.form).for_each(without_stuck);
         equations.acceleration.iter_mut().for_each(without_stuck);
 
-        let row_of = |form: &Form| space.row::<R, C>(form);
+        let row_of = |form: &Form| space.row::<N>(form);
         let mut rate = Matrix::zero();
-        let put = |rate: &mut Matrix<R, C>, row: usize, form: &Form| {
+        let put = |rate: &mut Matrix<N, N>, row: usize, form: &Form| {
             for (column, value) in row_of(form).into_iter().enumerate() {
                 rate.set(row, column, value);
             }
@@ -261,15 +332,17 @@ impl<const R: usize, const C: usize> ModeMatrices<R, C> {
             put(&mut rate, layout.coordinate[body], &way);
         }
         for drive in 0..layout.inputs {
-            put(&mut rate, layout.current[drive], &equations.current_rate[drive]);
+            if let Some(place) = layout.current[drive] {
+                put(&mut rate, place, &equations.current_rate[drive]);
+            }
             for k in 0..space.highest {
-                rate.set(space.chain::<R>(drive, k), space.chain::<R>(drive, k + 1), 1.0);
+                rate.set(space.chain(drive, k), space.chain(drive, k + 1), 1.0);
             }
         }
 
         // The current does g i φ̇ of work, and its own rate is −δ i − β φ̇. With the weight w = g/β on its share ½ w i² in V the
         // two cancel. Where there is no β to speak of, a large weight leaves next to nothing.
-        let inertia = equations.inertia;
+        let inertia = mechanism.balanced_inertia(&equations, mode);
         let (mut magnetic, mut growth, mut decays, mut coupled) = ([0.0; DRIVES], 0.0, 0.0, false);
         for (index, drive) in mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.has_current_state()) {
             let moved: f64 = (0..BODIES).map(|j| inertia[j] * equations.acceleration[j].current[index].powi(2)).sum();
@@ -323,11 +396,25 @@ impl<const R: usize, const C: usize> ModeMatrices<R, C> {
             let magnetic = currents.fold(0.0, |sum: f64, (current, weight)| sum.hypot(current.abs() / weight.sqrt()));
             Size { mechanical: sum.sqrt() * (1.0 + 1e-9), magnetic: magnetic * (1.0 + 1e-9) }
         };
-        let guards = equations
-            .guards
-            .iter()
-            .map(|guard| Watch::new::<R>(&row_of(&guard.form), dual(&guard.form), guard.form.input, guard.cause))
-            .collect();
+        let rows: Vec<[f64; N]> = equations.guards.iter().map(|guard| row_of(&guard.form)).collect();
+        let guards = rows.iter().zip(&equations.guards).map(|(row, guard)| Watch::new(row, guard.cause)).collect();
+        let none = [0.0; LANES];
+        let side = |rows| Beside { rows, mechanical: none, magnetic: none, at_once: [none; DRIVES] };
+        let mut beside: Vec<Beside<N>> = lanes(&rows).map(side).collect();
+        for (index, guard) in equations.guards.iter().enumerate() {
+            let (dual, beside, lane) = (dual(&guard.form), &mut beside[index / LANES], index % LANES);
+            // Motion and current pass energy to each other: only their sum is bounded.
+            (beside.mechanical[lane], beside.magnetic[lane]) = match coupled {
+                true => (dual.whole(), 0.0),
+                false => (dual.mechanical, dual.magnetic),
+            };
+            (0..DRIVES).for_each(|drive| beside.at_once[drive][lane] = guard.form.input[drive].abs());
+        }
+        let loses = mechanism.drives.iter().any(|drive| drive.loses());
+        let load = match loses {
+            true => Vec::new(),
+            false => (0..layout.bodies()).map(|body| Row::new(&row_of(&equations.load[body]))).collect(),
+        };
         let forcing = std::array::from_fn(|drive| {
             let push: f64 = (0..BODIES).map(|j| inertia[j] * equations.acceleration[j].input[drive].powi(2)).sum();
             (push + magnetic[drive] * equations.current_rate[drive].input[drive].powi(2)).sqrt()
@@ -346,14 +433,34 @@ impl<const R: usize, const C: usize> ModeMatrices<R, C> {
         damp += decays;
         let swing = f64::sqrt(swing);
         let speed: f64 = swing + damp;
-        let finest = (speed * h / SERIES_REACH).log2().ceil().clamp(0.0, 1000.0) as usize;
+        let halvings = |reach: f64| (speed * h / reach).log2().ceil().clamp(0.0, 1000.0) as usize;
+        let (coarsest, finest) = (halvings(SERIES_REACH), halvings(EXPONENTIAL_REACH));
 
-        let bodies = 0..layout.bodies();
-        let moving = |list: [f64; DRIVES]| (0..layout.inputs).map(move |drive| (drive, list[drive]));
+        // 2V = Σ m a² + Σ k ṡ² + Σ w (di/dt)²
+        let mut energy: Vec<[f64; N]> = Vec::with_capacity(LANES);
+        for body in (0..layout.bodies()).filter(|&body| !stuck[body]) {
+            let mut row = [0.0; N];
+            row[layout.speed[body]] = inertia[body].sqrt();
+            energy.push(row);
+        }
+        for spring in (0..mechanism.springs.len()).filter(|&spring| stiffness[spring] > 0.0 && !at_rest[spring]) {
+            let mut row = [0.0; N];
+            layout.weights(spring).for_each(|(body, w)| row[layout.coordinate[body]] = stiffness[spring].sqrt() * w);
+            energy.push(row);
+        }
+        let mut magnetic_places = [(0, 0.0); DRIVES];
+        for (drive, place) in magnetic_places.iter_mut().enumerate() {
+            *place = layout.current[drive].map_or((0, 0.0), |place| (place, magnetic[drive]));
+        }
         Self {
             mode: *mode,
             guards,
+            beside,
+            has_gear_torque: equations.guards.iter().any(|guard| matches!(guard.cause, Cause::GearTorque(_))),
+            load,
             forcing,
+            speed,
+            coarsest,
             finest,
             h,
             swing,
@@ -363,47 +470,97 @@ impl<const R: usize, const C: usize> ModeMatrices<R, C> {
             growth,
             inertia,
             stiffness,
-            kinetic: bodies.filter(|&body| !stuck[body]).map(|body| (layout.speed[body], inertia[body])).collect(),
-            elastic: (0..mechanism.springs.len())
-                .filter(|&spring| stiffness[spring] > 0.0 && !at_rest[spring])
-                .map(|spring| {
-                    let mut terms = [(0, 0.0); MOST_TERMS];
-                    for (term, (body, weight)) in terms.iter_mut().zip(layout.weights(spring)) {
-                        *term = (layout.coordinate[body], weight);
-                    }
-                    (stiffness[spring], terms)
-                })
-                .collect(),
-            magnetic: moving(magnetic)
-                .filter(|(_, weight)| *weight > 0.0)
-                .map(|(drive, weight)| (layout.current[drive], weight))
-                .collect(),
+            energy: lanes(&energy).collect(),
+            magnetic: magnetic_places,
+            is_magnetic: magnetic_places.iter().any(|(_, weight)| *weight > 0.0),
             weight_of_current: magnetic,
             coupled,
+            current: [const { OnceLock::new() }; DRIVES],
             shown: OnceLock::new(),
         }
     }
 
     /// ż.
-    pub(super) fn rate(&self, z: &[f64; C]) -> [f64; R] {
+    pub(super) fn rate(&self, z: &[f64; N]) -> [f64; N] {
         self.rate.rate(z)
     }
 
-    /// z̈ from ż.
-    pub(super) fn rate_of_rate(&self, y: &[f64; R]) -> [f64; R] {
-        self.rate.rate(&widened(y))
+    /// A look at z: ż and its size, and the guards into `value`; or, with ż for z, at what is one derivative higher.
+    pub(super) fn look(&self, z: &[f64; N], value: &mut Values) -> ([f64; N], Size) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.look_by_avx2(z, value) };
+        }
+        self.look_by_any(z, value)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn look_by_avx2(&self, z: &[f64; N], value: &mut Values) -> ([f64; N], Size) {
+        self.look_by_any(z, value)
+    }
+
+    #[inline(always)]
+    fn look_by_any(&self, z: &[f64; N], value: &mut Values) -> ([f64; N], Size) {
+        let rate = self.rate.times(z);
+        self.values_by_any(z, value);
+        (rate, self.size_by_any(&rate))
+    }
+
+    /// The values of the guards.
+    pub(super) fn values(&self, z: &[f64; N], value: &mut Values) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.values_by_avx2(z, value) };
+        }
+        self.values_by_any(z, value);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn values_by_avx2(&self, z: &[f64; N], value: &mut Values) {
+        self.values_by_any(z, value);
+    }
+
+    #[inline(always)]
+    fn values_by_any(&self, z: &[f64; N], value: &mut Values) {
+        for (values, lanes) in value.as_chunks_mut().0.iter_mut().zip(&self.beside) {
+            *values = side_by_side(&lanes.rows, z);
+        }
     }
 
     /// √(2V) of ż.
-    pub(super) fn size(&self, y: &[f64; R]) -> Size {
-        // 2V = Σ m a² + Σ k ṡ² + Σ w (di/dt)²
-        let kinetic = self.kinetic.iter().fold(0.0, |sum, &(place, mass)| sum + mass * y[place] * y[place]);
-        let elastic = self.elastic.iter().fold(0.0, |sum, (stiffness, terms)| {
-            let rate = terms.iter().fold(0.0, |sum, &(place, weight)| sum + weight * y[place]);
-            sum + stiffness * rate * rate
-        });
+    pub(super) fn size(&self, y: &[f64; N]) -> Size {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.size_by_avx2(y) };
+        }
+        self.size_by_any(y)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn size_by_avx2(&self, y: &[f64; N]) -> Size {
+        self.size_by_any(y)
+    }
+
+    #[inline(always)]
+    fn size_by_any(&self, y: &[f64; N]) -> Size {
+        let mut squares = [0.0; LANES];
+        for lanes in &self.energy {
+            let rates = side_by_side(lanes, y);
+            squares.iter_mut().zip(rates).for_each(|(square, rate)| *square += rate * rate);
+        }
+        let [a, b, c, d, e, f, g, h] = squares;
+        let mechanical = f64::sqrt(((a + e) + (b + f)) + ((c + g) + (d + h)));
+        if !self.is_magnetic {
+            return Size { mechanical, magnetic: 0.0 };
+        }
         let magnetic = self.magnetic.iter().fold(0.0, |sum, &(place, weight)| sum + weight * y[place] * y[place]);
-        Size { mechanical: (kinetic + elastic).sqrt(), magnetic: f64::sqrt(magnetic) }
+        Size { mechanical, magnetic: f64::sqrt(magnetic) }
     }
 
     /// By how much √(2V) of ż can grow in a unit of time while the inputs change no faster than this.
@@ -411,16 +568,37 @@ impl<const R: usize, const C: usize> ModeMatrices<R, C> {
         self.forcing.iter().zip(rate).fold(0.0, |sum, (forcing, rate)| sum + forcing * rate)
     }
 
-    /// How fast a guard can change while ż has at most this size, and the input adds at most `push` to it.
-    pub(super) fn steepness(&self, guard: &Watch<C>, size: Size, push: f64) -> f64 {
-        let dual = guard.dual;
-        if self.coupled {
-            // Motion and current pass energy to each other: only their sum is bounded.
-            return (dual.mechanical * dual.mechanical + dual.magnetic * dual.magnetic).sqrt()
-                * ((size.mechanical * size.mechanical + size.magnetic * size.magnetic).sqrt() + push);
+    /// How fast the guards can change while ż has at most this size times `grow`, the inputs add at most `push` to it, and change at most
+    /// at this rate.
+    #[inline]
+    pub(super) fn steepness(&self, (size, push): (Size, f64), grow: f64, rate: &[f64; DRIVES], steepness: &mut Values) {
+        // As `Size` parts them.
+        let (mechanical, magnetic) = match (self.coupled, self.is_magnetic) {
+            (true, _) => (size.whole() + push, 0.0),
+            (false, true) => (size.mechanical, size.magnetic + push),
+            (false, false) => (size.mechanical + push, size.magnetic),
+        };
+        let (mechanical, magnetic) = (grow * mechanical, grow * magnetic);
+        for (steepness, beside) in steepness.as_chunks_mut().0.iter_mut().zip(&self.beside) {
+            let mut sum = [0.0; LANES];
+            for (lane, sum) in sum.iter_mut().enumerate() {
+                *sum = beside.mechanical[lane] * mechanical + beside.magnetic[lane] * magnetic;
+            }
+            for (at_once, &rate) in beside.at_once.iter().zip(rate).filter(|(_, rate)| **rate > 0.0) {
+                sum.iter_mut().zip(at_once).for_each(|(sum, at_once)| *sum += at_once * rate);
+            }
+            *steepness = sum;
         }
-        let (moving, magnetic) = if !self.magnetic.is_empty() { (0.0, push) } else { (push, 0.0) };
-        dual.mechanical * (size.mechanical + moving) + dual.magnetic * (size.magnetic + magnetic)
+    }
+
+    /// What acts on a body but its friction, where no gear loses power.
+    pub(super) fn load(&self, body: usize) -> Option<&Row<N>> {
+        self.load.get(body)
+    }
+
+    /// Current of a drive, made ready when it is first wanted.
+    pub(super) fn current(&self, mechanism: &Mechanism, space: &Space, drive: usize) -> &Row<N> {
+        self.current[drive].get_or_init(|| Row::new(&space.row(&mechanism.current(drive, &self.mode))))
     }
 
     /// Length of the intervals of a level: h/2^level.
@@ -430,22 +608,27 @@ impl<const R: usize, const C: usize> ModeMatrices<R, C> {
         self.h * power
     }
 
-    /// How far the Taylor series reaches.
+    /// The reach of a short Taylor series: what instants and moments are measured by.
     pub(super) fn reach(&self) -> f64 {
         self.length(self.finest)
     }
 
+    /// How far the longest Taylor series reaches.
+    pub(super) fn far(&self) -> f64 {
+        self.length(self.coarsest)
+    }
+
     /// e^{A h/2^level} − I, computed when it is first wanted.
-    pub(super) fn step(&self, level: usize) -> &Matrix<R, C> {
+    pub(super) fn step(&self, level: usize) -> &Matrix<N, N> {
         if self.steps[level].get().is_none() {
             let known = (level..=self.finest).find(|&l| self.steps[l].get().is_some());
             let from = known.unwrap_or_else(|| {
-                let _ = self.steps[self.finest].set(Box::new(self.rate.exponential(self.reach())));
+                let _ = self.steps[self.finest].set(self.rate.exponential(self.reach()));
                 self.finest
             });
             for l in (level..from).rev() {
                 let doubled = self.steps[l + 1].get().expect("just computed").doubled();
-                let _ = self.steps[l].set(Box::new(doubled));
+                let _ = self.steps[l].set(doubled);
             }
         }
         self.steps[level].get().expect("just computed")
@@ -456,19 +639,37 @@ impl<const R: usize, const C: usize> ModeMatrices<R, C> {
         self.steps.iter().filter(|step| step.get().is_some()).count() as u64
     }
 
-    /// Terms of the Taylor series of z over `distance`: z(s · distance) = Σ term_k sᵏ.
-    pub(super) fn series(&self, z: &[f64; C], distance: f64) -> [[f64; C]; SERIES_ORDER + 1] {
-        self.rate.series(z, distance)
+    /// The Taylor series of z over `distance`.
+    pub(super) fn series(&self, z: &[f64; N], distance: f64, series: &mut Series<N>) {
+        self.rate.series(z, distance, series_order(self.speed * distance), series);
     }
 
     /// What rounding may do to ż.
-    pub(super) fn noise_of_rate(&self, z: &[f64; C]) -> [f64; R] {
+    pub(super) fn noise_of_rate(&self, z: &[f64; N]) -> [f64; N] {
         self.rate.absolute().rate(&z.map(f64::abs)).map(|size| ROUNDING * size)
     }
 
-    /// How large the parts are that the terms of this series are sums of: |A|ᵏ |z| dᵏ/k!.
-    pub(super) fn sizes(&self, z: &[f64; C], distance: f64) -> [[f64; C]; SERIES_ORDER + 1] {
-        self.rate.absolute().series(&z.map(f64::abs), distance)
+    /// The first coefficient of a guard along the series from z over `distance`, from `first` on, that is more than rounding; those before
+    /// it count as zero, however many there are. The terms of the series are sums of parts of the size |A|ᵏ |z| dᵏ/k!.
+    pub(super) fn first_term(
+        &self,
+        guard: &Watch<N>,
+        coefficients: &[f64],
+        (z, distance): (&[f64; N], f64),
+        first: usize,
+    ) -> usize {
+        let absolute = self.rate.absolute();
+        let mut sizes = z.map(f64::abs);
+        for (k, coefficient) in coefficients.iter().enumerate() {
+            if k > 0 {
+                let factor = distance / k as f64;
+                sizes = absolute.rate(&sizes).map(|size| size * factor);
+            }
+            if k >= first && coefficient.abs() > 2.0 * guard.noise(&sizes) {
+                return k;
+            }
+        }
+        coefficients.len()
     }
 
     /// How much √V may grow by itself within `length`.
@@ -485,11 +686,4 @@ impl<const R: usize, const C: usize> ModeMatrices<R, C> {
     pub(super) fn growth_time(&self) -> f64 {
         if self.growth == 0.0 { f64::INFINITY } else { 0.69 / self.growth }
     }
-}
-
-/// `y` with zeros where the constants stand.
-fn widened<const R: usize, const C: usize>(y: &[f64; R]) -> [f64; C] {
-    let mut wide = [0.0; C];
-    wide[..R].copy_from_slice(y);
-    wide
 }

@@ -18,7 +18,6 @@ use super::coordinates::Coordinates;
 use super::inputs::Pieces;
 use super::machine::Engine;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
-use super::propagator::SERIES_ORDER;
 use super::record::Extra;
 use super::roots;
 use super::rounding::Rounding;
@@ -27,24 +26,28 @@ use crate::mechanism::{Cause, DRIVES, Form, Mechanism, Mode, State};
 use kernel::Modes;
 pub(super) use kernel::{Known, Make, in_kernel};
 pub(super) use matrices::Space;
-use matrices::{ModeMatrices, Size, Watch};
+use matrices::{ModeMatrices, Room, Size};
 pub(super) use run::Run;
 use std::sync::Arc;
+
+/// Halvings of an interval that are met exactly: eighths, where a delay ends in the midst of a sample.
+const HALVES: usize = 3;
 
 /// For so small a part of the series' reach a speed that has left zero is still told by its series alone.
 const SOON: f64 = 1e-6;
 
 /// A machine under way: its state, its mode, and what is needed to go on. A clone of it goes on in the same way.
 #[derive(Clone)]
-pub(super) struct Core<const R: usize, const C: usize> {
+pub(super) struct Core<const N: usize> {
     /// State in the solver's coordinates, inputs and their derivatives, and a one.
-    z: [f64; C],
+    z: [f64; N],
     /// The largest magnitudes that each place of it has had in rows so far.
-    largest: [f64; C],
-    matrices: Arc<ModeMatrices<R, C>>,
-    known: Modes<R, C>,
+    largest: [f64; N],
+    matrices: Arc<ModeMatrices<N>>,
+    known: Modes<N>,
     /// Matrices that were there before.
     shared: u64,
+    room: Box<Room<N>>,
     pub(super) common: Common,
 }
 
@@ -60,10 +63,12 @@ pub(super) struct Common {
     /// How many leading Taylor coefficients of a sliding body's speed are zero by definition, because it starts from rest:
     /// 1 where it is accelerated, 2 where the load has only just reached its friction. The same for all else that is watched.
     fresh: [u8; Cause::KINDS],
+    is_fresh: bool,
     /// By how much the load on a stuck body may pass its breakaway before it counts: what rounding can do to the load.
     /// Without it a body that comes to rest just at its limit would chatter on the last bit. The same for all else that is
     /// watched where it is zero but for rounding, and would count as wrong in either state.
-    tolerance: [f64; Cause::KINDS],
+    /// The place behind the others stays zero.
+    tolerance: [f64; Cause::KINDS + 1],
     /// Whether the input has changed, and what rounding does to the loads on stuck bodies is to be looked at anew.
     at_edge: bool,
     /// Bounds of |u̇| and |ü| on the present pieces.
@@ -92,14 +97,23 @@ pub(super) struct Common {
 }
 
 /// What a bound tells of an interval.
-enum Bound<const C: usize> {
+enum Bound<const N: usize> {
     /// No guard falls; here is the end, if it was computed.
-    Safe(Option<[f64; C]>),
+    Safe(Option<[f64; N]>),
     /// Look closer.
     Unsure,
 }
 
-impl<const R: usize, const C: usize> Core<R, C> {
+impl Common {
+    fn fresh_order(&self, cause: Cause) -> usize {
+        match cause {
+            Cause::BreakForward(_) | Cause::BreakBackward(_) => 0,
+            cause => usize::from(self.fresh[cause.kind()]),
+        }
+    }
+}
+
+impl<const N: usize> Core<N> {
     /// That of a machine at rest in its mode in `start`. `known` are modes made ready for intervals of any length; `end` is how far it
     /// is to go, to tell whether it gets there.
     pub(super) fn new(
@@ -107,19 +121,20 @@ impl<const R: usize, const C: usize> Core<R, C> {
         space: Arc<Space>,
         start: &State,
         (h, end): (f64, f64),
-        mut known: Modes<R, C>,
+        mut known: Modes<N>,
     ) -> Self {
         let layout = &space.layout;
         let (mut coordinates, inner) = Coordinates::new(layout, start);
-        let mut z = [0.0; C];
+        let mut z = [0.0; N];
         for body in 0..layout.bodies() {
             (z[layout.coordinate[body]], z[layout.speed[body]]) = (inner.position[body], inner.speed[body]);
         }
-        for (index, drive) in mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.has_current_state()) {
-            debug_assert!(drive.has_current_state());
-            z[layout.current[index]] = inner.current[index];
+        for (place, current) in layout.current.iter().zip(inner.current) {
+            if let Some(place) = place {
+                z[*place] = current;
+            }
         }
-        z[C - 1] = 1.0;
+        z[N - 1] = 1.0;
         let mode = mechanism.first_mode(start);
         coordinates.hold(layout, &mode, &inner);
         let shared = propagators(&known);
@@ -132,7 +147,8 @@ impl<const R: usize, const C: usize> Core<R, C> {
             h,
             mode,
             fresh: [0; Cause::KINDS],
-            tolerance: [0.0; Cause::KINDS],
+            is_fresh: false,
+            tolerance: [0.0; Cause::KINDS + 1],
             at_edge: true,
             input_rate: [0.0; DRIVES],
             input_curvature: [0.0; DRIVES],
@@ -151,7 +167,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
             asks: false,
             trouble: None,
         };
-        Self { z, largest: [0.0; C], matrices, known, shared, common }
+        Self { z, largest: [0.0; N], matrices, known, shared, room: Box::new(Room::new()), common }
     }
 
     pub(super) fn time(&self) -> f64 {
@@ -182,9 +198,8 @@ impl<const R: usize, const C: usize> Core<R, C> {
             let snapped = (left / eighth).round() * eighth;
             let left = if (left - snapped).abs() <= near { snapped } else { left };
             let matrices = Arc::clone(&self.matrices);
-            let y = matrices.rate(&self.z);
             let safe = match left >= self.common.h {
-                true => self.safe_intervals((left / self.common.h) as u64, &y),
+                true => self.safe_intervals(&matrices, (left / self.common.h) as u64).0,
                 false => 0,
             };
             if safe > 0 {
@@ -218,7 +233,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
     /// Takes up new inputs.
     pub(super) fn set_input(&mut self, pieces: &Pieces) {
         self.common.cost.pieces += 1;
-        self.common.fresh = [0; Cause::KINDS];
+        self.refreshed();
         self.common.at_edge = true;
         for drive in 0..self.common.space.layout.inputs {
             self.take_up(drive, &pieces.coefficients[drive], pieces.end - pieces.start);
@@ -229,8 +244,8 @@ impl<const R: usize, const C: usize> Core<R, C> {
     fn take_up(&mut self, drive: usize, coefficients: &[f64], length: f64) {
         let highest = self.common.space.highest;
         if coefficients[1..].iter().all(|&c| c == 0.0) {
-            (0..=highest).for_each(|k| self.z[self.common.space.chain::<R>(drive, k)] = 0.0);
-            self.z[self.common.space.chain::<R>(drive, 0)] = coefficients[0];
+            (0..=highest).for_each(|k| self.z[self.common.space.chain(drive, k)] = 0.0);
+            self.z[self.common.space.chain(drive, 0)] = coefficients[0];
             (self.common.input_rate[drive], self.common.input_curvature[drive]) = (0.0, 0.0);
             return;
         }
@@ -238,7 +253,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
         for (k, &c) in coefficients.iter().enumerate().take(highest + 1) {
             factorial *= k.max(1) as f64;
             // u⁽ᵏ⁾ = k! c_k
-            self.z[self.common.space.chain::<R>(drive, k)] = c * factorial;
+            self.z[self.common.space.chain(drive, k)] = c * factorial;
         }
         let length = if length.is_finite() { length } else { 0.0 };
         (self.common.input_rate[drive], self.common.input_curvature[drive]) = change_rates(coefficients, length);
@@ -270,62 +285,76 @@ impl<const R: usize, const C: usize> Core<R, C> {
         (self.common.base, self.common.offset) = (base, 0.0);
     }
 
-    /// How many whole intervals, up to `most`, no guard can fall on.
-    fn safe_intervals(&mut self, most: u64, y: &[f64; R]) -> u64 {
-        let law = Arc::clone(&self.matrices);
+    /// How many whole intervals, up to `most`, no guard can fall on; and whether nothing moves.
+    fn safe_intervals(&mut self, law: &ModeMatrices<N>, most: u64) -> (u64, bool) {
+        let (rate, size) = law.look(&self.z, &mut self.room.value);
+        let resting = rate == [0.0; N];
         if law.guards.is_empty() {
-            return most;
+            return (most, resting);
         }
         self.common.cost.looks += 1;
-        let size = law.size(y);
+        if self.common.is_fresh && law.guards.iter().any(|guard| self.common.fresh_order(guard.cause) > 0) {
+            return (0, resting);
+        }
+        // g(τ) ≥ g − (|w| √2V + |w_u| |u̇|) τ − |w| |b| |u̇| τ²/2
+        self.stand(law);
+        let grow = law.growth_factor();
+        let Room { value, steepness, bend, .. } = &mut *self.room;
+        law.steepness((size, 0.0), grow, &self.common.input_rate, steepness);
         let push = law.push(&self.common.input_rate) * 0.5;
         let mut time = f64::INFINITY;
-        for guard in &law.guards {
-            // g(τ) ≥ g − (|w| √2V + |w_u| |u̇|) τ − |w| |b| |u̇| τ²/2
-            let g = self.standing(guard);
-            let grow = law.growth_factor();
-            let slope = grow * law.steepness(guard, size, 0.0) + guard.at_once(&self.common.input_rate);
-            let bend = grow * law.steepness(guard, Size::ZERO, push);
-            let moves = slope > 0.0 || bend > 0.0;
-            if g < 0.0 || (g == 0.0 && moves) || self.fresh_order(guard.cause) > 0 {
-                time = 0.0;
-            } else if moves {
-                time = f64::min(time, 2.0 * g / (slope + (slope * slope + 4.0 * bend * g).sqrt()));
+        if push == 0.0 {
+            for (g, slope) in value.iter().zip(steepness).take(law.guards.len()) {
+                // What does not move has no end; 0/0 is no number, and not less.
+                let until = if *g < 0.0 { 0.0 } else { *g / *slope };
+                time = if until < time { until } else { time };
+            }
+        } else {
+            law.steepness((Size::ZERO, push), grow, &[0.0; DRIVES], bend);
+            for ((&mut g, &mut slope), &mut bend) in value.iter_mut().zip(steepness).zip(bend).take(law.guards.len()) {
+                let moves = slope > 0.0 || bend > 0.0;
+                if g < 0.0 || (g == 0.0 && moves) {
+                    time = 0.0;
+                } else if moves {
+                    time = f64::min(time, 2.0 * g / (slope + (slope * slope + 4.0 * bend * g).sqrt()));
+                }
             }
         }
         time = time.min(law.growth_time());
         // A float that is too large becomes the largest integer.
-        most.min((time / self.common.h * 0.999) as u64)
+        (most.min((time / self.common.h * 0.999) as u64), resting)
     }
 
-    /// Value of a guard, with what rounding alone may have made negative forgiven.
-    fn standing(&self, guard: &Watch<C>) -> f64 {
-        guard.standing(&self.z)
-            + match guard.cause {
-                Cause::Stop(_) => 0.0,
-                cause => self.common.tolerance[cause.kind()],
+    /// Forgives the values of the guards what rounding alone may have made negative.
+    #[inline]
+    fn stand(&mut self, law: &ModeMatrices<N>) {
+        for (value, guard) in self.room.value.iter_mut().zip(&law.guards) {
+            if *value < 0.0 && guard.is_zero(&self.z) {
+                *value = 0.0;
             }
+            *value += self.common.tolerance[guard.tolerance];
+        }
     }
 
-    fn fresh_order(&self, cause: Cause) -> usize {
-        match cause {
-            Cause::BreakForward(_) | Cause::BreakBackward(_) => 0,
-            cause => usize::from(self.common.fresh[cause.kind()]),
+    /// Nothing is fresh any more.
+    fn refreshed(&mut self) {
+        if self.common.is_fresh {
+            (self.common.fresh, self.common.is_fresh) = ([0; Cause::KINDS], false);
         }
     }
 
     /// Advances by `distance`, at most an interval; stops at the first guard that falls and says why.
     pub(super) fn advance(&mut self, mut distance: f64) -> Option<Cause> {
         let law = Arc::clone(&self.matrices);
-        if self.common.fresh != [0; Cause::KINDS] && distance > 0.0 {
+        if self.common.is_fresh && distance > 0.0 {
             // A speed that starts from zero is told apart from one that falls to zero by its series.
-            let first = distance.min(law.reach());
+            let first = distance.min(law.far());
             if let Some(cause) = self.advance_by_series(&law, first) {
                 return Some(cause);
             }
             distance -= first;
         }
-        for level in 0..=law.finest {
+        for level in 0..=law.coarsest {
             while distance >= law.length(level) && self.goes() {
                 if let Some(cause) = self.cross_interval(&law, level) {
                     return Some(cause);
@@ -333,11 +362,19 @@ impl<const R: usize, const C: usize> Core<R, C> {
                 distance -= law.length(level);
             }
         }
-        if distance > 0.0 && self.goes() { self.advance_by_series(&law, distance) } else { None }
+        if !(distance > 0.0 && self.goes()) {
+            return None;
+        }
+        // Half an interval and the like is met again and again: there is a matrix for it.
+        let exact = (law.coarsest + 1..=law.finest.min(HALVES)).find(|&level| distance == law.length(level));
+        match exact {
+            Some(level) => self.cross_interval(&law, level),
+            None => self.advance_by_series(&law, distance),
+        }
     }
 
     /// Crosses an interval of h/2^level.
-    fn cross_interval(&mut self, law: &ModeMatrices<R, C>, level: usize) -> Option<Cause> {
+    fn cross_interval(&mut self, law: &ModeMatrices<N>, level: usize) -> Option<Cause> {
         if !self.goes_on() {
             return None;
         }
@@ -352,7 +389,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
                 self.move_on(length);
                 None
             }
-            Bound::Unsure if level < law.finest => {
+            Bound::Unsure if level < law.coarsest => {
                 self.cross_interval(law, level + 1).or_else(|| self.cross_interval(law, level + 1))
             }
             Bound::Unsure => self.advance_by_series(law, length),
@@ -380,31 +417,30 @@ impl<const R: usize, const C: usize> Core<R, C> {
     }
 
     /// Decides, if it can, that no guard falls within `length`.
-    fn bound(&mut self, law: &ModeMatrices<R, C>, length: f64, level: Option<usize>) -> Bound<C> {
+    fn bound(&mut self, law: &ModeMatrices<N>, length: f64, level: Option<usize>) -> Bound<N> {
         if law.guards.is_empty() {
             return Bound::Safe(None);
         }
         self.common.cost.looks += 1;
-        let y = law.rate(&self.z);
+        let (rate, size) = law.look(&self.z, &mut self.room.value);
         let grow = law.growth_over(length);
-        let (size, push) = (law.size(&y), law.push(&self.common.input_rate) * length);
-        let steepness =
-            |guard: &Watch<C>| grow * law.steepness(guard, size, push) + guard.at_once(&self.common.input_rate);
-        let undecided = |g: f64, steepness: f64| !(g > steepness * length || (g >= 0.0 && steepness == 0.0));
-        if !law.guards.iter().any(|guard| undecided(self.standing(guard), steepness(guard))) {
-            return Bound::Safe(None);
-        }
+        self.stand(law);
+        let (input_rate, curvature) = (&self.common.input_rate, &self.common.input_curvature);
+        let Room { value, steepness, slope, bend, .. } = &mut *self.room;
+        law.steepness((size, law.push(input_rate) * length), grow, input_rate, steepness);
+        let undecided = |lane: usize| {
+            let (g, steepness) = (value[lane], steepness[lane]);
+            !(g > steepness * length || (g >= 0.0 && steepness == 0.0))
+        };
+        let guards = 0..law.guards.len();
+        let Some(first) = guards.clone().find(|&lane| undecided(lane)) else { return Bound::Safe(None) };
 
-        let second = law.rate_of_rate(&y);
-        let (size, push) = (law.size(&second), law.push(&self.common.input_curvature) * length);
+        // The same one derivative higher: its guards are the slopes.
+        let (_, size) = law.look(&rate, slope);
+        law.steepness((size, law.push(curvature) * length), grow, curvature, bend);
         let mut falling = false;
-        for guard in &law.guards {
-            let g = self.standing(guard);
-            if !undecided(g, steepness(guard)) {
-                continue;
-            }
-            let slope = guard.slope(&y);
-            let bend = grow * law.steepness(guard, size, push) + guard.at_once(&self.common.input_curvature);
+        for lane in (first..guards.end).filter(|&lane| undecided(lane)) {
+            let (g, slope, bend) = (value[lane], slope[lane], bend[lane]);
             // g(τ) ≥ g + ġ τ − |g̈| τ²/2
             let stays = g >= 0.0 && g + slope.min(0.0) * length - 0.5 * bend * length * length > 0.0;
             let rises = g >= 0.0 && slope > bend * length;
@@ -419,30 +455,35 @@ impl<const R: usize, const C: usize> Core<R, C> {
         // What falls all the way has not fallen through if it is still positive at the end.
         let mut end = self.z;
         law.step(level).advance(&mut end);
-        if law.guards.iter().all(|guard| guard.value(&end) > 0.0) { Bound::Safe(Some(end)) } else { Bound::Unsure }
+        law.values(&end, value);
+        if guards.into_iter().all(|lane| value[lane] > 0.0) { Bound::Safe(Some(end)) } else { Bound::Unsure }
     }
 
     /// Advances by a `distance` within the reach of the Taylor series, to the first guard that falls.
-    fn advance_by_series(&mut self, law: &ModeMatrices<R, C>, distance: f64) -> Option<Cause> {
+    fn advance_by_series(&mut self, law: &ModeMatrices<N>, distance: f64) -> Option<Cause> {
         self.common.cost.series += 1;
-        let series = law.series(&self.z, distance);
-        let mut sizes = None;
+        law.series(&self.z, distance, &mut self.room.series);
         let mut first: Option<(f64, Cause)> = None;
+        law.values(&self.z, &mut self.room.value);
+        self.stand(law);
         // Term 1 of the series is ż · distance: most guards are too far away to fall, as in `bound`.
-        let change = std::array::from_fn(|j| series[1][j]);
-        let (size, push) = (law.size(&change), law.push(&self.common.input_rate) * distance * distance);
-        let grow = law.growth_over(distance);
-        for guard in &law.guards {
-            let fall = grow * law.steepness(guard, size, push) + guard.at_once(&self.common.input_rate) * distance;
-            if self.standing(guard) > fall {
+        let rate = self.common.input_rate;
+        let Room { value, steepness, series, coefficients, .. } = &mut *self.room;
+        law.steepness(
+            (law.size(&series.terms[1]), law.push(&rate) * distance * distance),
+            law.growth_over(distance),
+            &rate.map(|rate| rate * distance),
+            steepness,
+        );
+        for (lane, guard) in law.guards.iter().enumerate() {
+            if value[lane] > steepness[lane] {
                 continue;
             }
-            let mut coefficients: [f64; SERIES_ORDER + 1] = std::array::from_fn(|k| guard.value(&series[k]));
-            coefficients[0] = self.standing(guard);
-            let mut order = self.fresh_order(guard.cause);
+            let coefficients = guard.row.along(series, coefficients);
+            coefficients[0] = value[lane];
+            let mut order = self.common.fresh_order(guard.cause);
             if order > 0 || coefficients[0] == 0.0 {
-                let sizes = sizes.get_or_insert_with(|| law.sizes(&self.z, distance));
-                order = guard.first_term(&coefficients, sizes, order.max(1));
+                order = law.first_term(guard, coefficients, (&self.z, distance), order.max(1));
             }
             let sooner = |s: f64| {
                 first.is_none_or(|(earliest, cause)| {
@@ -456,13 +497,10 @@ impl<const R: usize, const C: usize> Core<R, C> {
             }
         }
         let s = first.map_or(1.0, |(s, _)| s);
-        for j in 0..R {
-            let change = series[1..].iter().rev().fold(0.0, |sum, term| (sum + term[j]) * s);
-            self.z[j] += change;
-        }
+        series.add_to(&mut self.z, s);
         self.move_on(s * distance);
         if s * distance > SOON * law.reach() {
-            self.common.fresh = [0; Cause::KINDS];
+            self.refreshed();
         }
         first.map(|(_, cause)| cause)
     }
@@ -478,7 +516,7 @@ impl<const R: usize, const C: usize> Core<R, C> {
     }
 
     pub(super) fn input(&self) -> [f64; DRIVES] {
-        self.common.space.input::<R>(&self.z)
+        self.common.space.input(&self.z)
     }
 
     /// What rounding may have done to the value of a form.
@@ -503,23 +541,24 @@ struct Smoothed {
 impl Make for Smoothed {
     type Made = Box<dyn Engine>;
 
-    fn make<const R: usize, const C: usize>(self) -> Self::Made {
+    fn make<const N: usize>(self) -> Self::Made {
         let Self { z: states, derivatives, common } = self;
-        let mut z = [0.0; C];
+        let mut z = [0.0; N];
         z[..states.len()].copy_from_slice(&states);
         for (drive, derivatives) in derivatives.iter().enumerate() {
             for (k, value) in derivatives.iter().enumerate() {
-                z[common.space.chain::<R>(drive, k)] = *value;
+                z[common.space.chain(drive, k)] = *value;
             }
         }
-        z[C - 1] = 1.0;
+        z[N - 1] = 1.0;
         let mut known = Vec::new();
         let (matrices, _) = ModeMatrices::of(&mut known, &common.mechanism, &common.space, &common.mode, common.h);
-        Box::new(Core::<R, C> { z, largest: [0.0; C], matrices, known, shared: 0, common })
+        let room = Box::new(Room::new());
+        Box::new(Core::<N> { z, largest: [0.0; N], matrices, known, shared: 0, room, common })
     }
 }
 
-impl<const R: usize, const C: usize> Engine for Core<R, C> {
+impl<const N: usize> Engine for Core<N> {
     fn copy(&self) -> Box<dyn Engine> {
         Box::new(self.clone())
     }
@@ -532,17 +571,17 @@ impl<const R: usize, const C: usize> Engine for Core<R, C> {
         Core::time(self)
     }
 
-    fn is_smooth(&self) -> bool {
-        self.common.space.highest > 1
+    fn degree(&self) -> usize {
+        self.common.space.highest
     }
 
-    fn smooth(&self) -> Box<dyn Engine> {
+    fn raised(&self, degree: usize) -> Box<dyn Engine> {
         let mut common = self.common.clone();
         common.rounding.see(&self.largest);
         let old = &self.common.space;
-        let derivative = |drive: usize| (0..=old.highest).map(move |k| self.z[old.chain::<R>(drive, k)]);
+        let derivative = |drive: usize| (0..=old.highest).map(move |k| self.z[old.chain(drive, k)]);
         let derivatives = (0..old.layout.inputs).map(|drive| derivative(drive).collect()).collect();
-        let space = Arc::new(Space::new(&self.common.mechanism, true));
+        let space = Arc::new(Space::new(&self.common.mechanism, degree));
         common.space = Arc::clone(&space);
         in_kernel(space.size(), Smoothed { z: self.z[..old.layout.states].to_vec(), derivatives, common })
     }
@@ -608,6 +647,6 @@ fn change_rates(coefficients: &[f64], length: f64) -> (f64, f64) {
 }
 
 /// Matrices computed so far.
-fn propagators<const R: usize, const C: usize>(known: &[Arc<ModeMatrices<R, C>>]) -> u64 {
+fn propagators<const N: usize>(known: &[Arc<ModeMatrices<N>>]) -> u64 {
     known.iter().map(|matrices| matrices.propagators()).sum()
 }

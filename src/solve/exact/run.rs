@@ -1,10 +1,11 @@
 //! A run: a machine, and a recorder of its rows.
 
 use super::shown::Watching;
-use super::{Core, Known, Space};
+use super::{Core, Known, ModeMatrices, Space};
 use crate::mechanism::{Mechanism, State};
 use crate::solve::inputs::Pieces;
-use crate::solve::observe::Output;
+use crate::solve::observe::{Output, Reading};
+use crate::solve::propagator::Matrix;
 use crate::solve::record::Recorder;
 use crate::solve::run::{Running, Start};
 use crate::solve::{Detail, Ending, Flow, Grid, Outcome};
@@ -13,9 +14,12 @@ use std::sync::Arc;
 /// Intervals looked at closer after which a bound is made anew.
 const OFTEN: usize = 8;
 
+/// Rows at a time where nobody wants them.
+const SCRATCH: usize = 16;
+
 /// A run under way.
-pub(in crate::solve) struct Run<'a, const R: usize, const C: usize> {
-    pub(super) core: Core<R, C>,
+pub(in crate::solve) struct Run<'a, const N: usize> {
+    pub(super) core: Core<N>,
     grid: Grid,
     /// The row where it stands, or that it has passed last.
     row: u64,
@@ -24,7 +28,7 @@ pub(in crate::solve) struct Run<'a, const R: usize, const C: usize> {
     known: Known,
 }
 
-impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
+impl<'a, const N: usize> Run<'a, N> {
     /// A run that begins in `start`.
     pub(in crate::solve) fn new(
         mechanism: &Arc<Mechanism>,
@@ -35,9 +39,9 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     ) -> Self {
         let grid = Grid::new(start.every, start.until);
         let seen = mechanism.seen_by(&space.layout, &start.state);
-        let list = std::mem::take(known.list::<R, C>());
-        let inputs = |drive| space.chain::<R>(drive, 0);
-        let recorder = Recorder::new(&seen, &space.layout, (R, &inputs), grid, output);
+        let list = std::mem::take(known.list::<N>());
+        let inputs = |drive| space.chain(drive, 0);
+        let recorder = Recorder::new(&seen, &space.layout, (N, &inputs), grid, output);
         let core = Core::new(seen, Arc::new(space), &start.state, (grid.interval(), grid.end()), list);
         Self { core, grid, row: 0, recorder, watching: Watching::new(), known }
     }
@@ -45,6 +49,10 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     /// The row at or before `time` and how far behind it; next to a row means on it.
     fn locate(&self, time: f64) -> (u64, f64) {
         let (last, h) = (self.grid.even(), self.grid.interval());
+        // The next row, as where samples fall on rows.
+        if self.row < last && self.grid.time(self.row + 1) == time {
+            return (self.row + 1, 0.0);
+        }
         let mut row = ((time / h) as u64).min(last);
         while row > 0 && self.grid.time(row) > time {
             row -= 1;
@@ -133,7 +141,7 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             let core = &mut self.core;
             core.see();
             self.recorder.segment(core.common.taken, &core.common.coordinates, &core.common.mode);
-            self.recorder.push(core.z.first_chunk::<R>().expect("what moves stands first"));
+            self.recorder.push(&core.z);
         }
         self.heed();
     }
@@ -141,13 +149,11 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
     /// Moves as many whole intervals, up to `most`, as no guard can fall on; false if not even one.
     fn take_safe_intervals(&mut self, most: u64) -> bool {
         let law = Arc::clone(&self.core.matrices);
-        let y = law.rate(&self.core.z);
-        let safe = self.core.safe_intervals(most, &y);
+        let (safe, resting) = self.core.safe_intervals(&law, most);
         if safe == 0 {
             return false;
         }
         let h = self.grid.interval();
-        let resting = y.iter().all(|&rate| rate == 0.0);
         let mut bow = self.is_observed().then(|| self.bow(&law, h, safe as f64 * h));
         if let (true, Some(bow)) = (resting, &bow) {
             let (begin, z) = (self.core.time(), self.core.z);
@@ -170,37 +176,87 @@ impl<'a, const R: usize, const C: usize> Run<'a, R, C> {
             self.go_to(self.row);
             return true;
         }
+        match &mut bow {
+            Some(bow) => self.pass_rows(&law, safe, bow),
+            None => self.take_rows(step, safe),
+        }
+        self.go_to(self.row);
+        true
+    }
+
+    /// Goes so many intervals on, and puts out all rows on the way but the last.
+    fn take_rows(&mut self, step: &Matrix<N, N>, intervals: u64) {
+        let mut left = intervals - 1;
+        while left > 0 {
+            let scratch = &mut [[0.0; N]; SCRATCH];
+            let room = match self.recorder.detail {
+                Detail::None => &mut scratch[..],
+                _ => self.recorder.room(),
+            };
+            let rows = left.min(room.len() as u64) as usize;
+            let core = &mut self.core;
+            let (begin, largest) = (core.z, core.largest);
+            step.advance_rows(&mut core.z, &mut core.largest, &mut room[..rows]);
+            if !core.is_finite() {
+                // The last row that is made of numbers.
+                let good = room.iter().take_while(|row| row.iter().sum::<f64>().is_finite()).count();
+                (core.z, core.largest) = (begin, largest);
+                step.advance_rows(&mut core.z, &mut core.largest, &mut room[..good]);
+                self.passed(good);
+                step.advance(&mut self.core.z);
+                self.row += 1;
+                self.core.common.trouble = Some(Ending::Diverged { time: self.grid.time(self.row) });
+                return;
+            }
+            left -= rows as u64;
+            if !self.passed(rows) {
+                return;
+            }
+        }
+        self.core.common.cost.steps += 1;
+        step.advance(&mut self.core.z);
+        self.row += 1;
+    }
+
+    /// Takes so many rows that were passed; false if the receiver wants no more.
+    fn passed(&mut self, rows: usize) -> bool {
+        self.row += rows as u64;
+        self.core.common.cost.steps += rows as u64;
+        match self.recorder.detail {
+            Detail::None => self.recorder.skip(rows as u64),
+            _ => self.recorder.take(rows),
+        }
+        self.core.count_from(self.grid.time(self.row));
+        self.heed();
+        self.goes()
+    }
+
+    /// Goes so many intervals on, puts out all rows on the way but the last, and shows the way.
+    fn pass_rows(&mut self, law: &ModeMatrices<N>, intervals: u64, bow: &mut Reading) {
+        let (step, h) = (law.step(0), self.grid.interval());
         let mut closer = 0;
-        for j in 0..safe {
+        for j in 0..intervals {
             if j > 0 {
                 self.put_out();
                 if self.core.common.trouble.is_some() {
-                    self.go_to(self.row);
-                    return true;
+                    return;
                 }
             }
-            match &mut bow {
-                Some(bow) => {
-                    let mut end = self.core.z;
-                    step.advance(&mut end);
-                    closer += usize::from(self.move_shown(&law, self.grid.time(self.row), h, end, bow));
-                    if closer == OFTEN {
-                        // What swings has died down since.
-                        closer = 0;
-                        *bow = self.bow(&law, h, (safe - j) as f64 * h);
-                    }
-                }
-                None => step.advance(&mut self.core.z),
+            let mut end = self.core.z;
+            step.advance(&mut end);
+            closer += usize::from(self.move_shown(law, self.grid.time(self.row), h, end, bow));
+            if closer == OFTEN {
+                // What swings has died down since.
+                closer = 0;
+                *bow = self.bow(law, h, (intervals - j) as f64 * h);
             }
             self.row += 1;
+            self.core.common.cost.steps += 1;
         }
-        self.go_to(self.row);
-        self.core.common.cost.steps += safe;
-        true
     }
 }
 
-impl<const R: usize, const C: usize> Running for Run<'_, R, C> {
+impl<const N: usize> Running for Run<'_, N> {
     fn set_input(&mut self, pieces: &Pieces) {
         self.core.set_input(pieces);
         self.core.resolve();
@@ -221,7 +277,8 @@ impl<const R: usize, const C: usize> Running for Run<'_, R, C> {
     }
 
     fn current(&self, drive: usize) -> f64 {
-        self.core.value(&self.core.common.mechanism.current(drive, &self.core.common.mode))
+        let common = &self.core.common;
+        self.core.matrices.current(&common.mechanism, &common.space, drive).value(&self.core.z)
     }
 
     fn finish(&mut self, is_at_end: bool) -> Outcome {
@@ -254,7 +311,7 @@ impl<const R: usize, const C: usize> Running for Run<'_, R, C> {
     }
 
     fn known(&mut self) -> Known {
-        *self.known.list::<R, C>() = std::mem::take(&mut self.core.known);
+        *self.known.list::<N>() = std::mem::take(&mut self.core.known);
         std::mem::take(&mut self.known)
     }
 }

@@ -22,9 +22,9 @@ const SAME: f64 = 1e-10;
 const RIGHT: u32 = 32;
 
 /// An instant as an observer sees it.
-struct Sight<const R: usize, const C: usize> {
-    z: [f64; C],
-    rate: [f64; R],
+struct Sight<const N: usize> {
+    z: [f64; N],
+    rate: [f64; N],
     value: Reading,
     slope: Reading,
 }
@@ -48,7 +48,7 @@ impl Watching {
     }
 }
 
-impl<const R: usize, const C: usize> Run<'_, R, C> {
+impl<const N: usize> Run<'_, N> {
     /// Whether somebody observes.
     pub(super) fn is_observed(&self) -> bool {
         self.recorder.observer.is_some()
@@ -73,11 +73,11 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
     }
 
     /// How far readings can be off a straight line over intervals of this length, within `whole` from now on.
-    pub(super) fn bow(&self, law: &ModeMatrices<R, C>, interval: f64, whole: f64) -> Reading {
+    pub(super) fn bow(&self, law: &ModeMatrices<N>, interval: f64, whole: f64) -> Reading {
         self.bow_from(law, &self.core.z, interval, whole)
     }
 
-    fn bow_from(&self, law: &ModeMatrices<R, C>, z: &[f64; C], interval: f64, whole: f64) -> Reading {
+    fn bow_from(&self, law: &ModeMatrices<N>, z: &[f64; N], interval: f64, whole: f64) -> Reading {
         let shown = law.shown(&self.core.common.mechanism, &self.core.common.space);
         law.bow(
             shown,
@@ -88,7 +88,7 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
     }
 
     /// Shows the interval of `length` that began at `begin` and has led to `end`; says whether the observer wants to see closer.
-    fn show(&mut self, shown: &Shown<C>, begin: f64, length: f64, end: &[f64; C], bow: &Reading) -> bool {
+    fn show(&mut self, shown: &Shown<N>, begin: f64, length: f64, end: &[f64; N], bow: &Reading) -> bool {
         let to = self.read(shown, end);
         let from = match self.watching.now {
             Some(from) => from,
@@ -109,10 +109,10 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
     /// Moves on to `end`, `length` from now, in the present mode, and shows the way there; says whether it was looked at closer.
     pub(super) fn move_shown(
         &mut self,
-        law: &ModeMatrices<R, C>,
+        law: &ModeMatrices<N>,
         begin: f64,
         length: f64,
-        end: [f64; C],
+        end: [f64; N],
         bow: &Reading,
     ) -> bool {
         let start = self.core.z;
@@ -126,7 +126,7 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
     }
 
     /// Shows a way of any length that begins at `z`, in parts that there are matrices for and a rest that a series tells.
-    fn show_closer(&mut self, law: &ModeMatrices<R, C>, mut z: [f64; C], mut begin: f64, mut length: f64) {
+    fn show_closer(&mut self, law: &ModeMatrices<N>, mut z: [f64; N], mut begin: f64, mut length: f64) {
         for level in 0..=law.finest {
             // What a sum of times is off by makes no difference here.
             while length >= law.length(level) * (1.0 - SAME) {
@@ -136,15 +136,17 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
             }
         }
         if length > SAME * law.reach() {
-            let series = law.series(&z, length);
-            let end = std::array::from_fn(|j| series.iter().rev().fold(0.0, |sum, term| sum + term[j]));
+            let mut end = z;
+            let series = &mut self.core.room.series;
+            law.series(&z, length, series);
+            series.add_to(&mut end, 1.0);
             let curve = self.curve(law, &self.sight(law, &z), &self.sight(law, &end), begin, length);
             self.see(&curve);
         }
     }
 
     /// Shows an interval of h/2^level from `z` on in parts so short that cubics tell where there is something to see; returns its end.
-    fn show_level(&mut self, law: &ModeMatrices<R, C>, z: [f64; C], begin: f64, level: usize) -> [f64; C] {
+    fn show_level(&mut self, law: &ModeMatrices<N>, z: [f64; N], begin: f64, level: usize) -> [f64; N] {
         let fine = self.watching.level.saturating_sub(1).clamp(level, law.finest);
         let (parts, length) = (1_u64 << (fine - level).min(60), law.length(fine));
         let mut from = self.sight(law, &z);
@@ -163,7 +165,7 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
 
     /// Whether the observer wants to see closer what a cubic tells of a way: with slopes a and b at its ends and d between, it is off a
     /// straight line by s (1 − s) ((a − d)(1 − s) − (b − d) s).
-    fn asks(&mut self, from: &Sight<R, C>, to: &Sight<R, C>, begin: f64, length: f64) -> bool {
+    fn asks(&mut self, from: &Sight<N>, to: &Sight<N>, begin: f64, length: f64) -> bool {
         let bow: Reading = std::array::from_fn(|q| {
             let across = to.value[q] - from.value[q];
             let (a, b) = ((from.slope[q] * length - across).abs(), (to.slope[q] * length - across).abs());
@@ -173,7 +175,7 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
     }
 
     /// Shows an interval of h/2^level as a curve, or two halves of it where that is not right.
-    fn show_curve(&mut self, law: &ModeMatrices<R, C>, from: &Sight<R, C>, to: &Sight<R, C>, begin: f64, level: usize) {
+    fn show_curve(&mut self, law: &ModeMatrices<N>, from: &Sight<N>, to: &Sight<N>, begin: f64, level: usize) {
         self.watching.curves += 1;
         let length = law.length(level);
         let curve = self.curve(law, from, to, begin, length);
@@ -204,24 +206,22 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
     }
 
     /// What is to be seen of `z`.
-    fn sight(&self, law: &ModeMatrices<R, C>, z: &[f64; C]) -> Sight<R, C> {
+    fn sight(&self, law: &ModeMatrices<N>, z: &[f64; N]) -> Sight<N> {
         let rate = law.rate(z);
         let value = self.read(law.shown(&self.core.common.mechanism, &self.core.common.space), z);
         Sight { z: *z, rate, value, slope: self.rates(law, &rate) }
     }
 
     /// Rates of what is read, `rate` being that of z.
-    fn rates(&self, law: &ModeMatrices<R, C>, rate: &[f64; R]) -> Reading {
-        let mut wide = [0.0; C];
-        wide[..R].copy_from_slice(rate);
-        law.shown(&self.core.common.mechanism, &self.core.common.space).change(&wide)
+    fn rates(&self, law: &ModeMatrices<N>, rate: &[f64; N]) -> Reading {
+        law.shown(&self.core.common.mechanism, &self.core.common.space).change(rate)
     }
 
     /// The curve between two sights.
-    fn curve(&self, law: &ModeMatrices<R, C>, from: &Sight<R, C>, to: &Sight<R, C>, begin: f64, length: f64) -> Curve {
-        let terms = |sight: &Sight<R, C>| {
-            let second = law.rate_of_rate(&sight.rate);
-            let third = law.rate_of_rate(&second);
+    fn curve(&self, law: &ModeMatrices<N>, from: &Sight<N>, to: &Sight<N>, begin: f64, length: f64) -> Curve {
+        let terms = |sight: &Sight<N>| {
+            let second = law.rate(&sight.rate);
+            let third = law.rate(&second);
             // q, q̇ h, q̈ h²/2, q⃛ h³/6
             let [h1, h2, h3] = [length, length * length / 2.0, length * length * length / 6.0];
             let (slope, second, third) = (sight.slope, self.rates(law, &second), self.rates(law, &third));
@@ -237,7 +237,7 @@ impl<const R: usize, const C: usize> Run<'_, R, C> {
     }
 
     /// What is read in `z`.
-    fn read(&self, shown: &Shown<C>, z: &[f64; C]) -> Reading {
+    fn read(&self, shown: &Shown<N>, z: &[f64; N]) -> Reading {
         shown.read(z, self.core.common.coordinates.origin())
     }
 

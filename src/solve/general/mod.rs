@@ -23,6 +23,7 @@ use crate::mechanism::{
     AmplifierMode, Cause, DRIVES, Kind, Layout, Limit, Mechanism, Mode, Part, State, Status, Switch,
 };
 use crate::mechanism::{Form, What};
+use crate::signal::DEGREE;
 use fall::NODES;
 use ivp::dense::StepInterpolant;
 use ivp::methods::{DOP853, Tolerance};
@@ -454,11 +455,11 @@ impl Engine for Core {
         Core::time(self)
     }
 
-    fn is_smooth(&self) -> bool {
-        true
+    fn degree(&self) -> usize {
+        DEGREE
     }
 
-    fn smooth(&self) -> Box<dyn Engine> {
+    fn raised(&self, _: usize) -> Box<dyn Engine> {
         self.copy()
     }
 

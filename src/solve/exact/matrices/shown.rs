@@ -7,10 +7,10 @@ use crate::solve::observe::{QUANTITIES, Reading, Readout};
 use crate::solve::propagator::Matrix;
 
 /// Readings of one mode, and the norms of their forms.
-pub(in crate::solve) struct Shown<const C: usize> {
+pub(in crate::solve) struct Shown<const N: usize> {
     pub(in crate::solve) readout: Readout,
     /// What each place of z adds to each reading.
-    matrix: Matrix<QUANTITIES, C>,
+    matrix: Matrix<QUANTITIES, N>,
     /// The norm dual to the energy, of what springs hold, speeds and current.
     dual: [Size; QUANTITIES],
     /// √(mechanical² + magnetic²) of those.
@@ -21,12 +21,12 @@ pub(in crate::solve) struct Shown<const C: usize> {
     input: [Reading; DRIVES],
 }
 
-impl<const C: usize> Shown<C> {
-    fn new<const R: usize>(law: &ModeMatrices<R, C>, mechanism: &Mechanism, space: &Space) -> Self {
+impl<const N: usize> Shown<N> {
+    fn new(law: &ModeMatrices<N>, mechanism: &Mechanism, space: &Space) -> Self {
         let readout = Readout::new(mechanism, &law.mode);
         let mut matrix = Matrix::zero();
         for (q, form) in readout.forms.iter().enumerate() {
-            for (place, weight) in space.row::<R, C>(form).into_iter().enumerate() {
+            for (place, weight) in space.row::<N>(form).into_iter().enumerate() {
                 matrix.set(q, place, weight);
             }
         }
@@ -63,20 +63,20 @@ impl<const C: usize> Shown<C> {
 
     /// What is read in z, ways being counted from `origin`.
     #[inline]
-    pub(in crate::solve) fn read(&self, z: &[f64; C], origin: &[f64; BODIES]) -> Reading {
+    pub(in crate::solve) fn read(&self, z: &[f64; N], origin: &[f64; BODIES]) -> Reading {
         self.readout.placed(self.matrix.rate(z), origin)
     }
 
     /// The same of a change of z.
     #[inline]
-    pub(in crate::solve) fn change(&self, change: &[f64; C]) -> Reading {
+    pub(in crate::solve) fn change(&self, change: &[f64; N]) -> Reading {
         self.matrix.rate(change)
     }
 }
 
-impl<const R: usize, const C: usize> ModeMatrices<R, C> {
+impl<const N: usize> ModeMatrices<N> {
     /// What an observer is shown, made ready when it is first wanted.
-    pub(in crate::solve) fn shown(&self, mechanism: &Mechanism, space: &Space) -> &Shown<C> {
+    pub(in crate::solve) fn shown(&self, mechanism: &Mechanism, space: &Space) -> &Shown<N> {
         self.shown.get_or_init(|| Box::new(Shown::new(self, mechanism, space)))
     }
 
@@ -84,18 +84,17 @@ impl<const R: usize, const C: usize> ModeMatrices<R, C> {
     /// |ü| of each input, |q̈| interval²/8.
     pub(in crate::solve) fn bow(
         &self,
-        shown: &Shown<C>,
-        y: &[f64; R],
+        shown: &Shown<N>,
+        y: &[f64; N],
         (rate, curvature): (&[f64; DRIVES], &[f64; DRIVES]),
         (interval, length): (f64, f64),
     ) -> Reading {
         let grow = self.growth_over(length);
-        let (first, second) = (self.size(y), self.size(&self.rate_of_rate(y)));
-        let whole = |size: Size| (size.mechanical * size.mechanical + size.magnetic * size.magnetic).sqrt();
-        let (first, push) = (whole(first) + self.push(rate) * length, self.push(curvature) * length);
+        let (first, second) = (self.size(y), self.size(&self.rate(y)));
+        let (first, push) = (first.whole() + self.push(rate) * length, self.push(curvature) * length);
         // As `steepness` has it.
-        let (mechanical, magnetic) = match (self.coupled, !self.magnetic.is_empty()) {
-            (true, _) => (whole(second) + push, 0.0),
+        let (mechanical, magnetic) = match (self.coupled, self.is_magnetic) {
+            (true, _) => (second.whole() + push, 0.0),
             (false, true) => (second.mechanical, second.magnetic + push),
             (false, false) => (second.mechanical + push, 0.0),
         };

@@ -1,0 +1,414 @@
+//! A block of rows, column by column: states as they come, and all that follows from them.
+//!
+//! Every column is a form of columns before it, and is computed for all rows of one mode at once, so that the loops become vector
+//! instructions; they are compiled twice, as those of [`crate::solve::propagator`] are, and give the same bits.
+
+use super::sheet::{Elements, Held, Sheets};
+use super::{BLOCK, Detail, Extra, Segment};
+use crate::mechanism::{DRIVES, Form, Heading, Layout, Mechanism, Shown};
+use crate::solve::coordinates::Coordinates;
+use crate::trajectory::{Grid, Trajectory};
+use std::ops::Range;
+
+/// Values of one quantity in the rows of a block.
+type Values = [f64; BLOCK];
+
+/// A linear form of columns: places and weights, added in this order, and a constant.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Sum {
+    terms: Vec<(usize, f64)>,
+    pub(super) constant: f64,
+}
+
+impl Sum {
+    pub(super) fn of<const N: usize>(terms: [(usize, f64); N], constant: f64) -> Self {
+        let mut sum = Self { terms: Vec::with_capacity(N), constant };
+        terms.into_iter().for_each(|(place, weight)| sum.add(place, weight));
+        sum
+    }
+
+    pub(super) fn add(&mut self, place: usize, weight: f64) {
+        if weight != 0.0 {
+            self.terms.push((place, weight));
+        }
+    }
+
+    /// Its values in these rows, one for each in `out`. −0 + 0 is 0.
+    #[inline(always)]
+    fn put(&self, columns: &[Values], rows: Range<usize>, out: &mut [f64]) {
+        let (column, constant) = (|place: usize| &columns[place][rows.clone()], self.constant);
+        let rest = match self.terms[..] {
+            [] => {
+                out.fill(constant);
+                return;
+            }
+            [(a, wa)] => {
+                out.iter_mut().zip(column(a)).for_each(|(out, a)| *out = wa * a + constant);
+                return;
+            }
+            [(a, wa), (b, wb), ref rest @ ..] => {
+                let terms = column(a).iter().zip(column(b));
+                out.iter_mut().zip(terms).for_each(|(out, (a, b))| *out = (wa * a + constant) + wb * b);
+                rest
+            }
+        };
+        for &(place, weight) in rest {
+            out.iter_mut().zip(column(place)).for_each(|(out, value)| *out += weight * value);
+        }
+    }
+}
+
+/// Which column stands where, each behind those that it follows from: first the numbers of a row as they stand in it.
+#[derive(Clone)]
+pub(super) struct Places {
+    bodies: usize,
+    springs: usize,
+    drives: usize,
+    /// How many numbers a row has, and where the inputs stand.
+    stride: usize,
+    inputs: [usize; DRIVES],
+    layout: Layout,
+}
+
+impl Places {
+    /// A body's coordinate: its way from the origin, or the length that stands in its place.
+    fn coordinate(&self, body: usize) -> usize {
+        self.layout.coordinate[body]
+    }
+
+    pub(super) fn speed(&self, body: usize) -> usize {
+        self.layout.speed[body]
+    }
+
+    fn input(&self, drive: usize) -> usize {
+        self.inputs[drive]
+    }
+
+    fn stretch(&self, spring: usize) -> usize {
+        self.stride + spring
+    }
+
+    /// A body's position.
+    fn way(&self, body: usize) -> usize {
+        self.stretch(self.springs) + body
+    }
+
+    pub(super) fn force(&self, spring: usize) -> usize {
+        self.way(self.bodies) + spring
+    }
+
+    pub(super) fn current(&self, drive: usize) -> usize {
+        self.force(self.springs) + drive
+    }
+
+    fn count(&self) -> usize {
+        self.current(self.drives)
+    }
+
+    /// A form as a sum of columns.
+    pub(super) fn sum(&self, form: &Form) -> Sum {
+        let mut sum = Sum { terms: Vec::new(), constant: form.constant };
+        (0..self.springs).for_each(|j| sum.add(self.stretch(j), form.stretch[j]));
+        (0..self.bodies).for_each(|j| sum.add(self.speed(j), form.speed[j]));
+        let states = (0..self.drives).filter_map(|j| Some((self.layout.current[j]?, form.current[j])));
+        states.for_each(|(place, factor)| sum.add(place, factor));
+        (0..self.drives).for_each(|j| sum.add(self.input(j), form.input[j]));
+        sum
+    }
+}
+
+/// The columns of a block.
+pub(super) struct Columns {
+    /// The rows as they come.
+    raw: Vec<f64>,
+    values: Vec<Values>,
+    pub(super) places: Places,
+    detail: Detail,
+    /// Lengths of the springs from the coordinates.
+    stretches: Vec<Sum>,
+}
+
+/// What there is to fill.
+pub(super) struct Block<'b> {
+    pub(super) mechanism: &'b Mechanism,
+    pub(super) sheets: &'b Sheets,
+    pub(super) segments: &'b [Segment],
+    pub(super) extra: &'b [Extra],
+    /// Rows that stand in the columns; those up to `count` are like the last of them.
+    pub(super) written: usize,
+    pub(super) count: usize,
+    pub(super) grid: Grid,
+    /// The number of the first row.
+    pub(super) first: u64,
+}
+
+impl Columns {
+    /// Those of rows of `stride` numbers, a multiple of four.
+    pub(super) fn new(
+        mechanism: &Mechanism,
+        layout: &Layout,
+        (stride, inputs): (usize, [usize; DRIVES]),
+        detail: Detail,
+    ) -> Self {
+        assert!(stride.is_multiple_of(4));
+        let (bodies, springs, drives) = (mechanism.bodies.len(), mechanism.springs.len(), mechanism.drives.len());
+        let places = Places { bodies, springs, drives, stride, inputs, layout: layout.clone() };
+        let stretch = |spring: usize| {
+            let mut sum = Sum::default();
+            layout.weights(spring).for_each(|(body, weight)| sum.add(places.coordinate(body), weight));
+            sum
+        };
+        let stretches = (0..places.springs).map(stretch).collect();
+        let (raw, values) = match detail {
+            Detail::None => (Vec::new(), Vec::new()),
+            _ => (vec![0.0; BLOCK * stride], vec![[0.0; BLOCK]; places.count()]),
+        };
+        Self { raw, values, detail, stretches, places }
+    }
+
+    /// The rows from `first` on: room for them up to the end of the block.
+    #[inline]
+    pub(super) fn rows<const N: usize>(&mut self, first: usize) -> &mut [[f64; N]] {
+        debug_assert_eq!(N, self.places.stride);
+        self.raw.as_chunks_mut().0.split_at_mut(first).1
+    }
+
+    /// Repeats the last row before `from` up to `until`.
+    pub(super) fn repeat(&mut self, from: usize, until: usize) {
+        let stride = self.places.stride;
+        (from..until).for_each(|row| self.raw.copy_within((from - 1) * stride..from * stride, row * stride));
+    }
+
+    /// The next block begins with a row of the last one.
+    pub(super) fn begin_with(&mut self, row: usize) {
+        let stride = self.places.stride;
+        self.raw.copy_within(row * stride..(row + 1) * stride, 0);
+    }
+
+    /// Puts the numbers of the rows into columns, four by four. −0 + 0 is 0.
+    #[inline(always)]
+    fn turn(&mut self, rows: usize) {
+        let groups = self.places.stride / 4;
+        let fours = self.raw.as_chunks::<4>().0;
+        for block in 0..rows.div_ceil(4) {
+            for group in 0..groups {
+                let row = |j: usize| fours[(4 * block + j) * groups + group];
+                let rows = [row(0), row(1), row(2), row(3)];
+                for (c, column) in self.values[4 * group..4 * group + 4].iter_mut().enumerate() {
+                    column[4 * block..4 * block + 4].copy_from_slice(&rows.map(|row| row[c] + 0.0));
+                }
+            }
+        }
+    }
+
+    /// Computes all columns, and puts into `out` those that are shown.
+    pub(super) fn fill(&mut self, block: &Block, out: &mut Trajectory) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.fill_by_avx2(block, out) };
+        }
+        self.fill_by_any(block, out);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn fill_by_avx2(&mut self, block: &Block, out: &mut Trajectory) {
+        self.fill_by_any(block, out);
+    }
+
+    #[inline(always)]
+    fn fill_by_any(&mut self, block: &Block, out: &mut Trajectory) {
+        self.turn(block.written);
+        self.ways(block);
+        self.forces(block);
+        let shown = block.mechanism.columns.iter().filter(|heading| is_shown(heading, self.detail));
+        for (heading, column) in shown.zip(&mut out.columns) {
+            let values = &mut column.values;
+            if values.len() != block.count {
+                values.resize(block.count, 0.0);
+            }
+            if heading.shown == Shown::Time {
+                (block.first..).zip(values).for_each(|(row, time)| *time = block.grid.time(row));
+                continue;
+            }
+            let (written, rest) = values.split_at_mut(block.written);
+            self.show(block, heading, written);
+            rest.fill(written.last().copied().unwrap_or(0.0));
+        }
+    }
+
+    /// Lengths of the springs, and positions of the bodies.
+    #[inline(always)]
+    fn ways(&mut self, block: &Block) {
+        let (places, rows) = (&self.places, 0..block.written);
+        for (spring, sum) in self.stretches.iter().enumerate() {
+            let (from, to) = self.values.split_at_mut(places.stretch(spring));
+            sum.put(from, rows.clone(), &mut to[0][rows.clone()]);
+        }
+        for body in 0..places.bodies {
+            let (from, to) = self.values.split_at_mut(places.way(body));
+            to[0][rows.clone()].copy_from_slice(&from[places.coordinate(body)][rows.clone()]);
+        }
+        for replaced in &self.places.layout.replaced {
+            let (before, own) = self.values[places.way(0)..].split_at_mut(replaced.body);
+            let (own, behind) = own.split_first_mut().expect("a body's own column");
+            let way = |body: usize| -> &Values {
+                if body < replaced.body { &before[body] } else { &behind[body - replaced.body - 1] }
+            };
+            for (rows, segment) in block.segments() {
+                segment.coordinates.place(replaced, &mut own[rows.clone()], |body| &way(body)[rows.clone()]);
+            }
+        }
+        let origin = block.segments.first().map_or([0.0; _], |segment| *Coordinates::origin(&segment.coordinates));
+        for (body, origin) in origin.into_iter().enumerate().take(places.bodies).filter(|(_, origin)| *origin != 0.0) {
+            self.values[places.way(body)][rows.clone()].iter_mut().for_each(|way| *way += origin);
+        }
+    }
+
+    /// Forces of springs and currents of drives.
+    #[inline(always)]
+    fn forces(&mut self, block: &Block) {
+        for spring in 0..self.places.springs {
+            let (from, to) = self.values.split_at_mut(self.places.force(spring));
+            for (rows, elements) in block.elements() {
+                elements.force[spring].put(from, rows.clone(), &mut to[0][rows]);
+            }
+            to[0].iter_mut().zip(block.extra).for_each(|(force, extra)| *force += extra.force[spring]);
+        }
+        for (index, drive) in block.mechanism.drives.iter().enumerate() {
+            let (from, to) = self.values.split_at_mut(self.places.current(index));
+            for (rows, elements) in block.elements() {
+                elements.current[index].put(from, rows.clone(), &mut to[0][rows]);
+            }
+            clamp(&mut to[0][..block.written], drive.amplifier.current_limit);
+        }
+    }
+
+    /// What a heading shows. −0 + 0 is 0.
+    #[inline(always)]
+    fn show(&self, block: &Block, heading: &Heading, out: &mut [f64]) {
+        let places = &self.places;
+        let column = |place: usize| &self.values[place][..block.written];
+        let times = |out: &mut [f64], place: usize, factor: f64| {
+            out.iter_mut().zip(column(place)).for_each(|(out, value)| *out = value * factor + 0.0);
+        };
+        match heading.shown {
+            // It goes on where all else stands.
+            Shown::Time => {}
+            Shown::Input(drive) => out.copy_from_slice(column(places.input(drive))),
+            Shown::Voltage(drive) => {
+                for (rows, elements) in block.elements() {
+                    elements.voltage[drive].put(&self.values, rows.clone(), &mut out[rows]);
+                }
+                // What a limit holds is not beyond it by one bit.
+                clamp(out, block.mechanism.drives[drive].amplifier.voltage_limit);
+            }
+            Shown::Current(drive) => out.copy_from_slice(column(places.current(drive))),
+            Shown::Position(body, factor) => times(out, places.way(body), factor),
+            Shown::Speed(body, factor) => times(out, places.speed(body), factor),
+            Shown::Stretch(spring) => out.copy_from_slice(column(places.stretch(spring))),
+            Shown::Force(spring, factor) => {
+                out.iter_mut().zip(column(places.force(spring))).for_each(|(out, force)| *out = force * factor);
+            }
+            Shown::Friction(body) => self.friction(block, body, out),
+            Shown::Motion(body) => {
+                for (rows, segment) in block.segments() {
+                    out[rows].fill(f64::from(block.sheets.sheets[segment.sheet].mode.motion[body].code()));
+                }
+            }
+            Shown::Contact(spring) => {
+                block.elements().for_each(|(rows, elements)| out[rows].fill(elements.contact[spring]));
+            }
+            Shown::Counts(body, counts) => {
+                let way = column(places.way(body));
+                out.iter_mut().zip(way).for_each(|(out, way)| *out = (way * counts).round() + 0.0);
+            }
+            Shown::Bristle(body) => {
+                let extra = |j: usize| block.extra.get(j).map_or(0.0, |extra| extra.bristle[body]);
+                out.iter_mut().enumerate().for_each(|(j, out)| *out = extra(j));
+            }
+        }
+    }
+
+    /// Friction on a body: what its law gives while it slides, what holds it while it is stuck.
+    #[inline(always)]
+    fn friction(&self, block: &Block, body: usize, out: &mut [f64]) {
+        for (rows, segment) in block.segments() {
+            match &block.sheets.sheets[segment.sheet].friction[body] {
+                Held::Form(sum) => {
+                    sum.put(&self.values, rows.clone(), &mut out[rows.clone()]);
+                    out[rows].iter_mut().for_each(|value| *value += 0.0);
+                }
+                Held::Between => {
+                    for j in rows {
+                        let (least, most) = self.load(block.mechanism, body, j);
+                        out[j] = least.max(0.0) + most.min(0.0) + 0.0;
+                    }
+                }
+            }
+        }
+        out.iter_mut().zip(block.extra).for_each(|(value, extra)| *value += extra.friction[body]);
+    }
+
+    /// What acts on a body at rest in a row beside friction, the least and the most of it.
+    fn load(&self, mechanism: &Mechanism, leader: usize, row: usize) -> (f64, f64) {
+        let mut load = (0.0, 0.0);
+        for body in mechanism.followers(leader) {
+            let ratio = mechanism.ratio(body);
+            for (index, drive) in mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.shaft == body) {
+                let current = self.values[self.places.current(index)][row];
+                let torque = drive.motor.gear_ratio * drive.motor.torque_constant * current;
+                let (least, most) = match drive.has_rotor() {
+                    true => (torque, torque),
+                    false => mechanism.holding_torque(index, current),
+                };
+                load = (load.0 + ratio * least, load.1 + ratio * most);
+            }
+            for (spring, part) in mechanism.springs.iter().enumerate().rev() {
+                let force = self.values[self.places.force(spring)][row];
+                for &(_, arm) in part.arms.iter().filter(|(other, _)| *other == body) {
+                    load = (load.0 - ratio * arm * force, load.1 - ratio * arm * force);
+                }
+            }
+            let constant = ratio * mechanism.bodies[body].force;
+            load = (load.0 + constant, load.1 + constant);
+        }
+        load
+    }
+}
+
+impl Block<'_> {
+    /// The rows of each segment.
+    #[inline(always)]
+    fn segments(&self) -> impl Iterator<Item = (Range<usize>, &Segment)> {
+        let ends = self.segments.iter().skip(1).map(|segment| segment.start.min(self.written)).chain([self.written]);
+        self.segments.iter().zip(ends).map(|(segment, end)| (segment.start.min(end)..end, segment))
+    }
+
+    /// Rows one after another in which amplifiers, gears, belt and stops do the same.
+    #[inline(always)]
+    fn elements(&self) -> impl Iterator<Item = (Range<usize>, &Elements)> {
+        let of = |segment: &Segment| self.sheets.sheets[segment.sheet].elements;
+        let mut segments = self.segments().peekable();
+        std::iter::from_fn(move || {
+            let (mut rows, first) = segments.next()?;
+            while let Some((more, _)) = segments.next_if(|(_, next)| of(next) == of(first)) {
+                rows.end = more.end;
+            }
+            Some((rows, &self.sheets.elements[of(first)]))
+        })
+    }
+}
+
+/// Whether a column is put out.
+pub(super) fn is_shown(heading: &Heading, detail: Detail) -> bool {
+    detail == Detail::Full || heading.lean
+}
+
+#[inline(always)]
+fn clamp(column: &mut [f64], limit: Option<f64>) {
+    if let Some(limit) = limit {
+        column.iter_mut().for_each(|value| *value = value.clamp(-limit, limit));
+    }
+}

@@ -1,0 +1,123 @@
+//! What rows of one mode show, made ready once: the forms of forces, currents and voltages, and what stands still.
+
+use super::columns::{Places, Sum};
+use crate::friction::Motion;
+use crate::mechanism::{DriveMode, Mechanism, Mode, SpringLaw, What};
+
+/// Forces of springs, currents and voltages of drives: the same in all modes in which amplifiers, gears, belt and stops do the same.
+pub(super) struct Elements {
+    mode: Mode,
+    pub(super) force: Vec<Sum>,
+    pub(super) current: Vec<Sum>,
+    pub(super) voltage: Vec<Sum>,
+    /// Whether a spring is slack, or which side of it pushes.
+    pub(super) contact: Vec<f64>,
+}
+
+/// A mode that rows were in.
+pub(super) struct Sheet {
+    pub(super) mode: Mode,
+    /// Number of its [`Elements`].
+    pub(super) elements: usize,
+    /// Friction on each body from its speed, or from what acts on it.
+    pub(super) friction: Vec<Held>,
+}
+
+/// What friction on a body follows from.
+pub(super) enum Held {
+    /// One form.
+    Form(Sum),
+    /// What acts on it at rest, where gears with losses hold a share of their own: the least and the most of it.
+    Between,
+}
+
+/// All modes that rows were in.
+#[derive(Default)]
+pub(super) struct Sheets {
+    pub(super) sheets: Vec<Sheet>,
+    pub(super) elements: Vec<Elements>,
+}
+
+impl Sheets {
+    /// The number of the sheet of a mode, made ready if it is new.
+    pub(super) fn of(&mut self, mechanism: &Mechanism, places: &Places, mode: &Mode) -> usize {
+        if let Some(known) = self.sheets.iter().position(|sheet| sheet.mode == *mode) {
+            return known;
+        }
+        let elements = self.elements.iter().position(|elements| same_elements(&elements.mode, mode));
+        let elements = elements.unwrap_or_else(|| {
+            self.elements.push(Elements::new(mechanism, places, mode));
+            self.elements.len() - 1
+        });
+        let friction = (0..mechanism.bodies.len()).map(|body| Held::new(mechanism, places, body, mode)).collect();
+        self.sheets.push(Sheet { mode: *mode, elements, friction });
+        self.sheets.len() - 1
+    }
+}
+
+fn same_elements(a: &Mode, b: &Mode) -> bool {
+    let limits = |drive: &DriveMode| (drive.voltage, drive.current);
+    a.slack == b.slack && a.contact == b.contact && a.drive.iter().map(limits).eq(b.drive.iter().map(limits))
+}
+
+impl Elements {
+    fn new(mechanism: &Mechanism, places: &Places, mode: &Mode) -> Self {
+        let springs = 0..mechanism.springs.len();
+        let drives = 0..mechanism.drives.len();
+        let contact = |spring: usize| {
+            let what = match mechanism.springs[spring].law {
+                SpringLaw::Tension { .. } => What::Span(spring),
+                _ => What::Gap(spring),
+            };
+            f64::from(mode.status(what).code())
+        };
+        Self {
+            mode: *mode,
+            force: springs.clone().map(|spring| places.sum(&mechanism.spring_force(spring, mode))).collect(),
+            current: drives.clone().map(|drive| places.sum(&mechanism.current(drive, mode))).collect(),
+            voltage: drives.map(|drive| places.sum(&mechanism.voltage(drive, mode))).collect(),
+            contact: springs.map(contact).collect(),
+        }
+    }
+}
+
+impl Held {
+    fn new(mechanism: &Mechanism, places: &Places, body: usize, mode: &Mode) -> Self {
+        let law = mechanism.friction(body);
+        let sliding = |viscous: f64, dry: f64| Held::Form(Sum::of([(places.speed(body), viscous)], dry));
+        match mode.motion[body] {
+            // F_f = b v ± F_c                                                   (15)
+            Motion::Free => sliding(law.forward.viscous, 0.0),
+            Motion::Forward => sliding(law.forward.viscous, law.forward.coulomb),
+            Motion::Backward => sliding(law.backward.viscous, -law.backward.coulomb),
+            Motion::Stuck if mechanism.leader(body) != body => Held::Form(Sum::default()),
+            Motion::Stuck => {
+                let drives = |own: usize| mechanism.drives.iter().filter(move |drive| drive.shaft == own);
+                let loses = |own: usize| drives(own).any(|drive| drive.loses() && !drive.has_rotor());
+                match mechanism.followers(body).any(loses) {
+                    true => Held::Between,
+                    false => Held::Form(load(mechanism, places, body)),
+                }
+            }
+        }
+    }
+}
+
+/// What acts on a body at rest beside friction: the inner brackets of (16)-(18).
+fn load(mechanism: &Mechanism, places: &Places, leader: usize) -> Sum {
+    let mut sum = Sum::default();
+    for body in mechanism.followers(leader) {
+        let ratio = mechanism.ratio(body);
+        for (index, drive) in mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.shaft == body) {
+            let factor = ratio * (drive.motor.gear_ratio * drive.motor.torque_constant);
+            sum.add(places.current(index), factor);
+        }
+        for (spring, part) in mechanism.springs.iter().enumerate().rev() {
+            for &(_, arm) in part.arms.iter().filter(|(other, _)| *other == body) {
+                sum.add(places.force(spring), -(ratio * arm));
+            }
+        }
+        sum.constant += ratio * mechanism.bodies[body].force;
+    }
+    sum
+}

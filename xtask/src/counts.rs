@@ -1,0 +1,165 @@
+//! `cargo xtask counts [--keep]`: how many instructions eight standard works take, against those that are kept in `benches/counts.txt`.
+//!
+//! Times depend on what else a machine does; instructions do not. valgrind runs `examples/counts.rs` and counts those of each work. It knows
+//! AVX2 and nothing wider. The counts hold for one compiler, which the file names; another one is told, and its counts are compared all the same.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+pub const USAGE: &str = "cargo xtask counts [--keep]";
+
+/// Where the counts are kept.
+const KEPT: &str = "benches/counts.txt";
+
+/// A rise by more than this share is told.
+const RISE: f64 = 0.03;
+
+/// Counts the instructions of every work and compares them with those kept, or keeps them.
+pub fn run(words: &[&str]) -> Result<(), String> {
+    let keep = match words {
+        [] => false,
+        ["--keep"] => true,
+        _ => return Err(format!("usage: {USAGE}")),
+    };
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().ok_or("the project has no folder")?;
+    let compiler = told(Command::new("rustc").arg("--version"))?.trim().to_string();
+    let counts = count(root)?;
+    let file = root.join(KEPT);
+    let before = match fs::read_to_string(&file) {
+        Ok(text) => Kept::read(&text)?,
+        Err(_) if keep => Kept::default(),
+        Err(error) => return Err(format!("{KEPT} cannot be read: {error}; `{USAGE}` with --keep makes it")),
+    };
+    if !before.compiler.is_empty() && before.compiler != compiler {
+        println!("{KEPT} was counted with {}, this is {compiler}", before.compiler);
+    }
+    let rises = compare(&before.counts, &counts);
+    if keep {
+        let text = Kept { compiler, counts: counts.into_iter().collect() }.text();
+        return fs::write(&file, text).map_err(|error| format!("{KEPT} cannot be written: {error}"));
+    }
+    match rises[..] {
+        [] => Ok(()),
+        _ => Err(format!("more instructions than before: {}", rises.join(", "))),
+    }
+}
+
+/// Instructions of each work, in the order of the example.
+fn count(root: &Path) -> Result<Vec<(String, u64)>, String> {
+    let built = super::cargo(&["build", "--release", "--quiet", "--package", "taut", "--no-default-features"])
+        .args(["--example", "counts"])
+        .current_dir(root)
+        .status();
+    if !built.is_ok_and(|status| status.success()) {
+        return Err("the example counts could not be built".into());
+    }
+    let folder = root.join("target/counts");
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).map_err(|error| format!("{} cannot be made: {error}", folder.display()))?;
+    let mut command = Command::new("valgrind");
+    command.args(["--tool=callgrind", "--toggle-collect=measured_work", "--dump-after=measured_work"]);
+    command.arg(format!("--callgrind-out-file={}", folder.join("out").display()));
+    command.arg(root.join("target/release/examples/counts")).arg("1").current_dir(root);
+    let names = told(&mut command)?;
+    let names = names.lines().filter_map(|line| line.split_whitespace().next());
+    names
+        .enumerate()
+        .map(|(index, name)| {
+            let file = folder.join(format!("out.{}", index + 1));
+            let text =
+                fs::read_to_string(&file).map_err(|error| format!("valgrind made no {}: {error}", file.display()))?;
+            Ok((name.to_string(), total(&text).ok_or_else(|| format!("{} has no sum", file.display()))?))
+        })
+        .collect()
+}
+
+/// The sum of the costs in a file of callgrind's: the number behind `summary:`, or behind `totals:`.
+fn total(text: &str) -> Option<u64> {
+    let sum = |word: &str| text.lines().find_map(|line| line.strip_prefix(word)?.trim().parse().ok());
+    sum("totals:").or_else(|| sum("summary:"))
+}
+
+/// What a command prints.
+fn told(command: &mut Command) -> Result<String, String> {
+    let name = command.get_program().to_string_lossy().into_owned();
+    let output = command.output().map_err(|error| format!("{name} cannot be started: {error}"))?;
+    match output.status.success() {
+        true => Ok(String::from_utf8_lossy(&output.stdout).into_owned()),
+        false => Err(format!("{name} failed: {}", String::from_utf8_lossy(&output.stderr))),
+    }
+}
+
+/// Shows both counts of each work, and names those that rose.
+fn compare(before: &BTreeMap<String, u64>, now: &[(String, u64)]) -> Vec<String> {
+    println!("{:12} {:>12} {:>12}", "work", "kept", "now");
+    let mut rises = Vec::new();
+    for (name, now) in now {
+        let Some(&kept) = before.get(name) else {
+            println!("{name:12} {:>12} {now:>12}", "-");
+            continue;
+        };
+        let change = *now as f64 / kept as f64 - 1.0;
+        println!("{name:12} {kept:>12} {now:>12} {:+6.1} %", 100.0 * change);
+        if change > RISE {
+            rises.push(format!("{name} by {:.1} %", 100.0 * change));
+        }
+    }
+    rises
+}
+
+/// What is kept.
+#[derive(Debug, Default, PartialEq)]
+struct Kept {
+    compiler: String,
+    counts: BTreeMap<String, u64>,
+}
+
+impl Kept {
+    /// Lines of a name and a number; the compiler behind a number sign.
+    fn read(text: &str) -> Result<Self, String> {
+        let mut kept = Self::default();
+        for line in text.lines() {
+            if let Some(compiler) = line.strip_prefix("# ") {
+                kept.compiler = compiler.to_string();
+                continue;
+            }
+            let (name, count) =
+                line.split_once(' ').ok_or_else(|| format!("{KEPT}: {line:?} is no name and number"))?;
+            let count = count.trim().parse().map_err(|_| format!("{KEPT}: {line:?} has no number"))?;
+            kept.counts.insert(name.to_string(), count);
+        }
+        Ok(kept)
+    }
+
+    fn text(&self) -> String {
+        let lines = self.counts.iter().map(|(name, count)| format!("{name} {count}\n"));
+        format!("# {}\n{}", self.compiler, lines.collect::<String>())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rise_of_more_than_three_per_cent_is_told() {
+        let before = BTreeMap::from([("run".to_string(), 1000), ("sweep".to_string(), 1000)]);
+        let now = [("run".to_string(), 1029), ("sweep".to_string(), 1031), ("new".to_string(), 5)];
+        assert_eq!(compare(&before, &now), ["sweep by 3.1 %"]);
+    }
+
+    #[test]
+    fn what_is_kept_is_read_again() {
+        let kept = Kept { compiler: "rustc 1.95.0".into(), counts: BTreeMap::from([("run".to_string(), 123)]) };
+        assert_eq!(Kept::read(&kept.text()), Ok(kept));
+        assert!(Kept::read("run many").is_err_and(|told| told.contains("has no number")));
+    }
+
+    #[test]
+    fn the_sum_of_a_profile_is_found() {
+        assert_eq!(total("version: 1\nevents: Ir\nsummary: 12\n\nfn=(1)\ntotals: 345\n"), Some(345));
+        assert_eq!(total("events: Ir\n"), None);
+    }
+}
