@@ -11,6 +11,7 @@ mod modes;
 mod moves;
 mod posterior;
 mod result_schema;
+mod show;
 mod simulation;
 mod tune;
 
@@ -23,6 +24,7 @@ pub use modes::modes;
 pub use moves::{Moved, moves};
 pub use posterior::posterior;
 pub use result_schema::{identity, schema, schemas};
+pub use show::show;
 pub use simulation::{Band, Event, Metrics, Simulated, Simulation, load_unit};
 pub use tune::tuned;
 

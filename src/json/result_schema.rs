@@ -14,6 +14,7 @@ const RESULTS: &[(&str, &str, &str)] = &[
     ("modes", "`taut modes`", include_str!("results/modes.txt")),
     ("move", "`taut move`", include_str!("results/move.txt")),
     ("shape", "`taut shape`", include_str!("results/shape.txt")),
+    ("show", "`taut show`", include_str!("results/show.txt")),
     ("simulate", "`taut simulate`", include_str!("results/simulate.txt")),
     ("sweep", "`taut sweep`", include_str!("results/sweep.txt")),
 ];

@@ -5,6 +5,8 @@ mod gantry;
 mod page;
 mod table;
 
+pub use page::printed;
+
 use crate::args::{BodyName, HoldName, Modes as Args};
 use crate::command::{Finished, Report};
 use crate::failure::Outcome;

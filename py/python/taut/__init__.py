@@ -11,8 +11,8 @@ Mistakes are :class:`taut.Error`, a ``ValueError`` with the text that the comman
 """
 
 from ._native import Bug, Error, Seen, __version__
-from .case import Case, GantryCase, read, template
-from .results import Check, Estimate, Fit, GantryModes, LinearModel, Modes
+from .case import Case, GantryCase, read, show, template
+from .results import Check, Estimate, Fit, GantryModes, LinearModel, Modes, Shown
 from .runs import Run, Runs
 from .sweeps import sweep, sweep_tables
 from .table import Table
@@ -31,9 +31,11 @@ __all__ = [
     "Run",
     "Runs",
     "Seen",
+    "Shown",
     "Table",
     "__version__",
     "read",
+    "show",
     "sweep",
     "sweep_tables",
     "template",

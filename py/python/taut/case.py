@@ -8,7 +8,7 @@ from typing import Any, Protocol, overload
 
 from . import _checks, _html, _native
 from ._toml import change
-from .results import Check, Fit, GantryModes, LinearModel, Modes
+from .results import Check, Fit, GantryModes, LinearModel, Modes, Shown
 from .runs import Run, Runs
 from .sweeps import sweep
 from .table import Table
@@ -154,6 +154,10 @@ class Case:
         how = (_checks.word("solver", solver), _checks.number("tolerance", tolerance), _checks.number("step", step))
         runs = [Run(run) for run in self._native.simulate(names, *how, _checks.word("method", method))]
         return runs[0] if one else Runs(runs, moved=False)
+
+    def show(self) -> Shown:
+        """What follows from the numbers: moved mass, stiffness, frequencies, largest speed and acceleration, safety of the belt."""
+        return Shown(self._native.show())
 
     def check(self) -> Check:
         """What the logs can tell of the parameters in [fit], before any fit."""
@@ -309,6 +313,11 @@ class GantryCase(Case):
 def read(path: str | PathLike[str]) -> Case:
     """Reads a case file; that of a gantry becomes a :class:`GantryCase`."""
     return Case._of(_native.Case.read(_checks.path(path), []))
+
+
+def show(case: Case | str | PathLike[str]) -> Shown:
+    """What follows from the numbers of a case, or of a case file."""
+    return (case if isinstance(case, Case) else read(case)).show()
 
 
 def template() -> str:
