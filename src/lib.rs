@@ -77,6 +77,7 @@ pub mod mechanism;
 pub mod metrics;
 pub mod number;
 pub mod nuts;
+pub mod overview;
 pub mod parameter;
 pub mod quantity;
 pub mod reduction;

@@ -2,10 +2,14 @@
 
 pub mod axis;
 pub mod gantry;
+mod sheet;
+mod swing;
 
 use crate::friction::{Along, Friction};
 pub use crate::mechanism::{Amplifier, AmplifierMode, GearPlay, Motor};
+pub use sheet::{BELTS, BeltSheet, BeltType, Rating, SimpleDrive, Width};
 use std::f64::consts::PI;
+pub use swing::slowest_swing;
 
 /// A single-axis belt drive (paper, Fig. 1 and 2).
 #[derive(Debug, Clone, PartialEq)]
@@ -110,12 +114,15 @@ pub struct Belt {
     pub follows_cart: bool,
     /// How many of the three inertias move by themselves.
     pub model: BeltModel,
+    /// What else is known of it.
+    pub sheet: BeltSheet,
 }
 
 impl Belt {
     /// Spans of given stiffness (N/m) and damping (N s/m) and no more.
     pub fn given(stiffness: [f64; 3], damping: [f64; 3]) -> Self {
-        Self { stiffness, damping, make: None, pretension: None, follows_cart: false, model: BeltModel::Elastic }
+        let (model, sheet) = (BeltModel::Elastic, BeltSheet::default());
+        Self { stiffness, damping, make: None, pretension: None, follows_cart: false, model, sheet }
     }
 }
 

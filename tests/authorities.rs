@@ -38,6 +38,7 @@ fn stage(value: &Value) -> Stage {
             gear_ratio: get("gear_ratio"),
             gear_efficiency: get("gear_efficiency"),
             gear_play: None,
+            is_simple: false,
         },
         amplifier: Amplifier::ideal(
             match value["amplifier_mode"].as_str() {

@@ -3,7 +3,9 @@
 use std::fs;
 use std::path::Path;
 use taut::case::{Case, GantryCase};
+use taut::number::engineering;
 use taut::parameter::{free_markdown, markdown, sections};
+use taut::stage::BELTS;
 
 /// Sections of the table of parameters that a gantry alone has.
 const OF_GANTRIES: [&str; 2] = ["bridge", "gantry.initial"];
@@ -16,8 +18,11 @@ fn the_reference_holds_the_tables_of_the_program() {
         let mut updated = text.clone();
         let own = sections().filter(|section| OF_GANTRIES.contains(section) == of_gantries);
         let tables = own.map(|section| (section, markdown(section)));
-        for (section, table) in tables.chain((!of_gantries).then(|| ("free", free_markdown()))) {
-            let (begin, end) = (format!("<!-- parameters: {section} -->\n"), "<!-- end -->");
+        let others = [("parameters: free", free_markdown()), ("belts", belts())];
+        let others = others.into_iter().filter(|_| !of_gantries).map(|(name, table)| (name.to_string(), table));
+        let tables = tables.map(|(section, table)| (format!("parameters: {section}"), table));
+        for (section, table) in tables.chain(others) {
+            let (begin, end) = (format!("<!-- {section} -->\n"), "<!-- end -->");
             let from = updated.find(&begin).unwrap_or_else(|| panic!("no table of {section}")) + begin.len();
             let to = from + updated[from..].find(end).expect("an end");
             updated.replace_range(from..to, &table);
@@ -28,6 +33,30 @@ fn the_reference_holds_the_tables_of_the_program() {
             assert_eq!(text, updated, "run with UPDATE_EXPECT=1 to write the tables anew");
         }
     }
+}
+
+/// The types of belts as a table: at 10 mm of width, what each source has.
+fn belts() -> String {
+    const WIDTH: f64 = 10e-3;
+    let mut text = String::from(
+        "| type | pitch | E A of 10 mm | allowed tension | mass | a tooth carries | source |\n|---|---|---|---|---|---|---|\n",
+    );
+    let told = |value: Option<f64>, unit: &str, digits: usize| {
+        value.map_or("–".to_string(), |value| engineering(value, unit, digits))
+    };
+    for belt in BELTS {
+        text += &format!(
+            "| `{}` | {} | {} | {} | {} | {} | {} |\n",
+            belt.name,
+            engineering(belt.pitch, "m", 4),
+            told(belt.stiffness(WIDTH), "N", 3),
+            told(belt.tension(WIDTH), "N", 3),
+            told(belt.mass(WIDTH).map(|mass| 1e3 * mass), "g/m", 3),
+            told(belt.teeth(WIDTH, 1.0), "N", 3),
+            belt.source,
+        );
+    }
+    text
 }
 
 #[test]
@@ -54,13 +83,23 @@ fn the_examples_of_the_reference_read() {
     let blocks = text.split("```toml\n").skip(1).map(|block| block.split("```").next().unwrap_or_default());
     let (variants, parts): (Vec<&str>, Vec<&str>) = blocks.partition(|block| block.starts_with("# instead"));
     let whole = parts.join("\n");
-    assert_eq!(variants.len(), 2);
+    assert_eq!(variants.len(), 7);
     for variant in variants {
-        let begin = whole.find("[belt]").unwrap();
+        let table = variant.lines().find(|line| line.starts_with('[')).unwrap();
+        let begin = whole.find(if table == "[drive]" { "[motor]" } else { table }).unwrap();
         let end = begin + whole[begin..].find("\n[").unwrap();
-        let other = format!("{}{variant}{}", &whole[..begin], &whole[end..]);
+        let mut other = format!("{}{variant}{}", &whole[..begin], &whole[end..]);
+        if table == "[drive]" {
+            // Without a motor its resistance cannot vary.
+            let varied = r#""motor.resistance"       = { log_normal = ["0.71 ohm", 0.05] }"#;
+            other = other.replace(varied, r#""drive.drag" = { log_normal = ["12 N s/m", 0.05] }"#);
+        }
+        if variant.contains("type ") {
+            // A type has a pitch of its own.
+            other = other.replace("pitch    = \"2.03 mm\"\n", "");
+        }
         let case = Case::from_text("docs/case-file.md", &other).unwrap_or_else(|error| panic!("{error}"));
-        assert!(case.stage.belt.make.is_some());
+        assert_eq!(case.stage.belt.make.is_some(), table == "[belt]");
     }
     let case = Case::from_text("docs/case-file.md", &whole).unwrap_or_else(|error| panic!("{error}\n{whole}"));
     assert!(case.experiments.len() > 5);

@@ -7,8 +7,8 @@ use taut::friction::Friction;
 use taut::mechanism::{Amplifier, AmplifierMode, Motor, State};
 use taut::signal::Signal;
 use taut::solve::{Course, Detail, Ending, Event, Flow, Solver, stream_mechanism};
-use taut::stage::Pulley;
 use taut::stage::gantry::{Belts, Gantry, Routing, Slide};
+use taut::stage::{BeltSheet, Pulley};
 use taut::trajectory::Trajectory;
 
 /// What a run of the first experiment of a case gives.
@@ -54,6 +54,7 @@ fn motor() -> impl Strategy<Value = Motor> {
             gear_ratio,
             gear_efficiency: 1.0,
             gear_play: None,
+            is_simple: false,
         },
     )
 }
@@ -86,7 +87,14 @@ fn gantry() -> impl Strategy<Value = Gantry> {
                 drive_pulley,
                 bridge,
                 cart,
-                belts: Belts { stiffness, damping, pretension: None, make: None, follows: None },
+                belts: Belts {
+                    stiffness,
+                    damping,
+                    pretension: None,
+                    make: None,
+                    follows: None,
+                    sheet: BeltSheet::default(),
+                },
                 encoder: None,
             }
         },

@@ -38,6 +38,7 @@ mod reference;
 mod rounding;
 mod rows;
 mod shape;
+mod sheet;
 mod stages;
 mod stepping;
 mod survey;

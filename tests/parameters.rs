@@ -96,6 +96,13 @@ fn cases() -> Vec<(String, String)> {
         });
         cases.extend([(name.clone(), text), (name.clone(), other)]);
     }
+    let (motor, rest) = WHOLE.split_once("[amplifier]\nmode = \"current\"").unwrap();
+    assert!(motor.starts_with("\n[motor]"));
+    let drive = format!("[drive]\nforce_per_input = 2\ndrag = 4\n[amplifier]\nmode = \"voltage\"{rest}");
+    let drive = drive.replace("bandwidth = 1024\n", "").replace("at = \"motor\"", "at = \"cart\"");
+    let drive = drive.replace("stiffness = [1024, 1024, 512]", "specific_stiffness = 8192\nspans = [8, 16, 32]");
+    let drive = drive.replace("DRIVE", LAWS[0]).replace("IDLER", LAWS[0]).replace("CART", LAWS[0]);
+    cases.push((name, drive));
     cases
 }
 
@@ -325,8 +332,24 @@ fn the_table_is_of_one_piece() {
         }
         let places = [matches!(parameter.field, Field::Elsewhere), matches!(parameter.gantry, Field::Elsewhere)];
         assert!(parameter.off == Off::No || places != [true; 2], "{}", parameter.key);
-        let machine =
-            ["motor.", "amplifier.", "drive_pulley.", "idler_pulley.", "cart.", "belt.", "travel.", "encoder."];
+        // What only data sheets say: a machine keeps what follows from it, or nothing but what is told of it.
+        let sheets =
+            ["motor.speed_constant", "motor.rated.", "belt.width", "belt.mass_per_length", "belt.allowed_tension"];
+        if sheets.iter().any(|key| parameter.key.starts_with(key)) {
+            assert_eq!(places, [true; 2], "{}", parameter.key);
+            continue;
+        }
+        let machine = [
+            "motor.",
+            "drive.",
+            "amplifier.",
+            "drive_pulley.",
+            "idler_pulley.",
+            "cart.",
+            "belt.",
+            "travel.",
+            "encoder.",
+        ];
         let is_machine = machine.iter().any(|table| parameter.key.starts_with(table));
         assert_eq!(is_machine, !places[0], "{}", parameter.key);
         // The cart of a gantry has the rows of its bridge.

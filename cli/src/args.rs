@@ -31,6 +31,7 @@ Exit status: 0 done, 1 the work could not be done or its result is not to be rel
 pub enum Command {
     Paper(Paper),
     Init(Init),
+    Show(Show),
     Simulate(Simulate),
     Move(Move),
     Tune(Tune),
@@ -49,6 +50,7 @@ impl Command {
     pub fn json(&self) -> bool {
         match self {
             Self::Paper(args) => args.common.json,
+            Self::Show(args) => args.common.json,
             Self::Simulate(args) => args.common.json,
             Self::Move(args) => args.common.json,
             Self::Tune(args) => args.common.json,
@@ -103,16 +105,32 @@ pub struct Man {
 ///
 /// The file describes a complete machine and two experiments, and simulates as it stands; its remarks name what can be added.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  taut init axis.toml\n  taut init --kind core-xy gantry.toml")]
+#[command(
+    after_help = "Examples:\n  taut init axis.toml\n  taut init --template stage stage.toml\n  taut init --kind core-xy gantry.toml"
+)]
 pub struct Init {
     /// The file to write, such as axis.toml
     pub file: PathBuf,
     /// Kind of machine
     #[arg(long, value_enum, default_value = "axis")]
     pub kind: KindName,
+    /// Start from data sheets: a machine of this sort, by the keys that data sheets have
+    #[arg(long, value_enum, conflicts_with = "kind")]
+    pub template: Option<TemplateName>,
     /// Replace the file if it exists
     #[arg(long)]
     pub force: bool,
+}
+
+/// A machine to start from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum TemplateName {
+    /// A linear stage: a rated motor, an AT5 belt
+    Stage,
+    /// An axis of a printer: a motor by its K_v, a GT2 belt
+    Printer,
+    /// A CoreXY gantry with GT2 belts
+    Gantry,
 }
 
 /// A kind of machine.
@@ -125,6 +143,26 @@ pub enum KindName {
     /// Two motors, each with a belt of its own, move a cart in a plane
     CoreXy,
 }
+
+/// Say what follows from the numbers of a case: masses, stiffness, frequencies, limits.
+///
+/// Prints the moved mass with all that turns as seen at the cart, the stiffness of the spans and how much the cart gives way per newton, natural
+/// frequencies with their damping along the travel, the voltage at which the axis breaks away, the largest force, acceleration and speed, and
+/// what is left of teeth and tension where the belt's type says what they bear. Nothing is simulated. With --out it writes show.json and a report.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = SHOW)]
+pub struct Show {
+    /// The case file; - is standard input
+    pub case: PathBuf,
+    #[command(flatten)]
+    pub common: Common,
+}
+
+const SHOW: &str = "\
+Examples:
+  taut show axis.toml
+  taut show axis.toml --set belt.pretension=\"80 N\" --set amplifier.voltage_limit=\"24 V\"
+  taut show axis.toml --json | jq '.groups[].rows[] | {key, value, unit}'";
 
 /// Run the experiments of a case file.
 ///

@@ -1,10 +1,10 @@
 //! `taut init`: a case file to start from.
 
-use crate::args::{Init, KindName};
+use crate::args::{Init, KindName, TemplateName};
 use crate::failure::{Failure, Outcome, Status};
 use crate::terminal;
 use taut::Error;
-use taut::case::{TEMPLATE, gantry_template};
+use taut::case::{TEMPLATE, Template, gantry_template};
 use taut::files::write_atomically;
 use taut::stage::gantry::Routing;
 
@@ -12,7 +12,12 @@ use taut::stage::gantry::Routing;
 pub fn run(args: &Init) -> Outcome {
     let file = &args.file;
     if file.is_dir() {
-        let inside = file.join(if args.kind == KindName::Axis { "axis.toml" } else { "gantry.toml" });
+        let inside = file.join(match (args.template, args.kind) {
+            (Some(TemplateName::Stage), _) => "stage.toml",
+            (Some(TemplateName::Printer), _) => "printer.toml",
+            (None, KindName::Axis) => "axis.toml",
+            (Some(TemplateName::Gantry), _) | (None, KindName::HFrame | KindName::CoreXy) => "gantry.toml",
+        });
         return Err(Error::new("this is a folder")
             .in_file(file)
             .next(format!("name a file: {}", inside.display()))
@@ -22,13 +27,22 @@ pub fn run(args: &Init) -> Outcome {
         let error = Error::new("this file exists already, and nothing was written").in_file(file);
         return Err(error.next("choose another name, or replace it with --force").into());
     }
-    let text = match args.kind {
-        KindName::Axis => TEMPLATE.to_string(),
-        KindName::HFrame => gantry_template(Routing::HFrame),
-        KindName::CoreXy => gantry_template(Routing::CoreXy),
+    let template = args.template.map(|name| match name {
+        TemplateName::Stage => Template::Stage,
+        TemplateName::Printer => Template::Printer,
+        TemplateName::Gantry => Template::Gantry,
+    });
+    let text = match (template, args.kind) {
+        (Some(template), _) => template.text().to_string(),
+        (None, KindName::Axis) => TEMPLATE.to_string(),
+        (None, KindName::HFrame) => gantry_template(Routing::HFrame),
+        (None, KindName::CoreXy) => gantry_template(Routing::CoreXy),
     };
     write_atomically(file, text).map_err(Failure::work)?;
-    terminal::show(&format!("wrote {0}\nnext: taut simulate {0} --out results\n", quoted(&file.display().to_string())));
+    let name = quoted(&file.display().to_string());
+    let next =
+        if template.is_some() { format!("taut show {name}") } else { format!("taut simulate {name} --out results") };
+    terminal::show(&format!("wrote {name}\nnext: {next}\n"));
     Ok(Status::Done)
 }
 

@@ -15,6 +15,7 @@ mod motion;
 mod paper;
 mod progress;
 mod shape;
+mod show;
 mod simulate;
 mod sweep;
 mod terminal;
@@ -34,6 +35,7 @@ fn main() -> ExitCode {
     let done = match args.command {
         Command::Paper(args) => paper::run(&args),
         Command::Init(args) => init::run(&args),
+        Command::Show(args) => show::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Move(args) => motion::run(&args),
         Command::Check(args) => check::run(&args),

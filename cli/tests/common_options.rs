@@ -25,7 +25,7 @@ fn an_error_under_json_is_data_too() {
     let text = case(TABLE4).replacen("0.362 kg", "0.362 m", 1);
     fs::write(folder.path().join("wrong.toml"), &text).unwrap();
     let line = text.lines().position(|line| line.contains("0.362 m")).unwrap() + 1;
-    for command in ["simulate", "modes", "sweep", "move", "tune", "check", "fit"] {
+    for command in ["show", "simulate", "modes", "sweep", "move", "tune", "check", "fit"] {
         let output = taut(folder.path()).args([command, "wrong.toml", "--json"]).output().unwrap();
         assert_eq!(output.status.code(), Some(2), "{command}");
         let told: Value = serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{command}: {e}"));
@@ -46,7 +46,7 @@ fn an_error_under_json_is_data_too() {
 fn a_case_comes_from_standard_input() {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("table4.toml"), case(TABLE4)).unwrap();
-    for command in ["simulate", "modes"] {
+    for command in ["show", "simulate", "modes"] {
         let of = |args: &[&str], input: &str| {
             let output = taut(folder.path()).arg(command).args(args).write_stdin(input).output().unwrap();
             assert_eq!(output.status.code(), Some(0), "{command} {args:?}: {output:?}");

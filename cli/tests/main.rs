@@ -11,6 +11,7 @@ mod outputs;
 mod paper;
 mod schemas;
 mod shape;
+mod show;
 mod sweep;
 
 /// A file that is no module here would not be run, and nobody would notice.

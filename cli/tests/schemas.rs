@@ -131,6 +131,8 @@ fn results_follow_their_schemas() {
         ("sweep", &["sweep", TABLE4, "--design", "one-at-a-time", "--vary", "cart.mass=values(0.3, 0.4)"]),
         ("sweep", &["sweep", "stages/h-frame/h-frame.toml", "--runs", "3", "--vary", "all=10%"]),
         ("shape", &["shape", "stages/printer-axis/printer-axis.toml"]),
+        ("show", &["show", TABLE4]),
+        ("show", &["show", "stages/core-xy/follows.toml"]),
         ("error", &["simulate", TABLE4, "--set", "cart.mass=-1 kg"]),
         ("paper", &["paper", "--no-report", "--out", paper]),
         ("error", &["modes", "none.toml"]),

@@ -15,6 +15,7 @@ use taut::fit::{Posterior, Profile, check, fit, posterior, profiles};
 use taut::json;
 use taut::linear::{Analysis, GantryAnalysis};
 use taut::nuts::Effort;
+use taut::overview::Overview;
 use taut::solve::{Choice, Flow, Kind, Method};
 use taut::tune::{evaluate, tune};
 
@@ -241,6 +242,16 @@ impl Case {
     }
 
     /// Modes of a gantry, as `taut modes --json` has them.
+    /// What follows from the numbers.
+    fn show<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let opened = match &self.inner {
+            Inner::Axis(case) => Opened::Axis(Box::new(case.as_ref().clone())),
+            Inner::Gantry(case) => Opened::Gantry(Box::new(case.as_ref().clone())),
+        };
+        let overview = unlocked(py, || Overview::of(&opened))?.told(py)?;
+        value::json(py, &guarded(|| json::show(&overview))?)
+    }
+
     fn gantry_modes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let Inner::Gantry(case) = &self.inner else {
             return Err(taut::Error::new("this case describes an axis, not a gantry")).told(py);

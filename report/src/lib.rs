@@ -36,6 +36,7 @@ mod picture;
 mod plane;
 mod plot;
 mod raster;
+pub mod show;
 pub mod simulate;
 mod svg;
 pub mod sweep;

@@ -21,6 +21,7 @@ fn stage(encoder: Option<Encoder>) -> Stage {
             gear_ratio: 5.9,
             gear_efficiency: 0.8,
             gear_play: None,
+            is_simple: false,
         },
         amplifier: Amplifier::ideal(AmplifierMode::Voltage, 2.0),
         pulley_radius: 0.0194,

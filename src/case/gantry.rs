@@ -2,12 +2,14 @@
 
 use super::friction::friction;
 use super::reader::{Field, Table};
-use super::{Case, Folder, InputFile, Sweeping, check_name, input, listed, set, stage, sweep, times, title, unique};
+use super::{
+    Case, Folder, InputFile, Sweeping, check_name, input, listed, set, sheet, stage, sweep, times, title, unique,
+};
 use crate::error::{Error, Result};
 use crate::mechanism::{Amplifier, DRIVES, Motor, State};
 use crate::signal::Signal;
 use crate::stage::gantry::{BRIDGE, Belts, CART, Gantry, LEFT, Make, RIGHT, Routing, Slide};
-use crate::stage::{AmplifierMode, Encoder, EncoderPlace};
+use crate::stage::{AmplifierMode, BeltSheet, Encoder, EncoderPlace};
 use crate::trajectory::Grid;
 use std::collections::HashMap;
 use std::path::Path;
@@ -168,6 +170,7 @@ impl GantryCase {
             "title",
             "kind",
             "motor",
+            "drive",
             "amplifier",
             "left_drive",
             "right_drive",
@@ -225,6 +228,11 @@ fn gantry(root: &Table, routing: Routing) -> Result<Gantry> {
     pulley.check_keys(&[], &[])?;
     let belt = table(root, "belt", "stiffness")?;
     let belts = belts(&belt, routing)?;
+    if let Some(field) = root.optional("drive") {
+        return Err(field
+            .fail("this belongs to an axis")
+            .next("give the data of the gantry's motors in [motor], such as speed_constant and resistance"));
+    }
     let [bridge, cart] = [slide(root, "bridge")?, slide(root, "cart")?];
     if let Some(field) = belt.optional("follows_cart").filter(|_| belts.follows.is_some()) {
         for (name, slide) in [("bridge", &bridge), ("cart", &cart)] {
@@ -238,17 +246,21 @@ fn gantry(root: &Table, routing: Routing) -> Result<Gantry> {
         }
     }
     let encoder = root.optional("encoder").map(|field| encoder(&field.table()?)).transpose()?;
-    Ok(Gantry {
+    let mut gantry = Gantry {
         routing,
         motors: drives.map(|(motor, _)| motor),
         amplifiers: drives.map(|(_, amplifier)| amplifier),
-        pulley_radius: stage::radius(&pulley)?,
+        pulley_radius: stage::radius(&pulley, sheet::pitch(root)?)?,
         drive_pulley: stage::pulley(&pulley)?,
         bridge,
         cart,
         belts,
         encoder,
-    })
+    };
+    if let Some(proportion) = sheet::proportion(&belt, &gantry.mechanism())? {
+        gantry.belts.damping = gantry.belts.stiffness.iter().map(|stiffness| proportion * stiffness).collect();
+    }
+    Ok(gantry)
 }
 
 /// Motor and amplifier of a side: those of both, with what its own table says.
@@ -273,7 +285,7 @@ fn drive(root: &Table, side: &str) -> Result<(Motor, Amplifier)> {
         Some(motor) => motor,
         None => table(root, "motor", "torque_constant, back_emf_constant and resistance")?,
     };
-    let amplifier = stage::amplifier(part("amplifier")?.as_ref(), &motor)?;
+    let amplifier = stage::amplifier(part("amplifier")?.as_ref(), Some(&motor))?;
     Ok((stage::motor(&motor)?, amplifier))
 }
 
@@ -287,19 +299,21 @@ fn slide(root: &Table, name: &str) -> Result<Slide> {
 }
 
 fn belts(table: &Table, routing: Routing) -> Result<Belts> {
-    table.check_keys(&["follows_cart"], &[])?;
+    table.check_keys(&["follows_cart", "type"], &[])?;
+    let sheet = sheet::belt(table)?;
     let labels: Vec<&str> = routing.spans().iter().map(|span| span.name.trim_end_matches(" span")).collect();
     let count = labels.len();
     let per_span = format!("{count} values: {}", labels.join(", "));
     let pretension = table.number_if_given("pretension")?;
     let damping = table.optional("damping").map_or(Ok(vec![0.0; count]), |field| field.numbers(count, &per_span))?;
     let follows = table.optional("follows_cart").map_or(Ok(false), |field| field.truth())?;
-    let make = ["modulus", "section", "spans"];
+    let make = ["modulus", "section", "specific_stiffness", "spans"];
     if let Some(stiffness) = table.optional("stiffness") {
         if let Some(other) = make.iter().find_map(|key| table.optional(key)) {
-            return Err(other
-                .fail("the stiffness is given already")
-                .next("give either stiffness, or modulus, section and spans"));
+            return Err(other.fail("the stiffness is given already").next(match other.key() {
+                "specific_stiffness" => "give either stiffness, or specific_stiffness and spans",
+                _ => "give either stiffness, or modulus, section and spans",
+            }));
         }
         if let Some(field) = table.optional("follows_cart").filter(|_| follows) {
             return Err(field
@@ -307,15 +321,14 @@ fn belts(table: &Table, routing: Routing) -> Result<Belts> {
                 .next("give modulus, section and spans instead of stiffness"));
         }
         let stiffness = stiffness.numbers(count, &per_span)?;
-        return Ok(Belts { stiffness, damping, pretension, make: None, follows: None });
+        return Ok(Belts { stiffness, damping, pretension, make: None, follows: None, sheet });
     }
-    if make.iter().all(|key| table.optional(key).is_none()) {
+    if make.iter().all(|key| table.optional(key).is_none()) && sheet.kind.is_none() {
         let example = vec!["\"100 kN/m\""; count].join(", ");
         let what = format!("for example stiffness = [{example}], or modulus, section and spans");
         return Err(table.missing("stiffness", &what));
     }
-    let modulus = stage::modulus(&table.required("modulus", "for example modulus = \"8.335 GPa\"")?)?;
-    let section = stage::section(&table.required("section", "for example section = \"5.5626 mm^2\"")?)?;
+    let (modulus, section, is_specific) = stage::rigidity(table, &sheet)?;
     let spans = vec!["\"0.5 m\""; count].join(", ");
     let lengths = table.required("spans", &format!("for example spans = [{spans}]"))?.numbers(count, &per_span)?;
     let make = Make { modulus, section, spans: lengths };
@@ -324,14 +337,15 @@ fn belts(table: &Table, routing: Routing) -> Result<Belts> {
         table.computed("stiffness", &table.field, *k)?;
     }
     let follows = follows.then(|| (make.rigidity(), make.spans.clone()));
-    Ok(Belts { stiffness, damping, pretension, make: Some(make), follows })
+    let sheet = BeltSheet { is_specific, ..sheet };
+    Ok(Belts { stiffness, damping, pretension, make: Some(make), follows, sheet })
 }
 
 fn encoder(table: &Table) -> Result<Encoder> {
     table.check_keys(&["at"], &[])?;
     let places = [("motor", EncoderPlace::Motor), ("drive_pulley", EncoderPlace::DrivePulley)];
     let at = table.required("at", "for example at = \"motor\"")?.choice(&places)?;
-    Ok(Encoder { at, lines: table.number("lines")? })
+    Ok(Encoder { at, lines: sheet::lines(table)? })
 }
 
 fn experiments(root: &Table, gantry: &Gantry, folder: &Folder) -> Result<Vec<GantryExperiment>> {

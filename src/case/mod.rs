@@ -13,6 +13,7 @@ mod measurement;
 mod motion;
 mod reader;
 mod set;
+mod sheet;
 mod stage;
 mod sweep;
 mod template;
@@ -25,7 +26,7 @@ pub use gantry::{GantryCase, GantryExperiment, Opened};
 pub use get::Given;
 pub use motion::Move;
 pub use sweep::{Kinds, Origin, Sampling, Sweeping, Variation};
-pub use template::{TEMPLATE, gantry_template};
+pub use template::{TEMPLATE, Template, gantry_template};
 pub use tune::{Cost, Known, Tuning};
 
 use crate::chance::hash;
@@ -197,6 +198,7 @@ impl Case {
             "title",
             "kind",
             "motor",
+            "drive",
             "amplifier",
             "drive_pulley",
             "idler_pulley",

@@ -2,13 +2,20 @@
 
 use super::friction::{along, friction};
 use super::reader::{Field, Table};
+use super::sheet;
 use crate::error::Result;
 use crate::quantity::{rounded, show};
 use crate::stage::*;
 
 pub(super) fn stage(root: &Table) -> Result<Stage> {
     let table = |name: &str, holds: &str| root.required(name, &format!("a table [{name}] with {holds}"))?.table();
-    let motor = table("motor", "torque_constant, back_emf_constant and resistance")?;
+    let simple = sheet::simple_drive(root)?;
+    let motor = match simple {
+        Some(_) => None,
+        None => {
+            Some(table("motor", "torque_constant, back_emf_constant and resistance; or [drive] with force_per_input")?)
+        }
+    };
     let amplifier = root.optional("amplifier").map(|field| field.table()).transpose()?;
     let drive = table("drive_pulley", "radius and inertia")?;
     let idler = table("idler_pulley", "inertia")?;
@@ -20,10 +27,15 @@ pub(super) fn stage(root: &Table) -> Result<Stage> {
     drive.check_keys(&[], &[])?;
     idler.check_keys(&[], &[])?;
     cart.check_keys(&[], &[])?;
-    Ok(Stage {
-        motor: self::motor(&motor)?,
-        amplifier: self::amplifier(amplifier.as_ref(), &motor)?,
-        pulley_radius: radius(&drive)?,
+    let pulley_radius = radius(&drive, sheet::pitch(root)?)?;
+    let mut stage = Stage {
+        motor: match (&motor, simple) {
+            (Some(motor), _) => self::motor(motor)?,
+            (None, Some(simple)) => simple.motor(pulley_radius),
+            (None, None) => return Err(root.missing("motor", "a table [motor], or [drive]")),
+        },
+        amplifier: self::amplifier(amplifier.as_ref(), motor.as_ref())?,
+        pulley_radius,
         drive_pulley: pulley(&drive)?,
         cart: Cart {
             mass: cart.number("mass")?,
@@ -36,20 +48,26 @@ pub(super) fn stage(root: &Table) -> Result<Stage> {
         belt: self::belt(&belt, travel.as_ref())?,
         travel: travel.as_ref().map(self::travel).transpose()?,
         encoder: encoder.map(|table| self::encoder(&table)).transpose()?,
-    })
+    };
+    if let Some(proportion) = sheet::proportion(&belt, &stage.mechanism())? {
+        stage.belt.damping = stage.belt.stiffness.map(|stiffness| proportion * stiffness);
+    }
+    Ok(stage)
 }
 
 pub(super) fn motor(table: &Table) -> Result<Motor> {
     table.check_keys(&[], &[])?;
+    let [torque_constant, back_emf_constant, resistance] = sheet::constants(table)?;
     Ok(Motor {
-        torque_constant: table.number("torque_constant")?,
-        back_emf_constant: table.number("back_emf_constant")?,
-        resistance: table.number("resistance")?,
+        torque_constant,
+        back_emf_constant,
+        resistance,
         inductance: table.number("inductance")?,
         rotor_inertia: table.number("rotor_inertia")?,
         gear_ratio: table.number("gear_ratio")?,
         gear_efficiency: table.number("gear_efficiency")?,
         gear_play: gear_play(table)?,
+        is_simple: false,
     })
 }
 
@@ -93,14 +111,14 @@ pub(super) fn travel(table: &Table) -> Result<Travel> {
     }
 }
 
-pub(super) fn amplifier(table: Option<&Table>, motor: &Table) -> Result<Amplifier> {
+pub(super) fn amplifier(table: Option<&Table>, motor: Option<&Table>) -> Result<Amplifier> {
     let Some(table) = table else {
         return Ok(Amplifier::ideal(AmplifierMode::Voltage, 1.0));
     };
     table.check_keys(&["mode"], &[])?;
     let modes = [("voltage", AmplifierMode::Voltage), ("current", AmplifierMode::Current)];
     let mode = table.optional("mode").map_or(Ok(AmplifierMode::Voltage), |field| field.choice(&modes))?;
-    let inductance = motor.number("inductance")?;
+    let inductance = motor.map_or(Ok(0.0), |motor| motor.number("inductance"))?;
     match (mode, table.optional("bandwidth"), table.optional("voltage_limit")) {
         (AmplifierMode::Voltage, Some(bandwidth), _) => {
             return Err(bandwidth
@@ -128,10 +146,21 @@ pub(super) fn amplifier(table: Option<&Table>, motor: &Table) -> Result<Amplifie
     })
 }
 
-/// `radius`, or `teeth` and `pitch`.
-pub(super) fn radius(table: &Table) -> Result<f64> {
+/// `radius`, or `teeth` and `pitch`, which may be that of the belt's type.
+pub(super) fn radius(table: &Table, belt_pitch: Option<f64>) -> Result<f64> {
     let [radius, teeth, pitch] = ["radius", "teeth", "pitch"].map(|key| table.optional(key));
     match (radius, teeth, pitch) {
+        (None, Some(teeth), None) if let Some(pitch) = belt_pitch => {
+            table.computed("radius", &teeth, pitch_radius(teeth.number()?, pitch))
+        }
+        (None, Some(_), Some(pitch))
+            if belt_pitch.is_some_and(|belt| !same_pitch(belt, pitch.number().unwrap_or(belt))) =>
+        {
+            let belt = belt_pitch.unwrap_or_default();
+            Err(pitch
+                .fail(format!("the belt's type has a pitch of {}", show(belt, "mm")))
+                .next("leave the pitch out, or correct the one or the other"))
+        }
         (Some(radius), None, None) => radius.number(),
         (Some(_), Some(other), _) | (Some(_), None, Some(other)) => {
             Err(other.fail("the radius is given already").next("give either radius, or teeth and pitch"))
@@ -143,6 +172,11 @@ pub(super) fn radius(table: &Table) -> Result<f64> {
         (None, None, Some(_)) => Err(table.missing("teeth", "for example teeth = 60")),
         (None, None, None) => Err(table.missing("radius", "for example radius = \"19.4 mm\", or teeth and pitch")),
     }
+}
+
+/// Whether two pitches are the same but for rounding in print.
+fn same_pitch(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 0.01 * a
 }
 
 pub(super) fn pulley(table: &Table) -> Result<Pulley> {
@@ -166,7 +200,8 @@ pub(super) fn pulley(table: &Table) -> Result<Pulley> {
 }
 
 fn belt(table: &Table, travel: Option<&Table>) -> Result<Belt> {
-    table.check_keys(&["model", "follows_cart"], &[])?;
+    table.check_keys(&["model", "follows_cart", "type"], &[])?;
+    let sheet = sheet::belt(table)?;
     let models = [BeltModel::Elastic, BeltModel::TwoMass, BeltModel::Rigid].map(|model| (model.word(), model));
     let model = table.optional("model").map_or(Ok(BeltModel::Elastic), |field| field.choice(&models))?;
     let pretension = table.number_if_given("pretension")?;
@@ -179,14 +214,16 @@ fn belt(table: &Table, travel: Option<&Table>) -> Result<Belt> {
     }
     let follows_cart = table.optional("follows_cart").map_or(Ok(false), |field| field.truth())?;
     let follows = table.optional("follows_cart").filter(|_| follows_cart);
-    let given = |stiffness| Belt { stiffness, damping: [0.0; 3], make: None, pretension, follows_cart: false, model };
-    let make = ["modulus", "section", "spans"];
+    let given =
+        |stiffness| Belt { stiffness, damping: [0.0; 3], make: None, pretension, follows_cart: false, model, sheet };
+    let make = ["modulus", "section", "specific_stiffness", "spans"];
     let damping = table.optional("damping").map_or(Ok([0.0; 3]), |field| field.three())?;
     if let Some(stiffness) = table.optional("stiffness") {
         if let Some(other) = make.iter().find_map(|key| table.optional(key)) {
-            return Err(other
-                .fail("the stiffness is given already")
-                .next("give either stiffness, or modulus, section and spans"));
+            return Err(other.fail("the stiffness is given already").next(match other.key() {
+                "specific_stiffness" => "give either stiffness, or specific_stiffness and spans",
+                _ => "give either stiffness, or modulus, section and spans",
+            }));
         }
         if let Some(field) = follows {
             return Err(field
@@ -199,17 +236,15 @@ fn belt(table: &Table, travel: Option<&Table>) -> Result<Belt> {
     if none && model == BeltModel::Rigid {
         return Ok(Belt { damping, ..given([f64::INFINITY; 3]) });
     }
-    if none {
+    if none && sheet.kind.is_none() {
         return Err(table.missing(
             "stiffness",
             "for example stiffness = [\"132.76 kN/m\", \"132.76 kN/m\", \"58.885 kN/m\"], or modulus, section and spans",
         ));
     }
-    let make = BeltMake {
-        modulus: modulus(&table.required("modulus", "for example modulus = \"8.335 GPa\"")?)?,
-        section: section(&table.required("section", "for example section = \"5.5626 mm^2\"")?)?,
-        spans: table.required("spans", "for example spans = [\"0.34925 m\", \"0.34925 m\", \"0.7874 m\"]")?.three()?,
-    };
+    let (modulus, section, is_specific) = rigidity(table, &sheet)?;
+    let spans = table.required("spans", "for example spans = [\"0.34925 m\", \"0.34925 m\", \"0.7874 m\"]")?.three()?;
+    let make = BeltMake { modulus, section, spans };
     let stiffness = make.stiffness();
     for k in stiffness {
         table.computed("stiffness", &table.field, k)?;
@@ -217,7 +252,26 @@ fn belt(table: &Table, travel: Option<&Table>) -> Result<Belt> {
     if let Some(field) = follows {
         spans_left(&field, &make, travel)?;
     }
-    Ok(Belt { damping, make: Some(make), follows_cart, ..given(stiffness) })
+    let sheet = BeltSheet { is_specific, ..sheet };
+    Ok(Belt { damping, make: Some(make), follows_cart, sheet, ..given(stiffness) })
+}
+
+/// E and A of a belt; of one that is given by E A itself that and 1 m², and that it is so.
+pub(super) fn rigidity(table: &Table, sheet: &BeltSheet) -> Result<(f64, f64, bool)> {
+    let material = ["modulus", "section"].iter().find_map(|key| table.optional(key));
+    if let (Some(material), Some(_)) = (&material, table.optional("specific_stiffness")) {
+        return Err(material
+            .fail("the specific stiffness is given already, and is E A")
+            .next("give either specific_stiffness, or modulus and section"));
+    }
+    if material.is_none()
+        && let Some(specific) = sheet::specific_stiffness(table, sheet)?
+    {
+        return Ok((specific, 1.0, true));
+    }
+    let modulus = modulus(&table.required("modulus", "for example modulus = \"8.335 GPa\"")?)?;
+    let section = section(&table.required("section", "for example section = \"5.5626 mm^2\"")?)?;
+    Ok((modulus, section, false))
 }
 
 /// Within its travel the cart must leave something of the spans on either side: −l₂ < min, max < l₁.
@@ -275,6 +329,5 @@ fn encoder(table: &Table) -> Result<Encoder> {
     let places =
         [("motor", EncoderPlace::Motor), ("drive_pulley", EncoderPlace::DrivePulley), ("cart", EncoderPlace::Cart)];
     let at = table.required("at", "for example at = \"motor\"")?.choice(&places)?;
-    let lines = table.number("lines")?;
-    Ok(Encoder { at, lines })
+    Ok(Encoder { at, lines: sheet::lines(table)? })
 }

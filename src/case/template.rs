@@ -5,6 +5,38 @@ use crate::stage::gantry::Routing;
 /// A commented case file that runs as it stands.
 pub const TEMPLATE: &str = include_str!("template.toml");
 
+/// A case file that starts from data sheets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Template {
+    /// A linear stage: a rated motor, an AT5 belt.
+    Stage,
+    /// An axis of a printer: a motor by its K_v, a GT2 belt.
+    Printer,
+    /// A CoreXY gantry.
+    Gantry,
+}
+
+impl Template {
+    /// The commented case file, which runs as it stands.
+    ///
+    /// ```
+    /// use taut::case::{Opened, Template};
+    /// use taut::overview::Overview;
+    /// for template in [Template::Stage, Template::Printer, Template::Gantry] {
+    ///     let case = Opened::from_text_with("machine.toml", template.text(), &[])?;
+    ///     assert!(Overview::of(&case)?.value("largest_force").unwrap() > 10.0);
+    /// }
+    /// # Ok::<(), taut::Error>(())
+    /// ```
+    pub fn text(self) -> &'static str {
+        match self {
+            Template::Stage => include_str!("templates/stage.toml"),
+            Template::Printer => include_str!("templates/printer.toml"),
+            Template::Gantry => include_str!("templates/gantry.toml"),
+        }
+    }
+}
+
 /// A commented case file of a gantry that runs as it stands.
 ///
 /// ```

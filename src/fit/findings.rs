@@ -228,7 +228,7 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
 fn of_motor(case: &Case, fit: &Fit) -> Option<Finding> {
     let motor = &fit.stage.motor;
     let (k_t, k_e) = (motor.torque_constant, motor.back_emf_constant);
-    if case.stage.amplifier.mode != AmplifierMode::Voltage || k_t <= 0.0 || k_e <= 0.0 {
+    if motor.is_simple || case.stage.amplifier.mode != AmplifierMode::Voltage || k_t <= 0.0 || k_e <= 0.0 {
         return None;
     }
     let ratio = k_t / k_e;

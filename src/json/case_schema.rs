@@ -4,7 +4,7 @@
 //! below the Coulomb friction) only reading says.
 
 use crate::parameter::{self, Fallback, Parameter};
-use crate::stage::Quantity;
+use crate::stage::{BELTS, Quantity};
 use serde_json::{Map, Value, json};
 
 /// The schema, as JSON Schema draft 2020-12. Its `$id` is `urn:taut:case:1`: editors refuse one that is no whole URI.
@@ -108,6 +108,7 @@ fn root() -> Properties {
         ("title", text("What the file describes")),
         ("kind", described(words(["axis", "h-frame", "core-xy"]), "Which machine it is (default: axis)")),
         ("motor", table("motor", &[])),
+        ("drive", described(table("drive", &[]), "Instead of [motor]: a drive of which only the force is known")),
         ("amplifier", amplifier()),
         ("left_drive", described(drive(), "Of a gantry: what is different at the left drive")),
         ("right_drive", described(drive(), "Of a gantry: what is different at the right drive")),
@@ -169,6 +170,10 @@ fn belt() -> Value {
             ("spans", list(plain())),
             ("modulus", any(vec![row("belt.modulus"), list(table("belt.modulus", &[]))])),
             ("section", any(vec![row("belt.section"), table("belt.section", &[])])),
+            (
+                "type",
+                described(words(BELTS.iter().map(|belt| belt.name)), "Type of the belt, whose numbers the program has"),
+            ),
             ("model", words(["elastic", "two-mass", "rigid"])),
             ("follows_cart", json!({ "type": "boolean" })),
         ],

@@ -15,6 +15,7 @@ const RESULTS: &[(&str, &str, &str)] = &[
     ("move", "`taut move`", include_str!("results/move.txt")),
     ("paper", "`taut paper`: claims.json", include_str!("results/paper.txt")),
     ("shape", "`taut shape`", include_str!("results/shape.txt")),
+    ("show", "`taut show`", include_str!("results/show.txt")),
     ("simulate", "`taut simulate`", include_str!("results/simulate.txt")),
     ("sweep", "`taut sweep`", include_str!("results/sweep.txt")),
 ];

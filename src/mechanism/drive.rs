@@ -19,6 +19,8 @@ pub struct Motor {
     pub gear_efficiency: f64,
     /// A compliant gear, so that the rotor is an inertia of its own; none for one that is stiff and without play.
     pub gear_play: Option<GearPlay>,
+    /// Whether it only stands for a drive that is given by force and drag, so that its own numbers mean nothing.
+    pub is_simple: bool,
 }
 
 /// A gear with play and stiffness, seen from the drive pulley.

@@ -2,7 +2,7 @@
 
 use crate::friction::{Friction, Law, Shape, decay_of_velocity, velocity_of_decay};
 use crate::stage::gantry::{Gantry, Slide};
-use crate::stage::{Belt, BeltModel, Stage};
+use crate::stage::{Belt, BeltModel, SimpleDrive, Stage};
 
 /// Where a parameter sits in a machine of one kind: an axis, or a [`Gantry`].
 #[derive(Debug)]
@@ -242,10 +242,53 @@ macro_rules! part {
 
 /// A number of the belt's make, from which its stiffness is computed.
 macro_rules! make {
-    (number, |$make:ident, $span:pat_param| $($place:tt)*) => {
+    (material, |$make:ident| $($place:tt)*) => {
         Place {
-            axis: make!(axis number, |$make, $span| $($place)*),
-            gantry: make!(gantry number, |$make, $span| $($place)*),
+            axis: Field::number(
+                |stage, _| stage.belt.make.filter(|_| !stage.belt.sheet.is_specific).map(|$make| $($place)*),
+                |stage, _, value| {
+                    if let Some($make) = stage.belt.make.as_mut().filter(|_| !stage.belt.sheet.is_specific) {
+                        $($place)* = value;
+                        // k = A E / l                                                      (11)
+                        stage.belt.stiffness = $make.stiffness();
+                    }
+                },
+            ),
+            gantry: Field::number(
+                |gantry, _| {
+                    gantry.belts.make.as_ref().filter(|_| !gantry.belts.sheet.is_specific).map(|$make| $($place)*)
+                },
+                |gantry, _, value| {
+                    if let Some($make) = gantry.belts.make.as_mut().filter(|_| !gantry.belts.sheet.is_specific) {
+                        $($place)* = value;
+                        gantry.belts.follow_make();
+                    }
+                },
+            ),
+        }
+    };
+    (specific) => {
+        Place {
+            axis: Field::number(
+                |stage, _| stage.belt.make.filter(|_| stage.belt.sheet.is_specific).map(|make| make.modulus),
+                |stage, _, value| {
+                    if let Some(make) = stage.belt.make.as_mut().filter(|_| stage.belt.sheet.is_specific) {
+                        make.modulus = value;
+                        stage.belt.stiffness = make.stiffness();
+                    }
+                },
+            ),
+            gantry: Field::number(
+                |gantry, _| {
+                    gantry.belts.make.as_ref().filter(|_| gantry.belts.sheet.is_specific).map(|make| make.modulus)
+                },
+                |gantry, _, value| {
+                    if let Some(make) = gantry.belts.make.as_mut().filter(|_| gantry.belts.sheet.is_specific) {
+                        make.modulus = value;
+                        gantry.belts.follow_make();
+                    }
+                },
+            ),
         }
     };
     (spans, |$make:ident, $span:pat_param| $($place:tt)*) => {
@@ -311,7 +354,11 @@ macro_rules! of_drive {
 /// A number of the motor.
 macro_rules! motor {
     ($name:ident) => {
-        of_drive!(motor, motors, |motor| Some(motor.$name), |motor, value| motor.$name = value)
+        of_drive!(motor, motors, |motor| (!motor.is_simple).then_some(motor.$name), |motor, value| {
+            if !motor.is_simple {
+                motor.$name = value;
+            }
+        })
     };
     (play $name:ident) => {
         of_drive!(motor, motors, |motor| motor.gear_play.map(|play| play.$name), |motor, value| {
@@ -319,6 +366,16 @@ macro_rules! motor {
                 play.$name = value;
             }
         })
+    };
+}
+
+/// A number of a drive that is given by force and drag.
+macro_rules! of_simple {
+    ($name:ident) => {
+        Place::axis(Field::number(
+            |stage, _| simple(stage).map(|drive| drive.$name),
+            |stage, _, value| set_simple(stage, |drive| drive.$name = value),
+        ))
     };
 }
 
@@ -399,7 +456,28 @@ macro_rules! of_law {
     };
 }
 
-pub(super) use {always, amplifier, everywhere, make, motor, of_drive, of_friction, of_law, of_slide, part};
+pub(super) use {always, amplifier, everywhere, make, motor, of_drive, of_friction, of_law, of_simple, of_slide, part};
+
+/// The drive that is given by force and drag, if it is.
+pub(super) fn simple(stage: &Stage) -> Option<SimpleDrive> {
+    SimpleDrive::of(&stage.motor, stage.pulley_radius)
+}
+
+/// Sets the radius; a drive that is given by its force keeps it.
+pub(super) fn set_radius(stage: &mut Stage, radius: f64) {
+    let drive = simple(stage);
+    stage.pulley_radius = radius;
+    if let Some(drive) = drive {
+        stage.motor = drive.motor(radius);
+    }
+}
+
+pub(super) fn set_simple(stage: &mut Stage, change: impl FnOnce(&mut SimpleDrive)) {
+    if let Some(mut drive) = simple(stage) {
+        change(&mut drive);
+        stage.motor = drive.motor(stage.pulley_radius);
+    }
+}
 
 /// The stiffness of a span, where it is given as such.
 pub(super) fn stiffness(belt: &Belt, span: usize) -> Option<f64> {

@@ -322,6 +322,11 @@ fn numbers(machine: &dyn Numbers, key: &str, free: &[&str]) -> Result<(Vec<Numbe
             };
             return Err(of_gantries(machine, Error::new(format!("`{key}` {what}"))));
         }
+        Sits::Elsewhere if key == "motor.speed_constant" || key.starts_with("motor.rated.") => {
+            return Err(Error::new(format!("`{key}` is a number of the data sheet, and not of the machine")).next(
+                "name what follows from it: motor.torque_constant, motor.back_emf_constant or motor.resistance",
+            ));
+        }
         Sits::Elsewhere => {
             return Err(Error::new(format!("`{key}` is no number of the machine"))
                 .allowed("numbers of motor, amplifier, pulleys, cart, belt, travel and encoder")
@@ -432,7 +437,8 @@ fn not_there(machine: &dyn Numbers, key: &str, row: &Parameter) -> Error {
     let error = Error::new(format!("`{key}` has no value in this case"));
     let error = if beside.is_empty() { error } else { error.allowed(beside.join(", ")) };
     let (parent, name) = row.key.rsplit_once('.').unwrap_or_default();
-    let is_made = super::find("belt.modulus").is_some_and(|row| machine.get(row, 0).is_some());
+    let has = |key: &str| super::find(key).is_some_and(|row| machine.get(row, 0).is_some());
+    let (is_made, is_specific) = (has("belt.modulus"), has("belt.specific_stiffness"));
     // Of a gantry's cart the row is the bridge's.
     let parent = key.rsplit_once('.').filter(|(_, last)| *last == name).map_or(parent, |(parent, _)| parent);
     let form = match machine.sits(row) {
@@ -444,6 +450,12 @@ fn not_there(machine: &dyn Numbers, key: &str, row: &Parameter) -> Error {
     };
     error.next(match form {
         Some(of) => format!("name `{of}` instead"),
+        _ if matches!(row.key, "belt.stiffness" | "belt.modulus" | "belt.section") && is_specific => {
+            "it follows from specific_stiffness and spans: name one of these".into()
+        }
+        _ if row.key.starts_with("motor.") && has("drive.force_per_input") => {
+            "this case has a [drive] instead of [motor]: name drive.force_per_input or drive.drag".into()
+        }
         _ if row.key == "belt.stiffness" && is_made => {
             "it follows from modulus, section and spans: name one of these".into()
         }

@@ -1,9 +1,9 @@
 //! The rows: every number that a case file can hold.
 
 use super::field::{
-    Place, always, amplifier, breakaway, everywhere, make, motor, of_drive, of_friction, of_law, of_point, of_slide,
-    part, set_coulomb, set_of_point, set_stribeck_decay, set_stribeck_force, set_stribeck_velocity, slide, slide_mut,
-    stiffness, stribeck_decay, stribeck_force, stribeck_velocity,
+    Place, always, amplifier, breakaway, everywhere, make, motor, of_drive, of_friction, of_law, of_point, of_simple,
+    of_slide, part, set_coulomb, set_of_point, set_radius, set_simple, set_stribeck_decay, set_stribeck_force,
+    set_stribeck_velocity, simple, slide, slide_mut, stiffness, stribeck_decay, stribeck_force, stribeck_velocity,
 };
 use super::{Arm, Fallback, Field, INPUT, Off, Parameter, Range, Sum};
 use crate::friction::Law;
@@ -341,13 +341,27 @@ const MOTOR: &[Parameter] = &[
     row("motor.gear_ratio", "n", "", Value(1.0), Range::new(1e-6, 1e6), "5.9", "Motor turns per turn of the drive pulley.")
         .at(motor!(gear_ratio)),
     row("motor.gear_efficiency", "η", "", Value(1.0), UP_TO_ONE, "0.73", "The part of the power that passes the gear, whichever side drives.")
-        .at(of_drive!(motor, motors, |m| m.gear_play.is_none().then_some(m.gear_efficiency), |m, value| m.gear_efficiency = value)),
+        .at(of_drive!(motor, motors, |m| (m.gear_play.is_none() && !m.is_simple).then_some(m.gear_efficiency), |m, value| m.gear_efficiency = value)),
     row("motor.backlash", "2α", "rad", Value(0.0), Range { below: true, ..Range::new(0.0, 6.3) }, "0.5 deg", "Play of the gear: by how much the drive pulley can turn while the rotor stands. Needs `gear_stiffness`.")
         .at(motor!(play backlash)).off("gear's backlash"),
     row("motor.gear_stiffness", "k_g", "N m/rad", Words("stiff"), POSITIVE, "300 N m/rad", "Stiffness of the gear between rotor and drive pulley, at the pulley; makes the rotor an inertia of its own.")
         .at(motor!(play stiffness)).off("gear's stiffness"),
     row("motor.gear_damping", "c_g", "N m s/rad", Value(0.0), NOT_NEGATIVE, "0.01 N m s", "Damping of the gear where its flanks touch, at the pulley.")
         .at(motor!(play damping)).off("gear's damping"),
+    row("motor.speed_constant", "K_v", "rad/s/V", Words("not used with both constants"), POSITIVE, "190 rpm/V", "Speed per volt without load: K_t = K_e = 1/K_v, as far as these are not given themselves."),
+    row("motor.rated.voltage", "V_n", "V", Required, POSITIVE, "24 V", "Voltage of the rating, from which K_t, K_e and `resistance` follow as far as they are not given themselves."),
+    row("motor.rated.speed", "ω_n", "rad/s", Required, POSITIVE, "3000 rpm", "Speed under the rated load."),
+    row("motor.rated.torque", "M_n", "N m", Required, POSITIVE, "0.32 N m", "Rated torque, at the motor's own shaft."),
+    row("motor.rated.current", "I_n", "A", Required, POSITIVE, "5.5 A", "Current at that torque."),
+    row("motor.rated.no_load_current", "I_0", "A", Value(0.0), NOT_NEGATIVE, "0.4 A", "Current without load, which turns the motor itself."),
+];
+
+#[rustfmt::skip]
+const DRIVE: &[Parameter] = &[
+    row("drive.force_per_input", "k_F", "N/V", Required, POSITIVE, "0.65 N/V", "Force at the belt per unit of input; where inputs are counts, a count stands for a volt.")
+        .at(of_simple!(force)).off("motor constants"),
+    row("drive.drag", "d", "N s/m", Value(0.0), NOT_NEGATIVE, "12 N s/m", "Force per speed that the drive takes away: back-EMF, and what brakes with the motor.")
+        .at(of_simple!(drag)).off("drag"),
 ];
 
 #[rustfmt::skip]
@@ -365,7 +379,10 @@ const AMPLIFIER: &[Parameter] = &[
 #[rustfmt::skip]
 const RADIUS: &[Parameter] = &[
     row("drive_pulley.radius", "r", "m", Words("from `teeth` and `pitch`"), POSITIVE, "19.4 mm", "Pitch radius, the same for both pulleys.")
-        .at(everywhere!(|s| s.pulley_radius)).alone(),
+        .at(Place {
+            axis: Field::number(|s, _| Some(s.pulley_radius), |s, _, value| set_radius(s, value)),
+            gantry: Field::number(|g, _| Some(g.pulley_radius), |g, _, value| g.pulley_radius = value),
+        }).alone(),
     row("drive_pulley.teeth", "z", "", Words("not used with `radius`"), Range::whole(1.0, 1e6), "60", "Number of teeth or grooves; instead of `radius`, with `pitch`.")
         .at(Place::part_of("drive_pulley.radius")),
     row("drive_pulley.pitch", "p", "m", Words("not used with `radius`"), POSITIVE, "2.03 mm", "Distance from tooth to tooth along the belt.")
@@ -396,20 +413,26 @@ const BELT: &[Parameter] = &[
         .off("belt's stiffness").part(Sum::Stiffness, One),
     row("belt.modulus", "E", "Pa", Words("not used with `stiffness`"), POSITIVE, "8.335 GPa",
         "Modulus of elasticity, eq. (11); or a list of parts, each `{ share, modulus }`, for a composite.")
-        .at(make!(number, |make, _| make.modulus)).off("belt's stiffness"),
+        .at(make!(material, |make| make.modulus)).off("belt's stiffness"),
     row("belt.modulus.share", "", "", Required, UP_TO_ONE, "1/3", "Share of the section that is of this material; all shares add up to 1.")
         .at(Place::part_of("belt.modulus")),
     row("belt.modulus.modulus", "E", "Pa", Required, POSITIVE, "50 GPa", "Modulus of this material.")
         .at(Place::part_of("belt.modulus")),
     row("belt.section", "A", "m^2", Words("not used with `stiffness`"), POSITIVE, "5.5626 mm^2",
         "Cross-section that carries the load; or `{ plain, toothed, toothed_share }` for a toothed belt, eq. (12).")
-        .at(make!(number, |make, _| make.section)),
+        .at(make!(material, |make| make.section)),
     row("belt.section.plain", "A_nt", "m^2", Required, POSITIVE, "5.5626 mm^2", "Cross-section between the teeth.")
         .at(Place::part_of("belt.section")),
     row("belt.section.toothed", "A_t", "m^2", Required, POSITIVE, "10.4 mm^2", "Cross-section at a tooth.")
         .at(Place::part_of("belt.section")),
     row("belt.section.toothed_share", "", "", Required, Range::new(0.0, 1.0), "0.5", "Share of the belt's length that has the cross-section `toothed`.")
         .at(Place::part_of("belt.section")),
+    row("belt.specific_stiffness", "E A", "N", Words("of the `type`; not used with `stiffness`"), POSITIVE, "140 kN",
+        "Force per unit strain, C_spez of catalogues, instead of modulus and section; in N/m, N/mm it is that per width, and `width` goes with it.")
+        .at(make!(specific)).off("belt's stiffness"),
+    row("belt.width", "b", "m", Words("needed with `type`, or a stiffness per width"), POSITIVE, "10 mm", "Width of the belt."),
+    row("belt.mass_per_length", "", "kg/m", Words("of the `type`, or unknown"), POSITIVE, "0.03 kg/m", "Mass per length; not in the equations, `taut show` says what its share is."),
+    row("belt.allowed_tension", "F_zul", "N", Words("of the `type`, or unknown"), POSITIVE, "560 N", "Tension that the belt may have; `taut show` says what is left of it."),
     row("belt.spans", "l₁ l₂ l₃", "m", Words("not used with `stiffness`"), POSITIVE, "0.34925 m", "Length of each span. Three values in a list.")
         .at(make!(spans, |make, span| make.spans[span])),
     row("belt.damping", "c₁ c₂ c₃", "N s/m", Value(0.0), NOT_NEGATIVE, "0 N s/m", "Damping of each span, parallel to its stiffness. Three values in a list.")
@@ -418,6 +441,12 @@ const BELT: &[Parameter] = &[
             gantry: Field::gantry_spans(|g, span| g.belts.damping.get(span).copied(), |g, span, value| g.belts.damping[span] = value),
         })
         .off("belt's damping"),
+    row("belt.damping_ratio", "ζ", "", Words("not used with `damping`"), Range { below: true, ..Range::new(0.0, 1.0) }, "0.02",
+        "Damping ratio of the slowest elastic mode at x = 0; every span is damped in proportion to its stiffness, c = 2 ζ k / ω₀.")
+        .at(Place::part_of("belt.damping")),
+    row("belt.loss_factor", "η", "", Words("not used with `damping`"), Range { below: true, ..Range::new(0.0, 2.0) }, "0.04",
+        "Loss factor of the belt at that mode: η = 2 ζ.")
+        .at(Place::part_of("belt.damping")),
     row("belt.pretension", "T₀", "N", Words("none: spans can push"), POSITIVE, "50 N", "Tension of every span at rest; a span whose tension is used up goes slack and carries nothing.")
         .at(Place {
             axis: Field::number(|s, _| s.belt.pretension, |s, _, value| s.belt.pretension = s.belt.pretension.map(|_| value)),
@@ -447,8 +476,10 @@ const ALONG: &[Parameter] = &[
 
 #[rustfmt::skip]
 const ENCODER: &[Parameter] = &[
-    row("encoder.lines", "", "", Required, POSITIVE, "512", "Lines per turn, or at the cart per metre; in quadrature each gives four counts.")
+    row("encoder.lines", "", "", Words("from `counts`"), POSITIVE, "512", "Lines per turn, or at the cart per metre; in quadrature each gives four counts.")
         .at(part!(both |s| s.encoder, &mut s.encoder => lines)),
+    row("encoder.counts", "", "", Words("from `lines`"), POSITIVE, "2048", "Counts per turn, or at the cart per metre, every edge counted; instead of `lines`.")
+        .at(Place::part_of("encoder.lines")),
 ];
 
 #[rustfmt::skip]
@@ -684,6 +715,7 @@ pub(super) const SECTIONS: &[(&str, &[&[Parameter]])] = &[
             ),
         ],
     ),
+    ("drive", &[DRIVE]),
     (
         "idler_pulley",
         &[

@@ -120,5 +120,6 @@ const NAMES: &[(Dimension, &str, &str)] = &[
     (Dimension::new(1, 2, -2, -2, 0), "an inductance", "H"),
     (Dimension::new(1, 2, -2, -1, 0), "a torque constant", "N m/A"),
     (Dimension::new(1, 2, -2, -1, -1), "a back-EMF constant", "V s/rad"),
+    (Dimension::new(-1, -2, 2, 1, 1), "a speed per voltage", "rad/s/V"),
     (Dimension::new(0, 0, 1, 1, 0), "a charge", "A s"),
 ];

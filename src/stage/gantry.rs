@@ -14,7 +14,7 @@
 //! T = ½ J₁ φ̇₁² + ½ J₂ φ̇₂² + ½ (m_bridge + m_cart) ẋ² + ½ m_cart ẏ²: the cart rides along with the bridge.
 //! Sollmann, Jouaneh and Lavender, IEEE/ASME Transactions on Mechatronics 15(2), 2010, eq. (12)-(20), for the H-frame.
 
-use super::{Encoder, EncoderPlace, Pulley, Travel};
+use super::{BeltSheet, Encoder, EncoderPlace, Pulley, Travel};
 use crate::error::{Error, Result};
 use crate::friction::{Friction, Law};
 use crate::mechanism::{
@@ -145,6 +145,8 @@ pub struct Belts {
     pub make: Option<Make>,
     /// E A, N, and the lengths of the spans with bridge and cart at zero, m, where the spans follow them.
     pub follows: Option<(f64, Vec<f64>)>,
+    /// What else is known of the belt.
+    pub sheet: BeltSheet,
 }
 
 /// Spans by material and lengths.

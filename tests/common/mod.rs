@@ -26,6 +26,7 @@ pub fn paper_stage(stiffness: [f64; 3], inertia: f64, pulley: Friction, cart: Fr
             gear_ratio: 1.0,
             gear_efficiency: 1.0,
             gear_play: None,
+            is_simple: false,
         },
         amplifier: Amplifier::ideal(AmplifierMode::Voltage, 1.0),
         pulley_radius: 0.0194,

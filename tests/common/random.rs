@@ -74,6 +74,7 @@ pub fn stage(dry: Dry) -> impl Strategy<Value = Stage> {
             gear_ratio,
             gear_efficiency,
             gear_play: None,
+            is_simple: false,
         });
     let amplifier = (prop_oneof![5 => Just(AmplifierMode::Voltage), 1 => Just(AmplifierMode::Current)], 0.5..2.0)
         .prop_map(|(mode, gain)| Amplifier::ideal(mode, gain));

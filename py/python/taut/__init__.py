@@ -11,8 +11,8 @@ Mistakes are :class:`taut.Error`, a ``ValueError`` with the text that the comman
 """
 
 from ._native import Bug, Error, Seen, __version__
-from .case import Case, GantryCase, read, template
-from .results import Check, Estimate, Fit, FitLog, GantryModes, LinearModel, Modes, Tuned
+from .case import Case, GantryCase, read, show, template
+from .results import Check, Estimate, Fit, FitLog, GantryModes, LinearModel, Modes, Shown, Tuned
 from .runs import Run, Runs
 from .sweeps import sweep, sweep_tables
 from .table import Table
@@ -32,10 +32,12 @@ __all__ = [
     "Run",
     "Runs",
     "Seen",
+    "Shown",
     "Table",
     "Tuned",
     "__version__",
     "read",
+    "show",
     "sweep",
     "sweep_tables",
     "template",

@@ -10,7 +10,7 @@ from . import _checks, _html, _native
 from ._logs import write_log
 from ._toml import change
 from ._toml import written as toml
-from .results import Check, Fit, FitLog, GantryModes, LinearModel, Modes, Tuned
+from .results import Check, Fit, FitLog, GantryModes, LinearModel, Modes, Shown, Tuned
 from .runs import Run, Runs
 from .sweeps import sweep
 from .table import Table
@@ -159,6 +159,10 @@ class Case:
         how = (_checks.word("solver", solver), _checks.number("tolerance", tolerance), _checks.number("step", step))
         runs = [Run(run) for run in self._native.simulate(names, *how, _checks.word("method", method))]
         return runs[0] if one else Runs(runs)
+
+    def show(self) -> Shown:
+        """What follows from the numbers: moved mass, stiffness, frequencies, largest speed and acceleration, safety of the belt."""
+        return Shown(self._native.show())
 
     def check(self) -> Check:
         """What the logs can tell of the parameters in [fit], before any fit."""
@@ -375,6 +379,11 @@ class GantryCase(Case):
 def read(path: str | PathLike[str]) -> Case:
     """Reads a case file; that of a gantry becomes a :class:`GantryCase`."""
     return Case._of(_native.Case.read(_checks.path(path), []))
+
+
+def show(case: Case | str | PathLike[str]) -> Shown:
+    """What follows from the numbers of a case, or of a case file."""
+    return (case if isinstance(case, Case) else read(case)).show()
 
 
 def template() -> str:

@@ -389,6 +389,38 @@ class Modes:
 
 
 @dataclass(frozen=True)
+class Shown:
+    """What follows from the numbers of a case: ``shown["total_mass"]`` is a value in SI units."""
+
+    data: dict[str, Any]
+    """What ``taut show --json`` prints."""
+
+    @property
+    def rows(self) -> dict[str, tuple[float, str]]:
+        """Value and SI unit of each quantity, by its key."""
+        return {row["key"]: (row["value"], row["unit"]) for group in self.data["groups"] for row in group["rows"]}
+
+    @property
+    def notes(self) -> dict[str, str]:
+        """What should be known besides, by a word for programs."""
+        return {note["code"]: note["text"] for note in self.data["notes"]}
+
+    def __getitem__(self, key: str) -> float:
+        """The value of a quantity, in SI units."""
+        return self.rows[key][0]
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.rows
+
+    def __repr__(self) -> str:
+        return f"<taut.Shown {self.data['title']!r}: {', '.join(self.rows)}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(row["name"], row["value"], row["unit"]) for group in self.data["groups"] for row in group["rows"]]
+        return _html.table(self.data["title"], ("quantity", "value", "unit"), rows)
+
+
+@dataclass(frozen=True)
 class GantryModes:
     """How a gantry swings while everything slides."""
 

@@ -5,6 +5,6 @@ mod page;
 mod plots;
 mod rows;
 
-pub use page::page;
+pub use page::{page, printed};
 pub use plots::figures;
 pub use rows::{along, gain, pole, poles, words, z, zeros};

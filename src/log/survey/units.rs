@@ -4,7 +4,8 @@ use super::super::{Log, Output, Quantity};
 use super::channel::Channel;
 use super::motion::Motion;
 use super::{Note, Severity, quantile, shown};
-use crate::stage::{AmplifierMode, Stage};
+use crate::quantity::rounded;
+use crate::stage::{AmplifierMode, EncoderPlace, Stage};
 
 /// Measured and expected may differ by this factor without a suspicion: the machine's parameters may be rough.
 const ROUGH: f64 = 30.0;
@@ -17,6 +18,12 @@ const IDLE: f64 = 5.0;
 
 /// Accelerations so many times what the machine would do are no machine's.
 const HASTY: f64 = 12.0;
+
+/// Steps that differ by less than this factor are the same.
+const ALIKE: f64 = 1.02;
+
+/// Of fewer different values a step cannot be told.
+const FEWEST_LEVELS: usize = 10;
 
 /// Largest voltage and current that a drive of this kind takes.
 const MOST_VOLTS: f64 = 800.0;
@@ -41,11 +48,50 @@ pub(super) fn notes(log: &Log, stage: &Stage, channels: &[Channel], motion: Opti
         notes.extend(motion.filter(|motion| motion.moves).and_then(|motion| magnitude(log, stage, motion)));
     }
     notes.extend(pairs);
+    notes.extend(encoder_note(stage, channels));
     if trusted {
         notes.extend(motion.filter(|motion| motion.moves).and_then(|motion| direction(log, stage, motion)));
         notes.extend(current_note(log, stage));
     }
     notes
+}
+
+/// Steps of a position that are not those of the case's encoder.
+fn encoder_note(stage: &Stage, channels: &[Channel]) -> Option<Note> {
+    let encoder = stage.encoder?;
+    let counted: &[&'static str] = match encoder.at {
+        EncoderPlace::Motor => &["drive_angle", "rotor_angle"],
+        EncoderPlace::DrivePulley => &["drive_angle"],
+        EncoderPlace::Cart => &["cart_position"],
+    };
+    let count = 1.0 / encoder.counts_per_unit(stage.motor.gear_ratio);
+    let (channel, step) = channels.iter().find_map(|channel| {
+        let step = channel.step.filter(|_| counted.contains(&channel.name) && channel.levels > FEWEST_LEVELS)?;
+        Some((channel, step))
+    })?;
+    let ratio = step / count;
+    if (1.0 / ALIKE..ALIKE).contains(&ratio) {
+        return None;
+    }
+    let per = match encoder.at {
+        EncoderPlace::Cart => "per metre",
+        EncoderPlace::Motor | EncoderPlace::DrivePulley => "per turn",
+    };
+    let of_turn = match encoder.at {
+        EncoderPlace::Cart => 1.0,
+        EncoderPlace::Motor => std::f64::consts::TAU / stage.motor.gear_ratio,
+        EncoderPlace::DrivePulley => std::f64::consts::TAU,
+    };
+    let text = format!(
+        "it moves in steps of {}, and a count of the case's encoder is {}: the steps would be those of {} counts {per}; correct encoder.counts \
+         (or lines), or the unit or scale of this column",
+        shown(step, channel.unit),
+        shown(count, channel.unit),
+        rounded((of_turn / step * 1e3).round() / 1e3)
+    );
+    // Finer steps than counts may be those of the digits that were written.
+    let severity = if ratio > 1.0 { Severity::Warning } else { Severity::Fact };
+    Some(Note::new("encoder-step", severity, text).on(channel.name))
 }
 
 /// An input that no such amplifier gives.

@@ -1,0 +1,153 @@
+//! `taut show`: what follows from the numbers, and files that begin with data sheets.
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::f64::consts::PI;
+use std::path::Path;
+use tempfile::TempDir;
+
+fn taut(args: &[&str]) -> Command {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("taut"));
+    command.current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("..")).args(args);
+    command
+}
+
+fn shown(args: &[&str]) -> Value {
+    let output = taut(&[&["show"], args, &["--json"]].concat()).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn rows(shown: &Value) -> Vec<&Value> {
+    shown["groups"].as_array().unwrap().iter().flat_map(|group| group["rows"].as_array().unwrap()).collect()
+}
+
+fn value(shown: &Value, key: &str) -> f64 {
+    let row = rows(shown).into_iter().find(|row| row["key"] == key).unwrap_or_else(|| panic!("no {key}"));
+    row["value"].as_f64().unwrap()
+}
+
+fn codes(shown: &Value) -> Vec<&str> {
+    shown["notes"].as_array().unwrap().iter().map(|note| note["code"].as_str().unwrap()).collect()
+}
+
+fn near(a: f64, b: f64) {
+    assert!((a - b).abs() <= 1e-9 * b.abs(), "{a} and {b}");
+}
+
+const TABLE4: &str = "stages/sollmann-jouaneh/table4.toml";
+
+/// By hand from Table 4: r = 19.4 mm, J = 6.3e-5 kg m², M = 0.362 kg, K = 23 mN m/A, R = 0.71 ohm.
+#[test]
+fn the_papers_machine_as_one_computes_it_by_hand() {
+    let shown = shown(&[TABLE4]);
+    let (r, j, k) = (0.0194, 6.3e-5, 0.023);
+    let mass = 0.362 + 2.0 * j / (r * r);
+    near(value(&shown, "total_mass"), mass);
+    near(value(&shown, "force_per_input"), k / (0.71 * r));
+    near(value(&shown, "drag"), k * k / (0.71 * r * r));
+    near(value(&shown, "travel_per_turn"), 2.0 * PI * r);
+    // 0.2 N at the cart, 15 mN m at each pulley.
+    let friction = 0.2 + 2.0 * 0.015 / r;
+    near(value(&shown, "breakaway_input"), friction * 0.71 * r / k);
+    let stiffness = 132_760.0 + 132_760.0 * 58_885.0 / (132_760.0 + 58_885.0);
+    near(value(&shown, "stretch_per_force"), 1.0 / stiffness);
+    // Its experiments command 5 V at most.
+    let force = 5.0 * k / (0.71 * r);
+    near(value(&shown, "largest_force"), force);
+    near(value(&shown, "largest_acceleration"), (force - friction) / mass);
+    let slope = 19.0424 + 2.0 * 0.0016 / (r * r) + k * k / (0.71 * r * r);
+    near(value(&shown, "largest_speed"), (force - friction) / slope);
+    assert!(codes(&shown).contains(&"no-damping"), "{:?}", codes(&shown));
+    assert_eq!(shown["depends_on_place"], false);
+}
+
+/// Frequencies and damping are those of `taut modes`.
+#[test]
+fn frequencies_are_those_of_the_modes() {
+    for machine in ["stages/laser-gantry/laser-gantry.toml", "stages/h-frame/h-frame.toml"] {
+        let shown = shown(&[machine]);
+        let output = taut(&["modes", machine, "--json"]).output().unwrap();
+        let modes: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let first = match modes.get("elastic") {
+            Some(elastic) => elastic[0]["frequency_Hz"].as_f64().unwrap(),
+            None => modes["here"]["undamped_resonances_Hz"][0].as_f64().unwrap(),
+        };
+        near(value(&shown, "resonance1"), first);
+    }
+}
+
+#[test]
+fn templates_begin_with_data_sheets_and_run_as_they_stand() {
+    let folder = TempDir::new().unwrap();
+    for name in ["stage", "printer", "gantry"] {
+        let file = folder.path().join(format!("{name}.toml"));
+        let file = file.to_str().unwrap();
+        let told = taut(&["init", "--template", name, file]).output().unwrap();
+        assert_eq!(String::from_utf8(told.stdout).unwrap(), format!("wrote {file}\nnext: taut show {file}\n"));
+        let found = shown(&[file]);
+        for key in ["largest_force", "tension_safety", "teeth_in_mesh"] {
+            assert!(value(&found, key) > 1.0, "{name}: {key} is {}", value(&found, key));
+        }
+        assert_eq!(codes(&found), ["belt-source"], "{name}");
+        assert_eq!(found["depends_on_place"], true, "{name}");
+        // The ratio that the file asks for is that of the slowest mode, and friction and motor add to it.
+        assert!(value(&found, "resonance1_damping") > 0.0199, "{name}");
+        let out = folder.path().join(name);
+        taut(&["show", file, "--out", out.to_str().unwrap(), "--quiet"]).assert().success().stdout("");
+        for file in ["show.json", "report.html", "files.json"] {
+            assert!(out.join(file).exists(), "{name}: {file}");
+        }
+        taut(&["simulate", file, "--quiet"]).assert().success();
+    }
+    let refused = taut(&["init", "--template", "stage", "--kind", "h-frame", "x.toml"]).output().unwrap();
+    assert_eq!(refused.status.code(), Some(2));
+}
+
+#[test]
+fn what_nothing_bounds_is_said() {
+    let torque = "stages/laser-gantry/laser-gantry.toml";
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(torque)).unwrap();
+    let text = text.replace("[[experiment]]", "[[other]]");
+    let begin = text.find("[[other]]").unwrap();
+    let text = format!("{}[controller]\nevery = \"1 ms\"\npid = {{ proportional = 1 }}\n", &text[..begin]);
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("bare.toml");
+    std::fs::write(&file, &text).unwrap();
+    let found = shown(&[file.to_str().unwrap()]);
+    assert!(codes(&found).contains(&"no-limit"), "{:?}", codes(&found));
+    assert!(rows(&found).iter().all(|row| row["key"] != "largest_force"));
+}
+
+#[test]
+fn a_belt_that_is_too_weak_is_told_with_both_forces() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("printer.toml");
+    let file = file.to_str().unwrap();
+    taut(&["init", "--template", "printer", file]).assert().success();
+    let found = shown(&[file, "--set", "motor.speed_constant=60 rpm/V", "--set", "belt.width=3 mm"]);
+    assert!(codes(&found).contains(&"belt-overloaded"), "{:?}", codes(&found));
+    assert!(value(&found, "tension_safety") < 1.0);
+}
+
+#[test]
+fn wrong_input_is_told_with_its_place() {
+    let told = |args: &[&str]| {
+        let output = taut(&[&["show"], args].concat()).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    assert_eq!(
+        told(&["none.toml"]),
+        (Some(2), "error: none.toml: this case file cannot be read: there is no such file\n  next: check the path, or write a new case with `taut init`\n".into())
+    );
+    assert_eq!(
+        told(&[TABLE4, "--set", "cart.mass=0 kg"]),
+        (
+            Some(2),
+            "error: --set:1:11: cart.mass: 0 kg has to be above zero\n  1 | cart.mass=0 kg\n    |           ^^^^\n  allowed: from 1e-15 kg to 1e15 kg\n".into()
+        )
+    );
+    let (status, error) = told(&[]);
+    assert_eq!(status, Some(2));
+    assert!(error.contains("required arguments were not provided"), "{error}");
+}

@@ -1,0 +1,240 @@
+//! What follows from the numbers of an axis.
+
+use super::limits::{Most, Power, most, safety};
+use super::{Group, Note, Overview, Place, belt_mass, drive_at_belt, motor_rows, of_belt, of_constants, told};
+use crate::case::Case;
+use crate::error::Result;
+use crate::linear::{Operation, Root, places, travel};
+use crate::stage::{AmplifierMode, BeltModel, Stage};
+use std::f64::consts::PI;
+
+/// Places along the travel.
+const PLACES: usize = 7;
+
+pub(super) fn overview(case: &Case) -> Result<Overview> {
+    let stage = &case.stage;
+    let mut notes = Vec::new();
+    let masses = masses(stage);
+    let inputs = case.experiments.iter().map(|experiment| (&experiment.input, experiment.until));
+    let most = most(case.controller.as_ref().and_then(|design| design.limit), inputs);
+    let along = places(stage, PLACES);
+    let positions = along.clone().unwrap_or_else(|| vec![0.0]);
+    let found = travel(stage, Operation::default(), &positions)?;
+    let places: Vec<Place> = found.iter().map(|place| self::place(stage, place)).collect();
+    let mut groups = vec![drive(stage, &mut notes), inertia(stage, &masses, &mut notes)];
+    groups.extend(belt(stage, &places));
+    groups.extend(limits(stage, &masses, most.as_ref(), &mut notes));
+    of_constants(&stage.motor, "", &mut notes);
+    if stage.belt.model != BeltModel::Rigid {
+        of_belt(&stage.belt.sheet, &stage.belt.damping, stage.pulley_radius, &mut notes);
+    }
+    groups.retain(|group| !group.rows.is_empty());
+    let (title, kind, depends_on_place) = (case.title.clone(), "axis", along.is_some());
+    Ok(Overview { title, kind, groups, places, depends_on_place, notes })
+}
+
+/// Masses at the cart, kg.
+struct Masses {
+    drive: f64,
+    idler: f64,
+    rotor: f64,
+    total: f64,
+}
+
+fn masses(stage: &Stage) -> Masses {
+    let r = stage.pulley_radius;
+    let [drive, idler] = [&stage.drive_pulley, &stage.idler_pulley].map(|pulley| pulley.inertia / (r * r));
+    // n² J_r / r²
+    let rotor = stage.motor.rotor_inertia * (stage.motor.gear_ratio / r).powi(2);
+    Masses { drive, idler, rotor, total: stage.cart.mass + drive + idler + rotor }
+}
+
+fn drive(stage: &Stage, notes: &mut Vec<Note>) -> Group {
+    let mut group = Group::new("drive", "Drive");
+    motor_rows(&mut group, "", &stage.motor);
+    let r = stage.pulley_radius;
+    let amplifier = (stage.amplifier.mode, stage.amplifier.gain);
+    let (force, drag) = drive_at_belt(&stage.motor, amplifier, r);
+    let (per_input, input) = match stage.amplifier.mode {
+        AmplifierMode::Voltage => ("N/V", "V"),
+        AmplifierMode::Current => ("N/A", "A"),
+    };
+    group.add("force_per_input", "force at the belt per input", force, per_input);
+    if drag > 0.0 {
+        group.add("drag", "drag of the drive at the cart", drag, "N s/m").how(match stage.motor.is_simple {
+            true => "",
+            false => "of the back-EMF",
+        });
+    }
+    group.add("travel_per_turn", "travel per turn of the motor", 2.0 * PI * r / stage.motor.gear_ratio, "m");
+    if force > 0.0 {
+        let [forward, backward] = [1.0, -1.0].map(|side| breakaway(stage, side) / force);
+        let row = group.add("breakaway_input", breakaway_name(input), forward, input);
+        row.how("that friction holds against, the belt pulling all bodies along");
+        if (backward - forward).abs() > 1e-3 * forward.abs() {
+            group.add("breakaway_input_backward", "the same backward", backward, input);
+        }
+        if forward < 0.0 || backward < 0.0 {
+            let text = "friction does not hold the load on the cart: at rest the axis begins to slide".to_string();
+            notes.push(Note { code: "load-slides", text });
+        }
+    }
+    group
+}
+
+fn breakaway_name(input: &str) -> &'static str {
+    if input == "V" { "breakaway voltage" } else { "breakaway current" }
+}
+
+/// Force at the belt that moves everything from rest, N, in that direction.
+fn breakaway(stage: &Stage, side: f64) -> f64 {
+    let forward = side > 0.0;
+    let [drive, idler] =
+        [&stage.drive_pulley, &stage.idler_pulley].map(|pulley| pulley.friction.side(forward).breakaway);
+    let along = stage.cart.along.as_ref().map_or(1.0, |along| along.factor(0.0));
+    let cart = along * stage.cart.friction.side(forward).breakaway;
+    cart + (drive + idler) / stage.pulley_radius - side * stage.cart.constant_force()
+}
+
+fn inertia(stage: &Stage, masses: &Masses, notes: &mut Vec<Note>) -> Group {
+    let mut group = Group::new("inertia", "Moved mass, at the cart");
+    group.add("cart_mass", "cart", stage.cart.mass, "kg");
+    group.add("drive_pulley_mass", "drive pulley", masses.drive, "kg").how("J/r^2");
+    group.add("idler_pulley_mass", "idler pulley", masses.idler, "kg").how("J/r^2");
+    if masses.rotor > 0.0 {
+        group.add("rotor_mass", "rotor", masses.rotor, "kg").how("n^2 J/r^2");
+    }
+    group.add("total_mass", "all of it", masses.total, "kg");
+    let reflected = masses.total - stage.cart.mass;
+    group.add("reflected_share", "share of what turns", reflected / masses.total, "");
+    let length = stage.belt.make.map(|make| make.spans.iter().sum::<f64>() + 2.0 * PI * stage.pulley_radius);
+    belt_mass(&mut group, notes, &stage.belt.sheet, length, masses.total);
+    group
+}
+
+fn belt(stage: &Stage, places: &[Place]) -> Option<Group> {
+    if stage.belt.model == BeltModel::Rigid {
+        return None;
+    }
+    let mut group = Group::new("belt", "Belt, with the cart at x = 0");
+    if let Some(make) = stage.belt.make {
+        group.add("specific_stiffness", "specific stiffness E A", make.modulus * make.section, "N");
+    }
+    for (span, stiffness) in stage.belt.stiffness.iter().enumerate() {
+        group.add(format!("span{}_stiffness", span + 1), format!("stiffness of span {}", span + 1), *stiffness, "N/m");
+    }
+    let stretch = compliance(stage, 0.0);
+    group
+        .add("stiffness_at_cart", "stiffness at the cart", 1.0 / stretch, "N/m")
+        .how("the drive pulley held: k1 + k2 k3/(k2 + k3)");
+    group.add("stretch_per_force", "stretch per newton", stretch, "m/N");
+    if stage.belt.damping.iter().any(|c| *c > 0.0) {
+        for (span, damping) in stage.belt.damping.iter().enumerate() {
+            group.add(format!("span{}_damping", span + 1), format!("damping of span {}", span + 1), *damping, "N s/m");
+        }
+    }
+    // At x = 0, or where the travel comes nearest to it.
+    let nearest = places.iter().min_by(|a, b| a.position[0].abs().total_cmp(&b.position[0].abs()))?;
+    for (k, (hertz, ratio)) in nearest.modes.iter().enumerate() {
+        let number = k + 1;
+        group.add(format!("resonance{number}"), format!("resonance {number}"), *hertz, "Hz");
+        if let Some(ratio) = ratio {
+            let row = group.add(format!("resonance{number}_damping"), "its damping ratio", *ratio, "");
+            row.how("belt, viscous friction and back-EMF, everything sliding");
+        }
+    }
+    if let Some(hertz) = nearest.held {
+        group
+            .add("held_resonance", "resonance with the drive held", hertz, "Hz")
+            .how("anti-resonance of the drive angle");
+    }
+    Some(group)
+}
+
+/// By how much the cart gives way per force, the drive pulley held, m/N: the idler pulley turns freely between spans 2 and 3.
+fn compliance(stage: &Stage, x: f64) -> f64 {
+    let [mut k1, mut k2, k3] = stage.belt.stiffness;
+    if let Some(make) = stage.belt.make.filter(|_| stage.belt.follows_cart) {
+        [k1, k2] = make.stiffness_at(x);
+    }
+    1.0 / (k1 + k2 * k3 / (k2 + k3))
+}
+
+fn place(stage: &Stage, found: &crate::linear::Place) -> Place {
+    let [k1, k2] = found.stiffness;
+    let damped = |k: usize| match found.resonances.get(k) {
+        // Where damping makes fewer pairs, which is which cannot be told.
+        Some(Root::Pair { damping, .. }) if found.resonances.len() == found.undamped_resonances.len() => Some(*damping),
+        _ => None,
+    };
+    let modes = found.undamped_resonances.iter().enumerate().map(|(k, hertz)| (*hertz, damped(k))).collect();
+    Place {
+        position: vec![found.position],
+        stiffness: vec![k1, k2, stage.belt.stiffness[2]],
+        stretch: vec![compliance(stage, found.position)],
+        modes,
+        held: found.undamped_antiresonances.first().copied(),
+    }
+}
+
+fn limits(stage: &Stage, masses: &Masses, most: Option<&Most>, notes: &mut Vec<Note>) -> Option<Group> {
+    let r = stage.pulley_radius;
+    let Some((power, from)) = Power::of(&stage.motor, &stage.amplifier, r, most) else {
+        let text = "nothing bounds the input: give amplifier.voltage_limit or current_limit to see the largest speed and \
+                    acceleration";
+        notes.push(Note { code: "no-limit", text: text.to_string() });
+        return None;
+    };
+    let mut group = Group::new("limits", "Limits");
+    group.add("largest_force", "largest force of the motor at the belt", power.force, "N").how(format!("by {from}"));
+    for (side, end) in [(1.0, ""), (-1.0, "_backward")] {
+        let side_of = |forward: bool| {
+            let pulleys = [&stage.drive_pulley, &stage.idler_pulley].map(|pulley| pulley.friction.side(forward));
+            let cart = stage.cart.friction.side(forward);
+            let coulomb = cart.coulomb + pulleys.iter().map(|side| side.coulomb).sum::<f64>() / r;
+            let viscous = cart.viscous + pulleys.iter().map(|side| side.viscous).sum::<f64>() / (r * r);
+            (coulomb, viscous)
+        };
+        let (coulomb, viscous) = side_of(side > 0.0);
+        if side < 0.0 && stage.cart.constant_force() == 0.0 && side_of(true) == side_of(false) {
+            break;
+        }
+        let against = -side * stage.cart.constant_force();
+        let words = if end.is_empty() { "" } else { " backward" };
+        let left = (power.force - coulomb - against) / masses.total;
+        group
+            .add(format!("largest_acceleration{end}"), format!("largest acceleration{words}"), left.max(0.0), "m/s^2")
+            .how("from a creep, against friction");
+        match power.speed(coulomb, viscous, against) {
+            Some(speed) => {
+                group
+                    .add(format!("largest_speed{end}"), format!("largest speed{words}"), speed, "m/s")
+                    .how("in the long run");
+            }
+            None => notes.push(Note {
+                code: "no-largest-speed",
+                text: "nothing bounds the speed: in current mode give amplifier.voltage_limit".to_string(),
+            }),
+        }
+        if left <= 0.0 {
+            let text =
+                format!("the largest force of the motor, {}, does not move the axis{words}", told(power.force, "N"));
+            notes.push(Note { code: "does-not-move", text });
+        }
+    }
+    if stage.belt.model != BeltModel::Rigid {
+        group
+            .add("largest_stretch", "stretch of the belt under it", power.force * compliance(stage, 0.0), "m")
+            .how("at the cart, the drive held");
+        safety(&mut group, notes, &stage.belt.sheet, stage.belt.pretension, r, power.force);
+        if let Some(pretension) = stage.belt.pretension.filter(|pretension| *pretension < 0.5 * power.force) {
+            let text = format!(
+                "a pretension of {} is less than half of the largest force, {}: a span may go slack",
+                told(pretension, "N"),
+                told(power.force, "N")
+            );
+            notes.push(Note { code: "little-pretension", text });
+        }
+    }
+    Some(group)
+}

@@ -1,0 +1,215 @@
+//! What follows from the numbers of a gantry.
+
+use super::limits::{Power, most, safety};
+use super::{Group, Note, Overview, Place, belt_mass, drive_at_belt, motor_rows, of_belt, of_constants};
+use crate::case::GantryCase;
+use crate::error::Result;
+use crate::linear::Natural;
+use crate::mechanism::BODIES;
+use crate::stage::gantry::{BRIDGE, CART, Gantry};
+use crate::stage::{AmplifierMode, Travel};
+use std::f64::consts::PI;
+
+/// The drives, as rows call them.
+const SIDES: [&str; 2] = ["left", "right"];
+
+/// The directions that it moves in, and what moves then.
+const WAYS: [(&str, &str); 2] = [("x", "bridge and cart along x"), ("y", "cart along y")];
+
+pub(super) fn overview(case: &GantryCase) -> Result<Overview> {
+    let gantry = &case.gantry;
+    let mut notes = Vec::new();
+    let corners = corners(gantry);
+    let depends_on_place = corners.len() > 1;
+    let places = corners.iter().map(|at| place(gantry, *at)).collect::<Result<Vec<_>>>()?;
+    let mut groups =
+        vec![drive(gantry, &mut notes), inertia(gantry, &mut notes), belt(gantry, &place(gantry, [0.0, 0.0])?)];
+    groups.extend(limits(case, &mut notes));
+    for (motor, side) in gantry.motors.iter().zip(SIDES) {
+        of_constants(motor, &format!("{side} drive: "), &mut notes);
+    }
+    notes.dedup_by(|a, b| {
+        a.code == b.code && a.text.split_once(": ").map(|t| t.1) == b.text.split_once(": ").map(|t| t.1)
+    });
+    of_belt(&gantry.belts.sheet, &gantry.belts.damping, gantry.pulley_radius, &mut notes);
+    let (title, kind) = (case.title.clone(), gantry.routing.word());
+    Ok(Overview { title, kind, groups, places, depends_on_place, notes })
+}
+
+/// The middle of the working area and its corners, where the place makes a difference; else the origin.
+fn corners(gantry: &Gantry) -> Vec<[f64; 2]> {
+    let (Some(_), Some(x), Some(y)) = (&gantry.belts.follows, gantry.bridge.travel, gantry.cart.travel) else {
+        return vec![[0.0, 0.0]];
+    };
+    let middle = |travel: Travel| 0.5 * (travel.min + travel.max);
+    vec![[middle(x), middle(y)], [x.min, y.min], [x.min, y.max], [x.max, y.min], [x.max, y.max]]
+}
+
+fn drive(gantry: &Gantry, notes: &mut Vec<Note>) -> Group {
+    let mut group = Group::new("drive", "Drives");
+    let r = gantry.pulley_radius;
+    let alike = gantry.motors[0] == gantry.motors[1] && gantry.amplifiers[0] == gantry.amplifiers[1];
+    for (k, side) in SIDES.into_iter().enumerate().take(if alike { 1 } else { 2 }) {
+        let prefix = if alike { String::new() } else { format!("{side}_") };
+        let before = group.rows.len();
+        let (motor, amplifier) = (&gantry.motors[k], &gantry.amplifiers[k]);
+        motor_rows(&mut group, &prefix, motor);
+        let (force, drag) = drive_at_belt(motor, (amplifier.mode, amplifier.gain), r);
+        let (per_input, input) = match amplifier.mode {
+            AmplifierMode::Voltage => ("N/V", "V"),
+            AmplifierMode::Current => ("N/A", "A"),
+        };
+        group.add(format!("{prefix}force_per_input"), "force at the belt per input", force, per_input);
+        if drag > 0.0 {
+            group.add(format!("{prefix}drag"), "drag at the belt", drag, "N s/m").how("of the back-EMF");
+        }
+        group.add(
+            format!("{prefix}travel_per_turn"),
+            "belt per turn of the motor",
+            2.0 * PI * r / motor.gear_ratio,
+            "m",
+        );
+        if !alike {
+            group.rows[before..].iter_mut().for_each(|row| row.name = format!("{side}: {}", row.name));
+        }
+        if k == 0 && force > 0.0 {
+            for ((way, _), held) in WAYS.into_iter().zip(breakaway(gantry)) {
+                let both = force * 2.0;
+                let row =
+                    group.add(format!("breakaway_input_{way}"), format!("breakaway along {way}"), held / both, input);
+                row.how(if alike { "of both drives alike" } else { "of both drives, each with the left one's force" });
+            }
+        }
+    }
+    let _ = notes;
+    group
+}
+
+/// Breakaway along x and along y, N at what moves: that of both pulleys, and of the bridge or the cart.
+fn breakaway(gantry: &Gantry) -> [f64; 2] {
+    let pulleys = 2.0 * gantry.drive_pulley.friction.forward.breakaway / gantry.pulley_radius;
+    [pulleys + gantry.bridge.friction.forward.breakaway, pulleys + gantry.cart.friction.forward.breakaway]
+}
+
+/// What both pulleys and rotors weigh at the belt, kg.
+fn turning(gantry: &Gantry) -> f64 {
+    let r = gantry.pulley_radius;
+    let rotors: f64 = gantry.motors.iter().map(|motor| motor.rotor_inertia * motor.gear_ratio.powi(2)).sum();
+    (2.0 * gantry.drive_pulley.inertia + rotors) / (r * r)
+}
+
+/// Moved mass along x and along y, kg: both pulleys turn with either.
+fn masses(gantry: &Gantry) -> [f64; 2] {
+    let turning = turning(gantry);
+    [gantry.bridge.mass + gantry.cart.mass + turning, gantry.cart.mass + turning]
+}
+
+fn inertia(gantry: &Gantry, notes: &mut Vec<Note>) -> Group {
+    let mut group = Group::new("inertia", "Moved mass");
+    let turning = turning(gantry);
+    group.add("turning_mass", "both pulleys and rotors, at the belt", turning, "kg").how("(2 J + n^2 J_r of both)/r^2");
+    for ((way, words), mass) in WAYS.into_iter().zip(masses(gantry)) {
+        group.add(format!("total_mass_{way}"), words, mass, "kg");
+        group.add(format!("reflected_share_{way}"), "share of what turns", turning / mass, "");
+    }
+    let length = gantry.belts.make.as_ref().map(|make| make.spans.iter().sum::<f64>());
+    belt_mass(&mut group, notes, &gantry.belts.sheet, length, masses(gantry)[0]);
+    group
+}
+
+fn belt(gantry: &Gantry, place: &Place) -> Group {
+    let mut group = Group::new("belt", "Belt, with bridge and cart at zero");
+    if let Some(make) = &gantry.belts.make {
+        group.add("specific_stiffness", "specific stiffness E A", make.rigidity(), "N");
+    }
+    for (label, stiffness) in gantry.routing.spans().iter().zip(&gantry.belts.stiffness) {
+        group.add(format!("{}_stiffness", label.key), format!("stiffness, {}", label.name), *stiffness, "N/m");
+    }
+    for ((way, _), stretch) in WAYS.into_iter().zip(&place.stretch) {
+        let row =
+            group.add(format!("stretch_per_force_{way}"), format!("stretch per newton along {way}"), *stretch, "m/N");
+        row.how("the drive pulleys held");
+    }
+    for (k, (hertz, ratio)) in place.modes.iter().enumerate() {
+        let number = k + 1;
+        group.add(format!("resonance{number}"), format!("elastic mode {number}"), *hertz, "Hz");
+        if let Some(ratio) = ratio {
+            let row = group.add(format!("resonance{number}_damping"), "its damping ratio", *ratio, "");
+            row.how("belt, viscous friction and back-EMF, everything sliding");
+        }
+    }
+    group
+}
+
+/// The machine with the bridge at x and the cart at y.
+fn place(gantry: &Gantry, [x, y]: [f64; 2]) -> Result<Place> {
+    let mechanism = gantry.mechanism();
+    let mut position = [0.0; BODIES];
+    (position[BRIDGE], position[CART]) = (x, y);
+    let modes = Natural::of(&mechanism, &position)?;
+    let modes = modes.elastic.iter().map(|mode| (mode.hertz(), mode.damping())).collect();
+    let stiffness: Vec<f64> = match gantry.lengths(x, y) {
+        Some(lengths) => {
+            let rigidity = gantry.belts.follows.as_ref().map_or(0.0, |(rigidity, _)| *rigidity);
+            lengths.iter().map(|length| rigidity / length).collect()
+        }
+        None => gantry.belts.stiffness.clone(),
+    };
+    // K = Σ k a aᵀ over what bridge and cart do to the spans, the pulleys held; its inverse says by how much they give way.
+    let mut k = [[0.0; 2]; 2];
+    for (&span, stiffness) in mechanism.roles.spans.iter().zip(&stiffness) {
+        let arms = mechanism.leading_arms(span);
+        let a = [arms[BRIDGE], arms[CART]];
+        for (row, left) in k.iter_mut().zip(a) {
+            for (entry, right) in row.iter_mut().zip(a) {
+                *entry += stiffness * left * right;
+            }
+        }
+    }
+    let determinant = k[0][0] * k[1][1] - k[0][1] * k[1][0];
+    let stretch = vec![k[1][1] / determinant, k[0][0] / determinant];
+    Ok(Place { position: vec![x, y], stiffness, stretch, modes, held: None })
+}
+
+fn limits(case: &GantryCase, notes: &mut Vec<Note>) -> Option<Group> {
+    let gantry = &case.gantry;
+    let r = gantry.pulley_radius;
+    let inputs = case.experiments.iter().flat_map(|done| done.inputs.iter().map(|input| (input, done.until)));
+    let most = most(None, inputs);
+    let power = |k: usize| Power::of(&gantry.motors[k], &gantry.amplifiers[k], r, most.as_ref());
+    let (Some((left, from)), Some((right, _))) = (power(0), power(1)) else {
+        let text = "nothing bounds the inputs: give amplifier.voltage_limit or current_limit to see the largest speeds and accelerations";
+        notes.push(Note { code: "no-limit", text: text.to_string() });
+        return None;
+    };
+    let mut group = Group::new("limits", "Limits, both drives pulling alike");
+    let force = left.force.min(right.force);
+    group.add("largest_force", "largest force of a motor at the belt", force, "N").how(format!("by {from}"));
+    let pulleys = &gantry.drive_pulley.friction.forward;
+    let slides = [&gantry.bridge.friction.forward, &gantry.cart.friction.forward];
+    for (((way, _), mass), slide) in WAYS.into_iter().zip(masses(gantry)).zip(slides) {
+        let coulomb = slide.coulomb + 2.0 * pulleys.coulomb / r;
+        let viscous = slide.viscous + 2.0 * pulleys.viscous / (r * r);
+        let both = Power {
+            force: 2.0 * force,
+            voltage: left.voltage,
+            per_volt: left.per_volt + right.per_volt,
+            brake: left.brake + right.brake,
+        };
+        let acceleration = ((both.force - coulomb) / mass).max(0.0);
+        let row = group.add(
+            format!("largest_acceleration_{way}"),
+            format!("largest acceleration along {way}"),
+            acceleration,
+            "m/s^2",
+        );
+        row.how("from a creep, against friction");
+        if let Some(speed) = both.speed(coulomb, viscous, 0.0) {
+            group
+                .add(format!("largest_speed_{way}"), format!("largest speed along {way}"), speed, "m/s")
+                .how("in the long run");
+        }
+    }
+    safety(&mut group, notes, &gantry.belts.sheet, gantry.belts.pretension, r, force);
+    Some(group)
+}

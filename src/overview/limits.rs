@@ -1,0 +1,153 @@
+//! How fast and how quickly a drive can go, and what its belt takes then.
+
+use super::{Group, Note, told};
+use crate::signal::Signal;
+use crate::stage::{Amplifier, AmplifierMode, BeltSheet, Motor};
+use std::f64::consts::PI;
+
+/// What a drive gives: at the belt, per direction alike.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Power {
+    /// Largest force at standstill, N.
+    pub force: f64,
+    /// Largest voltage at the terminals, V, where one is known.
+    pub voltage: Option<f64>,
+    /// Force per volt at the terminals, N/V.
+    pub per_volt: f64,
+    /// Force per speed that the back-EMF takes at that voltage, N s/m.
+    pub brake: f64,
+}
+
+/// Where the largest input comes from.
+pub(super) struct Most {
+    /// V or A into the amplifier.
+    pub input: f64,
+    /// In words.
+    pub from: &'static str,
+}
+
+/// The largest input that a machine gets: of its controller's limit, or of its experiments.
+pub(super) fn most<'a>(limit: Option<f64>, inputs: impl Iterator<Item = (&'a Signal, f64)>) -> Option<Most> {
+    if let Some(input) = limit {
+        return Some(Most { input, from: "the controller's limit" });
+    }
+    const LOOKS: usize = 20_000;
+    let peak = |(signal, until): (&Signal, f64)| match signal {
+        Signal::Sampled { values, .. } => values.iter().fold(0.0, |most, value| value.abs().max(most)),
+        signal => {
+            let at = |k: usize| signal.value(until * k as f64 / LOOKS as f64).abs();
+            (0..=LOOKS).map(at).fold(0.0, f64::max)
+        }
+    };
+    let input = inputs.map(peak).fold(0.0, f64::max);
+    (input > 0.0).then_some(Most { input, from: "the largest input of the experiments" })
+}
+
+impl Power {
+    /// Of a drive with the largest input that it gets, or none; and what limits it, in words.
+    pub fn of(motor: &Motor, amplifier: &Amplifier, r: f64, most: Option<&Most>) -> Option<(Self, String)> {
+        let n = motor.gear_ratio;
+        let per_ampere = motor.gear_efficiency * n * motor.torque_constant / r;
+        let per_volt = per_ampere / motor.resistance;
+        let brake = per_volt * n * motor.back_emf_constant / r;
+        let commanded = most.map(|most| (amplifier.gain * most.input).abs());
+        let mut words: Vec<&str> = Vec::new();
+        let (mut volts, mut amperes) = (amplifier.voltage_limit, amplifier.current_limit);
+        let own = match amplifier.mode {
+            AmplifierMode::Voltage => &mut volts,
+            AmplifierMode::Current => &mut amperes,
+        };
+        // What is never commanded is never reached.
+        match (*own, commanded) {
+            (Some(limit), Some(commanded))
+                if commanded < limit && most.is_some_and(|most| !most.is_of_experiments()) =>
+            {
+                *own = Some(commanded);
+            }
+            (None, Some(commanded)) => *own = Some(commanded),
+            (Some(_), _) | (None, None) => {}
+        }
+        let is_limit = match amplifier.mode {
+            AmplifierMode::Voltage => amplifier.voltage_limit == volts,
+            AmplifierMode::Current => amplifier.current_limit == amperes,
+        };
+        if !is_limit && let Some(most) = most {
+            words.push(most.from);
+        }
+        if amplifier.voltage_limit.is_some() && volts == amplifier.voltage_limit {
+            words.push("amplifier.voltage_limit");
+        }
+        if amplifier.current_limit.is_some() && amperes == amplifier.current_limit {
+            words.push("amplifier.current_limit");
+        }
+        let of_volts = volts.map(|volts| per_volt * volts);
+        let of_amperes = amperes.map(|amperes| per_ampere * amperes);
+        let force = match (of_volts, of_amperes) {
+            (Some(a), Some(b)) => a.min(b),
+            (Some(a), None) | (None, Some(a)) => a,
+            (None, None) => return None,
+        };
+        Some((Self { force, voltage: volts, per_volt, brake }, words.join(" and ")))
+    }
+
+    /// The speed at which the force is used up by Coulomb friction, viscous friction and a constant load against it, m/s.
+    pub fn speed(&self, coulomb: f64, viscous: f64, against: f64) -> Option<f64> {
+        let left = self.force - coulomb - against;
+        if left <= 0.0 {
+            return Some(0.0);
+        }
+        // k (V − K_e n v / r) = F_c + b v
+        let by_voltage = self.voltage.map(|v| (self.per_volt * v - coulomb - against) / (self.brake + viscous));
+        // F = F_c + b v, where the current is the limit
+        let by_force = left / viscous;
+        let speed = by_voltage.map_or(by_force, |speed| speed.min(by_force.max(0.0)));
+        speed.is_finite().then_some(speed)
+    }
+}
+
+impl Most {
+    fn is_of_experiments(&self) -> bool {
+        self.from.ends_with("experiments")
+    }
+}
+
+/// Teeth and tension against the largest force of one drive.
+pub(super) fn safety(
+    group: &mut Group,
+    notes: &mut Vec<Note>,
+    sheet: &BeltSheet,
+    pretension: Option<f64>,
+    r: f64,
+    force: f64,
+) {
+    if let (Some(kind), Some(width)) = (sheet.kind, sheet.width) {
+        let teeth = 2.0 * PI * r / kind.pitch;
+        // The belt lies on half of the pulley.
+        let in_mesh = (0.5 * teeth).floor();
+        group.add("teeth_in_mesh", "teeth in mesh at the drive pulley", in_mesh, "");
+        if let Some(carried) = kind.teeth(width, in_mesh) {
+            group.add("tooth_force", "force that they carry at rest", carried, "N");
+            group
+                .add("tooth_safety", "safety of the teeth", carried / force, "")
+                .how("against the largest force of the motor");
+            unsafe_note(notes, "teeth-overloaded", carried, force, "the teeth in mesh carry");
+        }
+    }
+    if let Some(allowed) = sheet.allowed_tension {
+        let tension = pretension.unwrap_or(0.0) + force;
+        group.add("allowed_tension", "allowed tension", allowed, "N");
+        group.add("largest_tension", "largest tension of a span", tension, "N").how(match pretension {
+            Some(_) => "pretension and the largest force of the motor",
+            None => "the largest force of the motor; no pretension is given",
+        });
+        group.add("tension_safety", "safety of the tension", allowed / tension, "");
+        unsafe_note(notes, "belt-overloaded", allowed, tension, "the belt may have a tension of");
+    }
+}
+
+fn unsafe_note(notes: &mut Vec<Note>, code: &'static str, allowed: f64, there: f64, words: &str) {
+    if allowed < there {
+        let text = format!("{words} {}, and the motor can bring it to {}", told(allowed, "N"), told(there, "N"));
+        notes.push(Note { code, text });
+    }
+}
