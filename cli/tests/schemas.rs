@@ -128,6 +128,8 @@ fn results_follow_their_schemas() {
         ("sweep", &["sweep", TABLE4, "--design", "one-at-a-time", "--vary", "cart.mass=values(0.3, 0.4)"]),
         ("sweep", &["sweep", "stages/h-frame/h-frame.toml", "--runs", "3", "--vary", "all=10%"]),
         ("shape", &["shape", "stages/printer-axis/printer-axis.toml"]),
+        ("tune", &["tune", PID, "--evaluate"]),
+        ("tune", &["tune", "stages/sollmann-jouaneh/controllers/cascade.toml", "--set", "tune.cost=none"]),
         ("error", &["simulate", TABLE4, "--set", "cart.mass=-1 kg"]),
         ("error", &["modes", "none.toml"]),
     ];

@@ -16,6 +16,7 @@ const RESULTS: &[(&str, &str, &str)] = &[
     ("shape", "`taut shape`", include_str!("results/shape.txt")),
     ("simulate", "`taut simulate`", include_str!("results/simulate.txt")),
     ("sweep", "`taut sweep`", include_str!("results/sweep.txt")),
+    ("tune", "`taut tune`", include_str!("results/tune.txt")),
 ];
 
 /// What there are schemas of: names and sentences, the case file first.
