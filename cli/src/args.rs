@@ -3,7 +3,7 @@
 use crate::command::Common;
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
-use taut::control::shaper::Kind;
+use taut::control::shaper::{Firmware, Form};
 use taut::quantity;
 use taut::solve::{Choice, Kind as SolverKind, Method, Solver};
 use taut::stage::Stage;
@@ -396,29 +396,40 @@ Ctrl-C ends a fit early: the best so far is written and said not to be converged
 ///
 /// Takes a spectrum (Klipper's resonances_*.csv, calibration_data_*.csv), raw accelerometer samples (raw_data_*.csv), or a case
 /// file, whose resonances along the travel are computed. Prints for each shaper the best frequency, the vibration that
-/// remains, smoothing and the greatest acceleration, and which one to take. A second spectrum is compared with the first.
+/// remains, smoothing and the greatest acceleration, which one to take, and the lines for Klipper's configuration. A second spectrum is compared
+/// with the first; with --together one shaper is chosen for all.
 #[derive(Debug, clap::Args)]
 #[command(after_help = SHAPE)]
 pub struct Shape {
     /// A spectrum, accelerometer samples, or a case file (.toml)
     pub spectrum: PathBuf,
-    /// Another one to compare: the other belt, or after a change
-    pub second: Option<PathBuf>,
+    /// Another one to compare: the other belt, or after a change; with --together any number
+    pub others: Vec<PathBuf>,
+    /// One shaper for all of the spectra: of each the one counts of which most remains
+    #[arg(long)]
+    pub together: bool,
+    /// Whose definitions of shapers, and whose rule to choose one [default: klipper, as it is since 2026-03]
+    #[arg(long, value_enum, default_value_t, hide_default_value = true)]
+    pub firmware: FirmwareName,
     /// Axis of the accelerometer [default: the sum of x, y and z]
     #[arg(long, value_enum)]
     pub axis: Option<AxisName>,
-    /// Damping ratio that shapers are designed for [default: 0.1, or the model's]
-    #[arg(long, value_name = "RATIO")]
-    pub damping: Option<f64>,
+    /// Damping ratio that shapers are designed for, or "fitted" for that of a spectrum's highest peak [default: 0.1, or the model's]
+    #[arg(long, value_name = "RATIO", value_parser = damping)]
+    pub damping: Option<Damping>,
     /// Most smoothing that is allowed, such as "0.1 mm" [default: any]
     #[arg(long, value_name = "LENGTH", value_parser = smoothing)]
     pub max_smoothing: Option<f64>,
+    /// Most vibration that is wanted, in per cent of that without a shaper; a quieter shaper is then taken although it smooths more
+    #[arg(long, value_name = "PERCENT", value_parser = vibrations)]
+    pub max_vibrations: Option<f64>,
     /// Speed at right-angled corners, of which smoothing is computed [default: "5 mm/s"]
     #[arg(long, value_name = "SPEED", value_parser = corner_speed)]
     pub corner_speed: Option<f64>,
-    /// Shapers to choose from, separated by commas: zv, mzv, zvd, ei, 2hump_ei, 3hump_ei [default: all but zvd]
-    #[arg(long, value_delimiter = ',', value_name = "NAMES", value_parser = shaper)]
-    pub shapers: Vec<Kind>,
+    /// Shapers to choose from, separated by commas: zv, mzv, zvd, ei, 2hump_ei, 3hump_ei, mzv(n=4,t=0.9), ei(v_tol=0.1) [default: all but
+    /// zvd]
+    #[arg(long, value_name = "NAMES", value_parser = shapers)]
+    pub shapers: Option<Shapers>,
     /// Of a case file: by which part its frequencies may be wrong [default: 0.1]
     #[arg(long, value_name = "PART", value_parser = uncertainty)]
     pub uncertainty: Option<f64>,
@@ -476,7 +487,42 @@ Examples:
   taut shape resonances_x_20210821_152037.csv --out shaped
   taut shape raw_data_x.csv --axis x --max-smoothing \"0.15 mm\"
   taut shape belt_a.csv belt_b.csv
+  taut shape --together raw_data_x_left.csv raw_data_x_middle.csv raw_data_x_right.csv
+  taut shape raw_data_x.csv --shapers \"mzv(n=4,t=0.9),ei(v_tol=0.02)\" --max-vibrations 2
   taut shape axis.toml --set cart.mass=\"0.5 kg\" --json | jq .recommended";
+
+/// Shapers with their parameters.
+#[derive(Debug, Clone)]
+pub struct Shapers(pub Vec<Form>);
+
+/// The damping ratio of shapers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Damping {
+    /// A number.
+    Ratio(f64),
+    /// Of the highest peak.
+    Fitted,
+}
+
+/// Whose shapers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum FirmwareName {
+    /// Klipper as it is since 2026-03: shapers of 2025-09, choice of 2025-10, parameters of mzv and ei
+    #[default]
+    Klipper,
+    /// Klipper until 2025-08
+    #[value(name = "klipper-2025-08")]
+    Klipper202508,
+}
+
+impl From<FirmwareName> for Firmware {
+    fn from(name: FirmwareName) -> Self {
+        match name {
+            FirmwareName::Klipper => Firmware::Klipper,
+            FirmwareName::Klipper202508 => Firmware::Klipper202508,
+        }
+    }
+}
 
 /// An axis of the accelerometer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -663,9 +709,37 @@ fn corner_speed(text: &str) -> Result<f64, String> {
     }
 }
 
-fn shaper(text: &str) -> Result<Kind, String> {
-    let names = || Kind::ALL.map(Kind::name).join(", ");
-    Kind::from_name(text).ok_or_else(|| format!("there is no such shaper; there are {}", names()))
+fn shapers(text: &str) -> Result<Shapers, String> {
+    // A comma within parentheses parts parameters.
+    let (mut all, mut depth, mut from) = (Vec::new(), 0, 0);
+    for (place, character) in text.char_indices().chain([(text.len(), ',')]) {
+        match character {
+            '(' => depth += 1,
+            ')' => depth -= 1,
+            ',' if depth <= 0 || place == text.len() => {
+                all.push(Form::read(&text[from..place]).map_err(|e| e.to_string())?);
+                from = place + 1;
+            }
+            _ => {}
+        }
+    }
+    Ok(Shapers(all))
+}
+
+fn damping(text: &str) -> Result<Damping, String> {
+    match text.trim() {
+        "fitted" => Ok(Damping::Fitted),
+        text => {
+            text.parse().map(Damping::Ratio).map_err(|_| "a damping ratio such as 0.08 is needed, or \"fitted\"".into())
+        }
+    }
+}
+
+fn vibrations(text: &str) -> Result<f64, String> {
+    match text.trim().trim_end_matches('%').trim_end().parse::<f64>() {
+        Ok(percent) if (0.1..=100.0).contains(&percent) => Ok(0.01 * percent),
+        _ => Err("per cent from 0.1 to 100 are needed, such as 5".into()),
+    }
 }
 
 fn uncertainty(text: &str) -> Result<f64, String> {

@@ -133,6 +133,8 @@ fn results_follow_their_schemas() {
         ("shape", &["shape", "stages/printer-axis/printer-axis.toml"]),
         ("show", &["show", TABLE4]),
         ("show", &["show", "stages/core-xy/follows.toml"]),
+        ("tune", &["tune", PID, "--evaluate"]),
+        ("tune", &["tune", "stages/sollmann-jouaneh/controllers/cascade.toml", "--set", "tune.cost=none"]),
         ("error", &["simulate", TABLE4, "--set", "cart.mass=-1 kg"]),
         ("paper", &["paper", "--no-report", "--out", paper]),
         ("error", &["modes", "none.toml"]),

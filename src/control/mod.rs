@@ -7,9 +7,11 @@
 
 pub mod compare;
 pub mod compensation;
+pub mod damping;
 pub mod feedback;
 pub mod filter;
 pub mod fuzzy;
+mod insensitive;
 pub mod model;
 pub mod observer;
 mod outcome;
@@ -27,8 +29,8 @@ mod standard;
 pub mod state_feedback;
 mod welch;
 
-pub(crate) use outcome::follow;
 pub use outcome::{Deviation, Figures, MoveRun, Rows, Setup, close, closed_loop, stream};
+pub(crate) use outcome::{closed_loop_briefly, follow};
 pub use rest::Swing;
 pub use sampled::{Controller, Loop, Sample, Seen, measures_cart};
 pub use spread::{Worst, spread, worst};

@@ -6,7 +6,9 @@
 //! T. Tuttle, N. Singer, "Vibration reduction using multi-hump input shapers", same journal as the first, 119, 1997. MZV is
 //! Klipper's: three impulses within three quarters of a period (its documentation, "Resonance Compensation").
 
+use super::insensitive;
 use crate::error::{Error, Result};
+use nalgebra::Complex;
 use std::f64::consts::{PI, SQRT_2};
 
 /// Vibration that the EI shapers leave where they are designed for, of that without a shaper.
@@ -55,7 +57,11 @@ impl Kind {
 
     /// Amplitudes of the impulses for a mode without damping; their sum is 1.
     pub fn amplitudes(self) -> Vec<f64> {
-        let v = TOLERANCE;
+        self.amplitudes_for(TOLERANCE)
+    }
+
+    /// The same for a tolerance V of the EI shapers.
+    fn amplitudes_for(self, v: f64) -> Vec<f64> {
         match self {
             Kind::Zv => vec![0.5, 0.5],
             // A₁ + A₂ e^{3πi/4} + A₁ e^{3πi/2} = 0 and 2 A₁ + A₂ = 1
@@ -82,6 +88,242 @@ impl Kind {
     pub fn from_name(name: &str) -> Option<Kind> {
         Kind::ALL.into_iter().find(|kind| kind.name().eq_ignore_ascii_case(name.trim()))
     }
+
+    /// Most damping that today's definition is used for.
+    fn most_damping(self) -> f64 {
+        match self {
+            Kind::Zv | Kind::Mzv | Kind::Zvd => 0.99,
+            Kind::Ei => 0.4,
+            Kind::TwoHumpEi => 0.3,
+            Kind::ThreeHumpEi => 0.2,
+        }
+    }
+}
+
+/// Whose definitions of shapers, and whose rule to choose one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Firmware {
+    /// Klipper since 2025-09-16 (extra-insensitive shapers for a damped mode), 2025-10 (choice) and 2026-03-22 (parameters of MZV and EI).
+    #[default]
+    Klipper,
+    /// Klipper until 2025-08.
+    Klipper202508,
+}
+
+impl Firmware {
+    /// All of them.
+    pub const ALL: [Firmware; 2] = [Firmware::Klipper, Firmware::Klipper202508];
+
+    /// As on the command line.
+    pub fn word(self) -> &'static str {
+        match self {
+            Firmware::Klipper => "klipper",
+            Firmware::Klipper202508 => "klipper-2025-08",
+        }
+    }
+}
+
+/// A kind with its parameters, as Klipper's configuration has it: `ei`, `mzv(n=4,t=0.9)`, `ei(v_tol=0.1)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Form {
+    /// With the usual parameters.
+    Usual(Kind),
+    /// Zero vibration with so many impulses at equal distances, the last after so many damped periods.
+    Mzv {
+        /// 3 to 20.
+        pulses: usize,
+        /// In damped periods; 0.5 to below (n − 1)/2.
+        duration: f64,
+    },
+    /// Extra-insensitive with another tolerance.
+    Ei {
+        /// Vibration at the design frequency, of that without a shaper.
+        tolerance: f64,
+    },
+}
+
+impl From<Kind> for Form {
+    fn from(kind: Kind) -> Self {
+        Form::Usual(kind)
+    }
+}
+
+impl Form {
+    /// Its kind.
+    pub fn kind(self) -> Kind {
+        match self {
+            Form::Usual(kind) => kind,
+            Form::Mzv { .. } => Kind::Mzv,
+            Form::Ei { .. } => Kind::Ei,
+        }
+    }
+
+    /// As in Klipper's configuration.
+    pub fn name(self) -> String {
+        match self {
+            Form::Usual(kind) => kind.name().into(),
+            Form::Mzv { pulses, duration } => format!("mzv(n={pulses},t={duration})"),
+            Form::Ei { tolerance } => format!("ei(v_tol={tolerance})"),
+        }
+    }
+
+    /// Reads `ei`, `mzv(n=4,t=0.9)`, `mzv(n=4,tau=1)` or `ei(v_tol=0.1)`.
+    pub fn read(text: &str) -> Result<Form> {
+        let wrong = |what: String| {
+            Error::new(what)
+                .allowed("zv, mzv, zvd, ei, 2hump_ei, 3hump_ei, mzv(n=4,t=0.9), mzv(n=4,tau=1) and ei(v_tol=0.1)")
+                .next("name one of these")
+        };
+        let text = text.trim();
+        let (name, given) = match text.split_once('(') {
+            None => (text, None),
+            Some((name, rest)) => match rest.trim_end().strip_suffix(')') {
+                Some(inside) => (name, Some(inside)),
+                None => return Err(wrong(format!("the parenthesis of \"{text}\" is not closed"))),
+            },
+        };
+        let kind = Kind::from_name(name).ok_or_else(|| wrong(format!("there is no shaper \"{}\"", name.trim())))?;
+        let Some(given) = given else { return Ok(Form::Usual(kind)) };
+        let mut values: Vec<(&str, f64)> = Vec::new();
+        for one in given.split(',') {
+            let (key, value) = one.split_once('=').unwrap_or((one, ""));
+            let number = value.trim().parse::<f64>().ok().filter(|value| value.is_finite());
+            let Some(number) = number else {
+                return Err(wrong(format!("\"{}\" in \"{text}\" is no number", one.trim())));
+            };
+            values.push((key.trim(), number));
+        }
+        let value = |key: &str| values.iter().find(|(known, _)| *known == key).map(|(_, value)| *value);
+        let known: &[&str] = match kind {
+            Kind::Mzv => &["n", "t", "tau"],
+            Kind::Ei => &["v_tol"],
+            Kind::Zv | Kind::Zvd | Kind::TwoHumpEi | Kind::ThreeHumpEi => &[],
+        };
+        if let Some((key, _)) = values.iter().find(|(key, _)| !known.contains(key)) {
+            return Err(wrong(format!("{} has no parameter \"{key}\"", kind.name())));
+        }
+        let form = match kind {
+            Kind::Mzv => {
+                let n = value("n").unwrap_or(3.0);
+                if !(3.0..=20.0).contains(&n) || n.fract() != 0.0 {
+                    return Err(wrong(format!("mzv with n = {n} impulses")).allowed("whole numbers from 3 to 20"));
+                }
+                // tau is the duration as the number of impulses goes to infinity.
+                let duration = match (value("t"), value("tau")) {
+                    (Some(_), Some(_)) => return Err(wrong("mzv takes either t or tau".into())),
+                    (Some(t), None) => t,
+                    (None, Some(tau)) => tau * (n - 1.0) / (n + 2.0 * tau - 2.0),
+                    (None, None) => 0.75,
+                };
+                Form::Mzv { pulses: n as usize, duration }
+            }
+            Kind::Ei => Form::Ei { tolerance: value("v_tol").unwrap_or(TOLERANCE) },
+            Kind::Zv | Kind::Zvd | Kind::TwoHumpEi | Kind::ThreeHumpEi => Form::Usual(kind),
+        };
+        Pattern::new(form, Firmware::Klipper, USUAL_DAMPING).map(|_| form)
+    }
+}
+
+/// The impulses of a shaper for a damping ratio, at any frequency.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pattern {
+    /// Which.
+    pub form: Form,
+    /// Damping ratio ζ of the mode it is designed for.
+    pub damping: f64,
+    /// Time in undamped periods, amplitude.
+    impulses: Vec<(f64, f64)>,
+}
+
+impl Pattern {
+    /// That of a form by the definitions of a firmware, for a damping ratio from 0 to below 1.
+    pub fn new(form: Form, firmware: Firmware, damping: f64) -> Result<Self> {
+        check_damping(damping)?;
+        let kind = form.kind();
+        if firmware == Firmware::Klipper202508 {
+            let Form::Usual(kind) = form else {
+                let error = Error::new(format!("klipper-2025-08 has no {}", form.name()));
+                return Err(error.next("leave its parameters out, or take --firmware klipper"));
+            };
+            return Ok(Self { form, damping, impulses: weighted(&kind.amplitudes(), kind.spacing(), damping) });
+        }
+        let most = kind.most_damping();
+        if damping > most {
+            let error = Error::new(format!("{} for a damping ratio of {damping}", form.name()));
+            return Err(error
+                .allowed(format!("0 to {most}"))
+                .next("take a shorter shaper, or a smaller damping ratio"));
+        }
+        let impulses = match form {
+            Form::Usual(Kind::Zv | Kind::Mzv | Kind::Zvd) => weighted(&kind.amplitudes(), kind.spacing(), damping),
+            Form::Usual(_) => solved(form, TOLERANCE, damping)?,
+            Form::Ei { tolerance } => solved(form, tolerance, damping)?,
+            Form::Mzv { pulses, duration } => {
+                let amplitudes = modified(pulses, duration).ok_or_else(|| {
+                    let most = 0.5 * (pulses - 1) as f64;
+                    Error::new(format!("{} has no impulses that are all positive", form.name()))
+                        .allowed(format!("t from 0.5 to below {most}"))
+                        .next("take another duration, or more impulses")
+                })?;
+                weighted(&amplitudes, duration / (pulses - 1) as f64, damping)
+            }
+        };
+        Ok(Self { form, damping, impulses })
+    }
+
+    /// The shaper for a mode of this undamped natural frequency, Hz.
+    pub fn at(&self, frequency: f64) -> Shaper {
+        let impulses = self.impulses.iter().map(|&(t, a)| (t / frequency, a)).collect();
+        Shaper { kind: self.form.kind(), form: self.form, frequency, damping: self.damping, impulses }
+    }
+}
+
+/// Impulses (time in undamped periods, amplitude) at distances of so many damped periods: A_i = a_i e^{−ζ ω t_i} / Σ. At the last impulse all
+/// vibrations then weigh as they do without damping, so that those which cancel without it cancel with it.
+fn weighted(amplitudes: &[f64], spacing: f64, zeta: f64) -> Vec<(f64, f64)> {
+    let root = (1.0 - zeta * zeta).sqrt();
+    let weight = |i: usize| (-2.0 * PI * zeta / root * spacing * i as f64).exp();
+    let amplitudes: Vec<f64> = amplitudes.iter().enumerate().map(|(i, a)| a * weight(i)).collect();
+    let sum: f64 = amplitudes.iter().sum();
+    let all = amplitudes.iter().enumerate().filter(|(_, a)| **a != 0.0);
+    all.map(|(i, a)| (i as f64 * spacing / root, a / sum)).collect()
+}
+
+/// The solution of the constraint equations of an EI shaper.
+fn solved(form: Form, tolerance: f64, damping: f64) -> Result<Vec<(f64, f64)>> {
+    let kind = form.kind();
+    let known = (1e-4..=0.3).contains(&tolerance);
+    let found = known.then(|| insensitive::impulses(kind, tolerance, damping, &kind.amplitudes_for(tolerance)));
+    found.flatten().ok_or_else(|| {
+        Error::new(format!("{} has no solution for a damping ratio of {damping}", form.name()))
+            .allowed("v_tol from 0.0001 to 0.3")
+            .next("take another tolerance, or a smaller damping ratio")
+    })
+}
+
+/// Amplitudes without damping of n impulses over t periods that vanish at the frequency itself and at as many others at equal distances as they
+/// can: Σ A_i z^i = Π (z − e^{jθ_k}), θ_k = 2π/(n − 1) (t + k (n − 1 − 2t)/(n − 2)), k = 0 … n − 2. None if one is negative.
+fn modified(pulses: usize, duration: f64) -> Option<Vec<f64>> {
+    let (n, t) = (pulses as f64, duration);
+    if !(t >= 0.5 - 1e-9 && 2.0 * t < n - 1.0 - 1e-7) {
+        return None;
+    }
+    let mut product = vec![Complex::new(1.0, 0.0)];
+    for k in 0..pulses - 1 {
+        let angle = 2.0 * PI / (n - 1.0) * (t + k as f64 * (n - 1.0 - 2.0 * t) / (n - 2.0));
+        let zero = Complex::new(0.0, angle).exp();
+        let mut next = vec![Complex::ZERO; product.len() + 1];
+        for (i, a) in product.iter().enumerate() {
+            next[i + 1] += a;
+            next[i] -= a * zero;
+        }
+        product = next;
+    }
+    let sum: f64 = product.iter().map(|a| a.re).sum();
+    // What is nothing but rounding is no impulse.
+    let sure = |a: f64| if a.abs() < 1e-12 { 0.0 } else { a };
+    let amplitudes: Vec<f64> = product.iter().map(|a| sure(a.re / sum)).collect();
+    amplitudes.iter().all(|a| *a >= 0.0).then_some(amplitudes)
 }
 
 /// A shaper for one frequency and damping ratio.
@@ -89,6 +331,8 @@ impl Kind {
 pub struct Shaper {
     /// Which.
     pub kind: Kind,
+    /// With which parameters.
+    pub form: Form,
     /// Undamped natural frequency of the mode it is designed for, Hz.
     pub frequency: f64,
     /// Damping ratio ζ of that mode.
@@ -97,29 +341,19 @@ pub struct Shaper {
 }
 
 impl Shaper {
-    /// The shaper for a mode of undamped natural `frequency` (Hz, above 0) and `damping` ratio (0 to below 1).
+    /// The shaper for a mode of undamped natural `frequency` (Hz, above 0) and `damping` ratio (0 to below 1), damped as Klipper did until
+    /// 2025-08; [`Shaper::formed`] has today's definitions.
     pub fn new(kind: Kind, frequency: f64, damping: f64) -> Result<Self> {
+        Self::formed(kind.into(), Firmware::Klipper202508, frequency, damping)
+    }
+
+    /// The shaper of a form by the definitions of a firmware.
+    pub fn formed(form: Form, firmware: Firmware, frequency: f64, damping: f64) -> Result<Self> {
         if !(frequency > 0.0 && frequency.is_finite()) {
             let error = Error::new(format!("a shaper cannot be designed for {frequency} Hz"));
             return Err(error.allowed("a frequency above 0 Hz").next("give the frequency of a resonance"));
         }
-        check_damping(damping)?;
-        Ok(Self::of(kind, frequency, damping))
-    }
-
-    /// As [`Shaper::new`], of values that were checked.
-    pub(crate) fn of(kind: Kind, frequency: f64, damping: f64) -> Self {
-        let (f, zeta) = (frequency, damping);
-        let root = (1.0 - zeta * zeta).sqrt();
-        // t_i = i s T_d, T_d = 1 / (f √(1 − ζ²))
-        let period = 1.0 / (f * root);
-        // A_i = a_i e^{−ζ ω t_i} / Σ: at the last impulse all vibrations then weigh as they do without damping. Which
-        // impulses cancel is thereby kept; an EI shaper leaves a little less than its tolerance.
-        let weight = |i: usize| (-2.0 * PI * zeta / root * kind.spacing() * i as f64).exp();
-        let amplitudes: Vec<f64> = kind.amplitudes().iter().enumerate().map(|(i, a)| a * weight(i)).collect();
-        let sum: f64 = amplitudes.iter().sum();
-        let impulses = amplitudes.iter().enumerate().map(|(i, a)| (i as f64 * kind.spacing() * period, a / sum));
-        Self { kind, frequency, damping, impulses: impulses.collect() }
+        Ok(Pattern::new(form, firmware, damping)?.at(frequency))
     }
 
     /// Time (s, from 0, ascending) and amplitude of each impulse; the amplitudes are positive and sum to 1.

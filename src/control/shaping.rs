@@ -4,7 +4,7 @@
 //! that leaves the least vibration or hardly more, with the best score; and of all kinds the one with the clearly best score.
 
 use super::resonance::Resonance;
-use super::shaper::{Corner, Kind, Shaper, TOLERANCE, USUAL_DAMPING, check_damping};
+use super::shaper::{Corner, Firmware, Form, Kind, Pattern, Shaper, TOLERANCE, USUAL_DAMPING, check_damping};
 use super::spectrum::Spectrum;
 use crate::error::{Error, Result};
 use crate::quantity::rounded;
@@ -24,6 +24,8 @@ const PARTS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 pub enum Target<'a> {
     /// Density over frequency; damping is not known.
     Spectrum(&'a Spectrum),
+    /// Several of them: what remains of the one of which most does counts.
+    Spectra(&'a [Spectrum]),
     /// Modes of known damping, each at its own time: the one that keeps the most counts.
     Modes {
         /// At all places of the travel.
@@ -44,24 +46,30 @@ pub struct Criterion {
     pub corner: Corner,
     /// Most smoothing that is allowed, m.
     pub max_smoothing: Option<f64>,
-    /// Kinds that are fitted.
-    pub kinds: Vec<Kind>,
-    /// Kinds of them that may be recommended.
-    pub candidates: Vec<Kind>,
+    /// Most vibration that is wanted, of that without a shaper.
+    pub max_vibrations: Option<f64>,
+    /// Whose definitions and rule.
+    pub firmware: Firmware,
+    /// Forms that are fitted.
+    pub forms: Vec<Form>,
+    /// Those of them that may be recommended.
+    pub candidates: Vec<Form>,
 }
 
 impl Default for Criterion {
     /// As Klipper's: designed for a damping ratio of 0.1, looked at from 0.075 to 0.15. ZVD is fitted, but not a candidate: it
     /// is as long as EI and covers less.
     fn default() -> Self {
-        let kinds = Kind::ALL.to_vec();
-        let candidates = kinds.iter().copied().filter(|kind| *kind != Kind::Zvd).collect();
+        let forms: Vec<Form> = Kind::ALL.map(Form::from).to_vec();
+        let candidates = forms.iter().copied().filter(|form| form.kind() != Kind::Zvd).collect();
         let mut criterion = Self {
             damping: 0.0,
             tested: Vec::new(),
             corner: Corner::default(),
             max_smoothing: None,
-            kinds,
+            max_vibrations: None,
+            firmware: Firmware::default(),
+            forms,
             candidates,
         };
         criterion.assume(USUAL_DAMPING);
@@ -77,10 +85,10 @@ impl Criterion {
         Ok(self)
     }
 
-    /// Fits these kinds alone; each may be recommended.
-    pub fn with_kinds(mut self, kinds: &[Kind]) -> Self {
-        self.kinds = kinds.to_vec();
-        self.candidates = kinds.to_vec();
+    /// Fits these forms alone; each may be recommended.
+    pub fn with_forms(mut self, forms: &[Form]) -> Self {
+        self.forms = forms.to_vec();
+        self.candidates = forms.to_vec();
         self
     }
 
@@ -113,7 +121,7 @@ pub struct Fitted {
 /// All kinds at their best, and the one to take.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
-    /// In the order of the criterion's kinds, without those that `max_smoothing` excludes.
+    /// In the order of the criterion's forms, without those that `max_smoothing` excludes and those that there are not for its damping ratio.
     pub fitted: Vec<Fitted>,
     /// The place of the recommended one among them.
     pub recommended: usize,
@@ -132,15 +140,9 @@ impl Target<'_> {
     /// Vibration that a shaper leaves, of that without one: 0 to 1; of a spectrum what is above a twentieth of the highest peak.
     pub fn remaining(&self, shaper: &Shaper, dampings: &[f64]) -> f64 {
         match self {
-            // Σ max(V P − P_max/20, 0) / Σ max(P − P_max/20, 0), at the worst of the damping ratios
-            Target::Spectrum(spectrum) => {
-                let floor = TOLERANCE * spectrum.greatest();
-                let above = |p: f64| (p - floor).max(0.0);
-                let lines = || spectrum.frequency.iter().zip(&spectrum.density).filter(|(_, p)| **p > floor);
-                let whole: f64 = lines().map(|(_, p)| above(*p)).sum();
-                let left =
-                    |zeta: &f64| -> f64 { lines().map(|(f, p)| above(shaper.residual_vibration(*f, *zeta) * p)).sum() };
-                dampings.iter().map(left).fold(0.0, f64::max) / whole
+            Target::Spectrum(spectrum) => of_spectrum(spectrum, shaper, dampings),
+            Target::Spectra(spectra) => {
+                spectra.iter().map(|spectrum| of_spectrum(spectrum, shaper, dampings)).fold(0.0, f64::max)
             }
             // max V w / w_max over modes and over f (1 − u) to f (1 + u); nothing is taken off, as a model has no noise
             Target::Modes { modes, uncertainty } => {
@@ -164,7 +166,7 @@ impl Target<'_> {
     /// Frequencies that are tried for a kind, ascending.
     fn grid(&self, kind: Kind) -> Vec<f64> {
         match self {
-            Target::Spectrum(_) => {
+            Target::Spectrum(_) | Target::Spectra(_) => {
                 let first = lowest(kind) * STEPS;
                 let count = (HIGHEST * STEPS - first) as usize;
                 (0..count).map(|k| (first + k as f64) / STEPS).collect()
@@ -180,6 +182,16 @@ impl Target<'_> {
     }
 }
 
+/// Σ max(V P − P_max/20, 0) / Σ max(P − P_max/20, 0), at the worst of the damping ratios.
+fn of_spectrum(spectrum: &Spectrum, shaper: &Shaper, dampings: &[f64]) -> f64 {
+    let floor = TOLERANCE * spectrum.greatest();
+    let above = |p: f64| (p - floor).max(0.0);
+    let lines = || spectrum.frequency.iter().zip(&spectrum.density).filter(|(_, p)| **p > floor);
+    let whole: f64 = lines().map(|(_, p)| above(*p)).sum();
+    let left = |zeta: &f64| -> f64 { lines().map(|(f, p)| above(shaper.residual_vibration(*f, *zeta) * p)).sum() };
+    dampings.iter().map(left).fold(0.0, f64::max) / whole
+}
+
 /// The lowest frequency that is tried on a spectrum, Hz: below, hardly 1500 mm/s² would be left.
 fn lowest(kind: Kind) -> f64 {
     match kind {
@@ -191,60 +203,149 @@ fn lowest(kind: Kind) -> f64 {
     }
 }
 
-/// Fits every kind, and recommends one.
+/// Fits every form, and recommends one.
 pub fn choose(target: Target<'_>, criterion: &Criterion) -> Result<Choice> {
     if let Target::Modes { modes: [], .. } = target {
         return Err(Error::new("there is no mode to shape for").next("give a model whose belt stretches"));
     }
-    let fitted: Vec<Fitted> = criterion.kinds.iter().filter_map(|kind| fit(target, *kind, criterion)).collect();
-    let mut candidates = (0..fitted.len()).filter(|&i| fitted[i].is_candidate);
-    let Some(first) = candidates.next() else {
+    let (mut fitted, mut refused) = (Vec::new(), None);
+    for form in &criterion.forms {
+        match Pattern::new(*form, criterion.firmware, criterion.damping) {
+            Ok(pattern) => fitted.extend(Tried::all(target, &pattern, criterion)),
+            Err(error) => refused = Some(error),
+        }
+    }
+    let candidates: Vec<usize> =
+        (0..fitted.len()).filter(|&i| criterion.candidates.contains(&fitted[i].pattern.form)).collect();
+    let Some(&first) = candidates.first() else {
+        if let (Some(error), true) = (refused, fitted.is_empty()) {
+            return Err(error);
+        }
         let limit = rounded(criterion.max_smoothing.unwrap_or_default() * 1e3);
         let error = Error::new(format!("no shaper has so little smoothing as {limit} mm"));
         return Err(error.next("allow more smoothing, or more kinds of shapers"));
     };
-    // A longer shaper must be clearly better: by a fifth, or by a twentieth with a tenth less smoothing.
-    let recommended = candidates.fold(first, |best, i| {
-        let (one, best_one) = (&fitted[i], &fitted[best]);
-        let clearly = 1.2 * one.score < best_one.score;
-        let smoother = 1.05 * one.score < best_one.score && 1.1 * one.smoothing < best_one.smoothing;
-        if clearly || smoother { i } else { best }
-    });
+    let recommended =
+        match criterion.firmware {
+            Firmware::Klipper202508 => candidates.iter().copied().skip(1).fold(first, |best, i| {
+                if is_clearly_better(fitted[i].taken(), fitted[best].taken()) { i } else { best }
+            }),
+            Firmware::Klipper => {
+                let is_measured = !matches!(target, Target::Modes { .. });
+                recommended(&mut fitted, &candidates, criterion.max_vibrations, is_measured)
+            }
+        };
+    let fitted: Vec<Fitted> = fitted.iter().map(|one| one.fitted(criterion)).collect();
     let reason = reason(&fitted, recommended);
     Ok(Choice { fitted, recommended, reason })
 }
 
-/// A kind at its best frequency; none if it always smooths too much.
-fn fit(target: Target<'_>, kind: Kind, criterion: &Criterion) -> Option<Fitted> {
-    let grid = target.grid(kind);
-    let tried = grid.iter().copied().filter_map(|frequency| {
-        let shaper = Shaper::of(kind, frequency, criterion.damping);
-        let smoothing = shaper.smoothing(&criterion.corner);
-        if criterion.max_smoothing.is_some_and(|most| smoothing > most) {
-            return None;
+/// A shaper at one frequency.
+#[derive(Debug, Clone)]
+struct Point {
+    shaper: Shaper,
+    vibration: f64,
+    smoothing: f64,
+    score: f64,
+}
+
+/// A form at all frequencies, ascending, and the one that is taken.
+struct Tried {
+    pattern: Pattern,
+    points: Vec<Point>,
+    taken: usize,
+    lowest: Option<f64>,
+}
+
+/// A longer shaper must be clearly better: by a fifth, or by a twentieth with a tenth less smoothing.
+fn is_clearly_better(one: &Point, other: &Point) -> bool {
+    1.2 * one.score < other.score || 1.05 * one.score < other.score && 1.1 * one.smoothing < other.smoothing
+}
+
+/// The rule since 2025-10: as before from shorter to longer; a longer one, too, where the best so far leaves more than is wanted and it leaves less;
+/// each is moved to where it leaves less and smooths less than the best so far, if there is such a frequency; and a ZV gives way to the first
+/// that leaves a tenth less, unless what vibrates is known from a model.
+fn recommended(fitted: &mut [Tried], candidates: &[usize], wanted: Option<f64>, is_measured: bool) -> usize {
+    let mut best = candidates[0];
+    for &i in candidates {
+        let (one, other) = (fitted[i].taken().clone(), fitted[best].taken().clone());
+        let quieter = wanted.is_some_and(|most| other.vibration > most) && one.vibration < other.vibration;
+        if i != best && (is_clearly_better(&one, &other) || quieter) {
+            best = i;
         }
-        let v = target.remaining(&shaper, &criterion.tested);
-        // Smoothing in mm times (v^1.5 + 0.2 v + 0.01): with little vibration left it is smoothing that counts.
-        let score = smoothing * 1e3 * (v.powf(1.5) + 0.2 * v + 0.01);
-        Some((shaper, v, smoothing, score))
-    });
-    let tried: Vec<_> = tried.collect();
-    // The least vibration; of equals the highest frequency, which smooths least.
-    let least = tried.iter().rev().min_by(|a, b| a.1.total_cmp(&b.1))?;
-    // What leaves less than a tenth more is as good, and may have the better score.
-    let (shaper, vibration, smoothing, score) = tried
-        .iter()
-        .filter(|one| one.1 < 1.1 * least.1)
-        .fold(least, |best, one| if one.3 < best.3 { one } else { best });
-    Some(Fitted {
-        shaper: shaper.clone(),
-        vibration: *vibration,
-        smoothing: *smoothing,
-        max_acceleration: shaper.max_acceleration(ALLOWED_SMOOTHING, criterion.corner.speed),
-        score: *score,
-        is_candidate: criterion.candidates.contains(&kind),
-        is_lowest: grid.first() == Some(&shaper.frequency),
-    })
+        let mut least = (fitted[best].taken().vibration, fitted[best].taken().smoothing);
+        for place in 0..fitted[i].points.len() {
+            let point = &fitted[i].points[place];
+            if point.vibration < least.0 && point.smoothing < least.1 {
+                least = (point.vibration, point.smoothing);
+                (best, fitted[i].taken) = (i, place);
+            }
+        }
+    }
+    if is_measured && fitted[best].pattern.form.kind() == Kind::Zv {
+        let left = fitted[best].taken().vibration;
+        let other = candidates
+            .iter()
+            .copied()
+            .find(|&i| fitted[i].pattern.form.kind() != Kind::Zv && 1.1 * fitted[i].taken().vibration < left);
+        best = other.unwrap_or(best);
+    }
+    best
+}
+
+impl Tried {
+    /// A form at every frequency; none if it always smooths too much.
+    fn all(target: Target<'_>, pattern: &Pattern, criterion: &Criterion) -> Option<Self> {
+        let grid = target.grid(pattern.form.kind());
+        let point = |frequency: f64| {
+            let shaper = pattern.at(frequency);
+            let smoothing = shaper.smoothing(&criterion.corner);
+            if criterion.max_smoothing.is_some_and(|most| smoothing > most) {
+                return None;
+            }
+            let v = target.remaining(&shaper, &criterion.tested);
+            // Smoothing in mm times (v^1.5 + 0.2 v + 0.01): with little vibration left it is smoothing that counts.
+            let score = smoothing * 1e3 * (v.powf(1.5) + 0.2 * v + 0.01);
+            Some(Point { shaper, vibration: v, smoothing, score })
+        };
+        let points: Vec<Point> = grid.iter().copied().filter_map(point).collect();
+        // The least vibration; of equals the highest frequency, which smooths least.
+        let (mut taken, least) =
+            points.iter().enumerate().rev().min_by(|a, b| a.1.vibration.total_cmp(&b.1.vibration))?;
+        let least = least.vibration;
+        // What leaves hardly more is as good, and may have the better score.
+        let (more, is_loud) = match criterion.firmware {
+            Firmware::Klipper202508 => (0.0, false),
+            Firmware::Klipper => (0.0005, criterion.max_vibrations.is_some_and(|most| least > most)),
+        };
+        // Where too much was left out to smooth less, the least vibration is what is wanted.
+        let is_cut = criterion.firmware == Firmware::Klipper && points.len() < grid.len();
+        if !is_cut {
+            for (place, point) in points.iter().enumerate() {
+                if point.vibration < 1.1 * least + more && (point.score < points[taken].score || is_loud) {
+                    taken = place;
+                }
+            }
+        }
+        Some(Self { pattern: pattern.clone(), points, taken, lowest: grid.first().copied() })
+    }
+
+    fn taken(&self) -> &Point {
+        &self.points[self.taken]
+    }
+
+    fn fitted(&self, criterion: &Criterion) -> Fitted {
+        let point = self.taken();
+        Fitted {
+            shaper: point.shaper.clone(),
+            vibration: point.vibration,
+            smoothing: point.smoothing,
+            max_acceleration: point.shaper.max_acceleration(ALLOWED_SMOOTHING, criterion.corner.speed),
+            score: point.score,
+            is_candidate: criterion.candidates.contains(&self.pattern.form),
+            is_lowest: self.lowest == Some(point.shaper.frequency),
+        }
+    }
 }
 
 fn reason(fitted: &[Fitted], recommended: usize) -> String {
@@ -252,7 +353,7 @@ fn reason(fitted: &[Fitted], recommended: usize) -> String {
     let told = |one: &Fitted| {
         format!("leaves {:.1} % of the vibration and smooths by {:.3} mm", 100.0 * one.vibration, 1e3 * one.smoothing)
     };
-    let name = |one: &Fitted| one.shaper.kind.name();
+    let name = |one: &Fitted| one.shaper.form.name();
     let other = |i: &usize| *i != recommended && fitted[*i].is_candidate;
     let next = (0..fitted.len()).filter(other).min_by(|a, b| fitted[*a].score.total_cmp(&fitted[*b].score));
     let Some(next) = next.map(|i| &fitted[i]) else {

@@ -1,5 +1,6 @@
 //! Spectra of an axis' vibration: from a file, or from samples.
 
+use super::shaper::Firmware;
 use super::welch::power_spectral_density;
 use crate::log::Accelerometer;
 
@@ -41,7 +42,7 @@ impl Axis {
 pub struct Spectrum {
     /// Hz, ascending, at most [`HIGHEST`].
     pub frequency: Vec<f64>,
-    /// Of the axis that was asked for; 0 below [`LOWEST`].
+    /// Of the axis that was asked for; small or 0 below [`LOWEST`].
     pub density: Vec<f64>,
     /// Of x, y and z, to be shown.
     pub axes: [Vec<f64>; 3],
@@ -52,15 +53,20 @@ pub struct Spectrum {
 }
 
 impl Spectrum {
-    /// The spectrum of what was read.
+    /// The spectrum of what was read, divided by frequency as Klipper did until 2025-08.
     pub fn new(data: &Accelerometer, axis: Axis) -> Self {
+        Self::by(data, axis, Firmware::Klipper202508)
+    }
+
+    /// The same as a firmware divides it by frequency.
+    pub fn by(data: &Accelerometer, axis: Axis, firmware: Firmware) -> Self {
         match data {
             Accelerometer::Spectrum { frequency, density: [x, y, z, all], per_frequency } => {
                 let origin = match per_frequency {
                     true => "a spectrum with shapers, already divided by frequency",
                     false => "a spectrum",
                 };
-                let parts = [x, y, z, all].map(|density| scaled(frequency, density, *per_frequency));
+                let parts = [x, y, z, all].map(|density| scaled(frequency, density, *per_frequency, firmware));
                 Self::of(frequency, parts, axis, origin.to_string())
             }
             Accelerometer::Samples { time, acceleration } => {
@@ -71,7 +77,7 @@ impl Spectrum {
                 let [x, y, z] = acceleration.each_ref().map(|values| power_spectral_density(values, rate, length));
                 let frequency = x.0;
                 let all: Vec<f64> = x.1.iter().zip(&y.1).zip(&z.1).map(|((x, y), z)| x + y + z).collect();
-                let parts = [x.1, y.1, z.1, all].map(|density| scaled(&frequency, &density, false));
+                let parts = [x.1, y.1, z.1, all].map(|density| scaled(&frequency, &density, false, firmware));
                 let origin = format!("{} samples in {span:.1} s, {rate:.0} a second, segments of {length}", time.len());
                 Self::of(&frequency, parts, axis, origin)
             }
@@ -152,12 +158,15 @@ impl Spectrum {
     }
 }
 
-/// P(f) / f, without the lowest frequencies; a tenth of a hertz keeps it from infinity.
-fn scaled(frequency: &[f64], density: &[f64], is_already: bool) -> Vec<f64> {
-    let one = |(f, p): (&f64, &f64)| match *f {
-        f if f < LOWEST => 0.0,
-        _ if is_already => *p,
-        f => p / (f + 0.1),
+/// P(f) / f; a tenth of a hertz keeps it from infinity. Until 2025-08 without the lowest frequencies, today with what is below twice of them let
+/// down softly.
+fn scaled(frequency: &[f64], density: &[f64], is_already: bool, firmware: Firmware) -> Vec<f64> {
+    let one = |(f, p): (&f64, &f64)| match (*f, firmware) {
+        (_, Firmware::Klipper) if is_already => *p,
+        (f, Firmware::Klipper) if f < 2.0 * LOWEST => p / (f + 0.1) * (1.0 - (2.0 * LOWEST / (f + 0.1)).powi(2)).exp(),
+        (f, Firmware::Klipper202508) if f < LOWEST => 0.0,
+        (_, Firmware::Klipper202508) if is_already => *p,
+        (f, Firmware::Klipper | Firmware::Klipper202508) => p / (f + 0.1),
     };
     frequency.iter().zip(density).map(one).collect()
 }

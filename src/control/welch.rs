@@ -4,7 +4,7 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
 /// Form of the Kaiser window: its side lobes are 44 dB below the main one.
-const BETA: f64 = 6.0;
+pub(super) const BETA: f64 = 6.0;
 
 /// One-sided power spectral density of `values`, sampled `rate` times a second, in their unit squared per Hz: frequencies (Hz)
 /// and densities.

@@ -18,6 +18,7 @@ const RESULTS: &[(&str, &str, &str)] = &[
     ("show", "`taut show`", include_str!("results/show.txt")),
     ("simulate", "`taut simulate`", include_str!("results/simulate.txt")),
     ("sweep", "`taut sweep`", include_str!("results/sweep.txt")),
+    ("tune", "`taut tune`", include_str!("results/tune.txt")),
 ];
 
 /// The schemas that there are: names and sentences, the case file first.

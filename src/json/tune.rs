@@ -14,7 +14,7 @@ pub fn tuned(case: &Case, tuning: &Tuning, tuned: &Tuned) -> Value {
         .forced
         .map(|forced| json!({ "limit": forced.limit.word(), "mode_Hz": number(forced.mode), "place_m": forced.place }));
     json!({
-        "schema": "taut/tune/1",
+        "schema": super::identity("tune"),
         "title": case.title,
         "version": env!("CARGO_PKG_VERSION"),
         "structure": tuned.after.design.structure.name(),

@@ -6,7 +6,7 @@ use crate::chance::{normal_quantile, uniform};
 use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::Result;
-use crate::linear::places;
+use crate::linear::{Operation, Place, places, travel};
 use crate::number::engineering;
 use crate::parameter::{self, Free, kinds};
 use crate::stage::Stage;
@@ -204,10 +204,7 @@ impl Family {
 
     /// Its response, as the controller of `design` sees it.
     pub fn plant(&self, corner: &Corner, design: &Design, corners: &[f64]) -> Result<Plant> {
-        let mut stage = self.stage_at(corner);
-        // Along the travel spans are as long as they are, whatever the runs assume.
-        stage.belt.follows_cart |= stage.belt.make.is_some();
-        Plant::of(&stage, corner.place, design, corners)
+        Plant::of(&following(self.stage_at(corner)), corner.place, design, corners)
     }
 
     /// Steps to these ends of each unknown, to these places and loads.
@@ -370,10 +367,20 @@ fn moved<'a>(change: impl Fn(&mut Corner) + 'a) -> Step<'a> {
     })
 }
 
+/// The stage with spans that are as long as they are along the travel, whatever the runs assume.
+fn following(mut stage: Stage) -> Stage {
+    stage.belt.follows_cart |= stage.belt.make.is_some();
+    stage
+}
+
+/// Resonance and anti-resonance of a stage at these places along its travel.
+pub(super) fn modes_along(stage: &Stage, places: &[f64]) -> Result<Vec<Place>> {
+    travel(&following(stage.clone()), Operation::default(), places)
+}
+
 /// Places along the travel: of `[travel]`, or where the moves lead.
 fn along(case: &Case, count: usize) -> Vec<f64> {
-    let mut stage = case.stage.clone();
-    stage.belt.follows_cart |= stage.belt.make.is_some();
+    let stage = following(case.stage.clone());
     let Some(whole) = places(&stage, count) else { return vec![0.0] };
     let (low, high) = case
         .moves

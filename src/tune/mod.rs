@@ -4,6 +4,7 @@
 //! The recipe is [`tune`]; [`evaluate`] judges without a search. What is found is rounded to four digits, and everything that is said
 //! holds for the rounded gains.
 
+mod evolution;
 mod family;
 mod gains;
 mod hunting;
@@ -17,6 +18,7 @@ pub mod trouble;
 mod verdict;
 mod work;
 
+pub use evolution::evolve;
 pub use family::{Corner, Family, MACHINES, SPREAD, Source, Unknown};
 pub use gains::{Gain, gains};
 pub use hunting::{Hunt, hunting};
@@ -37,6 +39,12 @@ use work::Work;
 
 /// Machines that moves are run on while searching, the axis of the file with them.
 const SOME: usize = 4;
+
+/// How often a search goes on with the machines that are worst for what it found.
+const POLISHED: usize = 2;
+
+/// Searches for what makes no figure worse, each with the machines on which one was.
+const KEPT: usize = 4;
 
 /// Designs of each balance that are looked at before none is taken.
 const TRIES: usize = 6;
@@ -90,7 +98,7 @@ pub fn evaluate(case: &Case, tuning: &Tuning) -> Result<Tuned> {
     let (design, family, moves) = beginning(case, tuning)?;
     let work = Work::new(case, &family, tuning, &moves, design, &|| false)?;
     let before = work.verdict(design)?;
-    Ok(Tuned { searched: false, ..ended(&work, before.clone(), before, Vec::new(), None) })
+    Ok(Tuned { searched: false, ..ended(&work, before.clone(), before, Vec::new(), None)? })
 }
 
 /// Tunes the controller of a case; `stop` is asked now and then, and ends a search early with the best so far.
@@ -113,7 +121,7 @@ pub fn tune(case: &Case, tuning: &Tuning, stop: &dyn Fn() -> bool) -> Result<Tun
         let hertz = bandwidth.unwrap_or(first(design, swing));
         let placed = place(design, &case.stage, hertz, tuning.damping).unwrap_or(design.clone());
         let after = work.verdict(&gains::rounded(&placed))?;
-        return Ok(ended(&work, before, after, Vec::new(), Some(hertz)));
+        return ended(&work, before, after, Vec::new(), Some(hertz));
     };
     let is_good = work.excess(&before.worst) <= 1.0;
     let (finalists, placed) = work.screened(design, is_good)?;
@@ -130,14 +138,19 @@ pub fn tune(case: &Case, tuning: &Tuning, stop: &dyn Fn() -> bool) -> Result<Tun
         Cost::Disturbance => (work.verdict(&best.design)?, Vec::new()),
         Cost::Moves | Cost::Squares | Cost::Peak => {
             let leading = work.verdict(&best.design)?;
-            let some = some_of(&leading);
-            let archive = work.by_moves(&finalists, &some, cost, &before.on(&some))?;
-            work.chosen(&archive, &some, cost, &before, leading)?
+            let mut some = some_of(&leading);
+            let mut archive = work.by_moves(&finalists, &some, cost)?;
+            let leading = work.polished(&finalists, &mut archive, &mut some, cost, leading)?;
+            let (after, choices) = work.chosen(&archive, cost, &before, leading)?;
+            match compare(&before, &after) {
+                Judgement::Worse => work.kept(&finalists, &mut archive, some, cost, &before, after)?,
+                Judgement::Better | Judgement::Unchanged => (after, choices),
+            }
         }
     };
     // What is no better stays as it was.
     let after = if is_good && compare(&before, &after) != Judgement::Better { before.clone() } else { after };
-    Ok(ended(&work, before, after, choices, placed))
+    ended(&work, before, after, choices, placed)
 }
 
 /// The controller, the family and the moves of a case.
@@ -168,12 +181,11 @@ impl Work<'_> {
     fn chosen(
         &mut self,
         archive: &[work::Tried],
-        some: &[usize],
         cost: Cost,
         before: &Verdict,
         leading: Verdict,
     ) -> Result<(Verdict, Vec<Choice>)> {
-        let figures = before.on(some);
+        let figures = before.at_worst();
         let rank = |verdict: &Verdict| (compare(before, verdict) == Judgement::Worse, verdict.objective);
         let is_better = |one: &Verdict, other: &Verdict| rank(one) < rank(other);
         let mut after = leading;
@@ -184,6 +196,7 @@ impl Work<'_> {
             let known = choices.iter().find(|choice| choice.design == design).map(|c| (c.objective, c.worst.clone()));
             let (value, worst) = match known {
                 Some(known) => known,
+                None if design == after.design => (after.objective, after.at_worst()),
                 None => {
                     let verdict = self.verdict(&design)?;
                     let own = (verdict.objective, verdict.at_worst());
@@ -219,15 +232,96 @@ impl Work<'_> {
     }
 }
 
+impl Work<'_> {
+    /// The best design so far on the whole family, searched on from with the machines that are worst for it, too, as long as there are new ones.
+    fn polished(
+        &mut self,
+        finalists: &[work::Finalist],
+        archive: &mut Vec<work::Tried>,
+        some: &mut Vec<usize>,
+        cost: Cost,
+        mut leading: Verdict,
+    ) -> Result<Verdict> {
+        let weighed = work::Weighed { cost, bars: None };
+        for _ in 0..POLISHED {
+            if (self.stop)() {
+                break;
+            }
+            let Some(design) = self.best_of(archive, cost, &BALANCES[1], None, TRIES)? else { break };
+            let verdict = self.verdict(&design)?;
+            let known = some.len();
+            for place in some_of(&verdict) {
+                if place < self.family.machines.len() && !some.contains(&place) {
+                    some.push(place);
+                }
+            }
+            if verdict.objective < leading.objective {
+                leading = verdict;
+            }
+            if some.len() == known {
+                break;
+            }
+            self.further(finalists, archive, some, &weighed)?;
+        }
+        Ok(leading)
+    }
+
+    /// What is best with no figure worse than before, by differential evolution in the layouts of filters that came nearest to that; each time on
+    /// the machines, too, on which a figure was worse.
+    fn kept(
+        &mut self,
+        finalists: &[work::Finalist],
+        archive: &mut Vec<work::Tried>,
+        mut some: Vec<usize>,
+        cost: Cost,
+        before: &Verdict,
+        mut after: Verdict,
+    ) -> Result<(Verdict, Vec<Choice>)> {
+        let figures = before.at_worst();
+        let weighed = work::Weighed { cost, bars: Some(&figures) };
+        let mut latest = after.clone();
+        for _ in 0..KEPT {
+            if (self.stop)() {
+                break;
+            }
+            for place in latest.worse_on(before) {
+                // A corner that is none of the machines has no place among them.
+                if place < self.family.machines.len() && !some.contains(&place) {
+                    some.push(place);
+                }
+            }
+            for layout in self.nearest(archive, &weighed) {
+                self.again(archive, layout, &some, &weighed);
+                self.evolved(finalists, layout, &some, &weighed, archive)?;
+            }
+            let Some(design) = self.best_of(archive, cost, &BALANCES[1], Some(&figures), TRIES)? else { break };
+            if design == latest.design {
+                break;
+            }
+            latest = self.verdict(&design)?;
+            let rank = |verdict: &Verdict| (compare(before, verdict) == Judgement::Worse, verdict.objective);
+            if rank(&latest) < rank(&after) {
+                after = latest.clone();
+            }
+            if compare(before, &after) != Judgement::Worse {
+                break;
+            }
+        }
+        self.chosen(archive, cost, before, after)
+    }
+}
+
 /// All of it, told.
-fn ended(work: &Work, before: Verdict, after: Verdict, choices: Vec<Choice>, placed: Option<f64>) -> Tuned {
+fn ended(work: &Work, before: Verdict, after: Verdict, choices: Vec<Choice>, placed: Option<f64>) -> Result<Tuned> {
     let judgement = compare(&before, &after);
+    let before = work.watched(before)?;
+    let after = if before.design == after.design { before.clone() } else { work.watched(after)? };
     let breaks = work.excess(&before.worst) > 1.0;
     let forced = (judgement == Judgement::Worse && breaks && work.excess(&after.worst) <= 1.0)
         .then(|| forced(work.family, &after, work.tuning));
     let belt = &work.case.stage.belt;
     let is_undamped = belt.model != BeltModel::Rigid && belt.damping.iter().all(|damping| *damping == 0.0);
-    Tuned {
+    Ok(Tuned {
         judgement,
         forced,
         choices,
@@ -240,7 +334,7 @@ fn ended(work: &Work, before: Verdict, after: Verdict, choices: Vec<Choice>, pla
         before,
         after,
         searched: true,
-    }
+    })
 }
 
 impl Tuned {

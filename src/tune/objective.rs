@@ -12,7 +12,7 @@
 
 use super::family::{Corner, Family};
 use crate::case::{Cost, Move};
-use crate::control::{Setup, closed_loop};
+use crate::control::{Setup, closed_loop_briefly};
 use crate::design::Design;
 use crate::error::Result;
 use crate::solve::{Ending, Solver};
@@ -56,9 +56,9 @@ pub struct Seen {
 /// A move on one axis.
 pub fn look(stage: &Stage, model: &Stage, design: &Design, motion: &Move) -> Result<Seen> {
     let (until, window, solver) = (motion.until, motion.window, Solver::of(stage));
-    let run = closed_loop(&Setup { stage, model, design, profile: &motion.profile, until, window, solver })?;
-    let figures = run.figures;
-    if run.outcome.ending != Ending::Complete {
+    let setup = Setup { stage, model, design, profile: &motion.profile, until, window, solver };
+    let (figures, ending) = closed_loop_briefly(&setup)?;
+    if ending != Ending::Complete {
         return Ok(Seen {
             error: f64::INFINITY,
             rms: f64::INFINITY,

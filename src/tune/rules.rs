@@ -72,9 +72,6 @@ fn simc(design: &Design, stage: &Stage) -> Option<Design> {
 /// rate, Hz, the lowest first.
 pub fn layouts(design: &Design, modes: &[f64]) -> Vec<Design> {
     let mut all = vec![design.clone()];
-    if matches!(design.structure, Structure::StateFeedback(_)) {
-        return all;
-    }
     let notch = |frequency: f64| Filter::Notch { frequency, depth: DEPTH, damping: WIDTH };
     let there = design.filters.iter().filter(|filter| matches!(filter, Filter::Notch { .. })).count();
     let room = NOTCHES.saturating_sub(there);

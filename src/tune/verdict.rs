@@ -1,6 +1,6 @@
 //! What a controller does over the family, and whether one is better than another.
 
-use super::family::{Corner, Family};
+use super::family::{Corner, Family, modes_along};
 use super::hunting::{Hunt, hunting};
 use super::margins::Margins;
 use super::objective::{AtWorst, BALANCES, Seen, look_at_all, objective};
@@ -9,7 +9,6 @@ use crate::case::{Cost, Tuning};
 use crate::control::{Deviation, Setup, closed_loop};
 use crate::design::Design;
 use crate::error::Result;
-use crate::linear::{Operation, travel};
 use crate::solve::{Ending, Solver};
 
 /// By what share a figure may differ and be the same.
@@ -32,7 +31,7 @@ pub struct Verdict {
     pub objective: f64,
     /// Its moves.
     pub moves: Vec<MoveVerdict>,
-    /// Its limit cycle at rest, if there is one.
+    /// Its limit cycle at rest, if there is one; looked for of the gains of the file and of those that were chosen.
     pub hunt: Option<Hunt>,
 }
 
@@ -116,15 +115,32 @@ impl Verdict {
         self.moves.iter().map(|one| one.at_worst).collect()
     }
 
-    /// Its moves at worst on some of the machines alone.
-    pub(super) fn on(&self, some: &[usize]) -> Vec<AtWorst> {
-        let pick =
-            |one: &MoveVerdict| some.iter().filter_map(|&place| one.seen.get(place).copied()).collect::<Vec<_>>();
-        self.moves.iter().map(|one| AtWorst::of(&pick(one), 0)).collect()
+    /// Machines on which a figure is worse than it was at worst, of each move the two that are worst.
+    pub(super) fn worse_on(&self, before: &Verdict) -> Vec<usize> {
+        let mut all = Vec::new();
+        for (is, was) in self.moves.iter().zip(&before.moves) {
+            let beyond = |seen: &Seen| {
+                let later = (seen.settles - was.at_worst.settles.0) / was.at_worst.settles.0.max(0.05);
+                let left = if seen.settling.is_none() && is.settled.0 < was.settled.0 { 1.0 } else { 0.0 };
+                (seen.error / was.at_worst.error.0).ln().max(later).max(left)
+            };
+            let mut ranked: Vec<(f64, usize)> =
+                is.seen.iter().map(beyond).enumerate().map(|(place, value)| (value, place)).collect();
+            ranked.retain(|(value, _)| *value > 0.0);
+            ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+            all.extend(ranked.into_iter().take(2).map(|(_, place)| place));
+        }
+        all
     }
 }
 
 impl Work<'_> {
+    /// A verdict with its limit cycle at rest.
+    pub fn watched(&self, verdict: Verdict) -> Result<Verdict> {
+        let hunt = if verdict.nominal.stable { hunting(&self.case.stage, &verdict.design)? } else { None };
+        Ok(Verdict { hunt, ..verdict })
+    }
+
     /// What a design does.
     pub fn verdict(&self, design: &Design) -> Result<Verdict> {
         let feedback = self.feedback(design)?;
@@ -162,12 +178,11 @@ impl Work<'_> {
                 seen,
             });
         }
-        let hunt = if nominal.stable { hunting(&self.case.stage, design)? } else { None };
         let figures: Vec<AtWorst> = moves.iter().map(|one| one.at_worst).collect();
         let cost = self.tuning.cost.unwrap_or(Cost::Moves);
         let value = objective(cost, &BALANCES[1], self.moves, &self.asked, &figures);
         let unstable = (unstable, self.family.machines.len());
-        Ok(Verdict { design: design.clone(), nominal, corner, worst, unstable, objective: value, moves, hunt })
+        Ok(Verdict { design: design.clone(), nominal, corner, worst, unstable, objective: value, moves, hunt: None })
     }
 }
 
@@ -198,9 +213,7 @@ pub(super) fn forced(family: &Family, after: &Verdict, tuning: &Tuning) -> Force
         true => (Limit::Sensitivity, worst.at),
         false => (Limit::Complementary, worst.complementary_at),
     };
-    let mut stage = family.stage_at(&after.corner);
-    stage.belt.follows_cart |= stage.belt.make.is_some();
-    let there = travel(&stage, Operation::default(), &[after.corner.place]).unwrap_or_default();
+    let there = modes_along(&family.stage_at(&after.corner), &[after.corner.place]).unwrap_or_default();
     let modes: Vec<f64> = there.iter().flat_map(|place| place.undamped_resonances.iter().copied()).collect();
     Forced { limit, mode: mode_at(omega, &modes), place: after.corner.place }
 }

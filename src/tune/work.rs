@@ -1,17 +1,20 @@
 //! The search: many designs by what steps of command and reference do within the limits, which needs no run; the best of them by moves.
 
-use super::family::Family;
+use super::evolution::evolve;
+use super::family::{Family, modes_along};
 use super::gains::{self, rounded, searched, shaped};
 use super::margins::{Margins, Plant};
-use super::objective::{AtWorst, BALANCES, Balance, look_at_all, objective};
+use super::objective::{AtWorst, BALANCES, Balance, Seen, look, objective};
 use super::rules::{layouts, starts};
-use super::search::minimise;
+use super::search::{Found, minimise};
 use super::verdict::Verdict;
 use crate::case::{Case, Cost, Move, Tuning};
+use crate::chance::uniform;
 use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::Result;
-use crate::linear::{Operation, travel};
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::SeedableRng;
 use std::f64::consts::PI;
 
 /// Share of the limits that a search on the grid keeps to: tops between its points and rounding are in the rest.
@@ -23,10 +26,22 @@ const ROUNDS: usize = 5;
 /// Values that a search without moves may ask for, more for each gain, and those that one with moves may.
 const VALUES: usize = 40;
 const MORE: usize = 24;
-const MOVES: usize = 36;
+const MOVES: usize = 30;
 
-/// Designs that are searched by moves.
+/// Edge of the simplex of a search by moves, at first and where it goes on.
+const FIRST: f64 = 0.25;
+const FURTHER: f64 = 0.12;
+
+/// Members and generations of differential evolution, how far members are scattered about the best (natural logarithm of gains), and how often it
+/// is done again with an axis more.
+const MEMBERS: usize = 12;
+const GENERATIONS: usize = 8;
+const SCATTER: f64 = 0.4;
+const EVOLVED: usize = 2;
+
+/// Designs that are run, and those of them from which a search by moves begins.
 const FINALISTS: usize = 3;
+const MOVED: usize = 2;
 
 /// Share by which filters that are added have to make the cost smaller.
 const PAYS: f64 = 0.02;
@@ -70,6 +85,16 @@ pub(super) struct Finalist {
 pub(super) struct Tried {
     pub design: Design,
     pub worst: Vec<AtWorst>,
+    /// The finalist that it was made from, and the powers that lead to it.
+    pub layout: usize,
+    powers: Vec<f64>,
+}
+
+/// By what a search by moves weighs a design.
+pub(super) struct Weighed<'a> {
+    pub cost: Cost,
+    /// Figures that none may be worse than.
+    pub bars: Option<&'a [AtWorst]>,
 }
 
 impl<'a> Work<'a> {
@@ -155,9 +180,7 @@ impl<'a> Work<'a> {
 
     /// Modes of the axis that a command swings, each in the middle of where it goes along the travel, Hz; and the first anti-resonance.
     pub fn modes(&self) -> Result<(Vec<f64>, Option<f64>)> {
-        let mut stage = self.case.stage.clone();
-        stage.belt.follows_cart |= stage.belt.make.is_some();
-        let places = travel(&stage, Operation::default(), &self.family.places)?;
+        let places = modes_along(&self.case.stage, &self.family.places)?;
         let swing = places.iter().filter_map(|place| place.undamped_antiresonances.first().copied()).reduce(f64::min);
         let most = 0.4 / self.design().every;
         let mut modes = Vec::new();
@@ -283,61 +306,67 @@ impl<'a> Work<'a> {
         Ok(between(near))
     }
 
-    /// What a design does on these machines.
-    fn run(&self, design: &Design, some: &[usize]) -> Vec<AtWorst> {
-        let corners: Vec<_> = some.iter().map(|&place| self.family.machines[place].clone()).collect();
-        match look_at_all(self.family, &corners, &self.case.stage, design, self.moves) {
-            Ok(all) => all.iter().map(|seen| AtWorst::of(seen, 0)).collect(),
-            Err(_) => Vec::new(),
+    /// What a design does on these machines, and ln J by the balance of the search; as soon as it is at least `bar`, what it does on those that were
+    /// looked at until then: another machine makes no figure at worst smaller.
+    fn run(&self, design: &Design, some: &[usize], weighed: &Weighed, bar: f64) -> (Vec<AtWorst>, f64) {
+        let mut seen: Vec<Vec<Seen>> = vec![Vec::new(); self.moves.len()];
+        let mut found = (Vec::new(), f64::INFINITY);
+        // The axis of the file is seldom the worst.
+        for &place in some.iter().rev() {
+            let stage = self.family.stage_at(&self.family.machines[place]);
+            for (all, motion) in seen.iter_mut().zip(self.moves) {
+                let Ok(one) = look(&stage, &self.case.stage, design, motion) else {
+                    return (Vec::new(), f64::INFINITY);
+                };
+                all.push(one);
+            }
+            let worst: Vec<AtWorst> = seen.iter().map(|seen| AtWorst::of(seen, 0)).collect();
+            let value = self.valued(weighed.cost, &BALANCES[1], &worst, weighed.bars);
+            found = (worst, value);
+            if value >= bar {
+                break;
+            }
         }
+        found
     }
 
-    /// Searches by moves from the best finalist, on the machines `some`; all that was run and keeps the limits on the set. Then once more from
-    /// where that ended, with no figure worse than those of `before`.
-    pub fn by_moves(
-        &mut self,
-        finalists: &[Finalist],
-        some: &[usize],
-        cost: Cost,
-        before: &[AtWorst],
-    ) -> Result<Vec<Tried>> {
+    /// Searches by moves on the machines `some`: with the simplex from each of the best finalists, then with differential evolution about the best.
+    /// All that was run and keeps the limits on the set.
+    pub fn by_moves(&mut self, finalists: &[Finalist], some: &[usize], cost: Cost) -> Result<Vec<Tried>> {
+        let weighed = Weighed { cost, bars: None };
         let mut archive: Vec<Tried> = Vec::new();
-        let mut ranked: Vec<(f64, &Finalist)> = Vec::new();
-        for finalist in finalists {
-            let worst = self.run(&finalist.design, some);
-            ranked.push((self.valued(cost, &BALANCES[1], &worst, None), finalist));
-            archive.push(Tried { design: finalist.design.clone(), worst });
+        let mut ranked: Vec<(f64, usize)> = Vec::new();
+        for (layout, finalist) in finalists.iter().enumerate() {
+            let (worst, value) = self.run(&finalist.design, some, &weighed, f64::INFINITY);
+            ranked.push((value, layout));
+            archive.push(Tried { design: finalist.design.clone(), worst, layout, powers: finalist.powers.clone() });
         }
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // From each of the best, and on from where it is best then.
-        let mut best: Option<(f64, &Finalist, Vec<f64>)> = None;
-        for (_, finalist) in ranked.into_iter().take(FINALISTS) {
-            let step = (0.25, MOVES, None);
-            let (value, powers) = self.moved(finalist, &finalist.powers, some, cost, step, &mut archive)?;
-            if best.as_ref().is_none_or(|(least, ..)| value < *least) {
-                best = Some((value, finalist, powers));
+        let mut best: Option<(f64, usize)> = None;
+        for (_, layout) in ranked.into_iter().take(MOVED) {
+            let from = finalists[layout].powers.clone();
+            let (value, _) = self.moved(finalists, layout, &from, (some, FIRST, MOVES), &weighed, &mut archive)?;
+            if best.is_none_or(|(least, _)| value < least) {
+                best = Some((value, layout));
             }
         }
-        let Some((_, finalist, mut powers)) = best else { return Ok(archive) };
-        for step in [(0.1, MOVES / 2, None), (0.15, MOVES / 2, Some(before))] {
-            if !(self.stop)() {
-                powers = self.moved(finalist, &powers, some, cost, step, &mut archive)?.1;
-            }
+        if let Some((_, layout)) = best {
+            self.evolved(finalists, layout, some, &weighed, &mut archive)?;
         }
         Ok(archive)
     }
 
-    /// One search by moves: its step, how many designs it may try, and figures that none may be worse than. Its value, and the powers.
+    /// One search by moves with the simplex; its value, and the powers.
     fn moved(
         &mut self,
-        finalist: &Finalist,
+        finalists: &[Finalist],
+        layout: usize,
         from: &[f64],
-        some: &[usize],
-        cost: Cost,
-        (step, most, bars): (f64, usize, Option<&[AtWorst]>),
+        (some, step, most): (&[usize], f64, usize),
+        weighed: &Weighed,
         archive: &mut Vec<Tried>,
     ) -> Result<(f64, Vec<f64>)> {
-        let (start, own) = (&finalist.start, finalist.own);
+        let (start, own) = (&finalists[layout].start, finalists[layout].own);
         let mut value = |x: &[f64]| {
             if (self.stop)() {
                 return f64::INFINITY;
@@ -347,23 +376,120 @@ impl<'a> Work<'a> {
             if beyond > 0.05 {
                 return 1e3 + beyond.min(1e6);
             }
-            let worst = self.run(&design, some);
-            let value = self.valued(cost, &BALANCES[1], &worst, bars) + STEEP * beyond;
+            let (worst, value) = self.run(&design, some, weighed, f64::INFINITY);
             if beyond == 0.0 {
-                archive.push(Tried { design, worst });
+                archive.push(Tried { design, worst, layout, powers: x.to_vec() });
             }
-            value
+            value + STEEP * beyond
         };
         let found = minimise(from, step, 1e-3, most, &mut value);
         let (mut value, mut powers) = (found.value, found.x);
         if self.passes(&rounded(&shaped(start, own, &powers)))? {
             powers = self.pulled(start, own, from, &powers)?;
             let design = rounded(&shaped(start, own, &powers));
-            let worst = self.run(&design, some);
-            value = self.valued(cost, &BALANCES[1], &worst, bars);
-            archive.push(Tried { design, worst });
+            let (worst, now) = self.run(&design, some, weighed, f64::INFINITY);
+            value = now;
+            archive.push(Tried { design, worst, layout, powers: powers.clone() });
         }
         Ok((value, powers))
+    }
+
+    /// Differential evolution about the best designs of a layout that were run, once more where what it finds passes a limit on an axis that
+    /// was not looked at.
+    pub fn evolved(
+        &mut self,
+        finalists: &[Finalist],
+        layout: usize,
+        some: &[usize],
+        weighed: &Weighed,
+        archive: &mut Vec<Tried>,
+    ) -> Result<()> {
+        let (start, own) = (&finalists[layout].start, finalists[layout].own);
+        for round in 0..EVOLVED {
+            let mut known: Vec<Found> = Vec::new();
+            for tried in archive.iter().filter(|tried| tried.layout == layout) {
+                let value = self.valued(weighed.cost, &BALANCES[1], &tried.worst, weighed.bars);
+                known.push(Found { x: tried.powers.clone(), value });
+            }
+            known.sort_by(|a, b| a.value.total_cmp(&b.value));
+            let Some(best) = known.first().cloned() else { return Ok(()) };
+            known.truncate(MEMBERS / 2);
+            let mut random = Pcg64::seed_from_u64(15 + round as u64);
+            while known.len() < MEMBERS {
+                let x = best.x.iter().map(|x| x + SCATTER * (2.0 * uniform(&mut random) - 1.0)).collect();
+                known.push(Found { x, value: f64::INFINITY });
+            }
+            let mut value = |x: &[f64], bar: f64| {
+                if (self.stop)() {
+                    return f64::INFINITY;
+                }
+                let design = rounded(&shaped(start, own, x));
+                let beyond = self.on_set(&design).0;
+                if beyond > 0.0 {
+                    return 1e3 + beyond.min(1e6);
+                }
+                let (worst, value) = self.run(&design, some, weighed, bar);
+                if value < bar {
+                    archive.push(Tried { design, worst, layout, powers: x.to_vec() });
+                }
+                value
+            };
+            for member in &mut known {
+                member.value = value(&member.x, f64::INFINITY);
+            }
+            let found = evolve(known, GENERATIONS, 15 + round as u64, &mut value);
+            let Some(best) = found.first() else { break };
+            if (self.stop)() || !self.passes(&rounded(&shaped(start, own, &best.x)))? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// On with the simplex from the best design of all on machines that are more now.
+    pub fn further(
+        &mut self,
+        finalists: &[Finalist],
+        archive: &mut Vec<Tried>,
+        some: &[usize],
+        weighed: &Weighed,
+    ) -> Result<()> {
+        for layout in self.nearest(archive, weighed) {
+            self.again(archive, layout, some, weighed);
+        }
+        let value = |tried: &Tried| self.valued(weighed.cost, &BALANCES[1], &tried.worst, weighed.bars);
+        let best = archive.iter().min_by(|a, b| value(a).total_cmp(&value(b)));
+        if let Some((layout, powers)) = best.map(|tried| (tried.layout, tried.powers.clone())) {
+            self.moved(finalists, layout, &powers, (some, FURTHER, 2 * MOVES / 3), weighed, archive)?;
+        }
+        Ok(())
+    }
+
+    /// The two layouts with a design that is best where none of the figures may be worse.
+    pub fn nearest(&self, archive: &[Tried], weighed: &Weighed) -> Vec<usize> {
+        let value = |tried: &Tried| self.valued(weighed.cost, &BALANCES[1], &tried.worst, weighed.bars);
+        let mut ranked: Vec<(f64, usize)> = archive.iter().map(|tried| (value(tried), tried.layout)).collect();
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut layouts: Vec<usize> = Vec::new();
+        for (_, layout) in ranked {
+            if !layouts.contains(&layout) && layouts.len() < 2 {
+                layouts.push(layout);
+            }
+        }
+        layouts
+    }
+
+    /// Runs the best designs of a layout again, on other machines, and forgets the rest of it.
+    pub fn again(&self, archive: &mut Vec<Tried>, layout: usize, some: &[usize], weighed: &Weighed) {
+        let value = |tried: &Tried| self.valued(weighed.cost, &BALANCES[1], &tried.worst, weighed.bars);
+        let (mut own, other): (Vec<Tried>, Vec<Tried>) = archive.drain(..).partition(|tried| tried.layout == layout);
+        own.sort_by(|a, b| value(a).total_cmp(&value(b)));
+        own.truncate(MEMBERS / 2);
+        for tried in &mut own {
+            tried.worst = self.run(&tried.design, some, weighed, f64::INFINITY).0;
+        }
+        archive.extend(other);
+        archive.extend(own);
     }
 
     /// A design without those of its added filters, from number `own` on, without which the limits hold and it is as good: `is_as_good` is

@@ -13,8 +13,15 @@ pub fn figures(found: &Findings) -> Vec<(String, Figure)> {
         let name = if i == 0 { "spectrum" } else { "spectrum-2" };
         match &one.source {
             Source::Spectrum(spectrum) => {
-                figures.push((name.to_string(), shaped(one, spectrum)));
+                figures.push((name.to_string(), shaped(one, one.name(), spectrum)));
                 figures.push((name.replace("spectrum", "axes"), axes(one, spectrum)));
+            }
+            Source::Spectra(spectra) => {
+                for (k, (file, spectrum)) in spectra.iter().enumerate() {
+                    let title = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                    let name = if k == 0 { name.to_string() } else { format!("spectrum-of-{}", k + 1) };
+                    figures.push((name, shaped(one, title, spectrum)));
+                }
             }
             Source::Model { modes, .. } => figures.push((name.replace("spectrum", "modes"), model(one, modes))),
         }
@@ -32,7 +39,7 @@ fn density() -> Axis {
 }
 
 /// The spectrum, what the recommended shaper leaves of it, and what each shaper leaves at each frequency.
-fn shaped(one: &Found, spectrum: &Spectrum) -> Figure {
+fn shaped(one: &Found, title: String, spectrum: &Spectrum) -> Figure {
     let f = &spectrum.frequency;
     let best = one.choice.best();
     let mut above = Panel::new(density())
@@ -41,11 +48,11 @@ fn shaped(one: &Found, spectrum: &Spectrum) -> Figure {
     for (i, fitted) in one.choice.fitted.iter().enumerate() {
         let left = Target::left(spectrum, &fitted.shaper, &one.criterion.tested);
         let is_best = i == one.choice.recommended;
-        let name = format!("{} {:.1} Hz", fitted.shaper.kind.name(), fitted.shaper.frequency);
+        let name = format!("{} {:.1} Hz", fitted.shaper.form.name(), fitted.shaper.frequency);
         let style = if is_best { Style::Solid } else { Style::Dashed };
         above = above.series(Series::new(name, f.clone(), left).colour(colour(i)).style(style));
     }
-    Figure::new(one.name(), Axis::new("Frequency", "Hz"))
+    Figure::new(title, Axis::new("Frequency", "Hz"))
         .panel(above)
         .panel(responses(one, f, &one.criterion.tested))
         .vertical(best.shaper.frequency, "")
@@ -53,7 +60,7 @@ fn shaped(one: &Found, spectrum: &Spectrum) -> Figure {
             "Above the spectrum as measured and behind each shaper, below the part of the vibration that each leaves, both at the \
              worst of the damping ratios that are looked at. Recommended: {} at {:.1} Hz, the solid line; the vertical line is its \
              frequency.",
-            best.shaper.kind.name(),
+            best.shaper.form.name(),
             best.shaper.frequency
         ))
 }
@@ -99,7 +106,7 @@ fn model(one: &Found, modes: &[Resonance]) -> Figure {
     let above = Panel::new(Axis::new("Motion of the cart", "")).series(lines.colour(Colour::Ink));
     let mut legend = responses(one, &[0.0, 1.5 * high], &[super::damping(modes)]);
     for (series, fitted) in legend.series.iter_mut().zip(&one.choice.fitted) {
-        series.name = format!("{} {:.1} Hz", fitted.shaper.kind.name(), fitted.shaper.frequency);
+        series.name = format!("{} {:.1} Hz", fitted.shaper.form.name(), fitted.shaper.frequency);
     }
     Figure::new(one.name(), Axis::new("Frequency", "Hz"))
         .panel(above.weight(0.6))

@@ -2,9 +2,11 @@
 
 use super::{Findings, Found, Source};
 use serde_json::{Value, json};
+use std::path::PathBuf;
 use taut::control::compare::{Comparison, Pair};
 use taut::control::resonance::{Drive, Resonance};
 use taut::control::shaping::Fitted;
+use taut::control::spectrum::Spectrum;
 
 /// The text.
 pub fn text(found: &Findings) -> String {
@@ -23,11 +25,16 @@ fn one(found: &Found) -> Value {
         "file": found.file.display().to_string(),
         "told": found.told(),
         "recommended": {
-            "shaper": best.shaper.kind.name(),
+            "shaper": best.shaper.form.name(),
             "frequency": best.shaper.frequency,
             "damping": best.shaper.damping,
             "reason": found.choice.reason,
+            "lines": found.lines(),
         },
+        "firmware": criterion.firmware.word(),
+        "fitted_mode": found.mode.map(|mode| json!({
+            "frequency": mode.frequency, "damping": mode.damping, "interval": mode.interval, "error": mode.error,
+        })),
         "shapers": found.choice.fitted.iter().map(fitted).collect::<Vec<_>>(),
         "criterion": {
             "design_damping": criterion.damping,
@@ -35,6 +42,7 @@ fn one(found: &Found) -> Value {
             "corner_acceleration": criterion.corner.acceleration,
             "corner_speed": criterion.corner.speed,
             "max_smoothing": criterion.max_smoothing,
+            "max_vibrations": criterion.max_vibrations,
         },
     });
     match &found.source {
@@ -42,6 +50,18 @@ fn one(found: &Found) -> Value {
             value["peaks"] = peaks(&spectrum.peaks());
             value["spectrum"] =
                 json!({ "axis": spectrum.axis.word(), "frequency": spectrum.frequency, "density": spectrum.density });
+        }
+        Source::Spectra(spectra) => {
+            let one = |(file, spectrum): &(PathBuf, Spectrum)| {
+                json!({
+                    "file": file.display().to_string(),
+                    "peaks": peaks(&spectrum.peaks()),
+                    "axis": spectrum.axis.word(),
+                    "frequency": spectrum.frequency,
+                    "density": spectrum.density,
+                })
+            };
+            value["spectra"] = spectra.iter().map(one).collect();
         }
         Source::Model { title, drive, modes } => {
             let mode = |mode: &Resonance| json!({ "position": mode.position, "frequency": mode.frequency, "damping": mode.damping, "share": mode.share });
@@ -56,7 +76,7 @@ fn one(found: &Found) -> Value {
 fn fitted(fitted: &Fitted) -> Value {
     let impulses: Vec<[f64; 2]> = fitted.shaper.impulses().iter().map(|(t, a)| [*t, *a]).collect();
     json!({
-        "shaper": fitted.shaper.kind.name(),
+        "shaper": fitted.shaper.form.name(),
         "frequency": fitted.shaper.frequency,
         "vibration": fitted.vibration,
         "smoothing": fitted.smoothing,

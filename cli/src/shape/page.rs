@@ -11,9 +11,13 @@ pub fn page(found: &Findings, figures: &[(String, Figure)]) -> Page {
     for (i, one) in found.each.iter().enumerate() {
         page.section(&one.name());
         let best = one.choice.best();
-        let recommended = format!("{} at {:.1} Hz", best.shaper.kind.name(), best.shaper.frequency);
+        let recommended = format!("{} at {:.1} Hz", best.shaper.form.name(), best.shaper.frequency);
         page.callout(Callout::Note, recommended, format!("{}.", one.choice.reason));
         page.prose(format!("{}.", one.told()));
+        if let Some(told) = one.damping_told() {
+            page.prose(format!("{told}."));
+        }
+        page.embed("Lines for Klipper's configuration", &one.lines().join("\n"));
         shapers(&mut page, one);
         for (name, figure) in figures.iter().filter(|(name, _)| name != "compared") {
             if name.ends_with("-2") == (i == 1) {
@@ -47,7 +51,7 @@ fn shapers(page: &mut Page, one: &Found) {
             () if i == one.choice.recommended => Cell::Badge(Callout::Holds, "recommended".into()),
             () => Cell::from(table::remark(fitted)),
         };
-        let name = Cell::from(fitted.shaper.kind.name());
+        let name = Cell::from(fitted.shaper.form.name());
         let numbers = table::words(fitted).map(Cell::Number);
         rows.row(std::iter::once(name).chain(numbers).chain([word]));
     }
@@ -56,7 +60,7 @@ fn shapers(page: &mut Page, one: &Found) {
 
 fn impulses(page: &mut Page, one: &Found) {
     let best = one.choice.best();
-    let mut rows = Table::new(format!("The impulses of {}.", best.shaper.kind.name()));
+    let mut rows = Table::new(format!("The impulses of {}.", best.shaper.form.name()));
     rows = rows.column("Time", "ms").column("Amplitude", "");
     for (time, amplitude) in best.shaper.impulses() {
         rows.row([Cell::fixed(1e3 * time, 4), Cell::fixed(*amplitude, 6)]);

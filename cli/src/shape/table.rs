@@ -9,11 +9,19 @@ use taut::control::shaping::Fitted;
 pub fn text(found: &Findings) -> String {
     let mut text = String::new();
     for one in &found.each {
-        let _ = write!(text, "{}\n{}\n\n", bold(&one.name()), one.told());
+        let _ = writeln!(text, "{}\n{}", bold(&one.name()), one.told());
+        if let Some(told) = one.damping_told() {
+            let _ = writeln!(text, "{told}");
+        }
+        text.push('\n');
         shapers(&mut text, one);
         let best = one.choice.best();
-        let recommended = format!("recommended: {} at {:.1} Hz", best.shaper.kind.name(), best.shaper.frequency);
+        let recommended = format!("recommended: {} at {:.1} Hz", best.shaper.form.name(), best.shaper.frequency);
         let _ = write!(text, "\n{}\n{}\n\n", bold(&recommended), one.choice.reason);
+        for line in one.lines() {
+            let _ = writeln!(text, "  {line}");
+        }
+        text.push('\n');
     }
     if let Some(comparison) = &found.comparison {
         let _ = writeln!(text, "{}", bold("Compared"));
@@ -29,7 +37,7 @@ fn shapers(text: &mut String, one: &Found) {
     text.push_str("  shaper    frequency  vibration  smoothing  acceleration up to\n");
     for fitted in &one.choice.fitted {
         let [frequency, vibration, smoothing, acceleration] = words(fitted);
-        let name = fitted.shaper.kind.name();
+        let name = fitted.shaper.form.name();
         let row = format!(
             "  {name:<8} {frequency:>7} Hz {vibration:>8} % {smoothing:>7} mm {acceleration:>9} mm/s^2  {}",
             remark(fitted)

@@ -1,0 +1,144 @@
+//! The damping ratio of the highest peak of a spectrum, by a curve of one mode through it.
+//!
+//! A spectrum by Welch's method is the true one seen through the window of a segment: with bins Δ apart and the Kaiser window of form β,
+//!
+//! ```text
+//! P(f) = A ∫ K((f − f′)/Δ) g(f′) df′ + c,  g(f) = f (f₀² + (2 ζ f)²) / ((f₀² − f²)² + (2 ζ f₀ f)²)
+//! K(δ) ∝ (sinh √(β² − π²δ²) / √(β² − π²δ²))²
+//! ```
+//!
+//! g is the acceleration of a mode whose frame is shaken ever harder with the frequency, divided by the frequency as the spectrum is. A and c follow
+//! from f₀ and ζ by least squares of relative errors, and those two are searched for. Without the window in it a light damping would be
+//! found too large: at 1.6 Hz between bins a mode of 47 Hz seems to have 0.02 more.
+
+use super::spectrum::Spectrum;
+use super::welch::BETA;
+use std::f64::consts::PI;
+
+/// Bins about the peak, as shares of its frequency; and the fewest of them.
+const ABOUT: f64 = 1.3;
+const FEWEST: usize = 8;
+
+/// Points of a grid of one of both unknowns, and how often it is made finer.
+const GRID: i32 = 12;
+const FINER: usize = 7;
+
+/// Least and most damping ratio.
+const LEAST: f64 = 1e-3;
+const MOST: f64 = 0.5;
+
+/// Distances in bins at which the window counts.
+const REACH: f64 = 3.0;
+const PARTS: i32 = 30;
+
+/// What a curve of one mode says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FittedMode {
+    /// Undamped natural frequency, Hz.
+    pub frequency: f64,
+    /// Damping ratio.
+    pub damping: f64,
+    /// Central 95 % of the damping ratio.
+    pub interval: [f64; 2],
+    /// Root mean square of the relative errors of the curve.
+    pub error: f64,
+}
+
+/// The curve through the highest peak; none where there are too few bins about it, or no mode is the better for.
+pub fn fitted(spectrum: &Spectrum) -> Option<FittedMode> {
+    let (top, _) = spectrum.peaks().into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    // Half way to the next peak on either side.
+    let (mut low, mut high) = (top / ABOUT, top * ABOUT);
+    for (f, _) in spectrum.peaks() {
+        if f < top {
+            low = low.max(0.5 * (f + top));
+        } else if f > top {
+            high = high.min(0.5 * (f + top));
+        }
+    }
+    let pairs = spectrum.frequency.iter().copied().zip(spectrum.density.iter().copied());
+    let bins: Vec<(f64, f64)> = pairs.filter(|(f, p)| (low..=high).contains(f) && *p > 0.0).collect();
+    let width = spectrum.frequency.get(1)? - spectrum.frequency[0];
+    if bins.len() < FEWEST || !(width > 0.0) {
+        return None;
+    }
+    let kernel = kernel();
+    let at = |f: f64, zeta: f64| squares(&bins, &kernel, width, f, zeta);
+    let (mut best, mut steps): ((f64, f64), (f64, f64)) =
+        ((top, 0.05), (0.06 * top / f64::from(GRID) * 2.0, (MOST / LEAST).ln() / f64::from(GRID)));
+    let mut least = f64::INFINITY;
+    for _ in 0..FINER {
+        let centre = best;
+        for i in -GRID / 2..=GRID / 2 {
+            for k in -GRID / 2..=GRID / 2 {
+                let f = centre.0 + f64::from(i) * steps.0;
+                let zeta = (centre.1.ln() + f64::from(k) * steps.1).exp().clamp(LEAST, MOST);
+                let value = at(f, zeta);
+                if value < least {
+                    (least, best) = (value, (f, zeta));
+                }
+            }
+        }
+        steps = (0.35 * steps.0, 0.35 * steps.1);
+    }
+    if !least.is_finite() {
+        return None;
+    }
+    // Where the squares, least over the frequency, pass what 95 % of such curves stay below.
+    let freedom = bins.len() as f64 - 4.0;
+    let bound = least * (1.0 + 3.84 / freedom.max(1.0));
+    let along = |zeta: f64| {
+        let near = |k: i32| at(best.0 * (1.0 + 0.002 * f64::from(k)), zeta);
+        (-10..=10).map(near).fold(f64::INFINITY, f64::min)
+    };
+    let edge = |direction: f64| {
+        let mut zeta = best.1;
+        while (LEAST..MOST).contains(&zeta) && along(zeta) <= bound {
+            zeta *= (0.04 * direction).exp();
+        }
+        zeta.clamp(LEAST, MOST)
+    };
+    let error = (least / bins.len() as f64).sqrt();
+    Some(FittedMode { frequency: best.0, damping: best.1, interval: [edge(-1.0), edge(1.0)], error })
+}
+
+/// Shares of the window at distances in bins.
+fn kernel() -> Vec<(f64, f64)> {
+    let at = |delta: f64| {
+        let inside = BETA * BETA - (PI * delta).powi(2);
+        let root = inside.abs().sqrt();
+        let w = match inside {
+            _ if root < 1e-9 => 1.0,
+            i if i > 0.0 => root.sinh() / root,
+            _ => root.sin() / root,
+        };
+        w * w
+    };
+    let all: Vec<(f64, f64)> =
+        (-PARTS..=PARTS).map(|k| REACH * f64::from(k) / f64::from(PARTS)).map(|delta| (delta, at(delta))).collect();
+    let sum: f64 = all.iter().map(|one| one.1).sum();
+    all.into_iter().map(|(delta, w)| (delta, w / sum)).collect()
+}
+
+/// Σ ((P − A g − c)/P)² at the best A and c that are not negative.
+fn squares(bins: &[(f64, f64)], kernel: &[(f64, f64)], width: f64, f0: f64, zeta: f64) -> f64 {
+    let g =
+        |f: f64| f * (f0 * f0 + (2.0 * zeta * f).powi(2)) / ((f0 * f0 - f * f).powi(2) + (2.0 * zeta * f0 * f).powi(2));
+    let seen: Vec<f64> =
+        bins.iter().map(|(f, _)| kernel.iter().map(|(delta, w)| w * g((f + delta * width).max(1e-3))).sum()).collect();
+    // Normal equations of (A, c), weighted by 1/P².
+    let (mut gg, mut gc, mut cc, mut gp, mut cp) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for ((_, p), g) in bins.iter().zip(&seen) {
+        (gg, gc, cc) = (gg + (g / p).powi(2), gc + g / (p * p), cc + 1.0 / (p * p));
+        (gp, cp) = (gp + g / p, cp + 1.0 / p);
+    }
+    let determinant = gg * cc - gc * gc;
+    let (mut a, mut c) = ((gp * cc - cp * gc) / determinant, (cp * gg - gp * gc) / determinant);
+    if !(c >= 0.0) {
+        (a, c) = (gp / gg, 0.0);
+    }
+    if !(a > 0.0) {
+        return f64::INFINITY;
+    }
+    bins.iter().zip(&seen).map(|((_, p), g)| ((p - a * g - c) / p).powi(2)).sum()
+}
