@@ -94,7 +94,7 @@ fn ratios_are_told_where_a_gain_is_free() {
         let found = fitted(&case, &free);
         let checked = check(&case, &free).unwrap();
         // One verdict.
-        for (estimate, error) in found.estimates.iter().zip(&checked.identifiability.error) {
+        for (estimate, error) in found.estimates.iter().zip(&checked.identifiability.as_ref().unwrap().error) {
             assert_eq!(estimate.is_determined(), error.is_finite(), "{}", estimate.name);
         }
         assert!(found.estimates.iter().all(|estimate| !estimate.is_determined()), "{:?}", found.estimates);
@@ -149,7 +149,7 @@ fn what_is_determined_beside_what_is_not_keeps_its_interval() {
         assert!(text.contains("known = \"not determined\""), "{text}");
         let checked = check(&case, &plan(&free)).unwrap();
         assert_eq!(
-            checked.identifiability.error.iter().map(|e| e.is_finite()).collect::<Vec<_>>(),
+            checked.identifiability.as_ref().unwrap().error.iter().map(|e| e.is_finite()).collect::<Vec<_>>(),
             [false, false, true]
         );
     }
@@ -272,4 +272,18 @@ fn bounds_and_motors_that_cannot_be_are_said() {
     let told = found.findings.iter().find(|one| one.code == "bound").unwrap();
     assert!(told.grade == Grade::Warning && told.text.contains("cart.mass ended at its bound of"), "{told}");
     assert_eq!(found.ending_word(), "at_bound");
+}
+
+/// `check` ended as on a wrong file where every parameter ended at its bound, though `fit` had a result.
+#[test]
+fn check_tells_of_parameters_that_all_end_at_bounds() {
+    let case = made(&[], &["cart.friction.viscous=24"], &[1], slow(3, 0.0, 1.0, 1e-3));
+    let bounds = vec![("cart.friction.viscous".to_string(), [50.0, 100.0])];
+    let checked = check(&case, &Plan { bounds, ..plan(&["cart.friction.viscous"]) }).unwrap();
+    assert!(checked.identifiability.is_none() && checked.fit.estimates[0].at_bound);
+    let bound = checked.fit.findings.iter().find(|one| one.code == "bound").unwrap();
+    assert_eq!(
+        bound.to_string(),
+        "warning: cart.friction.viscous ended at its bound of 50 N s/m: the logs would have it beyond"
+    );
 }

@@ -130,6 +130,8 @@ fn results_follow_their_schemas() {
         ("sweep", &["sweep", TABLE4, "--runs", "4", "--vary", "cart.mass=9%", "--design", "sobol", "--indices"]),
         ("sweep", &["sweep", TABLE4, "--design", "one-at-a-time", "--vary", "cart.mass=values(0.3, 0.4)"]),
         ("sweep", &["sweep", "stages/h-frame/h-frame.toml", "--runs", "3", "--vary", "all=10%"]),
+        ("fit", &["fit", "stages/sollmann-jouaneh/identification/separate.toml"]),
+        ("check", &["check", "stages/sollmann-jouaneh/identification/separate.toml"]),
         ("shape", &["shape", "stages/printer-axis/printer-axis.toml"]),
         ("show", &["show", TABLE4]),
         ("show", &["show", "stages/core-xy/follows.toml"]),

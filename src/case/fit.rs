@@ -18,6 +18,12 @@ pub struct Plan {
     pub lumped: Vec<String>,
     /// Bounds that are given, SI, by name.
     pub bounds: Vec<(String, [f64; 2])>,
+    /// Which of these each campaign, or each log, has for itself.
+    pub separate: Vec<String>,
+    /// What has them for itself.
+    pub per: Per,
+    /// The campaigns: names, and the experiments of each, as patterns of their names.
+    pub campaigns: Vec<(String, Vec<String>)>,
     /// What is known beforehand, by name; counts for draws from the posterior alone.
     pub priors: Vec<(String, Prior)>,
     /// What is fitted along with each log.
@@ -46,6 +52,9 @@ impl Default for Plan {
             tied: Vec::new(),
             lumped: Vec::new(),
             bounds: Vec::new(),
+            separate: Vec::new(),
+            per: Per::Campaign,
+            campaigns: Vec::new(),
             priors: Vec::new(),
             nuisance: Nuisances::default(),
             huber: false,
@@ -57,6 +66,16 @@ impl Default for Plan {
             closed_loop: false,
         }
     }
+}
+
+/// What has a value of a separate parameter for itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Per {
+    /// The experiments of a campaign together.
+    #[default]
+    Campaign,
+    /// Each experiment.
+    Log,
 }
 
 /// What is known of a number before its logs are seen; SI.
@@ -90,6 +109,17 @@ impl Plan {
     pub fn names(&self) -> impl Iterator<Item = String> {
         let tied = self.tied.iter().map(|keys| keys.join(" = "));
         self.free.iter().cloned().chain(tied).chain(self.lumped.iter().cloned())
+    }
+
+    /// What the experiment of this name is part of, as far as separate parameters go: its campaign, or itself.
+    pub fn part<'a>(&'a self, experiment: &'a str) -> &'a str {
+        match self.per {
+            Per::Log => experiment,
+            Per::Campaign => {
+                let own = |names: &[String]| names.iter().any(|pattern| matches(experiment, pattern));
+                self.campaigns.iter().find(|(_, names)| own(names)).map_or("", |(campaign, _)| campaign)
+            }
+        }
     }
 }
 
@@ -142,9 +172,14 @@ pub enum Scope {
 pub(super) fn plan(root: &Table, stage: &Stage, experiments: &[Experiment]) -> Result<Option<Plan>> {
     let Some(field) = root.optional("fit") else { return Ok(None) };
     let table = field.table()?;
-    let known = ["free", "tied", "lumped", "bounds", "priors", "nuisance", "loss", "held_out", "loop"];
+    let known =
+        ["free", "tied", "lumped", "bounds", "priors", "nuisance", "loss", "held_out", "loop", "separate", "per"];
     table.check_keys(&known, &[])?;
-    let free = table.optional("free").map_or(Ok(Vec::new()), |field| words(&field))?;
+    let free = match table.optional("free") {
+        // An empty list asks for the errors of the case as it is.
+        Some(field) => field.list()?.iter().map(|field| field.text().map(str::to_string)).collect::<Result<_>>()?,
+        None => Vec::new(),
+    };
     let tied = match table.optional("tied") {
         Some(field) => field.filled_list()?.iter().map(words).collect::<Result<Vec<_>>>()?,
         None => Vec::new(),
@@ -153,10 +188,10 @@ pub(super) fn plan(root: &Table, stage: &Stage, experiments: &[Experiment]) -> R
         return Err(field.fail("a single parameter has nothing to be tied to").allowed("two and more in each list"));
     }
     let lumped = table.optional("lumped").map_or(Ok(Vec::new()), |field| words(&field))?;
-    if free.is_empty() && tied.is_empty() && lumped.is_empty() {
+    if free.is_empty() && tied.is_empty() && lumped.is_empty() && table.optional("free").is_none() {
         return Err(field
             .fail("nothing is searched for")
-            .next("add for example free = [\"cart.mass\", \"cart.friction.viscous\"]"));
+            .next("add for example free = [\"cart.mass\", \"cart.friction.viscous\"], or free = [] for the errors of the case as it is"));
     }
     let mut seen: Vec<&str> = Vec::new();
     for key in free.iter().chain(tied.iter().flatten()).chain(&lumped) {
@@ -187,6 +222,30 @@ pub(super) fn plan(root: &Table, stage: &Stage, experiments: &[Experiment]) -> R
                 .next("name experiments, with * for any part of a name, as in \"april-*-fast\""));
         }
     }
+    let names: Vec<String> =
+        Plan { free: free.clone(), tied: tied.clone(), lumped: lumped.clone(), ..Plan::default() }.names().collect();
+    let separate = separate(&table, &names)?;
+    let per = table
+        .optional("per")
+        .map_or(Ok(Per::Campaign), |field| field.choice(&[("campaign", Per::Campaign), ("log", Per::Log)]))?;
+    let campaigns = campaigns(root)?;
+    if let (Some(field), true, Per::Campaign) = (table.optional("separate"), campaigns.len() < 2, per) {
+        return Err(field
+            .fail("there are no campaigns that could have their own values")
+            .allowed("two campaigns or more")
+            .next("say campaign = \"april\" in [[experiment]], or per = \"log\""));
+    }
+    let of_none = |experiment: &&Experiment| {
+        let own = |names: &[String]| names.iter().any(|pattern| matches(&experiment.name, pattern));
+        experiment.log.is_some() && !campaigns.iter().any(|(_, names)| own(names))
+    };
+    if let (Some(field), Per::Campaign) = (table.optional("separate"), per)
+        && let Some(experiment) = experiments.iter().find(of_none)
+    {
+        return Err(field
+            .fail(format!("\"{}\" is of no campaign, so these parameters have no value for it", experiment.name))
+            .next("say campaign = \"...\" in its [[experiment]], too"));
+    }
     let huber =
         table.optional("loss").map_or(Ok(false), |field| field.choice(&[("squares", false), ("huber", true)]))?;
     let nuisance = nuisances(&table)?;
@@ -209,7 +268,43 @@ pub(super) fn plan(root: &Table, stage: &Stage, experiments: &[Experiment]) -> R
         free: free.clone(),
         tied: tied.clone(),
         lumped: lumped.clone(),
+        separate,
+        per,
+        campaigns,
     }))
+}
+
+/// The parameters that campaigns have for themselves, of those that are searched for.
+fn separate(table: &Table, names: &[String]) -> Result<Vec<String>> {
+    let Some(field) = table.optional("separate") else { return Ok(Vec::new()) };
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let mut separate = Vec::new();
+    for field in field.filled_list()? {
+        let name = field.text()?.to_string();
+        searched(&field, &name, &names)?;
+        separate.push(name);
+    }
+    Ok(separate)
+}
+
+/// The campaigns that experiments name, in their order, with the names of their experiments; those of a log that is split begin with it.
+fn campaigns(root: &Table) -> Result<Vec<(String, Vec<String>)>> {
+    let mut campaigns: Vec<(String, Vec<String>)> = Vec::new();
+    let experiments = root.optional("experiment").map_or(Ok(Vec::new()), |field| field.list())?;
+    for experiment in experiments {
+        let table = experiment.table()?;
+        let (Some(field), Some(name)) = (table.optional("campaign"), table.optional("name")) else { continue };
+        let (campaign, name) = (field.text()?, name.text()?);
+        if campaign.is_empty() || campaign.contains(['[', ']']) {
+            return Err(field.fail(format!("\"{campaign}\" is no name of a campaign")).allowed("text without [ and ]"));
+        }
+        let own = [name.to_string(), format!("{name}/*")];
+        match campaigns.iter_mut().find(|(known, _)| known == campaign) {
+            Some((_, names)) => names.extend(own),
+            None => campaigns.push((campaign.to_string(), own.to_vec())),
+        }
+    }
+    Ok(campaigns)
 }
 
 /// Refuses what a loop that is closed again cannot have.

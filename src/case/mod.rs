@@ -21,7 +21,7 @@ mod tree;
 mod tune;
 
 pub use bounds::LARGEST_FILE;
-pub use fit::{Nuisances, Plan, Prior, Scope, matches};
+pub use fit::{Nuisances, Per, Plan, Prior, Scope, matches};
 pub use gantry::{GantryCase, GantryExperiment, Opened};
 pub use get::Given;
 pub use motion::Move;
@@ -396,7 +396,7 @@ fn experiment(field: &Field, stage: &Stage, folder: &Folder) -> Result<Vec<Exper
         ..field.clone()
     };
     let table = field.table()?;
-    table.check_keys(&["name", "input", "log"], &[])?;
+    table.check_keys(&["name", "input", "log", "campaign"], &[])?;
     let name = table.required("name", "for example name = \"5 V pulse\"")?;
     check_name(&name)?;
     let name = name.text()?.to_string();

@@ -1,11 +1,11 @@
 //! Before a fit: what the logs show, what they determine, and what one more experiment would.
 
-use super::identify::Identifiability;
+use super::identify::{Group, Identifiability};
 use super::proposals::{Proposal, proposals};
 use super::regression::{Balance, regression};
 use super::{Fit, search, told};
 use crate::case::{Case, Plan};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::log::Survey;
 use crate::solve::Flow;
 
@@ -16,8 +16,8 @@ pub struct Check {
     pub logs: Vec<Survey>,
     /// The balance of torques of a rigid axis, by regression; none where the logs do not allow one.
     pub balance: Option<Balance>,
-    /// What they determine together.
-    pub identifiability: Identifiability,
+    /// What they determine together; none where everything that is searched for ended at a bound.
+    pub identifiability: Option<Identifiability>,
     /// What to do about each group that is not determined.
     pub choices: Vec<Vec<String>>,
     /// Which errors that is for.
@@ -28,16 +28,18 @@ pub struct Check {
     pub fit: Fit,
 }
 
+impl Check {
+    /// Groups of parameters that are not determined, and what to do about each.
+    pub fn groups(&self) -> impl Iterator<Item = (&Group, &Vec<String>)> {
+        self.identifiability.iter().flat_map(|known| &known.groups).zip(&self.choices)
+    }
+}
+
 /// Looks at the logs of a case: by a fit, whose verdict it gives.
 pub fn check(case: &Case, plan: &Plan) -> Result<Check> {
     let found = search(case, plan, None, &mut |_| Flow::Continue)?;
-    let numbers = || {
-        Error::new("every parameter that is searched for ended at a bound, or the model does not get through the logs: there is no sensitivity to tell")
-            .next("`taut fit` says what it finds wrong with logs and bounds")
-    };
-    let judged = found.judged(case, plan).ok_or_else(numbers)?;
-    let identifiability = judged.identifiability.clone();
-    let experiments = proposals(&found, &judged);
+    let judged = found.judged(case, plan);
+    let experiments = judged.as_ref().map_or(Vec::new(), |judged| proposals(&found, judged));
     let noise: Vec<String> = found
         .noise
         .iter()
@@ -46,14 +48,14 @@ pub fn check(case: &Case, plan: &Plan) -> Result<Check> {
             format!("{} {sigma}", quantity.name())
         })
         .collect();
-    let noise_words =
-        format!("for what the best model leaves ({}), {}", noise.join(", "), judged.slow_words(&found.problem));
+    let alike = judged.as_ref().map_or(String::new(), |judged| format!(", {}", judged.slow_words(&found.problem)));
+    let noise_words = format!("for what the best model leaves ({}){alike}", noise.join(", "));
     let balance = regression(&found.problem);
-    let fit = told(case, plan, &found, Some(&judged));
+    let fit = told(case, plan, &found, judged.as_ref());
     Ok(Check {
         balance,
         logs: case.experiments.iter().filter_map(|e| Some(Survey::new(e.log.as_ref()?, &case.stage))).collect(),
-        identifiability,
+        identifiability: judged.map(|judged| judged.identifiability),
         choices: fit.choices.clone(),
         noise_words,
         experiments,

@@ -25,6 +25,12 @@ pub fn machines(case: &Case, plan: &Plan, file: &Path) -> Result<Vec<Stage>> {
 /// The draws themselves: what is free, and its values by draw. Keys that are set by others do not go along with any of it.
 pub fn drawn(case: &Case, plan: &Plan, others: &[&str], file: &Path) -> Result<(Vec<Free>, Vec<Vec<f64>>)> {
     let parameters = parameters(&case.stage, plan, others)?;
+    if parameters.is_empty() {
+        return Err(Error::new("nothing is searched for").next("add free = [\"cart.mass\"] to [fit]"));
+    }
+    if !plan.separate.is_empty() {
+        return Err(separate());
+    }
     let headings: Vec<String> =
         parameters.iter().map(|parameter| Column::new(parameter.name.clone(), parameter.unit).heading()).collect();
     let names: Vec<&str> = headings.iter().map(String::as_str).collect();
@@ -46,4 +52,10 @@ pub fn drawn(case: &Case, plan: &Plan, others: &[&str], file: &Path) -> Result<(
             .next("use the draws of this case's own fit"));
     }
     Ok((parameters, columns))
+}
+
+/// There is one machine for each campaign, and draws are of one.
+pub(super) fn separate() -> Error {
+    Error::new("draws are of one machine, and `separate` makes one for each campaign")
+        .next("leave `separate` out of [fit], and hold out what is of the other campaigns")
 }

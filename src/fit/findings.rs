@@ -1,10 +1,11 @@
 //! What is to be known of a fit before its numbers are used: faults of the logs, and of the search, in two grades.
 
+use super::Fit;
 use super::least_squares::Ending;
 use super::problem::Problem;
 use super::regression::{Balance, regression_late};
 use super::run::is_position;
-use super::{Fit, Searched};
+use super::search::Searched;
 use crate::case::{Case, Plan, Scope};
 use crate::log::{Note, Severity, Survey};
 use crate::number::engineering;

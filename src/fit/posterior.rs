@@ -70,6 +70,12 @@ pub fn posterior(case: &Case, plan: &Plan, fit: &Fit, effort: Effort, watch: &Wa
     if matches!(fit.ending, Ending::Interrupted | Ending::Failed) {
         return Err(Error::new("draws begin at a fit that has ended, and this one has not").next("fit it again"));
     }
+    if !plan.separate.is_empty() {
+        return Err(super::drawn::separate());
+    }
+    if fit.estimates.is_empty() {
+        return Err(Error::new("nothing is searched for").next("add free = [\"cart.mass\"] to [fit]"));
+    }
     refuse_undetermined(fit)?;
     let mut problem = Problem::new(case, plan)?;
     for &(quantity, deviation) in &fit.noise {

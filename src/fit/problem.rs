@@ -26,6 +26,10 @@ pub struct Problem<'a> {
     pub stage: Stage,
     /// What is searched for of it.
     pub parameters: Vec<Free>,
+    /// The part of the logs that each of these is for, by its place in `parts`; none where it is for all of them.
+    pub of: Vec<Option<usize>>,
+    /// Names of the parts of the logs that have parameters for themselves: campaigns, or logs.
+    pub parts: Vec<String>,
     /// What holds for all logs and is no number of the machine.
     pub shared: Vec<Extra>,
     /// The logs that are fitted.
@@ -90,16 +94,16 @@ impl<'a> Problem<'a> {
     /// What `plan` asks of the logs of `case`.
     pub fn new(case: &Case, plan: &Plan) -> Result<Self> {
         let stage = case.stage.clone();
-        let parameters = parameters(&stage, plan, &[])?;
+        let (parameters, of, parts) = separated(case, plan, parameters(&stage, plan, &[])?)?;
         let mut runs = Vec::new();
         let mut held_out = Vec::new();
         for experiment in &case.experiments {
             let Some(log) = &experiment.log else { continue };
             let held = plan.held_out.iter().any(|pattern| matches(&experiment.name, pattern));
-            // What is only compared is compared whole.
-            let window = if held { None } else { plan.windows };
-            let setting = Setting { window, fitted_until: plan.until, held_out: held };
+            let setting = Setting { window: plan.windows, fitted_until: plan.until, held_out: held };
+            let part = plan.part(&experiment.name);
             for mut run in Run::all(experiment, log, &setting) {
+                run.part = parts.iter().position(|name| name == part).unwrap_or(0);
                 if plan.closed_loop {
                     run.close(case, log);
                 }
@@ -115,6 +119,8 @@ impl<'a> Problem<'a> {
             units: parameters.iter().map(|parameter| scale(&stage, parameter, &runs)).collect(),
             stage,
             parameters,
+            of,
+            parts,
             shared: Vec::new(),
             runs,
             held_out,
@@ -125,6 +131,23 @@ impl<'a> Problem<'a> {
         problem.prepare();
         problem.weigh_first();
         Ok(problem)
+    }
+
+    /// A single run of a machine that is known.
+    pub(super) fn alone(stage: Stage, mut run: Run) -> Self {
+        run.part = 0;
+        Self {
+            stage,
+            parameters: Vec::new(),
+            of: Vec::new(),
+            parts: Vec::new(),
+            shared: Vec::new(),
+            runs: vec![run],
+            held_out: Vec::new(),
+            simulations: 0,
+            units: Vec::new(),
+            stop: None,
+        }
     }
 
     /// Ends the work early once `stop` says so.
@@ -171,7 +194,7 @@ impl<'a> Problem<'a> {
             let long = run.time.last().copied().unwrap_or(1.0);
             let fast = f64::max(span / long, fastest).max(1e-6);
             let wide = span.max(1e-6);
-            let windowed = plan.windows.is_some() && !run.held_out;
+            let windowed = plan.windows.is_some();
             if let Some(start) = first {
                 let free = initial_state || windowed;
                 // Positions count from where the log begins, unless the case says where that is; its first value says that
@@ -391,12 +414,23 @@ impl<'a> Problem<'a> {
         matches!(self.units[j], Scale::Log(_))
     }
 
-    /// The machine with these values.
+    /// The machine with these values; of what parts of the logs have for themselves, those of the first.
     pub fn stage_at(&self, x: &[f64]) -> Stage {
+        self.stage_of(0, x)
+    }
+
+    /// The machine with the values for a part of the logs.
+    pub fn stage_of(&self, part: usize, x: &[f64]) -> Stage {
         let mut stage = self.stage.clone();
-        let units = self.units.iter().zip(x);
-        parameter::set(&mut stage, self.parameters.iter().zip(units.map(|(unit, x)| unit.value(*x))));
+        let values = self.parameters.iter().zip(&self.units).zip(x).zip(&self.of);
+        let own = values.filter(|(_, of)| of.is_none_or(|of| of == part));
+        parameter::set(&mut stage, own.map(|(((parameter, unit), x), _)| (parameter, unit.value(*x))));
         stage
+    }
+
+    /// The machines of all parts of the logs.
+    pub(super) fn stages(&self, x: &[f64]) -> Vec<Stage> {
+        (0..self.parts.len().max(1)).map(|part| self.stage_of(part, x)).collect()
     }
 
     /// Where the extras of run `index` begin among the variables.
@@ -443,6 +477,23 @@ impl<'a> Problem<'a> {
         self.runs[..index].iter().map(Run::rows).sum()
     }
 
+    /// Residuals of the runs of a part of the logs, those of the others left as they are; of all of them without a part.
+    fn evaluate_part(&mut self, part: Option<usize>, x: &[f64], r: &mut [f64]) -> bool {
+        let stages = self.stages(x);
+        let mut bench = Bench::default();
+        let mut first = 0;
+        for index in 0..self.runs.len() {
+            let (rows, own) = (self.runs[index].rows(), self.runs[index].part);
+            if part.is_none_or(|part| part == own)
+                && !self.one(&mut bench, index, &stages[own], x, &mut r[first..first + rows])
+            {
+                return false;
+            }
+            first += rows;
+        }
+        true
+    }
+
     fn one(&mut self, bench: &mut Bench, index: usize, stage: &Stage, x: &[f64], out: &mut [f64]) -> bool {
         if self.is_stopped() {
             return false;
@@ -453,16 +504,51 @@ impl<'a> Problem<'a> {
     }
 }
 
+/// Each separate parameter once for every part of the logs, the part that each is for, and the names of the parts.
+fn separated(case: &Case, plan: &Plan, all: Vec<Free>) -> Result<(Vec<Free>, Vec<Option<usize>>, Vec<String>)> {
+    if plan.separate.is_empty() {
+        let of = vec![None; all.len()];
+        return Ok((all, of, Vec::new()));
+    }
+    let is_held = |name: &str| plan.held_out.iter().any(|pattern| matches(name, pattern));
+    let logged = || case.experiments.iter().filter(|experiment| experiment.log.is_some());
+    let mut parts: Vec<String> = Vec::new();
+    for experiment in logged().filter(|experiment| !is_held(&experiment.name)) {
+        let part = plan.part(&experiment.name);
+        if !parts.iter().any(|known| known == part) {
+            parts.push(part.to_string());
+        }
+    }
+    let unknown = |name: &str| !parts.iter().any(|known| known == plan.part(name));
+    if let Some(experiment) = logged().find(|experiment| unknown(&experiment.name)) {
+        return Err(Error::new(format!(
+            "\"{}\" is held out, and no log is fitted that shares its separate parameters",
+            experiment.name
+        ))
+        .next("hold out some logs of a campaign only, or leave `separate` out of [fit]"));
+    }
+    let (mut parameters, mut of) = (Vec::new(), Vec::new());
+    for parameter in all {
+        if !plan.separate.contains(&parameter.name) {
+            parameters.push(parameter);
+            of.push(None);
+            continue;
+        }
+        for (place, part) in parts.iter().enumerate() {
+            let mut own = parameter.clone();
+            own.name = format!("{} [{part}]", parameter.name);
+            parameters.push(own);
+            of.push(Some(place));
+        }
+    }
+    Ok((parameters, of, parts))
+}
+
 /// What `plan` searches for of a machine of which `others` are set, too.
 pub fn parameters(stage: &Stage, plan: &Plan, others: &[&str]) -> Result<Vec<Free>> {
     let own = plan.free.iter().chain(plan.tied.iter().flatten()).map(String::as_str);
     let all: Vec<&str> = own.chain(others.iter().copied()).collect();
-    let parameters =
-        plan.names().map(|name| Free::new(stage, &name, &all, &plan.bounds)).collect::<Result<Vec<_>>>()?;
-    if parameters.is_empty() {
-        return Err(Error::new("nothing is searched for").next("add free = [\"cart.mass\"] to [fit]"));
-    }
-    Ok(parameters)
+    plan.names().map(|name| Free::new(stage, &name, &all, &plan.bounds)).collect()
 }
 
 /// Whether it matters where the cart is, and not only how far it goes.
@@ -549,17 +635,7 @@ impl Residuals for Problem<'_> {
     }
 
     fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool {
-        let stage = self.stage_at(x);
-        let mut bench = Bench::default();
-        let mut first = 0;
-        for index in 0..self.runs.len() {
-            let rows = self.runs[index].rows();
-            if !self.one(&mut bench, index, &stage, x, &mut r[first..first + rows]) {
-                return false;
-            }
-            first += rows;
-        }
-        true
+        self.evaluate_part(None, x, r)
     }
 
     fn jacobian(&mut self, x: &[f64], r: &[f64], bounds: &Bounds, how: &Differences) -> Option<DMatrix<f64>> {
@@ -569,11 +645,17 @@ impl Residuals for Problem<'_> {
         let (mut a, mut b) = (vec![0.0; rows], vec![0.0; rows]);
         for j in (0..globals).filter(|&j| !bounds.hold(j)) {
             let step = Step::new(x, bounds, j, how);
+            let part = self.of.get(j).copied().flatten();
+            if part.is_some() {
+                // What it does not concern stays as it is.
+                a.copy_from_slice(r);
+                b.copy_from_slice(r);
+            }
             moved[j] = step.first;
-            let mut good = self.evaluate(&moved, &mut a);
+            let mut good = self.evaluate_part(part, &moved, &mut a);
             if let Some(second) = step.second {
                 moved[j] = second;
-                good &= self.evaluate(&moved, &mut b);
+                good &= self.evaluate_part(part, &moved, &mut b);
             }
             moved[j] = x[j];
             if !good {
@@ -585,20 +667,21 @@ impl Residuals for Problem<'_> {
             }
         }
         // What belongs to one run moves its residuals alone.
-        let stage = self.stage_at(x);
+        let stages = self.stages(x);
         let mut bench = Bench::default();
         let mut first = 0;
         for index in 0..self.runs.len() {
             let rows = self.runs[index].rows();
+            let stage = &stages[self.runs[index].part];
             for (j, extra) in self.own_variables(index) {
                 let signed = self.runs[index].seen.iter().all(|seen| !seen.absolute);
                 let shifts = match extra.what {
                     Nuisance::Bias(_) => true,
-                    Nuisance::StartPosition => signed && !placed(&stage),
+                    Nuisance::StartPosition => signed && !placed(stage),
                     _ => false,
                 };
                 if shifts {
-                    self.runs[index].shift(&stage, &extra, &mut a[..rows]);
+                    self.runs[index].shift(stage, &extra, &mut a[..rows]);
                     for k in 0..rows {
                         jacobian[(first + k, j)] = a[k];
                     }
@@ -606,10 +689,10 @@ impl Residuals for Problem<'_> {
                 }
                 let step = Step::new(x, bounds, j, how);
                 moved[j] = step.first;
-                let mut good = self.one(&mut bench, index, &stage, &moved, &mut a[..rows]);
+                let mut good = self.one(&mut bench, index, stage, &moved, &mut a[..rows]);
                 if let Some(second) = step.second {
                     moved[j] = second;
-                    good &= self.one(&mut bench, index, &stage, &moved, &mut b[..rows]);
+                    good &= self.one(&mut bench, index, stage, &moved, &mut b[..rows]);
                 }
                 moved[j] = x[j];
                 if !good {

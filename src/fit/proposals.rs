@@ -1,10 +1,10 @@
 //! What one more experiment would tell: the sensitivities of its outputs beside those of the logs.
 
-use super::Searched;
 use super::identify::{Identifiability, LIMIT};
 use super::least_squares::{Differences, Step};
 use super::problem::Problem;
 use super::run::is_position;
+use super::search::Searched;
 use super::uncertainty::Judged;
 use crate::log::Quantity;
 use crate::solve::Bench;

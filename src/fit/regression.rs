@@ -170,7 +170,10 @@ impl Balance {
                 free.keys.iter().map(|(key, factor)| factor * free.start * at_pulley(stage, key)).sum()
             };
             let total: f64 = keys.iter().map(|key| value(stage, key).unwrap_or(0.0) * at_pulley(stage, key)).sum();
-            let searched: f64 = problem.parameters.iter().filter(|free| own(free)).map(part).sum();
+            // Of what each campaign has for itself, that of the first.
+            let first = |(_, of): &(&Free, &Option<usize>)| of.is_none_or(|of| of == 0);
+            let counted = problem.parameters.iter().zip(&problem.of).filter(first).map(|(free, _)| free);
+            let searched: f64 = counted.filter(|free| own(free)).map(part).sum();
             let factor = (wanted - (total - searched)) / searched;
             if searched > 0.0 && factor > 0.02 && factor < 50.0 {
                 for (value, free) in values.iter_mut().zip(&problem.parameters).filter(|(_, free)| own(free)) {
@@ -178,8 +181,10 @@ impl Balance {
                 }
             }
         }
-        for (value, parameter) in
-            values.iter_mut().zip(&problem.parameters).filter(|(_, parameter)| parameter.name == "cart.load")
+        for (value, parameter) in values
+            .iter_mut()
+            .zip(&problem.parameters)
+            .filter(|(_, parameter)| parameter.keys.iter().any(|(key, _)| key == "cart.load"))
         {
             let other = stage.cart.constant_force() - stage.cart.load;
             *value = (-self.load / stage.pulley_radius - other).clamp(parameter.low, parameter.high);

@@ -102,6 +102,8 @@ pub struct Run {
     pub logged: Vec<f64>,
     /// The outputs.
     pub seen: Vec<Seen>,
+    /// The part of the logs that it is of, as far as these have parameters for themselves.
+    pub part: usize,
     /// Whether none of it is fitted.
     pub held_out: bool,
     /// From which row on nothing is fitted.
@@ -214,6 +216,7 @@ impl Run {
             time,
             logged,
             seen,
+            part: 0,
             held_out: setting.held_out,
             fitted_rows,
             extras: Vec::new(),

@@ -11,9 +11,9 @@
 //!
 //! and with the whole logs by d. If either is more than noise makes of it, intervals are widened by both.
 
-use super::Searched;
 use super::least_squares::{Ending, Options, minimise};
 use super::problem::Problem;
+use super::search::Searched;
 use super::uncertainty::{Judged, inverse_of_square, student};
 use crate::case::{Case, Plan};
 use crate::solve::Flow;

@@ -234,6 +234,7 @@ fn experiment() -> Value {
             ("input", any(vec![reference("input"), object(&sides)])),
             ("initial", initial),
             ("log", log()),
+            ("campaign", json!({ "type": "string" })),
         ],
     )
 }
@@ -312,6 +313,8 @@ fn fit() -> Value {
             ("loss", words(["squares", "huber"])),
             ("held_out", names()),
             ("loop", words(["logged", "closed"])),
+            ("separate", names()),
+            ("per", words(["campaign", "log"])),
         ],
     )
 }

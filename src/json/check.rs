@@ -7,17 +7,18 @@ use serde_json::{Value, json};
 
 /// The findings of each log, how well each parameter would be known, which combinations nothing tells apart.
 pub fn check(case: &Case, found: &Check) -> Value {
-    let known = &found.identifiability;
+    let known = found.identifiability.as_ref();
     json!({
+        "schema": super::identity("check"),
         "title": case.title,
-        "complete": known.complete(),
-        "parameters": known.names.iter().enumerate().map(|(j, name)| json!({
-            "name": name,
-            "relative_error": number(found.fit.estimates.get(j).map_or(known.error[j], |estimate| {
-                estimate.error.map_or(known.error[j], |error| (error / estimate.value).abs())
-            })),
-            "determined": known.error[j].is_finite(),
-            "sensitivity": number(known.sensitivity[j]),
+        "version": env!("CARGO_PKG_VERSION"),
+        "complete": known.is_some_and(|known| known.complete()),
+        "parameters": found.fit.estimates.iter().enumerate().map(|(j, estimate)| json!({
+            "name": estimate.name,
+            "relative_error": estimate.error.map_or(Value::Null, |error| number((error / estimate.value).abs())),
+            "determined": known.is_some_and(|known| known.error[j].is_finite()),
+            "at_bound": estimate.at_bound,
+            "sensitivity": known.map_or(Value::Null, |known| number(known.sensitivity[j])),
         })).collect::<Vec<_>>(),
         "regression": found.balance.map(|b| json!({
             "inertia_kg_m2": b.inertia,
@@ -28,9 +29,10 @@ pub fn check(case: &Case, found: &Check) -> Value {
             "unexplained": b.unexplained,
             "equations": b.equations,
         })),
-        "singular_values": known.singular.iter().map(|s| number(*s)).collect::<Vec<_>>(),
-        "not_determined": known.groups.iter().zip(&found.choices)
-            .map(|(own, choices)| super::fit::group(known, own, choices))
+        "singular_values": known.iter().flat_map(|known| &known.singular).map(|s| number(*s)).collect::<Vec<_>>(),
+        "not_determined": known.iter()
+            .flat_map(|known| known.groups.iter().zip(&found.choices))
+            .map(|(own, choices)| super::fit::group(own, &found.fit.estimates, choices))
             .collect::<Vec<_>>(),
         "findings": found.fit.findings.iter().map(super::fit::finding).collect::<Vec<_>>(),
         "logs": found.logs.iter().map(|log| json!({

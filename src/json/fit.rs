@@ -2,7 +2,7 @@
 
 use super::number;
 use crate::case::Case;
-use crate::fit::{Combination, Finding, Fit, Group, Identifiability, Profile, Score};
+use crate::fit::{Combination, Estimate, Finding, Fit, Group, Profile, Score};
 use serde_json::{Value, json};
 
 fn score(score: Option<Score>) -> Value {
@@ -45,9 +45,9 @@ fn combination(combination: &Combination) -> Value {
 }
 
 /// Parameters that the logs do not tell apart, and what to do about them.
-pub(super) fn group(known: &Identifiability, group: &Group, choices: &[String]) -> Value {
+pub(super) fn group(group: &Group, estimates: &[Estimate], choices: &[String]) -> Value {
     json!({
-        "parameters": group.members.iter().map(|&j| &known.names[j]).collect::<Vec<_>>(),
+        "parameters": group.members.iter().map(|&j| &estimates[j].name).collect::<Vec<_>>(),
         "combinations_determined": group.determined,
         "combinations": group.combinations.iter().map(combination).collect::<Vec<_>>(),
         "words": group.words,
@@ -103,9 +103,12 @@ pub fn fit(case: &Case, fit: &Fit, profiles: &[Profile], posterior: Option<Value
     let not_determined: Vec<Value> = fit
         .identifiability
         .iter()
-        .flat_map(|known| known.groups.iter().zip(&fit.choices).map(|(own, choices)| group(known, own, choices)))
+        .flat_map(|known| {
+            known.groups.iter().zip(&fit.choices).map(|(own, choices)| group(own, &fit.estimates, choices))
+        })
         .collect();
     json!({
+        "schema": super::identity("fit"),
         "title": case.title,
         "version": env!("CARGO_PKG_VERSION"),
         "ending": fit.ending_word(),

@@ -7,8 +7,10 @@ use serde_json::{Map, Value, json};
 
 /// The results, by the word that each begins with: `"schema": "taut/WORD/1"`.
 const RESULTS: &[(&str, &str, &str)] = &[
+    ("check", "`taut check`", include_str!("results/check.txt")),
     ("error", "An error, under --json", include_str!("results/error.txt")),
     ("files", "What a folder of results holds: files.json", include_str!("results/files.txt")),
+    ("fit", "`taut fit`", include_str!("results/fit.txt")),
     ("gantry-modes", "`taut modes` of a gantry", include_str!("results/gantry-modes.txt")),
     ("gantry-simulate", "`taut simulate` of a gantry", include_str!("results/gantry-simulate.txt")),
     ("modes", "`taut modes`", include_str!("results/modes.txt")),

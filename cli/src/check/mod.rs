@@ -57,21 +57,21 @@ fn text(case: &Case, found: &Check) -> String {
         let _ = write!(text, "\n{finding}\n");
     }
     let _ = write!(text, "\n{}\n", bold("How well each parameter would be known, all others free"));
-    let known = &found.identifiability;
-    let wide = known.names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
+    let wide = found.fit.estimates.iter().map(|estimate| estimate.name.chars().count()).max().unwrap_or(0);
     for (name, error) in shares(found) {
         let _ = writeln!(text, "  {name:<wide$}  {error}");
     }
-    let _ = writeln!(
-        text,
-        "  singular values {}",
-        known.singular.iter().map(|s| format!("{s:.2e}")).collect::<Vec<_>>().join(", ")
-    );
-    let _ = writeln!(text, "  {}", found.noise_words);
-    if known.complete() {
-        text.push_str("\neverything that is searched for is determined\n");
+    if let Some(known) = &found.identifiability {
+        let singular: Vec<String> = known.singular.iter().map(|s| format!("{s:.2e}")).collect();
+        let _ = writeln!(text, "  singular values {}", singular.join(", "));
     }
-    for (group, choices) in known.groups.iter().zip(&found.choices) {
+    let _ = writeln!(text, "  {}", found.noise_words);
+    text.push_str(match &found.identifiability {
+        Some(known) if known.complete() => "\neverything that is searched for is determined\n",
+        Some(_) => "",
+        None => "\neverything that is searched for ended at a bound: there is no sensitivity to tell\n",
+    });
+    for (group, choices) in found.groups() {
         let _ = write!(text, "\n{}\n  {}\n", bold("Not determined"), group.words);
         for combination in &group.combinations {
             let shown = table::value(combination.value, &combination.unit, 5);
@@ -97,7 +97,7 @@ fn text(case: &Case, found: &Check) -> String {
 
 /// Each parameter with its standard error in words: that of the fit, and so what `taut fit` says.
 fn shares(found: &Check) -> impl Iterator<Item = (String, String)> {
-    let told = |(name, estimate): (&String, &Estimate)| {
+    let told = |estimate: &Estimate| {
         let error = match estimate.error {
             Some(e) if e.is_finite() && estimate.value != 0.0 => {
                 format!("to {:.2} %", 100.0 * (e / estimate.value).abs())
@@ -106,9 +106,9 @@ fn shares(found: &Check) -> impl Iterator<Item = (String, String)> {
             None => "at its bound".into(),
             Some(_) => "not at all".into(),
         };
-        (name.clone(), error)
+        (estimate.name.clone(), error)
     };
-    found.identifiability.names.iter().zip(&found.fit.estimates).map(told)
+    found.fit.estimates.iter().map(told)
 }
 
 /// What the balance of torques gives, each with its unit, value and standard error.

@@ -41,10 +41,18 @@ pub fn page(case: &Case, found: &Check) -> Page {
 }
 
 fn verdict(page: &mut Page, found: &Check) {
-    if found.identifiability.complete() {
-        page.callout(Callout::Holds, "All of it", "everything that is searched for is determined.");
+    match &found.identifiability {
+        Some(known) if known.complete() => {
+            page.callout(Callout::Holds, "All of it", "everything that is searched for is determined.");
+        }
+        Some(_) => {}
+        None => page.callout(
+            Callout::Fails,
+            "At bounds",
+            "everything that is searched for ended at a bound: there is no sensitivity to tell.",
+        ),
     }
-    for (group, choices) in found.identifiability.groups.iter().zip(&found.choices) {
+    for (group, choices) in found.groups() {
         page.callout(Callout::Fails, "Not determined", format!("{}.", group.words));
         choices.iter().for_each(|choice| page.prose(choice.to_string()));
     }

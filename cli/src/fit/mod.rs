@@ -95,7 +95,9 @@ fn find(args: &Args, case: &Case, plan: &Plan, interrupt: &Interrupt) -> Result<
         fit => fit?,
     };
     progress.tell(|| "profiles of the parameters".into());
-    let profiles = match (common.reports() && !is_stopped()).then(|| profiles(case, plan, &fit, Some(&is_stopped))) {
+    // What warns holds back the report, and with it the profiles.
+    let is_told = common.reports() && (args.anyway || fit.warnings().next().is_none());
+    let profiles = match (is_told && !is_stopped()).then(|| profiles(case, plan, &fit, Some(&is_stopped))) {
         Some(Err(_)) if is_stopped() => Vec::new(),
         Some(profiles) => profiles?,
         None => Vec::new(),

@@ -1,0 +1,131 @@
+//! What a fit found, and how well it is known.
+
+use super::scores::LogFit;
+use super::{Combination, Disagreement, Ending, Finding, Grade, Identifiability};
+use crate::log::Quantity;
+use crate::stage::Stage;
+
+/// What a fit found.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The machine with the estimates; what is not determined is what the case says.
+    pub stage: Stage,
+    /// The machine of each campaign, or log, that has parameters for itself: `stage` is the first. Empty where nothing is separate.
+    pub parts: Vec<(String, Stage)>,
+    /// The estimates: free parameters, then what all logs share.
+    pub estimates: Vec<Estimate>,
+    /// Correlations of the estimates, row by row; NaN where one is at a bound.
+    pub correlation: Vec<Vec<f64>>,
+    /// What was taken as the standard deviation of each quantity's residuals.
+    pub noise: Vec<(Quantity, f64)>,
+    /// How each log is met: those fitted, then those held out.
+    pub logs: Vec<LogFit>,
+    /// What the logs determine at the estimates.
+    pub identifiability: Option<Identifiability>,
+    /// What to do about each group of parameters that is not determined.
+    pub choices: Vec<Vec<String>>,
+    /// Parts of the logs that say otherwise than the whole, by more than noise would make of it.
+    pub disagreement: Option<Disagreement>,
+    /// What is to be known of logs and search before the estimates are used, warnings first.
+    pub findings: Vec<Finding>,
+    /// The variables of the search where it ended.
+    pub point: Vec<f64>,
+    /// How the search ended.
+    pub ending: Ending,
+    /// What the last step promised, in standard errors.
+    pub decrement: f64,
+    /// ½ Σ r² of the weighted residuals.
+    pub cost: f64,
+    /// The cost that each start led to, in the first weights; the first start is that of the case, or what a regression makes
+    /// of it if that is nearer.
+    pub starts: Vec<f64>,
+    /// Values that count.
+    pub values: usize,
+    /// Variables, what is fitted along included.
+    pub variables: usize,
+    /// What it took.
+    pub work: Work,
+}
+
+/// What a fit took.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Work {
+    /// Jacobians.
+    pub iterations: usize,
+    /// Trial points.
+    pub evaluations: usize,
+    /// Simulated logs.
+    pub simulations: u64,
+}
+
+/// One parameter's estimate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// Its key, or those of a tie, or the name of a group.
+    pub name: String,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Where the search started.
+    pub start: f64,
+    /// The estimate.
+    pub value: f64,
+    /// Its standard error; infinite where it is not determined, none where it is at a bound.
+    pub error: Option<f64>,
+    /// 95 % interval; infinite where it is not determined. At a bound it reaches from there to where it would without that
+    /// bound; none where even that cannot be said.
+    pub interval: Option<[f64; 2]>,
+    /// Its bounds.
+    pub bounds: [f64; 2],
+    /// Whether it ended at one of them.
+    pub at_bound: bool,
+    /// The part of the logs that it is for, by its place among the fit's; none where it is for all of them.
+    pub part: Option<usize>,
+    /// What it sets in the case file: key and value.
+    pub sets: Vec<(String, f64)>,
+}
+
+impl Estimate {
+    /// Whether the logs tell it, or it is at a bound.
+    pub fn is_determined(&self) -> bool {
+        self.at_bound || self.error.is_some_and(f64::is_finite)
+    }
+}
+
+impl Fit {
+    /// Whether all that is searched for is determined and nothing warns.
+    pub fn is_reliable(&self) -> bool {
+        self.is_complete() && self.warnings().next().is_none()
+    }
+
+    /// Whether all that is searched for is determined.
+    pub fn is_complete(&self) -> bool {
+        self.estimates.iter().all(Estimate::is_determined)
+    }
+
+    /// What makes the result not to be relied on.
+    pub fn warnings(&self) -> impl Iterator<Item = &Finding> {
+        self.findings.iter().filter(|finding| finding.grade == Grade::Warning)
+    }
+
+    /// Whether the search ended at a minimum within the bounds, and nothing warns.
+    pub fn is_converged(&self) -> bool {
+        self.ending == Ending::Converged
+            && !self.estimates.iter().any(|estimate| estimate.at_bound)
+            && self.is_reliable()
+    }
+
+    /// How it ended, for files: `converged` only where it is.
+    pub fn ending_word(&self) -> &'static str {
+        match self.ending {
+            Ending::Converged if self.estimates.iter().any(|estimate| estimate.at_bound) => "at_bound",
+            Ending::Converged if !self.is_complete() => "not_determined",
+            Ending::Converged if !self.is_reliable() => "doubtful",
+            ending => ending.word(),
+        }
+    }
+
+    /// What is determined of parameters that are not.
+    pub fn combinations(&self) -> impl Iterator<Item = &Combination> {
+        self.identifiability.iter().flat_map(|found| &found.groups).flat_map(|group| &group.combinations)
+    }
+}

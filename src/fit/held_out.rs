@@ -1,0 +1,59 @@
+//! Logs that are only compared: where they start is fitted to them, and nothing else.
+
+use super::least_squares::{Ending, Options, minimise};
+use super::problem::Problem;
+use super::run::{Extra, Nuisance, Run};
+use super::scores::{LogFit, compared};
+use crate::log::Quantity;
+use crate::solve::Flow;
+use crate::stage::Stage;
+
+/// What the fitted logs say beside parameters.
+pub(super) struct Known<'a> {
+    /// Deviation of each quantity's residuals.
+    pub noise: &'a [(Quantity, f64)],
+    /// Delays, gains and offsets of single logs, in the mean.
+    pub means: Vec<(Nuisance, f64)>,
+    /// What all logs share, and its values.
+    pub shared: Vec<(Extra, f64)>,
+}
+
+/// A log beside `stage`: delay, gain and offsets are what the fitted logs say.
+pub(super) fn met(run: &Run, stage: &Stage, known: &Known) -> LogFit {
+    let is_start = |what| matches!(what, Nuisance::StartPosition | Nuisance::StartSpeed);
+    let mut alone = run.clone();
+    for extra in alone.extras.iter_mut().filter(|extra| !is_start(extra.what)) {
+        let mean = known.means.iter().find(|(what, _)| *what == extra.what);
+        *extra = held(extra, mean.map_or(extra.start, |(_, mean)| *mean));
+    }
+    alone.extras.extend(known.shared.iter().map(|(extra, value)| held(extra, *value)));
+    alone.share(&[]);
+    alone.fitted_rows = alone.time.len();
+    let mut problem = Problem::alone(stage.clone(), alone);
+    for &(quantity, deviation) in known.noise {
+        problem.weigh(quantity, deviation, true);
+        problem.doubt_starts(quantity, deviation);
+    }
+    let mut x = problem.start();
+    if !x.is_empty() {
+        let options = Options { iterations: 15, tolerance: 0.05, rounding: problem.rounding(), ..Options::default() };
+        let bounds = problem.bounds();
+        let found = minimise(&mut problem, &x, &bounds, &options, &mut |_, _| Flow::Continue);
+        if found.ending != Ending::Failed {
+            x = found.x;
+        }
+    }
+    let extras = problem.extras_of(0, &x);
+    let alone = &problem.runs[0];
+    let own = alone.extras.iter().zip(&extras);
+    let told = own.filter(|(extra, _)| is_start(extra.what) && extra.known.is_none()).map(|(e, v)| (e.what, *v, None));
+    let told = told.collect();
+    let mut shown = alone.clone();
+    shown.fitted_rows = run.fitted_rows;
+    compared(&shown, stage, &extras, told)
+}
+
+/// An extra that has this value.
+fn held(extra: &Extra, value: f64) -> Extra {
+    Extra { start: value, low: value, high: value, known: None, ..*extra }
+}

@@ -1,0 +1,115 @@
+//! Model and log side by side.
+
+use super::run::{Nuisance, Run};
+use super::uncertainty;
+use crate::log::Quantity;
+use crate::solve::Bench;
+use crate::stage::Stage;
+
+/// How a log is met.
+#[derive(Debug, Clone)]
+pub struct LogFit {
+    /// The experiment.
+    pub name: String,
+    /// Which window of it.
+    pub window: usize,
+    /// Whether none of it was fitted.
+    pub held_out: bool,
+    /// Times, s.
+    pub time: Vec<f64>,
+    /// First row that was not fitted.
+    pub fitted_rows: usize,
+    /// Each output.
+    pub outputs: Vec<OutputFit>,
+    /// What was fitted along: name, value, standard error.
+    pub extras: Vec<(Nuisance, f64, Option<f64>)>,
+    /// Whether the model reached the end of it.
+    pub complete: bool,
+}
+
+/// How an output is met.
+#[derive(Debug, Clone)]
+pub struct OutputFit {
+    /// What it is.
+    pub quantity: Quantity,
+    /// What was seen.
+    pub seen: Vec<f64>,
+    /// What the model says.
+    pub model: Vec<f64>,
+    /// Over the rows that were fitted.
+    pub fitted: Option<Score>,
+    /// Over those that were not.
+    pub held_out: Option<Score>,
+}
+
+/// How far model and log are apart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Score {
+    /// Values compared.
+    pub count: usize,
+    /// Root mean square of the residuals.
+    pub rmse: f64,
+    /// Largest residual.
+    pub worst: f64,
+    /// 100 (1 − ‖y − ŷ‖/‖y − ȳ‖)
+    pub percent: f64,
+    /// Correlation of neighbouring residuals.
+    pub memory: f64,
+}
+
+/// Model and log side by side.
+pub(super) fn compared(run: &Run, stage: &Stage, extras: &[f64], told: Vec<(Nuisance, f64, Option<f64>)>) -> LogFit {
+    let quantities: Vec<Quantity> = run.seen.iter().map(|seen| seen.quantity).collect();
+    let mut columns = vec![Vec::new(); quantities.len()];
+    let complete = run.predict(&mut Bench::default(), stage, extras, &quantities, &mut columns);
+    let n = run.time.len();
+    let outputs = run
+        .seen
+        .iter()
+        .zip(columns)
+        .enumerate()
+        .map(|(i, (seen, column))| {
+            let bias = run.bias(i, extras);
+            let mut model: Vec<f64> =
+                column.iter().map(|v| if seen.absolute { v.abs() + bias } else { v + bias }).collect();
+            model.resize(n, f64::NAN);
+            OutputFit {
+                quantity: seen.quantity,
+                fitted: score(&seen.values, &model, 0..run.fitted_rows.min(n)),
+                held_out: score(&seen.values, &model, run.fitted_rows.min(n)..n),
+                seen: seen.values.clone(),
+                model,
+            }
+        })
+        .collect();
+    LogFit {
+        name: run.name.clone(),
+        window: run.window,
+        held_out: run.held_out,
+        time: run.time.clone(),
+        fitted_rows: run.fitted_rows,
+        outputs,
+        extras: told,
+        complete,
+    }
+}
+
+fn score(seen: &[f64], model: &[f64], rows: std::ops::Range<usize>) -> Option<Score> {
+    let rows: Vec<usize> = rows.filter(|&k| seen[k].is_finite() && model[k].is_finite()).collect();
+    if rows.is_empty() {
+        return None;
+    }
+    let n = rows.len() as f64;
+    let residuals: Vec<f64> = rows.iter().map(|&k| model[k] - seen[k]).collect();
+    let squares: f64 = residuals.iter().map(|r| r * r).sum();
+    let mean = rows.iter().map(|&k| seen[k]).sum::<f64>() / n;
+    let spread: f64 = rows.iter().map(|&k| (seen[k] - mean).powi(2)).sum();
+    let places: Vec<usize> = (0..residuals.len()).collect();
+    Some(Score {
+        count: rows.len(),
+        rmse: (squares / n).sqrt(),
+        worst: residuals.iter().fold(0.0, |most: f64, r| most.max(r.abs())),
+        percent: 100.0 * (1.0 - (squares / spread.max(f64::MIN_POSITIVE)).sqrt()),
+        memory: uncertainty::memory_of(&residuals, &places),
+    })
+}
