@@ -98,6 +98,22 @@ impl Curve {
 
     /// The curve from values and the first three derivatives by s, each over its order's factorial, at both ends.
     pub(super) fn through(begin: f64, length: f64, from: &[Reading; 4], to: &[Reading; 4]) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { Self::through_by_avx2(begin, length, from, to) };
+        }
+        Self::through_by_any(begin, length, from, to)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn through_by_avx2(begin: f64, length: f64, from: &[Reading; 4], to: &[Reading; 4]) -> Self {
+        Self::through_by_any(begin, length, from, to)
+    }
+
+    #[inline(always)]
+    fn through_by_any(begin: f64, length: f64, from: &[Reading; 4], to: &[Reading; 4]) -> Self {
         let mut terms = [[0.0; QUANTITIES]; TERMS];
         terms[..4].copy_from_slice(from);
         let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (from, to);

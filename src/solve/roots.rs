@@ -118,7 +118,29 @@ fn search<const N: usize>(c: &[f64], b: &[f64; N], low: f64, high: f64) -> Optio
         // What only touches within a point is told by the sign at the end.
         return ends_below.then(|| polish(c, (low, b[0]), (high, b[N - 1])));
     }
-    // de Casteljau: the coefficients of both halves
+    let (left, right) = halves(b);
+    let middle = 0.5 * (low + high);
+    search(c, &left, low, middle).or_else(|| search(c, &right, middle, high))
+}
+
+/// The coefficients on both halves, by de Casteljau's scheme.
+fn halves<const N: usize>(b: &[f64; N]) -> ([f64; N], [f64; N]) {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        return unsafe { halves_by_avx2(b) };
+    }
+    halves_by_any(b)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn halves_by_avx2<const N: usize>(b: &[f64; N]) -> ([f64; N], [f64; N]) {
+    halves_by_any(b)
+}
+
+#[inline(always)]
+fn halves_by_any<const N: usize>(b: &[f64; N]) -> ([f64; N], [f64; N]) {
     let (mut left, mut right) = ([0.0; N], *b);
     for (i, left) in left.iter_mut().enumerate() {
         *left = right[0];
@@ -126,9 +148,8 @@ fn search<const N: usize>(c: &[f64], b: &[f64; N], low: f64, high: f64) -> Optio
             right[j] = 0.5 * (right[j] + right[j + 1]);
         }
     }
-    let middle = 0.5 * (low + high);
-    // What is left in `right` runs from the middle outwards, the other way round.
-    search(c, &left, low, middle).or_else(|| search(c, &right, middle, high))
+    // What is left runs from the middle outwards.
+    (left, right)
 }
 
 /// Newton's method kept within a bracket whose upper end is negative; halving where it would leave it. It begins where a straight line

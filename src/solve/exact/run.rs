@@ -53,11 +53,11 @@ impl<'a, const N: usize> Run<'a, N> {
         if self.row < last && self.grid.time(self.row + 1) == time {
             return (self.row + 1, 0.0);
         }
+        // Right but for rounding.
         let mut row = ((time / h) as u64).min(last);
-        while row > 0 && self.grid.time(row) > time {
+        if row > 0 && self.grid.time(row) > time {
             row -= 1;
-        }
-        while row < last && self.grid.time(row + 1) <= time {
+        } else if row < last && self.grid.time(row + 1) <= time {
             row += 1;
         }
         let offset = time - self.grid.time(row);
