@@ -61,6 +61,33 @@ impl Gap<'_> {
         middle + rise(half, bow)
     }
 
+    /// Whether the magnitude of any quantity is above its height at either end, and whether it can be above `factor` times that within.
+    pub fn rises_above(&self, heights: &Reading, factor: f64) -> (bool, bool) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.rises_above_by_avx2(heights, factor) };
+        }
+        self.rises_above_by_any(heights, factor)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn rises_above_by_avx2(&self, heights: &Reading, factor: f64) -> (bool, bool) {
+        self.rises_above_by_any(heights, factor)
+    }
+
+    #[inline(always)]
+    fn rises_above_by_any(&self, heights: &Reading, factor: f64) -> (bool, bool) {
+        let (mut ends, mut within) = (0_u64, 0_u64);
+        for q in 0..QUANTITIES {
+            let (from, to, height) = (self.from[q], self.to[q], heights[q]);
+            ends |= u64::from(from.abs() > height) | u64::from(to.abs() > height);
+            within |= u64::from(Self::bound_of(from, to, self.bow[q]) > height * factor);
+        }
+        (ends != 0, within != 0)
+    }
+
     /// Bounds of the value of quantity `q` within, from below and above.
     pub fn range(&self, q: usize) -> (f64, f64) {
         let (middle, half) = (0.5 * (self.from[q] + self.to[q]), 0.5 * (self.to[q] - self.from[q]).abs());

@@ -184,6 +184,60 @@ mod tests {
         assert!((root - 0.3).abs() < 1e-14, "{root}");
     }
 
+    /// Wider vectors do the same operations in the same order.
+    #[cfg(target_arch = "x86_64")]
+    #[test]
+    fn wider_vectors_give_the_same_bits() {
+        if !std::arch::is_x86_feature_detected!("avx2") {
+            return;
+        }
+        let c: [f64; 24] = std::array::from_fn(|k| (1.7 * k as f64).sin() / (1.0 + k as f64));
+        let b = bernstein(&c, &RATIOS_24);
+        // SAFETY: the processor has AVX2.
+        assert_eq!(unsafe { bernstein_by_avx2(&c, &RATIOS_24) }.map(f64::to_bits), b.map(f64::to_bits));
+        let (left, right) = halves(&b);
+        let (plain_left, plain_right) = halves_by_any(&b);
+        assert_eq!(left.map(f64::to_bits), plain_left.map(f64::to_bits));
+        assert_eq!(right.map(f64::to_bits), plain_right.map(f64::to_bits));
+        // Both halves meet in the middle: Σ c_k 2⁻ᵏ.
+        let middle = value_and_slope(&c, 0.5).0;
+        assert!((left[23] - middle).abs() < 1e-14 && (right[0] - middle).abs() < 1e-14);
+    }
+
+    /// Polynomials of each number of coefficients, against a fine grid.
+    #[test]
+    fn all_lengths_are_searched_alike() {
+        let mut seed = 1_u64;
+        let mut next = || {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let (mut falls, mut stays) = (0, 0);
+        for length in (2..=24).cycle().take(23 * 40) {
+            let mut scale = 1.0;
+            let mut c: Vec<f64> = (0..length)
+                .map(|k| {
+                    scale *= 2.0 / f64::from(k.max(1));
+                    scale * next()
+                })
+                .collect();
+            c[0] = 0.2 * next().abs();
+            let fine = (1..=20_000).map(|j| f64::from(j) / 20_000.0);
+            let below = fine.clone().find(|&s| value_and_slope(&c, s).0 < 0.0);
+            match (first_fall(&c), below) {
+                (Some(root), Some(below)) => {
+                    assert!(root <= below && root > below - 1e-4, "{c:?}: {root} {below}");
+                    falls += 1;
+                }
+                (None, None) => stays += 1,
+                // A dip between the places of the grid.
+                (Some(root), None) => assert!(value_and_slope(&c, root).0.abs() < 1e-9, "{c:?}: {root}"),
+                (None, Some(below)) => panic!("{c:?}: it falls before {below}"),
+            }
+        }
+        assert!(falls > 200 && stays > 200, "{falls} {stays}");
+    }
+
     #[test]
     fn one_change_of_sign_is_one_root() {
         // e⁻ˢ − 0.5 by its series falls at ln 2, and e⁻ˢ − 0.3 not before 1.

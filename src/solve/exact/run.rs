@@ -82,14 +82,18 @@ impl<'a, const N: usize> Run<'a, N> {
     fn reach(&mut self, row: u64, offset: f64) {
         while (self.row < row || (self.row == row && self.core.common.offset < offset)) && self.goes() {
             self.core.check();
+            let mut looked = false;
             if self.core.common.offset == 0.0 {
                 self.put_out();
-                if self.row < row && self.goes() && self.take_safe_intervals(row - self.row) {
-                    continue;
+                if self.row < row && self.goes() {
+                    if self.take_safe_intervals(row - self.row) {
+                        continue;
+                    }
+                    looked = true;
                 }
             }
             let ahead = if self.row < row { self.grid.interval() } else { offset };
-            match self.advance_shown(ahead - self.core.common.offset) {
+            match self.advance_shown(ahead - self.core.common.offset, looked) {
                 Some(cause) => {
                     self.core.change(cause);
                     self.core.resolve();

@@ -258,13 +258,13 @@ impl<const N: usize> Run<'_, N> {
     }
 
     /// The same as [`Core::advance`], and shows the way to whoever observes.
-    pub(super) fn advance_shown(&mut self, distance: f64) -> Option<Cause> {
+    pub(super) fn advance_shown(&mut self, distance: f64, looked: bool) -> Option<Cause> {
         if !self.is_observed() {
-            return self.core.advance(distance);
+            return self.core.advance(distance, looked);
         }
         let core = &mut self.core;
         let (law, before, begin, offset) = (Arc::clone(&core.matrices), core.z, core.time(), core.common.offset);
-        let cause = core.advance(distance);
+        let cause = core.advance(distance, looked);
         let (after, length) = (core.z, core.common.offset - offset);
         core.z = before;
         let bow = self.bow(&law, length, length);
