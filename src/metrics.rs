@@ -14,7 +14,7 @@ pub use watch::{Sum, Watch, Watched};
 use crate::case::Experiment;
 use crate::friction::Motion;
 use crate::mechanism::{AmplifierMode, Mode, State};
-use crate::solve::{Curve, Event, Gap, Observe, reading};
+use crate::solve::{Curve, Event, Gap, Observe, QUANTITIES, reading};
 use crate::stage::Stage;
 use crate::stage::axis::{BODIES, CART, DRIVE, ROTOR};
 
@@ -213,12 +213,9 @@ impl Meter {
 impl Observe for Meter {
     fn pass(&mut self, gap: &Gap) -> bool {
         let end = gap.begin + gap.length;
-        let (mut news, mut closer) = (false, false);
-        for (q, peak) in self.peaks.iter().enumerate() {
-            let height = peak.value.abs();
-            news |= gap.from[q].abs().max(gap.to[q].abs()) > height;
-            closer |= gap.bound(q) > height * (1.0 + NEWS);
-        }
+        let mut heights = [f64::INFINITY; QUANTITIES];
+        heights.iter_mut().zip(&self.peaks).for_each(|(height, peak)| *height = peak.value.abs());
+        let (news, mut closer) = gap.rises_above(&heights, 1.0 + NEWS);
         if news {
             for (q, peak) in self.peaks.iter_mut().enumerate() {
                 peak.take(gap.from[q], gap.begin);

@@ -158,7 +158,10 @@ impl Mechanism {
     pub(crate) fn balanced_inertia(&self, equations: &Equations, mode: &Mode) -> [f64; BODIES] {
         let mut inertia = equations.inertia;
         for (index, drive) in self.drives.iter().enumerate().filter(|(_, drive)| drive.loses()) {
-            if let Some(spring) = self.gear_spring(index) {
+            // Flanks that are apart, and rotors that stand, pass nothing on.
+            let passes =
+                |spring: &usize| equations.stiffness[*spring] > 0.0 && mode.motion[drive.shaft] != Motion::Stuck;
+            if let Some(spring) = self.gear_spring(index).filter(passes) {
                 let forward = mode.motion[drive.shaft] != Motion::Backward;
                 inertia[drive.shaft] /= self.gear_share(drive.shaft, spring, forward, mode);
             }

@@ -39,13 +39,17 @@ impl Pieces {
     /// The same from `time` on: powers count from there.
     pub fn since(&self, time: f64) -> Self {
         let by = time - self.start;
-        Self { start: time, end: self.end, coefficients: self.coefficients.map(|c| Self::shifted(&c, by)) }
+        let mut pieces = Self { start: time, ..*self };
+        for coefficients in &mut pieces.coefficients {
+            *coefficients = Self::shifted(coefficients, by);
+        }
+        pieces
     }
 
     /// Coefficients in powers of (τ − `by`) of Σ c_k τᵏ: Horner's rule, again and again.
     pub(super) fn shifted(coefficients: &[f64; DEGREE + 1], by: f64) -> [f64; DEGREE + 1] {
         let mut shifted = *coefficients;
-        if by != 0.0 {
+        if by != 0.0 && coefficients[1..].iter().any(|&c| c != 0.0) {
             for i in 0..DEGREE {
                 for k in (i..DEGREE).rev() {
                     shifted[k] += by * shifted[k + 1];

@@ -61,6 +61,33 @@ impl Gap<'_> {
         middle + rise(half, bow)
     }
 
+    /// Whether the magnitude of any quantity is above its height at either end, and whether it can be above `factor` times that within.
+    pub fn rises_above(&self, heights: &Reading, factor: f64) -> (bool, bool) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.rises_above_by_avx2(heights, factor) };
+        }
+        self.rises_above_by_any(heights, factor)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn rises_above_by_avx2(&self, heights: &Reading, factor: f64) -> (bool, bool) {
+        self.rises_above_by_any(heights, factor)
+    }
+
+    #[inline(always)]
+    fn rises_above_by_any(&self, heights: &Reading, factor: f64) -> (bool, bool) {
+        let (mut ends, mut within) = (0_u64, 0_u64);
+        for q in 0..QUANTITIES {
+            let (from, to, height) = (self.from[q], self.to[q], heights[q]);
+            ends |= u64::from(from.abs() > height) | u64::from(to.abs() > height);
+            within |= u64::from(Self::bound_of(from, to, self.bow[q]) > height * factor);
+        }
+        (ends != 0, within != 0)
+    }
+
     /// Bounds of the value of quantity `q` within, from below and above.
     pub fn range(&self, q: usize) -> (f64, f64) {
         let (middle, half) = (0.5 * (self.from[q] + self.to[q]), 0.5 * (self.to[q] - self.from[q]).abs());
@@ -98,6 +125,22 @@ impl Curve {
 
     /// The curve from values and the first three derivatives by s, each over its order's factorial, at both ends.
     pub(super) fn through(begin: f64, length: f64, from: &[Reading; 4], to: &[Reading; 4]) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { Self::through_by_avx2(begin, length, from, to) };
+        }
+        Self::through_by_any(begin, length, from, to)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn through_by_avx2(begin: f64, length: f64, from: &[Reading; 4], to: &[Reading; 4]) -> Self {
+        Self::through_by_any(begin, length, from, to)
+    }
+
+    #[inline(always)]
+    fn through_by_any(begin: f64, length: f64, from: &[Reading; 4], to: &[Reading; 4]) -> Self {
         let mut terms = [[0.0; QUANTITIES]; TERMS];
         terms[..4].copy_from_slice(from);
         let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (from, to);

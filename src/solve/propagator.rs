@@ -354,6 +354,37 @@ mod tests {
         }
     }
 
+    /// Wider vectors do the same operations in the same order: the same bits on every processor.
+    #[cfg(target_arch = "x86_64")]
+    #[test]
+    fn wider_vectors_give_the_same_bits() {
+        if !std::arch::is_x86_feature_detected!("avx2") {
+            return;
+        }
+        let mut number = 0.37_f64;
+        let mut next = || {
+            number = (997.0 * number).fract();
+            number - 0.5
+        };
+        let mut a = Matrix::<12, 12>::zero();
+        (0..12).for_each(|row| (0..12).for_each(|column| a.set(row, column, 0.1 * next())));
+        let z: [f64; 12] = std::array::from_fn(|_| next());
+        let bits = |list: &[f64]| list.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+        let (mut wide, mut narrow) = (Series::room(), Series::room());
+        a.series(&z, 1.9, 23, &mut wide);
+        narrow.order = 23;
+        a.series_by_any(&z, 1.9, &mut narrow);
+        assert_eq!(bits(wide.terms.as_flattened()), bits(narrow.terms.as_flattened()));
+        assert_eq!(bits(&wide.change(0.77)), bits(&wide.change_by_any(0.77)));
+        let (p, q) = (a.exponential(0.2).doubled(), a.exponential_by_any(0.2).doubled_by_any());
+        assert_eq!(bits(p.column.as_flattened()), bits(q.column.as_flattened()));
+        let [mut one, mut other] = [(z, [0.0; 12], [[0.0; 12]; 7]); 2];
+        p.advance_rows(&mut one.0, &mut one.1, &mut one.2);
+        p.advance_rows_by_any(&mut other.0, &mut other.1, &mut other.2);
+        assert_eq!(bits(one.2.as_flattened()), bits(other.2.as_flattened()));
+        assert_eq!((bits(&one.0), bits(&one.1)), (bits(&other.0), bits(&other.1)));
+    }
+
     #[test]
     fn rotation_by_doubling() {
         // ż₀ = ω z₁, ż₁ = −ω z₀ turns by ω t; a constant drives z₂ = t.

@@ -118,7 +118,29 @@ fn search<const N: usize>(c: &[f64], b: &[f64; N], low: f64, high: f64) -> Optio
         // What only touches within a point is told by the sign at the end.
         return ends_below.then(|| polish(c, (low, b[0]), (high, b[N - 1])));
     }
-    // de Casteljau: the coefficients of both halves
+    let (left, right) = halves(b);
+    let middle = 0.5 * (low + high);
+    search(c, &left, low, middle).or_else(|| search(c, &right, middle, high))
+}
+
+/// The coefficients on both halves, by de Casteljau's scheme.
+fn halves<const N: usize>(b: &[f64; N]) -> ([f64; N], [f64; N]) {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        return unsafe { halves_by_avx2(b) };
+    }
+    halves_by_any(b)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn halves_by_avx2<const N: usize>(b: &[f64; N]) -> ([f64; N], [f64; N]) {
+    halves_by_any(b)
+}
+
+#[inline(always)]
+fn halves_by_any<const N: usize>(b: &[f64; N]) -> ([f64; N], [f64; N]) {
     let (mut left, mut right) = ([0.0; N], *b);
     for (i, left) in left.iter_mut().enumerate() {
         *left = right[0];
@@ -126,9 +148,8 @@ fn search<const N: usize>(c: &[f64], b: &[f64; N], low: f64, high: f64) -> Optio
             right[j] = 0.5 * (right[j] + right[j + 1]);
         }
     }
-    let middle = 0.5 * (low + high);
-    // What is left in `right` runs from the middle outwards, the other way round.
-    search(c, &left, low, middle).or_else(|| search(c, &right, middle, high))
+    // What is left runs from the middle outwards.
+    (left, right)
 }
 
 /// Newton's method kept within a bracket whose upper end is negative; halving where it would leave it. It begins where a straight line
@@ -161,6 +182,60 @@ mod tests {
         // (s − 0.3)(s − 0.31) falls at 0.3
         let root = first_fall(&[0.3 * 0.31, -0.61, 1.0]).unwrap();
         assert!((root - 0.3).abs() < 1e-14, "{root}");
+    }
+
+    /// Wider vectors do the same operations in the same order.
+    #[cfg(target_arch = "x86_64")]
+    #[test]
+    fn wider_vectors_give_the_same_bits() {
+        if !std::arch::is_x86_feature_detected!("avx2") {
+            return;
+        }
+        let c: [f64; 24] = std::array::from_fn(|k| (1.7 * k as f64).sin() / (1.0 + k as f64));
+        let b = bernstein(&c, &RATIOS_24);
+        // SAFETY: the processor has AVX2.
+        assert_eq!(unsafe { bernstein_by_avx2(&c, &RATIOS_24) }.map(f64::to_bits), b.map(f64::to_bits));
+        let (left, right) = halves(&b);
+        let (plain_left, plain_right) = halves_by_any(&b);
+        assert_eq!(left.map(f64::to_bits), plain_left.map(f64::to_bits));
+        assert_eq!(right.map(f64::to_bits), plain_right.map(f64::to_bits));
+        // Both halves meet in the middle: Σ c_k 2⁻ᵏ.
+        let middle = value_and_slope(&c, 0.5).0;
+        assert!((left[23] - middle).abs() < 1e-14 && (right[0] - middle).abs() < 1e-14);
+    }
+
+    /// Polynomials of each number of coefficients, against a fine grid.
+    #[test]
+    fn all_lengths_are_searched_alike() {
+        let mut seed = 1_u64;
+        let mut next = || {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let (mut falls, mut stays) = (0, 0);
+        for length in (2..=24).cycle().take(23 * 40) {
+            let mut scale = 1.0;
+            let mut c: Vec<f64> = (0..length)
+                .map(|k| {
+                    scale *= 2.0 / f64::from(k.max(1));
+                    scale * next()
+                })
+                .collect();
+            c[0] = 0.2 * next().abs();
+            let fine = (1..=20_000).map(|j| f64::from(j) / 20_000.0);
+            let below = fine.clone().find(|&s| value_and_slope(&c, s).0 < 0.0);
+            match (first_fall(&c), below) {
+                (Some(root), Some(below)) => {
+                    assert!(root <= below && root > below - 1e-4, "{c:?}: {root} {below}");
+                    falls += 1;
+                }
+                (None, None) => stays += 1,
+                // A dip between the places of the grid.
+                (Some(root), None) => assert!(value_and_slope(&c, root).0.abs() < 1e-9, "{c:?}: {root}"),
+                (None, Some(below)) => panic!("{c:?}: it falls before {below}"),
+            }
+        }
+        assert!(falls > 200 && stays > 200, "{falls} {stays}");
     }
 
     #[test]

@@ -44,6 +44,18 @@ impl Grid {
         if k >= self.intervals { self.until } else { self.interval.times(k) }
     }
 
+    /// Times of the rows from `first` on, s.
+    pub(crate) fn times(&self, first: u64, out: &mut [f64]) {
+        let (last, Interval { over, under, exact, .. }) = (first + out.len() as u64, self.interval);
+        if last > exact.min(self.intervals) {
+            (first..).zip(out).for_each(|(k, time)| *time = self.time(k));
+            return;
+        }
+        // The numbers of rows are whole, and far below 2⁵³.
+        let first = first as f64;
+        out.iter_mut().enumerate().for_each(|(j, time)| *time = (first + f64::from(j as u32)) * over / under);
+    }
+
     /// Number of intervals; there is one row more.
     pub fn intervals(&self) -> u64 {
         self.intervals

@@ -90,6 +90,11 @@ pub(in crate::solve) struct Size {
 impl Size {
     pub(super) const ZERO: Size = Size { mechanical: 0.0, magnetic: 0.0 };
 
+    /// That of a rate `factor` times as large.
+    pub(super) fn times(self, factor: f64) -> Size {
+        Size { mechanical: self.mechanical * factor, magnetic: self.magnetic * factor }
+    }
+
     /// Of both parts together.
     fn whole(self) -> f64 {
         (self.mechanical * self.mechanical + self.magnetic * self.magnetic).sqrt()
@@ -185,6 +190,9 @@ pub(super) type Values = [f64; GUARDS];
 /// Room for what looks at the guards need.
 #[derive(Clone)]
 pub(super) struct Room<const N: usize> {
+    /// ż and its size at the last look.
+    pub(super) rate: [f64; N],
+    pub(super) size: Size,
     pub(super) value: Values,
     pub(super) steepness: Values,
     pub(super) slope: Values,
@@ -197,7 +205,8 @@ impl<const N: usize> Room<N> {
     pub(super) fn new() -> Self {
         let none = [0.0; GUARDS];
         let (series, coefficients) = (Series::room(), [0.0; SERIES_TERMS]);
-        Self { value: none, steepness: none, slope: none, bend: none, series, coefficients }
+        let (rate, size) = ([0.0; N], Size::ZERO);
+        Self { rate, size, value: none, steepness: none, slope: none, bend: none, series, coefficients }
     }
 }
 

@@ -198,7 +198,8 @@ impl<const N: usize> Core<N> {
             let snapped = (left / eighth).round() * eighth;
             let left = if (left - snapped).abs() <= near { snapped } else { left };
             let matrices = Arc::clone(&self.matrices);
-            let safe = match left >= self.common.h {
+            let looked = left >= self.common.h;
+            let safe = match looked {
                 true => self.safe_intervals(&matrices, (left / self.common.h) as u64).0,
                 false => 0,
             };
@@ -209,7 +210,7 @@ impl<const N: usize> Core<N> {
                 self.move_on(safe as f64 * self.common.h);
                 continue;
             }
-            if let Some(cause) = self.advance(left.min(self.common.h)) {
+            if let Some(cause) = self.advance(left.min(self.common.h), looked) {
                 self.change(cause);
                 self.resolve();
             } else if left <= self.common.h && !self.common.asks && self.common.trouble.is_none() {
@@ -287,8 +288,8 @@ impl<const N: usize> Core<N> {
 
     /// How many whole intervals, up to `most`, no guard can fall on; and whether nothing moves.
     fn safe_intervals(&mut self, law: &ModeMatrices<N>, most: u64) -> (u64, bool) {
-        let (rate, size) = law.look(&self.z, &mut self.room.value);
-        let resting = rate == [0.0; N];
+        self.look(law);
+        let resting = self.room.rate == [0.0; N];
         if law.guards.is_empty() {
             return (most, resting);
         }
@@ -297,10 +298,9 @@ impl<const N: usize> Core<N> {
             return (0, resting);
         }
         // g(τ) ≥ g − (|w| √2V + |w_u| |u̇|) τ − |w| |b| |u̇| τ²/2
-        self.stand(law);
         let grow = law.growth_factor();
-        let Room { value, steepness, bend, .. } = &mut *self.room;
-        law.steepness((size, 0.0), grow, &self.common.input_rate, steepness);
+        let Room { size, value, steepness, bend, .. } = &mut *self.room;
+        law.steepness((*size, 0.0), grow, &self.common.input_rate, steepness);
         let push = law.push(&self.common.input_rate) * 0.5;
         let mut time = f64::INFINITY;
         if push == 0.0 {
@@ -325,6 +325,13 @@ impl<const N: usize> Core<N> {
         (most.min((time / self.common.h * 0.999) as u64), resting)
     }
 
+    /// Looks at the state: ż, its size, and the guards, forgiven what rounding alone may have made negative.
+    #[inline]
+    fn look(&mut self, law: &ModeMatrices<N>) {
+        (self.room.rate, self.room.size) = law.look(&self.z, &mut self.room.value);
+        self.stand(law);
+    }
+
     /// Forgives the values of the guards what rounding alone may have made negative.
     #[inline]
     fn stand(&mut self, law: &ModeMatrices<N>) {
@@ -343,22 +350,25 @@ impl<const N: usize> Core<N> {
         }
     }
 
-    /// Advances by `distance`, at most an interval; stops at the first guard that falls and says why.
-    pub(super) fn advance(&mut self, mut distance: f64) -> Option<Cause> {
+    /// Advances by `distance`, at most an interval; stops at the first guard that falls and says why. `looked` says that it has just
+    /// been looked at where it stands.
+    pub(super) fn advance(&mut self, mut distance: f64, mut looked: bool) -> Option<Cause> {
         let law = Arc::clone(&self.matrices);
         if self.common.is_fresh && distance > 0.0 {
             // A speed that starts from zero is told apart from one that falls to zero by its series.
             let first = distance.min(law.far());
-            if let Some(cause) = self.advance_by_series(&law, first) {
+            if let Some(cause) = self.advance_by_series(&law, first, looked) {
                 return Some(cause);
             }
+            looked = false;
             distance -= first;
         }
         for level in 0..=law.coarsest {
             while distance >= law.length(level) && self.goes() {
-                if let Some(cause) = self.cross_interval(&law, level) {
+                if let Some(cause) = self.cross_interval(&law, level, looked) {
                     return Some(cause);
                 }
+                looked = false;
                 distance -= law.length(level);
             }
         }
@@ -368,17 +378,20 @@ impl<const N: usize> Core<N> {
         // Half an interval and the like is met again and again: there is a matrix for it.
         let exact = (law.coarsest + 1..=law.finest.min(HALVES)).find(|&level| distance == law.length(level));
         match exact {
-            Some(level) => self.cross_interval(&law, level),
-            None => self.advance_by_series(&law, distance),
+            Some(level) => self.cross_interval(&law, level, looked),
+            None => self.advance_by_series(&law, distance, looked),
         }
     }
 
     /// Crosses an interval of h/2^level.
-    fn cross_interval(&mut self, law: &ModeMatrices<N>, level: usize) -> Option<Cause> {
+    fn cross_interval(&mut self, law: &ModeMatrices<N>, level: usize, looked: bool) -> Option<Cause> {
         if !self.goes_on() {
             return None;
         }
         let length = law.length(level);
+        if !looked {
+            self.look(law);
+        }
         match self.bound(law, length, Some(level)) {
             Bound::Safe(end) => {
                 match end {
@@ -390,9 +403,9 @@ impl<const N: usize> Core<N> {
                 None
             }
             Bound::Unsure if level < law.coarsest => {
-                self.cross_interval(law, level + 1).or_else(|| self.cross_interval(law, level + 1))
+                self.cross_interval(law, level + 1, true).or_else(|| self.cross_interval(law, level + 1, false))
             }
-            Bound::Unsure => self.advance_by_series(law, length),
+            Bound::Unsure => self.advance_by_series(law, length, true),
         }
     }
 
@@ -416,18 +429,16 @@ impl<const N: usize> Core<N> {
         self.common.since_change += by;
     }
 
-    /// Decides, if it can, that no guard falls within `length`.
+    /// Decides by the last look, if it can, that no guard falls within `length`.
     fn bound(&mut self, law: &ModeMatrices<N>, length: f64, level: Option<usize>) -> Bound<N> {
         if law.guards.is_empty() {
             return Bound::Safe(None);
         }
         self.common.cost.looks += 1;
-        let (rate, size) = law.look(&self.z, &mut self.room.value);
         let grow = law.growth_over(length);
-        self.stand(law);
         let (input_rate, curvature) = (&self.common.input_rate, &self.common.input_curvature);
-        let Room { value, steepness, slope, bend, .. } = &mut *self.room;
-        law.steepness((size, law.push(input_rate) * length), grow, input_rate, steepness);
+        let Room { rate, size, value, steepness, slope, bend, .. } = &mut *self.room;
+        law.steepness((*size, law.push(input_rate) * length), grow, input_rate, steepness);
         let undecided = |lane: usize| {
             let (g, steepness) = (value[lane], steepness[lane]);
             !(g > steepness * length || (g >= 0.0 && steepness == 0.0))
@@ -436,7 +447,7 @@ impl<const N: usize> Core<N> {
         let Some(first) = guards.clone().find(|&lane| undecided(lane)) else { return Bound::Safe(None) };
 
         // The same one derivative higher: its guards are the slopes.
-        let (_, size) = law.look(&rate, slope);
+        let (_, size) = law.look(rate, slope);
         law.steepness((size, law.push(curvature) * length), grow, curvature, bend);
         let mut falling = false;
         for lane in (first..guards.end).filter(|&lane| undecided(lane)) {
@@ -455,22 +466,23 @@ impl<const N: usize> Core<N> {
         // What falls all the way has not fallen through if it is still positive at the end.
         let mut end = self.z;
         law.step(level).advance(&mut end);
-        law.values(&end, value);
-        if guards.into_iter().all(|lane| value[lane] > 0.0) { Bound::Safe(Some(end)) } else { Bound::Unsure }
+        law.values(&end, slope);
+        if guards.into_iter().all(|lane| slope[lane] > 0.0) { Bound::Safe(Some(end)) } else { Bound::Unsure }
     }
 
     /// Advances by a `distance` within the reach of the Taylor series, to the first guard that falls.
-    fn advance_by_series(&mut self, law: &ModeMatrices<N>, distance: f64) -> Option<Cause> {
+    fn advance_by_series(&mut self, law: &ModeMatrices<N>, distance: f64, looked: bool) -> Option<Cause> {
         self.common.cost.series += 1;
+        if !looked {
+            self.look(law);
+        }
         law.series(&self.z, distance, &mut self.room.series);
         let mut first: Option<(f64, Cause)> = None;
-        law.values(&self.z, &mut self.room.value);
-        self.stand(law);
-        // Term 1 of the series is ż · distance: most guards are too far away to fall, as in `bound`.
+        // Most guards are too far away to fall, as in `bound`.
         let rate = self.common.input_rate;
-        let Room { value, steepness, series, coefficients, .. } = &mut *self.room;
+        let Room { size, value, steepness, series, coefficients, .. } = &mut *self.room;
         law.steepness(
-            (law.size(&series.terms[1]), law.push(&rate) * distance * distance),
+            (size.times(distance), law.push(&rate) * distance * distance),
             law.growth_over(distance),
             &rate.map(|rate| rate * distance),
             steepness,

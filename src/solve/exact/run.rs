@@ -53,11 +53,11 @@ impl<'a, const N: usize> Run<'a, N> {
         if self.row < last && self.grid.time(self.row + 1) == time {
             return (self.row + 1, 0.0);
         }
+        // Right but for rounding.
         let mut row = ((time / h) as u64).min(last);
-        while row > 0 && self.grid.time(row) > time {
+        if row > 0 && self.grid.time(row) > time {
             row -= 1;
-        }
-        while row < last && self.grid.time(row + 1) <= time {
+        } else if row < last && self.grid.time(row + 1) <= time {
             row += 1;
         }
         let offset = time - self.grid.time(row);
@@ -82,14 +82,18 @@ impl<'a, const N: usize> Run<'a, N> {
     fn reach(&mut self, row: u64, offset: f64) {
         while (self.row < row || (self.row == row && self.core.common.offset < offset)) && self.goes() {
             self.core.check();
+            let mut looked = false;
             if self.core.common.offset == 0.0 {
                 self.put_out();
-                if self.row < row && self.goes() && self.take_safe_intervals(row - self.row) {
-                    continue;
+                if self.row < row && self.goes() {
+                    if self.take_safe_intervals(row - self.row) {
+                        continue;
+                    }
+                    looked = true;
                 }
             }
             let ahead = if self.row < row { self.grid.interval() } else { offset };
-            match self.advance_shown(ahead - self.core.common.offset) {
+            match self.advance_shown(ahead - self.core.common.offset, looked) {
                 Some(cause) => {
                     self.core.change(cause);
                     self.core.resolve();

@@ -21,12 +21,13 @@ const SAME: f64 = 1e-10;
 /// Curves in a row that are right before longer ones are tried.
 const RIGHT: u32 = 32;
 
-/// An instant as an observer sees it.
+/// An instant as an observer sees it; rates, and the terms of curves that begin or end there, are made ready when they are first wanted.
 struct Sight<const N: usize> {
     z: [f64; N],
-    rate: [f64; N],
     value: Reading,
-    slope: Reading,
+    slope: Option<([f64; N], Reading)>,
+    /// q̈ and q⃛
+    terms: Option<[Reading; 2]>,
 }
 
 /// Where an observer is.
@@ -140,7 +141,7 @@ impl<const N: usize> Run<'_, N> {
             let series = &mut self.core.room.series;
             law.series(&z, length, series);
             series.add_to(&mut end, 1.0);
-            let curve = self.curve(law, &self.sight(law, &z), &self.sight(law, &end), begin, length);
+            let curve = self.curve(law, &mut self.sight(law, &z), &mut self.sight(law, &end), begin, length);
             self.see(&curve);
         }
     }
@@ -153,10 +154,10 @@ impl<const N: usize> Run<'_, N> {
         for part in 0..parts {
             let mut end = from.z;
             law.step(fine).advance(&mut end);
-            let to = self.sight(law, &end);
+            let mut to = self.sight(law, &end);
             let begin = begin + part as f64 * length;
-            if self.asks(&from, &to, begin, length) {
-                self.show_curve(law, &from, &to, begin, fine);
+            if self.asks(law, &mut from, &mut to, begin, length) {
+                self.show_curve(law, &mut from, &mut to, begin, fine);
             }
             from = to;
         }
@@ -165,17 +166,18 @@ impl<const N: usize> Run<'_, N> {
 
     /// Whether the observer wants to see closer what a cubic tells of a way: with slopes a and b at its ends and d between, it is off a
     /// straight line by s (1 − s) ((a − d)(1 − s) − (b − d) s).
-    fn asks(&mut self, from: &Sight<N>, to: &Sight<N>, begin: f64, length: f64) -> bool {
+    fn asks(&mut self, law: &ModeMatrices<N>, from: &mut Sight<N>, to: &mut Sight<N>, begin: f64, length: f64) -> bool {
+        let (from_slope, to_slope) = (self.slope(law, from), self.slope(law, to));
         let bow: Reading = std::array::from_fn(|q| {
             let across = to.value[q] - from.value[q];
-            let (a, b) = ((from.slope[q] * length - across).abs(), (to.slope[q] * length - across).abs());
+            let (a, b) = ((from_slope[q] * length - across).abs(), (to_slope[q] * length - across).abs());
             0.25 * MARGIN * if a > b { a } else { b }
         });
         self.ask(begin, length, &from.value, &to.value, &bow)
     }
 
     /// Shows an interval of h/2^level as a curve, or two halves of it where that is not right.
-    fn show_curve(&mut self, law: &ModeMatrices<N>, from: &Sight<N>, to: &Sight<N>, begin: f64, level: usize) {
+    fn show_curve(&mut self, law: &ModeMatrices<N>, from: &mut Sight<N>, to: &mut Sight<N>, begin: f64, level: usize) {
         self.watching.curves += 1;
         let length = law.length(level);
         let curve = self.curve(law, from, to, begin, length);
@@ -185,7 +187,7 @@ impl<const N: usize> Run<'_, N> {
         }
         let mut middle = from.z;
         law.step(level + 1).advance(&mut middle);
-        let middle = self.sight(law, &middle);
+        let mut middle = self.sight(law, &middle);
         let near = |((is, told), scale): ((&f64, f64), &f64)| (is - told).abs() <= OFF * scale;
         if middle.value.iter().zip(curve.at(0.5)).zip(&self.watching.scale).all(near) {
             // What has been right for a while may be right over a longer way.
@@ -198,18 +200,27 @@ impl<const N: usize> Run<'_, N> {
         }
         (self.watching.right, self.watching.level) = (0, self.watching.level.max(level + 1));
         let half = 0.5 * length;
-        for (from, to, begin) in [(from, &middle, begin), (&middle, to, begin + half)] {
-            if self.asks(from, to, begin, half) {
-                self.show_curve(law, from, to, begin, level + 1);
-            }
+        if self.asks(law, from, &mut middle, begin, half) {
+            self.show_curve(law, from, &mut middle, begin, level + 1);
+        }
+        if self.asks(law, &mut middle, to, begin + half, half) {
+            self.show_curve(law, &mut middle, to, begin + half, level + 1);
         }
     }
 
     /// What is to be seen of `z`.
     fn sight(&self, law: &ModeMatrices<N>, z: &[f64; N]) -> Sight<N> {
-        let rate = law.rate(z);
         let value = self.read(law.shown(&self.core.common.mechanism, &self.core.common.space), z);
-        Sight { z: *z, rate, value, slope: self.rates(law, &rate) }
+        Sight { z: *z, value, slope: None, terms: None }
+    }
+
+    /// The rates of what is read.
+    fn slope(&self, law: &ModeMatrices<N>, sight: &mut Sight<N>) -> Reading {
+        let fresh = || {
+            let rate = law.rate(&sight.z);
+            (rate, self.rates(law, &rate))
+        };
+        sight.slope.get_or_insert_with(fresh).1
     }
 
     /// Rates of what is read, `rate` being that of z.
@@ -217,17 +228,22 @@ impl<const N: usize> Run<'_, N> {
         law.shown(&self.core.common.mechanism, &self.core.common.space).change(rate)
     }
 
-    /// The curve between two sights.
-    fn curve(&self, law: &ModeMatrices<N>, from: &Sight<N>, to: &Sight<N>, begin: f64, length: f64) -> Curve {
-        let terms = |sight: &Sight<N>| {
-            let second = law.rate(&sight.rate);
-            let third = law.rate(&second);
-            // q, q̇ h, q̈ h²/2, q⃛ h³/6
-            let [h1, h2, h3] = [length, length * length / 2.0, length * length * length / 6.0];
-            let (slope, second, third) = (sight.slope, self.rates(law, &second), self.rates(law, &third));
-            [sight.value, slope.map(|v| v * h1), second.map(|v| v * h2), third.map(|v| v * h3)]
+    /// What is read and its first three derivatives, each times h to its order and over its factorial: q, q̇ h, q̈ h²/2, q⃛ h³/6.
+    fn terms(&self, law: &ModeMatrices<N>, sight: &mut Sight<N>, length: f64) -> [Reading; 4] {
+        let slope = self.slope(law, sight);
+        let higher = || {
+            let rate = sight.slope.map_or_else(|| law.rate(&sight.z), |(rate, _)| rate);
+            let second = law.rate(&rate);
+            [self.rates(law, &second), self.rates(law, &law.rate(&second))]
         };
-        Curve::through(begin, length, &terms(from), &terms(to))
+        let [second, third] = *sight.terms.get_or_insert_with(higher);
+        let [h1, h2, h3] = [length, length * length / 2.0, length * length * length / 6.0];
+        [sight.value, slope.map(|v| v * h1), second.map(|v| v * h2), third.map(|v| v * h3)]
+    }
+
+    /// The curve between two sights.
+    fn curve(&self, law: &ModeMatrices<N>, from: &mut Sight<N>, to: &mut Sight<N>, begin: f64, length: f64) -> Curve {
+        Curve::through(begin, length, &self.terms(law, from, length), &self.terms(law, to, length))
     }
 
     fn see(&mut self, curve: &Curve) {
@@ -242,13 +258,13 @@ impl<const N: usize> Run<'_, N> {
     }
 
     /// The same as [`Core::advance`], and shows the way to whoever observes.
-    pub(super) fn advance_shown(&mut self, distance: f64) -> Option<Cause> {
+    pub(super) fn advance_shown(&mut self, distance: f64, looked: bool) -> Option<Cause> {
         if !self.is_observed() {
-            return self.core.advance(distance);
+            return self.core.advance(distance, looked);
         }
         let core = &mut self.core;
         let (law, before, begin, offset) = (Arc::clone(&core.matrices), core.z, core.time(), core.common.offset);
-        let cause = core.advance(distance);
+        let cause = core.advance(distance, looked);
         let (after, length) = (core.z, core.common.offset - offset);
         core.z = before;
         let bow = self.bow(&law, length, length);

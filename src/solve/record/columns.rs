@@ -229,7 +229,7 @@ impl Columns {
                 values.resize(block.count, 0.0);
             }
             if heading.shown == Shown::Time {
-                (block.first..).zip(values).for_each(|(row, time)| *time = block.grid.time(row));
+                block.grid.times(block.first, values);
                 continue;
             }
             let (written, rest) = values.split_at_mut(block.written);
