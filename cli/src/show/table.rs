@@ -2,7 +2,7 @@
 
 use crate::terminal::bold;
 use std::fmt::Write;
-use taut::number::{ascii, engineering_ascii, fixed};
+use taut::number::{ascii, engineering, fixed};
 use taut::overview::{Overview, Place, Row};
 
 /// Width of the column of names.
@@ -16,7 +16,7 @@ pub fn text(overview: &Overview) -> String {
     for group in &overview.groups {
         let _ = write!(text, "\n{}\n", bold(group.name));
         for row in &group.rows {
-            let value = value(row);
+            let value = ascii(&value(row));
             let line = format!("  {:<NAMES$}{value:<VALUES$}{}", row.name, ascii(&row.how));
             let _ = writeln!(text, "{}", line.trim_end());
         }
@@ -32,8 +32,8 @@ pub fn text(overview: &Overview) -> String {
 /// A value as it is read: shares in per cent.
 pub fn value(row: &Row) -> String {
     match row.unit {
-        "" if row.key.contains("share") => format!("{} %", engineering_ascii(100.0 * row.value, "", 3)),
-        unit => engineering_ascii(row.value, unit, 4),
+        "" if row.key.contains("share") => format!("{} %", engineering(100.0 * row.value, "", 3)),
+        unit => engineering(row.value, unit, 4),
     }
 }
 
@@ -45,7 +45,7 @@ fn places(text: &mut String, overview: &Overview) {
     }
     let _ = write!(text, "\n{}\n", bold(if is_axis { "Along the travel" } else { "Over the working area" }));
     for (k, row) in rows(overview).iter().enumerate() {
-        let cells: Vec<String> = row.iter().map(|cell| format!("{cell:>15}")).collect();
+        let cells: Vec<String> = row.iter().map(|cell| format!("{:>12}", ascii(cell))).collect();
         let line = format!("  {}", cells.concat());
         let _ = writeln!(text, "{}", if k == 0 { line.to_lowercase().replace("hz", "Hz") } else { line });
     }
@@ -64,13 +64,13 @@ pub fn rows(overview: &Overview) -> Vec<Vec<String>> {
     let has_held = overview.places.iter().any(|place| place.held.is_some());
     head.extend(has_held.then(|| "Drive held".to_string()));
     let row = |place: &Place| {
-        let mut row: Vec<String> = place.position.iter().map(|x| ascii(&format!("{} mm", fixed(1e3 * x, 1)))).collect();
-        row.extend(place.stretch.iter().map(|stretch| engineering_ascii(*stretch, "m/N", 4)));
+        let mut row: Vec<String> = place.position.iter().map(|x| format!("{} mm", fixed(1e3 * x, 1))).collect();
+        row.extend(place.stretch.iter().map(|stretch| engineering(*stretch, "m/N", 4)));
         for (hertz, ratio) in &place.modes {
-            row.push(engineering_ascii(*hertz, "Hz", 4));
-            row.push(ratio.map_or("-".to_string(), |ratio| engineering_ascii(ratio, "", 3)));
+            row.push(engineering(*hertz, "Hz", 4));
+            row.push(ratio.map_or("-".to_string(), |ratio| engineering(ratio, "", 3)));
         }
-        row.extend(place.held.map(|hertz| engineering_ascii(hertz, "Hz", 4)));
+        row.extend(place.held.map(|hertz| engineering(hertz, "Hz", 4)));
         row
     };
     std::iter::once(head).chain(overview.places.iter().map(row)).collect()
