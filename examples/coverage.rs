@@ -298,6 +298,7 @@ fn recorded(cell: &Cell, truth: [f64; 3], chance: &mut Chance) -> Case {
             hold: Hold::Zero,
             reference: None,
             outputs: vec![Output { quantity: Quantity::DriveAngle, absolute: false, values }],
+            ended: None,
         };
         let mut experiment = pattern.clone();
         (experiment.name, experiment.until, experiment.every) = (log.name.clone(), until, EVERY);

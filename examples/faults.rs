@@ -223,6 +223,7 @@ fn made(fault: Fault, seed: u64) -> Case {
         hold: Hold::Zero,
         reference: None,
         outputs,
+        ended: None,
     }));
     case.experiments = vec![experiment];
     case

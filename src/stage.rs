@@ -310,11 +310,13 @@ pub enum Quantity {
     RotorAngle,
     /// φ_r′, rad/s.
     RotorSpeed,
+    /// x″, m/s².
+    CartAcceleration,
 }
 
 impl Quantity {
     /// All of them, in the order of a log.
-    pub const ALL: [Quantity; 10] = [
+    pub const ALL: [Quantity; 11] = [
         Quantity::MotorCurrent,
         Quantity::MotorVoltage,
         Quantity::DriveAngle,
@@ -325,6 +327,7 @@ impl Quantity {
         Quantity::IdlerSpeed,
         Quantity::RotorAngle,
         Quantity::RotorSpeed,
+        Quantity::CartAcceleration,
     ];
 
     /// Its name, in case files and as a column.
@@ -340,6 +343,7 @@ impl Quantity {
             Quantity::IdlerSpeed => "idler_speed",
             Quantity::RotorAngle => "rotor_angle",
             Quantity::RotorSpeed => "rotor_speed",
+            Quantity::CartAcceleration => "cart_acceleration",
         }
     }
 
@@ -352,6 +356,7 @@ impl Quantity {
             Quantity::DriveSpeed | Quantity::IdlerSpeed | Quantity::RotorSpeed => "rad/s",
             Quantity::CartPosition => "m",
             Quantity::CartSpeed => "m/s",
+            Quantity::CartAcceleration => "m/s^2",
         }
     }
 }

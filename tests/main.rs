@@ -33,6 +33,7 @@ mod parameters;
 mod posterior;
 mod published;
 mod quantity;
+mod recorders;
 mod reference;
 
 mod rounding;

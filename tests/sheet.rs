@@ -201,7 +201,16 @@ fn counted(counts: f64) -> Log {
     let values = time.iter().map(|t| (counts * 0.05 * (1.0 - (2.0 * t).cos())).round() / counts).collect();
     let outputs = vec![Output { quantity: Quantity::CartPosition, absolute: false, values }];
     let input = time.iter().map(|t| 2.0 * (2.0 * t).sin()).collect();
-    Log { name: "to and fro".into(), file: "log.csv".into(), time, input, hold: Hold::Zero, reference: None, outputs }
+    Log {
+        name: "to and fro".into(),
+        file: "log.csv".into(),
+        time,
+        input,
+        hold: Hold::Zero,
+        reference: None,
+        outputs,
+        ended: None,
+    }
 }
 
 #[test]

@@ -26,6 +26,7 @@ fn clean() -> (Stage, Log) {
         hold: Hold::Zero,
         reference: None,
         outputs: quantities.into_iter().map(output).collect(),
+        ended: None,
     };
     (stage, log)
 }

@@ -130,6 +130,11 @@ fn the_readme_shows_what_the_program_prints() {
 }
 
 #[test]
+fn the_first_axis_goes_from_data_sheets_to_a_fitted_model() {
+    check("docs/first-axis.md");
+}
+
+#[test]
 fn the_documentation_of_the_fit_shows_what_it_prints() {
     check("docs/fit.md");
 }
@@ -210,6 +215,7 @@ fn what_the_documents_name_is_there() {
         "docs/case-file.md",
         "docs/commands.md",
         "docs/control.md",
+        "docs/first-axis.md",
         "docs/fit.md",
         "docs/gantry.md",
         "docs/logs.md",

@@ -52,8 +52,8 @@ fn the_papers_machine_as_one_computes_it_by_hand() {
     near(value(&shown, "breakaway_input"), friction * 0.71 * r / k);
     let stiffness = 132_760.0 + 132_760.0 * 58_885.0 / (132_760.0 + 58_885.0);
     near(value(&shown, "stretch_per_force"), 1.0 / stiffness);
-    // Its experiments command 5 V at most.
-    let force = 5.0 * k / (0.71 * r);
+    // Its experiments command 10 V at most.
+    let force = 10.0 * k / (0.71 * r);
     near(value(&shown, "largest_force"), force);
     near(value(&shown, "largest_acceleration"), (force - friction) / mass);
     let slope = 19.0424 + 2.0 * 0.0016 / (r * r) + k * k / (0.71 * r * r);

@@ -241,8 +241,7 @@ impl Case {
         modes::answers(py, &analysis)
     }
 
-    /// Modes of a gantry, as `taut modes --json` has them.
-    /// What follows from the numbers.
+    /// What follows from the numbers, as `taut show --json` has it.
     fn show<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let opened = match &self.inner {
             Inner::Axis(case) => Opened::Axis(Box::new(case.as_ref().clone())),
@@ -252,6 +251,7 @@ impl Case {
         value::json(py, &guarded(|| json::show(&overview))?)
     }
 
+    /// Modes of a gantry, as `taut modes --json` has them.
     fn gantry_modes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let Inner::Gantry(case) = &self.inner else {
             return Err(taut::Error::new("this case describes an axis, not a gantry")).told(py);

@@ -75,6 +75,14 @@ def test_modes_are_the_command_lines(root):
     assert np.array_equal(modes.discrete.A, told["discrete"]["A"])
 
 
+def test_what_follows_from_the_numbers_is_the_command_lines(root):
+    for file in [f"{STAGE}/table4.toml", "stages/core-xy/core-xy.toml"]:
+        shown = taut.show(root / file)
+        assert shown.data == program(root, "show", file)
+        assert all(shown[key] == value for key, (value, _) in shown.rows.items())
+        assert "no such" not in shown and shown.data["title"] in shown._repr_html_()
+
+
 def test_models_go_to_python_control(case):
     control = pytest.importorskip("control")
     modes = case.modes(sample_time=1e-3)

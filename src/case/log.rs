@@ -3,17 +3,19 @@
 use super::reader::{Field, Table};
 use super::tree::Kind;
 use super::{Folder, InputFile};
-use crate::error::Result;
-use crate::log::{Clock, ColumnId, Dialect, Filter, Log, Mapping, Quantity, Source, Unit};
+use crate::error::{Error, Result};
+use crate::log::{Clock, ColumnId, Dialect, Filter, In, Log, Mapping, PRESETS, Preset, Quantity, Source, Unit};
 use crate::parameter::Parameter;
 use crate::quantity::{self, shortest};
 use crate::signal::Hold;
-use crate::stage::{EncoderPlace, Stage};
+use crate::stage::{BeltModel, EncoderPlace, Stage};
+use std::f64::consts::TAU;
 
 /// Keys of the table beside its quantities.
 const KEYS: &[&str] = &[
     "file",
     "fetch",
+    "preset",
     "input",
     "reference",
     "units",
@@ -36,7 +38,16 @@ pub(super) fn logs(field: &Field, stage: &Stage, folder: &Folder, driven: bool) 
     let file = table.required("file", "file = \"...\" with the path of the log")?;
     let path = folder.path.join(file.text()?);
     let fetch = table.optional("fetch").map(|field| field.text()).transpose()?;
-    let sources = Sources::new(&table, stage)?;
+    let missing = |error: Error| match &fetch {
+        Some(line) if !path.exists() => error.next(format!("`{line}` fetches it")),
+        _ => error,
+    };
+    let known: Vec<(&str, &Preset)> = PRESETS.iter().map(|preset| (preset.name, preset)).collect();
+    let preset = table.optional("preset").map(|field| field.choice(&known)).transpose()?;
+    let mut columns = preset.map_or(Ok(Vec::new()), |preset| preset.columns_of(&path)).map_err(missing)?;
+    // What was meant goes before what was logged, unless the table names a column itself.
+    columns.retain(|(key, ..)| *key != "input" || !driven);
+    let sources = Sources::new(&table, columns, stage)?;
 
     let input = sources.source("input", field.input_unit)?;
     match (&input, driven) {
@@ -56,6 +67,15 @@ pub(super) fn logs(field: &Field, stage: &Stage, folder: &Folder, driven: bool) 
     }
     let mut outputs = Vec::new();
     for quantity in Quantity::ALL {
+        if quantity == Quantity::CartAcceleration
+            && stage.belt.model == BeltModel::Rigid
+            && sources.is_named(quantity.name())
+        {
+            let field = table.optional(quantity.name()).unwrap_or_else(|| field.clone());
+            return Err(field
+                .fail("a rigid belt has no force at the cart, of which its acceleration would be made")
+                .next("write model = \"elastic\" in [belt], or leave the accelerometer out"));
+        }
         outputs.extend(sources.source(quantity.name(), quantity.unit())?.map(|source| (quantity, source)));
     }
     if outputs.is_empty() {
@@ -94,11 +114,9 @@ pub(super) fn logs(field: &Field, stage: &Stage, folder: &Folder, driven: bool) 
         filter: table.optional("where").map(|field| filter(&field)).transpose()?,
         split: table.optional("split").map(|field| column(&field)).transpose()?,
         dialect,
+        preset,
     };
-    let runs = mapping.read().map_err(|error| match fetch {
-        Some(line) if !path.exists() => error.next(format!("`{line}` fetches it")),
-        _ => error,
-    })?;
+    let runs = mapping.read().map_err(missing)?;
     folder.read.borrow_mut().push(InputFile { path, place: file.node.span.clone() });
     Ok(runs)
 }
@@ -109,16 +127,27 @@ struct Sources<'a> {
     units: Option<Table<'a>>,
     scale: Option<Table<'a>>,
     offset: Option<Table<'a>>,
+    /// What a preset knows of the file.
+    columns: Vec<(&'static str, ColumnId, In)>,
     stage: &'a Stage,
+    steps_per_turn: f64,
 }
 
 impl<'a> Sources<'a> {
-    fn new(table: &'a Table<'a>, stage: &'a Stage) -> Result<Self> {
+    fn new(table: &'a Table<'a>, known: Vec<(&'static str, ColumnId, In)>, stage: &'a Stage) -> Result<Self> {
         let part = |key: &str| table.optional(key).map(|field| field.table()).transpose();
-        let sources = Self { units: part("units")?, scale: part("scale")?, offset: part("offset")?, table, stage };
+        let steps_per_turn = table.number("steps_per_turn")?;
+        if let Some(field) = table.optional("steps_per_turn")
+            && !known.iter().any(|(.., of)| *of == In::MotorSteps)
+        {
+            let error = field.fail("no column of this log counts in steps");
+            return Err(error.next("leave it out, or name the preset whose file counts in them"));
+        }
+        let (units, scale, offset) = (part("units")?, part("scale")?, part("offset")?);
+        let sources = Self { units, scale, offset, table, columns: known, stage, steps_per_turn };
         for part in [&sources.units, &sources.scale, &sources.offset].into_iter().flatten() {
             let columns = ["time", "input", "reference"].into_iter().chain(Quantity::ALL.map(Quantity::name));
-            let named: Vec<&'static str> = columns.clone().filter(|key| table.optional(key).is_some()).collect();
+            let named: Vec<&'static str> = columns.clone().filter(|key| sources.is_named(key)).collect();
             // A quantity without a column, rather than a word that is none.
             let other = part.keys().find(|key| !named.contains(key) && columns.clone().any(|column| column == *key));
             if let Some(field) = other.and_then(|key| part.optional(key)) {
@@ -130,19 +159,53 @@ impl<'a> Sources<'a> {
         Ok(sources)
     }
 
+    /// Whether there is a column of this, by the table or a preset.
+    fn is_named(&self, key: &str) -> bool {
+        self.table.optional(key).is_some() || self.columns.iter().any(|(own, ..)| *own == key)
+    }
+
     fn source(&self, key: &str, unit: &'static str) -> Result<Option<Source>> {
-        let Some(field) = self.table.optional(key) else { return Ok(None) };
+        let (column, known) = match (self.table.optional(key), self.columns.iter().find(|(own, ..)| *own == key)) {
+            (Some(field), _) => (column(&field)?, None),
+            (None, Some((_, column, of))) => (column.clone(), self.known_unit(key, *of)),
+            (None, None) => return Ok(None),
+        };
         let number = |part: &Option<Table>, unit: &'static str, example: &'static str| {
             let field = part.as_ref().and_then(|part| part.optional(key));
             field.map(|field| field.number_of(&Parameter { unit, example, ..NUMBER })).transpose()
         };
         let given = self.units.as_ref().and_then(|units| units.optional(key));
+        if let (None, Some(Unit::Name(known)), Some(preset)) = (&given, &known, self.table.optional("preset"))
+            && quantity::read(&format!("1 {known}"), unit).is_err()
+        {
+            let error = preset.fail(format!("its {key} is in {known}; {unit} is wanted")).allowed(unit);
+            return Err(error.next(match key {
+                "input" => format!(
+                    "correct `mode` of [amplifier], name the column of another input, or say units = {{ input = \"{unit}\" }}"
+                ),
+                _ => format!("say what it is: units = {{ {key} = \"{unit}\" }}"),
+            }));
+        }
         Ok(Some(Source {
-            column: column(&field)?,
-            unit: given.map(|field| self.unit(&field, unit)).transpose()?,
+            column,
+            unit: given.map(|field| self.unit(&field, unit)).transpose()?.or(known),
             scale: number(&self.scale, "", "-1")?.unwrap_or(1.0),
             offset: number(&self.offset, unit, example(unit))?.unwrap_or(0.0),
         }))
+    }
+
+    /// What a preset's column is in: of turns and steps of the motor, what one of them is behind the gear.
+    fn known_unit(&self, key: &str, of: In) -> Option<Unit> {
+        let turn = match key {
+            "reference" => TAU * self.stage.pulley_radius,
+            _ => TAU,
+        } / self.stage.motor.gear_ratio;
+        match of {
+            In::Own => None,
+            In::Unit(name) => Some(Unit::Name(name.to_string())),
+            In::MotorTurns => Some(Unit::Factor(turn)),
+            In::MotorSteps => Some(Unit::Factor(turn / self.steps_per_turn)),
+        }
     }
 
     fn unit(&self, field: &Field, unit: &str) -> Result<Unit> {
@@ -195,6 +258,7 @@ fn example(unit: &str) -> &'static str {
         "rad" => "1 deg",
         "rad/s" => "1 rpm",
         "m" => "1 mm",
+        "m/s^2" => "1 mm/s^2",
         _ => "1 mm/s",
     }
 }
@@ -216,15 +280,14 @@ fn column(field: &Field) -> Result<ColumnId> {
 
 /// When the samples were taken: a column, or `{ every = "20 ms" }`.
 fn clock(table: &Table, sources: &Sources) -> Result<Clock> {
-    let field =
-        table.required("time", "time = \"...\" with the name of the time's column, or time = { every = \"1 ms\" }")?;
-    if field.is_table() {
+    let wanted = "time = \"...\" with the name of the time's column, or time = { every = \"1 ms\" }";
+    if let Some(field) = table.optional("time").filter(Field::is_table) {
         let time = field.table()?;
         time.check_keys(&[], &[])?;
         return time.number("every").map(Clock::Every);
     }
     let source = sources.source("time", "s")?;
-    source.map(Clock::Column).ok_or_else(|| table.missing("time", "a column"))
+    source.map(Clock::Column).ok_or_else(|| table.missing("time", wanted))
 }
 
 /// Which rows count: `{ column = "pwm", is = 100 }`.

@@ -1,5 +1,6 @@
 //! A log made ready to be compared: when the model is asked, what it is told, and what its answer is weighed with.
 
+use super::acceleration::cart_acceleration;
 use crate::case::{Case, Experiment, Initial};
 use crate::control::follow;
 use crate::design::Design;
@@ -348,9 +349,13 @@ impl Run {
         let mut slopes: Vec<Vec<f64>> = vec![Vec::new(); quantities.len()];
         out.iter_mut().for_each(Vec::clear);
         let solver = Solver::of(&stage);
+        let cart = stage.cart.clone();
         let mut take = |block: &Trajectory| {
             for (i, quantity) in quantities.iter().enumerate() {
-                out[i].extend_from_slice(column(block, *quantity));
+                match quantity {
+                    Quantity::CartAcceleration => out[i].extend(cart_acceleration(block, &cart)),
+                    _ => out[i].extend_from_slice(column(block, *quantity)),
+                }
                 if !self.even
                     && let Some(speed) = speed_of(*quantity)
                 {
@@ -366,9 +371,11 @@ impl Run {
             }
             None => {
                 stage.encoder = None;
-                // A rotor of its own has columns that only the whole table has.
-                let of_rotor = |quantity: &Quantity| quantity.name().starts_with("rotor");
-                let detail = if quantities.iter().any(of_rotor) { Detail::Full } else { Detail::Lean };
+                // A rotor of its own has columns that only the whole table has, and so have all forces at the cart.
+                let is_beyond = |quantity: &Quantity| {
+                    quantity.name().starts_with("rotor") || *quantity == Quantity::CartAcceleration
+                };
+                let detail = if quantities.iter().any(is_beyond) { Detail::Full } else { Detail::Lean };
                 bench.mount(&stage).and_then(|()| bench.run(&experiment, detail, &mut take))
             }
         };

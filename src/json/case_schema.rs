@@ -3,6 +3,7 @@
 //! It says what a reader refuses by its form: keys that are none, a text for a table. What depends on other values (a breakaway
 //! below the Coulomb friction) only reading says.
 
+use crate::log::PRESETS;
 use crate::parameter::{self, Fallback, Parameter};
 use crate::stage::{BELTS, Quantity};
 use serde_json::{Map, Value, json};
@@ -247,6 +248,7 @@ fn log() -> Value {
     let mut own = vec![
         ("file", json!({ "type": "string" })),
         ("fetch", described(json!({ "type": "string" }), "The command that brings the file where it is not there")),
+        ("preset", words(PRESETS.iter().map(|preset| preset.name))),
         ("time", any(vec![column(), table("experiment.log.time", &[])])),
         ("input", column()),
         ("reference", column()),

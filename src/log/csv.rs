@@ -36,11 +36,21 @@ fn read_from<R: BufRead>(file: &Path, input: R, request: &Request<'_>) -> Result
     sheet.begin(request);
     let mut fields = Fields::new(layout.separator);
     let mut first = true;
+    let mut metadata = request.preset.is_some_and(|preset| preset.has_metadata);
     // The first row of numbers may be at hand already.
     let mut more = !layout.is_heading || lines.advance()?;
     while more {
+        if let Some(end) = request.preset.and_then(|preset| preset.end(&lines.text)) {
+            sheet.ended = end.is_loss.then(|| end.line.to_string());
+            break;
+        }
         fields.split(&lines)?;
         let row = Row { lines: &lines, fields: &fields, layout: &layout, request };
+        metadata &= row.texts().next().is_none_or(|text| !numeric(text));
+        if metadata {
+            more = lines.advance()?;
+            continue;
+        }
         row.check_length()?;
         if std::mem::take(&mut first)
             && request.units_row
@@ -66,6 +76,26 @@ fn read_from<R: BufRead>(file: &Path, input: R, request: &Request<'_>) -> Result
         wanted: layout.wanted[..request.columns.len()].to_vec(),
     });
     Ok(sheet)
+}
+
+/// The names in the first line that has one of these among them.
+pub(super) fn heading(file: &Path, wanted: &[&str]) -> Result<Option<Vec<String>>> {
+    let mut lines = Lines::new(file, open(file)?);
+    let mut passed = 0;
+    while passed < PREAMBLE && lines.advance()? {
+        for separator in SEPARATORS {
+            let mut fields = Fields::new(separator);
+            if fields.split(&lines).is_err() {
+                continue;
+            }
+            let names: Vec<String> = (0..fields.len()).map(|k| fields.get(k).to_string()).collect();
+            if names.iter().any(|name| wanted.contains(&name.as_str())) {
+                return Ok(Some(names));
+            }
+        }
+        passed += 1;
+    }
+    Ok(None)
 }
 
 /// What it takes to find a field of a file again.

@@ -1,6 +1,7 @@
 //! From a file's columns to logs: what each column is, in which unit, and which rows belong to which run.
 
 use super::csv::{count, shown};
+use super::presets::Preset;
 use super::sheet::{ColumnId, Dialect, Filter, Request, Run, Sheet};
 use super::{Log, Output, Quantity};
 use crate::error::{Error, Result};
@@ -53,6 +54,8 @@ pub struct Mapping {
     pub split: Option<ColumnId>,
     /// How a text file is written.
     pub dialect: Dialect,
+    /// What made the file, where that says more of it than its columns.
+    pub preset: Option<&'static Preset>,
 }
 
 /// When samples were taken.
@@ -153,6 +156,7 @@ impl Mapping {
             filter: None,
             split: None,
             dialect: Dialect::default(),
+            preset: None,
         }
     }
 
@@ -181,6 +185,7 @@ impl Mapping {
             dialect: self.dialect,
             filter: self.filter.as_ref(),
             split: self.split.as_ref(),
+            preset: self.preset,
         };
         let mut sheet = Sheet::read(&self.file, &request)?;
         let mut values = Vec::new();
@@ -304,6 +309,7 @@ impl Columns<'_> {
             hold: mapping.hold,
             reference: None,
             outputs,
+            ended: self.sheet.ended.clone().filter(|_| within.end == self.sheet.rows.len()),
         };
         if let Some(i) = self.roles.iter().position(|role| matches!(role, Role::Reference)) {
             log.reference = Some(self.inputs(i, &rows, &within)?);

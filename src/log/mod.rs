@@ -2,17 +2,21 @@
 
 mod accelerometer;
 mod csv;
+#[cfg(feature = "json")]
+mod klipper;
 mod lines;
 mod mapping;
 mod matlab;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod presets;
 mod sheet;
 mod survey;
 
 pub use crate::stage::Quantity;
 pub use accelerometer::{Accelerometer, read_accelerometer};
 pub use mapping::{Clock, Mapping, Source, Unit};
+pub use presets::{End, In, PRESETS, Pick, Preset};
 pub use sheet::{ColumnId, Dialect, Filter};
 pub use survey::{Channel, Clipped, Gap, Motion, Note, Outlier, Severity, Steady, Survey, Timing};
 
@@ -38,6 +42,8 @@ pub struct Log {
     pub reference: Option<Vec<f64>>,
     /// What was seen; at least one.
     pub outputs: Vec<Output>,
+    /// With which words the recorder ended the file early.
+    pub ended: Option<String>,
 }
 
 /// One measured quantity over time.

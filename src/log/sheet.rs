@@ -1,5 +1,6 @@
 //! The wanted columns of a file, whatever its kind, and where each of their values stands.
 
+use super::presets::Preset;
 use super::{csv, lines, matlab};
 use crate::error::{Error, Result};
 use crate::quantity::shortest;
@@ -89,6 +90,8 @@ pub(super) struct Request<'a> {
     pub filter: Option<&'a Filter>,
     /// The column that tells runs apart.
     pub split: Option<&'a ColumnId>,
+    /// What made the file, if that is known.
+    pub preset: Option<&'static Preset>,
 }
 
 impl<'a> Request<'a> {
@@ -103,6 +106,7 @@ impl<'a> Request<'a> {
             dialect: Dialect::default(),
             filter: None,
             split: None,
+            preset: None,
         }
     }
 
@@ -132,6 +136,8 @@ pub(super) struct Sheet {
     pub fields: Option<csv::Locator>,
     /// The values seen in the column of the filter, a few of them.
     pub filtered: Vec<String>,
+    /// The words with which the recorder ended the file early.
+    pub ended: Option<String>,
 }
 
 /// Rows one after another with the same value in the column that tells runs apart.
@@ -149,6 +155,7 @@ impl Sheet {
         let mut sheet = match () {
             () if matlab::is_matlab(file, &beginning) => matlab::read(file, &beginning, request)?,
             () if beginning.starts_with(b"PAR1") => read_parquet(file, request)?,
+            () if request.preset.is_some_and(|preset| preset.is_packed(&beginning)) => read_packed(file, request)?,
             () => csv::read(file, request)?,
         };
         sheet.file = file.to_path_buf();
@@ -298,4 +305,14 @@ fn read_parquet(file: &Path, _: &Request<'_>) -> Result<Sheet> {
     Err(Error::new("this is a Parquet file, and this build of the program does not read them")
         .in_file(file)
         .next("build it with the feature `parquet`, or export the data as CSV"))
+}
+
+#[cfg(feature = "json")]
+fn read_packed(file: &Path, request: &Request<'_>) -> Result<Sheet> {
+    super::klipper::read(file, request)
+}
+
+#[cfg(not(feature = "json"))]
+fn read_packed(file: &Path, _: &Request<'_>) -> Result<Sheet> {
+    Err(super::presets::no_messages(file))
 }

@@ -99,10 +99,10 @@ fn breakaway(stage: &Stage, side: f64) -> f64 {
 fn inertia(stage: &Stage, masses: &Masses, notes: &mut Vec<Note>) -> Group {
     let mut group = Group::new("inertia", "Moved mass, at the cart");
     group.add("cart_mass", "cart", stage.cart.mass, "kg");
-    group.add("drive_pulley_mass", "drive pulley", masses.drive, "kg").how("J/r^2");
-    group.add("idler_pulley_mass", "idler pulley", masses.idler, "kg").how("J/r^2");
+    group.add("drive_pulley_mass", "drive pulley", masses.drive, "kg").how("J/r²");
+    group.add("idler_pulley_mass", "idler pulley", masses.idler, "kg").how("J/r²");
     if masses.rotor > 0.0 {
-        group.add("rotor_mass", "rotor", masses.rotor, "kg").how("n^2 J/r^2");
+        group.add("rotor_mass", "rotor", masses.rotor, "kg").how("n² J/r²");
     }
     group.add("total_mass", "all of it", masses.total, "kg");
     let reflected = masses.total - stage.cart.mass;

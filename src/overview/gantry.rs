@@ -107,7 +107,7 @@ fn masses(gantry: &Gantry) -> [f64; 2] {
 fn inertia(gantry: &Gantry, notes: &mut Vec<Note>) -> Group {
     let mut group = Group::new("inertia", "Moved mass");
     let turning = turning(gantry);
-    group.add("turning_mass", "both pulleys and rotors, at the belt", turning, "kg").how("(2 J + n^2 J_r of both)/r^2");
+    group.add("turning_mass", "both pulleys and rotors, at the belt", turning, "kg").how("(2 J + n² J_r of both)/r²");
     for ((way, words), mass) in WAYS.into_iter().zip(masses(gantry)) {
         group.add(format!("total_mass_{way}"), words, mass, "kg");
         group.add(format!("reflected_share_{way}"), "share of what turns", turning / mass, "");

@@ -508,6 +508,7 @@ const FIT: &[Parameter] = &[
 const LOG: &[Parameter] = &[
     row("experiment.log.time.every", "", "s", Required, DURATION, "20 ms", "Interval between rows, for a file without a column of times."),
     row("experiment.log.from", "", "s", Words("the first row"), ANY, "0.1 s", "Where the log begins, on its own clock; this is time zero."),
+    row("experiment.log.steps_per_turn", "", "", Value(200.0), Range::whole(1.0, 1e6), "400", "Full steps of the motor in a turn of its shaft, for a `preset` whose file counts in them."),
     row("experiment.log.to", "", "s", Words("the last row"), ANY, "2 s", "Where it ends."),
 ];
 

@@ -15,5 +15,6 @@ pub fn logged(name: &str, run: &Trajectory, drive_angle: Vec<f64>) -> Arc<Log> {
         hold: Hold::Zero,
         reference: run.get("reference").map(<[f64]>::to_vec),
         outputs: vec![Output { quantity: Quantity::DriveAngle, absolute: false, values: drive_angle }],
+        ended: None,
     })
 }

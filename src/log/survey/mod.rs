@@ -81,7 +81,7 @@ impl Survey {
     /// let position = Output { quantity: Quantity::CartPosition, absolute: false, values };
     /// let input = vec![5.0; 500];
     /// let log = Log { name: "5 V".into(), file: "log.csv".into(), time, input, hold: Hold::Zero, reference: None,
-    ///     outputs: vec![position] };
+    ///     outputs: vec![position], ended: None };
     /// let survey = Survey::new(&log, &stage);
     /// assert!(survey.has("unit"));
     /// # Ok::<(), taut::Error>(())
@@ -94,6 +94,10 @@ impl Survey {
         }
         let motion = Motion::of(log, &channels, &timing);
         let mut notes = timing.notes();
+        notes.extend(log.ended.as_ref().map(|words| {
+            let text = format!("the recorder ended the file with `{words}`: what came after it is missing");
+            Note::new("ended", Severity::Warning, text)
+        }));
         for (k, channel) in channels.iter().enumerate() {
             let output = k.checked_sub(1).map(|k| &log.outputs[k]);
             notes.extend(channel.notes(output, &timing));

@@ -171,7 +171,7 @@ impl Motion {
     /// Unit of its speeds.
     pub fn unit(&self) -> &'static str {
         match self.quantity {
-            Quantity::CartPosition | Quantity::CartSpeed => "m/s",
+            Quantity::CartPosition | Quantity::CartSpeed | Quantity::CartAcceleration => "m/s",
             _ => "rad/s",
         }
     }

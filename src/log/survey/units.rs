@@ -135,7 +135,7 @@ fn swapped_note(log: &Log, channels: &[Channel]) -> Option<Note> {
 /// Positions along the belt, m per unit.
 fn lever(quantity: Quantity, stage: &Stage) -> f64 {
     match quantity {
-        Quantity::CartPosition | Quantity::CartSpeed => 1.0,
+        Quantity::CartPosition | Quantity::CartSpeed | Quantity::CartAcceleration => 1.0,
         _ => stage.pulley_radius,
     }
 }
@@ -461,9 +461,9 @@ mod tests {
 
     #[test]
     fn every_quantity_is_of_one_kind() {
-        let electrical = [Quantity::MotorCurrent, Quantity::MotorVoltage];
+        let others = [Quantity::MotorCurrent, Quantity::MotorVoltage, Quantity::CartAcceleration];
         for quantity in Quantity::ALL {
-            let kinds = [is_speed(quantity), super::super::is_position(quantity), electrical.contains(&quantity)];
+            let kinds = [is_speed(quantity), super::super::is_position(quantity), others.contains(&quantity)];
             assert_eq!(kinds.iter().filter(|kind| **kind).count(), 1);
         }
     }

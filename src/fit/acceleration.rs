@@ -1,0 +1,18 @@
+//! The cart's acceleration, as an accelerometer on it shows: of the forces in the rows of a run.
+
+use crate::stage::Cart;
+use crate::trajectory::Trajectory;
+
+/// M·x″ = F₁ − F₂ − friction + what else pulls at the cart. Empty where the rows lack the forces, as with a rigid belt.
+pub(super) fn cart_acceleration(rows: &Trajectory, cart: &Cart) -> Vec<f64> {
+    let column = |name: &str| rows.get(name).unwrap_or(&[]);
+    let [first, second, friction] = ["span1_force", "span2_force", "cart_friction"].map(column);
+    let stop = rows.get("stop_force");
+    let forces = first.iter().zip(second).zip(friction).enumerate();
+    forces
+        .map(|(k, ((first, second), friction))| {
+            let stop = stop.map_or(0.0, |stop| stop[k]);
+            (first - second - friction + stop + cart.constant_force()) / cart.mass
+        })
+        .collect()
+}
