@@ -204,6 +204,9 @@ pub struct Move {
     /// Also run with each parameter of the axis wrong by this share, the controller knowing nothing of it: 20%
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub spread: Option<f64>,
+    /// Also print feed-forward gains for WPILib, LinuxCNC, ODrive and Beckhoff, from the model
+    #[arg(long)]
+    pub drives: bool,
     #[command(flatten)]
     pub common: Common,
 }

@@ -57,6 +57,10 @@ pub struct FrfFit {
     pub mode: Option<(f64, f64)>,
 }
 
+/// Distances in lines, and the power of Hann's window there, (sin πδ/(πδ (1 − δ²)))²: through it a spectrum is seen.
+const WINDOW: [(f64, f64); 7] =
+    [(-1.5, 0.0288), (-1.0, 0.25), (-0.5, 0.7205), (0.0, 1.0), (0.5, 0.7205), (1.0, 0.25), (1.5, 0.0288)];
+
 /// ln s, ln τ, t_d, ln g.
 const UNKNOWNS: usize = 4;
 
@@ -73,6 +77,24 @@ fn changed(stage: &Stage, known: &Known, x: &[f64]) -> Stage {
         *c = x[1].exp() * *k;
     }
     stage
+}
+
+/// The same as Welch's averages see it: Σ |W|² Ĝ/Σ |W|² about each line, where the input is white. Of whole periods nothing is smeared.
+fn smeared(stage: &Stage, place: f64, delay: f64, frf: &Frf) -> Result<Vec<Complex<f64>>> {
+    if frf.periodic {
+        return model(stage, place, delay, frf);
+    }
+    let line = 2.0 * PI / (frf.length as f64 * frf.every);
+    let sum: f64 = WINDOW.iter().map(|one| one.1).sum();
+    let mut seen = vec![Complex::ZERO; frf.points.len()];
+    for (distance, weight) in WINDOW {
+        let points = frf.points.iter().map(|point| Point { omega: point.omega + distance * line, ..*point }).collect();
+        let moved = Frf { points, ..frf.clone() };
+        for (sum_of, value) in seen.iter_mut().zip(model(stage, place, delay, &moved)?) {
+            *sum_of += value * (weight / sum);
+        }
+    }
+    Ok(seen)
 }
 
 /// The sampled model's response at these points.
@@ -96,7 +118,7 @@ impl Problem<'_> {
         let stage = changed(self.stage, self.known, x);
         let gain = x[3].exp();
         let one = |frf: &Frf| {
-            let curve = model(&stage, self.known.place, x[2].max(0.0), frf)?;
+            let curve = smeared(&stage, self.known.place, x[2].max(0.0), frf)?;
             Ok(curve.into_iter().map(|value| value * gain).collect())
         };
         self.frfs.iter().map(one).collect()

@@ -5,6 +5,7 @@ use crate::simulate::table::{early_end, plain, time, value};
 use crate::terminal::bold;
 use std::fmt::Write;
 use taut::control::compensation::Rigid;
+use taut::control::drives::drive_gains;
 use taut::control::sliding;
 use taut::design::{Design, FeedForwardModel, Structure};
 use taut::metrics::largest;
@@ -203,5 +204,15 @@ pub fn comparison(tried: &[Tried]) -> String {
     } else {
         "\n"
     });
+    text
+}
+
+/// Feed-forward gains as drives of others take them.
+pub fn drives(stage: &Stage) -> String {
+    let mut text = format!("\n{}\n", bold("Feed-forward for drives, of the axis as one mass going forward"));
+    for gain in drive_gains(stage) {
+        let value = value(gain.value, gain.unit);
+        let _ = writeln!(text, "  {:<10}{:<34}{value}", gain.system, gain.name);
+    }
     text
 }
