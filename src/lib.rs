@@ -67,6 +67,7 @@ pub mod design;
 pub mod error;
 pub mod files;
 pub mod fit;
+pub mod frf;
 pub mod friction;
 #[cfg(feature = "json")]
 pub mod json;

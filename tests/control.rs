@@ -491,3 +491,28 @@ fn a_spread_that_is_no_share_is_refused() {
     let stopped = taut::control::worst(&case.stage, design, motion, 0.2, Solver::Exact, &|| true).unwrap();
     assert_eq!(stopped, None);
 }
+
+/// What WPILib and LinuxCNC would feed forward is what the rigid feed-forward does, and the torque of ODrive is that of the motor.
+#[test]
+fn gains_for_drives_make_the_same_command() {
+    let stage = Case::read("stages/sollmann-jouaneh/table4.toml").unwrap().stage;
+    let rigid = taut::control::compensation::Rigid::of(&stage);
+    let gains = taut::control::drives::drive_gains(&stage);
+    let value = |name: &str| gains.iter().find(|gain| gain.name == name).unwrap().value;
+    let (speed, acceleration) = (0.3, 4.0);
+    let force = rigid.mass * acceleration + rigid.viscous[0] * speed + rigid.coulomb[0];
+    let wanted = rigid.command(force, 0.0, speed) * stage.amplifier.gain;
+    let wpilib = value("kS") + value("kV") * speed + value("kA") * acceleration;
+    assert!((wpilib - wanted).abs() < 1e-12 * wanted, "{wpilib} {wanted}");
+    let linuxcnc = value("FF1") * 1e3 * speed + value("FF2") * 1e3 * acceleration + value("kS");
+    assert!((linuxcnc - wanted).abs() < 1e-12 * wanted, "{linuxcnc} {wanted}");
+    // Turns of the motor per metre, and its torque from the current.
+    let turns = stage.motor.gear_ratio / (2.0 * std::f64::consts::PI * stage.pulley_radius);
+    let torque = value("config.inertia") * acceleration * turns
+        + value("input_torque per input_vel") * speed * turns
+        + value("input_torque against dry friction");
+    let current = (wanted - rigid.brake * speed) / stage.motor.resistance;
+    assert!((torque - stage.motor.torque_constant * current).abs() < 1e-12, "{torque} {current}");
+    let inertia = value("P-AXIS-00391 load") - value("3140:07 load inertia");
+    assert_eq!(inertia, stage.motor.rotor_inertia);
+}

@@ -15,6 +15,7 @@ mod definitions;
 mod definitions_control;
 mod elements;
 mod fit;
+mod frf;
 mod gantry;
 mod gantry_laws;
 mod general;

@@ -146,7 +146,7 @@ const BAD: &[(&str, &str, &str, &str)] = &[
     (
         "100 rpm/V",
         "V s/rad",
-        "\"100 rpm/V\" is in kg^-1 m^-2 s^2 A rad; a back-EMF constant (V s/rad) is wanted",
+        "\"100 rpm/V\" is a speed per voltage (rad/s/V); a back-EMF constant (V s/rad) is wanted",
         "that is the inverse of what is wanted: write 0.095493 V s/rad",
     ),
     ("5 KN", "N", "\"5 KN\" has an unknown unit `KN`", "did you mean kN?"),

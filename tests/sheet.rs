@@ -221,7 +221,7 @@ fn a_log_that_steps_otherwise_than_the_encoder_is_told() {
     let note = survey.notes.iter().find(|note| note.code == "encoder-step").unwrap();
     assert_eq!(
         note.text,
-        "it moves in steps of 160 um, and a count of the case's encoder is 40 um: the steps would be those of 6250 counts per metre; correct \
+        "it moves in steps of 160 µm, and a count of the case's encoder is 40 µm: the steps would be those of 6250 counts per metre; correct \
          encoder.counts (or lines), or the unit or scale of this column"
     );
 }

@@ -40,6 +40,7 @@ pub enum Command {
     Fit(Fit),
     Shape(Shape),
     Modes(Modes),
+    Frf(Frf),
     Schema(Schema),
     Completions(Completions),
     Man(Man),
@@ -59,6 +60,7 @@ impl Command {
             Self::Fit(args) => args.common.json,
             Self::Shape(args) => args.common.json,
             Self::Modes(args) => args.common.json,
+            Self::Frf(args) => args.common.json,
             Self::Init(_) | Self::Schema(_) | Self::Completions(_) | Self::Man(_) => false,
         }
     }
@@ -237,6 +239,9 @@ pub struct Move {
     /// Also run with each parameter of the axis wrong by this share, the controller knowing nothing of it: 20%
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub spread: Option<f64>,
+    /// Also print feed-forward gains for WPILib, LinuxCNC, ODrive and Beckhoff, from the model
+    #[arg(long)]
+    pub drives: bool,
     #[command(flatten)]
     pub common: Common,
 }
@@ -440,6 +445,33 @@ pub struct Shape {
     pub common: Common,
 }
 
+/// Measure a frequency response: from the logs of a case, without a model, with coherence and intervals.
+///
+/// Takes every experiment with a log. Segments of it are averaged after Welch, or whole periods with --period; where the log has a reference, it was
+/// made in closed loop, and the response is that from the reference to output and input, divided. Prints for each output where it is coherent, fits
+/// stiffness and damping of the belt and the delay to the responses, and computes the margins of the case's controller around what was measured.
+/// With --out it also writes frf.json, frf.csv and a report with the responses over the model's.
+#[derive(Debug, clap::Args)]
+#[command(after_help = FRF)]
+pub struct Frf {
+    /// The case file; - is standard input
+    pub case: PathBuf,
+    /// Length of a segment, such as "0.5 s" [default: some 16 segments]
+    #[arg(long, value_name = "TIME", value_parser = seconds, conflicts_with = "period")]
+    pub segment: Option<f64>,
+    /// Period of the input, such as "1 s", of which whole ones are averaged; the first is left out
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
+    pub period: Option<f64>,
+    /// Where the cart was, for the model [default: 0 m]
+    #[arg(long, value_name = "POSITION", value_parser = metres, allow_hyphen_values = true)]
+    pub at: Option<f64>,
+    /// Delay of the model's input, where a fit of it begins [default: that of the controller]
+    #[arg(long, value_name = "TIME", value_parser = delay)]
+    pub delay: Option<f64>,
+    #[command(flatten)]
+    pub common: Common,
+}
+
 /// Say how a machine swings: poles, zeros, frequency response, resonance along the travel.
 ///
 /// Linearises the stage of a case while everything slides, and prints its poles with frequency and damping, the gain and
@@ -490,6 +522,12 @@ Examples:
   taut shape --together raw_data_x_left.csv raw_data_x_middle.csv raw_data_x_right.csv
   taut shape raw_data_x.csv --shapers \"mzv(n=4,t=0.9),ei(v_tol=0.02)\" --max-vibrations 2
   taut shape axis.toml --set cart.mass=\"0.5 kg\" --json | jq .recommended";
+
+const FRF: &str = "\
+Examples:
+  taut frf axis.toml
+  taut frf axis.toml --segment 0.5s --out response
+  taut frf axis.toml --period 1s --json | jq .fit.stiffness";
 
 /// Shapers with their parameters.
 #[derive(Debug, Clone)]

@@ -6,6 +6,7 @@ mod command;
 mod failure;
 mod fit;
 mod folder;
+mod frf;
 mod init;
 mod interrupt;
 mod listing;
@@ -44,6 +45,7 @@ fn main() -> ExitCode {
         Command::Tune(args) => tune::run(&args),
         Command::Sweep(args) => sweep::run(&args),
         Command::Modes(args) => modes::run(&args),
+        Command::Frf(args) => frf::run(&args),
         Command::Schema(args) => manual::schema(&args),
         Command::Completions(args) => manual::completions(&args),
         Command::Man(args) => manual::run(&args),

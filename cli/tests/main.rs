@@ -6,6 +6,7 @@ mod documents;
 mod endings;
 mod faults;
 mod fit;
+mod frf;
 mod gantry;
 mod outputs;
 mod paper;

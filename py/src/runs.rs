@@ -455,9 +455,9 @@ pub fn moves<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound
         })
         .collect();
     let first = runs.iter().find_map(|run| match &run.what {
-        What::Move { case, structure, timing, .. } => Some((&case.title, structure, timing)),
+        What::Move { case, structure, timing, .. } => Some((case, structure, timing)),
         What::Experiment { .. } | What::Gantry { .. } => None,
     });
-    let Some((title, structure, timing)) = first else { return Ok(py.None().into_bound(py)) };
-    value::json(py, &guarded(|| json::moves(title, structure, timing, &told))?)
+    let Some((case, structure, timing)) = first else { return Ok(py.None().into_bound(py)) };
+    value::json(py, &guarded(|| json::moves(&case.title, structure, timing, &case.stage, &told))?)
 }

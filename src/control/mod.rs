@@ -8,6 +8,7 @@
 pub mod compare;
 pub mod compensation;
 pub mod damping;
+pub mod drives;
 pub mod feedback;
 pub mod filter;
 pub mod fuzzy;

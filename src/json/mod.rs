@@ -5,6 +5,7 @@
 mod case_schema;
 mod check;
 mod fit;
+mod frf;
 mod gantry;
 mod gantry_modes;
 mod modes;
@@ -19,6 +20,7 @@ mod tune;
 pub use case_schema::case_schema;
 pub use check::check;
 pub use fit::fit;
+pub use frf::frf;
 pub use gantry::{GantrySimulated, GantrySimulation, gantry_metrics};
 pub use gantry_modes::gantry_modes;
 pub use modes::modes;

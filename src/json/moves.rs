@@ -2,7 +2,9 @@
 
 use super::{ending, peak};
 use crate::case::Move;
+use crate::control::drives::{DriveGain, drive_gains};
 use crate::control::{Deviation, Loop, MoveRun, Worst};
+use crate::stage::Stage;
 use crate::tune::trouble::Trouble;
 use serde_json::{Value, json};
 
@@ -21,8 +23,10 @@ pub struct Moved<'a> {
     pub files: &'a [String],
 }
 
-/// The moves of a case of this title under a controller of this name.
-pub fn moves(title: &str, structure: &str, timing: &Loop, moved: &[Moved]) -> Value {
+/// The moves of a case of this title under a controller of this name, on this stage.
+pub fn moves(title: &str, structure: &str, timing: &Loop, stage: &Stage, moved: &[Moved]) -> Value {
+    let gain =
+        |gain: DriveGain| json!({ "system": gain.system, "name": gain.name, "value": gain.value, "unit": gain.unit });
     json!({
         "schema": super::identity("move"),
         "title": title,
@@ -31,6 +35,7 @@ pub fn moves(title: &str, structure: &str, timing: &Loop, moved: &[Moved]) -> Va
         "every_s": timing.every,
         "delay_s": timing.delay,
         "moves": moved.iter().map(motion).collect::<Vec<_>>(),
+        "drive_gains": drive_gains(stage).into_iter().map(gain).collect::<Vec<_>>(),
     })
 }
 

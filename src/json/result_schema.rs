@@ -11,6 +11,7 @@ const RESULTS: &[(&str, &str, &str)] = &[
     ("error", "An error, under --json", include_str!("results/error.txt")),
     ("files", "What a folder of results holds: files.json", include_str!("results/files.txt")),
     ("fit", "`taut fit`", include_str!("results/fit.txt")),
+    ("frf", "`taut frf`", include_str!("results/frf.txt")),
     ("gantry-modes", "`taut modes` of a gantry", include_str!("results/gantry-modes.txt")),
     ("gantry-simulate", "`taut simulate` of a gantry", include_str!("results/gantry-simulate.txt")),
     ("modes", "`taut modes`", include_str!("results/modes.txt")),

@@ -49,7 +49,13 @@ pub fn run(args: &Args) -> Outcome {
         tried.push(Tried { case, design, done });
     }
     let (json, text, advice) = match &tried[..] {
-        [one] => (json::text(&told(one)), table::text(one), "add --out DIR for files and a report"),
+        [one] => {
+            let mut text = table::text(one);
+            if args.drives {
+                text.push_str(&table::drives(&one.case.stage));
+            }
+            (json::text(&told(one)), text, "add --out DIR for files and a report")
+        }
         several => (json::text(&several.iter().map(told).collect::<Vec<_>>()), table::comparison(several), ""),
     };
     let mut finished = Finished::new("move", ("summary.json", json), text, advice);
@@ -80,7 +86,8 @@ fn names(args: &Args, case: &Case, path: &Path) -> Result<Vec<String>> {
 /// A case with its moves as data.
 fn told(tried: &Tried) -> impl serde::Serialize + use<> {
     let moved: Vec<Moved> = tried.done.iter().map(Done::told).collect();
-    json::moves(&tried.case.title, tried.design.structure.name(), &Loop::of(tried.design), &moved)
+    let (design, case) = (tried.design, tried.case);
+    json::moves(&case.title, design.structure.name(), &Loop::of(design), &case.stage, &moved)
 }
 
 /// Runs one move.

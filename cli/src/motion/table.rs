@@ -2,9 +2,10 @@
 
 use crate::terminal::bold;
 use std::fmt::Write;
-use taut::stage::AmplifierMode;
+use taut::control::drives::drive_gains;
+use taut::stage::{AmplifierMode, Stage};
 use taut_report::motion::{Tried, controller, length, lines};
-use taut_report::simulate::early_end;
+use taut_report::simulate::{early_end, value};
 
 /// Text on the terminal for one case.
 pub fn text(tried: &Tried) -> String {
@@ -84,5 +85,15 @@ pub fn comparison(tried: &[Tried]) -> String {
     } else {
         "\n"
     });
+    text
+}
+
+/// Feed-forward gains as drives of others take them.
+pub fn drives(stage: &Stage) -> String {
+    let mut text = format!("\n{}\n", bold("Feed-forward for drives, of the axis as one mass going forward"));
+    for gain in drive_gains(stage) {
+        let value = value(gain.value, gain.unit);
+        let _ = writeln!(text, "  {:<10}{:<34}{value}", gain.system, gain.name);
+    }
     text
 }

@@ -5,6 +5,7 @@ use super::rows::{controller, lines};
 use crate::drawing::stage_drawing;
 use crate::page::{Callout, Cell, Page, Table};
 use crate::simulate::{Named, early_end};
+use taut::control::drives::drive_gains;
 
 /// The page; `text` is the case that repeats the moves.
 pub fn page(tried: &Tried, text: &str, figures: &[Vec<Named>]) -> Page {
@@ -26,6 +27,13 @@ pub fn page(tried: &Tried, text: &str, figures: &[Vec<Named>]) -> Page {
             page.figure(figure);
         }
     }
+    page.section("Feed-forward for drives");
+    page.prose("Of the axis as one mass going forward, as others name the gains and in their units.");
+    let mut rows = Table::new("").column("System", "").column("Gain", "").column("Value", "").column("Unit", "");
+    for gain in drive_gains(&tried.case.stage) {
+        rows.row([Cell::from(gain.system), gain.name.into(), Cell::number(gain.value, 5), gain.unit.into()]);
+    }
+    page.table(&rows);
     page.section("The case");
     page.prose("This text repeats the moves.");
     page.embed("case.toml", text);

@@ -1,0 +1,63 @@
+//! `taut frf`: frequency responses from the logs of a case.
+
+mod figures;
+mod page;
+mod table;
+
+use crate::args::Frf as Args;
+use crate::command::{Finished, Report};
+use crate::failure::Outcome;
+use crate::folder::{self, Folder};
+use std::f64::consts::PI;
+use std::fmt::Write;
+use taut::frf::{Cut, Known, Measurement, measure};
+use taut::json;
+
+/// Reads the case and its logs, measures, writes, tells.
+pub fn run(args: &Args) -> Outcome {
+    let common = &args.common;
+    let case = common.case(&args.case)?;
+    let folder =
+        Folder::wanted(common, || folder::inputs(&args.case, &case.files), ["frf.json", "frf.csv", "report.html"])?;
+    let delay = args.delay.or(case.controller.as_ref().map(|design| design.delay)).unwrap_or_default();
+    let known = Known { place: args.at.unwrap_or_default(), delay };
+    let cut = Cut { segment: args.segment, period: args.period };
+    let found = measure(&case, &cut, known).map_err(|error| error.in_file(&args.case))?;
+    let data = json::text(&json::frf(&case, &found));
+    let advice = "add --out DIR for the responses as a table and a report";
+    let mut finished = Finished::new("frf", ("frf.json", data), table::text(&case.title, &found), advice);
+    if common.out.is_some() {
+        finished.files.push(("frf.csv".into(), csv(&found)));
+    }
+    if common.reports() {
+        let figures = figures::all(&found, &case.stage);
+        let page = page::page(&case, &found, &figures);
+        let pictures = figures.into_iter().map(|(name, figure)| (name, figure.into()));
+        finished.report = Some(Report { page, pictures: pictures.collect() });
+    }
+    finished.finish(common, folder)
+}
+
+/// One row for each frequency of each response.
+fn csv(found: &Measurement) -> String {
+    let mut text = String::from("log,quantity,frequency_Hz,real,imaginary,magnitude,phase_deg,radius,coherence\n");
+    for one in &found.responses {
+        // A name with a comma in it stands in quotes.
+        let name = format!("\"{}\"", one.frf.name.replace('"', "\"\""));
+        for point in &one.frf.points {
+            let (value, hertz) = (point.value, point.omega / (2.0 * PI));
+            let _ = writeln!(
+                text,
+                "{name},{},{hertz},{},{},{},{},{},{}",
+                one.frf.quantity.name(),
+                value.re,
+                value.im,
+                value.norm(),
+                value.arg().to_degrees(),
+                point.radius,
+                point.coherence
+            );
+        }
+    }
+    text
+}

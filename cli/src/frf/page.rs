@@ -1,0 +1,39 @@
+//! The report: one HTML file.
+
+use super::table;
+use taut::case::Case;
+use taut::frf::Measurement;
+use taut_report::{Callout, Cell, Figure, Page, Table};
+
+/// The page.
+pub fn page(case: &Case, found: &Measurement, figures: &[(String, Figure)]) -> Page {
+    let mut page = Page::new(case.title.clone()).subtitle("Frequency responses from logs, without a model.");
+    match &found.fit {
+        Ok(fit) => {
+            let kind = if fit.chi < 3.0 { Callout::Holds } else { Callout::Note };
+            let head = format!("The belt is {:.3} times as stiff as the file says", fit.stiffness.0);
+            let [low, high] = fit.stiffness.1;
+            page.callout(kind, head, format!("{low:.3} to {high:.3} with 95 %; {}.", table::quality(fit)));
+            let mut rows = Table::new("What was fitted to the responses.").column("", "").column("Value", "");
+            rows = rows.column("From", "").column("To", "");
+            for (name, value, [low, high]) in fit.rows() {
+                rows.row([name.to_string(), value, low, high].map(Cell::from));
+            }
+            page.table(&rows);
+        }
+        Err(error) => page.callout(Callout::Note, "Nothing was fitted", error.what.clone()),
+    }
+    for (one, (_, figure)) in found.responses.iter().zip(figures) {
+        page.section(&format!("{}: {}", one.frf.name, one.frf.quantity.name()));
+        for line in table::lines(&one.frf) {
+            page.prose(format!("{line}."));
+        }
+        if let Some(margins) = &one.margins {
+            page.prose(format!("With the case's controller: {}.", margins.words()));
+        }
+        page.figure(figure);
+    }
+    page.embed("Case file", &case.text);
+    page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
+    page
+}

@@ -1,0 +1,73 @@
+//! Feed-forward gains as drives and controllers of others take them, with their units.
+//!
+//! The axis is one mass along the belt, M ÿ + b ẏ + F sgn ẏ = κ η i with κ = n K_t/r, fed by V = R i + L di/dt + n K_e ẏ/r ([`Rigid`]). So, forward,
+//!
+//! | system | gain | unit | value |
+//! |---|---|---|---|
+//! | WPILib, `SimpleMotorFeedforward` in metres | kS, kV, kA | V, V/(m/s), V/(m/s²) | R F/(κ η), R b/(κ η) + n K_e/r, R M/(κ η) |
+//! | LinuxCNC, `pid`, command in mm, output in V | FF1, FF2, FF3 | V s/mm, V s²/mm, V s³/mm | kV, kA and L M/(κ η), over 1000 |
+//! | LinuxCNC, output in A | FF1, FF2 | A s/mm, A s²/mm | b and M over κ η, over 1000 |
+//! | ODrive | `config.inertia`; torque with the speed; torque against dry friction | N m/(turn/s²), N m/(turn/s), N m | 2π M (r/n)²/η, 2π b (r/n)²/η, F r/(n η) |
+//! | Beckhoff AX8000 3140:07, TwinCAT CNC P-AXIS-00391 | load inertia | kg m² | M (r/n)² less the rotor's; with it |
+//!
+//! Sources: docs.wpilib.org, "Feedforward Control in WPILib": V = kS sgn v + kV v + kA a. LinuxCNC, pid(9): FF1, FF2, FF3 times the first three
+//! derivatives of the command. ODrive, API reference, `Controller.Config`: inertia in N m/(turn/s²), torques in N m at the motor, speeds in turn/s. Beckhoff
+//! Information System, AX8xxx object 3140:07 "Load inertia/mass", TF5200 P-AXIS-00391 "Load inertia": the total at the motor shaft.
+
+use super::compensation::Rigid;
+use crate::stage::{AmplifierMode, Stage};
+use std::f64::consts::PI;
+
+/// A gain of a drive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DriveGain {
+    /// Whose.
+    pub system: &'static str,
+    /// As it is called there.
+    pub name: &'static str,
+    /// In the unit that is used there.
+    pub value: f64,
+    /// That unit.
+    pub unit: &'static str,
+}
+
+/// The gains for an axis going forward; those in volts where a voltage is commanded.
+pub fn drive_gains(stage: &Stage) -> Vec<DriveGain> {
+    let rigid = Rigid::of(stage);
+    let motor = &stage.motor;
+    // Before the amplifier's gain, which is the drive's own affair: the voltage or current at the motor.
+    let gain = stage.amplifier.gain;
+    let friction = rigid.coulomb[0];
+    let at_rest = |force: f64| rigid.command(force, 0.0, 0.0) * gain;
+    let moving = |force: f64| rigid.command(force, 0.0, 1.0) * gain;
+    let (s, v, a) = (at_rest(friction), moving(rigid.viscous[0]), at_rest(rigid.mass));
+    let one = |system, name, value, unit| DriveGain { system, name, value, unit };
+    let mut all = match stage.amplifier.mode {
+        AmplifierMode::Voltage => {
+            let jerk = motor.inductance * rigid.mass / (rigid.force_per_ampere * motor.gear_efficiency);
+            vec![
+                one("WPILib", "kS", s, "V"),
+                one("WPILib", "kV", v, "V/(m/s)"),
+                one("WPILib", "kA", a, "V/(m/s^2)"),
+                one("LinuxCNC", "FF1", 1e-3 * v, "V/(mm/s)"),
+                one("LinuxCNC", "FF2", 1e-3 * a, "V/(mm/s^2)"),
+                one("LinuxCNC", "FF3", 1e-3 * jerk, "V/(mm/s^3)"),
+            ]
+        }
+        AmplifierMode::Current => {
+            vec![one("LinuxCNC", "FF1", 1e-3 * v, "A/(mm/s)"), one("LinuxCNC", "FF2", 1e-3 * a, "A/(mm/s^2)")]
+        }
+    };
+    // Of the motor's shaft: a way x is an angle n x/r.
+    let arm = stage.pulley_radius / motor.gear_ratio;
+    let loss = motor.gear_efficiency;
+    let total = rigid.mass * arm * arm;
+    all.extend([
+        one("ODrive", "config.inertia", 2.0 * PI * total / loss, "Nm/(turn/s^2)"),
+        one("ODrive", "input_torque per input_vel", 2.0 * PI * rigid.viscous[0] * arm * arm / loss, "Nm/(turn/s)"),
+        one("ODrive", "input_torque against dry friction", friction * arm / loss, "Nm"),
+        one("Beckhoff", "3140:07 load inertia", total - motor.rotor_inertia, "kg m^2"),
+        one("Beckhoff", "P-AXIS-00391 load", total, "kg m^2"),
+    ]);
+    all
+}

@@ -1,0 +1,271 @@
+//! Stiffness and damping of the belt and the delay of the loop from frequency responses, beside a model of all else.
+//!
+//! With the model Ĝ of the sampled axis, gain g, stiffness k = s k₀, damping c = τ k and delay t_d,
+//!
+//! ```text
+//! χ² = Σ |G − g Ĝ(s, τ, t_d)|² / E|ΔG|²  over coherent points
+//! ```
+//!
+//! is made least by Gauss and Newton's method, damped after Levenberg and Marquardt. One number τ stands for all spans, whose damping then is in
+//! proportion to their stiffness; g takes up what mass and friction of the model are off. Errors are those of the linearised problem, widened by the
+//! root of χ² per degree of freedom where the curves fit worse than noise allows.
+
+use super::{Frf, Point};
+use crate::error::{Error, Result};
+use crate::linear::{Hold, Operation, StateSpace};
+use crate::number::engineering;
+use crate::stage::{BeltModel, Stage};
+use nalgebra::{Complex, DMatrix, DVector};
+use std::f64::consts::PI;
+
+/// Most iterations, and the least change of the unknowns.
+const ITERATIONS: usize = 60;
+const CHANGE: f64 = 1e-9;
+
+/// Fewest points.
+const FEWEST: usize = 10;
+
+/// What is asked of a model.
+#[derive(Debug, Clone, Copy)]
+pub struct Known {
+    /// Cart position, m.
+    pub place: f64,
+    /// Delay of the input where the model says, s.
+    pub delay: f64,
+}
+
+/// What a fit found, each with the end points of its central 95 %.
+#[derive(Debug, Clone)]
+pub struct FrfFit {
+    /// Factor on the stiffness of every span.
+    pub stiffness: (f64, [f64; 2]),
+    /// Stiffness of each span at the place, N/m.
+    pub spans: [f64; 3],
+    /// Damping over stiffness, s.
+    pub damping: (f64, [f64; 2]),
+    /// Delay of the input, s.
+    pub delay: (f64, [f64; 2]),
+    /// Factor on the whole response.
+    pub gain: (f64, [f64; 2]),
+    /// χ² per degree of freedom.
+    pub chi: f64,
+    /// Points that were used.
+    pub points: usize,
+    /// The model's response with what was found, one for each frequency response, at all of its points.
+    pub curves: Vec<Vec<Complex<f64>>>,
+    /// Damping ratio of the first mode that a command swings, and its frequency, Hz.
+    pub mode: Option<(f64, f64)>,
+}
+
+/// Distances in lines, and the power of Hann's window there, (sin πδ/(πδ (1 − δ²)))²: through it a spectrum is seen.
+const WINDOW: [(f64, f64); 7] =
+    [(-1.5, 0.0288), (-1.0, 0.25), (-0.5, 0.7205), (0.0, 1.0), (0.5, 0.7205), (1.0, 0.25), (1.5, 0.0288)];
+
+/// ln s, ln τ, t_d, ln g.
+const UNKNOWNS: usize = 4;
+
+/// The stage with its belt so many times as stiff, and damped.
+fn changed(stage: &Stage, known: &Known, x: &[f64]) -> Stage {
+    let mut stage = stage.clone();
+    if let (true, Some(make)) = (stage.belt.follows_cart, stage.belt.make) {
+        let [k1, k2] = make.stiffness_at(known.place);
+        (stage.belt.stiffness[0], stage.belt.stiffness[1]) = (k1, k2);
+    }
+    (stage.belt.follows_cart, stage.belt.make) = (false, None);
+    for (k, c) in stage.belt.stiffness.iter_mut().zip(&mut stage.belt.damping) {
+        *k *= x[0].exp();
+        *c = x[1].exp() * *k;
+    }
+    stage
+}
+
+/// The same as Welch's averages see it: Σ |W|² Ĝ/Σ |W|² about each line, where the input is white. Of whole periods nothing is smeared.
+fn smeared(stage: &Stage, place: f64, delay: f64, frf: &Frf) -> Result<Vec<Complex<f64>>> {
+    if frf.periodic {
+        return model(stage, place, delay, frf);
+    }
+    let line = 2.0 * PI / (frf.length as f64 * frf.every);
+    let sum: f64 = WINDOW.iter().map(|one| one.1).sum();
+    let mut seen = vec![Complex::ZERO; frf.points.len()];
+    for (distance, weight) in WINDOW {
+        let points = frf.points.iter().map(|point| Point { omega: point.omega + distance * line, ..*point }).collect();
+        let moved = Frf { points, ..frf.clone() };
+        for (sum_of, value) in seen.iter_mut().zip(model(stage, place, delay, &moved)?) {
+            *sum_of += value * (weight / sum);
+        }
+    }
+    Ok(seen)
+}
+
+/// The sampled model's response at these points.
+pub(super) fn model(stage: &Stage, place: f64, delay: f64, frf: &Frf) -> Result<Vec<Complex<f64>>> {
+    let system = StateSpace::of(stage, Operation { position: place, ..Operation::default() })?;
+    let Some(output) = system.output(frf.quantity.name()) else {
+        return Err(Error::new(format!("the model has no {}", frf.quantity.name())).next("log another quantity"));
+    };
+    let discrete = system.discrete(frf.every, Hold::Zero, delay)?;
+    Ok(frf.points.iter().map(|point| discrete.at(point.omega)[output]).collect())
+}
+
+struct Problem<'a> {
+    stage: &'a Stage,
+    known: &'a Known,
+    frfs: &'a [Frf],
+}
+
+impl Problem<'_> {
+    fn curves(&self, x: &[f64]) -> Result<Vec<Vec<Complex<f64>>>> {
+        let stage = changed(self.stage, self.known, x);
+        let gain = x[3].exp();
+        let one = |frf: &Frf| {
+            let curve = smeared(&stage, self.known.place, x[2].max(0.0), frf)?;
+            Ok(curve.into_iter().map(|value| value * gain).collect())
+        };
+        self.frfs.iter().map(one).collect()
+    }
+
+    /// Real and imaginary parts of (G − g Ĝ)/σ √2, of variance 1.
+    fn residuals(&self, x: &[f64]) -> Result<DVector<f64>> {
+        let curves = self.curves(x)?;
+        let mut all = Vec::new();
+        for (frf, curve) in self.frfs.iter().zip(curves) {
+            for (point, value) in frf.points.iter().zip(curve).filter(|(point, _)| is_used(point)) {
+                let off = (point.value - value) / point.deviation * 2f64.sqrt();
+                all.extend([off.re, off.im]);
+            }
+        }
+        Ok(DVector::from_vec(all))
+    }
+
+    fn jacobian(&self, x: &[f64], rows: usize) -> Result<DMatrix<f64>> {
+        let mut jacobian = DMatrix::zeros(rows, UNKNOWNS);
+        for j in 0..UNKNOWNS {
+            let h = if j == 2 { 1e-7 } else { 1e-4 };
+            let at = |by: f64| {
+                let mut moved = x.to_vec();
+                moved[j] += by;
+                self.residuals(&moved)
+            };
+            // A delay is never below zero.
+            let low = if j == 2 && x[2] < h { 0.0 } else { h };
+            jacobian.set_column(j, &((at(h)? - at(-low)?) / (h + low)));
+        }
+        Ok(jacobian)
+    }
+}
+
+fn is_used(point: &Point) -> bool {
+    point.coherence >= super::COHERENT && point.deviation > 0.0 && point.radius < point.value.norm()
+}
+
+/// Fits the belt and the delay of a stage to frequency responses.
+pub fn fit(stage: &Stage, known: &Known, frfs: &[Frf]) -> Result<FrfFit> {
+    if stage.belt.model == BeltModel::Rigid {
+        return Err(Error::new("a rigid belt has no stiffness to be fitted").next("give belt.model = \"elastic\""));
+    }
+    let problem = Problem { stage, known, frfs };
+    let points: usize = frfs.iter().map(|frf| frf.points.iter().filter(|point| is_used(point)).count()).sum();
+    if points < FEWEST {
+        return Err(Error::new(format!("{points} points with a coherence of at least {}", super::COHERENT))
+            .allowed(format!("at least {FEWEST}"))
+            .next("excite the axis harder or for longer, or give a shorter --segment"));
+    }
+    let ratio = stage.belt.damping.iter().zip(&stage.belt.stiffness).map(|(c, k)| c / k).sum::<f64>() / 3.0;
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    // Resonances that are far off hide from each other: from several stiffnesses and dampings.
+    for stiffness in [1.0, 0.6, 1.6, 0.35, 2.8] {
+        for ratio in if ratio > 0.0 { vec![ratio] } else { vec![1e-5, 1e-4] } {
+            let start = vec![f64::ln(stiffness), ratio.ln(), known.delay, 0.0];
+            if let Ok((value, x)) = minimised(&problem, start)
+                && best.as_ref().is_none_or(|(least, _)| value < *least)
+            {
+                best = Some((value, x));
+            }
+        }
+    }
+    let Some((squares, x)) = best else {
+        return Err(
+            Error::new("no stiffness, damping and delay give the measured response").next("check the case file")
+        );
+    };
+    let rows = 2 * points;
+    let chi = squares / (rows - UNKNOWNS) as f64;
+    let jacobian = problem.jacobian(&x, rows)?;
+    let covariance = (jacobian.transpose() * &jacobian).try_inverse();
+    let wide = |j: usize| {
+        let variance = covariance.as_ref().map_or(f64::INFINITY, |covariance| covariance[(j, j)].max(0.0));
+        1.96 * (variance * chi.max(1.0)).sqrt()
+    };
+    let grown = |j: usize| (x[j].exp(), [(x[j] - wide(j)).exp(), (x[j] + wide(j)).exp()]);
+    let delay = x[2].max(0.0);
+    let found = changed(stage, known, &x);
+    let mode = StateSpace::of(&found, Operation { position: known.place, ..Operation::default() })
+        .and_then(|system| system.poles())
+        .ok()
+        .and_then(|poles| {
+            let swinging = poles.into_iter().filter(|pole| pole.im > 0.0 && pole.re.abs() < 0.7 * pole.norm());
+            swinging.min_by(|a, b| a.norm().total_cmp(&b.norm()))
+        });
+    Ok(FrfFit {
+        stiffness: grown(0),
+        spans: found.belt.stiffness,
+        damping: grown(1),
+        delay: (delay, [(delay - wide(2)).max(0.0), delay + wide(2)]),
+        gain: grown(3),
+        chi,
+        points,
+        curves: problem.curves(&x)?,
+        mode: mode.map(|pole| (-pole.re / pole.norm(), pole.norm() / (2.0 * PI))),
+    })
+}
+
+/// Σ r² and where it is least, from a start.
+fn minimised(problem: &Problem, mut x: Vec<f64>) -> Result<(f64, Vec<f64>)> {
+    let mut residuals = problem.residuals(&x)?;
+    let mut squares = residuals.norm_squared();
+    let mut mu = 1e-3;
+    for _ in 0..ITERATIONS {
+        let jacobian = problem.jacobian(&x, residuals.len())?;
+        let (normal, slope) = (jacobian.transpose() * &jacobian, jacobian.transpose() * &residuals);
+        let mut is_better = false;
+        for _ in 0..10 {
+            let mut damped = normal.clone();
+            for j in 0..UNKNOWNS {
+                damped[(j, j)] += mu * normal[(j, j)].max(1e-12);
+            }
+            let Some(step) = damped.lu().solve(&slope) else { break };
+            let trial: Vec<f64> = x.iter().zip(step.iter()).map(|(x, s)| x - s.clamp(-1.0, 1.0)).collect();
+            let trial = vec![trial[0], trial[1].clamp(-25.0, 0.0), trial[2].max(0.0), trial[3]];
+            if let Ok(there) = problem.residuals(&trial)
+                && there.norm_squared() < squares
+            {
+                let change = squares - there.norm_squared();
+                (x, residuals, is_better) = (trial, there, change > CHANGE * squares);
+                squares = residuals.norm_squared();
+                mu = (0.3 * mu).max(1e-12);
+                break;
+            }
+            mu *= 5.0;
+        }
+        if !is_better {
+            break;
+        }
+    }
+    if squares.is_finite() { Ok((squares, x)) } else { Err(Error::new("no finite residuals")) }
+}
+
+impl FrfFit {
+    /// What was found, each with its unit: name, value, end points.
+    pub fn rows(&self) -> Vec<(&'static str, String, [String; 2])> {
+        let shown = |value: f64, unit: &str| engineering(value, unit, 4);
+        let row = |name, unit: &str, (value, [low, high]): (f64, [f64; 2])| {
+            (name, shown(value, unit), [shown(low, unit), shown(high, unit)])
+        };
+        vec![
+            row("stiffness, of that in the file", "", self.stiffness),
+            row("belt damping over stiffness", "s", self.damping),
+            row("delay", "s", self.delay),
+            row("gain, of the model's", "", self.gain),
+        ]
+    }
+}

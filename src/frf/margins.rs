@@ -1,0 +1,100 @@
+//! Margins of a controller around a measured frequency response.
+
+use super::{Frf, Point};
+use crate::control::feedback::Feedback;
+use crate::design::Design;
+use crate::error::{Error, Result};
+use crate::stage::Stage;
+use nalgebra::Complex;
+use std::f64::consts::PI;
+
+/// Margins of L = N_y G/D with a measured G, over the frequencies at which it is coherent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// max |1/(1 + L)|, and where, rad/s.
+    pub sensitivity: (f64, f64),
+    /// The most it may be: with G anywhere in its circle; infinite where a circle holds −1.
+    pub sensitivity_at_most: f64,
+    /// Phase margin, rad, and where |L| passes 1, rad/s.
+    pub phase: Option<(f64, f64)>,
+    /// Gain margin, and where L passes the negative real axis, rad/s.
+    pub gain: Option<(f64, f64)>,
+    /// Lowest and highest frequency that was looked at, rad/s.
+    pub range: [f64; 2],
+}
+
+/// Those of a design around a response of the position that it measures; `length` is metres per unit of it.
+pub fn measured(frf: &Frf, design: &Design, stage: &Stage, length: f64) -> Result<Measured> {
+    let feedback = Feedback::new(design, stage)?;
+    if (frf.every / design.every - 1.0).abs() > 1e-6 {
+        return Err(Error::new(format!(
+            "the log is sampled every {} s, the controller every {} s",
+            frf.every, design.every
+        ))
+        .next("log at the controller's samples for margins"));
+    }
+    let points: Vec<&Point> = frf.coherent().collect();
+    let (Some(first), Some(last)) = (points.first(), points.last()) else {
+        return Err(Error::new("no frequency is coherent").next("excite the axis harder, or for longer"));
+    };
+    let mut found = Measured {
+        sensitivity: (0.0, 0.0),
+        sensitivity_at_most: 0.0,
+        phase: None,
+        gain: None,
+        range: [first.omega, last.omega],
+    };
+    let mut before: Option<(f64, Complex<f64>)> = None;
+    for point in &points {
+        let terms = feedback.at(point.omega);
+        if terms.current != Complex::ZERO {
+            return Err(Error::new("a current loop needs the response of the current, too")
+                .next("leave its margins to taut tune"));
+        }
+        let factor = terms.position / terms.own * length;
+        let l = factor * point.value;
+        let far = (l + 1.0).norm();
+        if 1.0 / far > found.sensitivity.0 {
+            found.sensitivity = (1.0 / far, point.omega);
+        }
+        let nearest = far - factor.norm() * point.radius;
+        let most = if nearest > 0.0 { 1.0 / nearest } else { f64::INFINITY };
+        found.sensitivity_at_most = found.sensitivity_at_most.max(most);
+        if let Some((omega, was)) = before {
+            if was.norm() >= 1.0 && l.norm() < 1.0 {
+                let margin = (-l).arg().abs().min((-was).arg().abs());
+                if found.phase.is_none_or(|(least, _)| margin < least) {
+                    found.phase = Some((margin, 0.5 * (omega + point.omega)));
+                }
+            }
+            if was.im * l.im < 0.0 && was.re < 0.0 && l.re < 0.0 {
+                let size = 0.5 * (was.re + l.re).abs();
+                if size < 1.0 && found.gain.is_none_or(|(least, _)| 1.0 / size < least) {
+                    found.gain = Some((1.0 / size, 0.5 * (omega + point.omega)));
+                }
+            }
+        }
+        before = Some((point.omega, l));
+    }
+    Ok(found)
+}
+
+impl Measured {
+    /// In a sentence.
+    pub fn words(&self) -> String {
+        let hertz = |omega: f64| format!("{:.2} Hz", omega / (2.0 * PI));
+        let most = match self.sensitivity_at_most {
+            most if most.is_finite() => format!("at most {most:.2} with 95 %"),
+            _ => "without a bound: the circle of a frequency holds −1".into(),
+        };
+        let phase = self.phase.map_or("no crossover in the range".into(), |(margin, omega)| {
+            format!("phase margin {:.1}° at {}", margin.to_degrees(), hertz(omega))
+        });
+        let gain = self.gain.map_or("no gain margin in the range".into(), |(margin, omega)| {
+            format!("gain margin {margin:.2} at {}", hertz(omega))
+        });
+        let [low, high] = self.range.map(hertz);
+        let (peak, at) = self.sensitivity;
+        format!("Ms {peak:.2} at {} ({most}); {phase}; {gain}; from {low} to {high}", hertz(at))
+    }
+}
