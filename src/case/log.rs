@@ -15,6 +15,7 @@ const KEYS: &[&str] = &[
     "file",
     "fetch",
     "input",
+    "added",
     "reference",
     "units",
     "scale",
@@ -54,6 +55,12 @@ pub(super) fn logs(field: &Field, stage: &Stage, folder: &Folder, driven: bool) 
         }
         _ => {}
     }
+    let added = sources.source("added", field.input_unit)?;
+    if let (Some(_), None, Some(field)) = (&added, &input, table.optional("added")) {
+        return Err(field
+            .fail("there is no logged input that this could be added to")
+            .next("name the column of the controller's output: input = \"...\""));
+    }
     let mut outputs = Vec::new();
     for quantity in Quantity::ALL {
         outputs.extend(sources.source(quantity.name(), quantity.unit())?.map(|source| (quantity, source)));
@@ -87,6 +94,7 @@ pub(super) fn logs(field: &Field, stage: &Stage, folder: &Folder, driven: bool) 
         hold_missing: word("missing_input", &[("refuse", false), ("hold", true)])?,
         absolute: absolute(&table, &outputs)?,
         outputs,
+        added,
         reference: sources.source("reference", "m")?,
         hold: if linear { Hold::Linear } else { Hold::Zero },
         from,
@@ -117,7 +125,7 @@ impl<'a> Sources<'a> {
         let part = |key: &str| table.optional(key).map(|field| field.table()).transpose();
         let sources = Self { units: part("units")?, scale: part("scale")?, offset: part("offset")?, table, stage };
         for part in [&sources.units, &sources.scale, &sources.offset].into_iter().flatten() {
-            let columns = ["time", "input", "reference"].into_iter().chain(Quantity::ALL.map(Quantity::name));
+            let columns = ["time", "input", "added", "reference"].into_iter().chain(Quantity::ALL.map(Quantity::name));
             let named: Vec<&'static str> = columns.clone().filter(|key| table.optional(key).is_some()).collect();
             // A quantity without a column, rather than a word that is none.
             let other = part.keys().find(|key| !named.contains(key) && columns.clone().any(|column| column == *key));

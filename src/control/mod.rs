@@ -30,6 +30,7 @@ mod welch;
 pub(crate) use outcome::follow;
 pub use outcome::{Deviation, Figures, MoveRun, Rows, Setup, close, closed_loop, stream};
 pub use rest::Swing;
+pub(crate) use sampled::Added;
 pub use sampled::{Controller, Loop, Sample, Seen, measures_cart};
 pub use spread::{Worst, spread, worst};
 pub use standard::Standard;

@@ -244,6 +244,7 @@ fn log() -> Value {
         ("fetch", described(json!({ "type": "string" }), "The command that brings the file where it is not there")),
         ("time", any(vec![column(), table("experiment.log.time", &[])])),
         ("input", column()),
+        ("added", column()),
         ("reference", column()),
         ("units", columns()),
         ("scale", columns()),

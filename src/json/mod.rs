@@ -4,6 +4,8 @@
 
 mod case_schema;
 mod check;
+mod comparison;
+mod drift;
 mod fit;
 mod gantry;
 mod gantry_modes;
@@ -16,6 +18,8 @@ mod tune;
 
 pub use case_schema::case_schema;
 pub use check::check;
+pub use comparison::comparison;
+pub use drift::drift;
 pub use fit::fit;
 pub use gantry::{GantrySimulated, GantrySimulation, gantry_metrics};
 pub use gantry_modes::gantry_modes;

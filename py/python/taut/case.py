@@ -8,7 +8,7 @@ from typing import Any, Protocol, overload
 
 from . import _checks, _html, _native
 from ._toml import change
-from .results import Check, Fit, GantryModes, LinearModel, Modes
+from .results import Check, Comparison, Drift, Fit, GantryModes, LinearModel, Modes
 from .runs import Run, Runs
 from .sweeps import sweep
 from .table import Table
@@ -171,6 +171,23 @@ class Case:
         native = self._native.fit(effort if posterior else None, bool(profiles))
         drawn = None if native.draws is None else Table(*native.draws)
         return Fit(native.data, self._of(native.case), drawn)
+
+    def compare(
+        self, laws: str | Sequence[str] | None = None, windows: Sequence[float | None] | None = None
+    ) -> Comparison:
+        """Friction laws and windows by the error on parts of the logs that are held out, and a fit with the best.
+
+        ``laws`` are of ``viscous``, ``coulomb``, ``asymmetric``, ``stribeck``, ``along`` and ``lugre``, by default all but the
+        last; ``windows`` are lengths, s, and None for whole logs.
+        """
+        names = _checks.names("laws", [laws] if isinstance(laws, str) else laws)
+        lengths = None if windows is None else [_checks.number("windows", window) for window in windows]
+        data, case = self._native.compare(names, lengths)
+        return Comparison(data, self._of(case))
+
+    def drift(self) -> Drift:
+        """Which single change of the machine explains the logs best, all else as the case has it."""
+        return Drift(self._native.drift())
 
     def modes(
         self,

@@ -113,6 +113,49 @@ class Fit:
 
 
 @dataclass(frozen=True)
+class Comparison:
+    """Friction laws and windows by what they predict."""
+
+    data: dict[str, Any]
+    """What ``taut fit --compare --json`` prints."""
+    case: Case
+    """The case with the chosen law and its estimates."""
+
+    @property
+    def chosen(self) -> str:
+        """The law and the windows that are chosen, in words."""
+        return str(self.data["candidates"][self.data["chosen"]]["name"])
+
+    def __repr__(self) -> str:
+        return f"<taut.Comparison {self.data['title']!r}: {self.chosen}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(c["name"], c["parameters"], c["held_out_rmse"], c["training_rmse"]) for c in self.data["candidates"]]
+        return _html.table(str(self.data["title"]), ("law and windows", "parameters", "held out", "training"), rows)
+
+
+@dataclass(frozen=True)
+class Drift:
+    """What single changes make of the errors of a machine."""
+
+    data: dict[str, Any]
+    """What ``taut fit --drift --json`` prints."""
+
+    @property
+    def changes(self) -> dict[str, float]:
+        """The value of each parameter that explains the logs best by itself, the one that explains most first."""
+        return {row["name"]: row["to"] for row in self.data["changes"]}
+
+    def __repr__(self) -> str:
+        best = next(iter(self.changes.items()), None)
+        return f"<taut.Drift {self.data['title']!r}: {'nothing' if best is None else f'{best[0]} to {best[1]:.6g}'}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(c["name"], c["from"], c["to"], c["left"]) for c in self.data["changes"]]
+        return _html.table(str(self.data["title"]), ("parameter", "from", "to", "left of the squares"), rows)
+
+
+@dataclass(frozen=True)
 class LinearModel:
     """A linear model: dx/dt = A x + B u, y = C x + D u, or x[k+1] = A x[k] + B u[k] where ``dt`` is a sample time."""
 
