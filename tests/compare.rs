@@ -89,7 +89,7 @@ fn what_cannot_be_compared_is_refused() {
 fn a_known_change_between_campaigns_is_named() {
     for (change, key, value) in [
         ("cart.mass=0.8", "cart.mass", 0.8),
-        ("amplifier.gain=0.8", "input_gain", 0.8),
+        ("motor.resistance=0.9", "motor.resistance", 0.9),
         ("cart.load=1.5", "cart.load", 1.5),
     ] {
         let case = made(&[change], 3);

@@ -130,7 +130,7 @@ fn laws_and_windows_that_are_none_are_refused() {
     assert!(text.contains("there is no friction law \"dry\" to compare"), "{text}");
     assert!(text.contains("allowed: viscous, coulomb, asymmetric, stribeck, along, lugre"), "{text}");
     for window in ["0s", "-1s", "long", "1 m"] {
-        let (status, text) = told(&["--compare", "--windows", window]);
+        let (status, text) = told(&["--compare", &format!("--windows={window}")]);
         assert_eq!(status, Some(2), "{window}: {text}");
         assert!(text.contains(&format!("\"{window}\" is no length of windows")), "{text}");
         assert!(text.contains("allowed: whole, or a time above zero such as 2s"), "{text}");
