@@ -29,7 +29,14 @@ fn main() -> taut::Result<()> {
     let run = close(stage, &mut Relay { volts: 10.0 }, &timing, &profile, 1.0, 50e-6, Solver::Exact)?;
     println!("relay: cart error at most {:.1} µm", 1e6 * run.figures.cart.peak.value.abs());
 
-    let pid = Pid { proportional: 3000.0, integral: 60e3, derivative: 10.0, filter: 200.0, tracking: 0.05 };
+    let pid = Pid {
+        proportional: 3000.0,
+        integral: 60e3,
+        derivative: 10.0,
+        filter: 200.0,
+        reference_speed: 1.0,
+        tracking: 0.05,
+    };
     let design = Design {
         every: 1e-3,
         delay: 0.0,

@@ -296,6 +296,7 @@ fn recorded(cell: &Cell, truth: [f64; 3], chance: &mut Chance) -> Case {
             time: time.clone(),
             input: voltage.clone(),
             hold: Hold::Zero,
+            added: None,
             reference: None,
             outputs: vec![Output { quantity: Quantity::DriveAngle, absolute: false, values }],
             ended: None,

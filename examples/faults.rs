@@ -221,6 +221,7 @@ fn made(fault: Fault, seed: u64) -> Case {
         time,
         input: values,
         hold: Hold::Zero,
+        added: None,
         reference: None,
         outputs,
         ended: None,

@@ -66,6 +66,8 @@ pub struct Pid {
     pub derivative: f64,
     /// Corner of the derivative's filter, Hz.
     pub filter: f64,
+    /// Weight of the reference in the derivative: 0 for one of the measurement alone.
+    pub reference_speed: f64,
     /// Time in which the integral follows a command that is limited, s.
     pub tracking: f64,
 }
@@ -81,6 +83,8 @@ pub struct Cascade {
     pub speed_integral: f64,
     /// Corner of the filter of the measured speed, Hz.
     pub filter: f64,
+    /// Weight of the reference's speed in the speed that is asked for.
+    pub reference_speed: f64,
     /// Time in which the integrals follow what is limited, s.
     pub tracking: f64,
     /// The current loop; needs an amplifier in voltage mode.

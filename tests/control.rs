@@ -153,6 +153,7 @@ fn closed_loops_agree_with_the_authority() {
                 integral: gain("integral"),
                 derivative: gain("derivative"),
                 filter: gain("filter"),
+                reference_speed: 1.0,
                 tracking: gain("tracking"),
             }),
             _ => Structure::Cascade(Cascade {
@@ -160,6 +161,7 @@ fn closed_loops_agree_with_the_authority() {
                 speed: gain("speed"),
                 speed_integral: gain("speed_integral"),
                 filter: gain("filter"),
+                reference_speed: 1.0,
                 tracking: gain("tracking"),
                 current: None,
             }),
@@ -251,13 +253,27 @@ fn a_riccati_equation_without_a_solution_says_so() {
 fn structures() -> Vec<Structure> {
     let rules = vec![vec![-1.0, -0.5, 0.0], vec![-0.5, 0.0, 0.5], vec![0.0, 0.5, 1.0]];
     let fuzzy = Fuzzy { error: 2e-3, rate: 0.5, command: 6.0, incremental: false, rules, filter: 200.0 };
-    let cascade =
-        Cascade { position: 60.0, speed: 10.0, speed_integral: 500.0, filter: 200.0, tracking: 0.02, current: None };
+    let cascade = Cascade {
+        position: 60.0,
+        speed: 10.0,
+        speed_integral: 500.0,
+        filter: 200.0,
+        reference_speed: 1.0,
+        tracking: 0.02,
+        current: None,
+    };
     let inner = CurrentLoop { proportional: 0.1, integral: 400.0, limit: Some(10.0) };
     let lqg =
         StateFeedback { position: 5e-4, speed: None, integral: None, command: 1.0, disturbance: 0.3, noise: 3e-6 };
     vec![
-        Structure::Pid(Pid { proportional: 3e3, integral: 6e4, derivative: 10.0, filter: 200.0, tracking: 0.05 }),
+        Structure::Pid(Pid {
+            proportional: 3e3,
+            integral: 6e4,
+            derivative: 10.0,
+            filter: 200.0,
+            reference_speed: 1.0,
+            tracking: 0.05,
+        }),
         Structure::Cascade(cascade),
         Structure::Cascade(Cascade { speed: 14.0, speed_integral: 700.0, current: Some(inner), ..cascade }),
         Structure::StateFeedback(lqg),
@@ -447,10 +463,24 @@ fn a_timing_that_is_none_is_refused() {
 #[test]
 fn a_limit_leaves_nothing_behind_where_there_is_no_integral() {
     use taut::control::{Controller, Seen};
-    let pid = Pid { proportional: 1000.0, integral: 0.0, derivative: 0.0, filter: 200.0, tracking: 0.05 };
+    let pid = Pid {
+        proportional: 1000.0,
+        integral: 0.0,
+        derivative: 0.0,
+        filter: 200.0,
+        reference_speed: 1.0,
+        tracking: 0.05,
+    };
     let inner = CurrentLoop { proportional: 0.3, integral: 0.0, limit: Some(1.0) };
-    let cascade =
-        Cascade { position: 60.0, speed: 10.0, speed_integral: 0.0, filter: 200.0, tracking: 0.02, current: None };
+    let cascade = Cascade {
+        position: 60.0,
+        speed: 10.0,
+        speed_integral: 0.0,
+        filter: 200.0,
+        reference_speed: 1.0,
+        tracking: 0.02,
+        current: None,
+    };
     let loops = [
         Structure::Pid(pid),
         Structure::Cascade(cascade),

@@ -24,6 +24,7 @@ fn clean() -> (Stage, Log) {
         input: time.iter().map(|&t| input.value(t)).collect(),
         time,
         hold: Hold::Zero,
+        added: None,
         reference: None,
         outputs: quantities.into_iter().map(output).collect(),
         ended: None,

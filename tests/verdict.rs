@@ -277,7 +277,7 @@ fn bounds_and_motors_that_cannot_be_are_said() {
 /// `check` ended as on a wrong file where every parameter ended at its bound, though `fit` had a result.
 #[test]
 fn check_tells_of_parameters_that_all_end_at_bounds() {
-    let case = made(&[], &["cart.friction.viscous=24"], &[1], slow(3, 0.0, 1.0, 1e-3));
+    let case = made(&["cart.friction.viscous=60"], &["cart.friction.viscous=24"], &[1], slow(3, 0.0, 1.0, 1e-3));
     let bounds = vec![("cart.friction.viscous".to_string(), [50.0, 100.0])];
     let checked = check(&case, &Plan { bounds, ..plan(&["cart.friction.viscous"]) }).unwrap();
     assert!(checked.identifiability.is_none() && checked.fit.estimates[0].at_bound);

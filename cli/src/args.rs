@@ -373,6 +373,18 @@ pub struct Fit {
     /// Also draw from the posterior, with the priors in [fit.priors]: intervals where those of the fit are too simple
     #[arg(long)]
     pub posterior: bool,
+    /// Compare friction laws and windows by the error on parts of the logs that are held out, and fit with the best
+    #[arg(long, conflicts_with_all = ["posterior", "drift"])]
+    pub compare: bool,
+    /// Laws to compare, separated by commas: viscous, coulomb, asymmetric, stribeck, along, lugre [default: all but lugre]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "compare")]
+    pub laws: Vec<String>,
+    /// Windows to compare, separated by commas: lengths such as 2s, and whole for whole logs
+    #[arg(long, value_name = "LENGTHS", value_delimiter = ',', requires = "compare")]
+    pub windows: Vec<String>,
+    /// Say which single change of the machine explains the logs best, such as those of another day
+    #[arg(long, conflicts_with = "posterior")]
+    pub drift: bool,
     /// Write the results although something warns that they are not to be relied on
     #[arg(long)]
     pub anyway: bool,
@@ -391,6 +403,8 @@ Examples:
   taut fit axis.toml --out fitted
   taut fit axis.toml --set fit.starts=8 --json | jq .parameters
   taut fit axis.toml --posterior --draws 2000 --out fitted
+  taut fit axis.toml --compare --laws coulomb,asymmetric,along --windows whole,2s --out compared
+  taut fit april.toml --drift
   taut simulate fitted/fitted.toml --draws fitted/posterior.csv --out band
 
 Lines that begin with `warning:` say what makes a result not to be relied on: the exit status is 1, and nothing is written without --anyway.

@@ -114,3 +114,88 @@ fn a_fit_that_warns_writes_nothing_unless_told() {
     assert_eq!(output.status.code(), Some(1));
     assert!(folder.path().join("found/fitted.toml").exists());
 }
+
+/// What a command says on standard error, and how it ends.
+fn told(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
+    let output = taut(folder).args(args).output().unwrap();
+    (output.status.code(), String::from_utf8(output.stderr).unwrap())
+}
+
+#[test]
+fn laws_and_windows_that_are_none_are_refused() {
+    let folder = with_a_log();
+    let told = |args: &[&str]| told(folder.path(), &[&["fit", "mine.toml"], args].concat());
+    let (status, text) = told(&["--compare", "--laws", "dry"]);
+    assert_eq!(status, Some(2), "{text}");
+    assert!(text.contains("there is no friction law \"dry\" to compare"), "{text}");
+    assert!(text.contains("allowed: viscous, coulomb, asymmetric, stribeck, along, lugre"), "{text}");
+    for window in ["0s", "-1s", "long", "1 m"] {
+        let (status, text) = told(&["--compare", &format!("--windows={window}")]);
+        assert_eq!(status, Some(2), "{window}: {text}");
+        assert!(text.contains(&format!("\"{window}\" is no length of windows")), "{text}");
+        assert!(text.contains("allowed: whole, or a time above zero such as 2s"), "{text}");
+    }
+    for args in [&["--laws", "coulomb"][..], &["--compare", "--drift"], &["--drift", "--posterior"]] {
+        assert_eq!(told(args).0, Some(2), "{args:?}");
+    }
+}
+
+/// Campaigns with a friction of their own: a case file for each of them, and errors by experiment.
+#[test]
+fn each_campaign_has_its_file() {
+    let folder = with_a_log();
+    let at = folder.path();
+    let mut text = std::fs::read_to_string(at.join("mine.toml")).unwrap();
+    text = text.replace("name = \"log\"", "name = \"log\"\ncampaign = \"february\"");
+    let again = "\n[[experiment]]\nname = \"again\"\ncampaign = \"april\"\nlog = { file = \"made/5-v-pulse.measured.csv\", time = \"time_s\", input = \"voltage_V\", drive_angle = \"drive_angle_rad\" }\n";
+    text = text.replace("\n[fit]\n", &format!("{again}\n[fit]\nseparate = [\"cart.friction.coulomb\"]\n"));
+    std::fs::write(at.join("two.toml"), &text).unwrap();
+    taut(at).args(["fit", "two.toml", "--out", "found", "--anyway", "--no-report", "--quiet"]).output().unwrap();
+    let value = json(at, "found/fit.json");
+    let names: Vec<&str> =
+        value["parameters"].as_array().unwrap().iter().map(|row| row["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["cart.friction.viscous", "cart.friction.coulomb [february]", "cart.friction.coulomb [april]"]);
+    for file in ["found/fitted.toml", "found/fitted-april.toml"] {
+        taut(at).args(["simulate", file, "--experiment", "5 V pulse", "--quiet"]).assert().success();
+    }
+    let (status, text) = told(at, &["fit", "two.toml", "--posterior"]);
+    assert_eq!(status, Some(2), "{text}");
+    assert!(text.contains("draws are of one machine, and `separate` makes one for each campaign"), "{text}");
+    // Of no campaign.
+    let lost =
+        std::fs::read_to_string(at.join("two.toml")).unwrap().replace("campaign = \"april\"\n", "campaign = \"may\"\n");
+    let lost = lost.replace("[[experiment]]\nname = \"again\"\ncampaign = \"may\"\n", "[[experiment]]\nname = \"third\"\ncampaign = \"may\"\nlog = { file = \"made/5-v-pulse.measured.csv\", time = \"time_s\", input = \"voltage_V\", drive_angle = \"drive_angle_rad\" }\n\n[[experiment]]\nname = \"again\"\n");
+    std::fs::write(at.join("lost.toml"), lost).unwrap();
+    let (status, text) = told(at, &["fit", "lost.toml"]);
+    assert_eq!(status, Some(2), "{text}");
+    assert!(text.contains("\"again\" is of no campaign, so these parameters have no value for it"), "{text}");
+}
+
+#[test]
+fn nothing_to_search_for_gives_errors_alone() {
+    let folder = with_a_log();
+    let output = taut(folder.path()).args(["fit", "mine.toml", "--set", "fit.free=[]"]).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("nothing is searched for: the errors of the case as it is"), "{text}");
+    assert!(text.contains("log  drive_angle: RMSE") && !text.contains("Parameters"), "{text}");
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// A case whose cart is more than twice as heavy as that of the log: what explains it stands first, and the mass is found.
+#[test]
+fn a_drift_is_a_table_that_begins_with_what_explains_most() {
+    let folder = with_a_log();
+    let output = taut(folder.path())
+        .args(["fit", "mine.toml", "--drift", "--set", "cart.mass=0.8", "--out", "drift", "--json"])
+        .output()
+        .unwrap();
+    let value: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(value, json(folder.path(), "drift/drift.json"));
+    let changes = value["changes"].as_array().unwrap();
+    let left: Vec<f64> = changes.iter().map(|change| change["left"].as_f64().unwrap_or(f64::INFINITY)).collect();
+    assert!(left.windows(2).all(|pair| pair[0] <= pair[1]) && left[0] < 0.05, "{left:?}");
+    let mass = changes.iter().find(|change| change["name"] == "cart.mass").unwrap();
+    assert!((mass["to"].as_f64().unwrap() - 0.362).abs() < 0.02, "{mass}");
+    let page = std::fs::read_to_string(folder.path().join("drift/report.html")).unwrap();
+    assert!(page.contains("Single changes") && page.contains("cart.mass"));
+}

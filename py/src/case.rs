@@ -11,7 +11,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use taut::case::{GantryCase, InputFile, Opened, Plan, TEMPLATE};
 use taut::files::{Inputs, write_atomically};
-use taut::fit::{Posterior, Profile, check, fit, posterior, profiles};
+use taut::fit::compare::{FrictionLaw, Setting, compare};
+use taut::fit::{Posterior, Profile, check, drift, fit, posterior, profiles};
 use taut::json;
 use taut::linear::{Analysis, GantryAnalysis};
 use taut::nuts::Effort;
@@ -220,6 +221,47 @@ impl Case {
         let changed = Self::from_text(py, self.path.clone(), &text, Vec::new())?;
         let told = guarded(|| json::tuned(case, &tuning, &tuned))?;
         Ok((value::json(py, &told)?.unbind(), Py::new(py, changed)?))
+    }
+
+    /// Compares friction laws and windows: the comparison as JSON, and the case with the estimates of the chosen ones.
+    fn compare(
+        &self,
+        py: Python<'_>,
+        laws: Vec<String>,
+        windows: Option<Vec<Option<f64>>>,
+    ) -> PyResult<(Py<PyAny>, Py<Self>)> {
+        let case = self.axis(py)?;
+        let plan = case.fit_plan(&self.path).told(py)?;
+        let mut setting = Setting::usual(case, &plan);
+        if !laws.is_empty() {
+            setting.laws = laws.iter().map(|law| FrictionLaw::named(law)).collect::<taut::Result<_>>().told(py)?;
+        }
+        if let Some(windows) = windows.filter(|windows| !windows.is_empty()) {
+            setting.windows = windows;
+        }
+        let interrupt = Interrupt::listen();
+        let stop = || interrupt.stop();
+        let watch = &mut |_: &str| if interrupt.stop() { Flow::Stop } else { Flow::Continue };
+        let found = unlocked(py, || compare(case, &self.path, &plan, &setting, Some(&stop), watch));
+        interrupt.finish()?;
+        let found = found?.told(py)?;
+        let text = guarded(|| found.fit.case_text(&found.case, &self.path))?.told(py)?;
+        let estimated = Self::from_text(py, self.path.clone(), &text, Vec::new())?;
+        let told = guarded(|| json::comparison(&found))?;
+        Ok((value::json(py, &told)?.unbind(), Py::new(py, estimated)?))
+    }
+
+    /// Which single change explains the logs, as JSON.
+    fn drift(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let case = self.axis(py)?;
+        let plan = case.fit_plan(&self.path).told(py)?;
+        let interrupt = Interrupt::listen();
+        let stop = || interrupt.stop();
+        let watch = &mut |_: &str| if interrupt.stop() { Flow::Stop } else { Flow::Continue };
+        let found = unlocked(py, || drift(case, &plan, Some(&stop), watch));
+        interrupt.finish()?;
+        let told = found?.told(py)?;
+        Ok(value::json(py, &guarded(|| json::drift(case, &told))?)?.unbind())
     }
 
     #[allow(clippy::too_many_arguments)] // each is an option of the command line

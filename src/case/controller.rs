@@ -72,6 +72,7 @@ fn structure(table: &Table, stage: &Stage) -> Result<Structure> {
             integral: own.number("integral")?,
             derivative: own.number("derivative")?,
             filter: own.number("filter")?,
+            reference_speed: own.number("reference_speed")?,
             tracking: own.number("tracking")?,
         }),
         "cascade" => Structure::Cascade(cascade(&field, stage)?),
@@ -121,6 +122,7 @@ fn cascade(field: &Field, stage: &Stage) -> Result<Cascade> {
         speed: table.number("speed")?,
         speed_integral: table.number("speed_integral")?,
         filter: table.number("filter")?,
+        reference_speed: table.number("reference_speed")?,
         tracking: table.number("tracking")?,
         current,
     })

@@ -17,6 +17,7 @@ const KEYS: &[&str] = &[
     "fetch",
     "preset",
     "input",
+    "added",
     "reference",
     "units",
     "scale",
@@ -65,6 +66,12 @@ pub(super) fn logs(field: &Field, stage: &Stage, folder: &Folder, driven: bool) 
         }
         _ => {}
     }
+    let added = sources.source("added", field.input_unit)?;
+    if let (Some(_), None, Some(field)) = (&added, &input, table.optional("added")) {
+        return Err(field
+            .fail("there is no logged input that this could be added to")
+            .next("name the column of the controller's output: input = \"...\""));
+    }
     let mut outputs = Vec::new();
     for quantity in Quantity::ALL {
         if quantity == Quantity::CartAcceleration
@@ -107,6 +114,7 @@ pub(super) fn logs(field: &Field, stage: &Stage, folder: &Folder, driven: bool) 
         hold_missing: word("missing_input", &[("refuse", false), ("hold", true)])?,
         absolute: absolute(&table, &outputs)?,
         outputs,
+        added,
         reference: sources.source("reference", "m")?,
         hold: if linear { Hold::Linear } else { Hold::Zero },
         from,
@@ -146,7 +154,7 @@ impl<'a> Sources<'a> {
         let (units, scale, offset) = (part("units")?, part("scale")?, part("offset")?);
         let sources = Self { units, scale, offset, table, columns: known, stage, steps_per_turn };
         for part in [&sources.units, &sources.scale, &sources.offset].into_iter().flatten() {
-            let columns = ["time", "input", "reference"].into_iter().chain(Quantity::ALL.map(Quantity::name));
+            let columns = ["time", "input", "added", "reference"].into_iter().chain(Quantity::ALL.map(Quantity::name));
             let named: Vec<&'static str> = columns.clone().filter(|key| sources.is_named(key)).collect();
             // A quantity without a column, rather than a word that is none.
             let other = part.keys().find(|key| !named.contains(key) && columns.clone().any(|column| column == *key));

@@ -33,6 +33,7 @@ mod welch;
 pub use outcome::{Deviation, Figures, MoveRun, Rows, Setup, close, closed_loop, stream};
 pub(crate) use outcome::{closed_loop_briefly, follow};
 pub use rest::Swing;
+pub(crate) use sampled::Added;
 pub use sampled::{Controller, Loop, Sample, Seen, measures_cart};
 pub use spread::{Worst, spread, worst};
 pub use standard::Standard;

@@ -1,7 +1,7 @@
 //! A move run in closed loop, and what it shows.
 
 use super::rest::Swing;
-use super::sampled::{Controller, Loop, Sample, Sampled};
+use super::sampled::{Added, Controller, Loop, Sample, Sampled};
 use super::standard::Standard;
 use crate::case::{Experiment, Initial};
 use crate::design::Design;
@@ -207,13 +207,13 @@ pub(crate) fn follow(
     stage: &Stage,
     model: &Stage,
     design: &Design,
-    profile: &Profile,
+    (profile, added): (&Profile, Option<&Added>),
     experiment: &Experiment,
     solver: Solver,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<solve::Outcome> {
     let mut controller = Standard::new(design, model)?;
-    let mut sampled = Sampled::new(stage, &mut controller, Loop::of(design), profile, false).exactly();
+    let mut sampled = Sampled::new(stage, &mut controller, Loop::of(design), profile, false).exactly().with(added);
     let stage = Stage { encoder: None, ..stage.clone() };
     let mut run = solve::Run::new(&stage, experiment, solver, Detail::Full, None, sink)?;
     sampled.drive(&mut run, experiment.until);

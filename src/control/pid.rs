@@ -1,10 +1,12 @@
 //! PID, and cascades of P and PI.
+//!
+//! With the weight c of the reference's speed: c = 1 differentiates the error, c = 0 the measurement alone.
 
 use super::sampled::Speed;
 use crate::design::{Cascade, Pid};
 use crate::signal::profile::Reference;
 
-/// A PID controller: u = K_p e + K_i ∫e dt + K_d ė.
+/// A PID controller: u = K_p e + K_i ∫e dt + K_d (c ẏ* − ẏ).
 #[derive(Debug, Clone)]
 pub struct PidState {
     gains: Pid,
@@ -22,13 +24,14 @@ impl PidState {
 
     /// The next command.
     pub fn step(&mut self, target: &Reference, position: f64) -> f64 {
-        let Pid { proportional, integral, derivative, filter, .. } = self.gains;
+        let Pid { proportional, integral, derivative, filter, reference_speed: c, .. } = self.gains;
         let error = target.position - position;
-        // T_f ḋ + d = ė by backward differences
+        // T_f ḋ + d = c ẏ* − ẏ by backward differences
         let time = 1.0 / (2.0 * std::f64::consts::PI * filter);
-        let change = error - self.last.unwrap_or(error);
+        let weighed = c * target.position - position;
+        let change = weighed - self.last.unwrap_or(weighed);
         self.slope = (time * self.slope + change) / (time + self.every);
-        self.last = Some(error);
+        self.last = Some(weighed);
         self.integral += integral * self.every * error;
         proportional * error + self.integral + derivative * self.slope
     }
@@ -67,8 +70,8 @@ impl CascadeState {
     pub fn step(&mut self, target: &Reference, position: f64, current: f64, forward: f64) -> f64 {
         let gains = &self.gains;
         let speed = self.speed.step(position);
-        // v* = K_v (y* − y) + ẏ*
-        let wanted = gains.position * (target.position - position) + target.speed;
+        // v* = K_v (y* − y) + c ẏ*
+        let wanted = gains.position * (target.position - position) + gains.reference_speed * target.speed;
         let error = wanted - speed;
         self.speed_integral += gains.speed_integral * self.every * error;
         let output = gains.speed * error + self.speed_integral;

@@ -116,6 +116,26 @@ pub(super) struct Sampled<'a> {
     /// The command after the profile.
     pub(super) at_rest: Rest,
     pub(super) kept: Option<Vec<Sample>>,
+    /// What is added to the command.
+    added: Option<&'a Added>,
+}
+
+/// A known input that is added to what a controller commands, held between its times.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Added {
+    /// s, increasing.
+    pub times: Vec<f64>,
+    /// V or A.
+    pub values: Vec<f64>,
+}
+
+impl Added {
+    /// The value at `time`, and when the next one comes.
+    fn at(&self, time: f64) -> (f64, f64) {
+        let next = self.times.partition_point(|t| *t <= time);
+        let value = next.checked_sub(1).and_then(|k| self.values.get(k)).copied().unwrap_or(0.0);
+        (value, self.times.get(next).copied().unwrap_or(f64::INFINITY))
+    }
 }
 
 impl<'a> Sampled<'a> {
@@ -154,15 +174,22 @@ impl<'a> Sampled<'a> {
             samples: 0,
             at_rest: Rest::new(f64::INFINITY, f64::INFINITY),
             kept: keep.then(Vec::new),
+            added: None,
         }
     }
 }
 
-impl Sampled<'_> {
+impl<'a> Sampled<'a> {
     /// For a run that ends there: what is held then is held no longer.
     pub(super) fn until(mut self, until: f64) -> Self {
         self.until = until;
         self.at_rest = Rest::new(self.profile.end(), until);
+        self
+    }
+
+    /// With a known input added to its commands.
+    pub(super) fn with(mut self, added: Option<&'a Added>) -> Self {
+        self.added = added;
         self
     }
 
@@ -190,8 +217,25 @@ impl Sampled<'_> {
         loop {
             let (input, end) = self.decide(&run.state(), run.current(0));
             let is_at_end = run.time() >= until;
-            if !run.hold(&[input], end) || is_at_end {
+            if !self.hold(run, input, end) || is_at_end {
                 return;
+            }
+        }
+    }
+
+    /// Holds a command, with what is added to it, until `end`, s; false where the run ends.
+    fn hold(&self, run: &mut Run, command: f64, end: f64) -> bool {
+        let Some(added) = self.added else { return run.hold(&[command], end) };
+        loop {
+            // A hundredth of a sample is what clocks of logs are off by.
+            let near = 1e-2 * self.timing.every;
+            let (value, next) = added.at(run.time() + near);
+            let next = if next < end - near { next } else { end };
+            if !run.hold(&[command + value], next) {
+                return false;
+            }
+            if next >= end {
+                return true;
             }
         }
     }

@@ -1,6 +1,7 @@
 //! What is to be known of a fit before its numbers are used: faults of the logs, and of the search, in two grades.
 
 use super::Fit;
+use super::controller::reproduced;
 use super::least_squares::Ending;
 use super::problem::Problem;
 use super::regression::{Balance, regression_late};
@@ -27,6 +28,9 @@ const OPPOSITE: f64 = -0.5;
 /// Most rows by which an input may be late and be found so, and the fewest that are told.
 const LATEST: usize = 40;
 const LATE: usize = 3;
+
+/// Share of the logged input that the controller of a case has to make of a log, %.
+const REPRODUCED: f64 = 90.0;
 
 /// How much something matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -70,6 +74,7 @@ impl std::fmt::Display for Finding {
 /// All there is to say, warnings first.
 pub(super) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit) -> Vec<Finding> {
     let mut all = of_logs(case, plan, &found.problem);
+    all.extend(of_controller(case, plan));
     all.extend(of_delay(plan, &found.problem));
     all.extend(of_search(fit));
     all.extend(of_motor(case, fit));
@@ -149,6 +154,25 @@ fn opposite(problem: &Problem, name: &str) -> Option<bool> {
         Some(correlation) if correlation > -OPPOSITE => Some(false),
         _ => None,
     }
+}
+
+/// Whether the controller of the case is the one that made the logs.
+fn of_controller(case: &Case, plan: &Plan) -> Vec<Finding> {
+    let logs = case.experiments.iter().filter_map(|experiment| experiment.log.as_ref());
+    let told = logs.filter_map(|log| {
+        let percent = reproduced(case, log)?;
+        let good = percent >= REPRODUCED;
+        let grade = if good || !plan.closed_loop { Grade::Note } else { Grade::Warning };
+        let next = match good {
+            true => "",
+            false => {
+                ": look at its gains, delay, filters and reference_speed, and at the columns of reference and position"
+            }
+        };
+        let text = format!("the controller of the case reproduces the logged input to {:.1} %{next}", percent.max(0.0));
+        Some(Finding { grade, code: "controller", log: Some(log.name.clone()), text })
+    });
+    told.collect()
 }
 
 /// Whether the logs answer their inputs late.

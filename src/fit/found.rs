@@ -39,6 +39,10 @@ pub struct Fit {
     /// The cost that each start led to, in the first weights; the first start is that of the case, or what a regression makes
     /// of it if that is nearer.
     pub starts: Vec<f64>,
+    /// Steps of derivatives, in standard errors, where the order of events left none; 0 where the cost was smooth.
+    pub coarse: f64,
+    /// How often an evolution strategy, which needs no derivatives, went on.
+    pub evolved: usize,
     /// Values that count.
     pub values: usize,
     /// Variables, what is fitted along included.
@@ -56,6 +60,15 @@ pub struct Work {
     pub evaluations: usize,
     /// Simulated logs.
     pub simulations: u64,
+}
+
+impl Work {
+    /// Adds what else was done.
+    pub(super) fn add(&mut self, other: &Work) {
+        self.iterations += other.iterations;
+        self.evaluations += other.evaluations;
+        self.simulations += other.simulations;
+    }
 }
 
 /// One parameter's estimate.

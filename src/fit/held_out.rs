@@ -8,6 +8,9 @@ use crate::log::Quantity;
 use crate::solve::Flow;
 use crate::stage::Stage;
 
+/// Fewest rows that a start is fitted to.
+const FEWEST: usize = 20;
+
 /// What the fitted logs say beside parameters.
 pub(super) struct Known<'a> {
     /// Deviation of each quantity's residuals.
@@ -18,8 +21,8 @@ pub(super) struct Known<'a> {
     pub shared: Vec<(Extra, f64)>,
 }
 
-/// A log beside `stage`: delay, gain and offsets are what the fitted logs say.
-pub(super) fn met(run: &Run, stage: &Stage, known: &Known) -> LogFit {
+/// A log beside `stage`: delay, gain and offsets are what the fitted logs say. Where it starts is fitted to the first `share` of its rows.
+pub(super) fn met(run: &Run, stage: &Stage, known: &Known, share: f64) -> LogFit {
     let is_start = |what| matches!(what, Nuisance::StartPosition | Nuisance::StartSpeed);
     let mut alone = run.clone();
     for extra in alone.extras.iter_mut().filter(|extra| !is_start(extra.what)) {
@@ -28,7 +31,8 @@ pub(super) fn met(run: &Run, stage: &Stage, known: &Known) -> LogFit {
     }
     alone.extras.extend(known.shared.iter().map(|(extra, value)| held(extra, *value)));
     alone.share(&[]);
-    alone.fitted_rows = alone.time.len();
+    let rows = alone.time.len();
+    alone.fitted_rows = ((rows as f64 * share).ceil() as usize).clamp(FEWEST.min(rows), rows);
     let mut problem = Problem::alone(stage.clone(), alone);
     for &(quantity, deviation) in known.noise {
         problem.weigh(quantity, deviation, true);

@@ -221,6 +221,8 @@ pub struct Minimum {
     pub ending: Ending,
     /// Steps of the derivatives, in standard errors, where the cost has kinks; 0 where it is smooth.
     pub coarse: f64,
+    /// How often an evolution strategy went on where derivatives did not help.
+    pub evolved: usize,
     /// Jacobians computed.
     pub iterations: usize,
     /// Trial points.
@@ -251,6 +253,7 @@ pub fn minimise(
         at_bound: vec![false; n],
         ending: Ending::Failed,
         coarse: 0.0,
+        evolved: 0,
         iterations: 0,
         evaluations: 1,
         x,
@@ -379,6 +382,7 @@ pub fn minimise(
             && evolve(problem, &mut best, bounds, &model, &held, deviation, options.huber)
         {
             evolved += 1;
+            best.evolved = evolved;
             coarser = COARSER.len() - 1;
         } else {
             best.ending = Ending::Stalled;

@@ -131,12 +131,12 @@ fn add(run: &Run, output: usize, stage: &Stage, noise: f64, late: usize, rows: &
 }
 
 /// Rows to each side that a Gaussian of this width weighs.
-fn reach(width: f64) -> usize {
+pub(super) fn reach(width: f64) -> usize {
     (5.0 * width).ceil() as usize
 }
 
 /// First and second derivative of `values` at interval `h`, smoothed, without the margins; exact for parabolas.
-fn derived(values: &[f64], width: f64, h: f64) -> Option<Vec<[f64; 2]>> {
+pub(super) fn derived(values: &[f64], width: f64, h: f64) -> Option<Vec<[f64; 2]>> {
     let reach = reach(width) as i64;
     if (values.len() as i64) < 2 * reach + 10 {
         return None;

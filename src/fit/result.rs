@@ -99,7 +99,6 @@ pub(super) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         .collect();
     let written = problem.stages(&kept);
     let mut logs = Vec::new();
-    let mut sums: Vec<(Nuisance, f64, usize)> = Vec::new();
     for (index, run) in problem.runs.iter().enumerate() {
         let extras = problem.extras_of(index, &best.x);
         let mut told = Vec::new();
@@ -109,20 +108,12 @@ pub(super) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
             // What is known beforehand is no result.
             if let (Some(j), None) = (j, extra.known) {
                 told.push((extra.what, value, error(j).map(|e| e * extra.unit)));
-                match sums.iter_mut().find(|(what, ..)| *what == extra.what) {
-                    Some((_, sum, count)) => (*sum, *count) = (*sum + value, *count + 1),
-                    None => sums.push((extra.what, value, 1)),
-                }
             }
         }
         logs.push(compared(run, &stages[run.part], &extras, told));
     }
-    let known = Known {
-        noise,
-        means: sums.iter().map(|(what, sum, count)| (*what, sum / *count as f64)).collect(),
-        shared: problem.shared.iter().copied().zip(problem.shared_values(&best.x)).collect(),
-    };
-    logs.extend(problem.held_out.iter().map(|run| met(run, &stages[run.part], &known)));
+    let known = known(found);
+    logs.extend(problem.held_out.iter().map(|run| met(run, &stages[run.part], &known, 1.0)));
     Fit {
         parts: problem.parts.iter().cloned().zip(written.iter().cloned()).collect(),
         stage: written[0].clone(),
@@ -142,8 +133,29 @@ pub(super) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         decrement: best.decrement,
         cost: best.cost,
         starts: starts.clone(),
+        coarse: best.coarse,
+        evolved: best.evolved,
         values: problem.counted(),
         variables: problem.variables(),
         work: *work,
+    }
+}
+
+/// What the fitted logs say beside parameters, for those that are held out.
+pub(super) fn known<'a>(found: &'a Searched) -> Known<'a> {
+    let Searched { problem, best, noise, .. } = found;
+    let mut sums: Vec<(Nuisance, f64, usize)> = Vec::new();
+    for (index, run) in problem.runs.iter().enumerate() {
+        for (extra, value) in run.extras.iter().zip(problem.extras_of(index, &best.x)) {
+            match sums.iter_mut().find(|(what, ..)| *what == extra.what) {
+                Some((_, sum, count)) => (*sum, *count) = (*sum + value, *count + 1),
+                None => sums.push((extra.what, value, 1)),
+            }
+        }
+    }
+    Known {
+        noise,
+        means: sums.iter().map(|(what, sum, count)| (*what, sum / *count as f64)).collect(),
+        shared: problem.shared.iter().copied().zip(problem.shared_values(&best.x)).collect(),
     }
 }

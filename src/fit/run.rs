@@ -2,13 +2,13 @@
 
 use super::acceleration::cart_acceleration;
 use crate::case::{Case, Experiment, Initial};
-use crate::control::follow;
+use crate::control::{Added, follow};
 use crate::design::Design;
 use crate::log::{Log, Quantity};
 use crate::signal::Signal;
 use crate::signal::profile::Profile;
 use crate::solve::{Bench, Detail, Ending, Flow, Solver};
-use crate::stage::Stage;
+use crate::stage::{AmplifierMode, Stage};
 use crate::trajectory::{Grid, Trajectory};
 use std::sync::Arc;
 
@@ -90,6 +90,15 @@ pub struct Seen {
     pub alike: Vec<f64>,
 }
 
+impl Seen {
+    /// Values that do not count yet.
+    fn new(quantity: Quantity, absolute: bool, values: Vec<f64>) -> Self {
+        let step = step_of(&values);
+        let (weights, repeats, alike) = (vec![0.0; values.len()], repeats(&values), alike(&values, step));
+        Self { quantity, absolute, weights, repeats, alike, values, step }
+    }
+}
+
 /// A log, or a window of one, and the model's side of it.
 #[derive(Debug, Clone)]
 pub struct Run {
@@ -129,6 +138,7 @@ struct Closed {
     /// What the controller takes the axis for: that of the case, whatever is fitted.
     model: Stage,
     profile: Profile,
+    added: Option<Added>,
 }
 
 /// How a run is made of a log.
@@ -197,19 +207,7 @@ impl Run {
         let seen = log
             .outputs
             .iter()
-            .map(|output| {
-                let values = output.values[rows.clone()].to_vec();
-                let step = step_of(&values);
-                Seen {
-                    quantity: output.quantity,
-                    absolute: output.absolute,
-                    weights: vec![0.0; n],
-                    repeats: repeats(&values),
-                    alike: alike(&values, step),
-                    values,
-                    step,
-                }
-            })
+            .map(|output| Seen::new(output.quantity, output.absolute, output.values[rows.clone()].to_vec()))
             .collect();
         Self {
             name: experiment.name.clone(),
@@ -232,10 +230,24 @@ impl Run {
     }
 
     /// Has the controller of a case follow the reference of the log, instead of taking the input as logged.
+    ///
+    /// A loop hides in its output what it makes up for, and shows it in its command: what was logged as the input is compared, too.
     pub fn close(&mut self, case: &Case, log: &Log) {
         if let (Some(design), Some(reference)) = (&case.controller, &log.reference) {
             let profile = Profile::sampled(&log.time, reference).shaped(&design.shaper);
-            self.closed = Some(Arc::new(Closed { design: design.clone(), model: case.stage.clone(), profile }));
+            let added = log.added.as_ref().map(|values| Added { times: log.time.clone(), values: values.clone() });
+            let amplifier = &case.stage.amplifier;
+            let (quantity, limit, late) = match amplifier.mode {
+                AmplifierMode::Voltage => (Quantity::MotorVoltage, amplifier.voltage_limit, None),
+                AmplifierMode::Current => (Quantity::MotorCurrent, amplifier.current_limit, amplifier.bandwidth),
+            };
+            if late.is_none() && !self.seen.iter().any(|seen| seen.quantity == quantity) {
+                let given = |input: &f64| {
+                    limit.map_or(amplifier.gain * input, |limit| (amplifier.gain * input).clamp(-limit, limit))
+                };
+                self.seen.push(Seen::new(quantity, false, self.logged.iter().map(given).collect()));
+            }
+            self.closed = Some(Arc::new(Closed { design: design.clone(), model: case.stage.clone(), profile, added }));
         }
     }
 
@@ -366,8 +378,8 @@ impl Run {
         };
         let outcome = match &self.closed {
             Some(closed) => {
-                let Closed { design, model, profile } = closed.as_ref();
-                follow(&stage, model, design, profile, &experiment, solver, &mut take)
+                let Closed { design, model, profile, added } = closed.as_ref();
+                follow(&stage, model, design, (profile, added.as_ref()), &experiment, solver, &mut take)
             }
             None => {
                 stage.encoder = None;

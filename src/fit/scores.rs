@@ -17,6 +17,8 @@ pub struct LogFit {
     pub held_out: bool,
     /// Times, s.
     pub time: Vec<f64>,
+    /// The input as logged.
+    pub input: Vec<f64>,
     /// First row that was not fitted.
     pub fitted_rows: usize,
     /// Each output.
@@ -87,6 +89,7 @@ pub(super) fn compared(run: &Run, stage: &Stage, extras: &[f64], told: Vec<(Nuis
         window: run.window,
         held_out: run.held_out,
         time: run.time.clone(),
+        input: run.logged.clone(),
         fitted_rows: run.fitted_rows,
         outputs,
         extras: told,
@@ -112,4 +115,59 @@ fn score(seen: &[f64], model: &[f64], rows: std::ops::Range<usize>) -> Option<Sc
         percent: 100.0 * (1.0 - (squares / spread.max(f64::MIN_POSITIVE)).sqrt()),
         memory: uncertainty::memory_of(&residuals, &places),
     })
+}
+
+/// How several logs are met together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Together {
+    /// What they have in common; empty where it is all of them.
+    pub name: String,
+    /// How many logs and windows.
+    pub logs: usize,
+    /// What was seen.
+    pub quantity: Quantity,
+    /// Whether this is what was not fitted.
+    pub held_out: bool,
+    /// Values compared.
+    pub count: usize,
+    /// Root mean square of the residuals; infinite where the model does not reach the end of one.
+    pub rmse: f64,
+}
+
+/// How the logs that have the same `name` are met together, in the order in which they come.
+pub fn together(logs: &[LogFit], name: impl Fn(&LogFit) -> String) -> Vec<Together> {
+    let mut all: Vec<Together> = Vec::new();
+    for log in logs {
+        let name = name(log);
+        for output in &log.outputs {
+            let of = |score: Option<Score>, held_out| {
+                score.map(|score| (score.rmse.powi(2) * score.count as f64, score.count, held_out))
+            };
+            let mut parts: Vec<_> =
+                [of(output.fitted, false), of(output.held_out, true)].into_iter().flatten().collect();
+            if !log.complete {
+                // What the model does not reach is missed by as much as can be.
+                parts = vec![(f64::INFINITY, output.seen.len(), log.held_out)];
+            }
+            for (squares, count, held_out) in parts {
+                let quantity = output.quantity;
+                let same = |one: &Together| one.name == name && one.quantity == quantity && one.held_out == held_out;
+                let place = all.iter().position(same).unwrap_or_else(|| {
+                    all.push(Together { name: name.clone(), logs: 0, quantity, held_out, count: 0, rmse: 0.0 });
+                    all.len() - 1
+                });
+                let one = &mut all[place];
+                one.rmse = ((one.rmse.powi(2) * one.count as f64 + squares) / (one.count + count).max(1) as f64).sqrt();
+                (one.count, one.logs) = (one.count + count, one.logs + 1);
+            }
+        }
+    }
+    all
+}
+
+impl LogFit {
+    /// The experiment that the log is of: of a log that is split into runs, what these have in common.
+    pub fn experiment(&self) -> &str {
+        self.name.split_once('/').map_or(&self.name, |(experiment, _)| experiment)
+    }
 }

@@ -251,6 +251,7 @@ fn log() -> Value {
         ("preset", words(PRESETS.iter().map(|preset| preset.name))),
         ("time", any(vec![column(), table("experiment.log.time", &[])])),
         ("input", column()),
+        ("added", column()),
         ("reference", column()),
         ("units", columns()),
         ("scale", columns()),

@@ -4,6 +4,8 @@
 
 mod case_schema;
 mod check;
+mod comparison;
+mod drift;
 mod fit;
 mod frf;
 mod gantry;
@@ -19,6 +21,8 @@ mod tune;
 
 pub use case_schema::case_schema;
 pub use check::check;
+pub use comparison::comparison;
+pub use drift::drift;
 pub use fit::fit;
 pub use frf::frf;
 pub use gantry::{GantrySimulated, GantrySimulation, gantry_metrics};

@@ -8,6 +8,8 @@ use serde_json::{Map, Value, json};
 /// The results, by the word that each begins with: `"schema": "taut/WORD/1"`.
 const RESULTS: &[(&str, &str, &str)] = &[
     ("check", "`taut check`", include_str!("results/check.txt")),
+    ("compare", "`taut fit --compare`", include_str!("results/compare.txt")),
+    ("drift", "`taut fit --drift`", include_str!("results/drift.txt")),
     ("error", "An error, under --json", include_str!("results/error.txt")),
     ("files", "What a folder of results holds: files.json", include_str!("results/files.txt")),
     ("fit", "`taut fit`", include_str!("results/fit.txt")),

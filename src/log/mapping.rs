@@ -36,6 +36,8 @@ pub struct Mapping {
     pub input_unit: &'static str,
     /// Whether an input that is missing is the one before it; otherwise it is an error.
     pub hold_missing: bool,
+    /// The column of what was added to the input behind the controller.
+    pub added: Option<Source>,
     /// The column of where the cart should have been.
     pub reference: Option<Source>,
     /// The columns of what was seen.
@@ -106,6 +108,7 @@ impl Source {
 enum Role {
     Time,
     Input(&'static str),
+    Added(&'static str),
     Reference,
     Output(Quantity),
 }
@@ -115,6 +118,7 @@ impl Role {
         match self {
             Role::Time => "time",
             Role::Input(_) => "input",
+            Role::Added(_) => "added",
             Role::Reference => "reference",
             Role::Output(quantity) => quantity.name(),
         }
@@ -123,7 +127,7 @@ impl Role {
     fn unit(self) -> &'static str {
         match self {
             Role::Time => "s",
-            Role::Input(unit) => unit,
+            Role::Input(unit) | Role::Added(unit) => unit,
             Role::Reference => "m",
             Role::Output(quantity) => quantity.unit(),
         }
@@ -147,6 +151,7 @@ impl Mapping {
             input: None,
             input_unit: "V",
             hold_missing: false,
+            added: None,
             reference: None,
             outputs: Vec::new(),
             absolute: Vec::new(),
@@ -174,6 +179,7 @@ impl Mapping {
         }
         let complete = sources.len();
         sources.extend(self.input.iter().map(|source| (Role::Input(self.input_unit), source)));
+        sources.extend(self.added.iter().map(|source| (Role::Added(self.input_unit), source)));
         sources.extend(self.reference.iter().map(|source| (Role::Reference, source)));
         sources.extend(self.outputs.iter().map(|(quantity, source)| (Role::Output(*quantity), source)));
         let ids: Vec<ColumnId> = sources.iter().map(|(_, source)| source.column.clone()).collect();
@@ -306,6 +312,7 @@ impl Columns<'_> {
             file: mapping.file.clone(),
             time: time_from_start,
             input: vec![0.0; within.len()],
+            added: None,
             hold: mapping.hold,
             reference: None,
             outputs,
@@ -314,8 +321,14 @@ impl Columns<'_> {
         if let Some(i) = self.roles.iter().position(|role| matches!(role, Role::Reference)) {
             log.reference = Some(self.inputs(i, &rows, &within)?);
         }
+        if let Some(i) = self.roles.iter().position(|role| matches!(role, Role::Added(_))) {
+            log.added = Some(self.inputs(i, &rows, &within)?);
+        }
         if let Some(i) = self.roles.iter().position(|role| matches!(role, Role::Input(_))) {
             log.input = self.inputs(i, &rows, &within)?;
+            for (input, added) in log.input.iter_mut().zip(log.added.iter().flatten()) {
+                *input += added;
+            }
             // A window that begins between two rows begins with the input of that moment, when nothing was seen.
             if let (Some(held), true) = (self.held(i, &rows, &within), log.time[0] > 0.0) {
                 let before = time[window.start - 1] - start;
@@ -326,6 +339,7 @@ impl Columns<'_> {
                 log.input.insert(0, held + share * (log.input[0] - held));
                 log.time.insert(0, 0.0);
                 log.reference.iter_mut().for_each(|reference| reference.insert(0, reference[0]));
+                log.added.iter_mut().for_each(|added| added.insert(0, added[0]));
                 log.outputs.iter_mut().for_each(|output| output.values.insert(0, f64::NAN));
             }
         }

@@ -34,8 +34,10 @@ pub struct Log {
     pub file: PathBuf,
     /// Times, s: increasing, not always evenly. Zero is the log's first row, or where its window begins.
     pub time: Vec<f64>,
-    /// What was fed into the amplifier at those times, V or A before its gain.
+    /// What was fed into the amplifier at those times, V or A before its gain; with what was added to it.
     pub input: Vec<f64>,
+    /// What of it was added behind the controller, if the log says so: a known disturbance.
+    pub added: Option<Vec<f64>>,
     /// What the input did between them.
     pub hold: Hold,
     /// Where the cart should have been at those times, m, if the log was made in closed loop and says so.

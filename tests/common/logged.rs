@@ -12,6 +12,7 @@ pub fn logged(name: &str, run: &Trajectory, drive_angle: Vec<f64>) -> Arc<Log> {
         file: Default::default(),
         time: run.get("time").unwrap().to_vec(),
         input: run.get("voltage").unwrap().to_vec(),
+        added: None,
         hold: Hold::Zero,
         reference: run.get("reference").map(<[f64]>::to_vec),
         outputs: vec![Output { quantity: Quantity::DriveAngle, absolute: false, values: drive_angle }],

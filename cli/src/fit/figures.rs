@@ -1,11 +1,14 @@
 //! Model and log side by side.
 
-use taut::fit::{Estimate, LogFit, OutputFit, Posterior, Profile};
+use taut::fit::{Estimate, Fit, LogFit, OutputFit, Posterior, Profile, ResidualForce};
 use taut::log::Quantity;
 use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// Logs drawn; the numbers of the rest are in the tables.
-pub const MOST_LOGS: usize = 12;
+pub const MOST_LOGS: usize = 6;
+
+/// Logs in one overlay.
+const MOST_OVERLAID: usize = 60;
 
 /// The logs that are drawn: those whose residuals are largest beside what the fit takes as their deviation, the worst first.
 pub fn worst<'a>(logs: &'a [LogFit], noise: &[(Quantity, f64)]) -> Vec<&'a LogFit> {
@@ -28,7 +31,11 @@ fn misfit(log: &LogFit, noise: &[(Quantity, f64)]) -> f64 {
 
 /// A quantity's axis, in a unit that suits it.
 fn axis(output: &OutputFit, label: &str) -> Axis {
-    let unit = output.quantity.unit();
+    axis_of(output.quantity, label)
+}
+
+fn axis_of(quantity: Quantity, label: &str) -> Axis {
+    let unit = quantity.unit();
     match unit {
         "m" => Axis::new(label, unit).shown_as("mm", 1e3),
         "m/s" => Axis::new(label, unit).shown_as("mm/s", 1e3),
@@ -57,6 +64,127 @@ pub fn overlay(log: &LogFit, output: &OutputFit) -> Figure {
         figure = figure.vertical(log.time[log.fitted_rows], "held out from here");
     }
     figure
+}
+
+/// What is between model and log, all logs over each other, one figure for each quantity.
+pub fn together(fit: &Fit) -> Vec<Figure> {
+    let mut quantities: Vec<Quantity> = Vec::new();
+    for output in fit.logs.iter().flat_map(|log| &log.outputs) {
+        if !quantities.contains(&output.quantity) {
+            quantities.push(output.quantity);
+        }
+    }
+    let one = |quantity: Quantity| {
+        let mut panel = Panel::new(axis_of(quantity, "Model − log"));
+        for (held, name, colour) in [(false, "fitted", Colour::Blue), (true, "held out", Colour::Vermillion)] {
+            let (mut x, mut y) = (Vec::new(), Vec::new());
+            for log in fit.logs.iter().filter(|log| log.held_out == held).take(MOST_OVERLAID) {
+                for output in log.outputs.iter().filter(|output| output.quantity == quantity) {
+                    x.extend_from_slice(&log.time);
+                    y.extend(output.model.iter().zip(&output.seen).map(|(model, seen)| model - seen));
+                    // A gap between one log and the next.
+                    x.push(0.0);
+                    y.push(f64::NAN);
+                }
+            }
+            if !x.is_empty() {
+                panel = panel.series(Series::new(name, x, y).colour(colour));
+            }
+        }
+        let name = quantity.name().replace('_', " ");
+        Figure::new(format!("All logs: {name}"), Axis::new("Time", "s"))
+            .panel(panel.horizontal(0.0, ""))
+            .caption("Model minus log, all logs over each other.")
+    };
+    quantities.into_iter().map(one).collect()
+}
+
+/// How far each log is missed, in the case's order.
+pub fn by_log(logs: &[LogFit], quantity: Quantity) -> Option<Figure> {
+    let of = |held: bool| -> (Vec<f64>, Vec<f64>) {
+        let scores = logs.iter().enumerate().filter_map(|(k, log)| {
+            let output = log.outputs.iter().find(|output| output.quantity == quantity)?;
+            let score = if held { output.held_out } else { output.fitted }?;
+            Some(((k + 1) as f64, score.rmse))
+        });
+        scores.unzip()
+    };
+    let (fitted, held) = (of(false), of(true));
+    if fitted.0.len() + held.0.len() < 3 {
+        return None;
+    }
+    let name = quantity.name().replace('_', " ");
+    let mut panel = Panel::new(axis_of(quantity, "RMSE"));
+    for (name, (x, y), colour) in [("fitted", fitted, Colour::Blue), ("held out", held, Colour::Vermillion)] {
+        if !x.is_empty() {
+            panel = panel.series(Series::new(name, x, y).style(Style::Points).colour(colour));
+        }
+    }
+    let figure = Figure::new(format!("Error of each log: {name}"), Axis::new("Log, in the order of the case", ""));
+    Some(
+        figure
+            .panel(panel.horizontal(0.0, ""))
+            .caption("Root mean square of model minus log; the table says which is which."),
+    )
+}
+
+/// Bins of a residual force.
+const BINS: usize = 40;
+
+/// Means of a force over bins of what it is drawn beside, those with few values left out.
+fn binned(x: &[f64], force: &[f64], chosen: impl Fn(usize) -> bool) -> (Vec<f64>, Vec<f64>) {
+    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
+    let mut sums = [(0.0, 0.0, 0usize); BINS];
+    let wide = (high - low).max(f64::MIN_POSITIVE) / BINS as f64;
+    for k in (0..x.len()).filter(|&k| chosen(k)) {
+        let bin = &mut sums[(((x[k] - low) / wide) as usize).min(BINS - 1)];
+        *bin = (bin.0 + x[k], bin.1 + force[k], bin.2 + 1);
+    }
+    let fewest = (x.len() / (20 * BINS)).max(3);
+    sums.iter().filter(|bin| bin.2 >= fewest).map(|(x, f, n)| (x / *n as f64, f / *n as f64)).unzip()
+}
+
+/// What the model lacks as a force, beside position, speed and force of the motor: `all` over all logs.
+pub fn residual_forces(all: &ResidualForce) -> Vec<Figure> {
+    let force = || Axis::new("Residual force", "N");
+    let beside = |title: &str, x: Axis, values: &[f64], caption: &str| {
+        let mut panel = Panel::new(force());
+        for (name, forward, colour) in [("forward", true, Colour::Blue), ("backward", false, Colour::Vermillion)] {
+            let (x, y) = binned(values, &all.force, |k| (all.speed[k] > 0.0) == forward);
+            if x.len() > 2 {
+                panel = panel.series(Series::new(name, x, y).colour(colour));
+            }
+        }
+        Figure::new(title, x).panel(panel.horizontal(0.0, "")).caption(caption)
+    };
+    vec![
+        beside(
+            "Residual force beside position",
+            Axis::new("Position", "m").shown_as("mm", 1e3),
+            &all.position,
+            "Means over all logs, each direction by itself. What repeats along the travel with opposite signs is friction that changes along it; with \
+             the same sign it is a force that depends on the place.",
+        ),
+        beside(
+            "Residual force beside speed",
+            Axis::new("Speed", "m/s"),
+            &all.speed,
+            "A curve near zero is a Stribeck curve; different slopes or heights on both sides are friction that differs by direction.",
+        ),
+        beside(
+            "Residual force beside the motor's force",
+            Axis::new("Force of the motor", "N"),
+            &all.drive,
+            "A slope is a gain, or friction that grows with load.",
+        ),
+    ]
+}
+
+/// The same over time, for one log.
+pub fn residual_over_time(log: &LogFit, own: &ResidualForce) -> Figure {
+    Figure::new(format!("{}: residual force", log.name), Axis::new("Time", "s"))
+        .panel(Panel::new(Axis::new("Residual force", "N")).line("", &own.time, &own.force).horizontal(0.0, ""))
+        .caption("What would have to act on the cart beside the model, so that it followed the log; stretches at rest are left out. A mean that wanders is a drift.")
 }
 
 /// The autocorrelation of residuals over lags.
@@ -158,6 +286,7 @@ mod tests {
             window: 0,
             held_out: held,
             time: Vec::new(),
+            input: Vec::new(),
             fitted_rows: 0,
             outputs: vec![output(Quantity::DriveAngle, angle), output(Quantity::MotorCurrent, current)],
             extras: Vec::new(),

@@ -1,5 +1,7 @@
 //! `taut fit`: finds parameters from the logs of a case, and says how well they are known.
 
+mod compare;
+mod drift;
 mod figures;
 mod page;
 mod posterior;
@@ -34,6 +36,12 @@ pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
     let case = common.case(&args.case)?;
     let plan = case.fit_plan(&args.case)?;
+    if args.compare {
+        return compare::run(args, &case, &plan);
+    }
+    if args.drift {
+        return drift::run(args, &case, &plan);
+    }
     let folder = Folder::wanted(common, || folder::inputs(&args.case, &case.files), names(args))?;
     if let Some(folder) = &folder {
         folder::leading(&case.text, &case.files, folder.root())?;
@@ -65,6 +73,12 @@ pub fn run(args: &Args) -> Outcome {
             finished.report = Some(Report { page: page::page(&case, &found, &text), pictures: Vec::new() });
         }
         finished.files.push(("fitted.toml".into(), text));
+        // What other campaigns have for themselves.
+        for (part, (name, _)) in fit.parts.iter().enumerate().skip(1) {
+            let text = fit.case_text_of(&case, &args.case, part)?;
+            let text = folder::leading(&text, &Case::from_text(&args.case, &text)?.files, folder.root())?;
+            finished.files.push((part_file(name), text));
+        }
     }
     if args.posterior && found.drawn.is_none() {
         let told = "interrupted before the first draw: there is no posterior";
@@ -117,6 +131,11 @@ fn find(args: &Args, case: &Case, plan: &Plan, interrupt: &Interrupt) -> Result<
 fn names(args: &Args) -> impl Iterator<Item = &'static str> {
     let report = (!args.common.no_report).then_some("report.html");
     ["fitted.toml", "fit.json"].into_iter().chain(args.posterior.then_some("posterior.csv")).chain(report)
+}
+
+/// The file with the values of a campaign.
+fn part_file(name: &str) -> String {
+    format!("fitted-{}.toml", taut::case::file_name(name))
 }
 
 /// Writes the draws.

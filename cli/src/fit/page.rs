@@ -2,23 +2,35 @@
 
 use super::{Found, figures, posterior, table};
 use taut::case::Case;
-use taut::fit::{Fit, Grade, Profile};
+use taut::fit::{Fit, Grade, LogFit, Profile, ResidualForce, Score, residual_force};
+use taut::log::Quantity;
 use taut_report::{Callout, Cell, Page, Table};
 
 /// The page; `text` is the case with the estimates.
 pub fn page(case: &Case, found: &Found, text: &str) -> Page {
+    page_with(case, found, text, |_| {})
+}
+
+/// The same with something before it.
+pub fn page_with(case: &Case, found: &Found, text: &str, first: impl FnOnce(&mut Page)) -> Page {
     let fit = &found.fit;
     let mut page = Page::new(case.title.clone()).subtitle("Parameters from logs.");
+    first(&mut page);
     page.section("How it ended");
     let kind = if fit.is_converged() { Callout::Holds } else { Callout::Fails };
     page.callout(kind, fit.ending_word().replace('_', " "), format!("{}.", table::ending(fit)));
-    for finding in &fit.findings {
-        let kind = if finding.grade == Grade::Warning { Callout::Fails } else { Callout::Note };
-        page.callout(kind, finding.grade.word(), finding.to_string());
+    for told in table::findings(fit) {
+        let (grade, text) = told.split_once(": ").unwrap_or(("note", &told));
+        let kind = if grade == Grade::Warning.word() { Callout::Fails } else { Callout::Note };
+        page.callout(kind, grade, text.to_string());
     }
     page.prose(format!(
-        "{} values, {} variables, {} steps, {} simulated logs.",
-        fit.values, fit.variables, fit.work.iterations, fit.work.simulations
+        "{} values, {} variables, {} steps, {} simulated logs{}.",
+        fit.values,
+        fit.variables,
+        fit.work.iterations,
+        fit.work.simulations,
+        table::past_kinks(fit)
     ));
     parameters(&mut page, fit);
     correlations(&mut page, fit);
@@ -28,21 +40,26 @@ pub fn page(case: &Case, found: &Found, text: &str) -> Page {
     }
     logs(&mut page, fit);
     if fit.logs.len() > figures::MOST_LOGS {
+        for overlay in figures::together(fit) {
+            page.figure(&overlay);
+        }
         page.prose(format!(
-            "The {} logs that the model meets worst, by RMSE over the deviation of their residuals, the worst first; the other {} are in the table \
+            "The {} logs that the model meets worst, by RMSE over the deviation of their residuals, the worst first; the others are in the tables \
              above.",
-            figures::MOST_LOGS,
-            fit.logs.len() - figures::MOST_LOGS
+            figures::MOST_LOGS
         ));
     }
+    let few = fit.logs.len() <= figures::MOST_LOGS;
     for log in figures::worst(&fit.logs, &fit.noise) {
         for output in &log.outputs {
             page.figure(&figures::overlay(log, output));
-            if let Some(figure) = figures::memory(log, output) {
+            // Of many logs, that of the worst.
+            if let Some(figure) = figures::memory(log, output).filter(|_| few) {
                 page.figure(&figure);
             }
         }
     }
+    residual(&mut page, fit);
     page.section("The case with the estimates");
     page.embed("fitted.toml", text);
     page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
@@ -102,29 +119,93 @@ fn correlations(page: &mut Page, fit: &Fit) {
 
 fn logs(page: &mut Page, fit: &Fit) {
     page.section("Logs");
-    let mut rows = Table::new("How each log is met.");
-    for heading in ["Log", "Quantity", "Rows", "RMSE", "Largest", "Fit", "Neighbours' correlation"] {
-        rows = rows.column(heading, "");
-    }
-    for log in &fit.logs {
-        for output in &log.outputs {
-            let unit = output.quantity.unit();
-            for (word, score) in [("fitted", output.fitted), ("held out", output.held_out)] {
-                let Some(score) = score else { continue };
-                rows.row(
-                    [
-                        log.name.clone(),
-                        format!("{}, {word}", output.quantity.name().replace('_', " ")),
-                        score.count.to_string(),
-                        table::value(score.rmse, unit, 4),
-                        table::value(score.worst, unit, 4),
-                        format!("{:.2} %", score.percent),
-                        format!("{:.3}", score.memory),
-                    ]
-                    .map(Cell::from),
-                );
-            }
+    let mut quantities: Vec<Quantity> = Vec::new();
+    for output in fit.logs.iter().flat_map(|log| &log.outputs) {
+        if !quantities.contains(&output.quantity) {
+            quantities.push(output.quantity);
         }
     }
+    for quantity in quantities {
+        table_of(page, fit, quantity);
+        if let Some(figure) = figures::by_log(&fit.logs, quantity) {
+            page.figure(&figure);
+        }
+    }
+}
+
+/// How each log is met in one quantity, the worst first, in one unit.
+fn table_of(page: &mut Page, fit: &Fit, quantity: Quantity) {
+    let mut scores: Vec<(usize, &LogFit, &str, Score)> = Vec::new();
+    for (k, log) in fit.logs.iter().enumerate() {
+        for output in log.outputs.iter().filter(|output| output.quantity == quantity) {
+            let both = [("fitted", output.fitted), ("held out", output.held_out)];
+            scores.extend(both.into_iter().filter_map(|(word, score)| Some((k, log, word, score?))));
+        }
+    }
+    let many = scores.len() > 2;
+    if many {
+        scores.sort_by(|a, b| b.3.rmse.total_cmp(&a.3.rmse));
+    }
+    let (unit, factor) = table::unit_for(scores.iter().map(|(.., score)| score.rmse), quantity.unit());
+    let name = quantity.name().replace('_', " ");
+    let order = if many { ", the worst first; numbers are those of the picture below" } else { "" };
+    let mut rows = Table::new(format!("How each log is met in its {name}{order}."))
+        .column("Log", "")
+        .column("", "")
+        .column("", "")
+        .column("Rows", "")
+        .column("RMSE", &unit)
+        .column("Largest", &unit)
+        .column("Fit", "%")
+        .column("Neighbours' correlation", "");
+    for (k, log, word, score) in scores {
+        let number = |value: f64, decimals: usize| Cell::Number(format!("{value:.decimals$}"));
+        rows.row([
+            Cell::Number((k + 1).to_string()),
+            Cell::Text(table::name(log)),
+            Cell::Text(word.into()),
+            Cell::Number(score.count.to_string()),
+            number(factor * score.rmse, 3),
+            number(factor * score.worst, 3),
+            number(score.percent, 2),
+            number(score.memory, 3),
+        ]);
+    }
     page.table(&rows);
+    let experiments = table::by_experiment(fit).into_iter().filter(|one| one.quantity == quantity);
+    let experiments: Vec<_> = experiments.collect();
+    if !experiments.is_empty() {
+        let mut rows = Table::new("By experiment.")
+            .column("Experiment", "")
+            .column("", "")
+            .column("Logs", "")
+            .column("RMSE", &unit);
+        for one in experiments {
+            let word = if one.held_out { "held out" } else { "fitted" };
+            let rmse = Cell::Number(format!("{:.3}", factor * one.rmse));
+            rows.row([Cell::Text(one.name.clone()), word.into(), Cell::Number(one.logs.to_string()), rmse]);
+        }
+        page.table(&rows);
+    }
+}
+
+/// What the model lacks, as a force.
+fn residual(page: &mut Page, fit: &Fit) {
+    let mut all = ResidualForce::default();
+    for log in &fit.logs {
+        if let Some(own) = residual_force(&fit.stage, log) {
+            all.join(&own);
+        }
+    }
+    if all.force.len() < 100 {
+        return;
+    }
+    page.section("What the model lacks, as a force");
+    for figure in figures::residual_forces(&all) {
+        page.figure(&figure);
+    }
+    let worst = figures::worst(&fit.logs, &fit.noise).into_iter();
+    if let Some((log, own)) = worst.filter_map(|log| Some((log, residual_force(&fit.stage, log)?))).next() {
+        page.figure(&figures::residual_over_time(log, &own));
+    }
 }

@@ -1,11 +1,11 @@
 //! The result for people.
 
-use super::{Found, posterior};
+use super::{Found, figures, posterior};
 use crate::terminal::bold;
 use std::fmt::Write;
 use std::time::Duration;
 use taut::case::Case;
-use taut::fit::{Ending, Estimate, Fit, Profile, Score};
+use taut::fit::{Ending, Estimate, Fit, LogFit, Profile, Score, Together, together};
 use taut::number;
 
 /// The text on the terminal.
@@ -13,10 +13,12 @@ pub fn text(case: &Case, found: &Found, took: Duration) -> String {
     let fit = &found.fit;
     let mut text = format!("{}\n", bold(&case.title));
     let _ = writeln!(text, "{}", ending(fit));
-    for finding in &fit.findings {
+    for finding in findings(fit) {
         let _ = writeln!(text, "{finding}");
     }
-    let _ = write!(text, "\n{}\n", bold("Parameters"));
+    if !fit.estimates.is_empty() {
+        let _ = write!(text, "\n{}\n", bold("Parameters"));
+    }
     let wide = fit.estimates.iter().map(|e| e.name.chars().count()).max().unwrap_or(0).max(10);
     for estimate in &fit.estimates {
         let [value, error, interval] = words(estimate);
@@ -50,20 +52,55 @@ pub fn text(case: &Case, found: &Found, took: Duration) -> String {
         text.push_str(&posterior::text(drawn, wide));
     }
     let _ = write!(text, "\n{}\n", bold("Logs"));
-    let wide = fit.logs.iter().map(|log| name(log).chars().count()).max().unwrap_or(0).min(40);
-    for (word, scores) in scores(fit) {
+    let scores = scores(fit);
+    let wide = scores.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).min(40);
+    for (word, scores) in scores {
         let _ = writeln!(text, "  {word:<wide$}  {scores}");
     }
     let _ = writeln!(
         text,
-        "\n{} values, {} variables; {} steps, {} simulated logs\n  took {}",
+        "\n{} values, {} variables; {} steps, {} simulated logs{}\n  took {}",
         fit.values,
         fit.variables,
         fit.work.iterations,
         fit.work.simulations,
+        past_kinks(fit),
         plain(&number::engineering(took.as_secs_f64(), "s", 3)),
     );
     text
+}
+
+/// Findings of one kind in so many logs are told of the first.
+const MOST_ALIKE: usize = 3;
+
+/// What is to be known; of what is said of many logs, the first and how many more.
+pub fn findings(fit: &Fit) -> Vec<String> {
+    let mut told: Vec<String> = Vec::new();
+    let mut codes: Vec<&str> = Vec::new();
+    for finding in &fit.findings {
+        let alike =
+            fit.findings.iter().filter(|other| (other.code, other.grade) == (finding.code, finding.grade)).count();
+        if alike <= MOST_ALIKE || finding.log.is_none() {
+            told.push(finding.to_string());
+        } else if !codes.contains(&finding.code) {
+            codes.push(finding.code);
+            told.push(format!("{finding}; and the like of {} other logs", alike - 1));
+        }
+    }
+    told
+}
+
+/// What the search did where the order of events left no derivative; empty where it did not have to.
+pub fn past_kinks(fit: &Fit) -> String {
+    let evolved = match fit.evolved {
+        0 => String::new(),
+        1 => " and an evolution strategy".into(),
+        times => format!(" and an evolution strategy, {times} times"),
+    };
+    match fit.coarse {
+        0.0 => String::new(),
+        steps => format!("; where events change their order: derivatives over {steps} standard errors{evolved}"),
+    }
 }
 
 /// Parameters whose interval is not to be believed on one side.
@@ -73,6 +110,9 @@ pub fn crooked(profiles: &[Profile]) -> Vec<&str> {
 
 /// How the search ended, in a sentence.
 pub fn ending(fit: &Fit) -> String {
+    if fit.estimates.is_empty() && fit.ending == Ending::Converged {
+        return "nothing is searched for: the errors of the case as it is".into();
+    }
     let mut text = match fit.ending {
         Ending::Converged if !fit.is_converged() => {
             format!(
@@ -149,26 +189,50 @@ pub fn words(estimate: &Estimate) -> [String; 3] {
     }
 }
 
-fn name(log: &taut::fit::LogFit) -> String {
+/// The unit in which numbers of this size are told in one column, and how many of it the SI unit is.
+pub fn unit_for(sizes: impl Iterator<Item = f64>, unit: &str) -> (String, f64) {
+    let mut sizes: Vec<f64> = sizes.filter(|size| size.is_finite() && *size > 0.0).collect();
+    sizes.sort_by(f64::total_cmp);
+    let middle = sizes.get(sizes.len() / 2).copied().unwrap_or(1.0);
+    match unit {
+        "m" | "s" | "V" | "A" | "rad" | "m/s" | "rad/s" if middle < 0.5e-3 => (format!("µ{unit}"), 1e6),
+        "m" | "s" | "V" | "A" | "rad" | "m/s" | "rad/s" if middle < 0.5 => (format!("m{unit}"), 1e3),
+        _ => (unit.to_string(), 1.0),
+    }
+}
+
+/// How experiments of several logs, or logs of several windows, are met; empty where that is no other than each log, or all together.
+pub fn by_experiment(fit: &Fit) -> Vec<Together> {
+    let all = together(&fit.logs, |log| log.experiment().to_string());
+    let mut names: Vec<&str> = all.iter().map(|one| one.name.as_str()).collect();
+    names.dedup();
+    names.sort_unstable();
+    names.dedup();
+    if names.len() < 2 || names.len() == fit.logs.len() { Vec::new() } else { all }
+}
+
+/// Its name, and which window of it.
+pub fn name(log: &LogFit) -> String {
     if log.window == 0 { log.name.clone() } else { format!("{} [{}]", log.name, log.window + 1) }
 }
 
-/// How each log is met, and all of them together.
+/// Most logs of which each is told.
+const MOST_TOLD: usize = 24;
+
+/// How each log is met, of many those that are met worst; each experiment, and all together.
 fn scores(fit: &Fit) -> Vec<(String, String)> {
     let mut lines = Vec::new();
-    let mut sums: Vec<(&str, &str, bool, f64, usize)> = Vec::new();
-    for log in &fit.logs {
+    let logs: Vec<&LogFit> = match fit.logs.len() > MOST_TOLD {
+        true => figures::worst(&fit.logs, &fit.noise),
+        false => fit.logs.iter().collect(),
+    };
+    for log in &logs {
         let mut parts = Vec::new();
         for output in &log.outputs {
             let quantity = output.quantity;
             for (score, held) in [(output.fitted, false), (output.held_out, true)] {
                 let Some(score) = score else { continue };
                 parts.push(told(quantity.name(), quantity.unit(), &score, held));
-                let squares = score.rmse * score.rmse * score.count as f64;
-                match sums.iter_mut().find(|sum| sum.0 == quantity.name() && sum.2 == held) {
-                    Some(sum) => (sum.3, sum.4) = (sum.3 + squares, sum.4 + score.count),
-                    None => sums.push((quantity.name(), quantity.unit(), held, squares, score.count)),
-                }
             }
         }
         if !log.complete {
@@ -176,12 +240,22 @@ fn scores(fit: &Fit) -> Vec<(String, String)> {
         }
         lines.push((name(log), parts.join("; ")));
     }
+    if logs.len() < fit.logs.len() {
+        lines.push((
+            format!("and {} more", fit.logs.len() - logs.len()),
+            "which are met better; see fit.json or the report".into(),
+        ));
+    }
+    let word = |one: &Together| {
+        let rmse = if one.rmse.is_finite() { value(one.rmse, one.quantity.unit(), 4) } else { "–".into() };
+        format!("{} {}: RMSE {rmse}", one.quantity.name(), if one.held_out { "held out" } else { "fitted" })
+    };
+    for one in by_experiment(fit) {
+        let logs = if one.logs > 1 { format!(" of {} logs", one.logs) } else { String::new() };
+        lines.push((one.name.clone(), format!("{}{logs}", word(&one))));
+    }
     if fit.logs.len() > 1 {
-        for (quantity, unit, held, squares, count) in sums {
-            let rmse = value((squares / count as f64).sqrt(), unit, 4);
-            let word = if held { "held out" } else { "fitted" };
-            lines.push(("all together".into(), format!("{quantity} {word}: RMSE {rmse}")));
-        }
+        lines.extend(together(&fit.logs, |_| String::new()).iter().map(|one| ("all together".into(), word(one))));
     }
     lines
 }

@@ -10,7 +10,7 @@ from . import _checks, _html, _native
 from ._logs import write_log
 from ._toml import change
 from ._toml import written as toml
-from .results import Check, Fit, FitLog, GantryModes, LinearModel, Modes, Shown, Tuned
+from .results import Check, Comparison, Drift, Fit, FitLog, GantryModes, LinearModel, Modes, Shown, Tuned
 from .runs import Run, Runs
 from .sweeps import sweep
 from .table import Table
@@ -213,6 +213,23 @@ class Case:
         table = {"file": written, **columns, **settings}
         experiment = f"\n[[experiment]]\nname = {toml(_checks.text('name', name))}\nlog = {toml(table)}\n"
         return Case(self.text.rstrip("\n") + "\n" + experiment, self.path)
+
+    def compare(
+        self, laws: str | Sequence[str] | None = None, windows: Sequence[float | None] | None = None
+    ) -> Comparison:
+        """Friction laws and windows by the error on parts of the logs that are held out, and a fit with the best.
+
+        ``laws`` are of ``viscous``, ``coulomb``, ``asymmetric``, ``stribeck``, ``along`` and ``lugre``, by default all but the
+        last; ``windows`` are lengths, s, and None for whole logs.
+        """
+        names = _checks.names("laws", [laws] if isinstance(laws, str) else laws)
+        lengths = None if windows is None else [_checks.number("windows", window) for window in windows]
+        data, case = self._native.compare(names, lengths)
+        return Comparison(data, self._of(case))
+
+    def drift(self) -> Drift:
+        """Which single change of the machine explains the logs best, all else as the case has it."""
+        return Drift(self._native.drift())
 
     def modes(
         self,

@@ -307,6 +307,75 @@ class Tuned:
 
 
 @dataclass(frozen=True)
+class Comparison:
+    """Friction laws and windows by what they predict."""
+
+    data: dict[str, Any]
+    """What ``taut fit --compare --json`` prints."""
+    case: Case
+    """The case with the chosen law and its estimates."""
+
+    @property
+    def chosen(self) -> str:
+        """The law and the windows that are chosen, in words."""
+        return str(self.data["candidates"][self.data["chosen"]]["name"])
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A pandas.DataFrame of laws and windows: parameters, and RMSE on held-out parts and in training."""
+        rows = self.data["candidates"]
+        return _frame({key: [row[key] for row in rows] for key in ("name", "parameters", "held_out_rmse", "training_rmse")})
+
+    def plot(self, *, ax: Axes | None = None) -> Figure:
+        """The error on held-out parts and in training, for each law and window."""
+        rows = self.data["candidates"]
+        figure, (axis,) = _plots.panels(ax, 1, height=1 + 0.35 * len(rows))
+        _plots.bars(axis, [row["name"] for row in rows], [row["held_out_rmse"] or np.nan for row in rows], "RMSE")
+        axis.plot([row["training_rmse"] or np.nan for row in rows], range(len(rows)), "k|", markersize=12, label="training")
+        axis.legend(loc="best", fontsize="small")
+        return figure
+
+    def __repr__(self) -> str:
+        return f"<taut.Comparison {self.data['title']!r}: {self.chosen}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(c["name"], c["parameters"], c["held_out_rmse"], c["training_rmse"]) for c in self.data["candidates"]]
+        return _html.table(str(self.data["title"]), ("law and windows", "parameters", "held out", "training"), rows)
+
+
+@dataclass(frozen=True)
+class Drift:
+    """What single changes make of the errors of a machine."""
+
+    data: dict[str, Any]
+    """What ``taut fit --drift --json`` prints."""
+
+    @property
+    def changes(self) -> dict[str, float]:
+        """The value of each parameter that explains the logs best by itself, the one that explains most first."""
+        return {row["name"]: row["to"] for row in self.data["changes"]}
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A pandas.DataFrame of single changes: parameter, from, to, and the share of the squares that is left."""
+        rows = self.data["changes"]
+        return _frame({key: [row[key] for row in rows] for key in ("name", "from", "to", "left")})
+
+    def plot(self, *, ax: Axes | None = None) -> Figure:
+        """The share of the squares that each single change leaves."""
+        rows = self.data["changes"]
+        figure, (axis,) = _plots.panels(ax, 1, height=1 + 0.35 * len(rows))
+        _plots.bars(axis, [row["name"] for row in rows], [100 * row["left"] for row in rows], "squares that are left, %")
+        return figure
+
+    def __repr__(self) -> str:
+        best = next(iter(self.changes.items()), None)
+        return f"<taut.Drift {self.data['title']!r}: {'nothing' if best is None else f'{best[0]} to {best[1]:.6g}'}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(c["name"], c["from"], c["to"], c["left"]) for c in self.data["changes"]]
+        return _html.table(str(self.data["title"]), ("parameter", "from", "to", "left of the squares"), rows)
+
+
+@dataclass(frozen=True)
 class LinearModel:
     """A linear model: dx/dt = A x + B u, y = C x + D u, or x[k+1] = A x[k] + B u[k] where ``dt`` is a sample time."""
 

@@ -80,8 +80,8 @@ impl Survey {
     /// let values = time.iter().map(|t| 224.0 * (t - 0.01 * (1.0 - (-t / 0.01).exp()))).collect();
     /// let position = Output { quantity: Quantity::CartPosition, absolute: false, values };
     /// let input = vec![5.0; 500];
-    /// let log = Log { name: "5 V".into(), file: "log.csv".into(), time, input, hold: Hold::Zero, reference: None,
-    ///     outputs: vec![position], ended: None };
+    /// let log = Log { name: "5 V".into(), file: "log.csv".into(), time, input, added: None, hold: Hold::Zero,
+    ///     reference: None, outputs: vec![position], ended: None };
     /// let survey = Survey::new(&log, &stage);
     /// assert!(survey.has("unit"));
     /// # Ok::<(), taut::Error>(())

@@ -1,0 +1,167 @@
+//! `taut fit --compare`: friction laws and windows by what they predict.
+
+use super::{Found, page, table};
+use crate::args::Fit as Args;
+use crate::command::{Finished, Report};
+use crate::failure::{Outcome, Status};
+use crate::folder::{self, Folder};
+use crate::interrupt::Interrupt;
+use crate::progress::Progress;
+use crate::terminal::bold;
+use std::fmt::Write;
+use std::time::Instant;
+use taut::case::{Case, Plan};
+use taut::fit::Ending;
+use taut::fit::compare::{Comparison, FrictionLaw, Setting, compare};
+use taut::json;
+use taut::solve::Flow;
+use taut::{Error, Result};
+use taut_report::{Cell, Page, Table};
+
+/// Compares, fits with the best, writes, tells.
+pub fn run(args: &Args, case: &Case, plan: &Plan) -> Outcome {
+    let common = &args.common;
+    let setting = setting(args, case, plan)?;
+    let report = (!common.no_report).then_some("report.html");
+    let names = ["fitted.toml", "compare.json", "fit.json"].into_iter().chain(report);
+    let folder = Folder::wanted(common, || folder::inputs(&args.case, &case.files), names)?;
+    let interrupt = Interrupt::listen();
+    let is_stopped = || interrupt.signal().is_some();
+    let begin = Instant::now();
+    let progress = Progress::new("comparing laws of friction", None, common.quiet);
+    let found = compare(case, &args.case, plan, &setting, Some(&is_stopped), &mut |name| {
+        progress.tell(|| name.to_string());
+        if is_stopped() { Flow::Stop } else { Flow::Continue }
+    });
+    progress.clear();
+    let compared = match (found, interrupt.signal()) {
+        (Err(error), Some(signal)) => {
+            crate::terminal::show_error(&error);
+            return Ok(Status::Interrupted(signal));
+        }
+        (found, _) => found?,
+    };
+    let found = Found { fit: compared.fit.clone(), profiles: Vec::new(), drawn: None };
+    let json = json::comparison(&compared);
+    let own = &compared.case;
+    let text = format!("{}{}", shown(&compared), table::text(own, &found, begin.elapsed()));
+    let held_back = found.fit.warnings().next().is_some() && !args.anyway;
+    let advice = match common.out.is_some() {
+        true => "something warns; --anyway writes it all the same",
+        false => "add --out DIR for fitted.toml, compare.json, fit.json and a report",
+    };
+    let folder = folder.filter(|_| !held_back);
+    let mut finished = Finished::new("fit", ("compare.json", json::text(&json)), text, advice);
+    if let Some(folder) = &folder {
+        let text = found.fit.case_text(own, &args.case)?;
+        let text = folder::leading(&text, &Case::from_text(&args.case, &text)?.files, folder.root())?;
+        if !common.no_report {
+            let page = page::page_with(own, &found, &text, |page| section(page, &compared));
+            finished.report = Some(Report { page, pictures: Vec::new() });
+        }
+        finished.files.push(("fitted.toml".into(), text));
+        finished.files.push(("fit.json".into(), json::text(&json::fit(own, &found.fit, &[], None))));
+    }
+    finished.status = match (interrupt.signal(), found.fit.ending) {
+        (Some(signal), _) => Status::Interrupted(signal),
+        (None, _) if !found.fit.is_reliable() => Status::Incomplete,
+        (None, Ending::Converged | Ending::Stalled) => Status::Done,
+        (None, _) => Status::Incomplete,
+    };
+    finished.finish(common, folder)
+}
+
+/// The laws and windows that are asked for.
+fn setting(args: &Args, case: &Case, plan: &Plan) -> Result<Setting> {
+    let mut setting = Setting::usual(case, plan);
+    if !args.laws.is_empty() {
+        let laws = args.laws.iter().map(|name| FrictionLaw::named(name).map_err(|error| error.in_file("--laws")));
+        setting.laws = laws.collect::<Result<_>>()?;
+    }
+    if !args.windows.is_empty() {
+        setting.windows = args.windows.iter().map(|text| window(text)).collect::<Result<_>>()?;
+    }
+    Ok(setting)
+}
+
+/// The length of a window, s; none for whole logs.
+fn window(text: &str) -> Result<Option<f64>> {
+    if text == "whole" {
+        return Ok(None);
+    }
+    let allowed = || {
+        Error::new(format!("\"{text}\" is no length of windows"))
+            .in_file("--windows")
+            .allowed("whole, or a time above zero such as 2s")
+    };
+    match taut::quantity::read(text, "s") {
+        Ok(length) if length > 0.0 && length.is_finite() => Ok(Some(length)),
+        _ => Err(allowed()),
+    }
+}
+
+/// The rows of the table: name, parameters, errors.
+fn rows(compared: &Comparison) -> impl Iterator<Item = [String; 5]> {
+    let mut by_training: Vec<usize> = (0..compared.candidates.len()).collect();
+    by_training.sort_by(|&a, &b| compared.candidates[a].training.total_cmp(&compared.candidates[b].training));
+    compared.candidates.iter().enumerate().map(move |(k, candidate)| {
+        let place = by_training.iter().position(|&own| own == k).map_or(0, |place| place + 1);
+        [
+            candidate.name(),
+            candidate.parameters.to_string(),
+            compared.shown(candidate.held_out),
+            compared.shown(candidate.training),
+            if candidate.failed.is_some() { "–".into() } else { place.to_string() },
+        ]
+    })
+}
+
+const HEADINGS: [&str; 5] = ["Law and windows", "Parameters", "Held out", "Training", "Rank by training"];
+
+fn shown(compared: &Comparison) -> String {
+    let mut text =
+        format!("{}\n", bold(&format!("Friction of the {} by what it predicts", compared.body.replace('_', " "))));
+    let _ = writeln!(text, "  held out: {}", compared.held_out);
+    let rows: Vec<[String; 5]> = std::iter::once(HEADINGS.map(str::to_lowercase)).chain(rows(compared)).collect();
+    let wide: [usize; 5] = std::array::from_fn(|k| rows.iter().map(|row| row[k].chars().count()).max().unwrap_or(0));
+    for (k, [name, parameters, held_out, training, rank]) in rows.iter().enumerate() {
+        let mark = if k == compared.chosen + 1 { "*" } else { " " };
+        let _ = writeln!(
+            text,
+            " {mark} {name:<0$}  {parameters:>1$}  {held_out:>2$}  {training:>3$}  {rank:>4$}",
+            wide[0], wide[1], wide[2], wide[3], wide[4]
+        );
+    }
+    for candidate in &compared.candidates {
+        if let Some(why) = &candidate.failed {
+            let _ = writeln!(text, "  {}: {why}", candidate.name());
+        }
+    }
+    for line in compared.words() {
+        let _ = writeln!(text, "  {line}");
+    }
+    text.push('\n');
+    text
+}
+
+/// The section of the report.
+fn section(page: &mut Page, compared: &Comparison) {
+    page.section("Laws and windows");
+    for line in compared.words() {
+        page.prose(format!("{line}."));
+    }
+    let mut table = Table::new(format!(
+        "Root mean square errors, the one that predicts best first. Held out: {}.",
+        compared.held_out
+    ));
+    for heading in HEADINGS {
+        table = table.column(heading, "");
+    }
+    for (k, mut row) in rows(compared).enumerate() {
+        if k == compared.chosen {
+            row[0].push_str(" (chosen)");
+        }
+        table.row(row.map(Cell::from));
+    }
+    page.table(&table);
+}

@@ -1,0 +1,262 @@
+//! The friction laws that are compared: what each makes of the text of a case, and what is searched for then.
+
+use crate::case::{Case, Plan};
+use crate::error::{Error, Result};
+use crate::fit::run::is_position;
+use crate::friction::Friction;
+use crate::log::Quantity;
+use crate::stage::Stage;
+use std::path::Path;
+use toml_edit::{Array, DocumentMut, InlineTable, Item, Value};
+
+/// Points of friction along the travel.
+const POINTS: usize = 7;
+
+/// Share of the Coulomb friction that a Stribeck curve begins above it, and share of the greatest speed over which it falls.
+const ABOVE: f64 = 0.2;
+const FALL: f64 = 0.05;
+
+/// Way over which bristles bend, m of the cart, where a search begins.
+const BEND: f64 = 2e-5;
+
+/// A friction law of a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrictionLaw {
+    /// b v alone.
+    Viscous,
+    /// The same and Coulomb friction.
+    Coulomb,
+    /// Each direction with its own values.
+    Asymmetric,
+    /// A Stribeck curve above the better one of the two before.
+    Stribeck,
+    /// The better one of these, with a factor on dry friction that changes along the travel.
+    Along,
+    /// Bristles in place of a Stribeck curve.
+    LuGre,
+}
+
+impl FrictionLaw {
+    /// All of them, the simplest first.
+    pub const ALL: [Self; 6] =
+        [Self::Viscous, Self::Coulomb, Self::Asymmetric, Self::Stribeck, Self::Along, Self::LuGre];
+
+    /// Those that are compared unless others are named: bristles take long.
+    pub const USUAL: [Self; 5] = [Self::Viscous, Self::Coulomb, Self::Asymmetric, Self::Stribeck, Self::Along];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Viscous => "viscous",
+            Self::Coulomb => "coulomb",
+            Self::Asymmetric => "asymmetric",
+            Self::Stribeck => "stribeck",
+            Self::Along => "along",
+            Self::LuGre => "lugre",
+        }
+    }
+
+    /// The law of this name.
+    pub fn named(name: &str) -> Result<Self> {
+        Self::ALL.into_iter().find(|law| law.name() == name).ok_or_else(|| {
+            Error::new(format!("there is no friction law \"{name}\" to compare"))
+                .allowed(Self::ALL.map(Self::name).join(", "))
+        })
+    }
+
+    /// Whether it stands above one of the laws of straight lines.
+    pub(super) fn is_above(self) -> bool {
+        match self {
+            Self::Viscous | Self::Coulomb | Self::Asymmetric => false,
+            Self::Stribeck | Self::Along | Self::LuGre => true,
+        }
+    }
+}
+
+/// The body whose friction is compared: that of which most is searched for; the cart where that is none.
+pub(super) fn body(plan: &Plan) -> &'static str {
+    let count = |body: &str| {
+        let own = plan.free.iter().chain(plan.tied.iter().flatten());
+        own.filter(|key| key.starts_with(&format!("{body}.friction."))).count()
+    };
+    if count("drive_pulley") > count("cart") { "drive_pulley" } else { "cart" }
+}
+
+/// The case with this law above `sided` friction or not, beginning at the machine `from`, and what is searched for in it.
+pub(super) fn with(
+    case: &Case,
+    name: &Path,
+    plan: &Plan,
+    law: FrictionLaw,
+    sided: bool,
+    from: &Stage,
+) -> Result<(Case, Plan)> {
+    let body = body(plan);
+    let friction = if body == "cart" { from.cart.friction } else { from.drive_pulley.friction };
+    let mut document: DocumentMut = case.text.parse().map_err(|_| Error::new("this is not TOML").in_file(name))?;
+    let fastest = fastest(case) / if body == "cart" { 1.0 } else { from.pulley_radius };
+    let sided = sided || law == FrictionLaw::Asymmetric;
+    let (table, keys) = table(case, law, sided, &friction, fastest, body);
+    let mut free: Vec<String> = keys.iter().map(|key| format!("{body}.friction.{key}")).collect();
+    put(&mut document, body, "friction", Value::InlineTable(table));
+    let is_own =
+        |key: &str| key.starts_with(&format!("{body}.friction.")) || matches!(key, "total.viscous" | "total.coulomb");
+    let offset = sided && plan.free.iter().any(|key| key == "cart.load");
+    if offset {
+        // Both directions hold it.
+        put(&mut document, "cart", "load", Value::from(0.0));
+    }
+    let kept = plan.free.iter().filter(|key| !is_own(key) && !(offset && *key == "cart.load"));
+    free = kept.cloned().chain(free).collect();
+    let tied: Vec<Vec<String>> = plan.tied.iter().filter(|keys| !keys.iter().any(|key| is_own(key))).cloned().collect();
+    let lumped: Vec<String> = plan.lumped.iter().filter(|name| !is_own(name)).cloned().collect();
+    let separate = plan.separate.iter().filter(|name| free.contains(name)).cloned().collect();
+    let bounds = plan.bounds.iter().filter(|(key, _)| free.contains(key) || !is_own(key)).cloned().collect();
+    let priors = plan.priors.iter().filter(|(key, _)| free.contains(key) || !is_own(key)).cloned().collect();
+    rewrite(&mut document, &free, &tied, &lumped, &is_own);
+    // The logs are those that are there already.
+    let own = Case { experiments: case.experiments.clone(), ..Case::from_text(name, &document.to_string())? };
+    Ok((own, Plan { free, tied, lumped, separate, bounds, priors, ..plan.clone() }))
+}
+
+/// The table of the friction, and the keys in it that are searched for.
+fn table(
+    case: &Case,
+    law: FrictionLaw,
+    sided: bool,
+    from: &Friction,
+    fastest: f64,
+    body: &str,
+) -> (InlineTable, Vec<String>) {
+    let mut table = InlineTable::new();
+    let mut keys = Vec::new();
+    let mut put = |key: &str, value: f64| {
+        table.insert(key, Value::from(value));
+        keys.push(key.to_string());
+    };
+    let (forward, backward) = (from.forward, from.backward);
+    let mean = |a: f64, b: f64| if sided { a } else { 0.5 * (a + b) };
+    put("viscous", mean(forward.viscous, backward.viscous));
+    let coulomb = mean(forward.coulomb, backward.coulomb);
+    let coulomb = if coulomb > 0.0 { coulomb } else { 0.05 * forward.viscous * fastest };
+    if law != FrictionLaw::Viscous {
+        put("coulomb", coulomb);
+    }
+    if sided {
+        put("viscous_backward", backward.viscous);
+        put("coulomb_backward", if backward.coulomb > 0.0 { backward.coulomb } else { coulomb });
+    }
+    let velocity = FALL * fastest;
+    match law {
+        FrictionLaw::Viscous | FrictionLaw::Coulomb | FrictionLaw::Asymmetric => {}
+        FrictionLaw::Stribeck => {
+            let mut own = InlineTable::new();
+            own.insert("force", Value::from(ABOVE * coulomb));
+            own.insert("velocity", Value::from(velocity));
+            table.insert("stribeck", Value::InlineTable(own));
+            keys.extend(["stribeck.force", "stribeck.velocity"].map(String::from));
+        }
+        FrictionLaw::Along => {
+            let (low, high) = travel(case);
+            let point = |k: usize| {
+                let x = low + (high - low) * k as f64 / (POINTS - 1) as f64;
+                Value::Array(Array::from_iter([x, 1.0]))
+            };
+            table.insert("along", Value::Array((0..POINTS).map(point).collect()));
+            // One of them is 1: Coulomb friction is what the factors are of.
+            let others = (0..POINTS).filter(|k| *k != POINTS / 2);
+            keys.extend(others.map(|k| format!("along.{k}.factor")));
+        }
+        FrictionLaw::LuGre => {
+            let stiffness = coulomb / BEND * if body == "cart" { 1.0 } else { case.stage.pulley_radius };
+            let mass = if body == "cart" { case.stage.cart.mass } else { case.stage.drive_pulley.inertia };
+            let mut own = InlineTable::new();
+            own.insert("stiffness", Value::from(stiffness));
+            own.insert("damping", Value::from((stiffness * mass).sqrt()));
+            own.insert("velocity", Value::from(velocity));
+            table.insert("static", Value::from((1.0 + ABOVE) * coulomb.max(backward.coulomb)));
+            table.insert("lugre", Value::InlineTable(own));
+            keys.extend(["static", "lugre.stiffness", "lugre.velocity"].map(String::from));
+        }
+    }
+    (table, keys)
+}
+
+/// Puts a value into a table of the document, in place of what is there.
+fn put(document: &mut DocumentMut, table: &str, key: &str, value: Value) {
+    if let Some(table) = document.get_mut(table).and_then(Item::as_table_like_mut) {
+        table.remove(key);
+        table.insert(key, Item::Value(value));
+    }
+}
+
+/// Puts what is searched for into the table of the fit.
+fn rewrite(
+    document: &mut DocumentMut,
+    free: &[String],
+    tied: &[Vec<String>],
+    lumped: &[String],
+    is_own: &dyn Fn(&str) -> bool,
+) {
+    let Some(fit) = document.get_mut("fit").and_then(Item::as_table_like_mut) else { return };
+    let list = |names: &[String]| Value::Array(names.iter().map(String::as_str).collect());
+    for key in ["free", "tied", "lumped"] {
+        fit.remove(key);
+    }
+    fit.insert("free", Item::Value(list(free)));
+    if !tied.is_empty() {
+        fit.insert("tied", Item::Value(Value::Array(tied.iter().map(|keys| list(keys)).collect())));
+    }
+    if !lumped.is_empty() {
+        fit.insert("lumped", Item::Value(list(lumped)));
+    }
+    for key in ["bounds", "priors"] {
+        let Some(table) = fit.get_mut(key).and_then(Item::as_table_like_mut) else { continue };
+        let gone: Vec<String> = table
+            .iter()
+            .map(|(name, _)| name.to_string())
+            .filter(|name| is_own(name) && !free.contains(name))
+            .collect();
+        gone.iter().for_each(|name| {
+            table.remove(name);
+        });
+    }
+    if let Some(names) = fit.get_mut("separate").and_then(Item::as_array_mut) {
+        names.retain(|name| name.as_str().is_some_and(|name| free.iter().any(|own| own == name)));
+    }
+}
+
+/// The greatest speed of the cart that the logs show, m/s, roughly.
+fn fastest(case: &Case) -> f64 {
+    let r = case.stage.pulley_radius;
+    let logs = case.experiments.iter().filter_map(|experiment| experiment.log.as_ref());
+    let speeds = logs.flat_map(|log| {
+        log.outputs.iter().map(move |output| {
+            let arm = if output.quantity.name().starts_with("cart") { 1.0 } else { r };
+            let values = &output.values;
+            if !is_position(output.quantity) {
+                return arm * values.iter().filter(|v| v.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()));
+            }
+            let step = (values.len() / 100).max(1);
+            let pairs = (step..values.len()).step_by(step);
+            let slope = pairs.map(|k| (values[k] - values[k - step]) / (log.time[k] - log.time[k - step]));
+            arm * slope.filter(|v| v.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()))
+        })
+    });
+    speeds.fold(1e-3, f64::max)
+}
+
+/// Where the cart is in the logs, m.
+fn travel(case: &Case) -> (f64, f64) {
+    let r = case.stage.pulley_radius;
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for log in case.experiments.iter().filter_map(|experiment| experiment.log.as_ref()) {
+        for output in log.outputs.iter().filter(|output| is_position(output.quantity)) {
+            let arm = if output.quantity == Quantity::CartPosition { 1.0 } else { r };
+            for value in output.values.iter().filter(|value| value.is_finite()) {
+                (low, high) = (low.min(arm * value), high.max(arm * value));
+            }
+        }
+    }
+    if high > low { (low, high) } else { (-1.0, 1.0) }
+}

@@ -1,0 +1,113 @@
+//! Records cut into parts, one of which is held out at a time.
+
+use crate::case::Plan;
+use crate::case::{Case, Experiment, matches};
+use crate::log::{Log, Output};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// From so many logs on, whole logs are held out; of fewer, each is cut into blocks.
+const FEWEST_LOGS: usize = 4;
+
+/// How many parts logs are taken in, into how many blocks fewer logs are cut, and the fewest samples of a block: errors add up along a
+/// block as they do along a record, so blocks are long.
+const FOLDS: usize = 5;
+const BLOCKS: usize = 4;
+const SAMPLES: usize = 60;
+
+/// What is fitted and what is held out.
+pub(super) struct Fold {
+    pub fitted: Vec<Experiment>,
+    pub held_out: Vec<Experiment>,
+}
+
+/// The records in parts: each is held out once. The flag says that logs were cut, so that their parts have starts of their own.
+pub(super) struct Parts {
+    pub folds: Vec<Fold>,
+    pub is_cut: bool,
+}
+
+impl Parts {
+    /// Of the logs of a case that its plan fits.
+    pub fn new(case: &Case, plan: &Plan) -> Self {
+        let is_held = |name: &str| plan.held_out.iter().any(|pattern| matches(name, pattern));
+        let logs: Vec<&Experiment> = case.experiments.iter().filter(|e| e.log.is_some() && !is_held(&e.name)).collect();
+        if logs.len() >= FEWEST_LOGS {
+            return Self { folds: by_log(&logs), is_cut: false };
+        }
+        Self { folds: by_block(&logs), is_cut: true }
+    }
+
+    /// What was held out, in words.
+    pub fn words(&self) -> String {
+        match self.is_cut {
+            true => format!(
+                "{} blocks of the logs, one after the other, each with its start fitted to its first tenth",
+                self.folds.len()
+            ),
+            false => format!("the logs, in {} parts, one after the other", self.folds.len()),
+        }
+    }
+}
+
+/// Every so many logs, so that each part is like the others.
+fn by_log(logs: &[&Experiment]) -> Vec<Fold> {
+    let count = FOLDS.min(logs.len());
+    let fold = |part: usize| {
+        let pick = |held: bool| {
+            let own = logs.iter().enumerate().filter(move |(k, _)| (k % count == part) == held);
+            own.map(|(_, experiment)| (*experiment).clone()).collect::<Vec<_>>()
+        };
+        Fold { fitted: pick(false), held_out: pick(true) }
+    };
+    (0..count).map(fold).collect()
+}
+
+/// Blocks of each log; what is left of it before and behind the block is fitted.
+fn by_block(logs: &[&Experiment]) -> Vec<Fold> {
+    let mut folds = Vec::new();
+    for (index, experiment) in logs.iter().enumerate() {
+        let Some(log) = &experiment.log else { continue };
+        let blocks = BLOCKS.div_ceil(logs.len()).max(2).min(log.len() / SAMPLES);
+        if blocks < 2 {
+            continue;
+        }
+        for block in 0..blocks {
+            let edge = |k: usize| k * (log.len() - 1) / blocks;
+            let (first, last) = (edge(block), edge(block + 1));
+            let mut fitted: Vec<Experiment> =
+                logs.iter().enumerate().filter(|(k, _)| *k != index).map(|(_, other)| (*other).clone()).collect();
+            fitted.extend(cut(experiment, 0..first + 1));
+            fitted.extend(cut(experiment, last..log.len()));
+            folds.push(Fold { fitted, held_out: cut(experiment, first..last + 1).into_iter().collect() });
+        }
+    }
+    folds
+}
+
+/// Some rows of an experiment's log as an experiment; none if they are too few.
+fn cut(experiment: &Experiment, rows: Range<usize>) -> Option<Experiment> {
+    let log = experiment.log.as_ref()?;
+    if rows.len() < SAMPLES / 2 {
+        return None;
+    }
+    let begin = log.time[rows.start];
+    let output = |output: &Output| Output { values: output.values[rows.clone()].to_vec(), ..output.clone() };
+    let own = Log {
+        time: log.time[rows.clone()].iter().map(|t| t - begin).collect(),
+        input: log.input[rows.clone()].to_vec(),
+        added: log.added.as_ref().map(|added| added[rows.clone()].to_vec()),
+        reference: log.reference.as_ref().map(|reference| reference[rows.clone()].to_vec()),
+        outputs: log.outputs.iter().map(output).collect(),
+        ..(**log).clone()
+    };
+    let initial = if rows.start == 0 { experiment.initial } else { Default::default() };
+    Some(Experiment {
+        name: format!("{} from row {}", experiment.name, rows.start + 1),
+        input: own.signal(),
+        until: own.time.last().copied().unwrap_or_default(),
+        every: experiment.every,
+        initial,
+        log: Some(Arc::new(own)),
+    })
+}

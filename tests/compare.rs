@@ -1,0 +1,196 @@
+//! Laws and windows by what they predict, single changes between campaigns, errors without a search, and what a model lacks.
+
+use crate::common::chance::Chance;
+use crate::common::logged::logged;
+use std::sync::Arc;
+use taut::case::{Case, Per, Plan, TEMPLATE};
+use taut::fit::compare::{FrictionLaw, Setting, compare};
+use taut::fit::{drift, fit, residual_force, together};
+use taut::log::Log;
+use taut::signal::Hold;
+use taut::solve::{Flow, Solver, simulate};
+
+/// Both experiments of the template, longer, with logs of the machine that it is with these changes; the encoder's angle trembles.
+fn made(truth: &[&str], seed: u64) -> Case {
+    let input = "experiment.1.input={ sine = \"6 V\", frequency = \"0.7 Hz\" }";
+    let long = [input, "experiment.1.until=6 s", "experiment.1.every=2 ms"];
+    let mut case = Case::from_text_with("axis.toml", TEMPLATE, &long).unwrap();
+    let real = Case::from_text_with("axis.toml", TEMPLATE, &[&long, truth].concat()).unwrap();
+    let step = std::f64::consts::TAU / 2048.0;
+    let mut chance = Chance::new(seed);
+    case.experiments.remove(0);
+    let run = simulate(&real.stage, &real.experiments[1], Solver::Exact).unwrap().trajectory;
+    let angle = run.get("drive_angle").unwrap().iter();
+    let values = angle.map(|v| step * ((v + 1e-3 * chance.normal()) / step).round()).collect();
+    let name = case.experiments[0].name.clone();
+    let mut log: Log = (*logged(&name, &run, values)).clone();
+    // A sine is none that is held between samples.
+    log.hold = Hold::Linear;
+    case.experiments[0].input = log.signal();
+    case.experiments[0].log = Some(Arc::new(log));
+    case
+}
+
+fn plan(free: &[&str]) -> Plan {
+    Plan { free: free.iter().map(|key| key.to_string()).collect(), ..Plan::default() }
+}
+
+fn whole(laws: &[FrictionLaw]) -> Setting {
+    Setting { laws: laws.to_vec(), windows: vec![None] }
+}
+
+const SIDED: [&str; 2] = ["cart.friction.viscous_backward=26", "cart.friction.coulomb_backward=0.9"];
+
+/// The law that the machine has is chosen, and not the one with the least training error.
+#[test]
+fn the_law_of_the_machine_is_chosen() {
+    let keys = ["cart.friction.viscous", "cart.friction.coulomb"];
+    let laws = [FrictionLaw::Viscous, FrictionLaw::Coulomb, FrictionLaw::Asymmetric];
+    for (truth, law) in [(&SIDED[..], FrictionLaw::Asymmetric), (&[][..], FrictionLaw::Coulomb)] {
+        let case = made(truth, 5);
+        // Logs are of no file: candidates take them from the case.
+        let found =
+            compare(&case, "axis.toml".as_ref(), &plan(&keys), &whole(&laws), None, &mut |_| Flow::Continue).unwrap();
+        let chosen = &found.candidates[found.chosen];
+        assert_eq!(chosen.law, law, "{:?}", found.words());
+        assert_eq!(found.candidates.len(), 3);
+        assert!(found.candidates.windows(2).all(|pair| pair[0].held_out <= pair[1].held_out));
+        let viscous = found.candidates.iter().find(|one| one.law == FrictionLaw::Viscous).unwrap();
+        assert!(viscous.held_out > 3.0 * chosen.held_out, "{viscous:?} {chosen:?}");
+        let backward = found.fit.stage.cart.friction.backward.coulomb;
+        assert!((backward - if law == FrictionLaw::Asymmetric { 0.9 } else { 0.2 }).abs() < 0.06, "{backward}");
+    }
+}
+
+#[test]
+fn what_cannot_be_compared_is_refused() {
+    let case = made(&[], 1);
+    let told = |setting: &Setting| {
+        let found = compare(&case, "axis.toml".as_ref(), &plan(&["cart.friction.viscous"]), setting, None, &mut |_| {
+            Flow::Continue
+        });
+        found.unwrap_err().to_string()
+    };
+    let none = Setting { laws: Vec::new(), windows: vec![None] };
+    assert_eq!(
+        told(&none),
+        "there is nothing to compare\n  next: name a law and a length of windows, or leave both out"
+    );
+    let never = Setting { laws: vec![FrictionLaw::Coulomb], windows: vec![Some(-1.0)] };
+    assert_eq!(told(&never), "-1 s is no length of windows\n  allowed: above zero");
+    assert_eq!(
+        FrictionLaw::named("dry").unwrap_err().to_string(),
+        "there is no friction law \"dry\" to compare\n  allowed: viscous, coulomb, asymmetric, stribeck, along, lugre"
+    );
+}
+
+/// Two campaigns, the second after a known change: the table names it, with the value that it has.
+#[test]
+fn a_known_change_between_campaigns_is_named() {
+    for (change, key, value) in [
+        ("cart.mass=0.8", "cart.mass", 0.8),
+        ("motor.resistance=0.9", "motor.resistance", 0.9),
+        ("cart.load=1.5", "cart.load", 1.5),
+    ] {
+        let case = made(&[change], 3);
+        let found =
+            drift(&case, &plan(&["cart.mass", "cart.friction.viscous"]), None, &mut |_| Flow::Continue).unwrap();
+        let best: Vec<(&str, f64)> =
+            found.best().map(|change| (change.estimate.name.as_str(), change.estimate.value)).collect();
+        let own = best.iter().find(|(name, _)| *name == key);
+        assert!(own.is_some_and(|(_, found)| (found / value - 1.0).abs() < 0.03), "{change}: {best:?}");
+        let unchanged = found.unchanged[0].rmse;
+        assert!(found.changes[0].errors[0].rmse < 0.2 * unchanged, "{change}: {unchanged} {:?}", found.changes[0]);
+        assert!(found.changes.len() > 10);
+    }
+}
+
+/// Campaigns share the mass, and each has its own friction.
+#[test]
+fn campaigns_have_parameters_for_themselves() {
+    let (mut case, other) = (made(&["cart.mass=0.5"], 1), made(&["cart.mass=0.5", "cart.friction.coulomb=1.2"], 2));
+    for (experiment, name) in
+        [(&case.experiments[0], "february 1"), (&other.experiments[0], "april 1")].map(|(e, n)| (e.clone(), n))
+    {
+        let mut log: Log = (**experiment.log.as_ref().unwrap()).clone();
+        log.name = name.into();
+        case.experiments.push(taut::case::Experiment { name: name.into(), log: Some(Arc::new(log)), ..experiment });
+    }
+    case.experiments.remove(0);
+    let free = ["cart.mass", "cart.friction.coulomb"];
+    let campaigns = ["february", "april"].map(|name| (name.to_string(), vec![format!("{name} *")])).to_vec();
+    for per in [Per::Campaign, Per::Log] {
+        let own =
+            Plan { separate: vec!["cart.friction.coulomb".into()], per, campaigns: campaigns.clone(), ..plan(&free) };
+        let found = fit(&case, &own, None, &mut |_| Flow::Continue).unwrap();
+        let names: Vec<&str> = found.estimates.iter().map(|estimate| estimate.name.as_str()).collect();
+        let [first, second] = if per == Per::Campaign { ["february", "april"] } else { ["february 1", "april 1"] };
+        assert_eq!(names[0], "cart.mass");
+        assert_eq!(
+            names[1..],
+            [format!("cart.friction.coulomb [{first}]"), format!("cart.friction.coulomb [{second}]")]
+        );
+        for (estimate, truth) in found.estimates.iter().zip([0.5, 0.2, 1.2]) {
+            let [low, high] = estimate.interval.unwrap();
+            let wide = high - low;
+            assert!(low - wide < truth && truth < high + wide && wide < 0.3, "{}: {low} {high}", estimate.name);
+        }
+        let texts = [0, 1].map(|part| found.case_text_of(&case, "axis.toml".as_ref(), part).unwrap());
+        let coulomb =
+            texts.map(|text| Case::from_text("fitted.toml", &text).unwrap().stage.cart.friction.forward.coulomb);
+        assert!((coulomb[0] - 0.2).abs() < 0.1 && (coulomb[1] - 1.2).abs() < 0.1, "{coulomb:?}");
+    }
+}
+
+/// An empty list of parameters was refused; it asks for the errors of the case as it is.
+#[test]
+fn errors_are_told_without_a_search() {
+    let case = made(&["cart.mass=0.5"], 1);
+    let found = fit(&case, &plan(&[]), None, &mut |_| Flow::Continue).unwrap();
+    assert!(found.estimates.is_empty() && found.is_complete());
+    let score = found.logs[0].outputs[0].fitted.unwrap();
+    assert!(score.rmse > 1e-2, "{score:?}");
+    let all = together(&found.logs, |log| log.experiment().to_string());
+    assert_eq!((all.len(), all[0].logs, all[0].count), (1, 1, score.count));
+    assert!((all[0].rmse / score.rmse - 1.0).abs() < 1e-12);
+}
+
+/// Where a log begins was taken from its first row where it was held out, and one outlier there spoilt all of it.
+#[test]
+fn the_start_of_a_log_that_is_held_out_is_fitted() {
+    let mut case = made(&[], 1);
+    let mut log: Log = (**case.experiments[0].log.as_ref().unwrap()).clone();
+    let begin = log.time.iter().position(|t| *t > 1.7).unwrap();
+    // It begins in motion.
+    for column in [&mut log.time, &mut log.input, &mut log.outputs[0].values] {
+        column.drain(..begin);
+    }
+    let first = log.time[0];
+    log.time.iter_mut().for_each(|t| *t -= first);
+    log.name = "later".into();
+    let mut later = case.experiments[0].clone();
+    (later.name, later.input) = ("later".into(), log.signal());
+    later.log = Some(Arc::new(log));
+    case.experiments.push(later);
+    let own = Plan { held_out: vec!["later".into()], ..plan(&["cart.friction.viscous"]) };
+    let mut own = Plan { windows: Some(2.0), ..own };
+    own.nuisance.initial_state = true;
+    let found = fit(&case, &own, None, &mut |_| Flow::Continue).unwrap();
+    let held: Vec<_> = found.logs.iter().filter(|log| log.held_out).collect();
+    assert_eq!(held.len(), 2, "it is cut into windows like the others");
+    for log in held {
+        assert!(log.outputs[0].held_out.unwrap().rmse < 2e-3, "{:?}", log.outputs[0].held_out);
+        assert!(log.extras.iter().any(|(what, ..)| what.name() == "start_speed"));
+    }
+}
+
+/// What pulls at the cart beside the model is found as a force.
+#[test]
+fn a_force_that_is_missing_is_seen() {
+    let case = made(&["cart.load=0.8"], 4);
+    let found = fit(&case, &plan(&[]), None, &mut |_| Flow::Continue).unwrap();
+    let own = residual_force(&found.stage, &found.logs[0]).unwrap();
+    let mean = own.force.iter().sum::<f64>() / own.force.len() as f64;
+    assert!((mean - 0.8).abs() < 0.08, "{mean}");
+    assert!(own.time.len() > 1000 && own.position.len() == own.force.len());
+}
