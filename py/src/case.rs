@@ -11,6 +11,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use taut::case::{GantryCase, InputFile, Opened, Plan, TEMPLATE};
 use taut::files::{Inputs, write_atomically};
+use taut::frf::{Cut, Known, measure};
 use taut::fit::compare::{FrictionLaw, Setting, compare};
 use taut::fit::{Posterior, Profile, check, drift, fit, posterior, profiles};
 use taut::json;
@@ -196,6 +197,22 @@ impl Case {
         let draws = drawn.map(|drawn| Columns::of(py, drawn.table())).transpose()?;
         let logs = fit.logs.into_iter().map(|log| logs::met(py, log)).collect::<PyResult<_>>()?;
         Ok(Fit { data: value::json(py, &told)?.unbind(), case: Py::new(py, estimated)?, draws, logs })
+    }
+
+    /// Frequency responses from the logs, as `--json` prints them.
+    fn frf<'py>(
+        &self,
+        py: Python<'py>,
+        segment: Option<f64>,
+        period: Option<f64>,
+        at: Option<f64>,
+        delay: Option<f64>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let case = self.axis(py)?;
+        let delay = delay.or(case.controller.as_ref().map(|design| design.delay)).unwrap_or_default();
+        let (cut, known) = (Cut { segment, period }, Known { place: at.unwrap_or_default(), delay });
+        let found = unlocked(py, || measure(case, &cut, known))?.map_err(|error| error.in_file(&self.path)).told(py)?;
+        value::json(py, &guarded(|| json::frf(case, &found))?)
     }
 
     /// Tunes the controller, or judges it as it is: what `--json` prints, and the case with the gains that were found.

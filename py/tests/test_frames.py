@@ -39,6 +39,8 @@ def test_every_result_plots_into_axes_of_ones_own(case, root, moving):
         (2, lambda ax: case.modes().plot("cart_position", ax=ax)),
         (1, lambda ax: gantry.plot(ax=ax)),
         (1, lambda ax: moving.tune(evaluate=True).plot(ax=ax)),
+        (1, lambda ax: case.show().plot(ax=ax)),
+        (1, lambda ax: fit.compare("viscous").plot(ax=ax)),
     ]
     for count, plot in plots:
         figure = figures.Figure()
@@ -69,6 +71,10 @@ def test_every_result_goes_to_pandas(case, root, moving):
     assert case.modes().to_pandas().shape[0] == len(case.modes().frequency)
     assert list(gantry.to_pandas()["frequency_Hz"]) == gantry.resonances
     assert list(tuned.to_pandas()["gains"].unique()) == ["before", "after"]
+    assert dict(zip(*case.show().to_pandas()[["key", "value"]].to_dict("list").values())) == {
+        key: value for key, (value, _) in case.show().rows.items()
+    }
+    assert len(fit.compare("viscous").to_pandas()) == len(fit.compare("viscous").data["candidates"])
     runs = case.simulate()
     joined = runs.to_pandas()
     assert joined.shape[0] == sum(run.rows for run in runs)

@@ -231,6 +231,12 @@ def test_cases_from_nonsense():
             allowed(lambda: [repr(case), case._repr_html_(), case.moves, hash(case), case == case.copy()], f"mutant {number}")
 
 
+def test_overviews_with_nonsense(short):
+    for value in WRONG:
+        allowed(lambda: taut.show(value), told("show", value))
+        allowed(lambda: short.show()[value], told("shown[]", value))
+
+
 def test_values_of_nonsense(short):
     keys = [
         "cart.mass", "motor.resistance", "belt.stiffness", "belt", "motor", "experiment", "experiment.0", "experiment.0.input", "title",
@@ -513,6 +519,12 @@ def test_fits_with_nonsense(case, tmp_path):
     fit = fitted.fit()
     for value in WRONG:
         allowed(lambda: fit[value], told("fit[]", value))
+        if value not in (None, "", [], ()):
+            allowed(lambda: fitted.compare(value), told("compare", value))
+        allowed(lambda: fitted.frf(segment=value), told("frf", segment=value))
+        allowed(lambda: fitted.frf(period=value), told("frf", period=value))
+    with pytest.raises(taut.Error):
+        case.drift()
 
 
 def test_tunings_and_logs_with_nonsense(short, moving):
@@ -585,7 +597,8 @@ def test_everything_public_is_called_here():
     source = pathlib.Path(__file__).read_text(encoding="utf-8")
     called = {
         "Case": [
-            "changed", "check", "copy", "fit", "get", "modes", "move", "save", "simulate", "sweep", "tune", "update", "with_log",
+            "changed", "check", "compare", "copy", "drift", "fit", "frf", "get", "modes", "move", "save", "show", "simulate", "sweep",
+            "tune", "update", "with_log",
         ],  # fmt: skip
         "Run": ["plot", "write"],
         "Table": ["plot", "to_arrow", "to_pandas", "to_polars"],
@@ -596,5 +609,5 @@ def test_everything_public_is_called_here():
         assert sorted(public) == methods
         assert all(f".{method}(" in source for method in methods)
     assert {name for name in taut.__all__ if callable(getattr(taut, name)) and not isinstance(getattr(taut, name), type)} == {
-        "read", "sweep", "sweep_tables", "template",
+        "read", "show", "sweep", "sweep_tables", "template",
     }  # fmt: skip

@@ -12,7 +12,7 @@ Mistakes are :class:`taut.Error`, a ``ValueError`` with the text that the comman
 
 from ._native import Bug, Error, Seen, __version__
 from .case import Case, GantryCase, read, show, template
-from .results import Check, Comparison, Drift, Estimate, Fit, FitLog, GantryModes, LinearModel, Modes, Shown, Tuned
+from .results import Check, Comparison, Drift, Estimate, Fit, FitLog, FrequencyResponses, GantryModes, LinearModel, Modes, Shown, Tuned
 from .runs import Run, Runs
 from .sweeps import sweep, sweep_tables
 from .table import Table
@@ -27,6 +27,7 @@ __all__ = [
     "Estimate",
     "Fit",
     "FitLog",
+    "FrequencyResponses",
     "GantryCase",
     "GantryModes",
     "LinearModel",

@@ -10,7 +10,7 @@ from . import _checks, _html, _native
 from ._logs import write_log
 from ._toml import change
 from ._toml import written as toml
-from .results import Check, Comparison, Drift, Fit, FitLog, GantryModes, LinearModel, Modes, Shown, Tuned
+from .results import Check, Comparison, Drift, Fit, FitLog, FrequencyResponses, GantryModes, LinearModel, Modes, Shown, Tuned
 from .runs import Run, Runs
 from .sweeps import sweep
 from .table import Table
@@ -180,6 +180,24 @@ class Case:
         native = self._native.fit(effort if posterior else None, bool(profiles))
         drawn = None if native.draws is None else Table(*native.draws)
         return Fit(native.data, self._of(native.case), drawn, [FitLog._of(log) for log in native.logs])
+
+    def frf(
+        self,
+        *,
+        segment: float | None = None,
+        period: float | None = None,
+        at: float | None = None,
+        delay: float | None = None,
+    ) -> FrequencyResponses:
+        """Frequency responses from the logs, without a model, and stiffness, damping and delay fitted to them.
+
+        ``segment`` is the length of the pieces of Welch's method (s), ``period`` that of a multisine (s); ``at`` is where the cart is
+        (m), ``delay`` the time from a sample to its command (s, that of the controller unless said).
+        """
+        n = _checks.number
+        return FrequencyResponses(
+            self._native.frf(n("segment", segment), n("period", period), n("at", at), n("delay", delay))
+        )
 
     def tune(self, *, spread: float | None = None, corners: bool = False, evaluate: bool = False) -> Tuned:
         """Finds gains and filters for the case's controller, judged by moves over a family of machines that can exist.

@@ -481,12 +481,76 @@ class Shown:
     def __contains__(self, key: str) -> bool:
         return key in self.rows
 
+    def to_pandas(self) -> pandas.DataFrame:
+        """A pandas.DataFrame of all quantities: key, name, value and SI unit."""
+        rows = [row for group in self.data["groups"] for row in group["rows"]]
+        return _frame({key: [row[key] for row in rows] for key in ("key", "name", "value", "unit")})
+
+    def plot(self, *, ax: Axes | None = None) -> Figure:
+        """Natural frequencies at each place along the travel, without damping."""
+        figure, (axis,) = _plots.panels(ax, 1, height=3.0)
+        places = self.data["places"]
+        for k in range(min((len(place["resonances"]) for place in places), default=0)):
+            hertz = [place["resonances"][k]["frequency_Hz"] for place in places]
+            axis.plot([1e3 * place["position_m"][0] for place in places], hertz, ".-", label=f"resonance {k + 1}")
+        _plots.finished(axis, "position, mm", "frequency, Hz")
+        return figure
+
     def __repr__(self) -> str:
         return f"<taut.Shown {self.data['title']!r}: {', '.join(self.rows)}>"
 
     def _repr_html_(self) -> str:
         rows = [(row["name"], row["value"], row["unit"]) for group in self.data["groups"] for row in group["rows"]]
         return _html.table(self.data["title"], ("quantity", "value", "unit"), rows)
+
+
+@dataclass(frozen=True)
+class FrequencyResponses:
+    """Frequency responses from logs."""
+
+    data: dict[str, Any]
+    """What ``taut frf --json`` prints."""
+
+    @property
+    def stiffness(self) -> tuple[float, tuple[float, float]] | None:
+        """The factor on the stiffness of the case's belt with its 95 % interval; None where the responses do not tell it."""
+        fit = self.data["fit"]
+        return None if fit is None else (fit["stiffness"]["value"], tuple(fit["stiffness"]["interval"]))
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A pandas.DataFrame with a row for each frequency of each response; ``real`` and ``imaginary`` are output per V or A."""
+        columns: dict[str, list[Any]] = {}
+        for one in self.data["responses"]:
+            count = len(one["frequency_Hz"])
+            for name in ("log", "quantity"):
+                columns.setdefault(name, []).extend([one[name]] * count)
+            for name in ("frequency_Hz", "real", "imaginary", "radius", "coherence"):
+                columns.setdefault(name, []).extend(one[name])
+        return _frame(columns)
+
+    def response(self, number: int = 0) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+        """Frequencies (Hz) and complex values of a response, by its number."""
+        one = self.data["responses"][number]
+        return np.array(one["frequency_Hz"]), np.array(one["real"]) + 1j * np.array(one["imaginary"])
+
+    def plot(self, response: int = 0, *, ax: Axes | Sequence[Axes] | None = None) -> Figure:
+        """Magnitude and coherence of a response over frequency, by its number."""
+        one = self.data["responses"][response]
+        hertz, values = self.response(response)
+        figure, (above, below) = _plots.panels(ax, 2)
+        above.loglog(hertz, abs(values), ".", markersize=3)
+        below.semilogx(hertz, one["coherence"], linewidth=1)
+        _plots.finished(above, "", f"magnitude of {one['quantity'].replace('_', ' ')}")
+        _plots.finished(below, "frequency, Hz", "coherence")
+        return figure
+
+    def __repr__(self) -> str:
+        told = ", ".join(f"{one['log']}: {one['quantity']}" for one in self.data["responses"])
+        return f"<taut.FrequencyResponses {self.data['title']!r}: {told}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(one["log"], one["quantity"], len(one["frequency_Hz"])) for one in self.data["responses"]]
+        return _html.table(str(self.data["title"]), ("log", "quantity", "frequencies"), rows)
 
 
 @dataclass(frozen=True)
