@@ -80,10 +80,9 @@ impl Gap<'_> {
     #[inline(always)]
     fn rises_above_by_any(&self, heights: &Reading, factor: f64) -> (bool, bool) {
         let (mut ends, mut within) = (0_u64, 0_u64);
-        for q in 0..QUANTITIES {
-            let (from, to, height) = (self.from[q], self.to[q], heights[q]);
-            ends |= u64::from(from.abs() > height) | u64::from(to.abs() > height);
-            within |= u64::from(Self::bound_of(from, to, self.bow[q]) > height * factor);
+        for (((from, to), bow), height) in self.from.iter().zip(self.to).zip(self.bow).zip(heights) {
+            ends |= u64::from(from.abs() > *height) | u64::from(to.abs() > *height);
+            within |= u64::from(Self::bound_of(*from, *to, *bow) > height * factor);
         }
         (ends != 0, within != 0)
     }
@@ -183,17 +182,14 @@ impl Curve {
         }
         for i in 1..TERMS {
             for k in (i..TERMS).rev() {
-                for q in 0..QUANTITIES {
-                    b[k][q] += b[k - 1][q];
-                }
+                let (before, here) = b.split_at_mut(k);
+                here[0].iter_mut().zip(&before[k - 1]).for_each(|(b, before)| *b += before);
             }
         }
         let (mut low, mut high) = (b[0], b[0]);
         for b in &b[1..] {
-            for q in 0..QUANTITIES {
-                low[q] = if b[q] < low[q] { b[q] } else { low[q] };
-                high[q] = if b[q] > high[q] { b[q] } else { high[q] };
-            }
+            low.iter_mut().zip(b).for_each(|(low, b)| *low = if *b < *low { *b } else { *low });
+            high.iter_mut().zip(b).for_each(|(high, b)| *high = if *b > *high { *b } else { *high });
         }
         (low, high)
     }

@@ -48,8 +48,8 @@ pub(crate) fn first_fall(c: &[f64]) -> Option<f64> {
     // Bernstein coefficients, b_i = Σ_{k ≤ i} C(i,k)/C(n,k) c_k: the polynomial lies within their hull.
     match c.len() {
         0..=12 => by_bernstein(c, &RATIOS_12),
-        0..=16 => by_bernstein(c, &RATIOS_16),
-        0..=20 => by_bernstein(c, &RATIOS_20),
+        13..=16 => by_bernstein(c, &RATIOS_16),
+        17..=20 => by_bernstein(c, &RATIOS_20),
         _ => by_bernstein(c, &RATIOS_24),
     }
 }

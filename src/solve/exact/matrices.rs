@@ -1,11 +1,14 @@
 //! One mode made ready: its matrices, its guards, and how fast anything in it can change.
 
+mod guards;
 mod shown;
 
 use crate::friction::Motion;
 use crate::mechanism::{BODIES, Cause, DRIVES, Form, Layout, Mechanism, Mode, ROUNDING, SPRINGS, State};
 use crate::signal::DEGREE;
-use crate::solve::propagator::{EXPONENTIAL_REACH, Matrix, SERIES_REACH, SERIES_TERMS, Series, series_order};
+use crate::solve::propagator::{EXPONENTIAL_REACH, Matrix, SERIES_REACH, Series, series_order};
+use guards::{Beside, LANES, Lanes, Row, Values, lanes, side_by_side};
+pub(super) use guards::{Room, Watch};
 pub(super) use shown::Shown;
 use std::sync::{Arc, OnceLock};
 
@@ -99,148 +102,6 @@ impl Size {
     fn whole(self) -> f64 {
         (self.mechanical * self.mechanical + self.magnetic * self.magnetic).sqrt()
     }
-}
-
-/// A linear form of the vector z.
-pub(in crate::solve) struct Row<const N: usize> {
-    /// What counts in it: places in z in ascending order, and their weights. Most others are zero.
-    places: [u8; N],
-    weights: [f64; N],
-    count: usize,
-}
-
-impl<const N: usize> Row<N> {
-    fn new(row: &[f64; N]) -> Self {
-        let (mut places, mut weights, mut count) = ([0; N], [0.0; N], 0);
-        for (place, weight) in row.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
-            (places[count], weights[count]) = (place as u8, *weight);
-            count += 1;
-        }
-        Self { places, weights, count }
-    }
-
-    fn terms(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        self.places.iter().zip(&self.weights).take(self.count).map(|(place, weight)| (usize::from(*place), *weight))
-    }
-
-    /// Σ w_j z_j, in the order of the places.
-    pub(super) fn value(&self, z: &[f64; N]) -> f64 {
-        self.terms().fold(0.0, |sum, (place, weight)| sum + weight * z[place])
-    }
-
-    /// What rounding may do to its value, the parts of z being of these sizes.
-    pub(super) fn noise(&self, sizes: &[f64; N]) -> f64 {
-        ROUNDING * self.terms().fold(0.0, |sum, (place, weight)| sum + (weight * sizes[place]).abs())
-    }
-
-    /// Its coefficients along a series, as many as it has terms.
-    pub(super) fn along<'c>(&self, series: &Series<N>, room: &'c mut [f64; SERIES_TERMS]) -> &'c mut [f64] {
-        let coefficients = &mut room[..=series.order];
-        coefficients.fill(0.0);
-        for (place, weight) in self.terms() {
-            for (coefficient, term) in coefficients.iter_mut().zip(&series.terms) {
-                *coefficient += weight * term[place];
-            }
-        }
-        coefficients
-    }
-}
-
-/// A condition of the mode on the vector z.
-pub(in crate::solve) struct Watch<const N: usize> {
-    pub(super) row: Row<N>,
-    pub(super) cause: Cause,
-    /// Where its tolerance stands; the speed of a body that stops has none.
-    pub(super) tolerance: usize,
-}
-
-impl<const N: usize> Watch<N> {
-    fn new(row: &[f64; N], cause: Cause) -> Self {
-        let tolerance = if matches!(cause, Cause::Stop(_)) { Cause::KINDS } else { cause.kind() };
-        Self { row: Row::new(row), cause, tolerance }
-    }
-
-    pub(super) fn value(&self, z: &[f64; N]) -> f64 {
-        self.row.value(z)
-    }
-
-    /// Whether its value is zero but for rounding.
-    pub(super) fn is_zero(&self, z: &[f64; N]) -> bool {
-        self.value(z).abs() <= 2.0 * self.noise(z)
-    }
-
-    /// What rounding may do to its value.
-    pub(super) fn noise(&self, z: &[f64; N]) -> f64 {
-        self.row.noise(z)
-    }
-}
-
-/// Linear forms side by side, by the places of z.
-type Lanes<const N: usize> = [[f64; LANES]; N];
-
-/// Forms that are computed side by side.
-const LANES: usize = 8;
-
-/// Room for the guards of a mode: two for each body, five for each drive, two for each spring.
-const GUARDS: usize = (2 * BODIES + 5 * DRIVES + 2 * SPRINGS).next_multiple_of(LANES);
-
-/// One number for each guard of a mode.
-pub(super) type Values = [f64; GUARDS];
-
-/// Room for what looks at the guards need.
-#[derive(Clone)]
-pub(super) struct Room<const N: usize> {
-    /// ż and its size at the last look.
-    pub(super) rate: [f64; N],
-    pub(super) size: Size,
-    pub(super) value: Values,
-    pub(super) steepness: Values,
-    pub(super) slope: Values,
-    pub(super) bend: Values,
-    pub(super) series: Series<N>,
-    pub(super) coefficients: [f64; SERIES_TERMS],
-}
-
-impl<const N: usize> Room<N> {
-    pub(super) fn new() -> Self {
-        let none = [0.0; GUARDS];
-        let (series, coefficients) = (Series::room(), [0.0; SERIES_TERMS]);
-        let (rate, size) = ([0.0; N], Size::ZERO);
-        Self { rate, size, value: none, steepness: none, slope: none, bend: none, series, coefficients }
-    }
-}
-
-/// Guards side by side.
-#[derive(Clone)]
-struct Beside<const N: usize> {
-    rows: Lanes<N>,
-    /// How fast their values can change: per unit of √(2V), mechanical and magnetic, and of the inputs' rates.
-    mechanical: [f64; LANES],
-    magnetic: [f64; LANES],
-    at_once: [[f64; LANES]; DRIVES],
-}
-
-/// The forms of some rows, side by side.
-fn lanes<const N: usize>(rows: &[[f64; N]]) -> impl Iterator<Item = Lanes<N>> + '_ {
-    rows.chunks(LANES).map(|rows| {
-        let mut lanes = [[0.0; LANES]; N];
-        for (lane, row) in rows.iter().enumerate() {
-            lanes.iter_mut().zip(row).for_each(|(place, weight)| place[lane] = *weight);
-        }
-        lanes
-    })
-}
-
-/// The values of forms side by side.
-#[inline(always)]
-fn side_by_side<const N: usize>(lanes: &Lanes<N>, z: &[f64; N]) -> [f64; LANES] {
-    let mut sum = [0.0; LANES];
-    for (weights, factor) in lanes.iter().zip(z) {
-        for (sum, weight) in sum.iter_mut().zip(weights) {
-            *sum += weight * factor;
-        }
-    }
-    sum
 }
 
 /// The equations of one mode, ż = A z, and what follows from them.

@@ -1,0 +1,151 @@
+//! The guards of a mode: one by one, as rows of a few weights, and side by side, for all of them at once.
+
+use super::Size;
+use crate::mechanism::{BODIES, Cause, DRIVES, ROUNDING, SPRINGS};
+use crate::solve::propagator::{SERIES_TERMS, Series};
+
+/// A linear form of the vector z.
+pub(in crate::solve) struct Row<const N: usize> {
+    /// What counts in it: places in z in ascending order, and their weights. Most others are zero.
+    places: [u8; N],
+    weights: [f64; N],
+    count: usize,
+}
+
+impl<const N: usize> Row<N> {
+    pub(super) fn new(row: &[f64; N]) -> Self {
+        let (mut places, mut weights, mut count) = ([0; N], [0.0; N], 0);
+        for (place, weight) in row.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
+            (places[count], weights[count]) = (place as u8, *weight);
+            count += 1;
+        }
+        Self { places, weights, count }
+    }
+
+    fn terms(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.places.iter().zip(&self.weights).take(self.count).map(|(place, weight)| (usize::from(*place), *weight))
+    }
+
+    /// Σ w_j z_j, in the order of the places.
+    pub(in crate::solve::exact) fn value(&self, z: &[f64; N]) -> f64 {
+        self.terms().fold(0.0, |sum, (place, weight)| sum + weight * z[place])
+    }
+
+    /// What rounding may do to its value, the parts of z being of these sizes.
+    pub(in crate::solve::exact) fn noise(&self, sizes: &[f64; N]) -> f64 {
+        ROUNDING * self.terms().fold(0.0, |sum, (place, weight)| sum + (weight * sizes[place]).abs())
+    }
+
+    /// Its coefficients along a series, as many as it has terms.
+    pub(in crate::solve::exact) fn along<'c>(
+        &self,
+        series: &Series<N>,
+        room: &'c mut [f64; SERIES_TERMS],
+    ) -> &'c mut [f64] {
+        let coefficients = &mut room[..=series.order];
+        coefficients.fill(0.0);
+        for (place, weight) in self.terms() {
+            for (coefficient, term) in coefficients.iter_mut().zip(&series.terms) {
+                *coefficient += weight * term[place];
+            }
+        }
+        coefficients
+    }
+}
+
+/// A condition of the mode on the vector z.
+pub(in crate::solve) struct Watch<const N: usize> {
+    pub(in crate::solve::exact) row: Row<N>,
+    pub(in crate::solve::exact) cause: Cause,
+    /// Where its tolerance stands; the speed of a body that stops has none.
+    pub(in crate::solve::exact) tolerance: usize,
+}
+
+impl<const N: usize> Watch<N> {
+    pub(super) fn new(row: &[f64; N], cause: Cause) -> Self {
+        let tolerance = if matches!(cause, Cause::Stop(_)) { Cause::KINDS } else { cause.kind() };
+        Self { row: Row::new(row), cause, tolerance }
+    }
+
+    pub(in crate::solve::exact) fn value(&self, z: &[f64; N]) -> f64 {
+        self.row.value(z)
+    }
+
+    /// Whether its value is zero but for rounding.
+    pub(in crate::solve::exact) fn is_zero(&self, z: &[f64; N]) -> bool {
+        self.value(z).abs() <= 2.0 * self.noise(z)
+    }
+
+    /// What rounding may do to its value.
+    pub(in crate::solve::exact) fn noise(&self, z: &[f64; N]) -> f64 {
+        self.row.noise(z)
+    }
+}
+
+/// Linear forms side by side, by the places of z.
+pub(super) type Lanes<const N: usize> = [[f64; LANES]; N];
+
+/// Forms that are computed side by side.
+pub(super) const LANES: usize = 8;
+
+/// Room for the guards of a mode: two for each body, five for each drive, two for each spring.
+const GUARDS: usize = (2 * BODIES + 5 * DRIVES + 2 * SPRINGS).next_multiple_of(LANES);
+
+/// One number for each guard of a mode.
+pub(in crate::solve::exact) type Values = [f64; GUARDS];
+
+/// Room for what looks at the guards need.
+#[derive(Clone)]
+pub(in crate::solve::exact) struct Room<const N: usize> {
+    /// ż and its size at the last look.
+    pub(in crate::solve::exact) rate: [f64; N],
+    pub(in crate::solve::exact) size: Size,
+    pub(in crate::solve::exact) value: Values,
+    pub(in crate::solve::exact) steepness: Values,
+    pub(in crate::solve::exact) slope: Values,
+    pub(in crate::solve::exact) bend: Values,
+    pub(in crate::solve::exact) series: Series<N>,
+    pub(in crate::solve::exact) coefficients: [f64; SERIES_TERMS],
+}
+
+impl<const N: usize> Room<N> {
+    pub(in crate::solve::exact) fn new() -> Self {
+        let none = [0.0; GUARDS];
+        let (series, coefficients) = (Series::room(), [0.0; SERIES_TERMS]);
+        let (rate, size) = ([0.0; N], Size::ZERO);
+        Self { rate, size, value: none, steepness: none, slope: none, bend: none, series, coefficients }
+    }
+}
+
+/// Guards side by side.
+#[derive(Clone)]
+pub(super) struct Beside<const N: usize> {
+    pub(super) rows: Lanes<N>,
+    /// How fast their values can change: per unit of √(2V), mechanical and magnetic, and of the inputs' rates.
+    pub(super) mechanical: [f64; LANES],
+    pub(super) magnetic: [f64; LANES],
+    pub(super) at_once: [[f64; LANES]; DRIVES],
+}
+
+/// The forms of some rows, side by side.
+pub(super) fn lanes<const N: usize>(rows: &[[f64; N]]) -> impl Iterator<Item = Lanes<N>> + '_ {
+    rows.chunks(LANES).map(|rows| {
+        let mut lanes = [[0.0; LANES]; N];
+        for (lane, row) in rows.iter().enumerate() {
+            lanes.iter_mut().zip(row).for_each(|(place, weight)| place[lane] = *weight);
+        }
+        lanes
+    })
+}
+
+/// The values of forms side by side.
+#[inline(always)]
+pub(super) fn side_by_side<const N: usize>(lanes: &Lanes<N>, z: &[f64; N]) -> [f64; LANES] {
+    let mut sum = [0.0; LANES];
+    for (weights, factor) in lanes.iter().zip(z) {
+        for (sum, weight) in sum.iter_mut().zip(weights) {
+            *sum += weight * factor;
+        }
+    }
+    sum
+}
