@@ -96,6 +96,9 @@ const IDEAS: &[Idea] = &[
             stage.belt.stiffness = [1e-6; 3];
             stage.belt.damping = [0.0; 3];
             stage.belt.model = BeltModel::Elastic;
+            // Spans that follow the cart have a stiffness by their make.
+            stage.belt.follows_cart = false;
+            stage.belt.pretension = None;
         },
         reversed: false,
         is_there: |problem| problem.stage.belt.model == BeltModel::Rigid,

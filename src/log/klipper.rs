@@ -187,7 +187,7 @@ impl Recording {
                 _ => names.extend(["x", "y", "z"].map(|axis| format!("{name}:{axis}"))),
             }
         }
-        for name in self.moves.keys() {
+        for (name, _) in self.moves.iter().filter(|(_, moves)| !moves.is_empty()) {
             for axis in ["x", "y", "z"] {
                 names.extend(["", "_velocity", "_accel"].map(|of| format!("{name}:{axis}{of}")));
             }

@@ -4,6 +4,9 @@ use super::super::Output;
 use super::timing::Timing;
 use super::{Note, Severity, is_position, median, percent, quantile, shown};
 
+/// Unit of an acceleration, which jumps by its nature.
+const ACCELERATION: &str = "m/s^2";
+
 /// An outlier is off by so many times the usual deviation from its neighbours.
 const OUTLYING: f64 = 10.0;
 
@@ -116,6 +119,7 @@ impl Channel {
 
     fn count_wraps(&self, values: &[f64]) -> usize {
         let turn = match (self.unit, self.step) {
+            (ACCELERATION, _) => return 0,
             ("rad", _) => std::f64::consts::TAU,
             (_, Some(q)) => 65536.0 * q,
             _ => return 0,
@@ -127,7 +131,7 @@ impl Channel {
 
     /// Single samples that are far from both neighbours, on the same side.
     fn find_outliers(&self, values: &[f64], time: &[f64]) -> Vec<Outlier> {
-        if self.name == "input" || values.len() < 10 {
+        if self.name == "input" || self.unit == ACCELERATION || values.len() < 10 {
             return Vec::new();
         }
         let off = |k: usize| values[k] - 0.5 * (values[k - 1] + values[k + 1]);
