@@ -408,3 +408,23 @@ fn a_search_is_as_good_as_its_simplex() {
     let found = minimise(&[3.0, -2.0], 0.5, 1e-9, 1000, &mut |x| (x[0] - 1.0).powi(2) + 4.0 * (x[1] + 1.0).powi(4));
     assert!((found.x[0] - 1.0).abs() < 1e-4, "{found:?}");
 }
+
+/// A search runs moves without what it does not ask for; what it asks for is that of a whole run to the last bit.
+#[test]
+fn a_brief_run_shows_what_a_whole_one_does() {
+    for name in ["pid-elastic.toml", "cascade.toml", "pid-shaped.toml"] {
+        let case = case(name, &[]);
+        let design = case.controller.as_ref().unwrap();
+        for motion in &case.moves {
+            let (stage, profile) = (&case.stage, &motion.profile);
+            let (until, window, solver) = (motion.until, motion.window, taut::solve::Solver::of(stage));
+            let setup = taut::control::Setup { stage, model: stage, design, profile, until, window, solver };
+            let whole = taut::control::closed_loop(&setup).unwrap().figures;
+            let brief = taut::tune::look(stage, stage, design, motion).unwrap();
+            assert_eq!(brief.error, whole.cart.peak.value.abs(), "{name}: {}", motion.name);
+            assert_eq!(brief.rms, whole.cart.rms, "{name}: {}", motion.name);
+            assert_eq!(brief.settling, whole.settling, "{name}: {}", motion.name);
+            assert_eq!(brief.current, whole.current.1, "{name}: {}", motion.name);
+        }
+    }
+}

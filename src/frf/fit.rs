@@ -22,6 +22,9 @@ use std::f64::consts::PI;
 const ITERATIONS: usize = 60;
 const CHANGE: f64 = 1e-9;
 
+/// χ² per residual from which on no other start is tried.
+const ENOUGH: f64 = 1.5;
+
 /// Fewest points.
 const FEWEST: usize = 10;
 
@@ -172,8 +175,11 @@ pub fn fit(stage: &Stage, known: &Known, frfs: &[Frf]) -> Result<FrfFit> {
     }
     let ratio = stage.belt.damping.iter().zip(&stage.belt.stiffness).map(|(c, k)| c / k).sum::<f64>() / 3.0;
     let mut best: Option<(f64, Vec<f64>)> = None;
-    // Resonances that are far off hide from each other: from several stiffnesses and dampings.
+    // Resonances that are far off hide from each other: from several stiffnesses and dampings, until noise explains what is left.
     for stiffness in [1.0, 0.6, 1.6, 0.35, 2.8] {
+        if best.as_ref().is_some_and(|(least, _)| *least < ENOUGH * (2 * points) as f64) {
+            break;
+        }
         for ratio in if ratio > 0.0 { vec![ratio] } else { vec![1e-5, 1e-4] } {
             let start = vec![f64::ln(stiffness), ratio.ln(), known.delay, 0.0];
             if let Ok((value, x)) = minimised(&problem, start)

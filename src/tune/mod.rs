@@ -74,6 +74,8 @@ pub struct Tuned {
     pub work: (usize, usize),
     /// The first mode of a belt that has no damping at all, Hz.
     pub undamped: Option<f64>,
+    /// Modes of the axis that a command swings, each in the middle of where it goes along the travel, Hz.
+    pub modes: Vec<f64>,
     /// Whether gains were looked for, and not judged alone.
     pub searched: bool,
 }
@@ -320,6 +322,7 @@ fn ended(work: &Work, before: Verdict, after: Verdict, choices: Vec<Choice>, pla
     let forced = (judgement == Judgement::Worse && breaks && work.excess(&after.worst) <= 1.0)
         .then(|| forced(work.family, &after, work.tuning));
     let belt = &work.case.stage.belt;
+    let modes = work.modes().map(|(modes, _)| modes).unwrap_or_default();
     let is_undamped = belt.model != BeltModel::Rigid && belt.damping.iter().all(|damping| *damping == 0.0);
     Ok(Tuned {
         judgement,
@@ -330,7 +333,8 @@ fn ended(work: &Work, before: Verdict, after: Verdict, choices: Vec<Choice>, pla
         moves: work.moves.to_vec(),
         holds: work.excess(&after.worst) <= 1.0,
         work: (work.rounds, work.tried),
-        undamped: work.modes().ok().and_then(|(modes, _)| modes.first().copied()).filter(|_| is_undamped),
+        undamped: modes.first().copied().filter(|_| is_undamped),
+        modes,
         before,
         after,
         searched: true,

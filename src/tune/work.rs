@@ -39,9 +39,8 @@ const GENERATIONS: usize = 8;
 const SCATTER: f64 = 0.4;
 const EVOLVED: usize = 2;
 
-/// Designs that are run, and those of them from which a search by moves begins.
+/// Designs from which a search by moves begins.
 const FINALISTS: usize = 3;
-const MOVED: usize = 2;
 
 /// Share by which filters that are added have to make the cost smaller.
 const PAYS: f64 = 0.02;
@@ -343,9 +342,9 @@ impl<'a> Work<'a> {
         }
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut best: Option<(f64, usize)> = None;
-        for (_, layout) in ranked.into_iter().take(MOVED) {
+        for (_, layout) in ranked.into_iter().take(FINALISTS) {
             let from = finalists[layout].powers.clone();
-            let (value, _) = self.moved(finalists, layout, &from, (some, FIRST, MOVES), &weighed, &mut archive)?;
+            let (value, _) = self.moved(finalists, layout, &from, (some, FIRST), &weighed, &mut archive)?;
             if best.is_none_or(|(least, _)| value < least) {
                 best = Some((value, layout));
             }
@@ -362,7 +361,7 @@ impl<'a> Work<'a> {
         finalists: &[Finalist],
         layout: usize,
         from: &[f64],
-        (some, step, most): (&[usize], f64, usize),
+        (some, step): (&[usize], f64),
         weighed: &Weighed,
         archive: &mut Vec<Tried>,
     ) -> Result<(f64, Vec<f64>)> {
@@ -382,7 +381,7 @@ impl<'a> Work<'a> {
             }
             value + STEEP * beyond
         };
-        let found = minimise(from, step, 1e-3, most, &mut value);
+        let found = minimise(from, step, 1e-3, MOVES, &mut value);
         let (mut value, mut powers) = (found.value, found.x);
         if self.passes(&rounded(&shaped(start, own, &powers)))? {
             powers = self.pulled(start, own, from, &powers)?;
@@ -460,7 +459,7 @@ impl<'a> Work<'a> {
         let value = |tried: &Tried| self.valued(weighed.cost, &BALANCES[1], &tried.worst, weighed.bars);
         let best = archive.iter().min_by(|a, b| value(a).total_cmp(&value(b)));
         if let Some((layout, powers)) = best.map(|tried| (tried.layout, tried.powers.clone())) {
-            self.moved(finalists, layout, &powers, (some, FURTHER, 2 * MOVES / 3), weighed, archive)?;
+            self.moved(finalists, layout, &powers, (some, FURTHER), weighed, archive)?;
         }
         Ok(())
     }

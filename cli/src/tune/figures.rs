@@ -20,6 +20,7 @@ const BELOW_PEAK: f64 = 30.0;
 /// All of them, with names for files.
 pub fn all(work: &Work) -> Result<Vec<(String, Figure)>> {
     let mut figures: Vec<(String, Figure)> = frequency(work)?.into_iter().map(|(n, f)| (n.to_string(), f)).collect();
+    figures.push(("bode".into(), bode(work)?));
     for motion in &work.tuned.moves {
         figures.push((format!("{}-before-and-after", motion.file_name()), moved(work, motion)?));
     }
@@ -81,6 +82,47 @@ fn frequency(work: &Work) -> Result<Vec<Named>> {
                 .caption("S = 1/(1 + L) and T = L/(1 + L), on the axis as the file has it and on the worst."),
         ),
     ])
+}
+
+/// Magnitude and phase of L before and after on the axis as it is taken for, with the crossover after and the modes along the travel marked.
+fn bode(work: &Work) -> Result<Figure> {
+    let tuned = work.tuned;
+    let nominal = tuned.family.nominal();
+    let mut magnitude = Panel::new(Axis::new("|L|, dB", "")).weight(1.3);
+    let mut phase = Panel::new(Axis::new("Phase of L", "°"));
+    let mut last = 0.0_f64;
+    for (name, verdict, colour) in [("before", &tuned.before, Colour::Amber), ("after", &tuned.after, Colour::Blue)] {
+        let feedback = Feedback::new(&verdict.design, &work.case.stage)?;
+        let plant = tuned.family.plant(&nominal, &verdict.design, &feedback.corners())?;
+        let open = loops(&plant, &feedback);
+        let hertz: Vec<f64> = plant.frequency.iter().map(|omega| omega / (2.0 * PI)).collect();
+        last = hertz.last().copied().unwrap_or(last).max(last);
+        let decibels: Vec<f64> = open.iter().map(|l| 20.0 * l.position.norm().max(1e-12).log10()).collect();
+        // From 0 down to −360°: −180° is what margins are counted from.
+        let turned = |angle: f64| if angle > 0.0 { angle - 360.0 } else { angle };
+        let degrees: Vec<f64> = open.iter().map(|l| turned(l.position.arg().to_degrees())).collect();
+        magnitude = magnitude.series(Series::new(name, hertz.clone(), decibels).colour(colour));
+        phase = phase.series(Series::new("", hertz, degrees).colour(colour));
+    }
+    let after = &tuned.after.nominal;
+    let told = format!(
+        "The open loop on the axis as the file has it. After: phase margin {:.1}° at the crossover, gain margin {:.2}; vertical lines are the \
+         crossover and the axis' own modes in the middle of its travel.",
+        after.phase.to_degrees(),
+        after.gain
+    );
+    let mut figure = Figure::new("Bode diagram of the open loop", Axis::new("Frequency", "Hz").logarithmic())
+        .panel(magnitude.horizontal(0.0, ""))
+        .panel(phase.horizontal(-180.0, "−180°"))
+        .view(0.1, last)
+        .caption(told);
+    if after.crossover.is_finite() {
+        figure = figure.vertical(after.crossover / (2.0 * PI), "crossover");
+    }
+    for (number, mode) in tuned.modes.iter().filter(|mode| **mode < last).enumerate() {
+        figure = figure.vertical(*mode, format!("mode {}", number + 1));
+    }
+    Ok(figure)
 }
 
 /// The cart's error in a move, before and after, and the command.

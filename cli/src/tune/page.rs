@@ -29,13 +29,13 @@ pub fn page(work: &Work, text: &str, figures: &[(String, Figure)]) -> Page {
     page.subsection("At worst");
     page.table(&rows(&table::margins(&tuned.before.worst, &tuned.after.worst)));
     page.prose(format!("Before: {}. After: {worst}.", tuned.family.words(&tuned.before.corner)));
-    for (_, figure) in figures.iter().take(2) {
+    for (_, figure) in figures.iter().take(3) {
         page.figure(figure);
     }
     if !tuned.after.moves.is_empty() {
         page.section("Moves");
         page.table(&rows(&table::moves(work)));
-        for (_, figure) in figures.iter().skip(2) {
+        for (_, figure) in figures.iter().skip(3) {
             page.figure(figure);
         }
     }
