@@ -95,9 +95,11 @@ fn log(stage: &Stage, closed: bool, delay: f64, seed: u64) -> taut::Result<Log> 
         file: "simulated.csv".into(),
         time: cut(&exciter.time),
         input: cut(&exciter.input),
+        added: None,
         hold: taut::signal::Hold::Zero,
         reference: closed.then(|| cut(&exciter.reference)),
         outputs: vec![output],
+        ended: None,
     })
 }
 
