@@ -50,6 +50,8 @@ fn log(model: &(Discrete, usize), input: &dyn Fn(usize) -> f64, gain: Option<f64
         x = &discrete.a * &x + &discrete.b * command;
     }
     Log {
+        added: None,
+        ended: None,
         name: "made".into(),
         file: "made.csv".into(),
         time,

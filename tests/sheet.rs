@@ -202,6 +202,7 @@ fn counted(counts: f64) -> Log {
     let outputs = vec![Output { quantity: Quantity::CartPosition, absolute: false, values }];
     let input = time.iter().map(|t| 2.0 * (2.0 * t).sin()).collect();
     Log {
+        added: None,
         name: "to and fro".into(),
         file: "log.csv".into(),
         time,
