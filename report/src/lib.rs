@@ -27,6 +27,7 @@ pub mod drawing;
 mod embed;
 pub mod equations;
 pub mod figure;
+pub mod frf;
 mod gantry;
 mod layout;
 pub mod modes;
@@ -41,6 +42,7 @@ pub mod simulate;
 mod svg;
 pub mod sweep;
 mod together;
+pub mod tune;
 
 pub use decimate::{Decimator, decimate};
 pub use drawing::stage_drawing;

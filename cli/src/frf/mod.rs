@@ -1,7 +1,5 @@
 //! `taut frf`: frequency responses from the logs of a case.
 
-mod figures;
-mod page;
 mod table;
 
 use crate::args::Frf as Args;
@@ -12,6 +10,7 @@ use std::f64::consts::PI;
 use std::fmt::Write;
 use taut::frf::{Cut, Known, Measurement, measure};
 use taut::json;
+use taut_report::frf::{figures, page};
 
 /// Reads the case and its logs, measures, writes, tells.
 pub fn run(args: &Args) -> Outcome {
@@ -30,8 +29,8 @@ pub fn run(args: &Args) -> Outcome {
         finished.files.push(("frf.csv".into(), csv(&found)));
     }
     if common.reports() {
-        let figures = figures::all(&found, &case.stage);
-        let page = page::page(&case, &found, &figures);
+        let figures = figures(&found, &case.stage);
+        let page = page(&case, &found, &figures);
         let pictures = figures.into_iter().map(|(name, figure)| (name, figure.into()));
         finished.report = Some(Report { page, pictures: pictures.collect() });
     }

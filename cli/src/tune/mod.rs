@@ -1,7 +1,5 @@
 //! `taut tune`: gains for the structure that a case names, good for the worst axis.
 
-mod figures;
-mod page;
 mod table;
 
 use crate::args::Tune as Args;
@@ -15,15 +13,9 @@ use std::path::Path;
 use taut::case::{Case, Tuning};
 use taut::files::{Inputs, write_atomically};
 use taut::json;
-use taut::tune::{Judgement, Tuned, evaluate, tune};
+use taut::tune::{Judgement, evaluate, tune};
 use taut::{Error, Result};
-
-/// What was asked for and what came of it.
-pub struct Work<'a> {
-    pub case: &'a Case,
-    pub tuning: &'a Tuning,
-    pub tuned: &'a Tuned,
-}
+use taut_report::tune::{Work, figures, hertz, page};
 
 /// Reads the case, tunes, writes, tells.
 pub fn run(args: &Args) -> Outcome {
@@ -75,8 +67,8 @@ pub fn run(args: &Args) -> Outcome {
         Target::Folder(folder) => {
             let text = folder.bring(&text, &Case::from_text(&args.case, &text)?.files).map_err(Failure::work)?;
             if !common.no_report {
-                let figures = figures::all(&work).map_err(Failure::work)?;
-                let page = page::page(&work, &text, &figures);
+                let figures = figures(&work).map_err(Failure::work)?;
+                let page = page(&work, &text, &figures);
                 let pictures = figures.into_iter().map(|(name, figure)| (name.to_string(), figure.into()));
                 finished.report = Some(Report { page, pictures: pictures.collect() });
             }
@@ -93,7 +85,7 @@ fn remarks(work: &Work) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if !tuned.after.nominal.stable {
         let told = "the loop is not stable on the axis as the file has it";
-        remarks.push(Remark::Warning(format!("{told}: it swings at {}", table::hertz(tuned.after.nominal.at))));
+        remarks.push(Remark::Warning(format!("{told}: it swings at {}", hertz(tuned.after.nominal.at))));
     }
     remarks
 }

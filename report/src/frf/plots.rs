@@ -1,13 +1,13 @@
 //! Measured responses over those of the model, and coherence.
 
+use crate::{Axis, Colour, Figure, Panel, Series, Style};
 use nalgebra::Complex;
 use std::f64::consts::PI;
 use taut::frf::{COHERENT, Measurement, Response};
 use taut::stage::Stage;
-use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// One for each response.
-pub fn all(found: &Measurement, stage: &Stage) -> Vec<(String, Figure)> {
+pub fn figures(found: &Measurement, stage: &Stage) -> Vec<(String, Figure)> {
     let one = |(k, response): (usize, &Response)| (format!("response-{}", k + 1), bode(response, stage));
     found.responses.iter().enumerate().map(one).collect()
 }

@@ -1,9 +1,9 @@
 //! The report: one HTML file.
 
-use super::table;
+use super::rows::{lines, quality};
+use crate::{Callout, Cell, Figure, Page, Table};
 use taut::case::Case;
 use taut::frf::Measurement;
-use taut_report::{Callout, Cell, Figure, Page, Table};
 
 /// The page.
 pub fn page(case: &Case, found: &Measurement, figures: &[(String, Figure)]) -> Page {
@@ -13,7 +13,7 @@ pub fn page(case: &Case, found: &Measurement, figures: &[(String, Figure)]) -> P
             let kind = if fit.chi < 3.0 { Callout::Holds } else { Callout::Note };
             let head = format!("The belt is {:.3} times as stiff as the file says", fit.stiffness.0);
             let [low, high] = fit.stiffness.1;
-            page.callout(kind, head, format!("{low:.3} to {high:.3} with 95 %; {}.", table::quality(fit)));
+            page.callout(kind, head, format!("{low:.3} to {high:.3} with 95 %; {}.", quality(fit)));
             let mut rows = Table::new("What was fitted to the responses.").column("", "").column("Value", "");
             rows = rows.column("From", "").column("To", "");
             for (name, value, [low, high]) in fit.rows() {
@@ -25,7 +25,7 @@ pub fn page(case: &Case, found: &Measurement, figures: &[(String, Figure)]) -> P
     }
     for (one, (_, figure)) in found.responses.iter().zip(figures) {
         page.section(&format!("{}: {}", one.frf.name, one.frf.quantity.name()));
-        for line in table::lines(&one.frf) {
+        for line in lines(&one.frf) {
             page.prose(format!("{line}."));
         }
         if let Some(margins) = &one.margins {

@@ -1,6 +1,8 @@
 //! Nyquist's curve, sensitivity, and the moves before and after.
 
 use super::Work;
+use crate::simulate::{Named, decimator};
+use crate::{Axis, Colour, Figure, Panel, Series, Style};
 use std::f64::consts::PI;
 use taut::Result;
 use taut::case::Move;
@@ -8,8 +10,6 @@ use taut::control::feedback::Feedback;
 use taut::control::{Loop, Rows, Standard, stream};
 use taut::solve::{Flow, Solver};
 use taut::tune::{Corner, Verdict, loops};
-use taut_report::simulate::{Named, decimator};
-use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// What is drawn of L beyond this would hide the point −1.
 const FAR: f64 = 3.0;
@@ -18,7 +18,7 @@ const FAR: f64 = 3.0;
 const BELOW_PEAK: f64 = 30.0;
 
 /// All of them, with names for files.
-pub fn all(work: &Work) -> Result<Vec<(String, Figure)>> {
+pub fn figures(work: &Work) -> Result<Vec<(String, Figure)>> {
     let mut figures: Vec<(String, Figure)> = frequency(work)?.into_iter().map(|(n, f)| (n.to_string(), f)).collect();
     figures.push(("bode".into(), bode(work)?));
     for motion in &work.tuned.moves {

@@ -1,15 +1,15 @@
 //! The report: one HTML file.
 
 use super::Work;
-use super::table::{self, Row};
+use super::rows::{self as told, Row};
+use crate::{Callout, Cell, Figure, Page, Table};
 use taut::tune::Judgement;
-use taut_report::{Callout, Cell, Figure, Page, Table};
 
 /// The page; `text` is the tuned case.
 pub fn page(work: &Work, text: &str, figures: &[(String, Figure)]) -> Page {
     let tuned = work.tuned;
     let structure = tuned.after.design.structure.name();
-    let mut page = Page::new(work.case.title.clone()).subtitle(format!("Tuned: {structure}. {}.", table::goal(work)));
+    let mut page = Page::new(work.case.title.clone()).subtitle(format!("Tuned: {structure}. {}.", told::goal(work)));
     let (kind, head) = match (tuned.holds, tuned.judgement) {
         (false, _) => (Callout::Fails, "The limits do not hold"),
         (true, Judgement::Worse) => (Callout::Fails, "Within the limits the moves are worse than before"),
@@ -17,38 +17,38 @@ pub fn page(work: &Work, text: &str, figures: &[(String, Figure)]) -> Page {
         (true, Judgement::Unchanged) => (Callout::Holds, "The gains of the file stay; the limits hold"),
     };
     let worst = tuned.family.words(&tuned.after.corner);
-    page.callout(kind, head, format!("{}. Over {}.", table::verdict(work), table::family(work)));
-    if let Some(told) = table::given(work) {
+    page.callout(kind, head, format!("{}. Over {}.", told::verdict(work), told::family(work)));
+    if let Some(told) = told::given(work) {
         page.prose(told);
     }
     page.section("Gains");
-    page.table(&rows(&table::gains(work)));
+    page.table(&rows(&told::gains(work)));
     page.section("Margins");
     page.subsection("The axis as the file has it");
-    page.table(&rows(&table::margins(&tuned.before.nominal, &tuned.after.nominal)));
+    page.table(&rows(&told::margins(&tuned.before.nominal, &tuned.after.nominal)));
     page.subsection("At worst");
-    page.table(&rows(&table::margins(&tuned.before.worst, &tuned.after.worst)));
+    page.table(&rows(&told::margins(&tuned.before.worst, &tuned.after.worst)));
     page.prose(format!("Before: {}. After: {worst}.", tuned.family.words(&tuned.before.corner)));
     for (_, figure) in figures.iter().take(3) {
         page.figure(figure);
     }
     if !tuned.after.moves.is_empty() {
         page.section("Moves");
-        page.table(&rows(&table::moves(work)));
+        page.table(&rows(&told::moves(work)));
         for (_, figure) in figures.iter().skip(3) {
             page.figure(figure);
         }
     }
     if !tuned.choices.is_empty() {
         page.section("Choices");
-        let mut all = table::CHOICES.into_iter().fold(Table::new(""), |table, heading| table.column(heading, ""));
-        for row in table::choices(work) {
+        let mut all = told::CHOICES.into_iter().fold(Table::new(""), |table, heading| table.column(heading, ""));
+        for row in told::choices(work) {
             all.row(row.into_iter().map(Cell::from));
         }
         page.table(&all);
     }
     page.section("Limit cycles at rest");
-    page.table(&rows(&[("Hunting".into(), table::hunt(&tuned.before.hunt), table::hunt(&tuned.after.hunt))]));
+    page.table(&rows(&[("Hunting".into(), told::hunt(&tuned.before.hunt), told::hunt(&tuned.after.hunt))]));
     page.section("The case");
     page.prose("This text has the tuned gains.");
     page.embed("tuned.toml", text);

@@ -1,0 +1,208 @@
+//! A tuning in words: rows of a name, before and after.
+
+use super::Work;
+use std::f64::consts::PI;
+use taut::control::Deviation;
+use taut::number::engineering;
+use taut::tune::{AtWorst, Hunt, Judgement, Margins, MoveVerdict, Source};
+
+/// A length in µm.
+fn length(metres: f64) -> String {
+    if metres.is_finite() { format!("{:.1} µm", 1e6 * metres) } else { "does not end".into() }
+}
+
+/// Before and after, with a name.
+pub type Row = (String, String, String);
+
+/// A value with four digits in its unit, spaces as on a keyboard.
+fn number(value: f64, unit: &str) -> String {
+    engineering(value, unit, 4).replace('\u{a0}', " ")
+}
+
+/// The gains.
+pub fn gains(work: &Work) -> Vec<Row> {
+    let name = |key: &str| key.trim_start_matches("controller.").to_string();
+    let row = |(gain, after): (taut::tune::Gain, f64)| {
+        (name(gain.key), number(gain.value, gain.unit), number(after, gain.unit))
+    };
+    let mut rows: Vec<Row> = work.tuned.changes().into_iter().map(row).collect();
+    if let Some([before, after]) = work.tuned.filters() {
+        rows.push(("filters".into(), before, after));
+    }
+    rows
+}
+
+/// A frequency.
+pub fn hertz(omega: f64) -> String {
+    if omega.is_finite() { format!("{:.2} Hz", omega / (2.0 * PI)) } else { "none".into() }
+}
+
+/// Margins before and after, one row each.
+pub fn margins(before: &Margins, after: &Margins) -> Vec<Row> {
+    let factor = |m: &Margins| match m.gain {
+        _ if !m.stable => "none".into(),
+        gain if gain.is_infinite() => "any".into(),
+        gain => format!("{gain:.2} ({:.1} dB)", 20.0 * gain.log10()),
+    };
+    type Shown<'a> = Box<dyn Fn(&Margins) -> String + 'a>;
+    let peak = |value: f64| if value.is_finite() { format!("{value:.3}") } else { "not stable".into() };
+    let top =
+        |m: &Margins| if m.stable { format!(" at {}", hertz(m.at)) } else { format!(", swings at {}", hertz(m.at)) };
+    let rows: [(&str, Shown); 7] = [
+        ("Ms", Box::new(move |m| format!("{}{}", peak(m.sensitivity), top(m)))),
+        ("Mt", Box::new(move |m| peak(m.complementary))),
+        ("gain margin", Box::new(factor)),
+        (
+            "phase margin",
+            Box::new(|m| if m.phase.is_finite() { format!("{:.1}°", m.phase.to_degrees()) } else { "any".into() }),
+        ),
+        ("crossover", Box::new(|m| hertz(m.crossover))),
+        ("bandwidth", Box::new(|m| hertz(m.bandwidth))),
+        ("reference to cart, -3 dB", Box::new(|m| hertz(m.tracking))),
+    ];
+    rows.iter().map(|(name, shown)| (name.to_string(), shown(before), shown(after))).collect()
+}
+
+/// The moves before and after.
+pub fn moves(work: &Work) -> Vec<Row> {
+    let (before, after) = (&work.tuned.before.moves, &work.tuned.after.moves);
+    let cart = |cart: &Deviation| format!("{}, {} rms", length(cart.peak.value.abs()), length(cart.rms));
+    let settles = |time: Option<f64>| time.map_or("not".into(), |time| format!("after {:.0} ms", 1e3 * time));
+    let amperes = |value: f64| if value.is_finite() { number(value, "A") } else { "none".into() };
+    let mut rows = Vec::new();
+    for (was, is) in before.iter().zip(after) {
+        let mut row = |name: &str, of: &dyn Fn(&MoveVerdict) -> String| rows.push((name.to_string(), of(was), of(is)));
+        row(&format!("{}: cart error", was.name), &|one| cart(&one.cart));
+        row("  settles", &|one| settles(one.settling));
+        row("  current", &|one| format!("{} rms", amperes(one.current)));
+        row("  at worst: cart error", &|one| length(one.worst.0));
+        row("  at worst: settles", &|one| settles(slowest(&one.at_worst)));
+        row("  at worst: current", &|one| format!("{} rms", amperes(one.at_worst.current)));
+        row("  axes that settle", &|one| format!("{} of {}", one.settled.0, one.settled.1));
+    }
+    rows
+}
+
+/// Time until the cart settles at worst, if it does.
+fn slowest(worst: &AtWorst) -> Option<f64> {
+    worst.settles.1.then_some(worst.settles.0)
+}
+
+/// The first line: what became of the moves, and what forces it.
+pub fn verdict(work: &Work) -> String {
+    let tuned = work.tuned;
+    let (before, after) = (&tuned.before, &tuned.after);
+    let told: Vec<String> = before.moves.iter().zip(&after.moves).filter_map(|(was, is)| change(was, is)).collect();
+    let told = if told.is_empty() { String::new() } else { format!(": {}", told.join("; ")) };
+    match (tuned.judgement, &tuned.forced) {
+        (Judgement::Better, _) => format!("BETTER{told}"),
+        (Judgement::Unchanged, _) => {
+            "UNCHANGED: no gains were found that make the moves better within the limits".into()
+        }
+        (Judgement::Worse, None) => format!("WORSE than the gains of the file{told}"),
+        (Judgement::Worse, Some(forced)) => format!(
+            "WORSE than the gains of the file{told}. The limit of {} forces it, by {:.1} Hz with the cart at {:.0} mm",
+            forced.limit.word(),
+            forced.mode,
+            1e3 * forced.place
+        ),
+    }
+}
+
+/// What became of a move at worst, in words; none where nothing did.
+fn change(was: &MoveVerdict, is: &MoveVerdict) -> Option<String> {
+    let mut words = Vec::new();
+    if was.worst.0 != is.worst.0 {
+        words.push(format!("errs {} at worst, {} before", length(is.worst.0), length(was.worst.0)));
+    }
+    if was.settled.0 != is.settled.0 {
+        words.push(format!("settles on {} of {} axes, {} before", is.settled.0, is.settled.1, was.settled.0));
+    }
+    (!words.is_empty()).then(|| format!("{} {}", was.name, words.join(" and ")))
+}
+
+/// What is to be said of the gains of the file first: that they break the limits themselves.
+pub fn given(work: &Work) -> Option<String> {
+    let (before, tuning) = (&work.tuned.before, work.tuning);
+    if before.worst.excess(tuning.sensitivity, tuning.complementary) <= 1.0 {
+        return None;
+    }
+    let nominal = &before.nominal;
+    let own = match nominal.stable {
+        true => {
+            format!("Ms {:.3}, gain margin {:.2} on the axis as it is taken for", nominal.sensitivity, nominal.gain)
+        }
+        false => format!("not stable on the axis as it is taken for, swinging at {}", hertz(nominal.at)),
+    };
+    let (unstable, all) = before.unstable;
+    Some(format!("The gains of the file break the limits: {own}; not stable on {unstable} of {all} axes."))
+}
+
+/// The choices between stiff and gentle: name, whether chosen, and of each move error, settling and current at worst.
+pub fn choices(work: &Work) -> Vec<Vec<String>> {
+    let mut rows = Vec::new();
+    for choice in &work.tuned.choices {
+        for (place, (motion, worst)) in work.tuned.moves.iter().zip(&choice.worst).enumerate() {
+            let settles = slowest(worst).map_or("not".into(), |time| format!("{:.0} ms", 1e3 * time));
+            let name = if choice.chosen { format!("{} (chosen)", choice.name) } else { choice.name.to_string() };
+            let first = if place == 0 { [name, format!("{:.3}", choice.objective.exp())] } else { Default::default() };
+            let figures = [motion.name.clone(), length(worst.error.0), settles, number(worst.current, "A")];
+            rows.push(first.into_iter().chain(figures).collect());
+        }
+    }
+    rows
+}
+
+/// Headings of [`choices`].
+pub const CHOICES: [&str; 6] = ["choice", "J", "move", "cart error", "settles", "current, rms"];
+
+/// A limit cycle in words.
+pub fn hunt(hunt: &Option<Hunt>) -> String {
+    match hunt {
+        None => "none after a slow reversal".into(),
+        Some(hunt) => format!(
+            "cart ± {} every {} s; {}",
+            length(hunt.amplitude),
+            number(hunt.period, ""),
+            match &hunt.needs[..] {
+                [] => "whatever is left out".into(),
+                needs => format!("not without {}", needs.join(", nor without ")),
+            }
+        ),
+    }
+}
+
+/// What the limits had to hold over.
+pub fn family(work: &Work) -> String {
+    let family = &work.tuned.family;
+    let off = match family.source {
+        Source::Fit => format!("{} parameters within the 95 % intervals of the fit", family.unknowns.len()),
+        Source::Spread(share) => format!("{} parameters ± {} %", family.unknowns.len(), number(100.0 * share, "")),
+    };
+    let places = match &family.places[..] {
+        [first, .., last] => {
+            format!(", {} places from {:.0} mm to {:.0} mm", family.places.len(), 1e3 * first, 1e3 * last)
+        }
+        _ => String::new(),
+    };
+    let loads = if family.loads.len() > 1 { format!(", {} loads", family.loads.len()) } else { String::new() };
+    let machines = family.machines.len();
+    let level = match (family.corners, family.left_out(machines)) {
+        (true, _) => format!("{machines} axes and the worst corner of all of them"),
+        (false, 0) => format!("{machines} axes, the worst of them"),
+        (false, left_out) => format!("{machines} axes, the worst of the central 95 % ({left_out} left out)"),
+    };
+    format!("{off}{loads}{places}: {level}")
+}
+
+/// What was looked for.
+pub fn goal(work: &Work) -> String {
+    let tuning = work.tuning;
+    let limits = format!("Ms ≤ {}, Mt ≤ {}", tuning.sensitivity, tuning.complementary);
+    let placed = work.tuned.placed.map(|hertz| format!("{} Hz, damping {}", number(hertz, ""), tuning.damping));
+    match (tuning.cost, placed) {
+        (None, placed) => format!("placed for {}; limits are {limits}", placed.unwrap_or_default()),
+        (Some(cost), Some(placed)) => format!("cost \"{}\" with {limits}; began with {placed}", cost.word()),
+        (Some(cost), None) => format!("cost \"{}\" with {limits}", cost.word()),
+    }
+}
