@@ -3,6 +3,7 @@
 use crate::command::Common;
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
+use taut::control::recommendation::Damping;
 use taut::control::shaper::{Firmware, Form};
 use taut::quantity;
 use taut::solve::{Choice, Kind as SolverKind, Method, Solver};
@@ -546,15 +547,6 @@ Examples:
 /// Shapers with their parameters.
 #[derive(Debug, Clone)]
 pub struct Shapers(pub Vec<Form>);
-
-/// The damping ratio of shapers.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Damping {
-    /// A number.
-    Ratio(f64),
-    /// Of the highest peak.
-    Fitted,
-}
 
 /// Whose shapers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]

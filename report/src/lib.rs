@@ -37,6 +37,7 @@ mod picture;
 mod plane;
 mod plot;
 mod raster;
+pub mod shape;
 pub mod show;
 pub mod simulate;
 mod svg;

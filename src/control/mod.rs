@@ -17,6 +17,7 @@ pub mod model;
 pub mod observer;
 mod outcome;
 pub mod pid;
+pub mod recommendation;
 pub mod resonance;
 mod rest;
 pub mod riccati;

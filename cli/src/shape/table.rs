@@ -1,9 +1,9 @@
-//! The result for people.
+//! The result on the terminal.
 
-use super::{Findings, Found};
 use crate::terminal::bold;
 use std::fmt::Write;
-use taut::control::shaping::Fitted;
+use taut::control::recommendation::{Findings, Found};
+use taut_report::shape::{remark, words};
 
 /// The text on the terminal.
 pub fn text(found: &Findings) -> String {
@@ -44,23 +44,4 @@ fn shapers(text: &mut String, one: &Found) {
         );
         let _ = writeln!(text, "{}", row.trim_end());
     }
-}
-
-/// What else there is to say.
-pub fn remark(fitted: &Fitted) -> &'static str {
-    match (fitted.is_candidate, fitted.is_lowest) {
-        (false, _) => "not a candidate",
-        (true, true) => "the lowest frequency tried",
-        (true, false) => "",
-    }
-}
-
-/// Frequency in Hz, vibration in %, smoothing in mm, acceleration in mm/s² to hundreds.
-pub fn words(fitted: &Fitted) -> [String; 4] {
-    [
-        format!("{:.1}", fitted.shaper.frequency),
-        format!("{:.1}", 100.0 * fitted.vibration),
-        format!("{:.3}", 1e3 * fitted.smoothing),
-        format!("{:.0}", (10.0 * fitted.max_acceleration).round() * 100.0),
-    ]
 }

@@ -1,10 +1,10 @@
 //! Spectra with and without shapers, what shapers leave at each frequency, and modes along the travel.
 
-use super::{Findings, Found, Source};
+use crate::{Axis, Colour, Figure, Panel, Series, Style};
+use taut::control::recommendation::{Findings, Found, Source, damping};
 use taut::control::resonance::Resonance;
 use taut::control::shaping::Target;
 use taut::control::spectrum::Spectrum;
-use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// All figures, with the names of their files.
 pub fn figures(found: &Findings) -> Vec<(String, Figure)> {
@@ -104,7 +104,7 @@ fn model(one: &Found, modes: &[Resonance]) -> Figure {
     }
     let lines = Series::new("modes", at, height);
     let above = Panel::new(Axis::new("Motion of the cart", "")).series(lines.colour(Colour::Ink));
-    let mut legend = responses(one, &[0.0, 1.5 * high], &[super::damping(modes)]);
+    let mut legend = responses(one, &[0.0, 1.5 * high], &[damping(modes)]);
     for (series, fitted) in legend.series.iter_mut().zip(&one.choice.fitted) {
         series.name = format!("{} {:.1} Hz", fitted.shaper.form.name(), fitted.shaper.frequency);
     }

@@ -1,21 +1,21 @@
-//! The result as data: what `--json` prints and `shape.json` holds. Everything is in SI units.
+//! Input shapers: `taut shape --json`, `shape.json`.
 
-use super::{Findings, Found, Source};
+use crate::control::compare::{Comparison, Pair};
+use crate::control::recommendation::{Findings, Found, Source};
+use crate::control::resonance::{Drive, Resonance};
+use crate::control::shaping::Fitted;
+use crate::control::spectrum::Spectrum;
 use serde_json::{Value, json};
 use std::path::PathBuf;
-use taut::control::compare::{Comparison, Pair};
-use taut::control::resonance::{Drive, Resonance};
-use taut::control::shaping::Fitted;
-use taut::control::spectrum::Spectrum;
 
-/// The text.
-pub fn text(found: &Findings) -> String {
+/// The shapers of the first file, with those of the second and the comparison under keys of their own.
+pub fn shape(found: &Findings) -> Value {
     let mut value = one(&found.each[0]);
-    value["schema"] = json!(taut::json::identity("shape"));
+    value["schema"] = json!(super::identity("shape"));
     value["version"] = json!(env!("CARGO_PKG_VERSION"));
     value["second"] = found.each.get(1).map_or(Value::Null, one);
     value["comparison"] = found.comparison.as_ref().map_or(Value::Null, comparison);
-    taut::json::text(&value)
+    value
 }
 
 fn one(found: &Found) -> Value {

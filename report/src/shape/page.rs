@@ -1,8 +1,9 @@
 //! The report: one HTML file.
 
-use super::{Findings, Found, table};
+use super::rows::{remark, words};
+use crate::{Callout, Cell, Figure, Page, Table};
 use taut::control::compare::Comparison;
-use taut_report::{Callout, Cell, Figure, Page, Table};
+use taut::control::recommendation::{Findings, Found};
 
 /// The page.
 pub fn page(found: &Findings, figures: &[(String, Figure)]) -> Page {
@@ -49,10 +50,10 @@ fn shapers(page: &mut Page, one: &Found) {
     for (i, fitted) in one.choice.fitted.iter().enumerate() {
         let word = match () {
             () if i == one.choice.recommended => Cell::Badge(Callout::Holds, "recommended".into()),
-            () => Cell::from(table::remark(fitted)),
+            () => Cell::from(remark(fitted)),
         };
         let name = Cell::from(fitted.shaper.form.name());
-        let numbers = table::words(fitted).map(Cell::Number);
+        let numbers = words(fitted).map(Cell::Number);
         rows.row(std::iter::once(name).chain(numbers).chain([word]));
     }
     page.table(&rows);

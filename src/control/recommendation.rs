@@ -1,0 +1,323 @@
+//! Input shapers for files of vibration: spectra, samples of an accelerometer, or the modes of a case; two spectra compared.
+
+use super::compare::{Comparison, compare};
+use super::damping::{FittedMode, fitted};
+use super::resonance::{Drive, Resonance, resonances};
+use super::shaper::{Firmware, Form};
+use super::shaping::{Choice, Criterion, Target, choose};
+use super::spectrum::{Axis, Spectrum};
+use crate::case::Case;
+use crate::error::{Error, Result};
+use crate::log::read_accelerometer;
+use std::path::{Path, PathBuf};
+
+/// By how much a model's frequencies may be wrong where the user does not say: masses are known to some 20 %.
+const UNCERTAINTY: f64 = 0.1;
+
+/// The vibration that a shaper is chosen for.
+#[derive(Debug, Clone)]
+pub enum Source {
+    /// A measured spectrum.
+    Spectrum(Spectrum),
+    /// Several of them, with their files.
+    Spectra(Vec<(PathBuf, Spectrum)>),
+    /// The modes of a case along its travel.
+    Model {
+        /// The case's.
+        title: String,
+        /// The motor meanwhile.
+        drive: Drive,
+        /// At all places.
+        modes: Vec<Resonance>,
+    },
+}
+
+/// A file with its shapers.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// The file.
+    pub file: PathBuf,
+    /// Further files that are read with it.
+    pub also: Vec<PathBuf>,
+    /// Its vibration.
+    pub source: Source,
+    /// The criterion of the choice.
+    pub criterion: Criterion,
+    /// The shapers, and the one that is recommended.
+    pub choice: Choice,
+    /// The curve through the highest peak.
+    pub mode: Option<FittedMode>,
+}
+
+/// The shapers of each file, and the comparison of two spectra.
+#[derive(Debug, Clone)]
+pub struct Findings {
+    /// By file.
+    pub each: Vec<Found>,
+    /// Of two spectra.
+    pub comparison: Option<Comparison>,
+}
+
+/// The questions to files of vibration; see the options of `taut shape`.
+#[derive(Debug, Clone, Default)]
+pub struct Question {
+    /// Changes of a case, each as `KEY=VALUE`.
+    pub changes: Vec<String>,
+    /// One shaper for all files.
+    pub together: bool,
+    /// Whose shapers, rule and parameters.
+    pub firmware: Firmware,
+    /// The axis of the accelerometer; all of them unless said.
+    pub axis: Option<Axis>,
+    /// The damping ratio that shapers are designed for.
+    pub damping: Option<Damping>,
+    /// Most smoothing, m.
+    pub max_smoothing: Option<f64>,
+    /// Most vibration, as a share.
+    pub max_vibrations: Option<f64>,
+    /// Speed at corners, m/s.
+    pub corner_speed: Option<f64>,
+    /// The shapers to choose among; those of the firmware unless said.
+    pub forms: Option<Vec<Form>>,
+    /// Share by which a model's frequencies may be off.
+    pub uncertainty: Option<f64>,
+    /// The motor while the cart vibrates.
+    pub drive: Option<Drive>,
+}
+
+/// A damping ratio that is given, or fitted to the highest peak.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Damping {
+    /// As given.
+    Ratio(f64),
+    /// Of the curve of one mode through the highest peak.
+    Fitted,
+}
+
+/// Reads files of vibration (spectra, samples of an accelerometer, or cases), chooses shapers, and compares two spectra.
+/// Errors: more than two files that are not taken together, files that cannot be read, options that do not fit them.
+///
+/// ```no_run
+/// use taut::control::recommendation::{Question, recommend};
+/// let found = recommend(&Question::default(), &["calibration_data_x.csv".into()])?;
+/// println!("{}", found.each[0].choice.best().shaper.frequency);
+/// # Ok::<(), taut::Error>(())
+/// ```
+pub fn recommend(args: &Question, files: &[PathBuf]) -> Result<Findings> {
+    let Some(_) = files.first() else {
+        return Err(
+            Error::new("there is no file to look at").next("name a spectrum, samples of an accelerometer, or a case")
+        );
+    };
+    if files.len() > 2 && !args.together {
+        let error = Error::new(format!("{} files, of which two can be compared", files.len())).in_file("taut shape");
+        return Err(error.next("say --together to choose one shaper for all of them"));
+    }
+    let each = match args.together {
+        true => vec![together(args, files)?],
+        false => files.iter().map(|file| find(args, files, file)).collect::<Result<Vec<Found>>>()?,
+    };
+    let comparison = match each.as_slice() {
+        [Found { source: Source::Spectrum(first), .. }, Found { source: Source::Spectrum(second), .. }] => {
+            Some(compare(first, second))
+        }
+        _ => None,
+    };
+    Ok(Findings { each, comparison })
+}
+
+/// One shaper for all files.
+fn together(args: &Question, files: &[PathBuf]) -> Result<Found> {
+    if let Some(file) = files.iter().find(|file| is_case(file)) {
+        let error = Error::new("a case file has no spectrum to put together with others").in_file(file);
+        return Err(error.next("leave --together out; a case is looked at along its whole travel anyway"));
+    }
+    let mut spectra = Vec::new();
+    for file in files {
+        if let Source::Spectrum(spectrum) = measured(args, files, file)? {
+            spectra.push((file.clone(), spectrum));
+        }
+    }
+    chosen(args, &files[0], Source::Spectra(spectra), files[1..].to_vec())
+}
+
+fn is_case(file: &Path) -> bool {
+    file.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+}
+
+fn find(args: &Question, files: &[PathBuf], file: &Path) -> Result<Found> {
+    let (source, also) = if is_case(file) { model(args, file)? } else { (measured(args, files, file)?, Vec::new()) };
+    chosen(args, file, source, also)
+}
+
+fn chosen(args: &Question, file: &Path, source: Source, also: Vec<PathBuf>) -> Result<Found> {
+    let mut criterion = Criterion {
+        max_smoothing: args.max_smoothing,
+        max_vibrations: args.max_vibrations,
+        firmware: args.firmware,
+        ..Criterion::default()
+    };
+    if let Some(forms) = &args.forms {
+        criterion = criterion.with_forms(forms);
+    }
+    if let Some(speed) = args.corner_speed {
+        criterion.corner.speed = speed;
+    }
+    let mode = match &source {
+        Source::Spectrum(spectrum) => fitted(spectrum),
+        Source::Spectra(spectra) => {
+            let all = spectra.iter().filter_map(|(_, spectrum)| fitted(spectrum));
+            all.min_by(|a, b| a.damping.total_cmp(&b.damping))
+        }
+        Source::Model { .. } => None,
+    };
+    // What the model knows is better than a guess; what the user says, better still.
+    let known = match (&source, args.damping) {
+        (_, Some(Damping::Ratio(damping))) => Some(damping),
+        (Source::Model { modes, .. }, _) => Some(damping(modes)),
+        (Source::Spectrum(_) | Source::Spectra(_), Some(Damping::Fitted)) => {
+            let error = || {
+                let error = Error::new("no curve of one mode goes through the highest peak").in_file("--damping");
+                error.next("give a damping ratio, such as --damping 0.1")
+            };
+            Some(mode.ok_or_else(error)?.damping)
+        }
+        (Source::Spectrum(_) | Source::Spectra(_), None) => None,
+    };
+    if let Some(damping) = known {
+        let option = |e: Error| if args.damping.is_some() { e.in_file("--damping") } else { e };
+        criterion = criterion.with_damping(damping).map_err(option)?;
+    }
+    let spectra: Vec<Spectrum>;
+    let target = match &source {
+        Source::Spectrum(spectrum) => Target::Spectrum(spectrum),
+        Source::Spectra(all) => {
+            spectra = all.iter().map(|(_, spectrum)| spectrum.clone()).collect();
+            Target::Spectra(&spectra)
+        }
+        Source::Model { modes, .. } => Target::Modes { modes, uncertainty: args.uncertainty.unwrap_or(UNCERTAINTY) },
+    };
+    let choice = choose(target, &criterion).map_err(|e| e.in_file(file))?;
+    Ok(Found { file: file.to_path_buf(), also, source, criterion, choice, mode })
+}
+
+/// The mean damping ratio of the modes that move the cart most, over the travel.
+pub fn damping(modes: &[Resonance]) -> f64 {
+    let main: Vec<f64> = modes.iter().filter(|mode| mode.share == 1.0).map(|mode| mode.damping).collect();
+    main.iter().sum::<f64>() / main.len().max(1) as f64
+}
+
+fn model(args: &Question, file: &Path) -> Result<(Source, Vec<PathBuf>)> {
+    if args.axis.is_some() {
+        let error = Error::new("a case file has no accelerometer").in_file("--axis");
+        return Err(error.next("leave --axis out, or give a spectrum"));
+    }
+    let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
+    let case = Case::read_with(file, &changes)?;
+    let drive = args.drive.unwrap_or(Drive::Held);
+    let modes = resonances(&case.stage, drive).map_err(|e| e.in_file(file))?;
+    let also = case.files.into_iter().map(|file| file.path).collect();
+    Ok((Source::Model { title: case.title, drive, modes }, also))
+}
+
+fn measured(args: &Question, files: &[PathBuf], file: &Path) -> Result<Source> {
+    let only_models = [
+        ("--set", !args.changes.is_empty()),
+        ("--motor", args.drive.is_some()),
+        ("--uncertainty", args.uncertainty.is_some()),
+    ];
+    let no_case = files.iter().all(|file| !is_case(file));
+    if let (true, Some((option, _))) = (no_case, only_models.into_iter().find(|(_, given)| *given)) {
+        let error = Error::new("a measured spectrum has no case file to change").in_file(option);
+        return Err(error.next(format!("leave {option} out, or give a case file, .toml")));
+    }
+    let axis = args.axis.unwrap_or(Axis::All);
+    let spectrum = Spectrum::by(&read_accelerometer(file)?, axis, args.firmware);
+    if spectrum.greatest() <= 0.0 {
+        let error = Error::new(format!("there is no vibration along {} from 5 to 200 Hz", axis.word())).in_file(file);
+        return Err(error.next("choose another axis, or leave --axis out"));
+    }
+    Ok(Source::Spectrum(spectrum))
+}
+
+impl Found {
+    /// The damping of the highest peak, in a sentence.
+    pub fn damping_told(&self) -> Option<String> {
+        let mode = self.mode?;
+        Some(format!(
+            "a mode of {:.1} Hz with a damping ratio of {:.3} ({:.3} to {:.3}) goes through the highest peak, {:.0} % off",
+            mode.frequency,
+            mode.damping,
+            mode.interval[0],
+            mode.interval[1],
+            100.0 * mode.error
+        ))
+    }
+
+    /// Lines for Klipper's configuration, of the axis that the option or the file's name says.
+    pub fn lines(&self) -> Vec<String> {
+        let name = self.name();
+        let named = ["x", "y", "z"].into_iter().find(|axis| name.contains(&format!("_{axis}_")));
+        let axis = match &self.source {
+            Source::Spectrum(Spectrum { axis, .. }) if *axis != Axis::All => axis.word(),
+            Source::Spectrum(_) | Source::Spectra(_) | Source::Model { .. } => named.unwrap_or("x"),
+        };
+        let shaper = &self.choice.best().shaper;
+        vec![
+            "[input_shaper]".into(),
+            format!("shaper_type_{axis}: {}", shaper.form.name()),
+            format!("shaper_freq_{axis}: {:.1}", shaper.frequency),
+            format!("damping_ratio_{axis}: {}", crate::quantity::rounded(shaper.damping)),
+        ]
+    }
+
+    /// The file's name without its folder.
+    pub fn name(&self) -> String {
+        self.file.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
+    /// What was looked at, in a sentence.
+    pub fn told(&self) -> String {
+        match &self.source {
+            Source::Spectra(spectra) => {
+                let one = |(file, spectrum): &(PathBuf, Spectrum)| {
+                    let peaks: Vec<String> = spectrum.peaks().iter().map(|peak| format!("{:.1} Hz", peak.0)).collect();
+                    let name = file.file_name().unwrap_or_default().to_string_lossy();
+                    format!("{name} with peaks at {}", peaks.join(", "))
+                };
+                let all: Vec<String> = spectra.iter().map(one).collect();
+                let count = spectra.len();
+                format!("{count} spectra together, the one counts of which most remains: {}", all.join("; "))
+            }
+            Source::Spectrum(spectrum) => {
+                let peak = |peak: &(f64, f64)| match spectrum.main_axis(peak.0) {
+                    Some((axis, part)) if spectrum.axis == Axis::All => {
+                        format!("{:.1} Hz ({:.0} % along {})", peak.0, 100.0 * part, axis.word())
+                    }
+                    _ => format!("{:.1} Hz", peak.0),
+                };
+                let peaks: Vec<String> = spectrum.peaks().iter().map(peak).collect();
+                format!("{}; axis {}; peaks at {}", spectrum.origin, spectrum.axis.word(), peaks.join(", "))
+            }
+            Source::Model { title, drive, modes } => {
+                let word = match drive {
+                    Drive::Held => "held on its command",
+                    Drive::Free => "free to give way",
+                };
+                let main = modes.iter().filter(|mode| mode.share == 1.0);
+                let (mut low, mut high) = (f64::INFINITY, 0.0f64);
+                for mode in main {
+                    (low, high) = (low.min(mode.frequency), high.max(mode.frequency));
+                }
+                let range = match high - low {
+                    d if d < 0.05 => format!("{high:.1} Hz wherever the cart is"),
+                    _ => format!("{low:.1} to {high:.1} Hz along the travel"),
+                };
+                let damping = damping(modes);
+                format!(
+                    "the model of \"{title}\", motor {word}; the cart vibrates at {range}, damping ratio {damping:.3}"
+                )
+            }
+        }
+    }
+}
