@@ -11,6 +11,7 @@ mod interrupt;
 mod logs;
 mod modes;
 mod runs;
+mod shape;
 mod sweep;
 mod value;
 
@@ -26,6 +27,8 @@ mod _native {
     use crate::error::{Bug, Error, fail_as_a_bug};
     #[pymodule_export]
     use crate::runs::{Run, moves, simulation, write};
+    #[pymodule_export]
+    use crate::shape::shape;
     #[pymodule_export]
     use crate::sweep::Sweep;
 

@@ -40,6 +40,7 @@ def test_every_result_plots_into_axes_of_ones_own(case, root, moving):
         (1, lambda ax: gantry.plot(ax=ax)),
         (1, lambda ax: moving.tune(evaluate=True).plot(ax=ax)),
         (1, lambda ax: case.show().plot(ax=ax)),
+        (1, lambda ax: taut.shape(root / "stages/printer-axis/printer-axis.toml").plot(ax=ax)),
         (1, lambda ax: fit.compare("viscous").plot(ax=ax)),
     ]
     for count, plot in plots:
@@ -173,3 +174,17 @@ def test_tuning_is_the_command_lines(root, moving):
         moving.tune(spread="10 %")
     with pytest.raises(taut.Error):
         taut.Case(taut.template()).tune()
+
+
+def test_shapers_are_the_command_lines(root):
+    from test_results import program
+
+    told = program(root, "shape", "stages/printer-axis/printer-axis.toml", "--shapers", "zv,mzv", "--motor", "free")
+    found = taut.shape(root / "stages/printer-axis/printer-axis.toml", shapers=["zv", "mzv"], motor="free")
+    assert {**found.data, "file": ""} == {**told, "file": ""}
+    assert found.recommended[0] in ("zv", "mzv") and found.lines[0] == "[input_shaper]"
+    assert list(found.to_pandas()["shaper"]) == ["zv", "mzv"]
+    with pytest.raises(ValueError, match='firmware: "marlin" is none of klipper, klipper-2025-08'):
+        taut.shape(root / "stages/printer-axis/printer-axis.toml", firmware="marlin")
+    with pytest.raises(taut.Error, match="there is no file to look at"):
+        taut.shape([])

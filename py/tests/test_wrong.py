@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 import taut
+from conftest import ROOT
 
 SEED = int(os.environ.get("TAUT_SEED", "1"))
 MANY = int(os.environ.get("TAUT_WRONG", "400"))
@@ -235,6 +236,14 @@ def test_overviews_with_nonsense(short):
     for value in WRONG:
         allowed(lambda: taut.show(value), told("show", value))
         allowed(lambda: short.show()[value], told("shown[]", value))
+
+
+def test_shapers_with_nonsense():
+    case = ROOT / "stages/printer-axis/printer-axis.toml"
+    for value in WRONG:
+        allowed(lambda: taut.shape(value), told("shape", value))
+        for option in ("firmware", "axis", "damping", "max_smoothing", "max_vibrations", "corner_speed", "shapers", "uncertainty", "motor", "changes"):
+            allowed(lambda: taut.shape(case, **{option: value}), told("shape", **{option: value}))
 
 
 def test_values_of_nonsense(short):
@@ -609,5 +618,5 @@ def test_everything_public_is_called_here():
         assert sorted(public) == methods
         assert all(f".{method}(" in source for method in methods)
     assert {name for name in taut.__all__ if callable(getattr(taut, name)) and not isinstance(getattr(taut, name), type)} == {
-        "read", "show", "sweep", "sweep_tables", "template",
+        "read", "shape", "show", "sweep", "sweep_tables", "template",
     }  # fmt: skip

@@ -14,6 +14,7 @@ from ._native import Bug, Error, Seen, __version__
 from .case import Case, GantryCase, read, show, template
 from .results import Check, Comparison, Drift, Estimate, Fit, FitLog, FrequencyResponses, GantryModes, LinearModel, Modes, Shown, Tuned
 from .runs import Run, Runs
+from .shapers import Shape, shape
 from .sweeps import sweep, sweep_tables
 from .table import Table
 
@@ -35,11 +36,13 @@ __all__ = [
     "Run",
     "Runs",
     "Seen",
+    "Shape",
     "Shown",
     "Table",
     "Tuned",
     "__version__",
     "read",
+    "shape",
     "show",
     "sweep",
     "sweep_tables",

@@ -1,0 +1,114 @@
+"""Input shapers from files of vibration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+from . import _checks, _html, _native, _plots
+from ._optional import needed
+from ._toml import change
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Input shapers for a file of vibration, and one that is recommended."""
+
+    data: dict[str, Any]
+    """What ``taut shape --json`` prints."""
+
+    @property
+    def recommended(self) -> tuple[str, float, float]:
+        """Name, frequency (Hz) and damping ratio of the shaper that is recommended."""
+        best = self.data["recommended"]
+        return best["shaper"], best["frequency"], best["damping"]
+
+    @property
+    def lines(self) -> list[str]:
+        """Lines for Klipper's configuration."""
+        return list(self.data["recommended"]["lines"])
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A pandas.DataFrame of the shapers: frequency (Hz), vibration that is left, smoothing (m), acceleration up to (m/s^2)."""
+        rows = self.data["shapers"]
+        keys = ("shaper", "frequency", "vibration", "smoothing", "max_acceleration", "candidate")
+        frame: pandas.DataFrame = needed("pandas", "pandas", "to_pandas()").DataFrame(
+            {key: [row[key] for row in rows] for key in keys}
+        )
+        return frame
+
+    def plot(self, *, ax: Axes | None = None) -> Figure:
+        """The vibration that each shaper leaves; over a measured spectrum the spectrum, with the shapers' frequencies."""
+        figure, (axis,) = _plots.panels(ax, 1, height=3.0)
+        spectrum = self.data.get("spectrum")
+        if spectrum is None:
+            rows = self.data["shapers"]
+            _plots.bars(axis, [row["shaper"] for row in rows], [100 * row["vibration"] for row in rows], "vibration left, %")
+            return figure
+        axis.plot(spectrum["frequency"], spectrum["density"], "k", linewidth=1, label="measured")
+        for row in self.data["shapers"]:
+            name = f"{row['shaper']} {row['frequency']:.1f} Hz"
+            axis.axvline(row["frequency"], linestyle="--", linewidth=1, label=name)
+        _plots.finished(axis, "frequency, Hz", "density")
+        return figure
+
+    def __repr__(self) -> str:
+        name, frequency, _ = self.recommended
+        return f"<taut.Shape {self.data['file']!r}: {name} at {frequency:.1f} Hz>"
+
+    def _repr_html_(self) -> str:
+        rows = [(row["shaper"], row["frequency"], row["vibration"], row["smoothing"]) for row in self.data["shapers"]]
+        return _html.table(str(self.data["file"]), ("shaper", "frequency, Hz", "vibration left", "smoothing, m"), rows)
+
+
+def shape(
+    files: str | PathLike[str] | Sequence[str | PathLike[str]],
+    *,
+    together: bool = False,
+    firmware: str = "klipper",
+    axis: str | None = None,
+    damping: float | str | None = None,
+    max_smoothing: float | None = None,
+    max_vibrations: float | None = None,
+    corner_speed: float | None = None,
+    shapers: Iterable[str] | None = None,
+    uncertainty: float | None = None,
+    motor: str | None = None,
+    changes: Mapping[str, Any] | None = None,
+) -> Shape:
+    """An input shaper from one file of vibration, two that are compared, or several ``together``.
+
+    A file is a spectrum or samples of an accelerometer as Klipper writes them, or a case. ``firmware`` is ``klipper`` or
+    ``klipper-2025-08``; ``axis`` of the accelerometer is ``x``, ``y`` or ``z``; ``damping`` is a ratio, or ``"fitted"``;
+    ``max_smoothing`` is in m, ``max_vibrations`` a share (0.05 is 5 %), ``corner_speed`` in m/s; ``shapers`` are names to choose
+    among. Of a case, ``uncertainty`` is by which share its frequencies may be off, ``motor`` is ``held`` or ``free``, and
+    ``changes`` are values by key, as of :meth:`taut.Case.changed`.
+    """
+    paths = [files] if isinstance(files, (str, PathLike)) else list(files)
+    fitted = isinstance(damping, str)
+    if fitted and damping != "fitted":
+        raise ValueError(f'damping: a ratio such as 0.08 is wanted, or "fitted", and not {damping!r}')
+    if not isinstance(changes, (Mapping, type(None))):
+        raise TypeError(f"changes: a dictionary is wanted, and no {type(changes).__name__}")
+    options = {
+        "together": bool(together),
+        "firmware": _checks.text("firmware", firmware),
+        "axis": _checks.word("axis", axis),
+        "damping": None if fitted else _checks.number("damping", damping),
+        "fitted": fitted,
+        "max_smoothing": _checks.number("max_smoothing", max_smoothing),
+        "max_vibrations": _checks.number("max_vibrations", max_vibrations),
+        "corner_speed": _checks.number("corner_speed", corner_speed),
+        "shapers": _checks.names("shapers", shapers),
+        "uncertainty": _checks.number("uncertainty", uncertainty),
+        "motor": _checks.word("motor", motor),
+        "changes": [change(key, value) for key, value in (changes or {}).items()],
+    }
+    return Shape(_native.shape([_checks.path(path) for path in paths], options))
