@@ -35,7 +35,7 @@ fn folder(name: &str) -> PathBuf {
 
 /// What is done with the machine: half a second to and fro.
 fn to_and_fro() -> Signal {
-    let square = |t: f64| if (t / 0.1) as u64 % 2 == 0 { 5.0 } else { -5.0 };
+    let square = |t: f64| if ((t / 0.1) as u64).is_multiple_of(2) { 5.0 } else { -5.0 };
     let times: Vec<f64> = (0..500).map(|k| f64::from(k) * 1e-3).collect();
     Signal::Sampled { values: times.iter().map(|t| square(*t)).collect(), times, hold: taut::signal::Hold::Zero }
 }

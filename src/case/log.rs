@@ -50,48 +50,14 @@ pub(super) fn logs(field: &Field, stage: &Stage, folder: &Folder, driven: bool) 
     columns.retain(|(key, ..)| *key != "input" || !driven);
     let sources = Sources::new(&table, columns, stage)?;
 
-    let input = sources.source("input", field.input_unit)?;
-    match (&input, driven) {
-        (None, false) => {
-            return Err(table.missing(
-                "input",
-                "input = \"...\" with the name of the input's column; or an input to the experiment",
-            ));
-        }
-        (Some(_), true) => {
-            let field = table.optional("input").unwrap_or_else(|| field.clone());
-            return Err(field
-                .fail("the experiment has an input already")
-                .next("leave out the one or the other: what was logged, or what was meant"));
-        }
-        _ => {}
-    }
+    let input = input(field, &table, &sources, driven)?;
     let added = sources.source("added", field.input_unit)?;
     if let (Some(_), None, Some(field)) = (&added, &input, table.optional("added")) {
         return Err(field
             .fail("there is no logged input that this could be added to")
             .next("name the column of the controller's output: input = \"...\""));
     }
-    let mut outputs = Vec::new();
-    for quantity in Quantity::ALL {
-        if quantity == Quantity::CartAcceleration
-            && stage.belt.model == BeltModel::Rigid
-            && sources.is_named(quantity.name())
-        {
-            let field = table.optional(quantity.name()).unwrap_or_else(|| field.clone());
-            return Err(field
-                .fail("a rigid belt has no force at the cart, of which its acceleration would be made")
-                .next("write model = \"elastic\" in [belt], or leave the accelerometer out"));
-        }
-        outputs.extend(sources.source(quantity.name(), quantity.unit())?.map(|source| (quantity, source)));
-    }
-    if outputs.is_empty() {
-        let names: Vec<&str> = Quantity::ALL.iter().map(|quantity| quantity.name()).collect();
-        return Err(field
-            .fail("nothing measured is named")
-            .allowed(names.join(", "))
-            .next("add for example drive_angle = \"...\" with the name of its column"));
-    }
+    let outputs = outputs(field, &table, &sources)?;
     let time = clock(&table, &sources)?;
     let (from, to) = (table.number_if_given("from")?, table.number_if_given("to")?);
     if let (Some(from), Some(to), Some(field)) = (from, to, table.optional("to"))
@@ -127,6 +93,52 @@ pub(super) fn logs(field: &Field, stage: &Stage, folder: &Folder, driven: bool) 
     let runs = mapping.read().map_err(missing)?;
     folder.read.borrow_mut().push(InputFile { path, place: file.node.span.clone() });
     Ok(runs)
+}
+
+/// The column of the input, unless the experiment has one of its own.
+fn input(field: &Field, table: &Table, sources: &Sources, driven: bool) -> Result<Option<Source>> {
+    let input = sources.source("input", field.input_unit)?;
+    match (&input, driven) {
+        (None, false) => {
+            return Err(table.missing(
+                "input",
+                "input = \"...\" with the name of the input's column; or an input to the experiment",
+            ));
+        }
+        (Some(_), true) => {
+            let field = table.optional("input").unwrap_or_else(|| field.clone());
+            return Err(field
+                .fail("the experiment has an input already")
+                .next("leave out the one or the other: what was logged, or what was meant"));
+        }
+        _ => {}
+    }
+    Ok(input)
+}
+
+/// The columns of what was measured; at least one.
+fn outputs(field: &Field, table: &Table, sources: &Sources) -> Result<Vec<(Quantity, Source)>> {
+    let mut outputs = Vec::new();
+    for quantity in Quantity::ALL {
+        if quantity == Quantity::CartAcceleration
+            && sources.stage.belt.model == BeltModel::Rigid
+            && sources.is_named(quantity.name())
+        {
+            let field = table.optional(quantity.name()).unwrap_or_else(|| field.clone());
+            return Err(field
+                .fail("a rigid belt has no force at the cart, of which its acceleration would be made")
+                .next("write model = \"elastic\" in [belt], or leave the accelerometer out"));
+        }
+        outputs.extend(sources.source(quantity.name(), quantity.unit())?.map(|source| (quantity, source)));
+    }
+    if outputs.is_empty() {
+        let names: Vec<&str> = Quantity::ALL.iter().map(|quantity| quantity.name()).collect();
+        return Err(field
+            .fail("nothing measured is named")
+            .allowed(names.join(", "))
+            .next("add for example drive_angle = \"...\" with the name of its column"));
+    }
+    Ok(outputs)
 }
 
 /// The columns of a log, and what makes their numbers SI.

@@ -227,14 +227,18 @@ fn limits(stage: &Stage, masses: &Masses, most: Option<&Most>, notes: &mut Vec<N
             .add("largest_stretch", "stretch of the belt under it", power.force * compliance(stage, 0.0), "m")
             .how("at the cart, the drive held");
         safety(&mut group, notes, &stage.belt.sheet, stage.belt.pretension, r, power.force);
-        if let Some(pretension) = stage.belt.pretension.filter(|pretension| *pretension < 0.5 * power.force) {
-            let text = format!(
-                "a pretension of {} is less than half of the largest force, {}: a span may go slack",
-                told(pretension, "N"),
-                told(power.force, "N")
-            );
-            notes.push(Note { code: "little-pretension", text });
-        }
+        notes.extend(little_pretension(stage, power.force));
     }
     Some(group)
+}
+
+/// Of a belt that the largest force makes slack.
+fn little_pretension(stage: &Stage, force: f64) -> Option<Note> {
+    let pretension = stage.belt.pretension.filter(|pretension| *pretension < 0.5 * force)?;
+    let text = format!(
+        "a pretension of {} is less than half of the largest force, {}: a span may go slack",
+        told(pretension, "N"),
+        told(force, "N")
+    );
+    Some(Note { code: "little-pretension", text })
 }
