@@ -194,3 +194,19 @@ fn a_force_that_is_missing_is_seen() {
     assert!((mean - 0.8).abs() < 0.08, "{mean}");
     assert!(own.time.len() > 1000 && own.position.len() == own.force.len());
 }
+
+/// Laws began where viscous friction alone had led, with so much of it that a cart with Coulomb friction beside it stood still, and
+/// viscous friction won.
+#[test]
+fn laws_do_not_begin_where_viscous_friction_led() {
+    if crate::common::data::data(["pendulepi/february.csv"]).is_none() {
+        return;
+    }
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/pendulepi/every-second.toml");
+    let case = Case::read(&path).unwrap();
+    let laws = [FrictionLaw::Viscous, FrictionLaw::Coulomb];
+    let found =
+        compare(&case, &path, case.fit.as_ref().unwrap(), &whole(&laws), None, &mut |_| Flow::Continue).unwrap();
+    let chosen = &found.candidates[found.chosen];
+    assert!(chosen.law == FrictionLaw::Coulomb && chosen.held_out < 8e-3, "{:?}", found.candidates);
+}

@@ -504,8 +504,11 @@ impl<'a> Problem<'a> {
     }
 }
 
+/// Parameters, the part of the logs that each is for, and the names of the parts.
+type Separated = (Vec<Free>, Vec<Option<usize>>, Vec<String>);
+
 /// Each separate parameter once for every part of the logs, the part that each is for, and the names of the parts.
-fn separated(case: &Case, plan: &Plan, all: Vec<Free>) -> Result<(Vec<Free>, Vec<Option<usize>>, Vec<String>)> {
+fn separated(case: &Case, plan: &Plan, all: Vec<Free>) -> Result<Separated> {
     if plan.separate.is_empty() {
         let of = vec![None; all.len()];
         return Ok((all, of, Vec::new()));

@@ -119,7 +119,7 @@ fn page(case: &Case, found: &Drift) -> Page {
     }
     let fitted = |all: &[Together]| -> Vec<String> { all.iter().filter(|one| !one.held_out).map(error).collect() };
     for quantity in found.quantities() {
-        rows = rows.column(&format!("RMSE of {}", quantity.name().replace('_', " ")), "");
+        rows = rows.column(format!("RMSE of {}", quantity.name().replace('_', " ")), "");
     }
     rows = rows.column("Left of the sum of squares", "");
     let row = |head: [String; 4], errors: Vec<String>, left: String| {

@@ -106,7 +106,7 @@ pub(super) fn with(
         // Both directions hold it.
         put(&mut document, "cart", "load", Value::from(0.0));
     }
-    let kept = plan.free.iter().filter(|key| !is_own(key) && !(offset && *key == "cart.load"));
+    let kept = plan.free.iter().filter(|key| !(is_own(key) || offset && *key == "cart.load"));
     free = kept.cloned().chain(free).collect();
     let tied: Vec<Vec<String>> = plan.tied.iter().filter(|keys| !keys.iter().any(|key| is_own(key))).cloned().collect();
     let lumped: Vec<String> = plan.lumped.iter().filter(|name| !is_own(name)).cloned().collect();

@@ -163,7 +163,8 @@ pub fn compare(
             }
             let found = course.try_one(&own, &searched, told, &start);
             if let Some(stage) = found {
-                if window == setting.windows[0] && !law.is_above() {
+                // A law without dry friction leads where a cart with it stands still.
+                if window == setting.windows[0] && !law.is_above() && law != FrictionLaw::Viscous {
                     from = stage.clone();
                 }
                 start = stage;
