@@ -129,7 +129,15 @@ fn results_follow_their_schemas() {
         ("sweep", &["sweep", "stages/h-frame/h-frame.toml", "--runs", "3", "--vary", "all=10%"]),
         ("shape", &["shape", "stages/printer-axis/printer-axis.toml"]),
         ("tune", &["tune", PID, "--evaluate"]),
-        ("tune", &["tune", "stages/sollmann-jouaneh/controllers/cascade.toml", "--set", "tune.cost=none"]),
+        (
+            "tune",
+            &[
+                "tune",
+                "stages/sollmann-jouaneh/controllers/cascade.toml",
+                "--set",
+                "tune={cost=\"none\",bandwidth=\"2 Hz\"}",
+            ],
+        ),
         ("error", &["simulate", TABLE4, "--set", "cart.mass=-1 kg"]),
         ("error", &["modes", "none.toml"]),
     ];
