@@ -149,7 +149,15 @@ fn results_follow_their_schemas() {
         ("show", &["show", TABLE4]),
         ("show", &["show", "stages/core-xy/follows.toml"]),
         ("tune", &["tune", PID, "--evaluate"]),
-        ("tune", &["tune", "stages/sollmann-jouaneh/controllers/cascade.toml", "--set", "tune.cost=none"]),
+        (
+            "tune",
+            &[
+                "tune",
+                "stages/sollmann-jouaneh/controllers/cascade.toml",
+                "--set",
+                "tune={cost=\"none\",bandwidth=\"2 Hz\"}",
+            ],
+        ),
         ("error", &["simulate", TABLE4, "--set", "cart.mass=-1 kg"]),
         ("paper", &["paper", "--no-report", "--out", paper]),
         ("error", &["modes", "none.toml"]),
