@@ -21,12 +21,14 @@
 //! ```
 
 mod axis;
+pub mod check;
 pub mod decimate;
 pub mod diagram;
 pub mod drawing;
 mod embed;
 pub mod equations;
 pub mod figure;
+pub mod fit;
 pub mod frf;
 mod gantry;
 mod layout;

@@ -1,18 +1,16 @@
 //! `taut check`: what the logs of a case can tell of its parameters, before any fit.
 
-mod page;
-
 use crate::args::Check as Args;
 use crate::command::{Finished, Report};
 use crate::failure::Outcome;
-use crate::fit::table;
 use crate::folder::{self, Folder};
 use crate::terminal::bold;
 use std::fmt::Write;
 use taut::case::Case;
-use taut::fit::{Balance, Check, Estimate, check};
+use taut::fit::{Check, check};
 use taut::json;
-use taut::log::{Severity, Survey};
+use taut_report::check::{page, regression, shares, shown};
+use taut_report::fit::value;
 
 /// So many logs are shown with all that is known of them; of more, what matters.
 const MOST_WHOLE: usize = 4;
@@ -28,7 +26,7 @@ pub fn run(args: &Args) -> Outcome {
     let json = ("check.json", json::text(&json::check(&case, &found)));
     let mut finished = Finished::new("check", json, text, "add --out DIR for check.json and a report");
     if common.reports() {
-        finished.report = Some(Report { page: page::page(&case, &found), pictures: Vec::new() });
+        finished.report = Some(Report { page: page(&case, &found), pictures: Vec::new() });
     }
     finished.finish(common, folder)
 }
@@ -41,8 +39,8 @@ fn text(case: &Case, found: &Check) -> String {
     }
     if let Some(found) = &found.balance {
         let _ = write!(text, "\n{}\n", bold("A rigid axis by regression, all at the drive pulley"));
-        for (name, unit, value, error) in regression(found) {
-            let _ = writeln!(text, "  {name:<9}{} ± {}", table::value(value, unit, 5), table::value(error, unit, 2));
+        for (name, unit, own, error) in regression(found) {
+            let _ = writeln!(text, "  {name:<9}{} ± {}", value(own, unit, 5), value(error, unit, 2));
         }
         let left = 100.0 * found.unexplained;
         let _ = writeln!(
@@ -74,13 +72,9 @@ fn text(case: &Case, found: &Check) -> String {
     for (group, choices) in found.groups() {
         let _ = write!(text, "\n{}\n  {}\n", bold("Not determined"), group.words);
         for combination in &group.combinations {
-            let shown = table::value(combination.value, &combination.unit, 5);
-            let _ = writeln!(
-                text,
-                "  {} = {shown} ± {}",
-                combination.name,
-                table::value(combination.error, &combination.unit, 2)
-            );
+            let shown = value(combination.value, &combination.unit, 5);
+            let _ =
+                writeln!(text, "  {} = {shown} ± {}", combination.name, value(combination.error, &combination.unit, 2));
         }
         for choice in choices {
             let _ = writeln!(text, "  - {choice}");
@@ -93,39 +87,4 @@ fn text(case: &Case, found: &Check) -> String {
         }
     }
     text
-}
-
-/// Each parameter with its standard error in words: that of the fit, and so what `taut fit` says.
-fn shares(found: &Check) -> impl Iterator<Item = (String, String)> {
-    let told = |estimate: &Estimate| {
-        let error = match estimate.error {
-            Some(e) if e.is_finite() && estimate.value != 0.0 => {
-                format!("to {:.2} %", 100.0 * (e / estimate.value).abs())
-            }
-            Some(e) if e.is_finite() => format!("to {}", table::value(e, estimate.unit, 2)),
-            None => "at its bound".into(),
-            Some(_) => "not at all".into(),
-        };
-        (estimate.name.clone(), error)
-    };
-    found.fit.estimates.iter().map(told)
-}
-
-/// What the balance of torques gives, each with its unit, value and standard error.
-fn regression(found: &Balance) -> impl Iterator<Item = (&'static str, &'static str, f64, f64)> {
-    // As `cart.load` counts it: positive towards larger x, where the motor has less to bring up.
-    let values = [found.inertia, found.viscous, found.coulomb, -found.load];
-    let names = [("inertia", "kg m^2"), ("viscous", "N m s/rad"), ("Coulomb", "N m"), ("load", "N m")];
-    let rows = names.into_iter().zip(values).zip(found.errors);
-    rows.map(|(((name, unit), value), error)| (name, unit, value, error))
-}
-
-/// What a log shows, indented; not `whole`: in its first line and its warnings.
-fn shown(log: &Survey, whole: bool) -> String {
-    let mut log = log.clone();
-    if !whole {
-        log.channels.clear();
-        log.notes.retain(|note| note.severity > Severity::Fact);
-    }
-    log.to_string().lines().fold(String::new(), |text, line| format!("{text}  {line}\n"))
 }

@@ -1,6 +1,6 @@
 //! `taut fit --compare`: friction laws and windows by what they predict.
 
-use super::{Found, page, table};
+use super::table;
 use crate::args::Fit as Args;
 use crate::command::{Finished, Report};
 use crate::failure::{Outcome, Status};
@@ -16,7 +16,8 @@ use taut::fit::compare::{Comparison, FrictionLaw, Setting, compare};
 use taut::json;
 use taut::solve::Flow;
 use taut::{Error, Result};
-use taut_report::{Cell, Page, Table};
+use taut_report::fit::compare::{HEADINGS, rows, section};
+use taut_report::fit::{Found, page_with};
 
 /// Compares, fits with the best, writes, tells.
 pub fn run(args: &Args, case: &Case, plan: &Plan) -> Outcome {
@@ -56,7 +57,7 @@ pub fn run(args: &Args, case: &Case, plan: &Plan) -> Outcome {
         let text = found.fit.case_text(own, &args.case)?;
         let text = folder::leading(&text, &Case::from_text(&args.case, &text)?.files, folder.root())?;
         if !common.no_report {
-            let page = page::page_with(own, &found, &text, |page| section(page, &compared));
+            let page = page_with(own, &found, &text, |page| section(page, &compared));
             finished.report = Some(Report { page, pictures: Vec::new() });
         }
         finished.files.push(("fitted.toml".into(), text));
@@ -100,24 +101,6 @@ fn window(text: &str) -> Result<Option<f64>> {
     }
 }
 
-/// The rows of the table: name, parameters, errors.
-fn rows(compared: &Comparison) -> impl Iterator<Item = [String; 5]> {
-    let mut by_training: Vec<usize> = (0..compared.candidates.len()).collect();
-    by_training.sort_by(|&a, &b| compared.candidates[a].training.total_cmp(&compared.candidates[b].training));
-    compared.candidates.iter().enumerate().map(move |(k, candidate)| {
-        let place = by_training.iter().position(|&own| own == k).map_or(0, |place| place + 1);
-        [
-            candidate.name(),
-            candidate.parameters.to_string(),
-            compared.shown(candidate.held_out),
-            compared.shown(candidate.training),
-            if candidate.failed.is_some() { "–".into() } else { place.to_string() },
-        ]
-    })
-}
-
-const HEADINGS: [&str; 5] = ["Law and windows", "Parameters", "Held out", "Training", "Rank by training"];
-
 fn shown(compared: &Comparison) -> String {
     let mut text =
         format!("{}\n", bold(&format!("Friction of the {} by what it predicts", compared.body.replace('_', " "))));
@@ -142,26 +125,4 @@ fn shown(compared: &Comparison) -> String {
     }
     text.push('\n');
     text
-}
-
-/// The section of the report.
-fn section(page: &mut Page, compared: &Comparison) {
-    page.section("Laws and windows");
-    for line in compared.words() {
-        page.prose(format!("{line}."));
-    }
-    let mut table = Table::new(format!(
-        "Root mean square errors, the one that predicts best first. Held out: {}.",
-        compared.held_out
-    ));
-    for heading in HEADINGS {
-        table = table.column(heading, "");
-    }
-    for (k, mut row) in rows(compared).enumerate() {
-        if k == compared.chosen {
-            row[0].push_str(" (chosen)");
-        }
-        table.row(row.map(Cell::from));
-    }
-    page.table(&table);
 }

@@ -2,10 +2,8 @@
 
 mod compare;
 mod drift;
-mod figures;
-mod page;
 mod posterior;
-pub mod table;
+mod table;
 
 use crate::args::Fit as Args;
 use crate::command::{Finished, Remark, Report};
@@ -17,19 +15,11 @@ use crate::terminal;
 use std::time::Instant;
 use taut::Result;
 use taut::case::{Case, Plan};
-use taut::fit::{Ending, Fit, Posterior, Profile, fit, profiles};
+use taut::fit::{Ending, Posterior, fit, profiles};
 use taut::json;
 use taut::solve::Flow;
 use taut::trajectory::CsvWriter;
-
-/// What was found, and what is told of it.
-pub struct Found {
-    pub fit: Fit,
-    /// Profiles, where a report is written.
-    pub profiles: Vec<Profile>,
-    /// The posterior, where one is asked for.
-    pub drawn: Option<Posterior>,
-}
+use taut_report::fit::{Found, page};
 
 /// Reads the case, fits, writes, tells.
 pub fn run(args: &Args) -> Outcome {
@@ -70,7 +60,7 @@ pub fn run(args: &Args) -> Outcome {
             write_draws(folder, drawn).map_err(Failure::work)?;
         }
         if !common.no_report {
-            finished.report = Some(Report { page: page::page(&case, &found, &text), pictures: Vec::new() });
+            finished.report = Some(Report { page: page(&case, &found, &text), pictures: Vec::new() });
         }
         finished.files.push(("fitted.toml".into(), text));
         // What other campaigns have for themselves.

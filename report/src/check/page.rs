@@ -1,10 +1,10 @@
 //! The report: one HTML file.
 
 use super::{shares, shown};
-use crate::fit::table;
+use crate::fit::value as told;
+use crate::{Callout, Cell, Page, Table};
 use taut::case::Case;
 use taut::fit::{Balance, Check};
-use taut_report::{Callout, Cell, Page, Table};
 
 /// The page.
 pub fn page(case: &Case, found: &Check) -> Page {
@@ -63,7 +63,7 @@ fn regression(page: &mut Page, found: &Balance) {
     let mut rows = Table::new("All at the drive pulley; a first guess, not a fit.");
     rows = rows.column("Quantity", "").column("Value", "").column("Standard error", "");
     for (name, unit, value, error) in super::regression(found) {
-        rows.row([name.to_string(), table::value(value, unit, 5), table::value(error, unit, 2)].map(Cell::from));
+        rows.row([name.to_string(), told(value, unit, 5), told(error, unit, 2)].map(Cell::from));
     }
     page.table(&rows);
 }

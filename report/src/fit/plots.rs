@@ -1,8 +1,8 @@
 //! Model and log side by side.
 
+use crate::{Axis, Colour, Figure, Panel, Series, Style};
 use taut::fit::{Estimate, Fit, LogFit, OutputFit, Posterior, Profile, ResidualForce};
 use taut::log::Quantity;
-use taut_report::{Axis, Colour, Figure, Panel, Series, Style};
 
 /// Logs drawn; the numbers of the rest are in the tables.
 pub const MOST_LOGS: usize = 6;

@@ -1,10 +1,10 @@
 //! The report: one HTML file.
 
-use super::{Found, figures, posterior, table};
+use super::{Found, plots, posterior, rows as told};
+use crate::{Callout, Cell, Page, Table};
 use taut::case::Case;
 use taut::fit::{Fit, Grade, LogFit, Profile, ResidualForce, Score, residual_force};
 use taut::log::Quantity;
-use taut_report::{Callout, Cell, Page, Table};
 
 /// The page; `text` is the case with the estimates.
 pub fn page(case: &Case, found: &Found, text: &str) -> Page {
@@ -18,8 +18,8 @@ pub fn page_with(case: &Case, found: &Found, text: &str, first: impl FnOnce(&mut
     first(&mut page);
     page.section("How it ended");
     let kind = if fit.is_converged() { Callout::Holds } else { Callout::Fails };
-    page.callout(kind, fit.ending_word().replace('_', " "), format!("{}.", table::ending(fit)));
-    for told in table::findings(fit) {
+    page.callout(kind, fit.ending_word().replace('_', " "), format!("{}.", told::ending(fit)));
+    for told in told::findings(fit) {
         let (grade, text) = told.split_once(": ").unwrap_or(("note", &told));
         let kind = if grade == Grade::Warning.word() { Callout::Fails } else { Callout::Note };
         page.callout(kind, grade, text.to_string());
@@ -30,7 +30,7 @@ pub fn page_with(case: &Case, found: &Found, text: &str, first: impl FnOnce(&mut
         fit.variables,
         fit.work.iterations,
         fit.work.simulations,
-        table::past_kinks(fit)
+        told::past_kinks(fit)
     ));
     parameters(&mut page, fit);
     correlations(&mut page, fit);
@@ -39,22 +39,22 @@ pub fn page_with(case: &Case, found: &Found, text: &str, first: impl FnOnce(&mut
         posterior::section(&mut page, fit, drawn);
     }
     logs(&mut page, fit);
-    if fit.logs.len() > figures::MOST_LOGS {
-        for overlay in figures::together(fit) {
+    if fit.logs.len() > plots::MOST_LOGS {
+        for overlay in plots::together(fit) {
             page.figure(&overlay);
         }
         page.prose(format!(
             "The {} logs that the model meets worst, by RMSE over the deviation of their residuals, the worst first; the others are in the tables \
              above.",
-            figures::MOST_LOGS
+            plots::MOST_LOGS
         ));
     }
-    let few = fit.logs.len() <= figures::MOST_LOGS;
-    for log in figures::worst(&fit.logs, &fit.noise) {
+    let few = fit.logs.len() <= plots::MOST_LOGS;
+    for log in plots::worst(&fit.logs, &fit.noise) {
         for output in &log.outputs {
-            page.figure(&figures::overlay(log, output));
+            page.figure(&plots::overlay(log, output));
             // Of many logs, that of the worst.
-            if let Some(figure) = figures::memory(log, output).filter(|_| few) {
+            if let Some(figure) = plots::memory(log, output).filter(|_| few) {
                 page.figure(&figure);
             }
         }
@@ -73,8 +73,8 @@ fn parameters(page: &mut Page, fit: &Fit) {
         rows = rows.column(heading, "");
     }
     for estimate in &fit.estimates {
-        let [value, error, interval] = table::words(estimate);
-        let start = table::value(estimate.start, estimate.unit, 5);
+        let [value, error, interval] = told::words(estimate);
+        let start = told::value(estimate.start, estimate.unit, 5);
         rows.row([estimate.name.clone(), value, error, interval, start].map(Cell::from));
     }
     page.table(&rows);
@@ -85,7 +85,7 @@ fn profiles(page: &mut Page, profiles: &[Profile]) {
         return;
     }
     page.subsection("Profiles");
-    page.prose(match table::crooked(profiles) {
+    page.prose(match told::crooked(profiles) {
         names if names.is_empty() => "Each parameter held off its estimate and all others fitted anew: the cost grows as the intervals say, to both sides.".to_string(),
         names => format!(
             "Each parameter held off its estimate and all others fitted anew. Not as a linear model has it: {}; `--posterior` makes intervals that do not need that.",
@@ -93,7 +93,7 @@ fn profiles(page: &mut Page, profiles: &[Profile]) {
         ),
     });
     for profile in profiles {
-        page.figure(&figures::profile(profile));
+        page.figure(&plots::profile(profile));
     }
 }
 
@@ -127,7 +127,7 @@ fn logs(page: &mut Page, fit: &Fit) {
     }
     for quantity in quantities {
         table_of(page, fit, quantity);
-        if let Some(figure) = figures::by_log(&fit.logs, quantity) {
+        if let Some(figure) = plots::by_log(&fit.logs, quantity) {
             page.figure(&figure);
         }
     }
@@ -146,7 +146,7 @@ fn table_of(page: &mut Page, fit: &Fit, quantity: Quantity) {
     if many {
         scores.sort_by(|a, b| b.3.rmse.total_cmp(&a.3.rmse));
     }
-    let (unit, factor) = table::unit_for(scores.iter().map(|(.., score)| score.rmse), quantity.unit());
+    let (unit, factor) = told::unit_for(scores.iter().map(|(.., score)| score.rmse), quantity.unit());
     let name = quantity.name().replace('_', " ");
     let order = if many { ", the worst first; numbers are those of the picture below" } else { "" };
     let mut rows = Table::new(format!("How each log is met in its {name}{order}."))
@@ -162,7 +162,7 @@ fn table_of(page: &mut Page, fit: &Fit, quantity: Quantity) {
         let number = |value: f64, decimals: usize| Cell::Number(format!("{value:.decimals$}"));
         rows.row([
             Cell::Number((k + 1).to_string()),
-            Cell::Text(table::name(log)),
+            Cell::Text(told::name(log)),
             Cell::Text(word.into()),
             Cell::Number(score.count.to_string()),
             number(factor * score.rmse, 3),
@@ -172,7 +172,7 @@ fn table_of(page: &mut Page, fit: &Fit, quantity: Quantity) {
         ]);
     }
     page.table(&rows);
-    let experiments = table::by_experiment(fit).into_iter().filter(|one| one.quantity == quantity);
+    let experiments = told::by_experiment(fit).into_iter().filter(|one| one.quantity == quantity);
     let experiments: Vec<_> = experiments.collect();
     if !experiments.is_empty() {
         let mut rows = Table::new("By experiment.")
@@ -201,11 +201,11 @@ fn residual(page: &mut Page, fit: &Fit) {
         return;
     }
     page.section("What the model lacks, as a force");
-    for figure in figures::residual_forces(&all) {
+    for figure in plots::residual_forces(&all) {
         page.figure(&figure);
     }
-    let worst = figures::worst(&fit.logs, &fit.noise).into_iter();
+    let worst = plots::worst(&fit.logs, &fit.noise).into_iter();
     if let Some((log, own)) = worst.filter_map(|log| Some((log, residual_force(&fit.stage, log)?))).next() {
-        page.figure(&figures::residual_over_time(log, &own));
+        page.figure(&plots::residual_over_time(log, &own));
     }
 }

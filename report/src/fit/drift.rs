@@ -1,0 +1,67 @@
+//! Single changes that explain the logs, in words and as a page.
+
+use super::rows::value;
+use crate::{Cell, Page, Table};
+use taut::case::Case;
+use taut::fit::{Change, Drift, Together};
+
+/// An error with its unit.
+pub fn error(one: &Together) -> String {
+    if one.rmse.is_finite() { value(one.rmse, one.quantity.unit(), 4) } else { "–".into() }
+}
+
+/// What is changed, from what to what, in words.
+pub fn words(change: &Change) -> [String; 4] {
+    let estimate = &change.estimate;
+    let shown = |number: f64| value(number, estimate.unit, 4);
+    let percent = match estimate.start {
+        0.0 => String::new(),
+        start => format!("{:+.1} %", 100.0 * (estimate.value / start - 1.0)),
+    };
+    let bound = if estimate.at_bound { " (at its bound)" } else { "" };
+    [estimate.name.clone(), shown(estimate.start), format!("{}{bound}", shown(estimate.value)), percent]
+}
+
+/// The changes that leave as little as the best, in a sentence.
+pub fn verdict(found: &Drift) -> String {
+    let names: Vec<&str> = found.best().map(|change| change.estimate.name.as_str()).collect();
+    let Some(best) = found.changes.first() else { return "nothing could be changed".into() };
+    let explained = 100.0 * (1.0 - best.left).max(0.0);
+    match &names[..] {
+        [] => "nothing could be changed".into(),
+        [one] => format!("a change of {one} explains most: {explained:.1} % of the sum of squares"),
+        [one, others @ ..] => format!(
+            "a change of {one} explains most: {explained:.1} % of the sum of squares; as well does one of {}, which these logs do not tell from it",
+            others.join(", ")
+        ),
+    }
+}
+
+/// The page.
+pub fn page(case: &Case, found: &Drift) -> Page {
+    let mut page = Page::new(case.title.clone()).subtitle("Which single change explains the logs.");
+    page.section("Single changes");
+    page.prose(format!("{}.", verdict(found)));
+    let mut rows = Table::new("Each change by itself, all else as the case has it, the one that explains most first.");
+    for heading in ["Parameter", "From", "To", "Change"] {
+        rows = rows.column(heading, "");
+    }
+    let fitted = |all: &[Together]| -> Vec<String> { all.iter().filter(|one| !one.held_out).map(error).collect() };
+    for quantity in found.quantities() {
+        rows = rows.column(format!("RMSE of {}", quantity.name().replace('_', " ")), "");
+    }
+    rows = rows.column("Left of the sum of squares", "");
+    let row = |head: [String; 4], errors: Vec<String>, left: String| {
+        head.into_iter().chain(errors).chain([left]).map(Cell::from).collect::<Vec<_>>()
+    };
+    let none = || String::new();
+    rows.row(row(["as it is".into(), none(), none(), none()], fitted(&found.unchanged), "100 %".into()));
+    for change in &found.changes {
+        rows.row(row(words(change), fitted(&change.errors), format!("{:.2} %", 100.0 * change.left)));
+    }
+    page.table(&rows);
+    page.section("The case");
+    page.embed("case.toml", &case.text);
+    page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
+    page
+}

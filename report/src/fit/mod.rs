@@ -1,0 +1,23 @@
+//! Fits as a person sees them.
+
+pub mod compare;
+pub mod drift;
+mod page;
+mod plots;
+pub mod posterior;
+mod rows;
+
+pub use page::{page, page_with};
+pub use rows::{crooked, ending, findings, past_kinks, plain, scores, value, words};
+
+use taut::fit::{Fit, Posterior, Profile};
+
+/// A fit with its profiles and its posterior.
+pub struct Found {
+    /// The fit.
+    pub fit: Fit,
+    /// Profiles, where a report is written.
+    pub profiles: Vec<Profile>,
+    /// The posterior, where one is asked for.
+    pub drawn: Option<Posterior>,
+}

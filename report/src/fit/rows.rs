@@ -1,0 +1,202 @@
+//! A fit in words.
+
+use super::plots;
+use std::fmt::Write;
+use taut::fit::{Ending, Estimate, Fit, LogFit, Profile, Score, Together, together};
+use taut::number;
+
+/// Findings of one kind in so many logs are told of the first.
+const MOST_ALIKE: usize = 3;
+
+/// What is to be known; of what is said of many logs, the first and how many more.
+pub fn findings(fit: &Fit) -> Vec<String> {
+    let mut told: Vec<String> = Vec::new();
+    let mut codes: Vec<&str> = Vec::new();
+    for finding in &fit.findings {
+        let alike =
+            fit.findings.iter().filter(|other| (other.code, other.grade) == (finding.code, finding.grade)).count();
+        if alike <= MOST_ALIKE || finding.log.is_none() {
+            told.push(finding.to_string());
+        } else if !codes.contains(&finding.code) {
+            codes.push(finding.code);
+            told.push(format!("{finding}; and the like of {} other logs", alike - 1));
+        }
+    }
+    told
+}
+
+/// What the search did where the order of events left no derivative; empty where it did not have to.
+pub fn past_kinks(fit: &Fit) -> String {
+    let evolved = match fit.evolved {
+        0 => String::new(),
+        1 => " and an evolution strategy".into(),
+        times => format!(" and an evolution strategy, {times} times"),
+    };
+    match fit.coarse {
+        0.0 => String::new(),
+        steps => format!("; where events change their order: derivatives over {steps} standard errors{evolved}"),
+    }
+}
+
+/// Parameters whose interval is not to be believed on one side.
+pub fn crooked(profiles: &[Profile]) -> Vec<&str> {
+    profiles.iter().filter(|profile| profile.is_crooked()).map(|profile| profile.name.as_str()).collect()
+}
+
+/// How the search ended, in a sentence.
+pub fn ending(fit: &Fit) -> String {
+    if fit.estimates.is_empty() && fit.ending == Ending::Converged {
+        return "nothing is searched for: the errors of the case as it is".into();
+    }
+    let mut text = match fit.ending {
+        Ending::Converged if !fit.is_converged() => {
+            format!(
+                "ended where another step would move the estimates by {:.1e} standard errors: {}",
+                fit.decrement,
+                fit.ending_word().replace('_', " ")
+            )
+        }
+        Ending::Converged => {
+            format!("converged: another step would move the estimates by {:.1e} standard errors", fit.decrement)
+        }
+        Ending::Stalled => format!(
+            "ended at a kink, where sticks and slips change their order: no step lowers the cost, though its slope promises {:.1} standard errors",
+            fit.decrement
+        ),
+        Ending::OutOfIterations => "not converged: the steps were used up".to_string(),
+        Ending::Interrupted => "interrupted: the best so far, not converged".to_string(),
+        Ending::Failed => "failed".to_string(),
+    };
+    if fit.starts.len() > 1 {
+        let best = fit.starts.iter().copied().fold(f64::INFINITY, f64::min);
+        let same = fit.starts.iter().filter(|cost| **cost <= best * 1.001 + 1e-12).count();
+        let _ = write!(text, "; {same} of {} starts led to the same cost", fit.starts.len());
+    }
+    text
+}
+
+/// Text with spaces as they are typed.
+pub fn plain(text: &str) -> String {
+    text.replace(['\u{a0}', '\u{202f}'], " ").replace('−', "-")
+}
+
+/// A number with its unit and as many digits as make sense.
+pub fn value(value: f64, unit: &str, digits: usize) -> String {
+    match unit {
+        _ if value == 0.0 => format!("0 {unit}").trim().to_string(),
+        // Prefixes where the unit takes one.
+        "m" | "s" | "N" | "V" | "A" | "H" | "rad" | "N m" | "m/s" | "rad/s" => {
+            plain(&number::engineering(value, unit, digits))
+        }
+        "" => taut::quantity::rounded(value),
+        _ => format!("{} {unit}", significant(value, digits)),
+    }
+}
+
+fn significant(value: f64, digits: usize) -> String {
+    let size = value.abs();
+    if (1e-3..1e5).contains(&size) {
+        let decimals = (digits as i32 - 1 - size.log10().floor() as i32).max(0) as usize;
+        format!("{value:.decimals$}")
+    } else {
+        format!("{value:.*e}", digits - 1)
+    }
+}
+
+/// Value, standard error and interval of an estimate.
+pub fn words(estimate: &Estimate) -> [String; 3] {
+    let shown = |v: f64, digits| value(v, estimate.unit, digits);
+    // Two digits of what separates the ends of the interval.
+    let wide = estimate.interval.map_or(f64::INFINITY, |[low, high]| high - low);
+    let digits = match (estimate.value / wide).abs().log10().ceil() {
+        digits if digits.is_finite() => (digits.clamp(2.0, 12.0) as usize + 2).max(4),
+        _ => 4,
+    };
+    let own = shown(estimate.value, digits.max(5));
+    match (estimate.error, estimate.interval) {
+        (_, Some([low, high])) if estimate.at_bound => {
+            [own, "-".into(), format!("95 %: {} to {}, at its bound", shown(low, digits), shown(high, digits))]
+        }
+        _ if estimate.at_bound => [own, "-".into(), "at its bound: no interval".into()],
+        (Some(error), Some([low, high])) if error.is_finite() => {
+            [own, shown(error, 2), format!("95 %: {} to {}", shown(low, digits), shown(high, digits))]
+        }
+        _ => [own, "∞".into(), "not determined by these logs".into()],
+    }
+}
+
+/// The unit in which numbers of this size are told in one column, and how many of it the SI unit is.
+pub fn unit_for(sizes: impl Iterator<Item = f64>, unit: &str) -> (String, f64) {
+    let mut sizes: Vec<f64> = sizes.filter(|size| size.is_finite() && *size > 0.0).collect();
+    sizes.sort_by(f64::total_cmp);
+    let middle = sizes.get(sizes.len() / 2).copied().unwrap_or(1.0);
+    match unit {
+        "m" | "s" | "V" | "A" | "rad" | "m/s" | "rad/s" if middle < 0.5e-3 => (format!("µ{unit}"), 1e6),
+        "m" | "s" | "V" | "A" | "rad" | "m/s" | "rad/s" if middle < 0.5 => (format!("m{unit}"), 1e3),
+        _ => (unit.to_string(), 1.0),
+    }
+}
+
+/// How experiments of several logs, or logs of several windows, are met; empty where that is no other than each log, or all together.
+pub fn by_experiment(fit: &Fit) -> Vec<Together> {
+    let all = together(&fit.logs, |log| log.experiment().to_string());
+    let mut names: Vec<&str> = all.iter().map(|one| one.name.as_str()).collect();
+    names.dedup();
+    names.sort_unstable();
+    names.dedup();
+    if names.len() < 2 || names.len() == fit.logs.len() { Vec::new() } else { all }
+}
+
+/// Its name, and which window of it.
+pub fn name(log: &LogFit) -> String {
+    if log.window == 0 { log.name.clone() } else { format!("{} [{}]", log.name, log.window + 1) }
+}
+
+/// Most logs of which each is told.
+const MOST_TOLD: usize = 24;
+
+/// How each log is met, of many those that are met worst; each experiment, and all together.
+pub fn scores(fit: &Fit) -> Vec<(String, String)> {
+    let mut lines = Vec::new();
+    let logs: Vec<&LogFit> = match fit.logs.len() > MOST_TOLD {
+        true => plots::worst(&fit.logs, &fit.noise),
+        false => fit.logs.iter().collect(),
+    };
+    for log in &logs {
+        let mut parts = Vec::new();
+        for output in &log.outputs {
+            let quantity = output.quantity;
+            for (score, held) in [(output.fitted, false), (output.held_out, true)] {
+                let Some(score) = score else { continue };
+                parts.push(told(quantity.name(), quantity.unit(), &score, held));
+            }
+        }
+        if !log.complete {
+            parts.push("the model does not reach its end".into());
+        }
+        lines.push((name(log), parts.join("; ")));
+    }
+    if logs.len() < fit.logs.len() {
+        lines.push((
+            format!("and {} more", fit.logs.len() - logs.len()),
+            "which are met better; see fit.json or the report".into(),
+        ));
+    }
+    let word = |one: &Together| {
+        let rmse = if one.rmse.is_finite() { value(one.rmse, one.quantity.unit(), 4) } else { "–".into() };
+        format!("{} {}: RMSE {rmse}", one.quantity.name(), if one.held_out { "held out" } else { "fitted" })
+    };
+    for one in by_experiment(fit) {
+        let logs = if one.logs > 1 { format!(" of {} logs", one.logs) } else { String::new() };
+        lines.push((one.name.clone(), format!("{}{logs}", word(&one))));
+    }
+    if fit.logs.len() > 1 {
+        lines.extend(together(&fit.logs, |_| String::new()).iter().map(|one| ("all together".into(), word(one))));
+    }
+    lines
+}
+
+fn told(quantity: &str, unit: &str, score: &Score, held: bool) -> String {
+    let word = if held { " held out" } else { "" };
+    format!("{quantity}{word}: RMSE {}, fit {:.2} %", value(score.rmse, unit, 4), score.percent)
+}
