@@ -1,4 +1,4 @@
-//! What the program is built from: the commit, where there is one, and the profile.
+//! Source of the build: the commit, where there is one, and the profile.
 
 use std::process::Command;
 

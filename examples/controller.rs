@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 use taut::case::{Case, TEMPLATE};
-use taut::control::{Controller, Loop, Seen, Setup, close, closed_loop};
+use taut::control::{Controller, Loop, Observation, Setup, close, closed_loop};
 use taut::design::{Design, FeedForward, Pid, Structure};
 use taut::signal::profile::{Leg, Limits, Profile};
 use taut::solve::Solver;
@@ -13,7 +13,7 @@ struct Relay {
 }
 
 impl Controller for Relay {
-    fn step(&mut self, seen: &Seen) -> f64 {
+    fn step(&mut self, seen: &Observation) -> f64 {
         self.volts * ((seen.reference.position - seen.position) / 1e-3).clamp(-1.0, 1.0)
     }
 

@@ -10,7 +10,7 @@ mod common;
 use std::hint::black_box;
 use std::time::Instant;
 use taut::case::{Case, Experiment, GantryCase, TEMPLATE};
-use taut::control::{Controller, Loop, Seen, close};
+use taut::control::{Controller, Loop, Observation, close};
 use taut::friction::{Law, Shape};
 use taut::mechanism::Mechanism;
 use taut::signal::profile::{Leg, Limits, Profile};
@@ -38,7 +38,7 @@ fn main() -> taut::Result<()> {
     Ok(())
 }
 
-/// What valgrind counts: it finds the function by its name.
+/// The work that valgrind counts: it finds the function by its name.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn measured_work(work: &dyn Fn() -> f64) {
@@ -127,7 +127,7 @@ const LIMIT: f64 = 12.0;
 struct Proportional;
 
 impl Controller for Proportional {
-    fn step(&mut self, seen: &Seen) -> f64 {
+    fn step(&mut self, seen: &Observation) -> f64 {
         GAIN * (seen.reference.position - seen.position)
     }
 

@@ -7,7 +7,7 @@ use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use std::f64::consts::PI;
 use taut::case::Case;
-use taut::control::{Controller, Loop, Seen, close};
+use taut::control::{Controller, Loop, Observation, close};
 use taut::frf::{Cut, Frf, Known, estimate, fit};
 use taut::linear::{Hold, Operation, StateSpace};
 use taut::log::{Log, Output, Quantity};
@@ -41,7 +41,7 @@ fn uniform(random: &mut Pcg64) -> f64 {
 }
 
 impl Controller for Exciter {
-    fn step(&mut self, seen: &Seen) -> f64 {
+    fn step(&mut self, seen: &Observation) -> f64 {
         let t = self.time.len() as f64 * EVERY;
         // Noise of two levels, new every sample.
         if self.held.0 == 0 {
@@ -103,7 +103,7 @@ fn log(stage: &Stage, closed: bool, delay: f64, seed: u64) -> taut::Result<Log> 
     })
 }
 
-/// What the response is in truth.
+/// The true response.
 fn truth(stage: &Stage, delay: f64, frf: &Frf) -> taut::Result<Vec<Complex<f64>>> {
     let system = StateSpace::of(stage, Operation::default())?;
     let output = system.output("drive_angle").unwrap_or_default();

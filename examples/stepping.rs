@@ -6,7 +6,7 @@
 use std::time::Instant;
 use taut::Result;
 use taut::case::{Case, TEMPLATE};
-use taut::control::{Controller, Loop, Seen, close};
+use taut::control::{Controller, Loop, Observation, close};
 use taut::signal::Signal;
 use taut::signal::profile::{Leg, Limits, Profile};
 use taut::solve::{Machine, Solver};
@@ -17,7 +17,7 @@ const LIMIT: f64 = 12.0;
 struct Proportional;
 
 impl Controller for Proportional {
-    fn step(&mut self, seen: &Seen) -> f64 {
+    fn step(&mut self, seen: &Observation) -> f64 {
         GAIN * (seen.reference.position - seen.position)
     }
 

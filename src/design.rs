@@ -1,4 +1,4 @@
-//! What a controller is, in data: its timing, its structure with its gains, and what stands around it.
+//! A controller as data: its timing, its structure with its gains, and the parts around it.
 //!
 //! A command is in units of the amplifier's input (V in voltage mode, A in current mode), a position in m along the belt: of an
 //! encoder at motor or pulley r φ, of one at the cart x. [`crate::control`] steps it in time.
@@ -12,11 +12,11 @@ pub struct Design {
     pub delay: f64,
     /// Largest command, either way, V or A; none without a limit of its own.
     pub limit: Option<f64>,
-    /// What it makes of the error.
+    /// The structure of the feedback.
     pub structure: Structure,
-    /// What it adds from the reference alone.
+    /// The feed-forward.
     pub feed_forward: FeedForward,
-    /// What it estimates and takes away.
+    /// The disturbance observer.
     pub disturbance_observer: Option<DisturbanceObserver>,
     /// Filters on what the structure gives, in this order.
     pub filters: Vec<Filter>,
@@ -151,7 +151,7 @@ pub struct Fuzzy {
     pub filter: f64,
 }
 
-/// What the reference alone tells.
+/// Feed-forward from the reference alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeedForward {
     /// Which model tells it.

@@ -77,7 +77,7 @@ pub struct Point {
 pub struct Frf {
     /// Of the log.
     pub name: String,
-    /// What was measured.
+    /// The measured quantity.
     pub quantity: Quantity,
     /// Between samples, s.
     pub every: f64,

@@ -1,4 +1,4 @@
-//! What follows from the numbers of a case: masses, stiffnesses, frequencies, limits and what is left to them. What `taut show` tells.
+//! Overview of a machine from the numbers of its case: masses, stiffnesses, frequencies, limits and the reserve to them. `taut show` prints it.
 //!
 //! Each answer is a [`Row`]: a key, a name, a value in SI and its unit. Terminal, page, JSON and Python show the same rows.
 
@@ -27,7 +27,7 @@ const HEAVY: f64 = 0.1;
 /// Everything that is told.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Overview {
-    /// What the case says it is.
+    /// The title of the case.
     pub title: String,
     /// `axis`, `h-frame` or `core-xy`.
     pub kind: &'static str,
@@ -37,7 +37,7 @@ pub struct Overview {
     pub places: Vec<Place>,
     /// Whether the place makes a difference.
     pub depends_on_place: bool,
-    /// What should be known besides.
+    /// Notes.
     pub notes: Vec<Note>,
 }
 

@@ -114,7 +114,7 @@ pub struct Belt {
     pub follows_cart: bool,
     /// How many of the three inertias move by themselves.
     pub model: BeltModel,
-    /// What else is known of it.
+    /// Its data sheet.
     pub sheet: BeltSheet,
 }
 

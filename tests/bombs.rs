@@ -12,7 +12,7 @@ fn place(name: &str) -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("bomb-{name}"))
 }
 
-/// What is said of a file, without its folder.
+/// The error on a file, without its folder.
 fn told(file: &Path, error: &taut::Error) -> String {
     error.to_string().replace(&file.display().to_string(), "FILE")
 }

@@ -184,7 +184,7 @@ fn the_start_of_a_log_that_is_held_out_is_fitted() {
     }
 }
 
-/// What pulls at the cart beside the model is found as a force.
+/// A pull at the cart beside the model is found as a force.
 #[test]
 fn a_force_that_is_missing_is_seen() {
     let case = made(&["cart.load=0.8"], 4);

@@ -417,7 +417,7 @@ fn the_compensated_reference_balances_the_belt() {
 fn a_timing_that_is_none_is_refused() {
     struct Idle;
     impl taut::control::Controller for Idle {
-        fn step(&mut self, _: &taut::control::Seen) -> f64 {
+        fn step(&mut self, _: &taut::control::Observation) -> f64 {
             1.0
         }
         fn reset(&mut self) {}
@@ -462,7 +462,7 @@ fn a_timing_that_is_none_is_refused() {
 /// a loop stood beside its target for ever.
 #[test]
 fn a_limit_leaves_nothing_behind_where_there_is_no_integral() {
-    use taut::control::{Controller, Seen};
+    use taut::control::{Controller, Observation};
     let pid = Pid {
         proportional: 1000.0,
         integral: 0.0,
@@ -492,7 +492,7 @@ fn a_limit_leaves_nothing_behind_where_there_is_no_integral() {
         controller.reset();
         let mut step = |error: f64| {
             let reference = Reference::at(error);
-            let seen = Seen { time: 0.0, reference, ahead: reference, position: 0.0, current: 0.0 };
+            let seen = Observation { time: 0.0, reference, ahead: reference, position: 0.0, current: 0.0 };
             let asked = controller.step(&seen);
             controller.limited(asked.clamp(-0.1, 0.1));
             asked
@@ -522,7 +522,7 @@ fn a_spread_that_is_no_share_is_refused() {
     assert_eq!(stopped, None);
 }
 
-/// What WPILib and LinuxCNC would feed forward is what the rigid feed-forward does, and the torque of ODrive is that of the motor.
+/// The feed-forward of WPILib and LinuxCNC is the rigid feed-forward, and the torque of ODrive is that of the motor.
 #[test]
 fn gains_for_drives_make_the_same_command() {
     let stage = Case::read("stages/sollmann-jouaneh/table4.toml").unwrap().stage;

@@ -1,4 +1,4 @@
-//! What runs cost, in pieces of work: a slip that leaves every result right may still make all runs slow.
+//! The cost of runs, in pieces of work: a slip that leaves every result right may still make all runs slow.
 
 use crate::common;
 use common::experiment;

@@ -4,7 +4,7 @@ use crate::common::document;
 use document::Pcg;
 use std::f64::consts::PI;
 use taut::case::{Case, TEMPLATE};
-use taut::control::{Controller, Seen, Standard};
+use taut::control::{Controller, Observation, Standard};
 use taut::signal::profile::Reference;
 
 const AXIS: [&str; 8] = [
@@ -53,7 +53,7 @@ fn compare(controller: &str, mut made: Made, around: impl Fn(&Case, &Reference) 
         };
         let (now, ahead) = (reference(), reference());
         let (position, current) = (draw(0.01), draw(5.0));
-        let seen = Seen { time: f64::from(k) * T, reference: now, ahead, position, current };
+        let seen = Observation { time: f64::from(k) * T, reference: now, ahead, position, current };
         let [forward, inner] = around(&case, &ahead);
         let wanted = if target { elastic(&case, &now).0 } else { now };
         let asked = (made.step)(&wanted, position, current, inner) + forward;

@@ -129,7 +129,7 @@ fn friction_curves_and_spans_that_follow_the_cart() {
     assert!(compare(include_str!("authorities/curves.json"), solver, 10.0) >= 30);
 }
 
-/// What the cases above bring about: every part changes what it does in some of them.
+/// The cases above are not idle: every part changes its state in some of them.
 #[test]
 fn every_part_has_its_turn() {
     let file: Value = serde_json::from_str(include_str!("authorities/elements.json")).unwrap();

@@ -248,7 +248,7 @@ fn the_profile_of_what_is_well_known_is_that_of_a_linear_model() {
     assert!(taut::fit::profiles(&case, &plan, &found, Some(&|| true)).unwrap().is_empty());
 }
 
-/// What is tied stays within the bounds of each of its keys.
+/// Tied parameters stay within the bounds of each of their keys.
 #[test]
 fn bounds_hold_for_all_that_is_tied() {
     let stage = Case::from_text("axis.toml", TEMPLATE).unwrap().stage;
@@ -343,7 +343,7 @@ fn what_an_encoder_cannot_tell_is_said_in_words() {
     );
 }
 
-/// What came of many fits.
+/// The results of many fits.
 #[derive(Debug, Default)]
 struct Coverage {
     /// Intervals that hold the truth, by parameter.

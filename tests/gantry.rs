@@ -8,7 +8,7 @@ use taut::solve::{Course, Detail, Ending, ErrorEstimate, Event, Flow, Solver, st
 use taut::stage::gantry::Routing;
 use taut::trajectory::Trajectory;
 
-/// What a run of the first experiment of a case gives.
+/// The result of the first experiment of a case.
 struct Run {
     rows: Trajectory,
     events: Vec<Event>,
@@ -99,7 +99,7 @@ fn the_general_solver_agrees_with_the_authority() {
     compare(Solver::General { tolerance: 1e-12 }, (1e-9, 1e-7, 1e-7));
 }
 
-/// What a meter says of a run with a row every so many seconds, and the rows.
+/// The figures of a run with a row every so many seconds, and the rows.
 fn metered(case: &GantryCase, solver: Solver, every: f64) -> (GantryMetrics, Trajectory) {
     let course = Course { every, ..Course::of(&case.experiments[0]) };
     let mut meter = GantryMeter::new(&case.gantry);

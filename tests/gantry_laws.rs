@@ -11,7 +11,7 @@ use taut::stage::gantry::{Belts, Gantry, Routing, Slide};
 use taut::stage::{BeltSheet, Pulley};
 use taut::trajectory::Trajectory;
 
-/// What a run of the first experiment of a case gives.
+/// The result of the first experiment of a case.
 struct Run {
     rows: Trajectory,
     events: Vec<Event>,
@@ -165,7 +165,7 @@ proptest! {
         prop_assert!(mechanism.energy(&state) > 0.0);
     }
 
-    /// What comes in goes into heat or is stored, in any state and mode.
+    /// Power that comes in goes into heat or is stored, in any state and mode.
     #[test]
     fn power_is_balanced(
         gantry in gantry(), speeds in prop::collection::vec(-2.0..2.0_f64, 4), ways in prop::collection::vec(-1e-4..1e-4_f64, 4),

@@ -273,7 +273,7 @@ fn stribeck_as_a_plain_integration_has_it() {
     }
 }
 
-/// What a tighter tolerance changes is small, under every law.
+/// A tighter tolerance changes little, under every law.
 #[test]
 fn every_law_converges() {
     for law in LAWS {

@@ -1,4 +1,4 @@
-//! What happens at one instant: limits, gear, spans and stops are settled before bodies break away.
+//! Events of one instant: limits, gear, spans and stops are settled before bodies break away.
 
 use crate::common;
 use common::random::{self, Dry};

@@ -121,7 +121,7 @@ fn hertz(system: &StateSpace) -> Vec<f64> {
 proptest! {
     #![proptest_config(cases(200))]
 
-    /// What has no source of energy does not grow: the motor gives no more than it takes only with K_t = K_e.
+    /// A stage without a source of energy does not grow: the motor gives no more than it takes only with K_t = K_e.
     #[test]
     fn poles_of_a_passive_stage_do_not_grow(mut stage in equipped(Dry::Any)) {
         stage.motor.back_emf_constant = stage.motor.torque_constant;

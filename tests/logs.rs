@@ -51,7 +51,7 @@ fn stored(log: &str) -> Result<Case, String> {
     Case::from_text(name, &case_text(&format!("log = {{ {log} }}"))).map_err(|error| error.to_string())
 }
 
-/// What `authorities/log_files.py` put into its files.
+/// The numbers that `authorities/log_files.py` put into its files.
 fn expected(k: usize) -> [f64; 3] {
     let n = k as f64;
     [n / 1024.0, if k < 10 { 5.0 } else { 0.0 }, n * n / 1_048_576.0]
@@ -108,7 +108,7 @@ fn parquet_files_of_every_compression() {
     assert_eq!(output(log, Quantity::CartPosition)[8], expected(8)[2]);
 }
 
-/// What one run writes is read as a log by the next.
+/// A file that one run writes is read as a log by the next.
 #[cfg(feature = "parquet")]
 #[test]
 fn parquet_of_our_own_states_its_units() {
@@ -295,7 +295,7 @@ fn damaged_files_are_told_or_read() {
     }
 }
 
-/// What Parquet can hold and a log cannot.
+/// Content that Parquet can hold and a log cannot.
 #[cfg(feature = "parquet")]
 #[test]
 fn parquet_files_that_are_no_logs() {

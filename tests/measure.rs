@@ -182,7 +182,7 @@ fn moments(values: &[f64]) -> (f64, f64) {
     (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt())
 }
 
-/// What an axis at rest shows is noise alone, here of deviation 1.
+/// An axis at rest shows noise alone, here of deviation 1.
 fn noise(name: &str, seed: u64, rows: f64) -> Vec<f64> {
     let mut setting = case(&["experiment.0.input={ step = 0 }", "measurement.cart_speed={ noise = 1 }"]);
     setting.1.seed = seed;
@@ -224,7 +224,7 @@ fn the_same_seed_gives_the_same_bits_whatever_else_is_recorded() {
     assert_eq!(noise("rest", 1, 3.0), FIRST);
 }
 
-/// What seed 1 gives first.
+/// The first numbers of seed 1.
 const FIRST: [f64; 4] = [0.46863511444632877, -0.3447139877983875, -0.1532959599641288, -0.6580502147064756];
 
 #[test]

@@ -1,6 +1,6 @@
 //! Bodies that a reduced belt makes one, each with a friction law of its own: against the written-out equation, a stiff belt, and laws.
 //!
-//! What moves as one has one speed: sliding friction adds up, each law's at its own speed ρ v, and so do breakaways, bristles and what never
+//! Bodies that move as one have one speed: sliding friction adds up, each law's at its own speed ρ v, and so do breakaways, bristles and what never
 //! sticks. [`Written`] has that in one line per body and a Runge-Kutta formula of its own.
 
 use crate::common;
@@ -113,7 +113,7 @@ impl Member {
         (self.ratio * (friction + side.viscous * v), rate)
     }
 
-    /// What it holds at rest, and what its bristles do.
+    /// Its breakaway at rest, and the force of its bristles.
     fn breakaway(&self, forward: bool, way: f64) -> f64 {
         let side = if forward { self.friction.forward } else { self.friction.backward };
         if self.never_sticks() { 0.0 } else { self.ratio * self.factor(way) * side.breakaway }
@@ -252,7 +252,7 @@ impl Written {
         [holds(true) - self.load(g, true, y, volts) + bristles, holds(false) + self.load(g, false, y, volts) - bristles]
     }
 
-    /// What a group at rest does now.
+    /// Decides what a group at rest does now.
     fn decide(&mut self, g: usize, y: &Vector, volts: f64) {
         let [forward, backward] = self.holds(g, y, volts);
         // A load that just reaches what holds moves nothing; rounding is no load.
@@ -392,7 +392,7 @@ proptest! {
         prop_assert!(off < 2e-9, "{off:e} m");
     }
 
-    /// What goes forward with the input goes backward with its opposite, if the laws are turned round.
+    /// A stage that goes forward with the input goes backward with its opposite, if the laws are turned round.
     #[test]
     fn a_mirror_image_moves_as_its_image(stage in merged(), input in square()) {
         let mut image = stage.clone();
@@ -411,7 +411,7 @@ proptest! {
         }
     }
 
-    /// What the motor gives and friction takes is what the machine has: M v²/2 = ∫ (K i − F_f) v dt with friction as the column has it.
+    /// The motor's work less that of friction is the machine's energy: M v²/2 = ∫ (K i − F_f) v dt with friction as the column has it.
     #[test]
     fn power_is_balanced(stage in merged(), input in square()) {
         let mut stage = stage;

@@ -314,7 +314,7 @@ fn a_spinning_rotor_behind_play_is_not_settled() {
     assert!(stop >= time[last] && stop <= time[last + 1] + 1e-6, "{stop} {}", time[last]);
 }
 
-/// What both solvers see between their steps is the same.
+/// Both solvers see the same between their steps.
 #[test]
 fn both_solvers_have_the_same_metrics() {
     let mut stage = table4();

@@ -65,7 +65,7 @@ const LAWS: [&str; 3] = [
      static_backward = 0.25, smooth = { breakaway_velocity = 0.5 }",
 ];
 
-/// What excludes something of that: the belt by its make, a gear with losses, a decay instead of a velocity.
+/// Tables that exclude something of that: the belt by its make, a gear with losses, a decay instead of a velocity.
 const OTHERS: [(&str, &str); 3] = [
     ("stiffness = [1024, 1024, 512]", "modulus = 1048576\nsection = 0.0078125\nspans = [8, 16, 32]"),
     ("gear_stiffness = 4096\ngear_damping = 0.5\nbacklash = 0.125", "gear_efficiency = 0.5"),
@@ -276,7 +276,7 @@ fn keys_that_cannot_be_free_say_what_can() {
     );
 }
 
-/// What is off by a share: a factor on the value, with what is tied by nature.
+/// Numbers off by a share: a factor on the value, with the numbers that are tied by nature.
 #[test]
 fn numbers_that_are_off_keep_their_ties() {
     for (name, text) in cases() {
@@ -360,7 +360,7 @@ fn the_table_is_of_one_piece() {
     assert!(free_markdown().contains("| `cart.friction.static` | axis | yes | cart's dry friction | `coulomb` |"));
 }
 
-/// What `--vary all` varies on the paper's machine.
+/// The parameters that `--vary all` varies on the paper's machine.
 #[test]
 fn everything_of_the_papers_machine() {
     let stage = Case::from_text("table4.toml", include_str!("../stages/sollmann-jouaneh/table4.toml")).unwrap().stage;

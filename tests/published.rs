@@ -10,7 +10,7 @@ use taut::case::Case;
 use taut::fit::{Fit, Score, check, fit};
 use taut::solve::Flow;
 
-/// What is asked of a fit: the root mean square of the residuals over some logs.
+/// The bar of a fit: the root mean square of the residuals over some logs.
 struct Row {
     case: &'static str,
     what: &'static str,

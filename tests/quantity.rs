@@ -1,4 +1,4 @@
-//! What people type as quantities, and what it means, to the last bit.
+//! Quantities as people type them, and their values, to the last bit.
 
 use proptest::prelude::*;
 use std::f64::consts::PI;

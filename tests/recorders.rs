@@ -33,7 +33,7 @@ fn folder(name: &str) -> PathBuf {
     folder
 }
 
-/// What is done with the machine: half a second to and fro.
+/// The motion of the machine: half a second to and fro.
 fn to_and_fro() -> Signal {
     let square = |t: f64| if ((t / 0.1) as u64).is_multiple_of(2) { 5.0 } else { -5.0 };
     let times: Vec<f64> = (0..500).map(|k| f64::from(k) * 1e-3).collect();
@@ -121,7 +121,7 @@ fn reprapfirmware_counts_in_steps_of_the_motor_and_says_when_data_were_lost() {
     agrees(&older, Quantity::DriveAngle, &turned, 1e-6);
 }
 
-/// What comes behind a window is not its end.
+/// A window before the end has lost nothing.
 #[test]
 fn a_window_before_the_end_has_lost_nothing() {
     let (folder, stage) = (folder("window"), stage());

@@ -1,4 +1,4 @@
-//! What rounding may do to a run, and what it must not: far from the origin, on stiff belts, at rest on an edge.
+//! The effect of rounding on a run, and its limits: far from the origin, on stiff belts, at rest on an edge.
 
 use crate::common;
 use common::table4;

@@ -389,7 +389,7 @@ const PUBLISHED: [(Kind, Option<Range>, Range); 6] = [
     (Kind::ThreeHumpEi, Some((-45.0, 50.0)), (-50.0, 55.0)),
 ];
 
-/// What is published lies within what is computed, and is at most five points of percent less: it was rounded down to 5 %.
+/// The published values lie within the computed ones, and are at most five points of percent less: they were rounded down to 5 %.
 #[test]
 fn the_published_table_of_robustness() {
     let mut missing = Vec::new();
@@ -596,7 +596,7 @@ fn densities_sum_to_the_variance() {
     assert!(power_spectral_density(&values[..100], rate, 512).1.is_empty());
 }
 
-/// What authorities/shapers.py says, which integrates the oscillator and shares nothing with taut.
+/// The numbers of authorities/shapers.py, which integrates the oscillator and shares nothing with taut.
 #[test]
 fn an_authority_agrees() {
     let text = fs::read_to_string("tests/authorities/shapers.json").unwrap();

@@ -27,7 +27,7 @@ fn stages() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("stages")
 }
 
-/// What is in a folder, sorted.
+/// The content of a folder, sorted.
 fn entries(folder: &Path) -> Vec<PathBuf> {
     let mut entries: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     entries.sort();
@@ -52,7 +52,7 @@ fn curve(path: &Path) -> String {
     }
 }
 
-/// What the columns of a machine's curves are called.
+/// The heading of the columns of a machine's curves.
 fn heading(machine: &Path) -> &'static str {
     let is_gantry = |path: &PathBuf| matches!(Opened::read_with(path, &[]), Ok(Opened::Gantry(_)));
     match cases(machine).iter().any(|(_, path)| is_gantry(path)) {

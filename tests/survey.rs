@@ -1,4 +1,4 @@
-//! What a survey says of logs: of measured ones, and of a simulated one with a known fault.
+//! Surveys of logs: of measured ones, and of a simulated one with a known fault.
 
 use crate::common;
 use std::f64::consts::TAU;
@@ -211,7 +211,7 @@ fn steps_and_noise_are_measured() {
     assert_eq!(channel.step, None);
 }
 
-/// What is said of the machines whose logs are published; nothing of it is a wrong suspicion.
+/// The survey of the machines whose logs are published raises no wrong suspicion.
 #[test]
 fn measured_data_of_others() {
     let files = ["pendulepi/february.csv", "emps/estimation.mat", "ced/DATAUNIF.csv", "ced/DATAPRBS.csv"];

@@ -381,7 +381,7 @@ fn moves_in_closed_loop_are_swept_too() {
     assert_eq!(bits(&table), bits(&rows(&sweep, 0, 4)));
 }
 
-/// What a fit leaves behind: its standard errors, or the draws of its posterior.
+/// Machines from a fit: from its standard errors, or from the draws of its posterior.
 #[test]
 fn machines_come_from_a_fit() {
     let folder = std::env::temp_dir().join(format!("taut-sweep-{}", std::process::id()));

@@ -9,7 +9,7 @@ use taut::case::{Case, Cost, Tuning};
 use taut::control::compensation::Rigid;
 use taut::control::feedback::Feedback;
 use taut::control::filter::Biquad;
-use taut::control::{Controller, Seen, Setup, Standard, closed_loop};
+use taut::control::{Controller, Observation, Setup, Standard, closed_loop};
 use taut::design::{Design, Structure};
 use taut::signal::profile::Reference;
 use taut::solve::{Ending, Solver};
@@ -56,7 +56,7 @@ fn the_linear_controller_is_what_the_controller_does() {
                 let phase = omega * t * k as f64;
                 let position = 1e-5 * phase.cos();
                 let at = Reference::default();
-                let seen = Seen { time: t * k as f64, reference: at, ahead: at, position, current: 0.0 };
+                let seen = Observation { time: t * k as f64, reference: at, ahead: at, position, current: 0.0 };
                 let command = controller.step(&seen);
                 controller.limited(command);
                 if k >= from {

@@ -1,4 +1,4 @@
-//! What `check` and `fit` say of what logs determine, of faults in them, and how far intervals reach.
+//! Verdicts of `check` and `fit`: on what logs determine, on faults in them, and on the width of intervals.
 
 use crate::common::chance::Chance;
 use crate::common::logged::logged;

@@ -90,7 +90,7 @@ pub struct Finished {
     pub report: Option<Report>,
     /// Files outside of the folder that are written already.
     pub written: Vec<String>,
-    /// What to add to the command to keep the result: "add --out DIR for …"; empty where nothing can be kept.
+    /// How to keep the result: "add --out DIR for …"; empty where nothing can be kept.
     pub advice: &'static str,
     /// Further lines for standard error.
     pub remarks: Vec<Remark>,

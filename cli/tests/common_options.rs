@@ -1,4 +1,4 @@
-//! What all commands have in common: errors as data, a case from standard input, completions, manual pages.
+//! Features of all commands: errors as data, a case from standard input, completions, manual pages.
 
 use assert_cmd::Command;
 use serde_json::Value;

@@ -21,7 +21,7 @@ fn workplace() -> TempDir {
     folder
 }
 
-/// What a command line prints on both streams, as in a terminal 100 characters wide.
+/// The output of a command line on both streams, as in a terminal 100 characters wide.
 fn printed(folder: &Path, line: &str) -> String {
     let programs = assert_cmd::cargo::cargo_bin("taut").parent().unwrap().to_path_buf();
     let path = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap_or_default());

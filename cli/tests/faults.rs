@@ -1,4 +1,4 @@
-//! What may go wrong around a command that writes: it is killed, the disk is full, the folder cannot be written to, somebody
+//! Faults around a command that writes: it is killed, the disk is full, the folder cannot be written to, somebody
 //! presses Ctrl-C. What stood before still stands, and what is new is whole or absent.
 //!
 //! `TAUT_KILLS=200` kills each command so often instead of 20 times, `TAUT_SEED=2` at other moments.
@@ -65,7 +65,7 @@ fn put(folder: &Path, files: &Files) {
     }
 }
 
-/// What a run leaves on purpose while it is not done: files under temporary names, and the parts of a sweep.
+/// Files that a run leaves on purpose while it is not done: those under temporary names, and the parts of a sweep.
 fn is_temporary(name: &str) -> bool {
     name.split('/').any(|part| part.starts_with('.') || part.ends_with(".tmp") || part.ends_with(".parts"))
 }
@@ -87,7 +87,7 @@ impl Writer {
         self
     }
 
-    /// What stands before, and what stands after, when nothing goes wrong; and how long that takes.
+    /// The folder before and after, when nothing goes wrong; and how long that takes.
     fn whole(&self) -> Whole {
         let folder = TempDir::new().unwrap();
         put(folder.path(), &self.read);
@@ -147,7 +147,7 @@ impl Writer {
     }
 }
 
-/// What stands before a command and after it.
+/// The folder before a command and after it.
 struct Whole {
     before: Files,
     after: Files,
@@ -178,7 +178,7 @@ impl Whole {
         marked || !new.is_empty() || left.keys().any(|name| is_temporary(name))
     }
 
-    /// What is otherwise in a folder than it should be after the command, in a few words.
+    /// The differences of a folder from its state after the command, in a few words.
     fn other(&self, folder: &Path) -> String {
         let left = files(folder);
         let names: BTreeSet<&String> = left.keys().chain(self.after.keys()).collect();

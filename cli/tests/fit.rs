@@ -115,7 +115,7 @@ fn a_fit_that_warns_writes_nothing_unless_told() {
     assert!(folder.path().join("found/fitted.toml").exists());
 }
 
-/// What a command says on standard error, and how it ends.
+/// The standard error of a command, and its exit status.
 fn told(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
     let output = taut(folder).args(args).output().unwrap();
     (output.status.code(), String::from_utf8(output.stderr).unwrap())

@@ -240,7 +240,7 @@ fn modes_refuses_what_is_asked_of_an_axis() {
     }
 }
 
-/// What is not there for a gantry says so, at the line that makes it one.
+/// Options that a gantry does not have are refused, at the line that makes it one.
 #[test]
 fn commands_for_an_axis_say_what_takes_a_gantry() {
     let case = stage("core-xy/core-xy.toml");

@@ -300,7 +300,7 @@ impl Case {
         modes::answers(py, &analysis)
     }
 
-    /// What follows from the numbers, as `taut show --json` has it.
+    /// The overview, as `taut show --json` has it.
     fn show<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let opened = match &self.inner {
             Inner::Axis(case) => Opened::Axis(Box::new(case.as_ref().clone())),

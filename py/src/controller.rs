@@ -9,7 +9,7 @@ use taut::control::{self, Controller};
 /// Measurements and references that a controller has at a sample. SI units.
 #[pyclass(frozen, get_all, module = "taut")]
 #[derive(Debug, Clone)]
-pub struct Seen {
+pub struct Observation {
     /// Time of the sample, s.
     time: f64,
     /// Measured position, m along the belt: whole counts of the encoder.
@@ -31,14 +31,14 @@ pub struct Seen {
 }
 
 #[pymethods]
-impl Seen {
+impl Observation {
     fn __repr__(&self) -> String {
-        format!("Seen(time={}, position={}, reference={}, ...)", self.time, self.position, self.reference)
+        format!("Observation(time={}, position={}, reference={}, ...)", self.time, self.position, self.reference)
     }
 }
 
-impl From<&control::Seen> for Seen {
-    fn from(seen: &control::Seen) -> Self {
+impl From<&control::Observation> for Observation {
+    fn from(seen: &control::Observation) -> Self {
         Self {
             time: seen.time,
             position: seen.position,
@@ -83,10 +83,10 @@ impl<'a, 'py> Own<'a, 'py> {
         Ok(Self { object: object.clone(), way, interrupt })
     }
 
-    fn command(&self, seen: &control::Seen) -> PyResult<f64> {
+    fn command(&self, seen: &control::Observation) -> PyResult<f64> {
         let py = self.object.py();
         let command = match self.way {
-            Way::Step => self.object.call_method1(intern!(py, "step"), (Seen::from(seen),))?,
+            Way::Step => self.object.call_method1(intern!(py, "step"), (Observation::from(seen),))?,
             Way::Call => self.object.call1((seen.position, seen.reference.position))?,
         };
         let time = seen.time;
@@ -115,7 +115,7 @@ impl<'a, 'py> Own<'a, 'py> {
 }
 
 impl Controller for Own<'_, '_> {
-    fn step(&mut self, seen: &control::Seen) -> f64 {
+    fn step(&mut self, seen: &control::Observation) -> f64 {
         if self.interrupt.stop() {
             return 0.0;
         }

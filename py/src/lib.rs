@@ -22,7 +22,7 @@ mod _native {
     #[pymodule_export]
     use crate::case::{Case, Fit, template};
     #[pymodule_export]
-    use crate::controller::Seen;
+    use crate::controller::Observation;
     #[pymodule_export]
     use crate::error::{Bug, Error, fail_as_a_bug};
     #[pymodule_export]

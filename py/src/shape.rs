@@ -29,7 +29,7 @@ pub struct Options {
     changes: Vec<String>,
 }
 
-/// What `taut shape --json` prints of these files.
+/// The JSON that `taut shape --json` prints of these files.
 #[pyfunction]
 pub fn shape<'py>(py: Python<'py>, files: Vec<PathBuf>, options: Options) -> PyResult<Bound<'py, PyAny>> {
     let one_of = |what: &str, name: &str, known: &[&str]| -> PyResult<usize> {

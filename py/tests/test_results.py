@@ -155,7 +155,7 @@ def test_a_controller_may_be_an_object(pid):
     run = pid.move(pid.moves[0], controller=relay, every=2e-3, limit=5.0)
     assert relay.resets == 1 and len(relay.left) == len(relay.seen)
     assert max(map(abs, relay.left)) == 5.0 and np.abs(run["voltage"]).max() <= 5.0
-    assert relay.seen[1].time == 2e-3 and isinstance(relay.seen[0], taut.Seen)
+    assert relay.seen[1].time == 2e-3 and isinstance(relay.seen[0], taut.Observation)
 
 
 def test_what_a_controller_raises_comes_out(pid):

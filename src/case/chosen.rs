@@ -1,4 +1,4 @@
-//! What of a case is asked for by name, told by the names of the command line's options where it is not there.
+//! Parts of a case that are asked for by name; where one is missing, the error names the command line's option.
 
 use super::{Case, Experiment, GantryCase, GantryExperiment, Move, Plan};
 use crate::design::Design;
@@ -32,7 +32,7 @@ impl Case {
         Ok((design, self.moves.iter().filter(|m| names.is_empty() || names.contains(&m.name)).collect()))
     }
 
-    /// What is to be found from its logs. `path` is the case's own.
+    /// The plan of its fit. `path` is the case's own.
     pub fn fit_plan(&self, path: &Path) -> Result<Plan> {
         self.fit.clone().ok_or_else(|| {
             Error::new("this case does not say what is searched for").in_file(path).next(

@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::parameter::{self, Free, INPUT, Numbers, Parameter, Range};
 use crate::stage::Stage;
 
-/// What a fit may change, and how it is done.
+/// The free parameters of a fit, and how it is done.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// Parameters by themselves.
@@ -20,13 +20,13 @@ pub struct Plan {
     pub bounds: Vec<(String, [f64; 2])>,
     /// Which of these each campaign, or each log, has for itself.
     pub separate: Vec<String>,
-    /// What has them for itself.
+    /// The groups of logs that have values of their own.
     pub per: Per,
     /// The campaigns: names, and the experiments of each, as patterns of their names.
     pub campaigns: Vec<(String, Vec<String>)>,
-    /// What is known beforehand, by name; counts for draws from the posterior alone.
+    /// Prior knowledge, by name; counts for draws from the posterior alone.
     pub priors: Vec<(String, Prior)>,
-    /// What is fitted along with each log.
+    /// The nuisances that are fitted along with each log.
     pub nuisance: Nuisances,
     /// Whether residuals beyond 1.345 standard deviations count linearly.
     pub huber: bool,
@@ -68,7 +68,7 @@ impl Default for Plan {
     }
 }
 
-/// What has a value of a separate parameter for itself.
+/// The groups that have a value of a separate parameter for themselves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Per {
     /// The experiments of a campaign together.
@@ -78,7 +78,7 @@ pub enum Per {
     Log,
 }
 
-/// What is known of a number before its logs are seen; SI.
+/// Prior knowledge of a number; SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Prior {
     /// Normally distributed.
@@ -105,13 +105,13 @@ pub enum Prior {
 }
 
 impl Plan {
-    /// What is searched for: keys, those of a tie joined by ` = `, and sums.
+    /// Names of the free parameters: keys, those of a tie joined by ` = `, and sums.
     pub fn names(&self) -> impl Iterator<Item = String> {
         let tied = self.tied.iter().map(|keys| keys.join(" = "));
         self.free.iter().cloned().chain(tied).chain(self.lumped.iter().cloned())
     }
 
-    /// What the experiment of this name is part of, as far as separate parameters go: its campaign, or itself.
+    /// The group of the experiment of this name, as far as separate parameters go: its campaign, or itself.
     pub fn part<'a>(&'a self, experiment: &'a str) -> &'a str {
         match self.per {
             Per::Log => experiment,
@@ -142,7 +142,7 @@ impl Prior {
     }
 }
 
-/// What is fitted along with the logs, and is no number of the machine.
+/// Numbers that are fitted along with the logs, and are none of the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Nuisances {
     /// The input acts later than logged.

@@ -17,13 +17,13 @@ use std::path::Path;
 /// Everything needed to repeat a run of a gantry.
 #[derive(Debug, Clone)]
 pub struct GantryCase {
-    /// What the file says it is; its name where it does not say.
+    /// The title of the file; its name where it has none.
     pub title: String,
     /// The machine.
     pub gantry: Gantry,
-    /// What is done with it, in the file's order.
+    /// The experiments, in the file's order.
     pub experiments: Vec<GantryExperiment>,
-    /// What is varied in many runs, where the file says so.
+    /// The sweep, where the file has one.
     pub sweep: Option<Sweeping>,
     /// The text it was read from, with `--set` applied: read again, it gives the same case.
     pub text: String,
@@ -36,7 +36,7 @@ pub struct GantryCase {
 pub struct GantryExperiment {
     /// Its name, unique within the case.
     pub name: String,
-    /// What is fed into the left and the right amplifier.
+    /// The inputs of the left and the right amplifier.
     pub inputs: [Signal; DRIVES],
     /// End of the run, s.
     pub until: f64,
@@ -73,7 +73,7 @@ impl Opened {
         }
     }
 
-    /// What the file says it is; its name where it does not say.
+    /// The title of the file; its name where it has none.
     pub fn title(&self) -> &str {
         match self {
             Opened::Axis(case) => &case.title,
@@ -97,7 +97,7 @@ impl Opened {
         }
     }
 
-    /// What is varied in many runs, where the file says so.
+    /// The sweep, where the file has one.
     pub fn sweep(&self) -> Option<&Sweeping> {
         match self {
             Opened::Axis(case) => case.sweep.as_ref(),
@@ -112,7 +112,7 @@ pub(super) fn kind(root: &Table) -> Result<Option<Routing>> {
     root.optional("kind").map_or(Ok(None), |field| field.choice(&kinds))
 }
 
-/// What is told where an axis is wanted.
+/// The error where an axis is wanted.
 pub(super) fn no_axis(root: &Table, routing: Routing) -> Error {
     let field = root.optional("kind").unwrap_or_else(|| root.field.clone());
     let what = format!("this needs a single axis, and the case describes a gantry ({})", routing.name());

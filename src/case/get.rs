@@ -1,4 +1,4 @@
-//! What a case says under a key: the other direction of `--set`.
+//! The value of a case under a key: the other direction of `--set`.
 
 use super::tree::{Kind, Node, Source};
 use super::{Case, GantryCase, set};
@@ -26,7 +26,7 @@ pub enum Given {
 }
 
 impl Case {
-    /// What the text says under `key`, written as for `--set`: quantities in SI units. A parameter that has a default and is not in
+    /// The value of the text under `key`, written as for `--set`: quantities in SI units. A parameter that has a default and is not in
     /// the text is that default.
     ///
     /// ```
@@ -46,7 +46,7 @@ impl Case {
 }
 
 impl GantryCase {
-    /// What the text says under `key`, as [`Case::value`] tells it.
+    /// The value of the text under `key`, as [`Case::value`] tells it.
     ///
     /// ```
     /// use taut::case::{GantryCase, Given};

@@ -33,7 +33,7 @@ const MOST_PERIODS: f64 = 1e8;
 /// Most sines of a multisine.
 const MOST_TONES: usize = 1000;
 
-/// What an input has to know about the experiment it belongs to.
+/// The experiment that an input belongs to, as far as it matters to it.
 pub(super) struct Context<'a> {
     /// Where relative paths begin.
     pub folder: &'a Folder<'a>,

@@ -147,7 +147,7 @@ struct Sources<'a> {
     units: Option<Table<'a>>,
     scale: Option<Table<'a>>,
     offset: Option<Table<'a>>,
-    /// What a preset knows of the file.
+    /// The columns that a preset knows.
     columns: Vec<(&'static str, ColumnId, In)>,
     stage: &'a Stage,
     steps_per_turn: f64,
@@ -214,7 +214,7 @@ impl<'a> Sources<'a> {
         }))
     }
 
-    /// What a preset's column is in: of turns and steps of the motor, what one of them is behind the gear.
+    /// The unit of a preset's column: of turns and steps of the motor, one of them behind the gear.
     fn known_unit(&self, key: &str, of: In) -> Option<Unit> {
         let turn = match key {
             "reference" => TAU * self.stage.pulley_radius,
@@ -244,7 +244,7 @@ impl<'a> Sources<'a> {
         }
     }
 
-    /// What a count of the encoder is.
+    /// The size of a count of the encoder.
     fn count(&self, field: &Field) -> Result<f64> {
         let Some(encoder) = self.stage.encoder else {
             return Err(field
@@ -331,7 +331,7 @@ fn filter(field: &Field) -> Result<Filter> {
     Ok(Filter { column, values: list.iter().map(text).collect::<Result<_>>()?, keep })
 }
 
-/// What parts the columns.
+/// The separator of the columns.
 fn separator(field: &Field) -> Result<char> {
     match &field.node.kind {
         Kind::Text(text) if text == "\t" => Ok('\t'),

@@ -57,25 +57,25 @@ const LONGEST_FILE_NAME: usize = 200;
 /// Everything needed to repeat a run.
 #[derive(Debug, Clone)]
 pub struct Case {
-    /// What the file says it is; its name where it does not say.
+    /// The title of the file; its name where it has none.
     pub title: String,
     /// The machine.
     pub stage: Stage,
     /// How its runs are recorded, where the file says so.
     pub measurement: Option<Measurement>,
-    /// What is done with it, in the file's order.
+    /// The experiments, in the file's order.
     pub experiments: Vec<Experiment>,
-    /// What holds the cart where it should be, where the file says so.
+    /// The controller, where the file has one.
     pub controller: Option<Design>,
     /// Where it should be, in the file's order.
     pub moves: Vec<Move>,
-    /// What is to be found from their logs, where the file says so.
+    /// The plan of a fit to their logs, where the file has one.
     pub fit: Option<Plan>,
-    /// What the controller's gains are to be good for, where the file says so.
+    /// The tuning of the controller, where the file has one.
     pub tune: Option<Tuning>,
-    /// What a fit said of its estimates.
+    /// The estimates of a fit, as it left them.
     pub known: Vec<Known>,
-    /// What is varied in many runs, where the file says so.
+    /// The sweep, where the file has one.
     pub sweep: Option<Sweeping>,
     /// The text it was read from, with `--set` applied: read again, it gives the same case.
     pub text: String,
@@ -97,7 +97,7 @@ pub struct InputFile {
 pub struct Experiment {
     /// Its name, unique within the case.
     pub name: String,
-    /// What is fed into the amplifier.
+    /// The input of the amplifier.
     pub input: Signal,
     /// End of the run, s.
     pub until: f64,
@@ -105,7 +105,7 @@ pub struct Experiment {
     pub every: f64,
     /// Where it starts from.
     pub initial: Initial,
-    /// What was measured in it, if the file names a log. Its times are the experiment's.
+    /// Its log, if the file names one. Its times are the experiment's.
     pub log: Option<Arc<Log>>,
 }
 
@@ -261,7 +261,7 @@ pub fn text_with(whole: &str, files: &[InputFile], name: impl Fn(&InputFile) -> 
     text + &whole[end..]
 }
 
-/// What the file says it is; its name where it does not say.
+/// The title of the file; its name where it has none.
 fn title(root: &Table, name: &Path) -> Result<String> {
     match root.optional("title") {
         Some(field) => Ok(field.text()?.to_string()),
@@ -292,7 +292,7 @@ fn read_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// What the system says about a file, in our words.
+/// The system's error on a file, in our words.
 fn told(error: &std::io::Error) -> String {
     use std::io::ErrorKind as Kind;
     match error.kind() {

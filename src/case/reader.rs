@@ -39,7 +39,7 @@ impl<'a> Field<'a> {
         Error::new(format!("{}: {what}", self.path)).at(self.source.place(self.node.span.clone()))
     }
 
-    /// What is told of a word that is known and that nobody reads.
+    /// The error for a word that is known and that nobody reads.
     pub fn unread(&self) -> Error {
         self.fail(format!("`{}` is known, but not read yet", self.key()))
             .next("this is a fault of taut: please report it")
@@ -225,7 +225,7 @@ impl<'a> Field<'a> {
 pub(super) struct Table<'a> {
     pub field: Field<'a>,
     entries: &'a [Entry],
-    /// What holds for keys that are not in it.
+    /// The table that holds for keys that are not in it.
     base: Option<Box<Table<'a>>>,
 }
 

@@ -120,7 +120,7 @@ impl<'a> Change<'a> {
         table.get_mut(step).ok_or_else(|| self.fail(format!("`{step}` cannot be made")))
     }
 
-    /// What the key names within `list`, which stands `depth` steps down: the number of an element, and of a point its part.
+    /// The element of `list` that the key names, `depth` steps down: the number of an element, and of a point its part.
     fn element<'v>(&self, list: &'v mut Value, depth: usize) -> Result<&'v mut Value> {
         let mut value = list;
         for (place, step) in self.key.iter().enumerate().skip(depth) {

@@ -113,7 +113,7 @@ pub(super) fn simple_drive(root: &Table) -> Result<Option<SimpleDrive>> {
     Ok(Some(SimpleDrive { force: table.number("force_per_input")?, drag: table.number("drag")? }))
 }
 
-/// What the table of a belt says beside stiffness and damping.
+/// The belt's data sheet: the keys beside stiffness and damping.
 pub(super) fn belt(table: &Table) -> Result<BeltSheet> {
     let kind = table.optional("type").map(|field| belt_type(&field)).transpose()?;
     let width = table.number_if_given("width")?;

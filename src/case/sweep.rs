@@ -11,7 +11,7 @@ use std::path::PathBuf;
 /// Most values of a grid, of one parameter.
 const MOST_VALUES: usize = 100_000;
 
-/// What `taut sweep` does.
+/// The plan of `taut sweep`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sweeping {
     /// How many machines are run; none where the design says it.
@@ -22,9 +22,9 @@ pub struct Sweeping {
     pub seed: u64,
     /// Interval between the rows that metrics are taken from, s; the experiment's where there is none.
     pub interval: Option<f64>,
-    /// What is varied by itself, by name: parameters, several tied by ` = `, groups, or `all`.
+    /// The parameters that are varied by themselves, by name: several tied by ` = `, groups, or `all`.
     pub vary: Vec<(String, Variation)>,
-    /// What a fit says of its parameters.
+    /// The fit that parameters are drawn from.
     pub from: Option<Origin>,
     /// Whether the runs are those that Sobol' indices need.
     pub indices: bool,
@@ -84,13 +84,13 @@ impl Sampling {
 /// How a parameter varies; SI.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Variation {
-    /// What values it takes.
+    /// The values that it takes.
     pub kind: Kinds,
     /// Where it is cut off, beside what the parameter may be at all.
     pub within: Option<[f64; 2]>,
 }
 
-/// What values a parameter takes.
+/// The values that a parameter takes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Kinds {
     /// Equally likely within this share of its value on either side.
@@ -103,7 +103,7 @@ pub enum Kinds {
     Factors(Vec<f64>),
 }
 
-/// What a fit left behind.
+/// The result of a fit that machines are drawn from.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Origin {
     /// Draws from its posterior, in this file.
@@ -112,7 +112,7 @@ pub enum Origin {
     Uncertainty,
 }
 
-/// What else of the case counts.
+/// Other parts of the case that count.
 pub(super) struct Context<'a> {
     pub machine: &'a dyn Numbers,
     /// Name of each experiment, and when it ends, s.
@@ -208,7 +208,7 @@ fn origin(field: &Field, context: &Context) -> Result<Origin> {
 const KINDS: &str = "\"20 %\", uniform = [least, most], normal = [mean, deviation], log_normal = [median, deviation of the logarithm], \
                      values = [...], grid = [from, to, count], factors = [...]";
 
-/// What stands at a key of `[sweep.vary]`.
+/// The variation at a key of `[sweep.vary]`.
 fn variation(field: &Field, key: &str, design: Sampling, machine: &dyn Numbers) -> Result<Variation> {
     let row = machine.row(key.split(" = ").next().unwrap_or(key));
     check_key(field, key, machine)?;

@@ -10,7 +10,7 @@ use toml_edit::{Document, Item, Value};
 pub(super) struct Source {
     pub name: PathBuf,
     pub text: String,
-    /// What `--set` put into the text.
+    /// Changes of the text by `--set`.
     pub overrides: Vec<Override>,
 }
 
@@ -179,7 +179,7 @@ fn value_node(value: &Value, outer: &Range<usize>) -> Node {
 }
 
 impl Kind {
-    /// What it is, for messages.
+    /// Its kind, for messages.
     pub fn word(&self) -> &'static str {
         match self {
             Kind::Text(_) => "a text",

@@ -6,10 +6,10 @@ use super::tree::Kind;
 use crate::design::{Design, Structure};
 use crate::error::Result;
 
-/// What `taut tune` looks for.
+/// The goal of `taut tune`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tuning {
-    /// What is made small; nothing, where bandwidth and damping alone say the gains.
+    /// The cost; none where bandwidth and damping alone give the gains.
     pub cost: Option<Cost>,
     /// Bandwidth that the gains are placed for, Hz; one that suits the axis where it is not said.
     pub bandwidth: Option<f64>,
@@ -30,7 +30,7 @@ pub struct Tuning {
 }
 
 impl Default for Tuning {
-    /// What holds where the file says nothing: the moves made good with Ms ≤ 1.8.
+    /// The default: the best moves with Ms ≤ 1.8.
     fn default() -> Self {
         Self {
             cost: Some(Cost::Moves),
@@ -46,7 +46,7 @@ impl Default for Tuning {
     }
 }
 
-/// What is made small.
+/// The cost that is minimised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cost {
     /// Of all moves: time until the cart settles, its largest error, and the current, each at worst.
@@ -55,7 +55,7 @@ pub enum Cost {
     Squares,
     /// Its largest magnitude.
     Peak,
-    /// What a disturbance does to the cart, without moves.
+    /// The effect of a disturbance on the cart, without moves.
     Disturbance,
 }
 
@@ -71,7 +71,7 @@ impl Cost {
     }
 }
 
-/// What a fit knows of a parameter.
+/// The estimate of a parameter by a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Known {
     /// Its key, or the name of a group, as in `[fit]`.

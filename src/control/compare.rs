@@ -24,7 +24,7 @@ impl Pair {
     }
 }
 
-/// What two spectra have in common.
+/// The comparison of two spectra.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
     /// 1 for the same form, 0 for nothing in common: Σ ab / √(Σ a² Σ b²).
@@ -90,7 +90,7 @@ fn step(spectrum: &Spectrum) -> f64 {
 }
 
 impl Comparison {
-    /// What the two suggest, in sentences, and what they cannot tell.
+    /// Suggestions of the two in sentences, and their limits.
     pub fn suggestions(&self) -> Vec<String> {
         let mut told = Vec::new();
         let alike = match self.similarity {

@@ -1,4 +1,4 @@
-//! What the reference alone tells: the command for an axis of one mass, and for one whose belt stretches.
+//! Feed-forward from the reference alone: the command for an axis of one mass, and for one whose belt stretches.
 
 use crate::design::{FeedForward, FeedForwardModel};
 use crate::signal::profile::Reference;
@@ -134,7 +134,7 @@ impl Compensation {
         }
     }
 
-    /// What the pulleys have to do so that the cart does what `y` says: quasi-static in the idler's own swing, exact otherwise.
+    /// The motion of the pulleys with which the cart follows `y`: quasi-static in the idler's own swing, exact otherwise.
     pub fn needed(&self, y: &Reference) -> Needed {
         let stage = &self.stage;
         let (r, sign) = (stage.pulley_radius, direction(y));

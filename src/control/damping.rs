@@ -31,7 +31,7 @@ const MOST: f64 = 0.5;
 const REACH: f64 = 3.0;
 const PARTS: i32 = 30;
 
-/// What a curve of one mode says.
+/// The mode that is fitted to a curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FittedMode {
     /// Undamped natural frequency, Hz.

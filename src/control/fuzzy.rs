@@ -43,7 +43,7 @@ impl FuzzyState {
     }
 }
 
-/// What the rules make of an error and its rate, both from −1 to 1; beyond that the outermost sets hold.
+/// The output of the rules for an error and its rate, both from −1 to 1; beyond that the outermost sets hold.
 pub fn infer(rules: &[Vec<f64>], error: f64, rate: f64) -> f64 {
     // Two sets overlap at any place: which is the lower, and how far the upper holds.
     let place = |value: f64, size: usize| {

@@ -75,7 +75,7 @@ impl Equations {
         (s, slope)
     }
 
-    /// What is left of the equations.
+    /// The residual of the equations.
     fn residual(&self, unknown: &DVector<f64>) -> DVector<f64> {
         let impulses = self.impulses(unknown);
         let frequencies: Vec<f64> = unknown.iter().skip(self.knobs()).copied().collect();

@@ -35,7 +35,7 @@ pub use outcome::{Deviation, Figures, MoveRun, Rows, Setup, close, closed_loop, 
 pub(crate) use outcome::{closed_loop_briefly, follow};
 pub use rest::Swing;
 pub(crate) use sampled::Added;
-pub use sampled::{Controller, Loop, Sample, Seen, measures_cart};
+pub use sampled::{Controller, Loop, Observation, Sample, measures_cart};
 pub use spread::{Worst, spread, worst};
 pub use standard::Standard;
 pub use welch::power_spectral_density;

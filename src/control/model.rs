@@ -21,7 +21,7 @@ pub struct Linear {
     pub cart: RowDVector<f64>,
     /// Its speed, m/s.
     pub cart_speed: RowDVector<f64>,
-    /// What each state is.
+    /// The quantity of each state.
     pub states: Vec<Quantity>,
 }
 
@@ -99,7 +99,7 @@ impl Linear {
         Self { a, b, e, measured, cart: at(CART), cart_speed, states }
     }
 
-    /// What happens in `time` (s) with inputs held: e^{A t} and ∫ e^{A s} ds [B E].
+    /// The transition over `time` (s) with inputs held: e^{A t} and ∫ e^{A s} ds [B E].
     pub fn sampled(&self, time: f64) -> (DMatrix<f64>, DMatrix<f64>) {
         let n = self.a.nrows();
         let mut whole = DMatrix::zeros(n + 2, n + 2);

@@ -47,7 +47,7 @@ impl DisturbanceState {
         self.state = Some(self.a * state + self.b * command + self.gain * (position - state[0]));
     }
 
-    /// What it makes at z of a command and of a position: w = W_u u + W_y y.
+    /// Its transfer at z from a command and from a position: w = W_u u + W_y y.
     pub(super) fn at(&self, z: Complex<f64>) -> [Complex<f64>; 2] {
         // s⁺ = (A − L c) s + b u + L y,  w = s₃
         let c = RowVector3::new(1.0, 0.0, 0.0);

@@ -26,7 +26,7 @@ pub struct Deviation {
     pub last: f64,
 }
 
-/// What a move shows: peaks over all instants and not only over rows, integrals over time.
+/// The key figures of a move: peaks over all instants and not only over rows, integrals over time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Figures {
     /// r φ₁ − y: the drive pulley from the cart's reference. A controller that makes up for the belt's stretch means part of it.
@@ -56,9 +56,9 @@ pub struct Figures {
 /// A move that was run.
 #[derive(Debug, Clone)]
 pub struct MoveRun {
-    /// What it shows.
+    /// Its key figures.
     pub figures: Figures,
-    /// What every run shows.
+    /// The key figures of any run.
     pub metrics: Metrics,
     /// Events, ending and cost.
     pub outcome: solve::Outcome,
@@ -66,7 +66,7 @@ pub struct MoveRun {
     pub samples: (u64, u64),
     /// The samples, if asked for.
     pub kept: Vec<Sample>,
-    /// What the command does after the profile.
+    /// The swing of the command after the profile.
     pub swing: Swing,
 }
 
@@ -75,7 +75,7 @@ pub struct MoveRun {
 pub struct Setup<'a> {
     /// The axis.
     pub stage: &'a Stage,
-    /// What the controller takes it for; mostly the same.
+    /// The machine that the controller assumes; mostly the same.
     pub model: &'a Stage,
     /// The controller.
     pub design: &'a Design,
@@ -262,7 +262,7 @@ impl<'a> Gauge<'a> {
         }
     }
 
-    /// What voltage and current do over a curve.
+    /// Adds voltage and current over a curve.
     fn power(&mut self, curve: &Curve) {
         let (v, i) = (curve.of(reading::VOLTAGE), curve.of(reading::CURRENT));
         if self.is_brief {
@@ -296,7 +296,7 @@ impl<'a> Gauge<'a> {
         }
     }
 
-    /// What the cart does over the part of a curve on which the reference is one polynomial.
+    /// Adds the cart's motion over the part of a curve on which the reference is one polynomial.
     fn track(&mut self, curve: &Curve, part: (f64, f64), reference: &Polynomial) {
         let (x, stretch) = (curve.of(reading::CART_POSITION), curve.of(reading::STRETCH));
         // x − y and r φ₁ − y = x − y + d₁

@@ -276,7 +276,7 @@ impl Found {
         self.file.file_name().unwrap_or_default().to_string_lossy().into_owned()
     }
 
-    /// What was looked at, in a sentence.
+    /// The source, in a sentence.
     pub fn told(&self) -> String {
         match &self.source {
             Source::Spectra(spectra) => {

@@ -10,7 +10,7 @@ const PLACES: usize = 21;
 /// Modes that move the cart less than this part of the strongest are left out.
 const LEAST: f64 = 1e-3;
 
-/// What holds the drive pulley.
+/// The state of the drive pulley.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Drive {
     /// A position loop or a stepper motor makes it follow its command: what vibrates is the cart on its belt.

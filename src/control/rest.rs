@@ -1,4 +1,4 @@
-//! What the command does after the profile.
+//! The command after the profile.
 
 /// Half of what the command goes to and fro after the profile.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -19,7 +19,7 @@ pub struct Solution {
     pub x: DMatrix<f64>,
     /// K: the feedback u = −K x.
     pub gain: DMatrix<f64>,
-    /// What is left of the equation, relative to the largest of its terms, in scaled states.
+    /// The residual of the equation, relative to the largest of its terms, in scaled states.
     pub residual: f64,
 }
 

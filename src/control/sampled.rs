@@ -11,9 +11,9 @@ use crate::stage::{Encoder, EncoderPlace, Stage};
 use crate::trajectory::Interval;
 use std::collections::VecDeque;
 
-/// What a controller knows at a sample.
+/// Measurements and references that a controller has at a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Seen {
+pub struct Observation {
     /// Time of the sample, s.
     pub time: f64,
     /// Where the cart should be now.
@@ -30,14 +30,14 @@ pub struct Seen {
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};
-/// use taut::control::{Controller, Loop, Seen, close};
+/// use taut::control::{Controller, Loop, Observation, close};
 /// use taut::signal::profile::{Leg, Limits, Profile};
 /// use taut::solve::Solver;
 ///
 /// /// So many volts per metre.
 /// struct Proportional(f64);
 /// impl Controller for Proportional {
-///     fn step(&mut self, seen: &Seen) -> f64 {
+///     fn step(&mut self, seen: &Observation) -> f64 {
 ///         self.0 * (seen.reference.position - seen.position)
 ///     }
 ///     fn reset(&mut self) {}
@@ -52,7 +52,7 @@ pub struct Seen {
 /// ```
 pub trait Controller {
     /// The command that follows from what is seen, V or A.
-    fn step(&mut self, seen: &Seen) -> f64;
+    fn step(&mut self, seen: &Observation) -> f64;
 
     /// Is told what the limit left of the command just asked for.
     fn limited(&mut self, _given: f64) {}
@@ -70,7 +70,7 @@ pub struct Loop {
     pub delay: f64,
     /// Largest command either way, V or A.
     pub limit: Option<f64>,
-    /// How far ahead of a sample [`Seen::ahead`] is, s.
+    /// How far ahead of a sample [`Observation::ahead`] is, s.
     pub lead: f64,
 }
 
@@ -116,7 +116,7 @@ pub(super) struct Sampled<'a> {
     /// The command after the profile.
     pub(super) at_rest: Rest,
     pub(super) kept: Option<Vec<Sample>>,
-    /// What is added to the command.
+    /// An input added to the command.
     added: Option<&'a Added>,
 }
 
@@ -251,7 +251,7 @@ impl Sampled<'_> {
             return (self.acting, self.clock.times(self.k));
         }
         let reference = self.profile.at(time);
-        let seen = Seen {
+        let seen = Observation {
             time,
             reference,
             ahead: if lead == 0.0 { reference } else { self.profile.at(time + lead) },

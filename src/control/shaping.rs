@@ -19,7 +19,7 @@ pub const ALLOWED_SMOOTHING: f64 = 0.12e-3;
 /// Where within the uncertainty of its frequency a mode is looked at.
 const PARTS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 
-/// What vibrates.
+/// The vibration that a shaper is chosen for.
 #[derive(Debug, Clone, Copy)]
 pub enum Target<'a> {
     /// Density over frequency; damping is not known.
@@ -110,7 +110,7 @@ pub struct Fitted {
     pub smoothing: f64,
     /// Greatest acceleration with at most [`ALLOWED_SMOOTHING`], m/s².
     pub max_acceleration: f64,
-    /// What is compared, smaller is better: smoothing in mm times a measure of the vibration.
+    /// The score that is compared, smaller is better: smoothing in mm times a measure of the vibration.
     pub score: f64,
     /// Whether it may be recommended.
     pub is_candidate: bool,

@@ -26,7 +26,7 @@ pub fn spread(stage: &Stage, share: f64) -> Vec<(String, Stage)> {
 pub struct Worst {
     /// Largest |x − y|, m; infinite where a run does not reach its end.
     pub error: f64,
-    /// What is wrong with that axis.
+    /// The parameter that is off on that axis, and by how much.
     pub axis: String,
     /// Largest |x − y| at the end, m.
     pub last: f64,

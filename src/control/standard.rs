@@ -5,7 +5,7 @@ use super::filter::Biquad;
 use super::fuzzy::FuzzyState;
 use super::observer::DisturbanceState;
 use super::pid::{CascadeState, PidState};
-use super::sampled::{Controller, Seen};
+use super::sampled::{Controller, Observation};
 use super::sliding::SlidingState;
 use super::state_feedback::StateFeedbackState;
 use crate::design::{Design, Structure};
@@ -20,7 +20,7 @@ pub struct Standard {
     compensation: Compensation,
     observer: Option<DisturbanceState>,
     filters: Vec<Biquad>,
-    /// What was asked for last, and the measured position and dry friction there.
+    /// The last command asked for, and the measured position and dry friction there.
     asked: f64,
     position: f64,
     dry: f64,
@@ -105,7 +105,7 @@ fn check(design: &Design, model: &Stage) -> Result<()> {
 }
 
 impl Controller for Standard {
-    fn step(&mut self, seen: &Seen) -> f64 {
+    fn step(&mut self, seen: &Observation) -> f64 {
         let target = self.compensation.target(&seen.reference);
         let mut forward = self.compensation.command(&seen.ahead);
         let own = match &mut self.core {

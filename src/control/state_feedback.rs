@@ -43,7 +43,7 @@ pub struct StateFeedbackState {
     pub residuals: [f64; 2],
 }
 
-/// What a linear view of it needs; names as in [`StateFeedbackState`].
+/// The parts that a linear view of it needs; names as in [`StateFeedbackState`].
 #[derive(Debug, Clone)]
 pub(super) struct Parts {
     pub every: f64,

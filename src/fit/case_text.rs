@@ -91,7 +91,7 @@ impl Fit {
     }
 }
 
-/// What is to be changed in the text so that `key` is `value`.
+/// The changes of the text with which `key` is `value`.
 fn changes_of(stage: &Stage, case: &Case, key: &str, value: f64) -> Vec<String> {
     let Some(row) = named(key) else { return Vec::new() };
     let own: Vec<(String, f64)> = values(stage)

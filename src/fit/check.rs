@@ -9,20 +9,20 @@ use crate::error::Result;
 use crate::log::Survey;
 use crate::solve::Flow;
 
-/// What there is to know before a fit.
+/// The result of a check: all that there is to know before a fit.
 #[derive(Debug, Clone)]
 pub struct Check {
-    /// What each log shows.
+    /// The survey of each log.
     pub logs: Vec<Survey>,
     /// The balance of torques of a rigid axis, by regression; none where the logs do not allow one.
     pub balance: Option<Balance>,
-    /// What they determine together; none where everything that is searched for ended at a bound.
+    /// The parameters that they determine together; none where every free parameter ended at a bound.
     pub identifiability: Option<Identifiability>,
-    /// What to do about each group that is not determined.
+    /// Advice for each group that is not determined.
     pub choices: Vec<Vec<String>>,
     /// Which errors that is for.
     pub noise_words: String,
-    /// What one more experiment would tell, the best first.
+    /// Proposals of one more experiment, the best first.
     pub experiments: Vec<Proposal>,
     /// The fit that says so.
     pub fit: Fit,

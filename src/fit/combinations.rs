@@ -1,4 +1,4 @@
-//! What is determined of parameters that are not: their sums, ratios and products, with names and intervals.
+//! Combinations of undetermined parameters that are determined: their sums, ratios and products, with names and intervals.
 
 use super::identify::Directions;
 use super::problem::Problem;

@@ -1,7 +1,7 @@
 //! Whether the controller of a case is the one that made a log: what it makes of the logged positions, beside the logged input.
 
 use crate::case::Case;
-use crate::control::{Controller, Loop, Seen, Standard};
+use crate::control::{Controller, Loop, Observation, Standard};
 use crate::log::{Log, Quantity};
 use crate::signal::profile::Profile;
 use crate::stage::{EncoderPlace, Stage};
@@ -31,7 +31,7 @@ pub(super) fn reproduced(case: &Case, log: &Log) -> Option<f64> {
         if time + timing.delay > end || k > 100_000_000 {
             break;
         }
-        let seen = Seen {
+        let seen = Observation {
             time,
             reference: profile.at(time),
             ahead: profile.at(time + timing.lead),
@@ -55,7 +55,7 @@ pub(super) fn reproduced(case: &Case, log: &Log) -> Option<f64> {
     percent.is_finite().then_some(percent)
 }
 
-/// What the controller's encoder shows along a log, m along the belt, gaps filled.
+/// The reading of the controller's encoder along a log, m along the belt, gaps filled.
 fn position(stage: &Stage, log: &Log) -> Option<Vec<f64>> {
     let of = |quantity: Quantity, arm: f64| {
         let output = log.output(quantity).filter(|output| !output.absolute)?;

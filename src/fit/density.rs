@@ -38,7 +38,7 @@ const STEP: f64 = 0.3;
 /// The logarithm of a variable's prior density, and its slope.
 pub type Prior<'a> = Box<dyn Fn(f64) -> (f64, f64) + Sync + 'a>;
 
-/// What the density is made of.
+/// The parts of the density.
 pub struct Ingredients<'a, R> {
     /// The residuals.
     pub problem: R,
@@ -48,15 +48,15 @@ pub struct Ingredients<'a, R> {
     pub jacobian: DMatrix<f64>,
     /// Where the variables may be.
     pub bounds: Bounds,
-    /// What is known beforehand; flat without.
+    /// The priors; flat without.
     pub priors: Vec<Option<Prior<'a>>>,
-    /// What the sum of squares is divided by.
+    /// The divisor of the sum of squares.
     pub inflation: f64,
     /// Residuals beyond this count linearly.
     pub huber: f64,
 }
 
-/// What was drawn.
+/// The draws.
 pub struct Sampled {
     /// Values of the variables.
     pub draws: Draws,

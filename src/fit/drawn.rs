@@ -11,7 +11,7 @@ use std::path::Path;
 
 /// The machine of `case` with each row of a file of draws: a column for everything that `plan` searches for, such as `cart.mass_kg`.
 ///
-/// What is no number of the machine, a log's delay say, is passed over. Errors: a column that is not there, values that are missing.
+/// Numbers that are none of the machine, a log's delay say, are passed over. Errors: a column that is not there, values that are missing.
 pub fn machines(case: &Case, plan: &Plan, file: &Path) -> Result<Vec<Stage>> {
     let (parameters, columns) = drawn(case, plan, &[], file)?;
     let machine = |row: usize| {

@@ -15,21 +15,21 @@ use crate::solve::Flow;
 /// Changes that leave as much of the sum of squares as the best one but for this part are as good.
 const ALIKE: f64 = 0.02;
 
-/// What single changes make of the errors of a machine.
+/// The effect of single changes on the errors of a machine.
 #[derive(Debug, Clone)]
 pub struct Drift {
     /// The errors of the machine as it is.
     pub unchanged: Vec<Together>,
     /// Single changes, the one that explains most first.
     pub changes: Vec<Change>,
-    /// What it took.
+    /// The effort.
     pub work: Work,
 }
 
 /// A single change.
 #[derive(Debug, Clone)]
 pub struct Change {
-    /// What is changed, from which value to which.
+    /// The parameter, with its old and its new value.
     pub estimate: Estimate,
     /// The errors with it.
     pub errors: Vec<Together>,

@@ -1,4 +1,4 @@
-//! What is to be known of a fit before its numbers are used: faults of the logs, and of the search, in two grades.
+//! Warnings and notes on a fit, before its numbers are used: faults of the logs, and of the search.
 
 use super::Fit;
 use super::controller::reproduced;
@@ -56,7 +56,7 @@ impl Grade {
 pub struct Finding {
     /// How much it matters.
     pub grade: Grade,
-    /// What it is about, in a word for programs.
+    /// Its subject, in a word for programs.
     pub code: &'static str,
     /// The log it is about; none if it is about the fit.
     pub log: Option<String>,
@@ -87,7 +87,7 @@ fn finding(grade: Grade, code: &'static str, text: String) -> Finding {
     Finding { grade, code, log: None, text }
 }
 
-/// What the survey of each log found.
+/// The findings of the survey of each log.
 fn of_logs(case: &Case, plan: &Plan, problem: &Problem) -> Vec<Finding> {
     let mut all = Vec::new();
     for experiment in &case.experiments {
@@ -292,7 +292,7 @@ fn plain(value: f64, unit: &str) -> String {
 }
 
 impl Balance {
-    /// What it means that so much of the torque is left.
+    /// The judgement on the share of torque that is left.
     pub fn words(&self) -> &'static str {
         match self.unexplained {
             left if left < 0.1 => "a rigid axis with viscous and Coulomb friction explains these logs",

@@ -1,11 +1,11 @@
-//! What a fit found, and how well it is known.
+//! The result of a fit, and how well it is known.
 
 use super::scores::LogFit;
 use super::{Combination, Disagreement, Ending, Finding, Grade, Identifiability};
 use crate::log::Quantity;
 use crate::stage::Stage;
 
-/// What a fit found.
+/// The result of a fit.
 #[derive(Debug, Clone)]
 pub struct Fit {
     /// The machine with the estimates; what is not determined is what the case says.
@@ -16,23 +16,23 @@ pub struct Fit {
     pub estimates: Vec<Estimate>,
     /// Correlations of the estimates, row by row; NaN where one is at a bound.
     pub correlation: Vec<Vec<f64>>,
-    /// What was taken as the standard deviation of each quantity's residuals.
+    /// The standard deviation of each quantity's residuals.
     pub noise: Vec<(Quantity, f64)>,
     /// How each log is met: those fitted, then those held out.
     pub logs: Vec<LogFit>,
-    /// What the logs determine at the estimates.
+    /// The information of the logs at the estimates.
     pub identifiability: Option<Identifiability>,
-    /// What to do about each group of parameters that is not determined.
+    /// Advice for each group of parameters that is not determined.
     pub choices: Vec<Vec<String>>,
     /// Parts of the logs that say otherwise than the whole, by more than noise would make of it.
     pub disagreement: Option<Disagreement>,
-    /// What is to be known of logs and search before the estimates are used, warnings first.
+    /// Findings on logs and search, warnings first.
     pub findings: Vec<Finding>,
     /// The variables of the search where it ended.
     pub point: Vec<f64>,
     /// How the search ended.
     pub ending: Ending,
-    /// What the last step promised, in standard errors.
+    /// The gain that the last step promised, in standard errors.
     pub decrement: f64,
     /// ½ Σ r² of the weighted residuals.
     pub cost: f64,
@@ -47,11 +47,11 @@ pub struct Fit {
     pub values: usize,
     /// Variables, what is fitted along included.
     pub variables: usize,
-    /// What it took.
+    /// The effort.
     pub work: Work,
 }
 
-/// What a fit took.
+/// The effort of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Work {
     /// Jacobians.
@@ -93,7 +93,7 @@ pub struct Estimate {
     pub at_bound: bool,
     /// The part of the logs that it is for, by its place among the fit's; none where it is for all of them.
     pub part: Option<usize>,
-    /// What it sets in the case file: key and value.
+    /// The keys that it sets in the case file, with their values.
     pub sets: Vec<(String, f64)>,
 }
 
@@ -115,7 +115,7 @@ impl Fit {
         self.estimates.iter().all(Estimate::is_determined)
     }
 
-    /// What makes the result not to be relied on.
+    /// The findings that make the result not to be relied on.
     pub fn warnings(&self) -> impl Iterator<Item = &Finding> {
         self.findings.iter().filter(|finding| finding.grade == Grade::Warning)
     }
@@ -137,7 +137,7 @@ impl Fit {
         }
     }
 
-    /// What is determined of parameters that are not.
+    /// The combinations of undetermined parameters that are determined.
     pub fn combinations(&self) -> impl Iterator<Item = &Combination> {
         self.identifiability.iter().flat_map(|found| &found.groups).flat_map(|group| &group.combinations)
     }

@@ -11,13 +11,13 @@ use crate::stage::Stage;
 /// Fewest rows that a start is fitted to.
 const FEWEST: usize = 20;
 
-/// What the fitted logs say beside parameters.
+/// Results of the fitted logs beside parameters.
 pub(super) struct Known<'a> {
     /// Deviation of each quantity's residuals.
     pub noise: &'a [(Quantity, f64)],
     /// Delays, gains and offsets of single logs, in the mean.
     pub means: Vec<(Nuisance, f64)>,
-    /// What all logs share, and its values.
+    /// Nuisances that all logs share, and their values.
     pub shared: Vec<(Extra, f64)>,
 }
 

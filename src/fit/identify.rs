@@ -1,4 +1,4 @@
-//! What logs can tell: the sensitivity of all outputs to each parameter, and the combinations that change nothing.
+//! Identifiability: the sensitivity of all outputs to each parameter, and the combinations that change nothing.
 //!
 //! With J the derivatives of the weighted outputs with respect to relative changes of the parameters, and what else is
 //! fitted along projected out, J = U S Vᵀ: along vᵢ the outputs change by sᵢ standard deviations of white noise. How far off that
@@ -30,7 +30,7 @@ const ROUNDING: f64 = 1e-8;
 /// Iterations of a singular value decomposition before it is given up.
 const MOST_SWEEPS: usize = 10_000;
 
-/// What the logs say of the parameters.
+/// The information of the logs on the parameters.
 #[derive(Debug, Clone)]
 pub struct Identifiability {
     /// Names of the free parameters, those of the machine first, then what is shared.
@@ -54,7 +54,7 @@ pub struct Group {
     pub members: Vec<usize>,
     /// How many combinations of them are determined.
     pub determined: usize,
-    /// What can be said in words and numbers.
+    /// The combination in words and numbers.
     pub words: String,
     /// The sums, ratios and products of them that are determined, as far as they have a name.
     pub combinations: Vec<Combination>,
@@ -221,7 +221,7 @@ impl Identifiability {
         text
     }
 
-    /// What to do about a group, each a line.
+    /// Advice for a group, a line each.
     pub fn choices(&self, problem: &Problem, group: &Group) -> Vec<String> {
         let names: Vec<&str> = group.members.iter().map(|&j| self.names[j].as_str()).collect();
         let mut choices = Vec::new();
@@ -334,7 +334,7 @@ fn leads(v: &DMatrix<f64>, lost: &[usize]) -> Vec<usize> {
 /// The least root mean square of a value's change, in its weights, that a machine shows.
 fn shows(problem: &Problem) -> f64 {
     let seen = problem.runs.iter().flat_map(|run| &run.seen);
-    let of = |seen: &super::run::Seen| {
+    let of = |seen: &super::run::MeasuredOutput| {
         let weight = seen.weights.iter().copied().fold(0.0, f64::max);
         weight * (SHOWS * seen.step / 12f64.sqrt()).max(MODEL * super::problem::extent(&seen.values))
     };

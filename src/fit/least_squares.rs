@@ -213,7 +213,7 @@ pub struct Minimum {
     pub cost: f64,
     /// The Jacobian there, by central differences where the search converged.
     pub jacobian: DMatrix<f64>,
-    /// What the next step promised, in standard errors.
+    /// The gain that the next step promised, in standard errors.
     pub decrement: f64,
     /// Variables held at a bound.
     pub at_bound: Vec<bool>,

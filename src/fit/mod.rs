@@ -45,7 +45,7 @@ pub use profile::{Profile, profiles};
 pub use proposals::Proposal;
 pub use regression::{Balance, regression};
 pub use residual_force::{ResidualForce, residual_force};
-pub use run::{Extra, Nuisance, Run, Seen};
+pub use run::{Extra, MeasuredOutput, Nuisance, Run};
 pub use scores::{LogFit, OutputFit, Score, Together, together};
 use search::{HUBER, Searched, search};
 pub use sub_records::Disagreement;

@@ -29,7 +29,7 @@ const POWERS: f64 = 3.0;
 const LEAST_POWER: f64 = 0.1;
 const MOST_POWERS: usize = 14;
 
-/// What counts for white noise alone before anything is seen.
+/// The share of white noise before anything is seen.
 const WHITE: f64 = 0.3;
 
 /// By so much a second slow noise, or one that swings, has to raise the logarithm of the likelihood before it counts.
@@ -57,7 +57,7 @@ struct Series {
     own: usize,
     /// Block by block the moved columns, and the residual behind them.
     rows: Vec<f64>,
-    /// What a slow noise of one makes of each.
+    /// The answer of each to a slow noise of one.
     gain: Vec<f64>,
     /// Times, s.
     time: Vec<f64>,
@@ -74,7 +74,7 @@ struct Told {
     freedom: f64,
 }
 
-/// What noise of one quantity makes of the parameters.
+/// The spread of the parameters from noise of one quantity.
 pub(super) struct Spread {
     /// Covariances of the globals with their weights.
     parts: Vec<(f64, DMatrix<f64>)>,

@@ -26,22 +26,22 @@ pub const EFFECTIVE: f64 = 400.0;
 /// Share of divergent transitions that is passed over.
 const DIVERGING: f64 = 0.01;
 
-/// What was drawn, and whether to believe it.
+/// The draws, and whether to believe them.
 #[derive(Debug, Clone)]
 pub struct Posterior {
-    /// What was drawn: parameters, what all logs share, then what each log has of its own.
+    /// The variables: parameters, nuisances that all logs share, then those of each log.
     pub variables: Vec<Credible>,
     /// How many of them stand among the estimates of the fit, in its order.
     pub globals: usize,
     /// The draws, SI.
     pub draws: Draws,
-    /// What the logarithm of the likelihood was divided by, for autocorrelated residuals.
+    /// The divisor of the logarithm of the likelihood, for autocorrelated residuals.
     pub inflation: f64,
     /// Whether the slopes along a path were those at the fit.
     pub fixed_slopes: bool,
 }
 
-/// What is known of one number.
+/// The posterior of one number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Credible {
     /// Its name; with the log's before it, where it is the log's own.
@@ -180,7 +180,7 @@ impl Posterior {
     }
 }
 
-/// What the covariance of the fit grows by for autocorrelated residuals, at most, and the variance of weighted residuals.
+/// The factor by which autocorrelated residuals widen the covariance of the fit, at most, and the variance of weighted residuals.
 fn inflation(problem: &Problem, residuals: &[f64], jacobian: &DMatrix<f64>, at: &[f64], bounds: &Bounds) -> (f64, f64) {
     let held: Vec<bool> = (0..at.len()).map(|j| at[j] <= bounds.low[j] || at[j] >= bounds.high[j]).collect();
     let squares: f64 = residuals.iter().map(|r| r * r).sum();

@@ -1,7 +1,7 @@
 //! All logs of a case as one least-squares problem.
 
 use super::least_squares::{Bounds, Differences, Residuals, Step};
-use super::run::{Extra, Nuisance, Run, Seen, Setting, is_position, rounding_at_rest};
+use super::run::{Extra, MeasuredOutput, Nuisance, Run, Setting, is_position, rounding_at_rest};
 use crate::case::{Case, Nuisances, Plan, Scope, matches};
 use crate::error::{Error, Result};
 use crate::log::Quantity;
@@ -19,18 +19,18 @@ const LATE: f64 = 10.0;
 /// Noise of first order that keeps to itself for 30 samples is so many times what neighbouring values differ by.
 const SHARED: f64 = 5.0;
 
-/// What is searched for, in which logs.
+/// The variables of a fit, and its logs.
 #[derive(Clone)]
 pub struct Problem<'a> {
     /// The machine as the case has it.
     pub stage: Stage,
-    /// What is searched for of it.
+    /// The free parameters of it.
     pub parameters: Vec<Free>,
     /// The part of the logs that each of these is for, by its place in `parts`; none where it is for all of them.
     pub of: Vec<Option<usize>>,
     /// Names of the parts of the logs that have parameters for themselves: campaigns, or logs.
     pub parts: Vec<String>,
-    /// What holds for all logs and is no number of the machine.
+    /// Nuisances that all logs share.
     pub shared: Vec<Extra>,
     /// The logs that are fitted.
     pub runs: Vec<Run>,
@@ -54,7 +54,7 @@ impl Noise {
     }
 }
 
-/// What says that it is enough: Ctrl-C, say.
+/// Asked whether to stop: Ctrl-C, say.
 pub type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
 
 /// How a variable of the search becomes the value of a free parameter.
@@ -91,7 +91,7 @@ impl Scale {
 }
 
 impl<'a> Problem<'a> {
-    /// What `plan` asks of the logs of `case`.
+    /// The problem that `plan` poses with the logs of `case`.
     pub fn new(case: &Case, plan: &Plan) -> Result<Self> {
         let stage = case.stage.clone();
         let (parameters, of, parts) = separated(case, plan, parameters(&stage, plan, &[])?)?;
@@ -237,7 +237,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// What the values of each quantity do from one to the next, and what its converter rounds.
+    /// The noise of each quantity: its correlation from one value to the next, and the rounding of its converter.
     pub fn noise(&self) -> Noise {
         let mut noise = Vec::new();
         for quantity in self.quantities() {
@@ -319,7 +319,8 @@ impl<'a> Problem<'a> {
     /// Residuals that are rounding, with the present weights: of each quantity `ROUNDING` of how far it ranges.
     pub fn rounding(&self) -> f64 {
         let seen = self.runs.iter().flat_map(|run| &run.seen);
-        let of = |seen: &Seen| ROUNDING * extent(&seen.values) * seen.weights.iter().copied().fold(0.0, f64::max);
+        let of =
+            |seen: &MeasuredOutput| ROUNDING * extent(&seen.values) * seen.weights.iter().copied().fold(0.0, f64::max);
         seen.map(of).fold(0.0, f64::max)
     }
 
@@ -392,7 +393,7 @@ impl<'a> Problem<'a> {
         self.units[j].slope(value)
     }
 
-    /// What counts as a change by 100 %, in the variable, of a machine like `stage`: of what may be zero, its value or what is much of it.
+    /// The change of the variable that counts as 100 %, of a machine like `stage`: where it may be zero, its value or a typical one.
     pub fn whole(&self, stage: &Stage, j: usize, x: f64) -> f64 {
         match self.units.get(j) {
             Some(Scale::Linear(unit)) => {
@@ -547,7 +548,7 @@ fn separated(case: &Case, plan: &Plan, all: Vec<Free>) -> Result<Separated> {
     Ok((parameters, of, parts))
 }
 
-/// What `plan` searches for of a machine of which `others` are set, too.
+/// The free parameters of `plan` in a machine of which `others` are set, too.
 pub fn parameters(stage: &Stage, plan: &Plan, others: &[&str]) -> Result<Vec<Free>> {
     let own = plan.free.iter().chain(plan.tied.iter().flatten()).map(String::as_str);
     let all: Vec<&str> = own.chain(others.iter().copied()).collect();
@@ -598,7 +599,7 @@ fn scale(stage: &Stage, parameter: &Free, runs: &[Run]) -> Scale {
     }
 }
 
-/// What is much of a quantity that may be zero: of friction a tenth of what the motor gives at the greatest input; none where that
+/// A typical value of a quantity that may be zero: of friction a tenth of the motor's force at the greatest input; none where that
 /// depends on the machine alone, as the gain of an amplifier, which has whatever unit its input has.
 fn typical(stage: &Stage, parameter: &Free, runs: &[Run]) -> Option<f64> {
     let most = runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));

@@ -1,4 +1,4 @@
-//! What one more experiment would tell: the sensitivities of its outputs beside those of the logs.
+//! Proposals of one more experiment: the sensitivities of its outputs beside those of the logs.
 
 use super::identify::{Identifiability, LIMIT};
 use super::least_squares::{Differences, Step};
@@ -14,9 +14,9 @@ use nalgebra::DMatrix;
 /// One more experiment.
 #[derive(Debug, Clone)]
 pub struct Proposal {
-    /// What is done or measured.
+    /// The action or the measurement.
     pub name: &'static str,
-    /// What that would tell.
+    /// Its promise, in words.
     pub told: String,
     /// Parameters determined with it.
     pub determined: usize,
@@ -24,15 +24,15 @@ pub struct Proposal {
     score: f64,
 }
 
-/// What is measured of a problem whose logs have these deviations, and with which deviations.
+/// The quantities to measure in a problem whose logs have these deviations, and with which deviations.
 type Measured = fn(&Problem, &[(Quantity, f64)]) -> Vec<(Quantity, f64)>;
 
-/// What is done once more, and how.
+/// An experiment to repeat, with a change.
 struct Idea {
     name: &'static str,
-    /// What is measured beside what the logs hold; a deviation for each.
+    /// The quantities to measure beside those of the logs; a deviation for each.
     measured: Measured,
-    /// What is done to the machine.
+    /// The change of the machine.
     change: fn(&mut Stage),
     /// Whether the input is turned round.
     reversed: bool,
@@ -45,12 +45,12 @@ fn same(problem: &Problem, noise: &[(Quantity, f64)]) -> Vec<(Quantity, f64)> {
     noise.to_vec()
 }
 
-/// What the logs measure and one more quantity.
+/// The quantities of the logs and one more.
 fn with(noise: &[(Quantity, f64)], quantity: Quantity, deviation: f64) -> Vec<(Quantity, f64)> {
     noise.iter().copied().chain([(quantity, deviation)]).collect()
 }
 
-/// What a position of the cart is known to, if an encoder like that of the logs were there.
+/// The deviation of a position of the cart, if an encoder like that of the logs were there.
 fn cart_noise(problem: &Problem, noise: &[(Quantity, f64)]) -> f64 {
     let r = problem.stage.pulley_radius;
     let known = noise.iter().find(|(quantity, _)| is_position(*quantity));
@@ -126,7 +126,7 @@ fn peak_current(problem: &Problem) -> f64 {
     }
 }
 
-/// What each idea would tell, ranked; only those that tell something, and not what the logs have.
+/// The gain of each idea, ranked; only those that gain something and are not in the logs already.
 pub(super) fn proposals(found: &Searched, judged: &Judged) -> Vec<Proposal> {
     let Searched { problem, best, noise, .. } = found;
     // White noise that is as bad as what the residuals show.
@@ -151,7 +151,7 @@ pub(super) fn proposals(found: &Searched, judged: &Judged) -> Vec<Proposal> {
     proposals
 }
 
-/// What `found` tells more than `now`.
+/// The gain of `found` over `now`.
 fn told(now: &Identifiability, found: &Identifiability) -> String {
     let places = || 0..found.names.len();
     let gained: Vec<String> = places()
@@ -227,7 +227,7 @@ fn with_rows(
     Some(all)
 }
 
-/// What is measured of run `index` with the idea, in standard deviations; none where the model does not reach its end.
+/// The outputs of run `index` with the idea, in standard deviations; none where the model does not reach its end.
 fn answer(problem: &Problem, idea: &Idea, measured: &[(Quantity, f64)], index: usize, x: &[f64]) -> Option<Vec<f64>> {
     let run = &problem.runs[index];
     let mut stage = problem.stage_at(x);

@@ -37,7 +37,7 @@ pub struct ResidualForce {
     pub speed: Vec<f64>,
     /// Force of the motor on the cart, N.
     pub drive: Vec<f64>,
-    /// What is missing, N.
+    /// The missing force, N.
     pub force: Vec<f64>,
 }
 
@@ -57,7 +57,7 @@ impl ResidualForce {
     }
 }
 
-/// What a log lacks beside `stage`; none without an evenly sampled position, or where the model does not reach the end.
+/// The force that a log lacks beside `stage`; none without an evenly sampled position, or where the model does not reach the end.
 pub fn residual_force(stage: &Stage, log: &LogFit) -> Option<ResidualForce> {
     let output = log.outputs.iter().find(|output| is_position(output.quantity)).filter(|_| log.complete)?;
     let n = log.time.len();

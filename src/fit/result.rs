@@ -141,7 +141,7 @@ pub(super) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
     }
 }
 
-/// What the fitted logs say beside parameters, for those that are held out.
+/// Results of the fitted logs beside parameters, for those that are held out.
 pub(super) fn known<'a>(found: &'a Searched) -> Known<'a> {
     let Searched { problem, best, noise, .. } = found;
     let mut sums: Vec<(Nuisance, f64, usize)> = Vec::new();

@@ -23,7 +23,7 @@ const FEWEST: usize = 2;
 /// speeds, all else straight lines. With h the raster, that is off by at most h⁴|x⁗|/384, and h²|ÿ|/8.
 const RASTER: f64 = 8.0;
 
-/// What is known of a log beside what is looked for: fitted along, one for each log.
+/// A nuisance of a log: fitted along, one for each log.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Nuisance {
     /// The input acts this much later, s.
@@ -61,20 +61,20 @@ pub struct Extra {
     pub what: Nuisance,
     /// Value at zero of its variable.
     pub start: f64,
-    /// What one of its variable is.
+    /// The unit of its variable.
     pub unit: f64,
     /// Least and greatest value.
     pub low: f64,
     /// The greatest.
     pub high: f64,
-    /// What is known of it beforehand: its standard deviation around `start`. A residual like any other.
+    /// Its prior standard deviation around `start`. A residual like any other.
     pub known: Option<f64>,
 }
 
 /// One output of a log with its weights.
 #[derive(Debug, Clone)]
-pub struct Seen {
-    /// What it is.
+pub struct MeasuredOutput {
+    /// The quantity.
     pub quantity: Quantity,
     /// Whether its sign was lost.
     pub absolute: bool,
@@ -90,7 +90,7 @@ pub struct Seen {
     pub alike: Vec<f64>,
 }
 
-impl Seen {
+impl MeasuredOutput {
     /// Values that do not count yet.
     fn new(quantity: Quantity, absolute: bool, values: Vec<f64>) -> Self {
         let step = step_of(&values);
@@ -111,18 +111,18 @@ pub struct Run {
     /// The input at these times.
     pub logged: Vec<f64>,
     /// The outputs.
-    pub seen: Vec<Seen>,
+    pub seen: Vec<MeasuredOutput>,
     /// The part of the logs that it is of, as far as these have parameters for themselves.
     pub part: usize,
     /// Whether none of it is fitted.
     pub held_out: bool,
     /// From which row on nothing is fitted.
     pub fitted_rows: usize,
-    /// What is fitted along.
+    /// The nuisances.
     pub extras: Vec<Extra>,
-    /// What is fitted along for all logs at once; its values stand behind those of `extras`.
+    /// The nuisances of all logs at once; their values stand behind those of `extras`.
     shared: Vec<Extra>,
-    /// What closes the loop, where the input is not as logged.
+    /// The closed loop, where the input is not as logged.
     closed: Option<Arc<Closed>>,
     input: Signal,
     initial: Initial,
@@ -135,7 +135,7 @@ pub struct Run {
 #[derive(Debug, Clone)]
 struct Closed {
     design: Design,
-    /// What the controller takes the axis for: that of the case, whatever is fitted.
+    /// The machine that the controller assumes: that of the case, whatever is fitted.
     model: Stage,
     profile: Profile,
     added: Option<Added>,
@@ -207,7 +207,7 @@ impl Run {
         let seen = log
             .outputs
             .iter()
-            .map(|output| Seen::new(output.quantity, output.absolute, output.values[rows.clone()].to_vec()))
+            .map(|output| MeasuredOutput::new(output.quantity, output.absolute, output.values[rows.clone()].to_vec()))
             .collect();
         Self {
             name: experiment.name.clone(),
@@ -245,7 +245,7 @@ impl Run {
                 let given = |input: &f64| {
                     limit.map_or(amplifier.gain * input, |limit| (amplifier.gain * input).clamp(-limit, limit))
                 };
-                self.seen.push(Seen::new(quantity, false, self.logged.iter().map(given).collect()));
+                self.seen.push(MeasuredOutput::new(quantity, false, self.logged.iter().map(given).collect()));
             }
             self.closed = Some(Arc::new(Closed { design: design.clone(), model: case.stage.clone(), profile, added }));
         }
@@ -346,7 +346,7 @@ impl Run {
         Experiment { input, initial, until: self.until, every: self.every, ..empty() }
     }
 
-    /// What the model says at the log's times, one column for each output, biases not yet added; false where it does not
+    /// The model's outputs at the log's times, one column for each, biases not yet added; false where it does not
     /// reach the end.
     pub fn predict(
         &self,
@@ -424,7 +424,7 @@ impl Run {
         true
     }
 
-    /// What is added to output `index`.
+    /// The bias of output `index`.
     pub fn bias(&self, index: usize, extras: &[f64]) -> f64 {
         let own = self.extras.iter().zip(extras).filter(|(extra, _)| extra.what == Nuisance::Bias(index));
         own.map(|(_, bias)| bias).sum()

@@ -23,7 +23,7 @@ pub struct LogFit {
     pub fitted_rows: usize,
     /// Each output.
     pub outputs: Vec<OutputFit>,
-    /// What was fitted along: name, value, standard error.
+    /// The nuisances: name, value, standard error.
     pub extras: Vec<(Nuisance, f64, Option<f64>)>,
     /// Whether the model reached the end of it.
     pub complete: bool,
@@ -32,11 +32,11 @@ pub struct LogFit {
 /// How an output is met.
 #[derive(Debug, Clone)]
 pub struct OutputFit {
-    /// What it is.
+    /// The quantity.
     pub quantity: Quantity,
-    /// What was seen.
+    /// The measured values.
     pub seen: Vec<f64>,
-    /// What the model says.
+    /// The model's values.
     pub model: Vec<f64>,
     /// Over the rows that were fitted.
     pub fitted: Option<Score>,
@@ -120,11 +120,11 @@ fn score(seen: &[f64], model: &[f64], rows: std::ops::Range<usize>) -> Option<Sc
 /// How several logs are met together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Together {
-    /// What they have in common; empty where it is all of them.
+    /// The name that they share; empty where it is all of them.
     pub name: String,
     /// How many logs and windows.
     pub logs: usize,
-    /// What was seen.
+    /// The measured values.
     pub quantity: Quantity,
     /// Whether this is what was not fitted.
     pub held_out: bool,

@@ -34,7 +34,7 @@ pub(super) struct Searched<'a> {
 }
 
 impl Searched<'_> {
-    /// What the logs tell there, and whether their parts agree; none if numbers fail.
+    /// The information of the logs there, and whether their parts agree; none if numbers fail.
     pub fn judged(&self, case: &Case, plan: &Plan) -> Option<Judged> {
         let Minimum { residuals, jacobian, x, at_bound, .. } = &self.best;
         let mut judged = Judged::new(&self.problem, residuals, jacobian, x, at_bound)?;

@@ -29,7 +29,7 @@ const COLOURED: f64 = 1.1;
 /// Standard errors by which the windows may be off the whole, and the windows off each other.
 const OFF: f64 = 2.3;
 
-/// What parts of the logs say otherwise than the whole.
+/// Parts of the logs that disagree with the whole.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Disagreement {
     /// Windows that were compared.
@@ -38,7 +38,7 @@ pub struct Disagreement {
     pub length: f64,
     /// By how many standard errors of noise each of the parameters is off in them.
     pub off: Vec<f64>,
-    /// What is added to the covariance of what concerns all runs, in variables.
+    /// The addition to the covariance of the variables that concern all runs.
     pub(super) added: DMatrix<f64>,
 }
 

@@ -26,7 +26,7 @@ pub struct Covariance {
     pub reach: f64,
 }
 
-/// What logs tell at a point: what is determined, and how well.
+/// The information of the logs at a point: which parameters are determined, and how well.
 pub(super) struct Judged {
     pub identifiability: Identifiability,
     pub covariance: Covariance,
@@ -124,7 +124,7 @@ impl Judged {
         self.disagreement = Some(disagreement);
     }
 
-    /// What the residuals are like, in words.
+    /// The autocorrelation of the residuals, in words.
     pub fn slow_words(&self, problem: &Problem) -> String {
         let quantities = problem.quantities();
         let shown = |value: f64, unit| crate::number::engineering(value, unit, 2).replace('\u{a0}', " ");

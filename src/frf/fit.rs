@@ -28,7 +28,7 @@ const ENOUGH: f64 = 1.5;
 /// Fewest points.
 const FEWEST: usize = 10;
 
-/// What is asked of a model.
+/// The operating point of the model.
 #[derive(Debug, Clone, Copy)]
 pub struct Known {
     /// Cart position, m.
@@ -37,7 +37,7 @@ pub struct Known {
     pub delay: f64,
 }
 
-/// What a fit found, each with the end points of its central 95 %.
+/// The result of a fit, each number with the end points of its central 95 %.
 #[derive(Debug, Clone)]
 pub struct FrfFit {
     /// Factor on the stiffness of every span.
@@ -261,7 +261,7 @@ fn minimised(problem: &Problem, mut x: Vec<f64>) -> Result<(f64, Vec<f64>)> {
 }
 
 impl FrfFit {
-    /// What was found, each with its unit: name, value, end points.
+    /// The numbers of the fit, each with its unit: name, value, end points.
     pub fn rows(&self) -> Vec<(&'static str, String, [String; 2])> {
         let shown = |value: f64, unit: &str| engineering(value, unit, 4);
         let row = |name, unit: &str, (value, [low, high]): (f64, [f64; 2])| {

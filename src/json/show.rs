@@ -1,4 +1,4 @@
-//! What follows from the numbers of a case: `taut show --json`, `show.json`.
+//! The overview of a machine: `taut show --json`, `show.json`.
 
 use super::number;
 use crate::overview::{Overview, Place, Row};

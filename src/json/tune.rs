@@ -6,7 +6,7 @@ use crate::tune::{AtWorst, Choice, Margins, MoveVerdict, Tuned, Verdict, gains};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 
-/// What was found for a case; numbers to the last bit, null for what is infinite.
+/// The tuning of a case; numbers to the last bit, null for what is infinite.
 pub fn tuned(case: &Case, tuning: &Tuning, tuned: &Tuned) -> Value {
     let change = |(gain, after): (crate::tune::Gain, f64)| json!({ "key": gain.key, "unit": gain.unit, "before": gain.value, "after": after });
     let filters = tuned.filters().map(|[before, after]| json!({ "before": before, "after": after }));

@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 /// Places along the travel.
 const PLACES: usize = 61;
 
-/// What an analysis is to tell.
+/// The question of an analysis.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Question {
     /// Speed of the cart at which everything slides, m/s; [`Operation::default`]'s if not said.
@@ -20,7 +20,7 @@ pub struct Question {
     pub held: [bool; 3],
     /// Of the discrete-time model, s; none is made if not said.
     pub sample_time: Option<f64>,
-    /// What the input does between samples.
+    /// The input between samples.
     pub hold: Hold,
     /// By how much the input is late, s.
     pub delay: f64,
@@ -41,7 +41,7 @@ pub struct Analysis<'a> {
     pub system: StateSpace,
     /// By output.
     pub transfers: Vec<Transfer>,
-    /// What was taken for granted.
+    /// The assumptions.
     pub words: Vec<String>,
     /// Whether the stage sticks at rest.
     pub sticks: bool,

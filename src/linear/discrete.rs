@@ -7,7 +7,7 @@ use super::zeros::{Zeros, relative_degree, zeros};
 use crate::error::{Error, Result};
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// What the input does between samples.
+/// The input between samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Hold {
     /// It stands: what a converter puts out. Exact.
@@ -41,7 +41,7 @@ const MOST_DELAY: f64 = 100.0;
 pub struct Discrete {
     /// T, s.
     pub sample_time: f64,
-    /// What the input does between samples.
+    /// The input between samples.
     pub hold: Hold,
     /// By how much the input is late, s.
     pub delay: f64,

@@ -14,7 +14,7 @@ const STRETCHES: usize = 5;
 /// The gear's twist among the lengths.
 const TWIST: usize = 3;
 
-/// What each length is, as coefficients of φ₁, x, φ₃ and φ_r.
+/// Each length as coefficients of φ₁, x, φ₃ and φ_r.
 fn arms(r: f64) -> [[f64; SPEEDS]; STRETCHES] {
     [[r, -1.0, 0.0, 0.0], [0.0, 1.0, -r, 0.0], [-r, 0.0, r, 0.0], [-1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]]
 }
@@ -41,7 +41,7 @@ pub(super) struct Frame {
     pub(super) speed_place: [Option<usize>; SPEEDS],
     pub(super) current_place: Option<usize>,
     pub(super) bristle_place: [Option<usize>; 3],
-    /// What each state is: the quantity whose coefficients in another frame are its own.
+    /// The kind of each state: the quantity whose coefficients in another frame are its own.
     kinds: Vec<Kind>,
 }
 

@@ -20,7 +20,7 @@ pub struct GantryAnalysis<'a> {
     pub modes: Natural,
     /// Over the working area, where the place makes a difference.
     pub map: Option<ResonanceMap>,
-    /// What was taken for granted.
+    /// The assumptions.
     pub words: Vec<String>,
 }
 
@@ -99,7 +99,7 @@ impl ResonanceMap {
     }
 }
 
-/// What was taken for granted.
+/// The assumptions.
 fn words(case: &GantryCase, mechanism: &Mechanism) -> Vec<String> {
     let gantry = &case.gantry;
     let mut words = vec!["everything slides: dry friction that does not change with speed drops out".to_string()];

@@ -51,7 +51,7 @@ impl StateSpace {
     }
 }
 
-/// What a pole or a zero is to an engineer.
+/// A pole or a zero as an engineer reads it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Root {
     /// At zero: an integrator, or as a zero a differentiator.

@@ -39,11 +39,11 @@ pub struct Variable {
 /// ẋ = A x + b u, y = C x + d u: small motions on top of steady sliding.
 #[derive(Debug, Clone)]
 pub struct StateSpace {
-    /// What x is, in order.
+    /// The states x, in order.
     pub states: Vec<Variable>,
-    /// What u is, before the amplifier's gain.
+    /// The input u, before the amplifier's gain.
     pub input: Variable,
-    /// What y is, in order.
+    /// The outputs y, in order.
     pub outputs: Vec<Variable>,
     /// A, 1/s and other units.
     pub a: DMatrix<f64>,

@@ -14,7 +14,7 @@ use crate::mechanism::{AmplifierMode, BODIES, Kind, Mechanism, Mode, SpringLaw};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::f64::consts::PI;
 
-/// What makes a singular value of the spans' lever arms zero, as a share of the largest.
+/// Singular values of the spans' lever arms up to this share of the largest are zero.
 const NOTHING: f64 = 1e-12;
 
 /// Rigid and elastic modes of a mechanism at one place.
@@ -44,7 +44,7 @@ pub struct RigidMode {
 pub struct ElasticMode {
     /// Frequency without damping, rad/s.
     pub frequency: f64,
-    /// What damping makes of it; none where it makes no pair of poles of each mode.
+    /// Its pair of poles with damping; none where not every mode has one.
     pub damped: Option<Root>,
     /// The way of each body at the belt, the largest being 1: r φ of what turns.
     pub shape: Vec<f64>,

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::friction::{Friction, Law, Side};
 use crate::stage::{Amplifier, AmplifierMode, Stage};
 
-/// What the stage does with the cart at one place. All frequencies in Hz, the lowest first.
+/// The resonances with the cart at one place. All frequencies in Hz, the lowest first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Place {
     /// x, m.

@@ -1,4 +1,4 @@
-//! What a linear model leaves out, in words.
+//! The limits of a linear model, in words.
 
 use super::Operation;
 use crate::friction::Law;
@@ -7,7 +7,7 @@ use crate::number::engineering_typed;
 use crate::stage::axis::{BODIES, CART};
 use crate::stage::{BeltModel, Stage};
 
-/// What was linearised, and what was taken for granted: a sentence for each part that makes the stage more than a linear system.
+/// The operating point and the assumptions: a sentence for each part that makes the stage more than a linear system.
 pub fn assumptions(stage: &Stage, operation: Operation) -> Vec<String> {
     let plant = stage.mechanism();
     let held = |body: usize| operation.held[body] || operation.held[plant.leader(body)];

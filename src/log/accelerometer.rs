@@ -26,7 +26,7 @@ const SHORTEST: f64 = 1.0;
 /// The longest pause within a recording, s.
 const PAUSE: f64 = 0.05;
 
-/// What a file of an accelerometer holds.
+/// The content of an accelerometer's file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Accelerometer {
     /// Power spectral densities over frequency.

@@ -98,7 +98,7 @@ pub(super) fn heading(file: &Path, wanted: &[&str]) -> Result<Option<Vec<String>
     Ok(None)
 }
 
-/// What it takes to find a field of a file again.
+/// The place of a field in a file.
 #[derive(Debug, Clone)]
 pub(super) struct Locator {
     separator: u8,
@@ -258,7 +258,7 @@ impl<R: BufRead> Row<'_, R> {
         words.then(|| texts.iter().map(|text| unit(text)).collect())
     }
 
-    /// What stands in the wanted columns of numbers.
+    /// The texts of the wanted columns of numbers.
     fn texts(&self) -> impl Iterator<Item = &str> {
         self.layout.wanted[..self.request.columns.len()].iter().map(|&k| self.fields.get(k))
     }
@@ -289,13 +289,13 @@ fn numeric(text: &str) -> bool {
     text.replacen(',', ".", 1).parse::<f64>().is_ok_and(|number| !number.is_nan())
 }
 
-/// What programs write where they have no value.
+/// Whether a text is one that programs write where they have no value.
 fn is_missing(text: &str) -> bool {
     const WORDS: [&str; 10] = ["", "nan", "-nan", "nan(ind)", "-nan(ind)", "na", "n/a", "null", "none", "-"];
     WORDS.iter().any(|word| text.eq_ignore_ascii_case(word)) || text.contains("#QNAN") || text.contains("#IND")
 }
 
-/// What the columns are called, and which are wanted.
+/// The names of the columns, and which are wanted.
 struct Layout {
     separator: u8,
     names: Vec<String>,
@@ -305,7 +305,7 @@ struct Layout {
     is_heading: bool,
     /// The line that names the columns, if one does.
     heading_line: Option<usize>,
-    /// What stands between the names and the first row, where columns go by number.
+    /// The text between the names and the first row, where columns go by number.
     below: Vec<String>,
     /// The separator, if the case file says it.
     said: Option<char>,
@@ -506,7 +506,7 @@ impl Layout {
         }
     }
 
-    /// What the i-th wanted column is called in messages.
+    /// The name of the i-th wanted column in messages.
     fn shown_name(&self, i: usize) -> String {
         let k = self.wanted[i];
         if self.names[k].is_empty() { (k + 1).to_string() } else { shown(&self.names[k]) }

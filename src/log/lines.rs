@@ -127,7 +127,7 @@ fn single_blanks(line: &str) -> String {
     text
 }
 
-/// What a line may begin with that is a remark.
+/// The beginnings of a line that is a remark.
 const REMARKS: [&str; 3] = ["#", "%", "//"];
 
 /// The lines of a file, one at a time.

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// Most runs of one file.
 const MOST_RUNS: usize = 1000;
 
-/// What the columns of a file are.
+/// The meaning of the columns of a file.
 ///
 /// ```no_run
 /// use taut::log::{Mapping, Quantity, Source};
@@ -44,7 +44,7 @@ pub struct Mapping {
     pub outputs: Vec<(Quantity, Source)>,
     /// Quantities whose sign was lost.
     pub absolute: Vec<Quantity>,
-    /// What the input did between its samples.
+    /// The input between its samples.
     pub hold: Hold,
     /// Where the window begins, s on the file's clock, and where time zero is; the first row without.
     pub from: Option<f64>,
@@ -56,7 +56,7 @@ pub struct Mapping {
     pub split: Option<ColumnId>,
     /// How a text file is written.
     pub dialect: Dialect,
-    /// What made the file, where that says more of it than its columns.
+    /// The recorder that made the file, where it says more of it than its columns.
     pub preset: Option<&'static Preset>,
 }
 
@@ -78,7 +78,7 @@ pub struct Source {
     pub unit: Option<Unit>,
     /// A factor beside the unit, such as −1.
     pub scale: f64,
-    /// What is added in the end, SI.
+    /// The offset that is added in the end, SI.
     pub offset: f64,
 }
 
@@ -103,7 +103,7 @@ impl Source {
     }
 }
 
-/// What a column is used for.
+/// The role of a column.
 #[derive(Clone, Copy)]
 enum Role {
     Time,
@@ -206,7 +206,7 @@ impl Mapping {
     }
 }
 
-/// What one of the i-th column's unit is in SI.
+/// One of the i-th column's unit in SI.
 fn factor(sheet: &Sheet, i: usize, role: Role, source: &Source) -> Result<f64> {
     let (key, wanted) = (role.key(), role.unit());
     let of = |unit: &str| quantity::read(&format!("1 {unit}"), wanted);
@@ -395,7 +395,7 @@ impl Columns<'_> {
         Err(error.allowed("a first time within 1e15 intervals of the others").next("leave out the row that is far off"))
     }
 
-    /// What to do about a clock that goes back in this row.
+    /// Advice for a clock that goes back in this row.
     fn backward(&self, first: usize, row: usize) -> String {
         let time = &self.values[0];
         let drop = time[row - 1] - time[row];
@@ -422,7 +422,7 @@ impl Columns<'_> {
         "sort the rows by time, or leave out the rows where the clock was set".into()
     }
 
-    /// What one of the clock's own unit is, s.
+    /// One of the clock's own unit, s.
     fn time_factor(&self) -> f64 {
         let Clock::Column(source) = &self.mapping.time else { return 1.0 };
         factor(&self.sheet, 0, Role::Time, source).map_or(1.0, |factor| factor * source.scale)

@@ -275,7 +275,7 @@ impl Input {
         open().map_err(|error| unreadable(file, &error))
     }
 
-    /// What all variables say of themselves.
+    /// The headers of all variables.
     fn variables(&mut self) -> io::Result<Vec<Variable>> {
         let mut place = HEADER as u64;
         let mut found = Vec::new();
@@ -447,7 +447,7 @@ impl<R: Read> Elements<R> {
         Ok((kind, data))
     }
 
-    /// What a variable says of itself, before its numbers; its tag has been read.
+    /// The header of a variable; its tag has been read.
     fn variable(&mut self) -> io::Result<Variable> {
         let (_, flags) = self.element()?;
         let flags = flags.get(..4).and_then(|word| word.try_into().ok()).ok_or(bad("an array has no class"))?;

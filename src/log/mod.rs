@@ -34,15 +34,15 @@ pub struct Log {
     pub file: PathBuf,
     /// Times, s: increasing, not always evenly. Zero is the log's first row, or where its window begins.
     pub time: Vec<f64>,
-    /// What was fed into the amplifier at those times, V or A before its gain; with what was added to it.
+    /// The input of the amplifier at those times, V or A before its gain; with any input that was added to it.
     pub input: Vec<f64>,
-    /// What of it was added behind the controller, if the log says so: a known disturbance.
+    /// The part of it that was added behind the controller, if the log says so: a known disturbance.
     pub added: Option<Vec<f64>>,
-    /// What the input did between them.
+    /// The input between them.
     pub hold: Hold,
     /// Where the cart should have been at those times, m, if the log was made in closed loop and says so.
     pub reference: Option<Vec<f64>>,
-    /// What was seen; at least one.
+    /// The outputs; at least one.
     pub outputs: Vec<Output>,
     /// With which words the recorder ended the file early.
     pub ended: Option<String>,
@@ -51,7 +51,7 @@ pub struct Log {
 /// One measured quantity over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Output {
-    /// What it is.
+    /// The quantity.
     pub quantity: Quantity,
     /// Whether its sign was lost, as by a counter of pulses: then it is to be compared with an absolute value.
     pub absolute: bool,

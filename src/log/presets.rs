@@ -1,4 +1,4 @@
-//! What recorders call their columns, and what they are in: a preset of a log's table for each.
+//! Presets of logs: the names of recorders' columns, and their units.
 //!
 //! Every row is from a public definition, named beside it. What a log's table says by itself counts before a preset.
 
@@ -16,7 +16,7 @@ pub struct Preset {
     pub title: &'static str,
     /// When the samples were taken: a column, and its unit.
     pub time: (Pick, &'static str),
-    /// What there may be: key of the log's table, columns of which the first that is there counts, and what they are in.
+    /// Columns that there may be: key of the log's table, names of which the first that is there counts, and their unit.
     pub columns: &'static [(&'static str, &'static [&'static str], In)],
     /// Lines that end the numbers.
     pub ends: &'static [End],
@@ -46,7 +46,7 @@ pub enum Pick {
     Number(usize),
 }
 
-/// What a column of a preset is in.
+/// The unit of a column of a preset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum In {
     /// As the file says, or SI.
@@ -150,7 +150,7 @@ pub const PRESETS: &[Preset] = &[
 ];
 
 impl Preset {
-    /// What a line ends, if it is one of those that end the numbers.
+    /// The end that a line means, if it is one of those that end the numbers.
     pub(super) fn end(&self, line: &str) -> Option<End> {
         self.ends.iter().find(|end| end.line == line.trim()).copied()
     }

@@ -45,7 +45,7 @@ impl From<&str> for ColumnId {
 /// How a text file is written, where that cannot be seen from itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Dialect {
-    /// What parts the columns; found out where it is not said. A space stands for any number of blanks.
+    /// The separator of the columns; found out where it is not said. A space stands for any number of blanks.
     pub separator: Option<char>,
     /// Whether numbers have decimal commas.
     pub decimal_comma: bool,
@@ -76,7 +76,7 @@ fn same(a: &str, b: &str) -> bool {
     }
 }
 
-/// What is wanted from a file.
+/// The columns that are wanted from a file.
 pub(super) struct Request<'a> {
     /// Columns of numbers.
     pub columns: &'a [ColumnId],
@@ -90,7 +90,7 @@ pub(super) struct Request<'a> {
     pub filter: Option<&'a Filter>,
     /// The column that tells runs apart.
     pub split: Option<&'a ColumnId>,
-    /// What made the file, if that is known.
+    /// The recorder that made the file, if it is known.
     pub preset: Option<&'static Preset>,
 }
 
@@ -120,11 +120,11 @@ impl<'a> Request<'a> {
 #[derive(Debug, Default)]
 pub(super) struct Sheet {
     pub file: PathBuf,
-    /// What a row is called in messages: a line of a text file has a text to show.
+    /// Whether a row is a line in messages: a line of a text file has a text to show.
     pub is_text: bool,
-    /// What the wanted columns are called.
+    /// The names of the wanted columns.
     pub names: Vec<String>,
-    /// What the file says of their units.
+    /// The units that the file gives them.
     pub units: Vec<Option<String>>,
     /// A value per row; NaN where it is missing.
     pub columns: Vec<Vec<f64>>,

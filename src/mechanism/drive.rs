@@ -34,7 +34,7 @@ pub struct GearPlay {
     pub damping: f64,
 }
 
-/// What the input commands.
+/// The quantity that the input commands.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Amplifier {
     /// Voltage or current.

@@ -1,4 +1,4 @@
-//! What works piece by piece beside the bodies: amplifiers with limits, springs that only pull or only push. Each is linear in each of
+//! Parts that work piece by piece beside the bodies: amplifiers with limits, springs that only pull or only push. Each is linear in each of
 //! its states; the conditions that lead from one to the other are linear forms.
 
 use super::{AmplifierMode, Cause, Contact, Drive, Form, Guard, Limit, Mechanism, Mode, SPRINGS, SpringLaw, Switch};
@@ -13,12 +13,12 @@ impl Mechanism {
         Form::speed(*shaft) * (motor.back_emf_constant * motor.gear_ratio)
     }
 
-    /// What the input commands: gain·u, V or A, before any limit.
+    /// The command of the input: gain·u, V or A, before any limit.
     fn command(&self, drive: usize) -> Form {
         Form::input(drive) * self.drives[drive].amplifier.gain
     }
 
-    /// What the input commands after the limit on it.
+    /// The command of the input after the limit on it.
     fn commanded(&self, drive: usize, mode: &Mode) -> Form {
         let (amplifier, now) = (&self.drives[drive].amplifier, &mode.drive[drive]);
         let (limit, bound) = match amplifier.mode {
@@ -49,7 +49,7 @@ impl Mechanism {
         }
     }
 
-    /// What is left to drive the current through the inductance at the terminal voltage `voltage`: v − R i − K_e n φ̇.
+    /// The voltage over the inductance at the terminal voltage `voltage`: v − R i − K_e n φ̇.
     fn left_for_inductance(&self, drive: usize, voltage: Form) -> Form {
         voltage - Form::current(drive) * self.drives[drive].motor.resistance - self.back_emf(drive)
     }

@@ -119,7 +119,7 @@ impl Form {
     }
 }
 
-/// What rounding may do to the value of a form, as a share of its largest parts.
+/// The rounding error of the value of a form, as a share of its largest parts.
 pub(crate) const ROUNDING: f64 = 5e-15;
 
 impl Add for Form {

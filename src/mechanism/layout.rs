@@ -11,7 +11,7 @@
 
 use super::{BODIES, DRIVES, Form, Kind, Mechanism, SPRINGS, State};
 
-/// What makes a coefficient zero but for rounding, as a share of those it comes from.
+/// Coefficients up to this share of those they come from are zero but for rounding.
 const NOTHING: f64 = 1e-12;
 
 /// A spring's length in the place of a body's way.

@@ -48,7 +48,7 @@ pub struct Label {
 /// An inertia that turns or slides.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Body {
-    /// What it is called.
+    /// Its name.
     pub label: Label,
     /// Whether it turns (rad) or slides (m).
     pub kind: Kind,
@@ -99,7 +99,7 @@ impl Kind {
 /// Something between bodies that has a length: a span of the belt, a gear, an end stop.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spring {
-    /// What it is called.
+    /// Its name.
     pub label: Label,
     /// A row of A: by how much it gets longer per way of each body.
     pub arms: Vec<(usize, f64)>,
@@ -163,9 +163,9 @@ impl Follows {
 /// A motor with gear and amplifier that turns a body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drive {
-    /// What it is called.
+    /// Its name.
     pub label: Label,
-    /// What its limits are called.
+    /// The name of its limits.
     pub voltage: Label,
     /// The same.
     pub current: Label,
@@ -175,7 +175,7 @@ pub struct Drive {
     pub shaft: usize,
     /// The motor.
     pub motor: Motor,
-    /// What feeds it.
+    /// The amplifier that feeds it.
     pub amplifier: Amplifier,
 }
 
@@ -229,7 +229,7 @@ pub enum Shown {
     Force(usize, f64),
     /// Friction on a body.
     Friction(usize),
-    /// What a body does, as [`Status::code`] has it.
+    /// The motion of a body, as [`Status::code`] has it.
     Motion(usize),
     /// Deflection of the bristles of a body.
     Bristle(usize),
@@ -246,7 +246,7 @@ pub struct Heading {
     pub name: Cow<'static, str>,
     /// Its unit.
     pub unit: &'static str,
-    /// What stands in it.
+    /// The quantity in it.
     pub shown: Shown,
     /// Whether it is there also where only what a controller or a comparison needs is asked for.
     pub lean: bool,
@@ -263,7 +263,7 @@ pub struct State {
     pub current: [f64; DRIVES],
 }
 
-/// What the parts of a machine are there for, by their numbers. Who asks for figures asks here, and takes keys and names from the labels.
+/// The roles of the parts of a machine, by their numbers. Who asks for figures asks here, and takes keys and names from the labels.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Roles {
     /// Bodies that it is there to move.
@@ -277,15 +277,15 @@ pub struct Roles {
 pub struct Mechanism {
     /// The inertias; rotors behind all others.
     pub bodies: Vec<Body>,
-    /// What is between them.
+    /// The springs between them.
     pub springs: Vec<Spring>,
-    /// What moves them. The inputs are one for each.
+    /// The drives that move them. The inputs are one for each.
     pub drives: Vec<Drive>,
     /// The columns of a run.
     pub columns: Vec<Heading>,
-    /// What an observer reads, in its order: no more than [`crate::solve::QUANTITIES`].
+    /// The readings of an observer, in their order: no more than [`crate::solve::QUANTITIES`].
     pub readings: Vec<Shown>,
-    /// What its parts are there for.
+    /// The roles of its parts.
     pub roles: Roles,
     /// Where ways are counted from: what follows them or changes along them begins there.
     pub origin: [f64; BODIES],
@@ -343,7 +343,7 @@ impl Mechanism {
     }
 
     /// Friction of a body and of those that move with it, as far as it is b v ± F_c and a breakaway: what the equations of a mode have.
-    /// What never sticks adds nothing but b v. Nothing for a body that another leads.
+    /// The friction of a body: one that never sticks has nothing but b v. None for a body that another leads.
     pub fn friction(&self, body: usize) -> &Friction {
         &self.friction[body].0
     }

@@ -12,11 +12,11 @@ pub struct Mode {
     pub slack: [bool; SPRINGS],
     /// Which side of a spring that only pushes touches.
     pub contact: [Contact; SPRINGS],
-    /// What each drive does.
+    /// The state of each drive.
     pub drive: [DriveMode; DRIVES],
 }
 
-/// What the parts of a drive do.
+/// The states of the parts of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct DriveMode {
     /// Whether the torque through the gear is positive; matters only where the gear loses power.
@@ -53,7 +53,7 @@ impl Mode {
         self
     }
 
-    /// What a part does.
+    /// The state of a part.
     pub fn status(&self, what: What) -> Status {
         match what {
             What::Body(body) => Status::Motion(self.motion[body]),
@@ -146,7 +146,7 @@ pub enum What {
 pub struct Part {
     /// Which.
     pub what: What,
-    /// What it is called.
+    /// Its name.
     pub label: Label,
 }
 
@@ -173,7 +173,7 @@ impl Part {
     }
 }
 
-/// What a part does.
+/// The state of a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
     /// Of a body.
@@ -221,9 +221,9 @@ impl PartialEq<Motion> for Status {
 /// A condition of a mode: the mode holds while `form` ≥ 0.
 #[derive(Debug, Clone, Copy)]
 pub struct Guard {
-    /// What must not become negative.
+    /// The form that must not become negative.
     pub form: Form,
-    /// What it means when it does.
+    /// The cause of the change where it does.
     pub cause: Cause,
 }
 
@@ -298,7 +298,7 @@ impl Cause {
     }
 }
 
-/// What a part other than a body does next.
+/// The next state of a part other than a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Switch {
     /// A spring that only pulls goes slack, or is taut again.

@@ -24,7 +24,7 @@ pub struct Power {
 }
 
 impl Power {
-    /// What is left over; zero but for rounding.
+    /// The imbalance; zero but for rounding.
     pub fn imbalance(&self) -> f64 {
         self.input + self.load
             - self.copper
@@ -45,12 +45,12 @@ impl Power {
     }
 }
 
-/// What a spring is strained by.
+/// The strain of a spring.
 #[derive(Debug, Clone, Copy, Default)]
 struct Strain {
-    /// What its force follows.
+    /// The way that its force follows.
     way: f64,
-    /// What its energy follows: nothing where one that is not straight yet is pulled tight against its damping.
+    /// The strain that its energy follows: nothing where one that is not straight yet is pulled tight against its damping.
     strain: f64,
     rate: f64,
 }
@@ -79,7 +79,7 @@ impl Mechanism {
         0.5 * (kinetic + elastic + magnetic)
     }
 
-    /// What a spring is strained by, counted from where it begins to push or pull.
+    /// The strain of a spring, counted from where it begins to push or pull.
     fn strain(&self, spring: usize, state: &State) -> Strain {
         let part = &self.springs[spring];
         let sum = |values: &[f64; BODIES]| part.arms.iter().map(|&(body, arm)| arm * values[body]).sum::<f64>();

@@ -1,4 +1,4 @@
-//! What follows from the numbers of an axis.
+//! Overview of an axis.
 
 use super::limits::{Most, Power, most, safety};
 use super::{Group, Note, Overview, Place, belt_mass, drive_at_belt, motor_rows, of_belt, of_constants, told};

@@ -1,4 +1,4 @@
-//! What follows from the numbers of a gantry.
+//! Overview of a gantry.
 
 use super::limits::{Power, most, safety};
 use super::{Group, Note, Overview, Place, belt_mass, drive_at_belt, motor_rows, of_belt, of_constants};
@@ -91,7 +91,7 @@ fn breakaway(gantry: &Gantry) -> [f64; 2] {
     [pulleys + gantry.bridge.friction.forward.breakaway, pulleys + gantry.cart.friction.forward.breakaway]
 }
 
-/// What both pulleys and rotors weigh at the belt, kg.
+/// The mass of both pulleys and rotors at the belt, kg.
 fn turning(gantry: &Gantry) -> f64 {
     let r = gantry.pulley_radius;
     let rotors: f64 = gantry.motors.iter().map(|motor| motor.rotor_inertia * motor.gear_ratio.powi(2)).sum();

@@ -5,7 +5,7 @@ use crate::signal::Signal;
 use crate::stage::{Amplifier, AmplifierMode, BeltSheet, Motor};
 use std::f64::consts::PI;
 
-/// What a drive gives: at the belt, per direction alike.
+/// The power of a drive: at the belt, per direction alike.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Power {
     /// Largest force at standstill, N.

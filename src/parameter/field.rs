@@ -62,10 +62,10 @@ pub enum List {
     Slides,
 }
 
-/// What the drives of a gantry are called in keys, before the key of an axis.
+/// The drives of a gantry in keys, before the key of an axis.
 pub(super) const DRIVES: [&str; 2] = ["left_drive.", "right_drive."];
 
-/// What slides in a gantry, as keys begin.
+/// The sliding bodies of a gantry, as keys begin.
 pub(super) const SLIDES: [&str; 2] = ["bridge.", "cart."];
 
 impl List {

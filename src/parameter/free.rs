@@ -60,7 +60,7 @@ pub type GivenBounds = [(String, [f64; 2])];
 const FAR: f64 = 100.0;
 
 impl Free {
-    /// What `name` stands for: a key of the case file, several joined by ` = `, which keep their present ratio (equal, where one of
+    /// The numbers that `name` stands for: a key of the case file, several joined by ` = `, which keep their present ratio (equal, where one of
     /// them is zero), or a sum such as `total.viscous`, whose parts keep theirs. What goes along with a key is set by itself if it is
     /// among `free`, the keys of all free parameters.
     ///
@@ -225,7 +225,7 @@ pub fn every(machine: &dyn Numbers) -> Vec<String> {
     keys
 }
 
-/// What may be off of a machine, each as a factor on all numbers that are tied by nature.
+/// The numbers of a machine that may be off, each as a factor on all numbers that are tied by nature.
 pub fn kinds(machine: &dyn Numbers) -> Vec<Free> {
     let mut kinds: Vec<Free> = Vec::new();
     for row in all() {
@@ -270,7 +270,7 @@ fn follows_any(machine: &dyn Numbers, number: Number) -> bool {
     leads(machine, number).next().is_some()
 }
 
-/// What a number follows, as far as it has the same value: of the same body, the one that is asked first first.
+/// The numbers that a number follows, as far as it has the same value: of the same body, the one that is asked first first.
 fn leads<'a>(machine: &'a dyn Numbers, number: Number) -> impl Iterator<Item = Number> + 'a {
     let Number { row, index } = number;
     let own = number.value(machine);
@@ -278,7 +278,7 @@ fn leads<'a>(machine: &'a dyn Numbers, number: Number) -> impl Iterator<Item = N
     followed.filter(move |lead| own.is_some() && own == lead.value(machine))
 }
 
-/// What goes along with `number` where `is_free` are set by themselves.
+/// The numbers that go along with `number` where `is_free` are set by themselves.
 fn followers<'a>(
     machine: &'a dyn Numbers,
     number: Number,
@@ -408,7 +408,7 @@ fn unknown(machine: &dyn Numbers, key: &str) -> Error {
     }
 }
 
-/// What a gantry has instead.
+/// The keys that a gantry has instead.
 fn of_gantries(machine: &dyn Numbers, error: Error) -> Error {
     let keys = keys_there(machine).join(", ");
     error.allowed(keys).next("of one drive alone write for example left_drive.motor.resistance")

@@ -30,11 +30,11 @@ pub struct Parameter {
     pub symbol: &'static str,
     /// Its SI unit; empty for a pure number, [`INPUT`] for what the amplifier takes.
     pub unit: &'static str,
-    /// What holds when it is not given.
+    /// The default.
     pub default: Fallback,
     /// The values it may take, in SI.
     pub range: Range,
-    /// What it is.
+    /// Its meaning.
     pub sentence: &'static str,
     /// How it is typically written.
     pub example: &'static str,
@@ -44,7 +44,7 @@ pub struct Parameter {
     pub gantry: Field<Gantry>,
     /// Whether it may be off where nobody names it, and with which others.
     pub off: Off,
-    /// What it goes with as long as it has the same value and is not named itself: keys, the one that is asked first first.
+    /// The keys that it goes with as long as it has the same value and is not named itself, the one that is asked first first.
     pub follows: &'static [&'static str],
     /// The sum over the bodies that it is a part of.
     pub part: Option<(Sum, Arm)>,
@@ -111,7 +111,7 @@ impl Sum {
     }
 }
 
-/// What one unit of a number is in a sum at the drive pulley.
+/// The weight of a number in a sum at the drive pulley.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Arm {
     /// As much.
@@ -164,14 +164,14 @@ pub fn unit_for(unit: &'static str, input: &str) -> &'static str {
     }
 }
 
-/// What holds for a parameter that is not given.
+/// The default of a parameter that is not given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Fallback {
     /// It has to be given, at least where its table is.
     Required,
     /// This value, in SI.
     Value(f64),
-    /// What the words say, mostly the value of another parameter.
+    /// As the words say, mostly the value of another parameter.
     Words(&'static str),
 }
 
@@ -296,7 +296,7 @@ pub fn sections() -> impl Iterator<Item = &'static str> {
     SECTIONS.iter().map(|(name, _)| *name)
 }
 
-/// What one unit of a parameter is at the drive pulley: r² for a mass or a viscous friction of the cart, r for its Coulomb
+/// The weight of a parameter at the drive pulley: r² for a mass or a viscous friction of the cart, r for its Coulomb
 /// friction, n² for the rotor's inertia.
 pub fn at_pulley(stage: &Stage, key: &str) -> f64 {
     named(key).and_then(|row| row.part).map_or(1.0, |(_, arm)| arm.of(stage))

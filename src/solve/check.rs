@@ -1,4 +1,4 @@
-//! What a stage and an experiment have to be before anything is computed.
+//! Checks of a stage and an experiment before anything is computed.
 //!
 //! The case reader checks what is in a file, and says on which line; here it is what a program built by itself.
 

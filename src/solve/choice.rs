@@ -16,7 +16,7 @@ pub enum Kind {
     Table3,
 }
 
-/// What was asked for; what is not said is chosen.
+/// The solver that is asked for; the rest is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Choice {
     /// By default the one for the stage.

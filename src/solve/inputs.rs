@@ -1,4 +1,4 @@
-//! What the inputs of all drives do at once: stretches of time on which each is one polynomial.
+//! The inputs of all drives at once: stretches of time on which each is one polynomial.
 
 use crate::mechanism::DRIVES;
 use crate::signal::{DEGREE, Piece, Signal};

@@ -48,7 +48,7 @@ impl Clone for Machine {
     }
 }
 
-/// What solves the equations of a machine under way: one of the exact solver's kernels, or the general solver.
+/// The solver of a machine under way: one of the exact solver's kernels, or the general solver.
 pub(super) trait Engine: Send + Sync {
     /// A copy that goes on in the same way.
     fn copy(&self) -> Box<dyn Engine>;
@@ -77,7 +77,7 @@ pub(super) trait Engine: Send + Sync {
     /// The state in angles and positions.
     fn state(&self) -> State;
 
-    /// What its parts do.
+    /// The states of its parts.
     fn mode(&self) -> &Mode;
 
     /// The inputs now.
@@ -86,7 +86,7 @@ pub(super) trait Engine: Send + Sync {
     /// The value of a form now, by the linear equations.
     fn value(&self, form: &Form) -> f64;
 
-    /// What a row shows beyond the linear equations.
+    /// The values of a row beyond the linear equations.
     fn extra(&self) -> Extra;
 
     /// By how much positions may be off, where that is known.
@@ -196,7 +196,7 @@ impl Machine {
         self.engine.state()
     }
 
-    /// What its parts do.
+    /// The states of its parts.
     pub fn mode(&self) -> &Mode {
         self.engine.mode()
     }

@@ -84,9 +84,9 @@ pub struct Event {
     pub time: f64,
     /// Which part.
     pub part: Part,
-    /// What it did before.
+    /// The state before.
     pub from: Status,
-    /// What it does after.
+    /// The state after.
     pub to: Status,
     /// The force (N) or torque (N m) on a body at that moment, friction apart; 0 for other parts.
     pub load: f64,
@@ -172,7 +172,7 @@ impl Ending {
     }
 }
 
-/// What a run cost, in pieces of work rather than seconds.
+/// The cost of a run, in pieces of work rather than seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Cost {
     /// Rows put out.
@@ -200,7 +200,7 @@ pub struct Outcome {
     pub events: Vec<Event>,
     /// How it ended.
     pub ending: Ending,
-    /// What it cost.
+    /// Its cost.
     pub cost: Cost,
     /// By how much positions may be off: of the exact solver a bound of what rounding does; the general solver's is estimated by
     /// [`ErrorEstimate`], Table 3 with a fixed step has none.
@@ -234,13 +234,13 @@ impl PositionError {
 /// A whole run in memory.
 #[derive(Debug, Clone)]
 pub struct Solution {
-    /// What every quantity did.
+    /// The columns of every quantity.
     pub trajectory: Trajectory,
     /// Events, ending and cost.
     pub outcome: Outcome,
 }
 
-/// What the receiver of a block of rows wants next.
+/// The answer of the receiver of a block of rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Flow {
     /// More.

@@ -7,7 +7,7 @@ use crate::trajectory::Trajectory;
 /// Number of quantities in a [`Reading`].
 pub const QUANTITIES: usize = 12;
 
-/// What is read off a run at one instant, in the order of [`Mechanism::readings`], which of an axis is that of [`reading`]. SI units.
+/// The readings of a run at one instant, in the order of [`Mechanism::readings`], which of an axis is that of [`reading`]. SI units.
 pub type Reading = [f64; QUANTITIES];
 
 /// Places in a [`Reading`] of an axis.
@@ -37,13 +37,13 @@ pub struct Gap<'a> {
     pub begin: f64,
     /// How long it is, s; 0 for a single instant.
     pub length: f64,
-    /// What is read at its beginning.
+    /// The reading at its beginning.
     pub from: &'a Reading,
-    /// What is read at its end.
+    /// The reading at its end.
     pub to: &'a Reading,
     /// By how much a quantity can be off the straight line between the two; infinite where no bound is known.
     pub bow: &'a Reading,
-    /// What everything does.
+    /// The states of all parts.
     pub mode: &'a Mode,
 }
 
@@ -194,7 +194,7 @@ impl Curve {
         (low, high)
     }
 
-    /// What is read at the share `s` of the length.
+    /// The reading at the share `s` of the length.
     pub fn at(&self, s: f64) -> Reading {
         let mut sum = self.terms[TERMS - 1];
         for term in self.terms[..TERMS - 1].iter().rev() {
@@ -354,7 +354,7 @@ pub trait Observe {
     fn end(&mut self, time: f64, state: &State, mode: &Mode);
 }
 
-/// What a machine shows in one mode: readings as linear forms.
+/// The readings of a machine in one mode, as linear forms.
 #[derive(Debug, Clone)]
 pub(super) struct Readout {
     pub(super) forms: [Form; QUANTITIES],
@@ -410,7 +410,7 @@ impl Readout {
         reading
     }
 
-    /// What is read in a state in the solver's coordinates, whose ways are counted from `origin`, under `input`.
+    /// The readings in a state in the solver's coordinates, whose ways are counted from `origin`, under `input`.
     pub(super) fn read(
         &self,
         layout: &Layout,

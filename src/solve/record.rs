@@ -18,7 +18,7 @@ const BLOCK: usize = 256;
 /// Room for a state with the inputs behind it, whatever the mechanism.
 pub(crate) const STATE: usize = 2 * BODIES + 2 * DRIVES;
 
-/// What a row shows that does not follow from its state by the linear equations.
+/// The values of a row that do not follow from its state by the linear equations.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Extra {
     /// Friction beyond b v ± F_c, N or N m.
@@ -36,7 +36,7 @@ struct Segment {
     start: usize,
     /// The number of its mode among the sheets.
     sheet: usize,
-    /// What angles follow from.
+    /// The coordinates that angles follow from.
     coordinates: Coordinates,
 }
 
@@ -66,7 +66,7 @@ pub(crate) struct Recorder<'a> {
     pub(crate) observer: Option<&'a mut dyn Observe>,
     /// Rows handed on.
     pub(crate) rows: u64,
-    /// What the receiver answered last.
+    /// The last answer of the receiver.
     pub(crate) flow: Flow,
 }
 

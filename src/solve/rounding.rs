@@ -9,7 +9,7 @@
 //! c ε (N + Φ) (v_max T + |x − x₀|_max) + 2 ε |x|_max
 //! ```
 //!
-//! What an error does to a decision (whether a body sticks, which flank touches first) is not in it: where that is uncertain the
+//! The effect of an error on a decision (whether a body sticks, which flank touches first) is not in it: where that is uncertain the
 //! model's own answer is as uncertain, for parameters that differ in their last bit.
 
 use super::PositionError;
@@ -18,7 +18,7 @@ use crate::mechanism::{Body, Layout, Mechanism};
 /// c: units in the last place of one step. The largest that independent solutions of random stages have shown is below one.
 const UNITS: f64 = 8.0;
 
-/// What the bound needs to know of a run so far.
+/// The run so far, as far as the bound needs it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rounding {
     /// Where speeds and ways stand in the solver's state, with what they are at the belt.

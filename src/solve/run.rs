@@ -20,10 +20,10 @@ pub(super) struct Start {
     pub(super) every: f64,
 }
 
-/// What is done with a mechanism in one run.
+/// The course of one run of a mechanism.
 #[derive(Debug, Clone)]
 pub struct Course {
-    /// What is fed into each drive's amplifier.
+    /// The input of each drive's amplifier.
     pub inputs: Vec<Signal>,
     /// The state at time zero.
     pub start: State,
@@ -34,7 +34,7 @@ pub struct Course {
 }
 
 impl Course {
-    /// What is done with a gantry in this experiment.
+    /// The course of a gantry in this experiment.
     pub fn of(experiment: &GantryExperiment) -> Self {
         let &GantryExperiment { ref inputs, until, every, initial, .. } = experiment;
         Self { inputs: inputs.to_vec(), start: initial, until, every }

@@ -197,7 +197,7 @@ impl<'a> Model<'a> {
         rate
     }
 
-    /// What the function makes of each body: frozen, or sliding with the sign of its speed.
+    /// The state of each body by the function: frozen, or sliding with the sign of its speed.
     fn motion(&self, state: &State, input: f64) -> [Motion; 3] {
         std::array::from_fn(|body| {
             let speed = state.speed[body];

@@ -145,7 +145,7 @@ pub struct Belts {
     pub make: Option<Make>,
     /// E A, N, and the lengths of the spans with bridge and cart at zero, m, where the spans follow them.
     pub follows: Option<(f64, Vec<f64>)>,
-    /// What else is known of the belt.
+    /// The data sheet of the belt.
     pub sheet: BeltSheet,
 }
 

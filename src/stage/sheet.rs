@@ -1,4 +1,4 @@
-//! What data sheets say: timing belts by their type, motors by their rating, a drive by its force.
+//! Data sheets: timing belts by their type, motors by their rating, a drive by its force.
 //!
 //! Every number of the table of belts stands in a catalogue, a data sheet or a published measurement, named beside it. What none of
 //! these says is left out.
@@ -215,7 +215,7 @@ impl BeltType {
     }
 }
 
-/// What is known of a belt beside its stiffness and damping.
+/// The data sheet of a belt: all beside its stiffness and damping.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct BeltSheet {
     /// Its type, where it has one of the table.
@@ -289,7 +289,7 @@ impl SimpleDrive {
         }
     }
 
-    /// What `motor` stands for, where it stands for one.
+    /// The simple drive that `motor` stands for, where it stands for one.
     pub fn of(motor: &Motor, r: f64) -> Option<Self> {
         let force = motor.torque_constant / r;
         motor.is_simple.then(|| Self { force, drag: motor.back_emf_constant * force / r })

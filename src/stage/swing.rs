@@ -4,7 +4,7 @@ use crate::friction::Motion;
 use crate::mechanism::{BODIES, Mechanism, Mode};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-/// What makes an eigenvalue zero, as a share of the largest.
+/// Eigenvalues up to this share of the largest are zero.
 const NOTHING: f64 = 1e-9;
 
 /// Frequency of the slowest elastic mode on the spans of the belt, rad/s, at the origin and without damping; rotors turn with their

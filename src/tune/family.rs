@@ -55,7 +55,7 @@ impl Unknown {
     }
 }
 
-/// What a parameter varies with: K_t and K_e of one motor are one number in SI units, and pulleys of one make are alike.
+/// The name of what a parameter varies with: K_t and K_e of one motor are one number in SI units, and pulleys of one make are alike.
 fn kin(name: &str) -> String {
     let first = name.split(" = ").next().unwrap_or(name);
     first.replace("back_emf_constant", "torque_constant").replace("idler_pulley.", "drive_pulley.")
@@ -77,7 +77,7 @@ pub struct Corner {
 pub struct Family {
     /// The axis as it is taken for.
     pub stage: Stage,
-    /// What can be off.
+    /// The parameters that can be off.
     pub unknowns: Vec<Unknown>,
     /// Where that is from.
     pub source: Source,

@@ -39,7 +39,7 @@ const STEPS: usize = 60;
 /// Local maxima below this share of the highest one are left as the grid has them.
 const HIGH: f64 = 0.7;
 
-/// What a command does at one frequency.
+/// The answer to a command at one frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Answer {
     /// Measured position, m per V or A.
@@ -55,7 +55,7 @@ pub struct Answer {
 pub struct Plant {
     /// ω, rad/s, up to half the sampling rate.
     pub frequency: Vec<f64>,
-    /// What a command does there.
+    /// The answers to a command there.
     pub answers: Vec<Answer>,
     model: Discrete,
     /// Outputs of the model: what is measured, the cart, the current; and metres per unit of the first.
@@ -88,7 +88,7 @@ impl Plant {
         Ok(plant)
     }
 
-    /// What a command does at ω, rad/s.
+    /// The answer to a command at ω, rad/s.
     pub fn at(&self, omega: f64) -> Answer {
         let all = self.model.at(omega);
         let [measured, cart, motor] = self.outputs;
@@ -123,7 +123,7 @@ fn grid(model: &Discrete, t: f64, corners: &[f64]) -> Vec<f64> {
     frequency
 }
 
-/// What a loop's frequency response says.
+/// The margins of a loop's frequency response.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Margins {
     /// Whether every pole of the closed loop lies within the unit circle, by Nyquist's criterion.
@@ -277,7 +277,7 @@ impl<'a> Curve<'a> {
         self.points = done;
     }
 
-    /// What the curve says; `finely` with every top and crossing followed to where it is.
+    /// The margins of the curve; `finely` with every top and crossing followed to where it is.
     fn margins(&self, finely: bool) -> Margins {
         let stable = stable(self.plant, &self.points);
         let (sensitivity, at) = self.highest(&Open::sensitivity, finely);

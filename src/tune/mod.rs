@@ -23,7 +23,7 @@ pub use family::{Corner, Family, MACHINES, SPREAD, Source, Unknown};
 pub use gains::{Gain, gains};
 pub use hunting::{Hunt, hunting};
 pub use margins::{Answer, Margins, Open, Plant, loops};
-pub use objective::{AtWorst, BALANCES, Balance, Seen, look, objective};
+pub use objective::{AtWorst, BALANCES, Balance, MoveFigures, look, objective};
 pub use placement::{first, place};
 pub use search::{Found, minimise};
 pub use verdict::{Forced, Judgement, Limit, MoveVerdict, Verdict};
@@ -49,14 +49,14 @@ const KEPT: usize = 4;
 /// Designs of each balance that are looked at before none is taken.
 const TRIES: usize = 6;
 
-/// What a tuning found.
+/// The result of a tuning.
 #[derive(Debug, Clone)]
 pub struct Tuned {
     /// The loop as the file has it.
     pub before: Verdict,
     /// As it was tuned.
     pub after: Verdict,
-    /// What became of it.
+    /// The judgement.
     pub judgement: Judgement,
     /// The limit that makes it worse, where one does.
     pub forced: Option<Forced>,
@@ -268,7 +268,7 @@ impl Work<'_> {
         Ok(leading)
     }
 
-    /// What is best with no figure worse than before, by differential evolution in the layouts of filters that came nearest to that; each time on
+    /// The best design with no figure worse than before, by differential evolution in the layouts of filters that came nearest to that; each time on
     /// the machines, too, on which a figure was worse.
     fn kept(
         &mut self,

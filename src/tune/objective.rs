@@ -31,16 +31,16 @@ pub struct Balance {
     pub current: f64,
 }
 
-/// What the table of choices has; the second is the objective.
+/// The balances of the table of choices; the second is the objective.
 pub const BALANCES: [Balance; 3] = [
     Balance { name: "stiff", error: 1.0, settling: 1.0, current: 0.1 },
     Balance { name: "balanced", error: 1.0, settling: 1.0, current: 1.0 },
     Balance { name: "gentle", error: 1.0, settling: 1.0, current: 10.0 },
 ];
 
-/// What a move shows on one axis.
+/// The figures of a move on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Seen {
+pub struct MoveFigures {
     /// Largest |x − y|, m; infinite where the run does not reach its end.
     pub error: f64,
     /// Root mean square of x − y, m.
@@ -54,12 +54,12 @@ pub struct Seen {
 }
 
 /// A move on one axis.
-pub fn look(stage: &Stage, model: &Stage, design: &Design, motion: &Move) -> Result<Seen> {
+pub fn look(stage: &Stage, model: &Stage, design: &Design, motion: &Move) -> Result<MoveFigures> {
     let (until, window, solver) = (motion.until, motion.window, Solver::of(stage));
     let setup = Setup { stage, model, design, profile: &motion.profile, until, window, solver };
     let (figures, ending) = closed_loop_briefly(&setup)?;
     if ending != Ending::Complete {
-        return Ok(Seen {
+        return Ok(MoveFigures {
             error: f64::INFINITY,
             rms: f64::INFINITY,
             settling: None,
@@ -69,7 +69,7 @@ pub fn look(stage: &Stage, model: &Stage, design: &Design, motion: &Move) -> Res
     }
     let left = (until - motion.profile.end()).max(motion.profile.end() * 1e-3);
     let away = left * (1.0 + (figures.final_cart_error.abs() / window).ln_1p());
-    Ok(Seen {
+    Ok(MoveFigures {
         error: figures.cart.peak.value.abs(),
         rms: figures.cart.rms,
         settling: figures.settling,
@@ -95,8 +95,8 @@ pub struct AtWorst {
 
 impl AtWorst {
     /// With so many axes left out of each figure.
-    pub fn of(seen: &[Seen], left_out: usize) -> Self {
-        let worst = |of: &dyn Fn(&Seen) -> f64| {
+    pub fn of(seen: &[MoveFigures], left_out: usize) -> Self {
+        let worst = |of: &dyn Fn(&MoveFigures) -> f64| {
             let mut all: Vec<(f64, usize)> = seen.iter().map(of).enumerate().map(|(i, v)| (sure(v), i)).collect();
             all.sort_by(|a, b| b.0.total_cmp(&a.0));
             all.get(left_out.min(all.len().saturating_sub(1))).copied().unwrap_or((f64::INFINITY, 0))
@@ -112,7 +112,7 @@ impl AtWorst {
     }
 }
 
-/// What is no number is as bad as can be.
+/// A value that is no number is as bad as can be.
 fn sure(value: f64) -> f64 {
     if value.is_nan() { f64::INFINITY } else { value }
 }
@@ -143,7 +143,7 @@ pub fn look_at_all(
     model: &Stage,
     design: &Design,
     moves: &[Move],
-) -> Result<Vec<Vec<Seen>>> {
+) -> Result<Vec<Vec<MoveFigures>>> {
     let stages: Vec<Stage> = corners.iter().map(|corner| family.stage_at(corner)).collect();
     let of = |motion: &Move| stages.iter().map(|stage| look(stage, model, design, motion)).collect();
     moves.iter().map(of).collect()

@@ -67,7 +67,7 @@ pub fn place(design: &Design, stage: &Stage, bandwidth: f64, damping: f64) -> Op
     Some(Design { structure, ..design.clone() })
 }
 
-/// What a loop adds to the drag of the axis to make `wanted`.
+/// The addition of a loop to the drag of the axis that makes `wanted`.
 fn least(wanted: f64, drag: f64) -> f64 {
     (wanted - drag).max(0.05 * wanted)
 }

@@ -1,6 +1,6 @@
 //! A search without derivatives (J. A. Nelder, R. Mead, "A simplex method for function minimization", The Computer Journal 7, 1965).
 
-/// What a search found.
+/// The result of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
     /// Where.

@@ -1,4 +1,4 @@
-//! What is wrong with a closed loop, as its model and its run show: not stable, at its limit, howling.
+//! Troubles of a closed loop, as its model and its run show them: not stable, at its limit, howling.
 
 use super::margins::{Margins, Plant};
 use crate::control::MoveRun;
@@ -22,7 +22,7 @@ const LEAST: f64 = 0.1;
 /// Distance of a frequency from a mode's, as a share, within which it is that mode's.
 const NEAR: f64 = 0.2;
 
-/// What is wrong.
+/// The kind of trouble.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// The sampled loop has poles outside the unit circle, or its swing grows.
@@ -47,7 +47,7 @@ impl Kind {
 /// A loop that is not to be relied on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trouble {
-    /// What it is.
+    /// The kind.
     pub kind: Kind,
     /// At which frequency it swings, Hz, where it does.
     pub frequency: Option<f64>,
@@ -57,7 +57,7 @@ pub struct Trouble {
     pub words: String,
 }
 
-/// What is wrong with a move that was run to `target`, m; none if nothing is.
+/// The trouble of a move that was run to `target`, m; none if it has none.
 pub fn trouble(stage: &Stage, design: &Design, run: &MoveRun, target: f64) -> Option<Trouble> {
     let model = unstable(stage, design, target);
     let (swing, (samples, limited)) = (run.swing, run.samples);

@@ -1,9 +1,9 @@
-//! What a controller does over the family, and whether one is better than another.
+//! The verdict on a controller over the family, and whether one is better than another.
 
 use super::family::{Corner, Family, modes_along};
 use super::hunting::{Hunt, hunting};
 use super::margins::Margins;
-use super::objective::{AtWorst, BALANCES, Seen, look_at_all, objective};
+use super::objective::{AtWorst, BALANCES, MoveFigures, look_at_all, objective};
 use super::work::{Work, mode_at};
 use crate::case::{Cost, Tuning};
 use crate::control::{Deviation, Setup, closed_loop};
@@ -14,7 +14,7 @@ use crate::solve::{Ending, Solver};
 /// By what share a figure may differ and be the same.
 const SAME: f64 = 1e-6;
 
-/// What a controller does on the axis of the file and at worst over the family.
+/// The verdict on a controller: on the axis of the file, and at worst over the family.
 #[derive(Debug, Clone)]
 pub struct Verdict {
     /// The controller.
@@ -35,7 +35,7 @@ pub struct Verdict {
     pub hunt: Option<Hunt>,
 }
 
-/// What a controller does in a move.
+/// The verdict on a move.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MoveVerdict {
     /// Its name.
@@ -54,10 +54,10 @@ pub struct MoveVerdict {
     pub at_worst: AtWorst,
     /// The axis that takes longest to settle, by its place in the list.
     pub(super) slowest: usize,
-    seen: Vec<Seen>,
+    seen: Vec<MoveFigures>,
 }
 
-/// What became of a controller.
+/// The judgement on a controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Judgement {
     /// No figure of its moves is worse, and the objective or the limits are better.
@@ -98,7 +98,7 @@ impl Limit {
     }
 }
 
-/// What keeps the gains from being as they were.
+/// The limit that keeps the gains from being as they were.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Forced {
     /// The limit that is reached.
@@ -119,7 +119,7 @@ impl Verdict {
     pub(super) fn worse_on(&self, before: &Verdict) -> Vec<usize> {
         let mut all = Vec::new();
         for (is, was) in self.moves.iter().zip(&before.moves) {
-            let beyond = |seen: &Seen| {
+            let beyond = |seen: &MoveFigures| {
                 let later = (seen.settles - was.at_worst.settles.0) / was.at_worst.settles.0.max(0.05);
                 let left = if seen.settling.is_none() && is.settled.0 < was.settled.0 { 1.0 } else { 0.0 };
                 (seen.error / was.at_worst.error.0).ln().max(later).max(left)
@@ -141,7 +141,7 @@ impl Work<'_> {
         Ok(Verdict { hunt, ..verdict })
     }
 
-    /// What a design does.
+    /// The verdict on a design.
     pub fn verdict(&self, design: &Design) -> Result<Verdict> {
         let feedback = self.feedback(design)?;
         let corners = feedback.corners();

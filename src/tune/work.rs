@@ -4,7 +4,7 @@ use super::evolution::evolve;
 use super::family::{Family, modes_along};
 use super::gains::{self, rounded, searched, shaped};
 use super::margins::{Margins, Plant};
-use super::objective::{AtWorst, BALANCES, Balance, Seen, look, objective};
+use super::objective::{AtWorst, BALANCES, Balance, MoveFigures, look, objective};
 use super::rules::{layouts, starts};
 use super::search::{Found, minimise};
 use super::verdict::Verdict;
@@ -71,7 +71,7 @@ pub(super) struct Work<'a> {
 #[derive(Debug, Clone)]
 pub(super) struct Finalist {
     pub design: Design,
-    /// What it was made from, number of filters that were there, and the powers that lead to it.
+    /// The design that it was made from, the number of its filters, and the powers that lead to it.
     start: Design,
     own: usize,
     powers: Vec<f64>,
@@ -305,10 +305,10 @@ impl<'a> Work<'a> {
         Ok(between(near))
     }
 
-    /// What a design does on these machines, and ln J by the balance of the search; as soon as it is at least `bar`, what it does on those that were
+    /// The figures of a design on these machines, and ln J by the balance of the search; as soon as it is at least `bar`, those of the machines that were
     /// looked at until then: another machine makes no figure at worst smaller.
     fn run(&self, design: &Design, some: &[usize], weighed: &Weighed, bar: f64) -> (Vec<AtWorst>, f64) {
-        let mut seen: Vec<Vec<Seen>> = vec![Vec::new(); self.moves.len()];
+        let mut seen: Vec<Vec<MoveFigures>> = vec![Vec::new(); self.moves.len()];
         let mut found = (Vec::new(), f64::INFINITY);
         // The axis of the file is seldom the worst.
         for &place in some.iter().rev() {

@@ -1,4 +1,4 @@
-//! What several tests share: the paper's machine, and and measurements of others.
+//! Shared by several tests: the paper's machine, and measurements of others.
 #![allow(dead_code)]
 
 pub mod chance;

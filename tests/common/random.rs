@@ -26,7 +26,7 @@ pub fn decades(low: f64, high: f64) -> impl Strategy<Value = f64> + Clone {
     (low.ln()..high.ln()).prop_map(f64::exp)
 }
 
-/// What the random friction may look like.
+/// The kinds of random friction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dry {
     /// The same both ways, breakaway at or above Coulomb.

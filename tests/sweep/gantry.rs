@@ -20,7 +20,7 @@ fn sweep(text: &str, changes: &[&str]) -> Sweep {
     Sweep::of_gantry(&case(text, changes)).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// What `taut simulate` tells of an experiment.
+/// The key figures that `taut simulate` gives of an experiment.
 fn simulated(case: &GantryCase, experiment: usize) -> GantryMetrics {
     let mechanism = case.gantry.mechanism();
     let mut meter = GantryMeter::new(&case.gantry);

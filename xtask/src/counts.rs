@@ -81,7 +81,7 @@ fn total(text: &str) -> Option<u64> {
     sum("totals:").or_else(|| sum("summary:"))
 }
 
-/// What a command prints.
+/// The output of a command.
 fn told(command: &mut Command) -> Result<String, String> {
     let name = command.get_program().to_string_lossy().into_owned();
     let output = command.output().map_err(|error| format!("{name} cannot be started: {error}"))?;
@@ -109,7 +109,7 @@ fn compare(before: &BTreeMap<String, u64>, now: &[(String, u64)]) -> Vec<String>
     rises
 }
 
-/// What is kept.
+/// The counts that are kept.
 #[derive(Debug, Default, PartialEq)]
 struct Kept {
     compiler: String,

@@ -30,7 +30,7 @@ pub fn text(overview: &Overview) -> String {
     text
 }
 
-/// What changes along the travel.
+/// The figures that change along the travel.
 fn places(text: &mut String, overview: &Overview) {
     let is_axis = overview.kind == "axis";
     if !overview.depends_on_place {

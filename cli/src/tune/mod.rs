@@ -79,7 +79,7 @@ pub fn run(args: &Args) -> Outcome {
     finished.finish(common, folder)
 }
 
-/// What makes the result less than it seems.
+/// Warnings about the result.
 fn remarks(work: &Work) -> Vec<Remark> {
     let tuned = work.tuned;
     let mut remarks = Vec::new();
@@ -90,7 +90,7 @@ fn remarks(work: &Work) -> Vec<Remark> {
     remarks
 }
 
-/// What the file says, with what the command line says.
+/// The tuning of the file, with the options of the command line.
 fn tuning(args: &Args, case: &Case) -> Tuning {
     let mut tuning = case.tune.clone().unwrap_or_default();
     tuning.spread = args.spread.or(tuning.spread);

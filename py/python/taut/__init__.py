@@ -10,7 +10,7 @@ Numbers are in SI units everywhere; names of columns and keys of dictionaries sa
 Mistakes are :class:`taut.Error`, a ``ValueError`` with the text that the command line shows.
 """
 
-from ._native import Bug, Error, Seen, __version__
+from ._native import Bug, Error, Observation, __version__
 from .case import Case, GantryCase, read, show, template
 from .results import Check, Comparison, Drift, Estimate, Fit, FitLog, FrequencyResponses, GantryModes, LinearModel, Modes, Shown, Tuned
 from .runs import Run, Runs
@@ -33,9 +33,9 @@ __all__ = [
     "GantryModes",
     "LinearModel",
     "Modes",
+    "Observation",
     "Run",
     "Runs",
-    "Seen",
     "Shape",
     "Shown",
     "Table",

@@ -21,7 +21,7 @@ class Error(ValueError):
 class Bug(RuntimeError):
     """A mistake in taut itself, which no input should bring about; where it happened stands on the standard error."""
 
-class Seen:
+class Observation:
     """What a controller knows at a sample. SI units."""
 
     @property

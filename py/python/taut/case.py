@@ -25,7 +25,7 @@ class Controller(Protocol):
     It may also have ``reset()``, called before a move, and ``limited(given)``, told after each sample what the limit left.
     """
 
-    def step(self, seen: _native.Seen, /) -> float:
+    def step(self, seen: _native.Observation, /) -> float:
         """The command, V or A, that follows from what is seen; called once a sample."""
         ...
 

@@ -24,7 +24,7 @@ pub fn shares(found: &Check) -> impl Iterator<Item = (String, String)> {
     found.fit.estimates.iter().map(told)
 }
 
-/// What the balance of torques gives, each with its unit, value and standard error.
+/// The results of the balance of torques, each with its unit, value and standard error.
 pub fn regression(found: &Balance) -> impl Iterator<Item = (&'static str, &'static str, f64, f64)> {
     // As `cart.load` counts it: positive towards larger x, where the motor has less to bring up.
     let values = [found.inertia, found.viscous, found.coulomb, -found.load];
@@ -33,7 +33,7 @@ pub fn regression(found: &Balance) -> impl Iterator<Item = (&'static str, &'stat
     rows.map(|(((name, unit), value), error)| (name, unit, value, error))
 }
 
-/// What a log shows, indented; not `whole`: in its first line and its warnings.
+/// The survey of a log, indented; not `whole`: its first line and its warnings.
 pub fn shown(log: &Survey, whole: bool) -> String {
     let mut log = log.clone();
     if !whole {

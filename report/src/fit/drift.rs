@@ -10,7 +10,7 @@ pub fn error(one: &Together) -> String {
     if one.rmse.is_finite() { value(one.rmse, one.quantity.unit(), 4) } else { "–".into() }
 }
 
-/// What is changed, from what to what, in words.
+/// The parameter, its old and its new value, and the change in words.
 pub fn words(change: &Change) -> [String; 4] {
     let estimate = &change.estimate;
     let shown = |number: f64| value(number, estimate.unit, 4);

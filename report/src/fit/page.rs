@@ -189,7 +189,7 @@ fn table_of(page: &mut Page, fit: &Fit, quantity: Quantity) {
     }
 }
 
-/// What the model lacks, as a force.
+/// The force that the model lacks.
 fn residual(page: &mut Page, fit: &Fit) {
     let mut all = ResidualForce::default();
     for log in &fit.logs {

@@ -66,7 +66,7 @@ pub fn overlay(log: &LogFit, output: &OutputFit) -> Figure {
     figure
 }
 
-/// What is between model and log, all logs over each other, one figure for each quantity.
+/// The residuals of all logs over each other, one figure for each quantity.
 pub fn together(fit: &Fit) -> Vec<Figure> {
     let mut quantities: Vec<Quantity> = Vec::new();
     for output in fit.logs.iter().flat_map(|log| &log.outputs) {
@@ -144,7 +144,7 @@ fn binned(x: &[f64], force: &[f64], chosen: impl Fn(usize) -> bool) -> (Vec<f64>
     sums.iter().filter(|bin| bin.2 >= fewest).map(|(x, f, n)| (x / *n as f64, f / *n as f64)).unzip()
 }
 
-/// What the model lacks as a force, beside position, speed and force of the motor: `all` over all logs.
+/// The force that the model lacks, beside position, speed and force of the motor: `all` over all logs.
 pub fn residual_forces(all: &ResidualForce) -> Vec<Figure> {
     let force = || Axis::new("Residual force", "N");
     let beside = |title: &str, x: Axis, values: &[f64], caption: &str| {

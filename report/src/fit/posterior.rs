@@ -14,7 +14,7 @@ pub fn ending(drawn: &Posterior) -> String {
     if doubts.is_empty() { "converged".into() } else { format!("not converged: {}", doubts.join("; ")) }
 }
 
-/// What it was drawn with, in a sentence.
+/// The effort of the draws, in a sentence.
 pub fn effort(drawn: &Posterior) -> String {
     let slopes = if drawn.fixed_slopes { "slopes of the fit" } else { "slopes measured at each place" };
     let memory = match drawn.inflation {

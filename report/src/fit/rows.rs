@@ -8,7 +8,7 @@ use taut::number;
 /// Findings of one kind in so many logs are told of the first.
 const MOST_ALIKE: usize = 3;
 
-/// What is to be known; of what is said of many logs, the first and how many more.
+/// Warnings and notes; of those that many logs share, the first and how many more.
 pub fn findings(fit: &Fit) -> Vec<String> {
     let mut told: Vec<String> = Vec::new();
     let mut codes: Vec<&str> = Vec::new();
@@ -25,7 +25,7 @@ pub fn findings(fit: &Fit) -> Vec<String> {
     told
 }
 
-/// What the search did where the order of events left no derivative; empty where it did not have to.
+/// The steps of the search past kinks, where the order of events left no derivative; empty where there were none.
 pub fn past_kinks(fit: &Fit) -> String {
     let evolved = match fit.evolved {
         0 => String::new(),

@@ -2,7 +2,7 @@
 
 use taut::control::shaping::Fitted;
 
-/// What else there is to say.
+/// A remark.
 pub fn remark(fitted: &Fitted) -> &'static str {
     match (fitted.is_candidate, fitted.is_lowest) {
         (false, _) => "not a candidate",

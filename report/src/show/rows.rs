@@ -1,4 +1,4 @@
-//! What follows from the numbers of a case, in words.
+//! The overview of a machine in words.
 
 use taut::number::{engineering_typed, fixed, typed};
 use taut::overview::{Overview, Place, Row};

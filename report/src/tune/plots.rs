@@ -11,7 +11,7 @@ use taut::control::{Loop, Rows, Standard, stream};
 use taut::solve::{Flow, Solver};
 use taut::tune::{Corner, Verdict, loops};
 
-/// What is drawn of L beyond this would hide the point −1.
+/// The largest |L| that is drawn: more of it would hide the point −1.
 const FAR: f64 = 3.0;
 
 /// |S| is shown from this part of the frequency of its lowest peak: below, it only falls.

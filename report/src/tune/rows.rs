@@ -109,7 +109,7 @@ pub fn verdict(work: &Work) -> String {
     }
 }
 
-/// What became of a move at worst, in words; none where nothing did.
+/// The change of a move at worst, in words; none where there is none.
 fn change(was: &MoveVerdict, is: &MoveVerdict) -> Option<String> {
     let mut words = Vec::new();
     if was.worst.0 != is.worst.0 {
@@ -121,7 +121,7 @@ fn change(was: &MoveVerdict, is: &MoveVerdict) -> Option<String> {
     (!words.is_empty()).then(|| format!("{} {}", was.name, words.join(" and ")))
 }
 
-/// What is to be said of the gains of the file first: that they break the limits themselves.
+/// The first sentence on the gains of the file: that they break the limits themselves.
 pub fn given(work: &Work) -> Option<String> {
     let (before, tuning) = (&work.tuned.before, work.tuning);
     if before.worst.excess(tuning.sensitivity, tuning.complementary) <= 1.0 {
@@ -172,7 +172,7 @@ pub fn hunt(hunt: &Option<Hunt>) -> String {
     }
 }
 
-/// What the limits had to hold over.
+/// The family that the limits had to hold over.
 pub fn family(work: &Work) -> String {
     let family = &work.tuned.family;
     let off = match family.source {
@@ -195,7 +195,7 @@ pub fn family(work: &Work) -> String {
     format!("{off}{loads}{places}: {level}")
 }
 
-/// What was looked for.
+/// The goal of the search.
 pub fn goal(work: &Work) -> String {
     let tuning = work.tuning;
     let limits = format!("Ms ≤ {}, Mt ≤ {}", tuning.sensitivity, tuning.complementary);

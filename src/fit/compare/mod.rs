@@ -29,7 +29,7 @@ use std::path::Path;
 /// Share of a record to which its start is fitted; the rest of it is foretold.
 const BEGIN: f64 = 0.1;
 
-/// What is compared.
+/// The laws and windows to compare.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
     /// Friction laws.
@@ -65,7 +65,7 @@ pub struct Comparison {
     pub chosen: usize,
     /// The one with the least training error.
     pub by_training: usize,
-    /// What was held out, in words.
+    /// The parts that were held out, in words.
     pub held_out: String,
     /// The body whose friction is compared.
     pub body: &'static str,
@@ -73,11 +73,11 @@ pub struct Comparison {
     pub quantities: Vec<Quantity>,
     /// The case with the chosen law, what is searched for in it, and the fit to all logs.
     pub case: Case,
-    /// What is searched for.
+    /// The free parameters.
     pub plan: Plan,
     /// The fit to all logs.
     pub fit: Fit,
-    /// What it took.
+    /// The effort.
     pub work: Work,
 }
 

@@ -15,7 +15,7 @@ const FOLDS: usize = 5;
 const BLOCKS: usize = 4;
 const SAMPLES: usize = 60;
 
-/// What is fitted and what is held out.
+/// The parts that are fitted, and those that are held out.
 pub(super) struct Fold {
     pub fitted: Vec<Experiment>,
     pub held_out: Vec<Experiment>,
@@ -38,7 +38,7 @@ impl Parts {
         Self { folds: by_block(&logs), is_cut: true }
     }
 
-    /// What was held out, in words.
+    /// The parts that are held out, in words.
     pub fn words(&self) -> String {
         match self.is_cut {
             true => format!(

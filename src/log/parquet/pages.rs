@@ -47,7 +47,7 @@ pub(super) fn check(file: &Path, metadata: &ParquetMetaData, column: usize) -> R
     Ok(())
 }
 
-/// What the header of a page says.
+/// The header of a page.
 struct Header {
     /// Sizes of its data, bytes.
     unpacked: i64,

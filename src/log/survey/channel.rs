@@ -56,7 +56,7 @@ pub struct Outlier {
     pub time: f64,
     /// Its value.
     pub value: f64,
-    /// What its neighbours would suggest.
+    /// The value that its neighbours suggest.
     pub expected: f64,
 }
 
@@ -106,7 +106,7 @@ impl Channel {
         self.greatest - self.least
     }
 
-    /// What cannot be told apart: the noise, or the rounding error of a step, whichever is more.
+    /// The resolution: the noise, or the rounding error of a step, whichever is more.
     pub fn resolution(&self) -> f64 {
         // A rounding error is evenly distributed: q / √12.
         self.noise.max(self.step.map_or(0.0, |q| q / 12f64.sqrt()))

@@ -1,4 +1,4 @@
-//! What a log is like, before anything is fitted to it: its clock, its columns, its motion, and what looks wrong.
+//! The survey of a log before anything is fitted to it: its clock, its columns, its motion, and its faults.
 //!
 //! Nothing here changes a log. Speeds are estimated where only positions were measured, to tell rest, reversals and steady
 //! motion apart, and are used for nothing else.
@@ -17,7 +17,7 @@ use crate::number::engineering_typed;
 use crate::stage::Stage;
 use std::fmt;
 
-/// What a log is like.
+/// The survey of a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Survey {
     /// The log's name.
@@ -26,22 +26,22 @@ pub struct Survey {
     pub timing: Timing,
     /// The input, then the outputs.
     pub channels: Vec<Channel>,
-    /// What moves, and how; none where nothing that was measured is a motion.
+    /// The motion; none where nothing that was measured is a motion.
     pub motion: Option<Motion>,
-    /// What is to be said about it, the most serious first.
+    /// The notes on it, the most serious first.
     pub notes: Vec<Note>,
 }
 
 /// Something to be known about a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Note {
-    /// What it is about, in a word for programs: `gaps`, `saturation`.
+    /// Its subject, in a word for programs: `gaps`, `saturation`.
     pub code: &'static str,
     /// How much it matters.
     pub severity: Severity,
     /// The column it is about: `input` or a quantity's name; none if it is about all.
     pub column: Option<&'static str>,
-    /// What was found, in a sentence with numbers, and what to do.
+    /// The finding, in a sentence with numbers, and what to do.
     pub text: String,
 }
 

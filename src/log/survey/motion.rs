@@ -1,4 +1,4 @@
-//! What moves in a log: rest, reversals, steady speeds.
+//! The motion in a log: rest, reversals, steady speeds.
 
 use super::super::{Log, Quantity};
 use super::channel::Channel;
@@ -23,7 +23,7 @@ const FEWEST_MISSING: usize = 3;
 /// Fewest samples of a steady speed.
 const SHORTEST: usize = 20;
 
-/// What moves in a log, judged by one of its columns.
+/// The motion in a log, judged by one of its columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {
     /// The column: a position if there is one, or else a speed.

@@ -1,4 +1,4 @@
-//! What a log would be if its units, columns and signs were right: compared with itself, and with a rough run of the machine.
+//! Suspicions of wrong units, columns and signs: a log compared with itself, and with a rough run of the machine.
 
 use super::super::{Log, Output, Quantity};
 use super::channel::Channel;
@@ -207,7 +207,7 @@ fn slope(x: &[f64], y: &[f64]) -> f64 {
     if xy * xy < 0.8 * xx * yy { f64::NAN } else { xy / xx }
 }
 
-/// What is wrong with a ratio that should be one.
+/// The fault of a ratio that should be one.
 enum Kind {
     Sign,
     Factor(String),
@@ -340,7 +340,7 @@ fn hasty(log: &Log, motion: &Motion, expected: f64) -> Option<Note> {
     Some(Note::new("time-unit", Severity::Suspicion, text).on(motion.quantity.name()))
 }
 
-/// What the motor does at the cart: force per volt or ampere, and what its back-EMF brakes, N s/m.
+/// The motor at the cart: force per volt or ampere, and the braking by its back-EMF, N s/m.
 struct Drive {
     force: f64,
     brake: f64,
@@ -372,7 +372,7 @@ struct Expected {
     acceleration: f64,
 }
 
-/// What the machine does as one rigid mass; none if it would hardly move.
+/// The motion of the machine as one rigid mass; none if it would hardly move.
 fn expected(log: &Log, stage: &Stage) -> Option<Expected> {
     let r = stage.pulley_radius;
     let (motor, cart) = (&stage.motor, &stage.cart);

@@ -1,4 +1,4 @@
-//! What follows when a mode ends: who does what next, and whether that holds.
+//! The change of a mode: the next state of each part, and whether that holds.
 
 use super::matrices::{Room, Watch};
 use super::{Core, ModeMatrices};
@@ -15,7 +15,7 @@ const EVENTS_AT_MOST: f64 = 2e7;
 /// The rank of conditions on bodies.
 const BODIES: u8 = 3;
 
-/// What counts as one instant, as a share of the reach of the series.
+/// The length of one instant, as a share of the reach of the series.
 const MOMENT: f64 = 1e-12;
 
 /// Mode changes allowed at one instant.
@@ -48,7 +48,7 @@ impl<const N: usize> Core<N> {
         }
     }
 
-    /// What a body at zero speed does under its present load.
+    /// The motion of a body at zero speed under its present load.
     fn decide(&self, body: usize) -> Motion {
         let law = self.common.mechanism.friction(body);
         let (forward, _, noise) = self.load(body, true);

@@ -12,7 +12,7 @@ pub(super) use guards::{Room, Watch};
 pub(super) use shown::Shown;
 use std::sync::{Arc, OnceLock};
 
-/// What the vector z of the exact solver holds: the state in the solver's coordinates, the inputs with their derivatives, and a one.
+/// The places of the vector z of the exact solver: the state in the solver's coordinates, the inputs with their derivatives, and a one.
 #[derive(Debug, Clone)]
 pub(in crate::solve) struct Space {
     pub(in crate::solve) layout: Layout,
@@ -112,7 +112,7 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     beside: Vec<Beside<N>>,
     /// Whether one of them is the torque of a gear.
     pub(super) has_gear_torque: bool,
-    /// What acts on each body but its friction; nothing where a gear loses power, and it is another at rest.
+    /// The load on each body without its friction; none where a gear loses power, and it is another at rest.
     load: Vec<Row<N>>,
     /// |b|: how fast √(2V) of ż can grow per unit of |u̇|.
     pub(super) forcing: [f64; DRIVES],
@@ -143,7 +143,7 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     coupled: bool,
     /// Currents of the drives.
     current: [OnceLock<Row<N>>; DRIVES],
-    /// What an observer is shown.
+    /// The readings of an observer.
     shown: OnceLock<Box<Shown<N>>>,
 }
 
@@ -461,7 +461,7 @@ impl<const N: usize> ModeMatrices<N> {
         }
     }
 
-    /// What acts on a body but its friction, where no gear loses power.
+    /// The load on a body without its friction, where no gear loses power.
     pub(super) fn load(&self, body: usize) -> Option<&Row<N>> {
         self.load.get(body)
     }
@@ -514,7 +514,7 @@ impl<const N: usize> ModeMatrices<N> {
         self.rate.series(z, distance, series_order(self.speed * distance), series);
     }
 
-    /// What rounding may do to ż.
+    /// The rounding error of ż.
     pub(super) fn noise_of_rate(&self, z: &[f64; N]) -> [f64; N] {
         self.rate.absolute().rate(&z.map(f64::abs)).map(|size| ROUNDING * size)
     }

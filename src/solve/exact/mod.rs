@@ -51,7 +51,7 @@ pub(super) struct Core<const N: usize> {
     pub(super) common: Common,
 }
 
-/// What of a machine under way does not depend on the kernel.
+/// The parts of a machine under way that do not depend on the kernel.
 #[derive(Clone)]
 pub(super) struct Common {
     pub(super) mechanism: Arc<Mechanism>,
@@ -96,7 +96,7 @@ pub(super) struct Common {
     pub(super) trouble: Option<Ending>,
 }
 
-/// What a bound tells of an interval.
+/// The verdict of a bound on an interval.
 enum Bound<const N: usize> {
     /// No guard falls; here is the end, if it was computed.
     Safe(Option<[f64; N]>),
@@ -531,7 +531,7 @@ impl<const N: usize> Core<N> {
         self.common.space.input(&self.z)
     }
 
-    /// What rounding may have done to the value of a form.
+    /// The rounding error of the value of a form.
     fn noise(&self, form: &Form) -> f64 {
         form.noise(&self.common.space.layout, &self.inner(), &self.input())
     }

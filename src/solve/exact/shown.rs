@@ -1,4 +1,4 @@
-//! What an observer is shown of a run: every interval, and closer where something may happen within.
+//! The view of an observer on a run: every interval, and closer where something may happen within.
 
 use super::matrices::Shown;
 use super::{ModeMatrices, Run};
@@ -6,7 +6,7 @@ use crate::mechanism::Cause;
 use crate::solve::observe::{Curve, Gap, QUANTITIES, Reading};
 use std::sync::Arc;
 
-/// What a curve may be off in the middle, as a share of the largest value seen of that quantity.
+/// The error of a curve that is allowed in the middle, as a share of the largest value seen of that quantity.
 const OFF: f64 = 1e-9;
 
 /// Curves of a run that are looked at closer at most: what swings more often than that between its rows is not seen whole.
@@ -32,7 +32,7 @@ struct Sight<const N: usize> {
 
 /// Where an observer is.
 pub(super) struct Watching {
-    /// What is read now, where nothing has jumped since.
+    /// The present reading, where nothing has jumped since.
     now: Option<Reading>,
     /// The largest magnitudes seen.
     scale: Reading,
@@ -208,7 +208,7 @@ impl<const N: usize> Run<'_, N> {
         }
     }
 
-    /// What is to be seen of `z`.
+    /// The sight of `z`.
     fn sight(&self, law: &ModeMatrices<N>, z: &[f64; N]) -> Sight<N> {
         let value = self.read(law.shown(&self.core.common.mechanism, &self.core.common.space), z);
         Sight { z: *z, value, slope: None, terms: None }
@@ -228,7 +228,7 @@ impl<const N: usize> Run<'_, N> {
         law.shown(&self.core.common.mechanism, &self.core.common.space).change(rate)
     }
 
-    /// What is read and its first three derivatives, each times h to its order and over its factorial: q, q̇ h, q̈ h²/2, q⃛ h³/6.
+    /// A reading and its first three derivatives, each times h to its order and over its factorial: q, q̇ h, q̈ h²/2, q⃛ h³/6.
     fn terms(&self, law: &ModeMatrices<N>, sight: &mut Sight<N>, length: f64) -> [Reading; 4] {
         let slope = self.slope(law, sight);
         let higher = || {
@@ -252,7 +252,7 @@ impl<const N: usize> Run<'_, N> {
         }
     }
 
-    /// What is read in `z`.
+    /// The readings in `z`.
     fn read(&self, shown: &Shown<N>, z: &[f64; N]) -> Reading {
         shown.read(z, self.core.common.coordinates.origin())
     }

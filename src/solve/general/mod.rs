@@ -273,7 +273,7 @@ impl Core {
         Tolerance::Vector(self.absolute[..self.model.size].to_vec())
     }
 
-    /// What a body at zero speed does under its present load.
+    /// The motion of a body at zero speed under its present load.
     fn decide(&self, body: usize, input: &[f64; DRIVES]) -> Motion {
         let (model, state) = (&*self.model, &self.y);
         let (mode, noise) = (&self.mode, model.noise(body, &self.mode, state, input));

@@ -58,7 +58,7 @@ pub(super) struct Model {
     following: Vec<Following>,
 }
 
-/// What is added to the linear equations.
+/// The additions to the linear equations.
 #[derive(Clone, Copy, Default)]
 struct Added {
     /// Forces and torques on each body that moves by itself: of springs that follow, and, to be taken off, friction beyond b v ± F_c of
@@ -178,7 +178,7 @@ impl Model {
         }
     }
 
-    /// What the force of a spring is beyond k s + c ṡ with the stiffness at the origin, taut or not: (k(q) − k) s.
+    /// The force of a spring beyond k s + c ṡ with the stiffness at the origin, taut or not: (k(q) − k) s.
     #[inline]
     fn beyond(&self, following: &Following, y: &[f64]) -> f64 {
         let spring = &self.mechanism.springs[following.spring];
@@ -188,7 +188,7 @@ impl Model {
         (stiffness - spring.stiffness) * length
     }
 
-    /// What the springs that follow put on each body that moves by itself, −Aᵀ f; a slack one nothing.
+    /// The loads of the springs that follow on each body that moves by itself, −Aᵀ f; a slack one has none.
     #[inline(always)]
     fn loads(&self, mode: &Mode, y: &[f64]) -> [f64; BODIES] {
         let mut loads = [0.0; BODIES];
@@ -210,12 +210,12 @@ impl Model {
         self.value(&self.mechanism.load(body, forward, &settled), &inner, input) + self.loads(mode, y)[body]
     }
 
-    /// What rounding may have done to it.
+    /// Its rounding error.
     pub(super) fn noise(&self, body: usize, mode: &Mode, y: &[f64], input: &[f64; DRIVES]) -> f64 {
         self.mechanism.load(body, true, mode).noise(&self.layout, &self.inner(y), input)
     }
 
-    /// What a body at rest holds this way, where it is, with all that moves with it: Σ ρ a(x) F_b.
+    /// The breakaway of a body at rest this way, where it is, with all that moves with it: Σ ρ a(x) F_b.
     #[inline]
     pub(super) fn breakaway(&self, leader: usize, forward: bool, y: &[f64]) -> f64 {
         let own = |body: usize| {
@@ -225,7 +225,7 @@ impl Model {
         self.mechanism.followers(leader).map(own).sum()
     }
 
-    /// What bent bristles hold a body at rest with, and all that moves with it: Σ ρ σ₀ z.
+    /// The force of bent bristles on a body at rest, and on all that moves with it: Σ ρ σ₀ z.
     #[inline]
     pub(super) fn bristle_force(&self, leader: usize, y: &[f64]) -> f64 {
         let of = |curved: &Curved| match (curved.friction.law, curved.bristle) {
@@ -235,7 +235,7 @@ impl Model {
         self.curved.iter().filter(|curved| curved.leader == leader).map(of).sum()
     }
 
-    /// What the laws and the belt add to the linear equations, and how the bristles move.
+    /// The additions of the laws and the belt to the linear equations, and how the bristles move.
     #[inline(always)]
     fn added(&self, mode: &Mode, y: &[f64]) -> Added {
         let mut added = Added { load: self.loads(mode, y), ..Added::default() };
@@ -248,7 +248,7 @@ impl Model {
         added
     }
 
-    /// What a body's own friction differs by from that of the linear equations, and how fast its bristles bend.
+    /// The difference of a body's own friction from that of the linear equations, and how fast its bristles bend.
     #[inline(always)]
     fn beyond_straight(&self, curved: &Curved, motion: Motion, y: &[f64]) -> (f64, f64) {
         let (body, friction, v) = (curved.body, &curved.friction, y[curved.speed]);
@@ -400,12 +400,12 @@ impl<'a> Field<'a> {
         self.stretch.input(tau)
     }
 
-    /// What is watched.
+    /// The guards that are watched.
     pub(super) fn watches(&self) -> Vec<Cause> {
         self.equations.guards.iter().map(|guard| guard.cause).collect()
     }
 
-    /// What the parts of a guard's value come to, and so what an error of a part of it may do.
+    /// The size of the parts of a guard's value, which bounds the effect of an error of a part.
     pub(super) fn size(&self, index: usize, tau: f64, y: &[f64]) -> f64 {
         let form = &self.equations.guards[index].form;
         form.noise(&self.model.layout, &self.model.inner(y), &self.input(tau)) / ROUNDING

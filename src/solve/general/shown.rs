@@ -1,4 +1,4 @@
-//! What an observer is shown of a run: each step of the formula as the polynomial that it is.
+//! The view of an observer on a run: each step of the formula as the polynomial that it is.
 
 use super::Core;
 use super::fall::{NODES, through};
@@ -8,7 +8,7 @@ use crate::mechanism::{DRIVES, Mechanism, Mode, Shown as Quantity};
 use crate::solve::machine::Engine;
 use crate::solve::observe::{Curve, Gap, QUANTITIES, Reading, Readout};
 
-/// What is read off in a mode, for the mode that was entered last.
+/// The readings in a mode, for the mode that was entered last.
 pub(super) struct Shown {
     mode: Mode,
     readout: Readout,
@@ -73,7 +73,7 @@ impl Rows<'_> {
     }
 }
 
-/// What is read, with what springs that follow the bodies add.
+/// The readings, with the additions of springs that follow the bodies.
 fn read(readout: &Readout, model: &Model, mode: &Mode, y: &Vector, input: &[f64; DRIVES]) -> Reading {
     let inner = model.inner(y);
     let mechanism = &model.mechanism;

@@ -128,7 +128,7 @@ pub(super) struct Columns {
     stretches: Vec<Sum>,
 }
 
-/// What there is to fill.
+/// The rows to fill.
 pub(super) struct Block<'b> {
     pub(super) mechanism: &'b Mechanism,
     pub(super) sheets: &'b Sheets,
@@ -285,7 +285,7 @@ impl Columns {
         }
     }
 
-    /// What a heading shows. −0 + 0 is 0.
+    /// The values of a heading. −0 + 0 is 0.
     #[inline(always)]
     fn show(&self, block: &Block, heading: &Heading, out: &mut [f64]) {
         let places = &self.places;
@@ -351,7 +351,7 @@ impl Columns {
         out.iter_mut().zip(block.extra).for_each(|(value, extra)| *value += extra.friction[body]);
     }
 
-    /// What acts on a body at rest in a row beside friction, the least and the most of it.
+    /// The load on a body at rest in a row beside friction, the least and the most of it.
     fn load(&self, mechanism: &Mechanism, leader: usize, row: usize) -> (f64, f64) {
         let mut load = (0.0, 0.0);
         for body in mechanism.followers(leader) {

@@ -1,4 +1,4 @@
-//! What rows of one mode show, made ready once: the forms of forces, currents and voltages, and what stands still.
+//! The columns of rows of one mode, made ready once: the forms of forces, currents and voltages, and the quantities that stand still.
 
 use super::columns::{Places, Sum};
 use crate::friction::Motion;
@@ -23,11 +23,11 @@ pub(super) struct Sheet {
     pub(super) friction: Vec<Held>,
 }
 
-/// What friction on a body follows from.
+/// The source of the friction on a body.
 pub(super) enum Held {
     /// One form.
     Form(Sum),
-    /// What acts on it at rest, where gears with losses hold a share of their own: the least and the most of it.
+    /// The load on it at rest, where gears with losses hold a share of their own: the least and the most of it.
     Between,
 }
 
@@ -103,7 +103,7 @@ impl Held {
     }
 }
 
-/// What acts on a body at rest beside friction: the inner brackets of (16)-(18).
+/// The load on a body at rest beside friction: the inner brackets of (16)-(18).
 fn load(mechanism: &Mechanism, places: &Places, leader: usize) -> Sum {
     let mut sum = Sum::default();
     for body in mechanism.followers(leader) {

@@ -6,7 +6,7 @@ use crate::solve::propagator::{SERIES_TERMS, Series};
 
 /// A linear form of the vector z.
 pub(in crate::solve) struct Row<const N: usize> {
-    /// What counts in it: places in z in ascending order, and their weights. Most others are zero.
+    /// Its terms: places in z in ascending order, and their weights. Most others are zero.
     places: [u8; N],
     weights: [f64; N],
     count: usize,
@@ -31,7 +31,7 @@ impl<const N: usize> Row<N> {
         self.terms().fold(0.0, |sum, (place, weight)| sum + weight * z[place])
     }
 
-    /// What rounding may do to its value, the parts of z being of these sizes.
+    /// The rounding error of its value, the parts of z being of these sizes.
     pub(in crate::solve::exact) fn noise(&self, sizes: &[f64; N]) -> f64 {
         ROUNDING * self.terms().fold(0.0, |sum, (place, weight)| sum + (weight * sizes[place]).abs())
     }
@@ -76,7 +76,7 @@ impl<const N: usize> Watch<N> {
         self.value(z).abs() <= 2.0 * self.noise(z)
     }
 
-    /// What rounding may do to its value.
+    /// The rounding error of its value.
     pub(in crate::solve::exact) fn noise(&self, z: &[f64; N]) -> f64 {
         self.row.noise(z)
     }

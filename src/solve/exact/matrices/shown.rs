@@ -1,4 +1,4 @@
-//! What an observer is shown of a mode: readings, and how far they can be off straight lines.
+//! The readings of an observer in a mode, and how far they can be off straight lines.
 
 use super::{ModeMatrices, Size, Space};
 use crate::friction::Motion;
@@ -9,7 +9,7 @@ use crate::solve::propagator::Matrix;
 /// Readings of one mode, and the norms of their forms.
 pub(in crate::solve) struct Shown<const N: usize> {
     pub(in crate::solve) readout: Readout,
-    /// What each place of z adds to each reading.
+    /// The weight of each place of z in each reading.
     matrix: Matrix<QUANTITIES, N>,
     /// The norm dual to the energy, of what springs hold, speeds and current.
     dual: [Size; QUANTITIES],
@@ -61,7 +61,7 @@ impl<const N: usize> Shown<N> {
         Self { readout, matrix, dual, whole, unsprung, input }
     }
 
-    /// What is read in z, ways being counted from `origin`.
+    /// The readings in z, ways being counted from `origin`.
     #[inline]
     pub(in crate::solve) fn read(&self, z: &[f64; N], origin: &[f64; BODIES]) -> Reading {
         self.readout.placed(self.matrix.rate(z), origin)
@@ -75,7 +75,7 @@ impl<const N: usize> Shown<N> {
 }
 
 impl<const N: usize> ModeMatrices<N> {
-    /// What an observer is shown, made ready when it is first wanted.
+    /// The readings of an observer, made ready when they are first wanted.
     pub(in crate::solve) fn shown(&self, mechanism: &Mechanism, space: &Space) -> &Shown<N> {
         self.shown.get_or_init(|| Box::new(Shown::new(self, mechanism, space)))
     }
