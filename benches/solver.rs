@@ -1,4 +1,5 @@
-//! The cost of the solvers: of the exact one on the paper's machine, per sample, per event, per edge; of the general one per friction law.
+//! The cost of the solvers: of the exact one on the paper's machine, per sample, per event, per edge; of the general
+//! one per friction law.
 //!
 //! `cargo bench --package taut`; rivals (SciPy, CVODE) are timed beside it by `authorities/speed.py`.
 
@@ -77,7 +78,8 @@ fn edges(c: &mut Criterion) {
     group.finish();
 }
 
-/// The general solver with its default tolerance: the same pulse with what the exact solver knows, and with what it does not.
+/// The general solver with its default tolerance: the same pulse with what the exact solver knows, and with what it
+/// does not.
 fn general(c: &mut Criterion) {
     let experiment = common::experiment(pulse(), 1.0);
     let dry = |law: Law| {

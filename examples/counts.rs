@@ -1,8 +1,8 @@
-//! Eight standard works, each done once to warm up and once to be measured: `cargo xtask counts` has valgrind count the instructions of the
-//! second time, which no load of the machine changes.
+//! Eight standard works, each done once to warm up and once to be measured: `cargo xtask counts` has valgrind count the
+//! instructions of the second time, which no load of the machine changes.
 //!
-//! `cargo run --release --package taut --example counts [-- CALLS [WORK]]` times them instead, the best of so many calls in µs, or of one
-//! of them alone; `-- 1` is what is counted.
+//! `cargo run --release --package taut --example counts [-- CALLS [WORK]]` times them instead, the best of so many
+//! calls in µs, or of one of them alone; `-- 1` is what is counted.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -88,7 +88,8 @@ fn stribeck() -> Stage {
     stage
 }
 
-/// The Table 4 machine with an inductance, limits of voltage and current, and a gear that loses, gives way and has play.
+/// The Table 4 machine with an inductance, limits of voltage and current, and a gear that loses, gives way and has
+/// play.
 fn geared() -> Stage {
     let mut stage = common::table4();
     stage.motor.inductance = 0.3e-3;
@@ -109,7 +110,8 @@ fn sweep() -> taut::Result<Box<dyn Fn() -> f64>> {
     Ok(Box::new(move || sweep.rows(0, 16, &|| false).expect("nobody stops it").len() as f64))
 }
 
-/// A proportional controller along a move, one second at 1 kHz, with all figures of the move: what a search for gains calls.
+/// A proportional controller along a move, one second at 1 kHz, with all figures of the move: what a search for gains
+/// calls.
 fn closed() -> taut::Result<Box<dyn Fn() -> f64>> {
     let stage = Case::from_text("axis.toml", TEMPLATE)?.stage;
     let profile = profile()?;

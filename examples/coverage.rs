@@ -1,4 +1,5 @@
-//! How often 95 % intervals hold the truth: machines with random friction and mass, logs with a disturbance that is known, a fit each.
+//! How often 95 % intervals hold the truth: machines with random friction and mass, logs with a disturbance that is
+//! known, a fit each.
 //!
 //! `cargo xtask coverage [--machines N] [--seed N] [--threads N] [--cell WORDS]...` prints a table.
 

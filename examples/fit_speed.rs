@@ -1,6 +1,7 @@
 //! How long a fit takes: `cargo run --release --example fit_speed -- CASE [RUNS]`.
 //!
-//! Prints the median of the runs and the quickest, in seconds, the number of simulated logs, how it ended, and each estimate.
+//! Prints the median of the runs and the quickest, in seconds, the number of simulated logs, how it ended, and each
+//! estimate.
 
 use std::time::Instant;
 use taut::case::Case;

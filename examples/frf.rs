@@ -1,4 +1,5 @@
-//! How far `taut frf` is off, and how often its circles and intervals hold the truth, on simulated logs with friction, counts and delay.
+//! How far `taut frf` is off, and how often its circles and intervals hold the truth, on simulated logs with friction,
+//! counts and delay.
 //!
 //! cargo run --release --example frf -- 500
 

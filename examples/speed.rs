@@ -1,10 +1,11 @@
-//! Times one run of the Table 4 machine: 5 V for 0.25 s, one simulated second, 1000 output intervals, every column; prints JSON.
+//! Times one run of the Table 4 machine: 5 V for 0.25 s, one simulated second, 1000 output intervals, every column;
+//! prints JSON.
 //!
-//! `cargo run --release --package taut --example speed [-- RUNS]`: the exact solver first, then all of `runs`, with Coulomb friction
-//! and with a Stribeck curve on top of it (30 % of Coulomb friction, gone with 0.05 m/s at the belt).
+//! `cargo run --release --package taut --example speed [-- RUNS]`: the exact solver first, then all of `runs`, with
+//! Coulomb friction and with a Stribeck curve on top of it (30 % of Coulomb friction, gone with 0.05 m/s at the belt).
 //!
-//! `… -- coulomb|stribeck exact|TOLERANCE RUNS`: one solver for `authorities/speed.py`, which compares it with others: the best time in
-//! seconds and the number of events, then φ₁, x and φ₃ of every row.
+//! `… -- coulomb|stribeck exact|TOLERANCE RUNS`: one solver for `authorities/speed.py`, which compares it with others:
+//! the best time in seconds and the number of events, then φ₁, x and φ₃ of every row.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -17,8 +18,8 @@ use taut::signal::Signal;
 use taut::solve::{Flow, Solver, simulate, stream};
 use taut::stage::Stage;
 
-/// The cart's rest position by independent solutions, m: with Coulomb friction (close reading of the paper, golden numbers), and with the
-/// Stribeck curve (`authorities/output/speed.txt`).
+/// The cart's rest position by independent solutions, m: with Coulomb friction (close reading of the paper, golden
+/// numbers), and with the Stribeck curve (`authorities/output/speed.txt`).
 const CART_AT_REST: [f64; 2] = [0.053746653033, 0.053607946139];
 
 /// A run, and the place where the cart comes to rest.

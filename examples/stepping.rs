@@ -1,5 +1,5 @@
-//! Times a simulated second of 1 ms steps: a proportional controller in the library's closed loop, and the same stepped from outside
-//! through a [`Machine`]; prints JSON.
+//! Times a simulated second of 1 ms steps: a proportional controller in the library's closed loop, and the same stepped
+//! from outside through a [`Machine`]; prints JSON.
 //!
 //! `cargo run --release --package taut --example stepping [-- CALLS]`
 

@@ -1,4 +1,5 @@
-//! `taut tune` on each of these cases, as a table: before and after at worst over the family, verdict, the limit that forces it, time.
+//! `taut tune` on each of these cases, as a table: before and after at worst over the family, verdict, the limit that
+//! forces it, time.
 //!
 //! cargo run --release --example tuning -- stages/sollmann-jouaneh/controllers/*.toml
 

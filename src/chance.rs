@@ -36,8 +36,8 @@ pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
 }
 
-/// The quantile of the standard normal distribution, to about 1e-16 of itself: M. J. Wichura, "Algorithm AS 241: The percentage
-/// points of the normal distribution", Appl. Statist. 37 (1988), its PPND16.
+/// The quantile of the standard normal distribution, to about 1e-16 of itself: M. J. Wichura, "Algorithm AS 241: The
+/// percentage points of the normal distribution", Appl. Statist. 37 (1988), its PPND16.
 pub fn normal_quantile(p: f64) -> f64 {
     let ratio = |above: &[f64; 8], below: &[f64; 8], x: f64| {
         let sum = |factors: &[f64; 8]| factors.iter().rev().fold(0.0, |sum, factor| sum * x + factor);

@@ -1,7 +1,7 @@
 //! A controller as data: its timing, its structure with its gains, and the parts around it.
 //!
-//! A command is in units of the amplifier's input (V in voltage mode, A in current mode), a position in m along the belt: of an
-//! encoder at motor or pulley r φ, of one at the cart x. [`crate::control`] steps it in time.
+//! A command is in units of the amplifier's input (V in voltage mode, A in current mode), a position in m along the
+//! belt: of an encoder at motor or pulley r φ, of one at the cart x. [`crate::control`] steps it in time.
 
 /// A sampled controller.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,7 +102,8 @@ pub struct CurrentLoop {
     pub limit: Option<f64>,
 }
 
-/// Weights of a linear-quadratic regulator and spreads for its Kalman filter: each an amount that counts as much as the others.
+/// Weights of a linear-quadratic regulator and spreads for its Kalman filter: each an amount that counts as much as the
+/// others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StateFeedback {
     /// Error of the cart's position, m.
@@ -145,7 +146,8 @@ pub struct Fuzzy {
     pub command: f64,
     /// Whether rules change the command (PI) instead of giving it (PD).
     pub incremental: bool,
-    /// `rules[i][j]` from −1 to 1 for set i of the error and set j of its rate, both from negative to positive; a square of odd size.
+    /// `rules[i][j]` from −1 to 1 for set i of the error and set j of its rate, both from negative to positive; a
+    /// square of odd size.
     pub rules: Vec<Vec<f64>>,
     /// Corner of the filter of the rate, Hz.
     pub filter: f64,

@@ -1,6 +1,8 @@
-//! Frequency responses from logs, without a model: Welch's averages or whole periods, with coherence and intervals, in open and closed loop.
+//! Frequency responses from logs, without a model: Welch's averages or whole periods, with coherence and intervals, in
+//! open and closed loop.
 //!
-//! Segments of the log are transformed under a window. With U, Y and R the transforms of input, output and reference, and sums over K segments,
+//! Segments of the log are transformed under a window. With U, Y and R the transforms of input, output and reference,
+//! and sums over K segments,
 //!
 //! ```text
 //! G = Σ Y R* / Σ U R*                                  the joint input-output method; in open loop R = U
@@ -9,13 +11,15 @@
 //! |ΔG| ≤ √(E|ΔG|² F₂,ν(0.95)),  ν = 2 (K_e − 1)          the circle that holds it in 95 of 100
 //! ```
 //!
-//! In closed loop Σ Y U*/Σ |U|² would tend to −1/C where noise is strong, as the controller answers it; the reference knows nothing of noise.
-//! Segments overlap by half under Hann's window, which makes K_e = 0.95 K of them count. Of a periodic input segments are whole periods without a
-//! window, the first one left out, and only lines that are excited count. All signals are taken as first differences, which leaves G as it is, and
-//! keeps the integrator of a position from leaking over the spectrum.
+//! In closed loop Σ Y U*/Σ |U|² would tend to −1/C where noise is strong, as the controller answers it; the reference
+//! knows nothing of noise. Segments overlap by half under Hann's window, which makes K_e = 0.95 K of them count. Of a
+//! periodic input segments are whole periods without a window, the first one left out, and only lines that are excited
+//! count. All signals are taken as first differences, which leaves G as it is, and keeps the integrator of a position
+//! from leaking over the spectrum.
 //!
-//! J. S. Bendat, A. G. Piersol, *Random Data*, 4th ed., Wiley 2010, chapters 9 and 11; L. Ljung, *System Identification*, 2nd ed., Prentice Hall 1999,
-//! section 13.5; R. Pintelon, J. Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., Wiley 2012, chapter 2.
+//! J. S. Bendat, A. G. Piersol, *Random Data*, 4th ed., Wiley 2010, chapters 9 and 11; L. Ljung, *System
+//! Identification*, 2nd ed., Prentice Hall 1999, section 13.5; R. Pintelon, J. Schoukens, *System Identification: A
+//! Frequency Domain Approach*, 2nd ed., Wiley 2012, chapter 2.
 
 mod fit;
 mod margins;

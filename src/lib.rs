@@ -46,8 +46,8 @@
 //! - [`signal`]: what is fed into it, and the references of its moves. [`design`]: what a controller is, in data.
 //! - [`mechanism`]: a machine as bodies, springs and drives, and its equations of motion, mode by mode.
 //! - [`log`]: measured columns in. [`case`]: the case file in.
-//! - [`solve`]: the motion. [`measure`]: what a recorder makes of it. [`metrics`]: what it shows. [`reduction`]: how far a reduced model
-//!   is from the elastic one.
+//! - [`solve`]: the motion. [`measure`]: what a recorder makes of it. [`metrics`]: what it shows. [`reduction`]: how
+//!   far a reduced model is from the elastic one.
 //! - [`linear`]: state space, poles, zeros, frequency response, resonance along the travel.
 //! - [`control`]: controllers stepped in time around the exact plant; input shapers, from spectra and from the model.
 //! - [`fit`]: parameters from logs, and what the logs cannot tell.
@@ -57,8 +57,8 @@
 //!
 //! # Features
 //!
-//! `parquet` adds Parquet files; `json` adds results as data. Without them the library is the physics alone. Figures and reports
-//! are a crate of their own, `taut-report`.
+//! `parquet` adds Parquet files; `json` adds results as data. Without them the library is the physics alone. Figures
+//! and reports are a crate of their own, `taut-report`.
 
 pub mod case;
 pub mod chance;

@@ -1,6 +1,7 @@
 //! Logs as a recorder writes them: encoder counts, and converters with steps, noise and limits, at its own instants.
 //!
-//! Sample k is taken at k·T − delay + jitter and recorded as that of time k·T. For it the run is solved on a raster of T/n:
+//! Sample k is taken at k·T − delay + jitter and recorded as that of time k·T. For it the run is solved on a raster of
+//! T/n:
 //! - Without jitter, n ≤ 1000 is chosen so that every instant lies on the raster; then samples are those of the solver.
 //! - With jitter, or where there is no such n, n is 20, and samples lie on straight lines between neighbours on the
 //!   raster: next to a smooth value by at most (T/20)² max|ÿ| / 8, where a value jumps between its two sides.
@@ -28,8 +29,8 @@ const FARTHEST: f64 = 0.5;
 
 /// Runs `experiment` on `stage` and records it.
 ///
-/// The columns are time, the commanded input (`voltage` or `current`), `encoder_count` and the angle or position it stands
-/// for, and what the measurement's channels record.
+/// The columns are time, the commanded input (`voltage` or `current`), `encoder_count` and the angle or position it
+/// stands for, and what the measurement's channels record.
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};

@@ -1,9 +1,9 @@
-//! The key figures of a run: where it ended, how fast it went, the load on belt and motor, when it stopped, and how far the
-//! encoder's pulley and the cart were apart.
+//! The key figures of a run: where it ended, how fast it went, the load on belt and motor, when it stopped, and how far
+//! the encoder's pulley and the cart were apart.
 //!
-//! A [`Meter`] observes a run as it goes on and keeps nothing of it, so that a run of any length needs the same memory. It sees the motion
-//! between rows, on both sides of every event and jump of the input: what it reports does not depend on the output interval but for
-//! rounding. Of the paper's Table 3 it sees the steps.
+//! A [`Meter`] observes a run as it goes on and keeps nothing of it, so that a run of any length needs the same memory.
+//! It sees the motion between rows, on both sides of every event and jump of the input: what it reports does not depend
+//! on the output interval but for rounding. Of the paper's Table 3 it sees the steps.
 
 mod gantry;
 mod watch;
@@ -30,7 +30,8 @@ const RESTING: f64 = 1e-6;
 /// The change of a steady speed that is allowed, relative to itself.
 const STEADY: f64 = 0.01;
 
-/// The key figures of one run. SI units; r is the pulleys' pitch radius, φ₁ the drive pulley's angle, x the cart's position.
+/// The key figures of one run. SI units; r is the pulleys' pitch radius, φ₁ the drive pulley's angle, x the cart's
+/// position.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Metrics {
     /// When the run ended, s.
@@ -49,8 +50,8 @@ pub struct Metrics {
     pub peak_cart_speed: Peak,
     /// r φ̇₁ of largest magnitude, m/s.
     pub peak_drive_speed: Peak,
-    /// The speed that the cart settles at under constant input; none if no input but zero lasts a fiftieth of the run, or the run ended
-    /// before that input did.
+    /// The speed that the cart settles at under constant input; none if no input but zero lasts a fiftieth of the run,
+    /// or the run ended before that input did.
     pub steady_speed: Option<SteadySpeed>,
     /// Stretch of spans 1, 2, 3 of largest magnitude, m: r φ₁ − x, x − r φ₃, r φ₃ − r φ₁; negative where the span is
     /// shorter than at rest (an axis whose belt is tensioned by more than that is meant).
@@ -62,16 +63,17 @@ pub struct Metrics {
     /// r φ₁ − x of largest magnitude, m: by how much an encoder at the drive pulley misses the cart.
     /// The same length as the stretch of span 1, seen as an error of measurement.
     pub peak_encoder_error: Peak,
-    /// When everything came to rest, s, if it has: the time of the last event of a body, or when a rotor that turns by itself was last
-    /// faster than a millionth of its largest speed, whichever is later; 0 if nothing ever moved. None while anything moves, where a body
-    /// has no dry friction to stick by, and for a solver that locates no events (`table3` freezes speeds and creeps on).
+    /// When everything came to rest, s, if it has: the time of the last event of a body, or when a rotor that turns by
+    /// itself was last faster than a millionth of its largest speed, whichever is later; 0 if nothing ever moved. None
+    /// while anything moves, where a body has no dry friction to stick by, and for a solver that locates no events
+    /// (`table3` freezes speeds and creeps on).
     pub stop_time: Option<f64>,
     /// Whether everything is at rest at the end: bodies and rotor.
     pub settled: bool,
     /// Whether all three bodies are stuck at the end, at a speed of exactly zero.
     pub bodies_rest: bool,
-    /// Whether the rotor is at rest at the end: that of a gear with play turns no faster than a millionth of its largest speed. True for
-    /// a stiff gear, whose rotor is part of the drive pulley.
+    /// Whether the rotor is at rest at the end: that of a gear with play turns no faster than a millionth of its
+    /// largest speed. True for a stiff gear, whose rotor is part of the drive pulley.
     pub rotor_rests: bool,
     /// Events of drive pulley, cart, idler pulley.
     pub events: [EventCount; 3],
@@ -86,8 +88,8 @@ pub struct Peak {
     pub time: f64,
 }
 
-/// The cart's speed at the end of the last stretch of time on which the input was constant and not zero, and that lasted at least a
-/// fiftieth of the run.
+/// The cart's speed at the end of the last stretch of time on which the input was constant and not zero, and that
+/// lasted at least a fiftieth of the run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SteadySpeed {
     /// Its speed at the end of that stretch, m/s.
@@ -437,10 +439,11 @@ impl Balance {
     }
 }
 
-/// The cart's speed at which a constant `input` (V or A) just makes up for all losses; the belt's stretch is constant then.
+/// The cart's speed at which a constant `input` (V or A) just makes up for all losses; the belt's stretch is constant
+/// then.
 ///
-/// Everything slides in the direction of the input, by its friction law, and limits of voltage and current hold. Where a law's curve
-/// lets the forces balance at several speeds, it is the one that the axis comes to from `near`, m/s.
+/// Everything slides in the direction of the input, by its friction law, and limits of voltage and current hold. Where
+/// a law's curve lets the forces balance at several speeds, it is the one that the axis comes to from `near`, m/s.
 pub fn balanced_speed(stage: &Stage, input: f64, near: f64) -> Balance {
     if stage.cart.along.is_some() || stage.belt.follows_cart {
         return Balance::Changing;
@@ -469,7 +472,8 @@ pub fn balanced_speed(stage: &Stage, input: f64, near: f64) -> Balance {
         }
     };
 
-    // Sum of (16), r (17) and (18) without accelerations, with v = ẋ = r φ̇₁ = r φ̇₃ and the constant force F on the cart:
+    // Sum of (16), r (17) and (18) without accelerations, with v = ẋ = r φ̇₁ = r φ̇₃ and the constant force F on the
+    // cart:
     //   excess(v) = τ_M + r F − τ_f1 − τ_f2 − r F_f
     let bodies = [(stage.drive_pulley.friction, r), (stage.cart.friction, 1.0), (stage.idler_pulley.friction, r)];
     let load = direction * r * stage.cart.constant_force();
@@ -511,7 +515,8 @@ pub fn balanced_speed(stage: &Stage, input: f64, near: f64) -> Balance {
     }
 }
 
-/// Speeds at which a friction curve is looked at: from this share of its own speed, to this many times it, each so many times the last.
+/// Speeds at which a friction curve is looked at: from this share of its own speed, to this many times it, each so many
+/// times the last.
 const SLOWER: f64 = 1e4;
 const FASTER: f64 = 50.0;
 const FINER: f64 = 1.05;

@@ -59,7 +59,8 @@ impl Effort {
 pub struct Draws {
     /// Values by chain, draw and parameter.
     pub chains: Vec<Vec<Vec<f64>>>,
-    /// Divergent transitions among the kept draws: a density too curved for the step. More than a few make the rest doubtful.
+    /// Divergent transitions among the kept draws: a density too curved for the step. More than a few make the rest
+    /// doubtful.
     pub divergences: u64,
     /// Evaluations of the density and its gradient.
     pub evaluations: u64,
@@ -70,12 +71,12 @@ pub struct Draws {
 /// The logarithm of the density at a point, and its gradient into the second argument; none where the density is zero.
 pub type LogDensity<'a> = dyn Fn(&[f64], &mut [f64]) -> Option<f64> + Sync + 'a;
 
-/// Told how many draws all chains have made so far, those for tuning included, at each evaluation of the density; says whether to
-/// go on.
+/// Told how many draws all chains have made so far, those for tuning included, at each evaluation of the density; says
+/// whether to go on.
 pub type Watch<'a> = dyn Fn(usize) -> bool + Sync + 'a;
 
-/// Draws from `log`, each chain beginning at one of `starts` in turn; each on a thread of its own. `watch` sees how far it is, and
-/// may end it early: then each chain keeps as many draws as the shortest has.
+/// Draws from `log`, each chain beginning at one of `starts` in turn; each on a thread of its own. `watch` sees how far
+/// it is, and may end it early: then each chain keeps as many draws as the shortest has.
 ///
 /// Variables that are about as wide as one, and not correlated, save draws for tuning; they need not be.
 pub fn sample(log: &LogDensity, starts: &[Vec<f64>], effort: Effort, watch: &Watch) -> Result<Draws> {
@@ -212,8 +213,8 @@ mod tests {
         assert!(draws.r_hat(0) < 1.01 && draws.effective(0) > 1000.0, "{} {}", draws.r_hat(0), draws.effective(0));
     }
 
-    /// Ten correlated normal variables, from a thousandth to ten thousand wide: means and covariances to five standard errors of the
-    /// draws, seen in the standard normal variables that they are made of.
+    /// Ten correlated normal variables, from a thousandth to ten thousand wide: means and covariances to five standard
+    /// errors of the draws, seen in the standard normal variables that they are made of.
     #[test]
     fn ten_correlated_normal_variables_of_all_sizes_have_their_moments() {
         const N: usize = 10;

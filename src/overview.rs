@@ -1,6 +1,8 @@
-//! Overview of a machine from the numbers of its case: masses, stiffnesses, frequencies, limits and the reserve to them. `taut show` prints it.
+//! Overview of a machine from the numbers of its case: masses, stiffnesses, frequencies, limits and the reserve to
+//! them. `taut show` prints it.
 //!
-//! Each answer is a [`Row`]: a key, a name, a value in SI and its unit. Terminal, page, JSON and Python show the same rows.
+//! Each answer is a [`Row`]: a key, a name, a value in SI and its unit. Terminal, page, JSON and Python show the same
+//! rows.
 
 mod axis;
 mod gantry;

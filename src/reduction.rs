@@ -23,8 +23,8 @@ pub struct Reduction {
 }
 
 impl Reduction {
-    /// Runs `experiment` on the reduced `stage` and on its elastic model; none where there is nothing to compare: the stage is not reduced,
-    /// no stiffness is given, or one of the runs does not reach its end.
+    /// Runs `experiment` on the reduced `stage` and on its elastic model; none where there is nothing to compare: the
+    /// stage is not reduced, no stiffness is given, or one of the runs does not reach its end.
     pub fn of(stage: &Stage, experiment: &Experiment, solver: Solver) -> Result<Option<Self>> {
         let known = stage.belt.stiffness.iter().all(|k| k.is_finite());
         if stage.belt.model == BeltModel::Elastic || !known {

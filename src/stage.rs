@@ -78,7 +78,8 @@ pub struct Cart {
     pub friction: Friction,
     /// How its dry friction changes along the travel, if it does.
     pub along: Option<Along>,
-    /// A constant force on the cart F_L, N, positive towards larger x: what a hanging mass or a spring of constant force pulls.
+    /// A constant force on the cart F_L, N, positive towards larger x: what a hanging mass or a spring of constant
+    /// force pulls.
     pub load: f64,
     /// Inclination of the axis, rad: positive if the cart climbs towards larger x.
     pub inclination: f64,
@@ -196,7 +197,8 @@ impl BeltMake {
     }
 }
 
-/// Modulus of a composite whose parts, given as (share of the section, modulus in Pa), act as springs in parallel (2.3.1).
+/// Modulus of a composite whose parts, given as (share of the section, modulus in Pa), act as springs in parallel
+/// (2.3.1).
 pub fn composite_modulus(parts: &[(f64, f64)]) -> f64 {
     parts.iter().map(|&(share, modulus)| share * modulus).sum()
 }

@@ -1,6 +1,6 @@
-//! Against an independent authority, which solved each case with two methods that share no code with ours; its raw output
-//! is kept: 200 random stages and inputs (`authorities/random_stages.py`), and the paper's machine under waves with many
-//! stick-slip transitions and steps beside each breakaway (`authorities/family.py`).
+//! Against an independent authority, which solved each case with two methods that share no code with ours; its raw
+//! output is kept: 200 random stages and inputs (`authorities/random_stages.py`), and the paper's machine under waves
+//! with many stick-slip transitions and steps beside each breakaway (`authorities/family.py`).
 //!
 //! Positions within 1e-9 m and rad, speeds within 1e-7 m/s and 1e-5 rad/s, event times within 1e-9 s, or four times the
 //! authority's own uncertainty where that is more; the same modes in the same order.

@@ -1,6 +1,7 @@
 //! Every wrong case file we could think of, with the exact message it must give.
 //!
-//! `UPDATE_EXPECT=1 cargo test -p taut --test all bad_cases::` writes the messages anew; read each of them aloud before keeping it.
+//! `UPDATE_EXPECT=1 cargo test -p taut --test all bad_cases::` writes the messages anew; read each of them aloud before
+//! keeping it.
 
 use crate::common::wrong;
 use std::fs;

@@ -1,4 +1,5 @@
-//! Parts that go together: a gear with play and losses, spans that follow the cart with pretension and in reduced belts.
+//! Parts that go together: a gear with play and losses, spans that follow the cart with pretension and in reduced
+//! belts.
 
 use taut::case::Case;
 use taut::solve::{Ending, Solution, Solver, simulate};
@@ -61,7 +62,8 @@ fn a_stiff_limit_of_a_gear_with_losses() {
     assert!(soft[0] < 2e-3 && soft[1] < 0.3 * soft[0] && soft[2] < 0.3 * soft[1], "{soft:?}");
 }
 
-/// Backlash and an efficiency: the exact solver and the general one agree, and the motor needs more current than without losses.
+/// Backlash and an efficiency: the exact solver and the general one agree, and the motor needs more current than
+/// without losses.
 #[test]
 fn play_and_losses_by_both_solvers() {
     let changes =
@@ -74,8 +76,8 @@ fn play_and_losses_by_both_solvers() {
     assert_eq!(exact.outcome.events.len(), general.outcome.events.len());
 }
 
-/// With more pretension than is ever used up, spans that follow the cart are what they are without; with less they go slack, and a
-/// slack span carries nothing.
+/// With more pretension than is ever used up, spans that follow the cart are what they are without; with less they go
+/// slack, and a slack span carries nothing.
 #[test]
 fn pretension_of_spans_that_follow_the_cart() {
     let free = run(&["belt.follows_cart=true"]).1;

@@ -1,4 +1,5 @@
-//! Laws and windows by what they predict, single changes between campaigns, errors without a search, and what a model lacks.
+//! Laws and windows by what they predict, single changes between campaigns, errors without a search, and what a model
+//! lacks.
 
 use crate::common::chance::Chance;
 use crate::common::logged::logged;
@@ -10,7 +11,8 @@ use taut::log::Log;
 use taut::signal::Hold;
 use taut::solve::{Flow, Solver, simulate};
 
-/// Both experiments of the template, longer, with logs of the machine that it is with these changes; the encoder's angle trembles.
+/// Both experiments of the template, longer, with logs of the machine that it is with these changes; the encoder's
+/// angle trembles.
 fn made(truth: &[&str], seed: u64) -> Case {
     let input = "experiment.1.input={ sine = \"6 V\", frequency = \"0.7 Hz\" }";
     let long = [input, "experiment.1.until=6 s", "experiment.1.every=2 ms"];
@@ -195,8 +197,8 @@ fn a_force_that_is_missing_is_seen() {
     assert!(own.time.len() > 1000 && own.position.len() == own.force.len());
 }
 
-/// Laws began where viscous friction alone had led, with so much of it that a cart with Coulomb friction beside it stood still, and
-/// viscous friction won.
+/// Laws began where viscous friction alone had led, with so much of it that a cart with Coulomb friction beside it
+/// stood still, and viscous friction won.
 #[test]
 fn laws_do_not_begin_where_viscous_friction_led() {
     if crate::common::data::data(["pendulepi/february.csv"]).is_none() {

@@ -295,8 +295,8 @@ fn rig() -> Stage {
 proptest! {
     #![proptest_config(cases(60))]
 
-    /// With every limit active, delays, counts, backlash of the reference's shape: all stays finite, the command within its limit, and
-    /// after the disturbance of a move that asks for too much the cart comes back near its target.
+    /// With every limit active, delays, counts, backlash of the reference's shape: all stays finite, the command within
+    /// its limit, and after the disturbance of a move that asks for too much the cart comes back near its target.
     #[test]
     fn every_controller_stays_finite_and_recovers(
         which in 0..8_usize,
@@ -337,7 +337,8 @@ proptest! {
     }
 }
 
-/// Sliding mode by bounds and root mean square, on axes whose parameters are off by up to 20 % one by one, as its reaching gain allows.
+/// Sliding mode by bounds and root mean square, on axes whose parameters are off by up to 20 % one by one, as its
+/// reaching gain allows.
 #[test]
 fn sliding_mode_keeps_its_bounds() {
     let stage = rig();
@@ -364,8 +365,8 @@ fn sliding_mode_keeps_its_bounds() {
     }
 }
 
-/// The promise of the issue: with a motor encoder alone, feed-forward for a belt that stretches and the compensated reference put
-/// the cart at least five times nearer than PID alone, in every one of the three moves.
+/// The promise of the issue: with a motor encoder alone, feed-forward for a belt that stretches and the compensated
+/// reference put the cart at least five times nearer than PID alone, in every one of the three moves.
 #[test]
 fn elastic_feed_forward_beats_pid_fivefold() {
     let errors = |name: &str| -> Vec<f64> {
@@ -392,7 +393,8 @@ fn elastic_feed_forward_beats_pid_fivefold() {
     }
 }
 
-/// At constant speed the cart is where it should be to the last digits if the motor follows the compensated reference exactly.
+/// At constant speed the cart is where it should be to the last digits if the motor follows the compensated reference
+/// exactly.
 #[test]
 fn the_compensated_reference_balances_the_belt() {
     let stage = common::table4();
@@ -412,7 +414,8 @@ fn the_compensated_reference_balances_the_belt() {
     assert!((6.3e-5 * needed.drive.acceleration / r - drive).abs() < 1e-10);
 }
 
-/// A controller whose limit was NaN or negative was clamped with it, which panics; and a delay of 1e9 samples asked for as much memory.
+/// A controller whose limit was NaN or negative was clamped with it, which panics; and a delay of 1e9 samples asked for
+/// as much memory.
 #[test]
 fn a_timing_that_is_none_is_refused() {
     struct Idle;
@@ -458,8 +461,8 @@ fn a_timing_that_is_none_is_refused() {
     assert_eq!(told(good, f64::NAN).as_deref(), Some("the cart cannot settle within NaN m\n  allowed: above zero"));
 }
 
-/// PD and cascades without integrals gathered what the limit had left in an integral that nothing empties: after a second at its limit such
-/// a loop stood beside its target for ever.
+/// PD and cascades without integrals gathered what the limit had left in an integral that nothing empties: after a
+/// second at its limit such a loop stood beside its target for ever.
 #[test]
 fn a_limit_leaves_nothing_behind_where_there_is_no_integral() {
     use taut::control::{Controller, Observation};

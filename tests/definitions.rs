@@ -1,7 +1,8 @@
 //! Definitions of the documents, made again from their words: inputs, random numbers, devices, runs of a sweep.
 //!
-//! Nothing here calls the library's own function for what it makes; each text stands in `docs/case-file.md` or `docs/random.md`. A change
-//! of either that the other does not follow fails here. Controllers are in `definitions_control.rs`.
+//! Nothing here calls the library's own function for what it makes; each text stands in `docs/case-file.md` or
+//! `docs/random.md`. A change of either that the other does not follow fails here. Controllers are in
+//! `definitions_control.rs`.
 
 use crate::common::document;
 use document::{Pcg, mix};

@@ -1,4 +1,5 @@
-//! Controllers as `docs/control.md` defines them sample by sample, made again from its words, beside those of the library.
+//! Controllers as `docs/control.md` defines them sample by sample, made again from its words, beside those of the
+//! library.
 
 use crate::common::document;
 use document::Pcg;

@@ -1,9 +1,9 @@
-//! The parts that work piece by piece (limits, backlash, slack spans, end stops, constant loads, reduced models), friction curves, bristles,
-//! friction along the travel and spans that follow the cart, against independent solutions: `authorities/elements.py` and
-//! `authorities/curves.py`, each by two methods that share no code with taut.
+//! The parts that work piece by piece (limits, backlash, slack spans, end stops, constant loads, reduced models),
+//! friction curves, bristles, friction along the travel and spans that follow the cart, against independent solutions:
+//! `authorities/elements.py` and `authorities/curves.py`, each by two methods that share no code with taut.
 //!
-//! Positions within 1e-9 m and rad, speeds within 1e-7 m/s and 1e-5 rad/s, events within 1e-9 s and in the same order, or four
-//! times what the two methods differ by where that is more.
+//! Positions within 1e-9 m and rad, speeds within 1e-7 m/s and 1e-5 rad/s, events within 1e-9 s and in the same order,
+//! or four times what the two methods differ by where that is more.
 
 use serde_json::Value;
 use taut::case::Case;
@@ -115,14 +115,16 @@ fn limits_backlash_slack_stops_loads_and_reduced_models() {
     assert!(compare(include_str!("authorities/elements.json"), Solver::Exact, 1.0) >= 90);
 }
 
-/// The general solver on the same cases: positions within 1e-9 m, events within 1e-7 s, and the same ones in the same order.
+/// The general solver on the same cases: positions within 1e-9 m, events within 1e-7 s, and the same ones in the same
+/// order.
 #[test]
 fn the_general_solver_agrees() {
     let solver = Solver::General { tolerance: 1e-11 };
     assert!(compare(include_str!("authorities/elements.json"), solver, 100.0) >= 90);
 }
 
-/// Stribeck curves in three shapes, Simscape's smooth law, LuGre, friction along the travel, spans that follow the cart.
+/// Stribeck curves in three shapes, Simscape's smooth law, LuGre, friction along the travel, spans that follow the
+/// cart.
 #[test]
 fn friction_curves_and_spans_that_follow_the_cart() {
     let solver = Solver::General { tolerance: 1e-11 };

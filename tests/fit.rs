@@ -106,8 +106,8 @@ fn certified_problems_of_nist_are_met() {
     }
 }
 
-/// The machine of the template with some numbers changed, and the logs of both pulses that its encoder makes of an angle that
-/// trembles with this deviation, rad.
+/// The machine of the template with some numbers changed, and the logs of both pulses that its encoder makes of an
+/// angle that trembles with this deviation, rad.
 fn recorded(changes: &[&str], seed: u64, noise: f64) -> Case {
     let mut case = Case::from_text_with("axis.toml", TEMPLATE, changes).unwrap();
     let step = std::f64::consts::TAU / 2048.0;
@@ -322,7 +322,8 @@ fn a_loop_is_closed_again() {
     assert!(wrong.logs[0].outputs[0].fitted.unwrap().rmse > 3.0 * rmse);
 }
 
-/// P7: an encoder at the motor does not tell the friction of the cart from that of the pulleys; what else is searched for is told.
+/// P7: an encoder at the motor does not tell the friction of the cart from that of the pulleys; what else is searched
+/// for is told.
 #[test]
 fn what_an_encoder_cannot_tell_is_said_in_words() {
     let case = with_logs_of(recorded(&[], 1, 0.0));
@@ -429,7 +430,8 @@ fn intervals_hold_the_truth_of_a_thousand_machines() {
     for noise in [0.0, 1e-3, 3e-3, 1e-2].into_iter().filter(|noise| only.is_none_or(|only: f64| only == *noise)) {
         let found = coverage(machines, noise);
         println!("{noise} rad: {}", found.told());
-        // Without any noise the errors of rounding go with the motion; with three counts of noise, some logs tell too little.
+        // Without any noise the errors of rounding go with the motion; with three counts of noise, some logs tell too
+        // little.
         let (least, most) = if [0.0, 1e-2].contains(&noise) { (0.9, 0.05) } else { (0.93, 0.01) };
         good &= (0..3).all(|j| (least..=0.97).contains(&found.share(j)));
         good &= found.astray.max(found.lost).max(found.refused) as f64 <= most * machines as f64;

@@ -1,4 +1,5 @@
-//! Everything of a machine can be free: what friction laws, belts, gears and limits are made of is found from logs of simulated machines.
+//! Everything of a machine can be free: what friction laws, belts, gears and limits are made of is found from logs of
+//! simulated machines.
 
 use crate::common::chance::Chance;
 use crate::common::logged::logged;

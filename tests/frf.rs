@@ -1,4 +1,5 @@
-//! Frequency responses from logs: against the sampled model that made them, in open and closed loop, and what is said of logs that have none.
+//! Frequency responses from logs: against the sampled model that made them, in open and closed loop, and what is said
+//! of logs that have none.
 
 use nalgebra::{Complex, DVector};
 use std::f64::consts::PI;
@@ -68,7 +69,8 @@ fn white(samples: usize, size: f64) -> impl Fn(usize) -> f64 {
     move |k| values[k]
 }
 
-/// Share of the coherent points between two frequencies whose circle holds the truth, how many there are, and the mean relative error.
+/// Share of the coherent points between two frequencies whose circle holds the truth, how many there are, and the mean
+/// relative error.
 fn held(frf: &Frf, truth: &(Discrete, usize), hertz: [f64; 2]) -> (f64, usize, f64) {
     let mut off = Complex::new(0.0, 0.0);
     let (mut holds, mut count) = (0, 0);

@@ -258,7 +258,8 @@ proptest! {
     }
 }
 
-/// The exact solver and the general one agree where both can be asked; spans that follow the cart are taken by the general one.
+/// The exact solver and the general one agree where both can be asked; spans that follow the cart are taken by the
+/// general one.
 #[test]
 fn spans_that_follow_the_cart_are_as_stiff_as_they_are_long() {
     let text = |belt: &str| {

@@ -149,7 +149,8 @@ fn power_is_balanced_under_every_law() {
     }
 }
 
-/// The equations written down a second time, and Runge and Kutta's formula with a step of 1 µs that is halved down to each event.
+/// The equations written down a second time, and Runge and Kutta's formula with a step of 1 µs that is halved down to
+/// each event.
 mod plain {
     use super::Shape;
 

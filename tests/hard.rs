@@ -103,7 +103,8 @@ proptest! {
 
 // --- breakaway ------------------------------------------------------------------------------------------------------
 
-/// A load equal to breakaway holds; so does what rounding could make of it (1e-14 of the forces in play); beyond, it moves.
+/// A load equal to breakaway holds; so does what rounding could make of it (1e-14 of the forces in play); beyond, it
+/// moves.
 #[test]
 fn breakaway_is_passed_only_above_it() {
     for volts in [0.3, 0.4630434782608695, 1.0, 7.7] {
@@ -132,8 +133,8 @@ fn breakaway_is_passed_only_above_it() {
     }
 }
 
-/// Each body held by itself under a load beside its breakaway: that of the drive pulley comes from the motor, that of cart
-/// and idler from a belt strained at the start.
+/// Each body held by itself under a load beside its breakaway: that of the drive pulley comes from the motor, that of
+/// cart and idler from a belt strained at the start.
 #[test]
 fn beside_each_breakaway() {
     let all = table4();
@@ -305,8 +306,8 @@ impl Rigid {
     }
 }
 
-/// The stiffer the belt, the nearer to one rigid mass. Dry friction of bodies that leave their rest one after another makes
-/// the error of the final position fall with the time this takes, as 1/√k.
+/// The stiffer the belt, the nearer to one rigid mass. Dry friction of bodies that leave their rest one after another
+/// makes the error of the final position fall with the time this takes, as 1/√k.
 #[test]
 fn a_stiff_belt_is_rigid() {
     for decade in [1e5, 1e6, 1e7, 1e8, 1e9] {
@@ -412,7 +413,8 @@ fn a_metre_of_stretch() {
     }
 }
 
-/// The pulse's second half is bisected to where the drive pulley only just does not stop: on both sides the same motion.
+/// The pulse's second half is bisected to where the drive pulley only just does not stop: on both sides the same
+/// motion.
 #[test]
 fn grazing() {
     let solve = |low: f64| {
@@ -476,8 +478,8 @@ fn table3_that_runs_away_is_told() {
     assert!(solution.trajectory.get("cart_position").unwrap().iter().all(|x| x.abs() <= 1e9));
 }
 
-/// A gear's torque that is zero counted as negative by its last bits, whichever way the gear carried, and the run went back
-/// and forth at one instant until it gave up.
+/// A gear's torque that is zero counted as negative by its last bits, whichever way the gear carried, and the run went
+/// back and forth at one instant until it gave up.
 #[test]
 fn a_gear_whose_torque_is_zero_but_for_rounding() {
     let side = |viscous, coulomb, breakaway| Side { viscous, coulomb, breakaway };
@@ -507,8 +509,9 @@ fn a_gear_whose_torque_is_zero_but_for_rounding() {
     complete(&stage, &Experiment { every: 0.01, ..experiment(input, 0.3) });
 }
 
-/// The bound of a gear that gives way and loses power took the torque on its rotor, T/e, for that on the pulley: the parting of its flanks
-/// was seen 8 µs late, at the end of the interval looked at, and rows of some intervals were 0.7 nm off.
+/// The bound of a gear that gives way and loses power took the torque on its rotor, T/e, for that on the pulley: the
+/// parting of its flanks was seen 8 µs late, at the end of the interval looked at, and rows of some intervals were 0.7
+/// nm off.
 #[test]
 fn a_gear_that_gives_way_and_loses_power_parts_when_it_does() {
     let mut stage = table4();

@@ -13,7 +13,8 @@ use taut::stage::{AmplifierMode, BeltModel, Stage};
 const SOLVERS: [Solver; 2] = [Solver::Exact, Solver::General { tolerance: 1e-11 }];
 const POSITIONS: [&str; 3] = ["drive_angle", "cart_position", "idler_angle"];
 
-/// A rigid axis that 0.5 V cannot move: at most 0.835 N at the belt, against 1.5 N of breakaway and 0.2 N of Coulomb friction.
+/// A rigid axis that 0.5 V cannot move: at most 0.835 N at the belt, against 1.5 N of breakaway and 0.2 N of Coulomb
+/// friction.
 const CLIPPED: &str = r#"
     [motor]
     torque_constant = 0.023
@@ -87,7 +88,8 @@ fn a_body_broke_away_with_a_voltage_that_the_amplifier_cannot_give() {
     }
 }
 
-/// A span that is slack at time zero pulled at the bodies for an instant: a pair of events that is not there, or a slide.
+/// A span that is slack at time zero pulled at the bodies for an instant: a pair of events that is not there, or a
+/// slide.
 #[test]
 fn a_span_that_is_slack_at_time_zero_moved_bodies() {
     let changes = [

@@ -115,8 +115,8 @@ proptest! {
         }
     }
 
-    /// The same balance at every row with limits, backlash, slack spans and end stops; limits hold to the last bit, and what is
-    /// slack or apart carries nothing.
+    /// The same balance at every row with limits, backlash, slack spans and end stops; limits hold to the last bit, and
+    /// what is slack or apart carries nothing.
     #[test]
     fn every_element_keeps_the_balance(stage in random::equipped(Dry::Any), input in random::input()) {
         let mechanism = stage.mechanism();
@@ -210,7 +210,8 @@ proptest! {
     }
 
     /// Rows more or less often: the same motion. (Where a load only just reaches its limit, the moment of the event is
-    /// hardly determined, the motion is; moments are compared on given machines in `reference.rs` and `authorities.rs`.)
+    /// hardly determined, the motion is; moments are compared on given machines in `reference.rs` and
+    /// `authorities.rs`.)
     #[test]
     fn the_output_interval_changes_nothing(
         stage in prop_oneof![random::stage(Dry::Any).boxed(), random::equipped(Dry::Any).boxed()],

@@ -1,4 +1,5 @@
-//! Linear analysis: against python-control with SLICOT and 60-digit numbers (`authorities/linear.py`), and by laws that hold for any stage.
+//! Linear analysis: against python-control with SLICOT and 60-digit numbers (`authorities/linear.py`), and by laws that
+//! hold for any stage.
 
 use crate::common;
 use common::random::{Dry, cases, equipped, stage};
@@ -348,7 +349,8 @@ fn a_delay_below_rounding_is_none() {
     assert_eq!(system.discrete(1e-3, Hold::Zero, 1e-14).unwrap().states.len(), none.states.len() + 1);
 }
 
-/// A place that is no number is within no travel and outside none: without a travel its eigenvalues were sought for ever.
+/// A place that is no number is within no travel and outside none: without a travel its eigenvalues were sought for
+/// ever.
 #[test]
 fn a_question_whose_numbers_are_none_is_refused() {
     use taut::linear::{Analysis, Question};

@@ -345,7 +345,8 @@ fn the_examples_of_the_documents_read() {
     assert!(read >= 2);
 }
 
-/// The logs of three machines under `stages` are not part of the project: whoever fits them without has to be told how to get them.
+/// The logs of three machines under `stages` are not part of the project: whoever fits them without has to be told how
+/// to get them.
 #[test]
 fn a_log_that_is_not_there_says_what_fetches_it() {
     let of = |more: &str| {

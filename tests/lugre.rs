@@ -1,13 +1,15 @@
-//! The classical experiments with LuGre's law of friction: the presliding loop, stick-slip of a mass that is dragged through a spring, and
-//! the break-away force over the force's rate, each as a case of a stage.
+//! The classical experiments with LuGre's law of friction: the presliding loop, stick-slip of a mass that is dragged
+//! through a spring, and the break-away force over the force's rate, each as a case of a stage.
 //!
-//! The law and the experiments are those of C. Canudas de Wit, H. Olsson, K. J. Åström, P. Lischinsky, "A new model for control of systems
-//! with friction", IEEE Transactions on Automatic Control 40(3), 1995, pp. 419-425, with its parameters and a unit mass. **The curves printed
-//! there were not to hand**: the experiments follow a public reconstruction of them (github.com/auralius/LuGre), the answers are those of
-//! `authorities/lugre.py` (three solvers that share no code with taut and agree to 1e-9 m), and nothing has been compared with print.
+//! The law and the experiments are those of C. Canudas de Wit, H. Olsson, K. J. Åström, P. Lischinsky, "A new model for
+//! control of systems with friction", IEEE Transactions on Automatic Control 40(3), 1995, pp. 419-425, with its
+//! parameters and a unit mass. **The curves printed there were not to hand**: the experiments follow a public
+//! reconstruction of them (github.com/auralius/LuGre), the answers are those of `authorities/lugre.py` (three solvers
+//! that share no code with taut and agree to 1e-9 m), and nothing has been compared with print.
 //!
-//! A rigid belt with pulleys next to weightless, and a current amplifier with K_t = r, make of i amperes i newtons on the cart. The dragged mass
-//! has span 1 as its spring, and a drive pulley too heavy to be slowed as the end that moves.
+//! A rigid belt with pulleys next to weightless, and a current amplifier with K_t = r, make of i amperes i newtons on
+//! the cart. The dragged mass has span 1 as its spring, and a drive pulley too heavy to be slowed as the end that
+//! moves.
 
 use serde_json::Value;
 use taut::case::Case;
@@ -86,7 +88,8 @@ fn presliding_is_a_loop_that_closes() {
     // Rows are half a second apart; the force is held up to 15 s, 40 s and 65 s.
     let [there, back, again] = [15.0, 40.0, 65.0].map(|t| x[(2.0 * t) as usize]);
     assert!((there - again).abs() < 1e-11, "the loop is open by {:e} m", again - there);
-    // What bends and slips on the way leaves the mass where it would not be without a past: bristles alone would bend by F/σ₀ = 14 µm.
+    // What bends and slips on the way leaves the mass where it would not be without a past: bristles alone would bend
+    // by F/σ₀ = 14 µm.
     assert!((there - 45.3e-6).abs() < 0.1e-6 && (back + 10.0e-6).abs() < 0.1e-6, "{there:e} m, {back:e} m");
     // Slowly, dF/dx = σ₀ (1 − F/F_S), so that x = −F_S/σ₀ ln(1 − F/F_S).
     let (sigma_0, f_s, share) = (1e5, 1.5, 0.95_f64);
@@ -94,7 +97,8 @@ fn presliding_is_a_loop_that_closes() {
     assert!((there / slow - 1.0).abs() < 0.01, "{there:e} m instead of {slow:e} m");
 }
 
-/// A spring of 2 N/m whose end moves at 0.1 m/s drags a unit mass: it stays until the spring pulls with 1.5 N, and jumps.
+/// A spring of 2 N/m whose end moves at 0.1 m/s drags a unit mass: it stays until the spring pulls with 1.5 N, and
+/// jumps.
 #[test]
 fn a_dragged_mass_sticks_and_slips() {
     let solution = compare("stick-slip", 1e-9);
@@ -170,9 +174,10 @@ fn break_away_comes_earlier_the_faster_the_force_grows() {
     }
 }
 
-/// With `along` the documents said one thing and two, the code a third: whether the factor is on g(v), on the force of the bristles, or on their
-/// stiffness as well. It is on g(v), as on Coulomb friction and breakaway: here beside the bare equations of docs/case-file.md, integrated
-/// without anything of the library. The other two readings differ by tens of micrometres.
+/// With `along` the documents said one thing and two, the code a third: whether the factor is on g(v), on the force of
+/// the bristles, or on their stiffness as well. It is on g(v), as on Coulomb friction and breakaway: here beside the
+/// bare equations of docs/case-file.md, integrated without anything of the library. The other two readings differ by
+/// tens of micrometres.
 #[test]
 fn along_scales_what_bristles_hold_and_not_how_stiff_they_are() {
     const POINTS: [[f64; 2]; 3] = [[-0.01, 0.5], [0.005, 1.0], [0.03, 2.5]];
@@ -195,7 +200,8 @@ fn along_scales_what_bristles_hold_and_not_how_stiff_they_are() {
             a0 + (a1 - a0) * (x - x0) / (x1 - x0)
         }
     };
-    // x, v, z by the classical formula of Runge and Kutta; the factor is on g, and on σ₀ z + σ₁ ż where `whole` says so.
+    // x, v, z by the classical formula of Runge and Kutta; the factor is on g, and on σ₀ z + σ₁ ż where `whole` says
+    // so.
     let integrated = |on_g: bool, whole: bool| {
         let rate = |t: f64, [x, v, z]: [f64; 3]| {
             let a = factor(x);

@@ -1,4 +1,5 @@
-//! All tests of the library in one program, which is linked once: `cargo test --package taut --test all fit::` runs those of `fit.rs`.
+//! All tests of the library in one program, which is linked once: `cargo test --package taut --test all fit::` runs
+//! those of `fit.rs`.
 
 mod authorities;
 mod bad_cases;

@@ -5,8 +5,9 @@ use taut::case::Case;
 use taut::control::feedback::Feedback;
 use taut::tune::{Margins, Plant};
 
-/// Ms peaks stand at poles of the closed loop; looked for about those of the axis alone, 7 of 76 tunings passed their limit unseen.
-/// None is below what `authorities/margins.py` finds on 400,000 points by more than 1e-6; above, it is the top of a grid refined about it.
+/// Ms peaks stand at poles of the closed loop; looked for about those of the axis alone, 7 of 76 tunings passed their
+/// limit unseen. None is below what `authorities/margins.py` finds on 400,000 points by more than 1e-6; above, it is
+/// the top of a grid refined about it.
 #[test]
 fn no_peak_is_missed_on_two_hundred_loops() {
     let text = include_str!("authorities/margins.json");

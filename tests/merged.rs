@@ -1,7 +1,9 @@
-//! Bodies that a reduced belt makes one, each with a friction law of its own: against the written-out equation, a stiff belt, and laws.
+//! Bodies that a reduced belt makes one, each with a friction law of its own: against the written-out equation, a stiff
+//! belt, and laws.
 //!
-//! Bodies that move as one have one speed: sliding friction adds up, each law's at its own speed ρ v, and so do breakaways, bristles and what never
-//! sticks. [`Written`] has that in one line per body and a Runge-Kutta formula of its own.
+//! Bodies that move as one have one speed: sliding friction adds up, each law's at its own speed ρ v, and so do
+//! breakaways, bristles and what never sticks. [`Written`] has that in one line per body and a Runge-Kutta formula of
+//! its own.
 
 use crate::common;
 
@@ -411,7 +413,8 @@ proptest! {
         }
     }
 
-    /// The motor's work less that of friction is the machine's energy: M v²/2 = ∫ (K i − F_f) v dt with friction as the column has it.
+    /// The motor's work less that of friction is the machine's energy: M v²/2 = ∫ (K i − F_f) v dt with friction as the
+    /// column has it.
     #[test]
     fn power_is_balanced(stage in merged(), input in square()) {
         let mut stage = stage;
@@ -475,7 +478,8 @@ fn a_stiff_belt_tends_to_a_rigid_one() {
     assert!(off[0] < 1e-3 && off[1] < 0.2 * off[0] && off[2] < 0.2 * off[1], "{off:?}");
 }
 
-/// Three Coulomb laws, one of them written as a Stribeck curve that is flat, are the same machine for the exact solver and the general one.
+/// Three Coulomb laws, one of them written as a Stribeck curve that is flat, are the same machine for the exact solver
+/// and the general one.
 #[test]
 fn a_flat_curve_is_coulomb_friction() {
     let input = wave(6.0, 10.0);
@@ -502,7 +506,8 @@ fn a_flat_curve_is_coulomb_friction() {
     }
 }
 
-/// Linearised at rest on its bristles, a rigid machine has the slow poles of one with a very stiff belt; and each body's bristles are a state.
+/// Linearised at rest on its bristles, a rigid machine has the slow poles of one with a very stiff belt; and each
+/// body's bristles are a state.
 #[test]
 fn bristles_of_bodies_made_one_are_states_of_their_own() {
     let mut stage = of_all_kinds();

@@ -36,7 +36,8 @@ fn simpson(h: f64, values: &[[f64; 2]]) -> f64 {
     values.chunks_exact(2).map(|pair| h / 3.0 * (pair[0][0] + 4.0 * pair[1][0] + pair[1][1])).sum()
 }
 
-/// Energy of a move was a sum over rows, one too many: 10 mJ for 9.01; errors and currents were means over rows, with whatever the last sample did.
+/// Energy of a move was a sum over rows, one too many: 10 mJ for 9.01; errors and currents were means over rows, with
+/// whatever the last sample did.
 #[test]
 fn integrals_are_those_of_a_dense_quadrature() {
     for (name, limit) in [("pid-elastic", None), ("cascade", None), ("pid", Some("limit"))] {
@@ -48,7 +49,8 @@ fn integrals_are_those_of_a_dense_quadrature() {
         let get = |name: &str| rows.get(name).unwrap();
         let [voltage, speed, cart, error, drive, reference] =
             ["voltage", "drive_speed", "cart_position", "cart_error", "drive_angle", "reference"].map(get);
-        // On an interval the voltage is held, and the current follows the speed: i = (v − K_e n φ̇)/R, which is also just before the voltage jumps.
+        // On an interval the voltage is held, and the current follows the speed: i = (v − K_e n φ̇)/R, which is also
+        // just before the voltage jumps.
         let current = |k: usize, at: usize| {
             (voltage[k] - motor.back_emf_constant * motor.gear_ratio * speed[at]) / motor.resistance
         };

@@ -8,7 +8,8 @@ use taut::parameter::{self, Field, Free, Off, Parameter, all, every, free_markdo
 use taut::stage::Stage;
 use taut::sweep::Sweep;
 
-/// A machine with all parts that go together. Numbers are sums of few powers of two, so that twice or a quarter of them is exact.
+/// A machine with all parts that go together. Numbers are sums of few powers of two, so that twice or a quarter of them
+/// is exact.
 const WHOLE: &str = r#"
 [motor]
 torque_constant = 0.5
@@ -114,7 +115,8 @@ fn value_of(stage: &Stage, key: &str) -> Option<f64> {
     values(stage).into_iter().find(|(own, _)| own == key).map(|(_, value)| value)
 }
 
-/// Sets each number of each machine to a quarter of its value: it is read back, and a case file that says so is the same machine.
+/// Sets each number of each machine to a quarter of its value: it is read back, and a case file that says so is the
+/// same machine.
 #[test]
 fn every_number_is_set_where_a_case_file_has_it() {
     let mut seen: Vec<&str> = Vec::new();
@@ -216,7 +218,8 @@ fn the_numbers_of_a_list_go_together() {
     }
 }
 
-/// Free parameters may be set in whatever order: the breakaway is at least Coulomb friction, and of a Stribeck curve its force above it.
+/// Free parameters may be set in whatever order: the breakaway is at least Coulomb friction, and of a Stribeck curve
+/// its force above it.
 #[test]
 fn the_order_in_which_numbers_are_set_does_not_count() {
     let (name, text) = cases().remove(0);

@@ -55,8 +55,8 @@ fn quantiles(points: &[f64], density: &[f64]) -> [f64; 2] {
     })
 }
 
-/// Coulomb friction that may be zero: the fit's interval is cut off at zero and as wide as if it were not, the posterior is
-/// what quadrature makes of the same likelihood.
+/// Coulomb friction that may be zero: the fit's interval is cut off at zero and as wide as if it were not, the
+/// posterior is what quadrature makes of the same likelihood.
 #[test]
 fn friction_near_zero_has_the_posterior_of_quadrature() {
     let case = with_log(19.0, 0.0, 5);
@@ -99,7 +99,8 @@ fn friction_near_zero_has_the_posterior_of_quadrature() {
     assert!((linear[1] - want[1]).abs() > 0.1 * wide, "{linear:?} {want:?}");
 }
 
-/// Truths drawn from the prior lie in 95 % of the intervals; the fit, which does not know what the prior does, has no such rule.
+/// Truths drawn from the prior lie in 95 % of the intervals; the fit, which does not know what the prior does, has no
+/// such rule.
 #[test]
 fn intervals_hold_truths_that_are_drawn_from_the_prior() {
     let machines = std::env::var("TAUT_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(12u64);

@@ -146,7 +146,8 @@ fn published_problems_are_met() {
     }
 }
 
-/// The inverse-dynamics regression of EMPS gives what its authors published: mass, viscous and Coulomb friction, offset.
+/// The inverse-dynamics regression of EMPS gives what its authors published: mass, viscous and Coulomb friction,
+/// offset.
 #[test]
 fn the_regression_of_emps_is_that_of_its_authors() {
     if common::data::data(["emps/estimation.mat"]).is_none() {
@@ -163,8 +164,9 @@ fn the_regression_of_emps_is_that_of_its_authors() {
     }
 }
 
-/// EMPS with its loop closed again: with the reference's speed fed forward the controller of the case was another one than that of the record, and
-/// from the position alone the mass did not show. The authors' mass is 95.15 kg, and their friction differs by direction.
+/// EMPS with its loop closed again: with the reference's speed fed forward the controller of the case was another one
+/// than that of the record, and from the position alone the mass did not show. The authors' mass is 95.15 kg, and their
+/// friction differs by direction.
 #[test]
 fn emps_in_closed_loop_has_the_mass_and_friction_of_its_authors() {
     if common::data::data(["emps/estimation.mat"]).is_none() {

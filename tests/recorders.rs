@@ -1,7 +1,7 @@
 //! Logs as recorders write them, read with their presets.
 //!
-//! No file here came from a machine: each is made by a generator below, which follows the public definition of its format, from a
-//! run of the model.
+//! No file here came from a machine: each is made by a generator below, which follows the public definition of its
+//! format, from a run of the model.
 
 use crate::common;
 use flate2::{Compression, write::GzEncoder};
@@ -70,8 +70,8 @@ fn agrees(log: &Log, quantity: Quantity, run: &[f64], within: f64) {
     }
 }
 
-/// A generator of RepRapFirmware's closed-loop data: heading and formats as in ClosedLoop.cpp, the columns of a firmware with
-/// 24 channels; `end` is its last line.
+/// A generator of RepRapFirmware's closed-loop data: heading and formats as in ClosedLoop.cpp, the columns of a
+/// firmware with 24 channels; `end` is its last line.
 fn reprapfirmware(stage: &Stage, run: &Trajectory, end: &str) -> String {
     let column = |name: &str| run.get(name).unwrap();
     let mut text = String::from(
@@ -130,7 +130,8 @@ fn a_window_before_the_end_has_lost_nothing() {
     assert_eq!(log.ended, None);
 }
 
-/// A generator of the messages of Klipper's data_logger.py: those that readlog.py reads, and an answer that it passes over.
+/// A generator of the messages of Klipper's data_logger.py: those that readlog.py reads, and an answer that it passes
+/// over.
 fn klipper(stage: &Stage, run: &Trajectory, acceleration: &[f64]) -> Vec<u8> {
     let column = |name: &str| run.get(name).unwrap();
     let mut text = String::from("{\"q\":\"status\",\"params\":{\"eventtime\":1.5,\"status\":{}}}\u{3}");

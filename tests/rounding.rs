@@ -145,8 +145,8 @@ fn geared() -> Stage {
     stage
 }
 
-/// Starts where r φ and x differ in the last bit ended as "too many events" at 1e-35 s, or listed a pair of events that is not
-/// there: the sign of the gear's torque turned with every term of the series that is nothing but rounding.
+/// Starts where r φ and x differ in the last bit ended as "too many events" at 1e-35 s, or listed a pair of events that
+/// is not there: the sign of the gear's torque turned with every term of the series that is nothing but rounding.
 #[test]
 fn a_gear_turned_its_sign_without_a_moment_passing() {
     let stage = geared();
@@ -276,8 +276,8 @@ fn a_run_that_would_not_end_is_told_and_can_be_stopped() {
     assert!(asked > 0);
 }
 
-/// Cases that the hunt against an independent solver found: runs that ended early, bodies that broke away late or never. By now both
-/// solvers come to the same positions and let the same bodies go.
+/// Cases that the hunt against an independent solver found: runs that ended early, bodies that broke away late or
+/// never. By now both solvers come to the same positions and let the same bodies go.
 #[test]
 fn what_the_hunt_found_stays_found() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/hunted");

@@ -87,7 +87,8 @@ fn what_is_zero_is_written_as_zero() {
     }
 }
 
-/// At rest a row is computed once and repeated: through the ends of blocks, and up to a row in the middle of one where it goes on.
+/// At rest a row is computed once and repeated: through the ends of blocks, and up to a row in the middle of one where
+/// it goes on.
 #[test]
 fn rows_at_rest_are_those_that_are_asked_for_one_by_one() {
     let stage = table4();
@@ -125,7 +126,8 @@ fn rows_at_rest_are_those_that_are_asked_for_one_by_one() {
     }
 }
 
-/// A receiver that wants no more is heard at the end of the block that it was handed, with nothing but rest behind and before.
+/// A receiver that wants no more is heard at the end of the block that it was handed, with nothing but rest behind and
+/// before.
 #[test]
 fn a_receiver_that_wants_no_more_is_heard_at_rest() {
     let (stage, mut rows) = (table4(), 0);

@@ -118,7 +118,8 @@ fn humps_are_as_high_as_the_tolerance() {
 
 const TODAY: [(Kind, f64); 3] = [(Kind::Ei, 0.4), (Kind::TwoHumpEi, 0.3), (Kind::ThreeHumpEi, 0.2)];
 
-/// Today's EI shapers keep what defines them with damping: no more than the tolerance between their outermost zeros, and the tolerance at every hump.
+/// Today's EI shapers keep what defines them with damping: no more than the tolerance between their outermost zeros,
+/// and the tolerance at every hump.
 #[test]
 fn humps_are_as_high_as_the_tolerance_with_damping() {
     for (kind, most) in TODAY {
@@ -132,7 +133,8 @@ fn humps_are_as_high_as_the_tolerance_with_damping() {
             let tops: Vec<f64> = v.windows(3).filter(|w| w[1] > w[0] && w[1] >= w[2]).map(|w| w[1]).collect();
             let humps = tops.iter().filter(|top| (**top - TOLERANCE).abs() < 2e-4).count();
             let wanted = [1, 2, 3][kind as usize - Kind::Ei as usize];
-            // The last impulse of EI stands after a damped period; its one hump then is not quite at the frequency itself.
+            // The last impulse of EI stands after a damped period; its one hump then is not quite at the frequency
+            // itself.
             let is_near = kind == Kind::Ei && tops.iter().any(|top| (*top / TOLERANCE - 1.0).abs() < 0.05);
             assert!(humps == wanted || is_near, "{kind:?} {zeta}: {tops:?}");
             let own = shaper.residual_vibration(1.0, zeta);
@@ -180,9 +182,10 @@ fn cubic(points: &[(f64, f64)]) -> [f64; 4] {
 /// Coefficients of t₂ … and A₁ … over the damping ratio.
 type Published = (Kind, f64, &'static [[f64; 4]], &'static [[f64; 4]]);
 
-/// The polynomials that Singhose, Porter, Tuttle and Singer (1997) publish, cubic in the damping ratio, for a tolerance of 5 %; times in undamped
-/// periods. Klipper has taken them since 2025-09. Two of the numbers are misprints there: of the third amplitude of two humps the constant
-/// 0.34089, with which the sum is 1.0005, and of the last time of three humps the sign of the quadratic term.
+/// The polynomials that Singhose, Porter, Tuttle and Singer (1997) publish, cubic in the damping ratio, for a tolerance
+/// of 5 %; times in undamped periods. Klipper has taken them since 2025-09. Two of the numbers are misprints there: of
+/// the third amplitude of two humps the constant 0.34089, with which the sum is 1.0005, and of the last time of three
+/// humps the sign of the quadratic term.
 const PUBLISHED_CUBICS: [Published; 2] = [
     (
         Kind::TwoHumpEi,
@@ -239,7 +242,8 @@ fn cubics_through_the_solutions_are_the_published_ones() {
     }
 }
 
-/// A modified ZV of n impulses leaves nothing at its own frequency whatever the damping, and the usual parameters give the usual shaper.
+/// A modified ZV of n impulses leaves nothing at its own frequency whatever the damping, and the usual parameters give
+/// the usual shaper.
 #[test]
 fn generalised_mzv() {
     for (pulses, duration) in [(3, 0.75), (3, 0.6), (4, 0.9), (5, 1.1), (6, 1.0), (10, 1.5)] {
@@ -317,7 +321,8 @@ fn resonant(modes: &[(f64, f64, f64)]) -> Spectrum {
     Spectrum::by(&data, Axis::All, Firmware::Klipper)
 }
 
-/// Of several spectra the one counts of which most remains: the vibration is that of the worst, and no less than of each alone.
+/// Of several spectra the one counts of which most remains: the vibration is that of the worst, and no less than of
+/// each alone.
 #[test]
 fn together_the_worst_counts() {
     let all = [resonant(&[(40.0, 0.05, 1.0)]), resonant(&[(55.0, 0.05, 1.0)])];
@@ -348,7 +353,8 @@ fn todays_rule() {
     assert!(quiet.best().vibration <= 0.001, "{quiet:?}");
 }
 
-/// The damping ratio of a mode on a frame that is shaken the harder the higher the frequency comes out, whatever the window does to it.
+/// The damping ratio of a mode on a frame that is shaken the harder the higher the frequency comes out, whatever the
+/// window does to it.
 #[test]
 fn fitted_damping() {
     let rate = 3200.0;
@@ -378,8 +384,8 @@ fn fitted_damping() {
 /// In % below and above.
 type Range = (f64, f64);
 
-/// Klipper's documentation, "Resonance Compensation", Technical details: ranges in % of the shaper's frequency within which
-/// vibration is reduced 20 and 10 times, said to be approximate, for shapers of ζ = 0.1 and machines around that.
+/// Klipper's documentation, "Resonance Compensation", Technical details: ranges in % of the shaper's frequency within
+/// which vibration is reduced 20 and 10 times, said to be approximate, for shapers of ζ = 0.1 and machines around that.
 const PUBLISHED: [(Kind, Option<Range>, Range); 6] = [
     (Kind::Zv, None, (-5.0, 5.0)),
     (Kind::Mzv, Some((-4.0, 4.0)), (-10.0, 15.0)),
@@ -389,7 +395,8 @@ const PUBLISHED: [(Kind, Option<Range>, Range); 6] = [
     (Kind::ThreeHumpEi, Some((-45.0, 50.0)), (-50.0, 55.0)),
 ];
 
-/// The published values lie within the computed ones, and are at most five points of percent less: they were rounded down to 5 %.
+/// The published values lie within the computed ones, and are at most five points of percent less: they were rounded
+/// down to 5 %.
 #[test]
 fn the_published_table_of_robustness() {
     let mut missing = Vec::new();
@@ -470,7 +477,8 @@ fn temporary(name: &str, text: &str) -> PathBuf {
     file
 }
 
-/// A file that names shapers holds densities that are divided by frequency already, with a column that marks them or without.
+/// A file that names shapers holds densities that are divided by frequency already, with a column that marks them or
+/// without.
 #[test]
 fn spectra_with_shapers_are_divided_already() {
     let plain: Vec<(f64, f64)> =

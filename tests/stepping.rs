@@ -28,8 +28,8 @@ fn in_one_go(stage: &Stage, input: &Signal, solver: Solver) -> (Vec<(String, f64
     (solution.trajectory.columns.iter().map(last).collect(), solution.outcome.events)
 }
 
-/// Steps a machine to the end by these shares of the time, each piece of its inputs as it begins. With `copies`, now and then a copy
-/// goes on in its place, after the machine itself has gone astray.
+/// Steps a machine to the end by these shares of the time, each piece of its inputs as it begins. With `copies`, now
+/// and then a copy goes on in its place, after the machine itself has gone astray.
 fn stepped(mut machine: Machine, inputs: &[Signal], until: f64, shares: &[f64], copies: bool) -> (Machine, Vec<Event>) {
     let mut times: Vec<f64> = shares.iter().map(|share| share * until).collect();
     times.push(until);

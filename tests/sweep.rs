@@ -264,7 +264,8 @@ fn blocks_for_indices_mix_two_samples() {
     }
 }
 
-/// A bench leaves out columns and rows that its meter does not need, and shares what it can: the figures are the same to the last bit.
+/// A bench leaves out columns and rows that its meter does not need, and shares what it can: the figures are the same
+/// to the last bit.
 #[test]
 fn a_bench_shows_what_a_stream_shows() {
     let mut bench = Bench::default();

@@ -30,8 +30,8 @@ fn error(stage: &Stage, experiment: &Experiment, method: Method, step: f64) -> f
     columns.into_iter().map(difference).fold(0.0, f64::max)
 }
 
-/// With half the step the error falls by 2⁴ and by 2⁵, where friction is viscous and the input a ramp; with the armature's
-/// current as a state as well.
+/// With half the step the error falls by 2⁴ and by 2⁵, where friction is viscous and the input a ramp; with the
+/// armature's current as a state as well.
 #[test]
 fn the_formulas_have_their_order() {
     let ramp = experiment(Signal::Ramp { value: 20.0, over: 0.02, at: 0.0 }, 0.02);
@@ -49,7 +49,8 @@ fn the_formulas_have_their_order() {
     }
 }
 
-/// While all bodies slide, Table 3 is Coulomb's law; below 0.01 rad/s and 0.01 m/s it freezes what should stop, so that the cart creeps on.
+/// While all bodies slide, Table 3 is Coulomb's law; below 0.01 rad/s and 0.01 m/s it freezes what should stop, so that
+/// the cart creeps on.
 #[test]
 fn friction_is_coulombs_above_the_band_and_frozen_within() {
     let stage = common::table4();

@@ -24,7 +24,8 @@ fn share(random: &mut Pcg64) -> f64 {
     (random.next_u64() >> 11) as f64 * 2f64.powi(-53)
 }
 
-/// The linear view of a controller answers any motion as the controller itself does: by the response to sines, after the transient.
+/// The linear view of a controller answers any motion as the controller itself does: by the response to sines, after
+/// the transient.
 #[test]
 fn the_linear_controller_is_what_the_controller_does() {
     let notch = "controller.filters=[{ notch = \"190 Hz\", depth = 0.1, damping = 0.7 }, { low_pass = \"300 Hz\" }]";
@@ -213,7 +214,8 @@ fn stability_is_that_of_a_run() {
     }
 }
 
-/// M_s by a sweep of its own: 20 000 frequencies, the plant by its matrices, the controller by its difference equations.
+/// M_s by a sweep of its own: 20 000 frequencies, the plant by its matrices, the controller by its difference
+/// equations.
 #[test]
 fn the_constraint_is_met_by_a_dense_sweep() {
     let case = case("pid.toml", &[]);
@@ -333,8 +335,9 @@ fn hunting_is_found_where_there_is_stiction() {
     assert_eq!(hunting(&smooth.stage, smooth.controller.as_ref().unwrap()).unwrap(), None);
 }
 
-/// With its defaults `taut tune` made the project's own machines worse (17 to 28 µm, 24 to 7 axes that settle) and said in green that the
-/// limits hold. Now a move is worse only where the limits force it, which is said; the text reads back to the same gains, remarks left alone.
+/// With its defaults `taut tune` made the project's own machines worse (17 to 28 µm, 24 to 7 axes that settle) and said
+/// in green that the limits hold. Now a move is worse only where the limits force it, which is said; the text reads
+/// back to the same gains, remarks left alone.
 #[test]
 fn no_move_gets_worse_unless_a_limit_forces_it() {
     let case = case("pid-elastic.toml", &[]);
@@ -362,7 +365,8 @@ fn no_move_gets_worse_unless_a_limit_forces_it() {
     assert_eq!(judged.before.objective, tuned.after.objective);
 }
 
-/// K_t and K_e of a motor are one number in SI units; a family in which one is 20 % more and the other 20 % less cannot exist.
+/// K_t and K_e of a motor are one number in SI units; a family in which one is 20 % more and the other 20 % less cannot
+/// exist.
 #[test]
 fn what_is_one_number_by_nature_varies_as_one() {
     let known = |name: &str, value: f64| format!("\"{name}\" = {{ low = {}, high = {} }}\n", 0.9 * value, 1.1 * value);

@@ -8,7 +8,8 @@ use taut::fit::{Grade, check, fit};
 use taut::log::Log;
 use taut::solve::{Flow, Solver, simulate};
 
-/// The template with these changes and logs of the machine that it is with those, the encoder's angle off by `noise(k)`.
+/// The template with these changes and logs of the machine that it is with those, the encoder's angle off by
+/// `noise(k)`.
 fn made(own: &[&str], truth: &[&str], experiments: &[usize], mut noise: impl FnMut(usize, f64) -> f64) -> Case {
     let mut case = Case::from_text_with("axis.toml", TEMPLATE, own).unwrap();
     let real = Case::from_text_with("axis.toml", TEMPLATE, &[own, truth].concat()).unwrap();
@@ -47,7 +48,8 @@ fn slow(seed: u64, deviation: f64, time: f64, white: f64) -> impl FnMut(usize, f
 
 const KEYS: [&str; 3] = ["cart.friction.viscous", "cart.friction.coulomb", "cart.mass"];
 
-/// White noise on top of a slow error hid the slow one: the lag-one correlation is small, and intervals held the truth in 41 to 49 %.
+/// White noise on top of a slow error hid the slow one: the lag-one correlation is small, and intervals held the truth
+/// in 41 to 49 %.
 #[test]
 fn white_noise_on_top_does_not_hide_a_slow_error() {
     let (mut held, machines) = (0, 12);
@@ -69,7 +71,8 @@ fn white_noise_on_top_does_not_hide_a_slow_error() {
     assert!(held >= 30, "{held} of {}", 3 * machines);
 }
 
-/// With the current commanded, only ratios to the amplifier's gain show; `fit` refused all of it, or gave numbers to each.
+/// With the current commanded, only ratios to the amplifier's gain show; `fit` refused all of it, or gave numbers to
+/// each.
 #[test]
 fn ratios_are_told_where_a_gain_is_free() {
     let own = [
@@ -112,7 +115,8 @@ fn ratios_are_told_where_a_gain_is_free() {
     }
 }
 
-/// Two parameters of which the sum shows are ± ∞ and keep their values; a third one keeps its interval, and so does the sum.
+/// Two parameters of which the sum shows are ± ∞ and keep their values; a third one keeps its interval, and so does the
+/// sum.
 #[test]
 fn what_is_determined_beside_what_is_not_keeps_its_interval() {
     for start in ["drive_pulley.friction.viscous=0.001", "drive_pulley.friction.viscous=0.004"] {
@@ -181,7 +185,8 @@ fn a_verdict_does_not_depend_on_the_unit_of_the_input() {
     }
 }
 
-/// "The same inputs again, the other way round" promised 2.4 times better where it gave √2: its start and its delay were taken as known.
+/// "The same inputs again, the other way round" promised 2.4 times better where it gave √2: its start and its delay
+/// were taken as known.
 #[test]
 fn the_other_way_round_gives_what_is_promised() {
     let truth = ["cart.friction.coulomb=0.6"];

@@ -69,8 +69,8 @@ impl Command {
 
 /// Recompute the paper of Sollmann and Jouaneh (2011): every table, figure and claim.
 ///
-/// Writes report.html, claims.json, each figure as SVG and its curves as CSV into out/paper, or where --out says, and prints each claim
-/// with its verdict.
+/// Writes report.html, claims.json, each figure as SVG and its curves as CSV into out/paper, or where --out says, and
+/// prints each claim with its verdict.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  taut paper --out out/paper")]
 pub struct Paper {
@@ -106,7 +106,8 @@ pub struct Man {
 
 /// Write a commented case file to start from.
 ///
-/// The file describes a complete machine and two experiments, and simulates as it stands; its remarks name what can be added.
+/// The file describes a complete machine and two experiments, and simulates as it stands; its remarks name what can be
+/// added.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  taut init axis.toml\n  taut init --template stage stage.toml\n  taut init --kind core-xy gantry.toml"
@@ -149,9 +150,10 @@ pub enum KindName {
 
 /// Say what follows from the numbers of a case: masses, stiffness, frequencies, limits.
 ///
-/// Prints the moved mass with all that turns as seen at the cart, the stiffness of the spans and how much the cart gives way per newton, natural
-/// frequencies with their damping along the travel, the voltage at which the axis breaks away, the largest force, acceleration and speed, and
-/// what is left of teeth and tension where the belt's type says what they bear. Nothing is simulated. With --out it writes show.json and a report.
+/// Prints the moved mass with all that turns as seen at the cart, the stiffness of the spans and how much the cart
+/// gives way per newton, natural frequencies with their damping along the travel, the voltage at which the axis breaks
+/// away, the largest force, acceleration and speed, and what is left of teeth and tension where the belt's type says
+/// what they bear. Nothing is simulated. With --out it writes show.json and a report.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = SHOW)]
 pub struct Show {
@@ -170,8 +172,8 @@ Examples:
 /// Run the experiments of a case file.
 ///
 /// Prints the key figures of each experiment. With --out it also writes, for each experiment, every quantity over time
-/// (CSV, Parquet), its stick and slip events and its plots, and for all of them a report, a summary as JSON, and the case
-/// file that repeats the run.
+/// (CSV, Parquet), its stick and slip events and its plots, and for all of them a report, a summary as JSON, and the
+/// case file that repeats the run.
 ///
 /// A length, a force or a time on the command line is written as in the case file: "0.5 kg", 0.1ms, "24 V".
 #[derive(Debug, Clone, clap::Args)]
@@ -224,10 +226,10 @@ Ctrl-C ends a run early: what was computed until then is written and reported, w
 
 /// Run the moves of a case in closed loop: the controller sampled, the axis exact.
 ///
-/// Prints for each move how far the drive pulley and the cart are from where the cart should be, when the cart settles, by how much it
-/// overshoots, and what belt and motor take. With --out it also writes, for each move, every quantity over time and the
-/// controller's samples as CSV, the events and the plots, and for all of them a report and a summary as JSON. With
-/// several cases it prints one table for each move, to compare controllers.
+/// Prints for each move how far the drive pulley and the cart are from where the cart should be, when the cart settles,
+/// by how much it overshoots, and what belt and motor take. With --out it also writes, for each move, every quantity
+/// over time and the controller's samples as CSV, the events and the plots, and for all of them a report and a summary
+/// as JSON. With several cases it prints one table for each move, to compare controllers.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MOVE)]
 pub struct Move {
@@ -255,9 +257,9 @@ Examples:
 
 /// Find gains and filters for the controller in a case, good for the machines that it may meet
 ///
-/// Makes settling, cart error and current of the moves small, at worst over a family of machines (parameters off, loads, places), while
-/// the sampled loop keeps its limits of sensitivity there. Says in its first line whether the moves became better or worse. Prints gains,
-/// margins, moves and limit cycles before and after.
+/// Makes settling, cart error and current of the moves small, at worst over a family of machines (parameters off,
+/// loads, places), while the sampled loop keeps its limits of sensitivity there. Says in its first line whether the
+/// moves became better or worse. Prints gains, margins, moves and limit cycles before and after.
 #[derive(Debug, clap::Args)]
 #[command(after_help = TUNE, mut_arg("out", |out| out.value_name("FILE or DIR").help(
     "The case file to write (ends in .toml), or the folder for it, a summary, a report and plots"
@@ -296,9 +298,9 @@ do not hold. Ctrl-C ends a search early with the best gains so far, with exit st
 
 /// Run a case many times with its parameters varied.
 ///
-/// Prints how each key figure is spread and which parameters it depends on. With --out FILE it writes a row for each run, as Parquet
-/// (units in its metadata) or CSV; with --out DIR also a summary, a report and plots. The same command resumes an
-/// interrupted or killed one. Rows are the same, bit for bit, on any number of threads.
+/// Prints how each key figure is spread and which parameters it depends on. With --out FILE it writes a row for each
+/// run, as Parquet (units in its metadata) or CSV; with --out DIR also a summary, a report and plots. The same command
+/// resumes an interrupted or killed one. Rows are the same, bit for bit, on any number of threads.
 #[derive(Debug, clap::Args)]
 #[command(after_help = SWEEP, mut_arg("out", |out| out.value_name("FILE or DIR").help(
     "The file of the rows (ends in .parquet or .csv), or the folder for it, a summary, a report and plots"
@@ -364,8 +366,8 @@ pub struct Check {
 /// Find the parameters in [fit] of a case from its logs.
 ///
 /// Prints the estimates with 95 % intervals and how each log is met. With --out it also writes fitted.toml, a case that
-/// simulates with the estimates, fit.json, and a report with model and log side by side; with --posterior also the draws,
-/// posterior.csv.
+/// simulates with the estimates, fit.json, and a report with model and log side by side; with --posterior also the
+/// draws, posterior.csv.
 #[derive(Debug, clap::Args)]
 #[command(after_help = FIT)]
 pub struct Fit {
@@ -377,7 +379,8 @@ pub struct Fit {
     /// Compare friction laws and windows by the error on parts of the logs that are held out, and fit with the best
     #[arg(long, conflicts_with_all = ["posterior", "drift"])]
     pub compare: bool,
-    /// Laws to compare, separated by commas: viscous, coulomb, asymmetric, stribeck, along, lugre [default: all but lugre]
+    /// Laws to compare, separated by commas: viscous, coulomb, asymmetric, stribeck, along, lugre [default: all but
+    /// lugre]
     #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "compare")]
     pub laws: Vec<String>,
     /// Windows to compare, separated by commas: lengths such as 2s, and whole for whole logs
@@ -414,10 +417,10 @@ Ctrl-C ends a fit early: the best so far is written and said not to be converged
 
 /// Recommend an input shaper, from a measured spectrum or from a model.
 ///
-/// Takes a spectrum (Klipper's resonances_*.csv, calibration_data_*.csv), raw accelerometer samples (raw_data_*.csv), or a case
-/// file, whose resonances along the travel are computed. Prints for each shaper the best frequency, the vibration that
-/// remains, smoothing and the greatest acceleration, which one to take, and the lines for Klipper's configuration. A second spectrum is compared
-/// with the first; with --together one shaper is chosen for all.
+/// Takes a spectrum (Klipper's resonances_*.csv, calibration_data_*.csv), raw accelerometer samples (raw_data_*.csv),
+/// or a case file, whose resonances along the travel are computed. Prints for each shaper the best frequency, the
+/// vibration that remains, smoothing and the greatest acceleration, which one to take, and the lines for Klipper's
+/// configuration. A second spectrum is compared with the first; with --together one shaper is chosen for all.
 #[derive(Debug, clap::Args)]
 #[command(after_help = SHAPE)]
 pub struct Shape {
@@ -434,20 +437,22 @@ pub struct Shape {
     /// Axis of the accelerometer [default: the sum of x, y and z]
     #[arg(long, value_enum)]
     pub axis: Option<AxisName>,
-    /// Damping ratio that shapers are designed for, or "fitted" for that of a spectrum's highest peak [default: 0.1, or the model's]
+    /// Damping ratio that shapers are designed for, or "fitted" for that of a spectrum's highest peak [default: 0.1, or
+    /// the model's]
     #[arg(long, value_name = "RATIO", value_parser = damping)]
     pub damping: Option<Damping>,
     /// Most smoothing that is allowed, such as "0.1 mm" [default: any]
     #[arg(long, value_name = "LENGTH", value_parser = smoothing)]
     pub max_smoothing: Option<f64>,
-    /// Most vibration that is wanted, in per cent of that without a shaper; a quieter shaper is then taken although it smooths more
+    /// Most vibration that is wanted, in per cent of that without a shaper; a quieter shaper is then taken although it
+    /// smooths more
     #[arg(long, value_name = "PERCENT", value_parser = vibrations)]
     pub max_vibrations: Option<f64>,
     /// Speed at right-angled corners, of which smoothing is computed [default: "5 mm/s"]
     #[arg(long, value_name = "SPEED", value_parser = corner_speed)]
     pub corner_speed: Option<f64>,
-    /// Shapers to choose from, separated by commas: zv, mzv, zvd, ei, 2hump_ei, 3hump_ei, mzv(n=4,t=0.9), ei(v_tol=0.1) [default: all but
-    /// zvd]
+    /// Shapers to choose from, separated by commas: zv, mzv, zvd, ei, 2hump_ei, 3hump_ei, mzv(n=4,t=0.9), ei(v_tol=0.1)
+    /// [default: all but zvd]
     #[arg(long, value_name = "NAMES", value_parser = shapers)]
     pub shapers: Option<Shapers>,
     /// Of a case file: by which part its frequencies may be wrong [default: 0.1]
@@ -462,10 +467,11 @@ pub struct Shape {
 
 /// Measure a frequency response: from the logs of a case, without a model, with coherence and intervals.
 ///
-/// Takes every experiment with a log. Segments of it are averaged after Welch, or whole periods with --period; where the log has a reference, it was
-/// made in closed loop, and the response is that from the reference to output and input, divided. Prints for each output where it is coherent, fits
-/// stiffness and damping of the belt and the delay to the responses, and computes the margins of the case's controller around what was measured.
-/// With --out it also writes frf.json, frf.csv and a report with the responses over the model's.
+/// Takes every experiment with a log. Segments of it are averaged after Welch, or whole periods with --period; where
+/// the log has a reference, it was made in closed loop, and the response is that from the reference to output and
+/// input, divided. Prints for each output where it is coherent, fits stiffness and damping of the belt and the delay to
+/// the responses, and computes the margins of the case's controller around what was measured. With --out it also writes
+/// frf.json, frf.csv and a report with the responses over the model's.
 #[derive(Debug, clap::Args)]
 #[command(after_help = FRF)]
 pub struct Frf {
@@ -489,13 +495,13 @@ pub struct Frf {
 
 /// Say how a machine swings: poles, zeros, frequency response, resonance along the travel.
 ///
-/// Linearises the stage of a case while everything slides, and prints its poles with frequency and damping, the gain and
-/// the zeros of each output, and resonance and anti-resonance along the travel; with --sample-time also its discrete-time
-/// model. With --out it also writes modes.json with the matrices, frequency-response.csv, and a report with a Bode
-/// diagram, a map of the travel and a map of poles and zeros.
+/// Linearises the stage of a case while everything slides, and prints its poles with frequency and damping, the gain
+/// and the zeros of each output, and resonance and anti-resonance along the travel; with --sample-time also its
+/// discrete-time model. With --out it also writes modes.json with the matrices, frequency-response.csv, and a report
+/// with a Bode diagram, a map of the travel and a map of poles and zeros.
 ///
-/// Of a gantry it prints rigid and elastic modes with frequency, damping and shape, and their frequencies over the working
-/// area; with --out it writes modes.json, map.csv and a report with the maps.
+/// Of a gantry it prints rigid and elastic modes with frequency, damping and shape, and their frequencies over the
+/// working area; with --out it writes modes.json, map.csv and a report with the maps.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MODES)]
 pub struct Modes {

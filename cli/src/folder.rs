@@ -45,8 +45,8 @@ impl Folder {
         common.out.as_deref().map(|root| Self::create(root, inputs(), names)).transpose()
     }
 
-    /// Makes the folder if it is not there. `names` are files that will be written: one that is among the inputs is told
-    /// before the work; all others, before the first file gets its place.
+    /// Makes the folder if it is not there. `names` are files that will be written: one that is among the inputs is
+    /// told before the work; all others, before the first file gets its place.
     pub fn create<N: AsRef<Path>>(
         root: &Path,
         inputs: Inputs,
@@ -73,8 +73,8 @@ impl Folder {
         self.batch.path(name)
     }
 
-    /// Gives all files their places, with a list of them, and removes what `command` listed in an earlier run and did not
-    /// write in this one; what somebody changed since stays, and is named. Returns the names of what was written.
+    /// Gives all files their places, with a list of them, and removes what `command` listed in an earlier run and did
+    /// not write in this one; what somebody changed since stays, and is named. Returns the names of what was written.
     pub fn place(&self, command: &str, quiet: bool) -> std::result::Result<Vec<PathBuf>, Failure> {
         let mut names = self.batch.names().map_err(Failure::work)?;
         let mut list = Listing::of(command, &self.batch.path(""), &names).map_err(Failure::work)?;
@@ -141,7 +141,8 @@ impl Folder {
     }
 }
 
-/// The files of a case, and what they are called in a folder of results: as they are, with a number where that is taken.
+/// The files of a case, and what they are called in a folder of results: as they are, with a number where that is
+/// taken.
 pub fn brought(files: &[InputFile]) -> HashMap<PathBuf, String> {
     let mut names: HashMap<PathBuf, String> = HashMap::new();
     for file in files {

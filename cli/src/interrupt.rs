@@ -15,8 +15,8 @@ impl Interrupt {
         let interrupt = Self::default();
         let twice = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM] {
-            // In this order: what the first signal sets, the second finds set. If the system refuses, the signal ends the
-            // program as it always does.
+            // In this order: what the first signal sets, the second finds set. If the system refuses, the signal ends
+            // the program as it always does.
             let _ = signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&twice));
             let _ = signal_hook::flag::register(signal, Arc::clone(&twice));
             let _ = signal_hook::flag::register_usize(signal, Arc::clone(&interrupt.0), signal as usize);

@@ -1,4 +1,5 @@
-//! `taut man`, `taut completions` and `taut schema`: the command line for readers and shells, cases and results for editors.
+//! `taut man`, `taut completions` and `taut schema`: the command line for readers and shells, cases and results for
+//! editors.
 
 use crate::args::{Args, Completions, Man, Schema};
 use crate::failure::{Failure, Outcome, Status};

@@ -23,8 +23,8 @@ pub fn show_note(note: &impl Display) {
     let _ = writeln!(io::stderr(), "{word}: {note}");
 }
 
-/// Writes `text` to standard output. Whoever closed the pipe has read enough: that is no error. Anything else, a full disk
-/// say, ends the program with status 1.
+/// Writes `text` to standard output. Whoever closed the pipe has read enough: that is no error. Anything else, a full
+/// disk say, ends the program with status 1.
 pub fn show(text: &str) {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
@@ -46,8 +46,8 @@ pub fn columns() -> usize {
 /// Fewer columns than these are not kept to.
 const LEAST_COLUMNS: usize = 40;
 
-/// `text` with the lines that are too long for the terminal broken between words: behind a name, the rest stands under what the
-/// line says of it.
+/// `text` with the lines that are too long for the terminal broken between words: behind a name, the rest stands under
+/// what the line says of it.
 pub fn wrapped(text: &str) -> String {
     let columns = columns();
     let mut out = String::with_capacity(text.len());

@@ -32,12 +32,13 @@ fn printed(folder: &Path, line: &str) -> String {
     text.lines().flat_map(|line| [line.trim_end(), "\n"]).collect()
 }
 
-/// Counts that follow from how a search or a solver goes about it, and not from the result: `12 steps`, `40 simulations`.
+/// Counts that follow from how a search or a solver goes about it, and not from the result: `12 steps`,
+/// `40 simulations`.
 const EFFORT: [&str; 9] =
     ["steps", "step", "evaluations", "modes", "mode", "simulations", "iterations", "designs", "rounds"];
 
-/// The words of an output that have to stay: without clock times and counts of effort, without what another step of a search would
-/// change, without the bound of rounding. Where lines are broken does not matter.
+/// The words of an output that have to stay: without clock times and counts of effort, without what another step of a
+/// search would change, without the bound of rounding. Where lines are broken does not matter.
 fn lasting(text: &str) -> Vec<String> {
     let mut words = Vec::new();
     for line in text.lines() {

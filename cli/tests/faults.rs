@@ -70,7 +70,8 @@ fn is_temporary(name: &str) -> bool {
     name.split('/').any(|part| part.starts_with('.') || part.ends_with(".tmp") || part.ends_with(".parts"))
 }
 
-/// A command that writes, in the folder of the files that it reads; the second set of words makes it write something else.
+/// A command that writes, in the folder of the files that it reads; the second set of words makes it write something
+/// else.
 struct Writer {
     read: Files,
     words: [Vec<&'static str>; 2],
@@ -109,8 +110,8 @@ impl Writer {
         Whole { before, after, took }
     }
 
-    /// Kills it at moments between its beginning and its end. Every file is as it was or as it will be; where some are the one and some
-    /// the other, a file says so; and the same command then does its work, and leaves nothing else.
+    /// Kills it at moments between its beginning and its end. Every file is as it was or as it will be; where some are
+    /// the one and some the other, a file says so; and the same command then does its work, and leaves nothing else.
     fn withstands_kills(&self, seed: u64) {
         let whole = self.whole();
         let mut random = Pcg64::seed_from_u64(number("TAUT_SEED").unwrap_or(1) << 8 | seed);
@@ -325,8 +326,8 @@ fn writers() -> [(Writer, &'static str); 8] {
     ]
 }
 
-/// A command that fails for want of space or of a right: it says which file and what to do, ends with status 1, or 2 where nothing was
-/// computed yet, and leaves each file as it was or as it will be, and none of its temporary ones.
+/// A command that fails for want of space or of a right: it says which file and what to do, ends with status 1, or 2
+/// where nothing was computed yet, and leaves each file as it was or as it will be, and none of its temporary ones.
 #[track_caller]
 fn fails_in_order(whole: &Whole, folder: &Path, command: &mut Command, what: &str) {
     let output = command.stderr(Stdio::piped()).output().unwrap();
@@ -427,8 +428,8 @@ fn a_folder_that_is_read_only_stays_as_it_is() {
 
 // ── Ctrl-C ─────────────────────────────────────────────────────────────────────────────────────
 
-/// Presses Ctrl-C once the command has been at work for a while. It ends within a second, by itself with status 130 or by the signal;
-/// of three attempts one has to, for the machine may be busy with other things.
+/// Presses Ctrl-C once the command has been at work for a while. It ends within a second, by itself with status 130 or
+/// by the signal; of three attempts one has to, for the machine may be busy with other things.
 #[track_caller]
 fn ends_at_ctrl_c(folder: &Path, words: &str) {
     ends_at_ctrl_c_within(folder, words, 1.0);
@@ -498,7 +499,8 @@ fn long_runs_end_at_ctrl_c() {
     ends_at_ctrl_c(folder.path(), &format!("{run} --set experiment.0.every=1000s"));
 }
 
-/// A machine so stiff that a single row takes minutes did not look up in between. It may also end by itself, as too stiff.
+/// A machine so stiff that a single row takes minutes did not look up in between. It may also end by itself, as too
+/// stiff.
 #[test]
 fn stiff_runs_end_at_ctrl_c() {
     let folder = TempDir::new().unwrap();

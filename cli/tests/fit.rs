@@ -181,7 +181,8 @@ fn nothing_to_search_for_gives_errors_alone() {
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// A case whose cart is more than twice as heavy as that of the log: what explains it stands first, and the mass is found.
+/// A case whose cart is more than twice as heavy as that of the log: what explains it stands first, and the mass is
+/// found.
 #[test]
 fn a_drift_is_a_table_that_begins_with_what_explains_most() {
     let folder = with_a_log();

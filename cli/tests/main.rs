@@ -1,4 +1,5 @@
-//! All tests of the program in one program, which is linked once: `cargo test --package taut-cli --test all fit::` runs those of `fit.rs`.
+//! All tests of the program in one program, which is linked once: `cargo test --package taut-cli --test all fit::` runs
+//! those of `fit.rs`.
 
 mod commands;
 mod common_options;

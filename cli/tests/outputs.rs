@@ -1,4 +1,5 @@
-//! Output of the commands: never over a file that they read, whole folders or none, and under every name that a user may choose.
+//! Output of the commands: never over a file that they read, whole folders or none, and under every name that a user
+//! may choose.
 
 use assert_cmd::Command;
 use std::collections::BTreeMap;

@@ -15,7 +15,8 @@ fn json_of(args: &[&str]) -> Value {
     serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{args:?}: {e}: {output:?}"))
 }
 
-/// Why `value` does not follow `schema`, as far as our schemas go: the words of JSON Schema that they use, and no others.
+/// Why `value` does not follow `schema`, as far as our schemas go: the words of JSON Schema that they use, and no
+/// others.
 fn faults(value: &Value, schema: &Value, root: &Value, path: &str, found: &mut Vec<String>) {
     let known = [
         "type",

@@ -83,7 +83,8 @@ fn the_file_is_the_same_on_any_number_of_threads() {
     assert!(holds("unit.cart.mass_kg") && holds("unit.5-v-pulse.peak_span1_force_N"));
 }
 
-/// kill -9 twice in the middle, and once Ctrl-C: the same command goes on, does nothing twice, and the file is that of a run in one go.
+/// kill -9 twice in the middle, and once Ctrl-C: the same command goes on, does nothing twice, and the file is that of
+/// a run in one go.
 #[test]
 fn a_killed_sweep_goes_on() {
     let folder = TempDir::new().unwrap();

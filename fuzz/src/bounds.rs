@@ -108,7 +108,8 @@ impl ProcessorTime {
     }
 }
 
-/// Ends the program where one input takes longer than `limit` by the clock: a loop that does not end cannot be ended otherwise.
+/// Ends the program where one input takes longer than `limit` by the clock: a loop that does not end cannot be ended
+/// otherwise.
 pub struct Watchdog {
     limit: Duration,
     state: std::sync::Arc<std::sync::Mutex<State>>,

@@ -287,7 +287,8 @@ fn zeros(name: &str, count: u32) -> Vec<u8> {
     matrix(name, count, 2, &vec![0; count as usize])
 }
 
-/// A MATLAB file with each of its elements packed as version 7 does; what does not look like an element is left as it is.
+/// A MATLAB file with each of its elements packed as version 7 does; what does not look like an element is left as it
+/// is.
 pub fn pack(file: &[u8]) -> Vec<u8> {
     let mut packed = file[..file.len().min(128)].to_vec();
     let mut rest = &file[packed.len()..];

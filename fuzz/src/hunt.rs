@@ -65,8 +65,8 @@ pub fn hunt(target: &Target, mutations: usize, seed: u64, folder: &Path) -> Repo
     hunt.report
 }
 
-/// Called by libFuzzer before the first input: it ends the program at any panic, also at those that a reader catches and tells as a
-/// damaged file, so [`fuzz`] does that for those that get out.
+/// Called by libFuzzer before the first input: it ends the program at any panic, also at those that a reader catches
+/// and tells as a damaged file, so [`fuzz`] does that for those that get out.
 pub fn told_once() {
     std::panic::set_hook(Box::new(|panic| eprintln!("{panic}")));
 }

@@ -1,8 +1,8 @@
 //! Every reader of taut as a plain function of bytes, files to begin with, and ways to spoil them.
 //!
-//! A [`Target`] takes any bytes and says how far they got; it panics where a law of its reader is broken. The tests run each target
-//! over its [`corpus`] and seeded [`mutation`]s of it, within the [`bounds`] of processor time and memory. libFuzzer drives the same
-//! functions from `libfuzzer/`, which `cargo xtask hunt --part readers` does.
+//! A [`Target`] takes any bytes and says how far they got; it panics where a law of its reader is broken. The tests run
+//! each target over its [`corpus`] and seeded [`mutation`]s of it, within the [`bounds`] of processor time and memory.
+//! libFuzzer drives the same functions from `libfuzzer/`, which `cargo xtask hunt --part readers` does.
 
 pub mod bounds;
 pub mod corpus;

@@ -48,7 +48,8 @@ fn refused(error: &Error) -> Reached {
     Reached::Refused
 }
 
-/// Gives a file other bytes. Many file systems wait for the disk when a file is cut to nothing and written again; so it is not.
+/// Gives a file other bytes. Many file systems wait for the disk when a file is cut to nothing and written again; so it
+/// is not.
 pub(crate) fn overwrite(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut file = fs::OpenOptions::new().write(true).create(true).truncate(false).open(path)?;
     file.write_all(bytes)?;

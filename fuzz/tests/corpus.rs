@@ -1,4 +1,5 @@
-//! Every reader over its corpus and 20,000 mutations of it in all: no panic, no broken law, within bounds of time and memory.
+//! Every reader over its corpus and 20,000 mutations of it in all: no panic, no broken law, within bounds of time and
+//! memory.
 //!
 //! `TAUT_MUTATIONS=…` tries more of each, `TAUT_SEED=…` others; what fails is kept under `target/tmp`.
 
@@ -50,7 +51,8 @@ macro_rules! readers {
 
 readers!(case, quantity, csv, parquet, matlab, samples, spectrum, gcode, draws);
 
-/// A MATLAB file of 1.4 MB, all zeros packed, took 4.7 GB to be refused: its times are looked at before the rest is unpacked.
+/// A MATLAB file of 1.4 MB, all zeros packed, took 4.7 GB to be refused: its times are looked at before the rest is
+/// unpacked.
 #[test]
 fn a_small_file_that_unpacks_to_much_takes_little() {
     let file = corpus::much_of_nothing();

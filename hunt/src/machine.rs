@@ -108,8 +108,8 @@ pub struct Machine {
     pub bandwidth: Option<Double>,
     /// State at time zero.
     pub start: State,
-    /// Difference between the positions given for drive pulley, cart and idler pulley and those of that state: less than a
-    /// strain.
+    /// Difference between the positions given for drive pulley, cart and idler pulley and those of that state: less
+    /// than a strain.
     pub beyond: [Double; 3],
     /// Radius of the pulleys.
     pub radius: Double,

@@ -53,7 +53,8 @@ pub fn one(seed: u64, number: u64) -> Outcome {
 }
 
 impl Hunt {
-    /// Compares all of them; the same whatever the number of threads. Those that were done, in the order of their numbers.
+    /// Compares all of them; the same whatever the number of threads. Those that were done, in the order of their
+    /// numbers.
     pub fn run(&self) -> Vec<Outcome> {
         let next = AtomicU64::new(0);
         let (done, unexplained) = (AtomicUsize::new(0), AtomicUsize::new(0));

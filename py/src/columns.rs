@@ -1,4 +1,5 @@
-//! Columns of numbers as NumPy arrays: the memory that Rust has filled is handed over, never copied, and nobody writes into it.
+//! Columns of numbers as NumPy arrays: the memory that Rust has filled is handed over, never copied, and nobody writes
+//! into it.
 
 use crate::error::Told;
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1};

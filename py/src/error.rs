@@ -19,8 +19,8 @@ pyo3::create_exception!(
     "A mistake in taut itself, which no input should bring about; where it happened stands on the standard error."
 );
 
-/// Does `work`. A panic in it is a mistake of ours: it becomes [`Bug`], which `except Exception` catches, after Rust has told
-/// place and backtrace on the standard error.
+/// Does `work`. A panic in it is a mistake of ours: it becomes [`Bug`], which `except Exception` catches, after Rust
+/// has told place and backtrace on the standard error.
 pub fn guarded<T>(work: impl FnOnce() -> T) -> PyResult<T> {
     catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
         let told = panic.downcast_ref::<String>().map(String::as_str);

@@ -52,8 +52,8 @@ impl Interrupt {
         }
     }
 
-    /// Does `work`, which has threads of its own, on one more thread: Python tells signals to the calling one alone, which
-    /// listens meanwhile.
+    /// Does `work`, which has threads of its own, on one more thread: Python tells signals to the calling one alone,
+    /// which listens meanwhile.
     pub fn beside<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         let (done, wait) = std::sync::mpsc::channel();
         // Another thread that asked would be told of no signal, and keep this one from asking.

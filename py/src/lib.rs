@@ -1,7 +1,7 @@
 //! The Python package `taut`: what is below its Python sources in `python/taut`.
 //!
-//! Every class here is wrapped there by one with docstrings, types, tables and plots. Work that takes long runs without the
-//! interpreter's lock and asks now and then whether Ctrl-C was pressed.
+//! Every class here is wrapped there by one with docstrings, types, tables and plots. Work that takes long runs without
+//! the interpreter's lock and asks now and then whether Ctrl-C was pressed.
 
 mod case;
 mod columns;

@@ -5,8 +5,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use taut::fit::LogFit;
 
-/// Name, window, whether it was held out, whether the model reached its end, times, rows that were fitted, and of each output
-/// unit, measured values and the model's.
+/// Name, window, whether it was held out, whether the model reached its end, times, rows that were fitted, and of each
+/// output unit, measured values and the model's.
 pub fn met(py: Python<'_>, log: LogFit) -> PyResult<Py<PyDict>> {
     let (told, outputs) = (PyDict::new(py), PyDict::new(py));
     told.set_item("name", log.name)?;

@@ -42,8 +42,8 @@ impl Sweep {
         self.inner.columns().iter().map(|c| (c.name.as_str(), c.unit.as_str(), c.heading())).collect()
     }
 
-    /// The rows of `count` runs from `first` on: columns by name, and name, unit and heading of each. The same bits for any
-    /// number of threads; 0 is one for each processor.
+    /// The rows of `count` runs from `first` on: columns by name, and name, unit and heading of each. The same bits for
+    /// any number of threads; 0 is one for each processor.
     fn rows(&self, py: Python<'_>, first: u64, count: u64, threads: usize) -> PyResult<(Py<PyDict>, Py<PyList>)> {
         let rows = count.min(self.inner.runs().saturating_sub(first));
         let piecewise = "taut.sweep_tables hands the rows on piece by piece";

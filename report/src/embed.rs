@@ -78,8 +78,8 @@ fn series(s: &Series, figure: &Figure, panel: &Panel, arrays: &mut Arrays) -> St
     )
 }
 
-/// The places of one width. Lengths go to a tenth of a pixel, ticks as value and text, entries of a legend as number of the
-/// series, left end, base line, width and name.
+/// The places of one width. Lengths go to a tenth of a pixel, ticks as value and text, entries of a legend as number of
+/// the series, left end, base line, width and name.
 fn layout(layout: &Layout) -> String {
     let pixels = |v: f64| svg::n((10.0 * v).round() / 10.0);
     let ticks = |ticks: &[(f64, String)]| -> String {

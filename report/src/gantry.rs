@@ -1,4 +1,5 @@
-//! A gantry in plan view, drawn with its symbols and values: motors below, the bridge across, x upward and y to the right.
+//! A gantry in plan view, drawn with its symbols and values: motors below, the bridge across, x upward and y to the
+//! right.
 
 use super::drawing::friction;
 use super::svg::{self, Anchor, Colour, Paint, Svg, n};
@@ -88,7 +89,8 @@ fn bridge(out: &mut Svg) {
     out.rect(CART.0, CART.1, 5.0, svg::PAPER, svg::INK, 1.6);
 }
 
-/// One belt: from the cart over the bridge's idlers to a motor on either side, and from there round the far end and across the bridge.
+/// One belt: from the cart over the bridge's idlers to a motor on either side, and from there round the far end and
+/// across the bridge.
 fn h_frame(out: &mut Svg, gantry: &Gantry) {
     let belt = Colour::Blue.paint();
     let far = FAR + RADIUS;
@@ -118,7 +120,8 @@ fn h_frame(out: &mut Svg, gantry: &Gantry) {
     }
 }
 
-/// Two belts: each from the cart straight back to its motor, and out from there round the far end to the cart's other side.
+/// Two belts: each from the cart straight back to its motor, and out from there round the far end to the cart's other
+/// side.
 fn core_xy(out: &mut Svg, gantry: &Gantry) {
     let [left, right] = [CART.0.0, CART.0.0 + CART.1.0];
     let paints = [Colour::Blue.paint(), Colour::Purple.paint()];

@@ -1,4 +1,5 @@
-//! The places of everything in a figure: plot areas, ticks with their texts, legends. The picture and `plot.js` use the same ones.
+//! The places of everything in a figure: plot areas, ticks with their texts, legends. The picture and `plot.js` use the
+//! same ones.
 
 use super::axis::{Scale, in_range};
 use super::figure::{Axis, Figure, Panel, Series, Style};

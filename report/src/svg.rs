@@ -379,7 +379,8 @@ fn raised_dots(dots: char, size: f64) -> String {
     )
 }
 
-/// Advance widths of the printable ASCII characters in hundredths of the font size (Noto Sans; most system fonts are narrower).
+/// Advance widths of the printable ASCII characters in hundredths of the font size (Noto Sans; most system fonts are
+/// narrower).
 const WIDTHS: [u8; 95] = [
     26, 27, 41, 65, 57, 83, 73, 23, 30, 30, 55, 57, 27, 32, 27, 37, 57, 57, 57, 57, 57, 57, 57, 57, 57, 57, 27, 27, 57,
     57, 57, 43, 90, 64, 65, 63, 73, 56, 52, 73, 74, 34, 27, 62, 52, 91, 76, 78, 61, 78, 62, 55, 56, 73, 60, 93, 58, 57,

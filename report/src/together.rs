@@ -74,7 +74,8 @@ fn is_unit(word: &str) -> bool {
 mod tests {
     use super::*;
 
-    /// In columns of 750 pixels "250.44" stood at the end of a line and "µm" at the beginning of the next; "1.6e-" and "5" too.
+    /// In columns of 750 pixels "250.44" stood at the end of a line and "µm" at the beginning of the next; "1.6e-" and
+    /// "5" too.
     #[test]
     fn numbers_stay_beside_their_units() {
         let cases = [

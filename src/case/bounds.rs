@@ -47,7 +47,8 @@ pub(super) fn check(source: &Source) -> Result<()> {
     Ok(())
 }
 
-/// The signs of a TOML text outside its strings and remarks. Of what is no TOML the weights mean nothing, and none is needed.
+/// The signs of a TOML text outside its strings and remarks. Of what is no TOML the weights mean nothing, and none is
+/// needed.
 struct Signs<'a> {
     text: &'a str,
     place: usize,

@@ -17,7 +17,8 @@ impl Case {
         experiments_named(&self.experiments, |experiment| &experiment.name, names)
     }
 
-    /// The controller, and the moves of these names in the case's order; all if none is named. `path` is the case's own.
+    /// The controller, and the moves of these names in the case's order; all if none is named. `path` is the case's
+    /// own.
     pub fn moves_named(&self, path: &Path, names: &[String]) -> Result<(&Design, Vec<&Move>)> {
         let Some(design) = self.controller.as_ref().filter(|_| !self.moves.is_empty()) else {
             return Err(Error::new("this case has no move and no controller to run it").in_file(path).next(

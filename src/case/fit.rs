@@ -287,7 +287,8 @@ fn separate(table: &Table, names: &[String]) -> Result<Vec<String>> {
     Ok(separate)
 }
 
-/// The campaigns that experiments name, in their order, with the names of their experiments; those of a log that is split begin with it.
+/// The campaigns that experiments name, in their order, with the names of their experiments; those of a log that is
+/// split begin with it.
 fn campaigns(root: &Table) -> Result<Vec<(String, Vec<String>)>> {
     let mut campaigns: Vec<(String, Vec<String>)> = Vec::new();
     let experiments = root.optional("experiment").map_or(Ok(Vec::new()), |field| field.list())?;

@@ -26,8 +26,8 @@ pub enum Given {
 }
 
 impl Case {
-    /// The value of the text under `key`, written as for `--set`: quantities in SI units. A parameter that has a default and is not in
-    /// the text is that default.
+    /// The value of the text under `key`, written as for `--set`: quantities in SI units. A parameter that has a
+    /// default and is not in the text is that default.
     ///
     /// ```
     /// use taut::case::{Case, Given, TEMPLATE};
@@ -128,7 +128,8 @@ fn given<U: Fn(&str) -> &'static str>(node: &Node, section: &str, rows: &Rows<U>
     }
 }
 
-/// The row of a key. What belongs to a kind of input, say, stands beside the kind in the file, and below it in the table.
+/// The row of a key. What belongs to a kind of input, say, stands beside the kind in the file, and below it in the
+/// table.
 fn row(section: &str) -> Option<&'static Parameter> {
     parameter::find(section).or_else(|| {
         let (parent, last) = section.rsplit_once('.')?;

@@ -1,4 +1,5 @@
-//! The log of an experiment: `log = { file = "pulse5.csv", time = "time_s", input = "voltage_V", drive_angle = "angle_rad" }`.
+//! The log of an experiment:
+//! `log = { file = "pulse5.csv", time = "time_s", input = "voltage_V", drive_angle = "angle_rad" }`.
 
 use super::reader::{Field, Table};
 use super::tree::Kind;

@@ -51,7 +51,8 @@ const MOST_SAMPLES: f64 = 1e9;
 /// Longest name of an experiment, in characters.
 const LONGEST_NAME: usize = 100;
 
-/// Longest name of an experiment's files, in bytes: file systems allow 255, and `-peak-motor-current-histogram.svg` follows.
+/// Longest name of an experiment's files, in bytes: file systems allow 255, and `-peak-motor-current-histogram.svg`
+/// follows.
 const LONGEST_FILE_NAME: usize = 200;
 
 /// Everything needed to repeat a run.
@@ -374,7 +375,8 @@ fn experiments(root: &Table, stage: &Stage, folder: &Folder) -> Result<Vec<Exper
     Ok(experiments)
 }
 
-/// Refuses a name that another experiment has, or that leads to the same files; `files` are those so far and whose they are.
+/// Refuses a name that another experiment has, or that leads to the same files; `files` are those so far and whose they
+/// are.
 fn unique(field: &Field, name: &str, files: &mut HashMap<String, String>) -> Result<()> {
     let file = file_name(name);
     let Some(other) = files.insert(file.clone(), name.to_string()) else { return Ok(()) };

@@ -167,8 +167,8 @@ fn section(key: &[String]) -> String {
     names.map(String::as_str).collect::<Vec<_>>().join(".")
 }
 
-/// The place of `step` in the list that `before` leads to: its number, or in a point the place of the part that the table of
-/// parameters gives this name.
+/// The place of `step` in the list that `before` leads to: its number, or in a point the place of the part that the
+/// table of parameters gives this name.
 fn place_in_list(step: &str, before: &[String]) -> Option<usize> {
     if let Ok(place) = step.parse() {
         return Some(place);

@@ -1,4 +1,5 @@
-//! The table of the tuning: what the gains are to be good for, and what they have to stand. And what a fit said of its estimates.
+//! The table of the tuning: what the gains are to be good for, and what they have to stand. And what a fit said of its
+//! estimates.
 
 use super::Move;
 use super::reader::{Field, Table};

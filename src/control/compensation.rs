@@ -110,7 +110,8 @@ pub struct Compensation {
     before_gear: bool,
 }
 
-/// Pulleys that make the cart follow its reference: y₁ = r φ₁ and y₃ = r φ₃, and the force that the motor needs at the belt.
+/// Pulleys that make the cart follow its reference: y₁ = r φ₁ and y₃ = r φ₃, and the force that the motor needs at the
+/// belt.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Needed {
     /// Drive pulley.
@@ -134,7 +135,8 @@ impl Compensation {
         }
     }
 
-    /// The motion of the pulleys with which the cart follows `y`: quasi-static in the idler's own swing, exact otherwise.
+    /// The motion of the pulleys with which the cart follows `y`: quasi-static in the idler's own swing, exact
+    /// otherwise.
     pub fn needed(&self, y: &Reference) -> Needed {
         let stage = &self.stage;
         let (r, sign) = (stage.pulley_radius, direction(y));

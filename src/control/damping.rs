@@ -1,15 +1,17 @@
 //! The damping ratio of the highest peak of a spectrum, by a curve of one mode through it.
 //!
-//! A spectrum by Welch's method is the true one seen through the window of a segment: with bins Δ apart and the Kaiser window of form β,
+//! A spectrum by Welch's method is the true one seen through the window of a segment: with bins Δ apart and the Kaiser
+//! window of form β,
 //!
 //! ```text
 //! P(f) = A ∫ K((f − f′)/Δ) g(f′) df′ + c,  g(f) = f (f₀² + (2 ζ f)²) / ((f₀² − f²)² + (2 ζ f₀ f)²)
 //! K(δ) ∝ (sinh √(β² − π²δ²) / √(β² − π²δ²))²
 //! ```
 //!
-//! g is the acceleration of a mode whose frame is shaken ever harder with the frequency, divided by the frequency as the spectrum is. A and c follow
-//! from f₀ and ζ by least squares of relative errors, and those two are searched for. Without the window in it a light damping would be
-//! found too large: at 1.6 Hz between bins a mode of 47 Hz seems to have 0.02 more.
+//! g is the acceleration of a mode whose frame is shaken ever harder with the frequency, divided by the frequency as
+//! the spectrum is. A and c follow from f₀ and ζ by least squares of relative errors, and those two are searched for.
+//! Without the window in it a light damping would be found too large: at 1.6 Hz between bins a mode of 47 Hz seems to
+//! have 0.02 more.
 
 use super::spectrum::Spectrum;
 use super::welch::BETA;

@@ -1,6 +1,7 @@
 //! Feed-forward gains as drives and controllers of others take them, with their units.
 //!
-//! The axis is one mass along the belt, M ÿ + b ẏ + F sgn ẏ = κ η i with κ = n K_t/r, fed by V = R i + L di/dt + n K_e ẏ/r ([`Rigid`]). So, forward,
+//! The axis is one mass along the belt, M ÿ + b ẏ + F sgn ẏ = κ η i with κ = n K_t/r, fed by V = R i + L di/dt + n K_e
+//! ẏ/r ([`Rigid`]). So, forward,
 //!
 //! | system | gain | unit | value |
 //! |---|---|---|---|
@@ -10,9 +11,10 @@
 //! | ODrive | `config.inertia`; torque with the speed; torque against dry friction | N m/(turn/s²), N m/(turn/s), N m | 2π M (r/n)²/η, 2π b (r/n)²/η, F r/(n η) |
 //! | Beckhoff AX8000 3140:07, TwinCAT CNC P-AXIS-00391 | load inertia | kg m² | M (r/n)² less the rotor's; with it |
 //!
-//! Sources: docs.wpilib.org, "Feedforward Control in WPILib": V = kS sgn v + kV v + kA a. LinuxCNC, pid(9): FF1, FF2, FF3 times the first three
-//! derivatives of the command. ODrive, API reference, `Controller.Config`: inertia in N m/(turn/s²), torques in N m at the motor, speeds in turn/s. Beckhoff
-//! Information System, AX8xxx object 3140:07 "Load inertia/mass", TF5200 P-AXIS-00391 "Load inertia": the total at the motor shaft.
+//! Sources: docs.wpilib.org, "Feedforward Control in WPILib": V = kS sgn v + kV v + kA a. LinuxCNC, pid(9): FF1, FF2,
+//! FF3 times the first three derivatives of the command. ODrive, API reference, `Controller.Config`: inertia in N
+//! m/(turn/s²), torques in N m at the motor, speeds in turn/s. Beckhoff Information System, AX8xxx object 3140:07 "Load
+//! inertia/mass", TF5200 P-AXIS-00391 "Load inertia": the total at the motor shaft.
 
 use super::compensation::Rigid;
 use crate::stage::{AmplifierMode, Stage};

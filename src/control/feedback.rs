@@ -1,4 +1,5 @@
-//! A controller as a linear filter of what it measures, for margins and stability: within its limit, without reference and counts.
+//! A controller as a linear filter of what it measures, for margins and stability: within its limit, without reference
+//! and counts.
 
 use super::compensation::Rigid;
 use super::filter::Biquad;
@@ -10,7 +11,8 @@ use crate::stage::Stage;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::PI;
 
-/// The controller of a design as D u = −(N_y y + N_i i), with y the measured position and i the measured current at a sample.
+/// The controller of a design as D u = −(N_y y + N_i i), with y the measured position and i the measured current at a
+/// sample.
 #[derive(Debug, Clone)]
 pub struct Feedback {
     every: f64,

@@ -1,11 +1,12 @@
-//! A fuzzy controller with its table of rules (A. Kulkarni, M. A. El-Sharkawi, "Intelligent precision position control of elastic drive
-//! systems", IEEE Transactions on Energy Conversion 16, 2001).
+//! A fuzzy controller with its table of rules (A. Kulkarni, M. A. El-Sharkawi, "Intelligent precision position control
+//! of elastic drive systems", IEEE Transactions on Energy Conversion 16, 2001).
 
 use super::sampled::Speed;
 use crate::design::Fuzzy;
 use crate::signal::profile::Reference;
 
-/// Triangular sets at equal distances that add up to 1, products of memberships, and the mean of the rules' values they weigh.
+/// Triangular sets at equal distances that add up to 1, products of memberships, and the mean of the rules' values they
+/// weigh.
 #[derive(Debug, Clone)]
 pub struct FuzzyState {
     rules: Fuzzy,

@@ -1,7 +1,7 @@
 //! Extra-insensitive shapers for a damped mode, from the equations that define them.
 //!
-//! With s = ζ + j√(1 − ζ²) and time in undamped periods of the mode designed for, impulses A_i at t_i leave of a mode at x times its
-//! frequency, with the same damping ratio,
+//! With s = ζ + j√(1 − ζ²) and time in undamped periods of the mode designed for, impulses A_i at t_i leave of a mode
+//! at x times its frequency, with the same damping ratio,
 //!
 //! ```text
 //! V(x) = |S(x)|,  S(x) = Σ A_i e^{2π s x (t_i − t_n)}                                       (Singer & Seering 1990)
@@ -15,8 +15,9 @@
 //! | two humps, four impulses | A₁…A₃, t₂…t₄, two zeros, two humps | S = 0 there and at 1, V = V and V′ = 0 at each hump |
 //! | three humps, five impulses | A₁…A₄, t₂…t₅, four zeros, two humps | S = 0 at each zero, V = V and V′ = 0 at each hump and at 1 |
 //!
-//! (W. Singhose, W. Seering, N. Singer 1994; W. Singhose, L. Porter, T. Tuttle, N. Singer 1997.) Without damping the solution is known:
-//! V(x) = V T_m(β cos πx/2) with Chebyshev's polynomial. From there Newton's method follows it as the damping grows.
+//! (W. Singhose, W. Seering, N. Singer 1994; W. Singhose, L. Porter, T. Tuttle, N. Singer 1997.) Without damping the
+//! solution is known: V(x) = V T_m(β cos πx/2) with Chebyshev's polynomial. From there Newton's method follows it as
+//! the damping grows.
 
 use super::shaper::Kind;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -47,8 +48,8 @@ impl Equations {
         }
     }
 
-    /// Impulses (time in undamped periods, amplitude) of a vector of unknowns: amplitudes but the last, times but the first (of EI but the last,
-    /// too), and frequencies.
+    /// Impulses (time in undamped periods, amplitude) of a vector of unknowns: amplitudes but the last, times but the
+    /// first (of EI but the last, too), and frequencies.
     fn impulses(&self, unknown: &DVector<f64>) -> Vec<(f64, f64)> {
         let n = self.count();
         let mut amplitudes: Vec<f64> = unknown.iter().take(n - 1).copied().collect();
@@ -159,8 +160,8 @@ fn undamped(kind: Kind, tolerance: f64, amplitudes: &[f64]) -> DVector<f64> {
     DVector::from_vec(unknown)
 }
 
-/// Impulses (time in undamped periods, amplitude) of an extra-insensitive shaper whose amplitudes without damping are `amplitudes`; none where
-/// the equations have no solution with positive impulses in that order.
+/// Impulses (time in undamped periods, amplitude) of an extra-insensitive shaper whose amplitudes without damping are
+/// `amplitudes`; none where the equations have no solution with positive impulses in that order.
 pub(super) fn impulses(kind: Kind, tolerance: f64, damping: f64, amplitudes: &[f64]) -> Option<Vec<(f64, f64)>> {
     let mut unknown = undamped(kind, tolerance, amplitudes);
     let steps = (damping / STEP).ceil().max(1.0) as usize;

@@ -1,6 +1,8 @@
-//! Control of an axis: controllers stepped in time around the exact plant, input shapers, and the spectra that these are chosen from.
+//! Control of an axis: controllers stepped in time around the exact plant, input shapers, and the spectra that these
+//! are chosen from.
 //!
-//! [`closed_loop`] runs a [`Design`] on a stage along a [`Profile`]; [`close`] does so with any [`Controller`], a user's own too.
+//! [`closed_loop`] runs a [`Design`] on a stage along a [`Profile`]; [`close`] does so with any [`Controller`], a
+//! user's own too.
 //!
 //! [`Design`]: crate::design::Design
 //! [`Profile`]: crate::signal::profile::Profile

@@ -6,7 +6,8 @@ use crate::stage::axis::{CART, DRIVE, SPANS};
 use crate::stage::{EncoderPlace, Stage};
 use nalgebra::{DMatrix, DVector, RowDVector};
 
-/// ẋ = A x + B u + E w, with w a force on the cart; measured position and the cart's position and speed from x. SI units.
+/// ẋ = A x + B u + E w, with w a force on the cart; measured position and the cart's position and speed from x. SI
+/// units.
 #[derive(Debug, Clone)]
 pub struct Linear {
     /// A.

@@ -29,13 +29,15 @@ pub struct Deviation {
 /// The key figures of a move: peaks over all instants and not only over rows, integrals over time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Figures {
-    /// r φ₁ − y: the drive pulley from the cart's reference. A controller that makes up for the belt's stretch means part of it.
+    /// r φ₁ − y: the drive pulley from the cart's reference. A controller that makes up for the belt's stretch means
+    /// part of it.
     pub following: Deviation,
     /// x − y: the cart from its reference.
     pub cart: Deviation,
     /// x − y at the end, m.
     pub final_cart_error: f64,
-    /// From the end of the profile, a shaper apart, until the cart stays within the window around its target, s; none if it does not.
+    /// From the end of the profile, a shaper apart, until the cart stays within the window around its target, s; none
+    /// if it does not.
     pub settling: Option<f64>,
     /// By how much the cart passes its target after the beginning of the last stroke, m.
     pub overshoot: f64,
@@ -62,7 +64,8 @@ pub struct MoveRun {
     pub metrics: Metrics,
     /// Events, ending and cost.
     pub outcome: solve::Outcome,
-    /// Samples taken by the controller, those held back by its limit, and the samples themselves where they were to be kept.
+    /// Samples taken by the controller, those held back by its limit, and the samples themselves where they were to be
+    /// kept.
     pub samples: (u64, u64),
     /// The samples, if asked for.
     pub kept: Vec<Sample>,
@@ -97,8 +100,8 @@ pub fn closed_loop(setup: &Setup) -> Result<MoveRun> {
     close(setup.stage, &mut controller, &timing, &profile, setup.until, setup.window, setup.solver)
 }
 
-/// The same of a search that runs it a thousand times: of the figures the cart's error, settling and the root mean square of the current, equal to
-/// those of [`closed_loop`] to the last bit, and how it ended.
+/// The same of a search that runs it a thousand times: of the figures the cart's error, settling and the root mean
+/// square of the current, equal to those of [`closed_loop`] to the last bit, and how it ended.
 pub(crate) fn closed_loop_briefly(setup: &Setup) -> Result<(Figures, solve::Ending)> {
     let mut controller = Standard::new(setup.design, setup.model)?;
     let profile = setup.profile.clone().shaped(&setup.design.shaper);
@@ -129,7 +132,8 @@ fn at_rest(stage: &Stage, profile: &Profile, until: f64, every: f64) -> Experime
     }
 }
 
-/// Runs any controller along a profile, from rest at its start, for `until` s; the cart has settled within `window` (m) of its target.
+/// Runs any controller along a profile, from rest at its start, for `until` s; the cart has settled within `window` (m)
+/// of its target.
 pub fn close(
     stage: &Stage,
     controller: &mut dyn Controller,
@@ -201,8 +205,9 @@ fn run(
     Ok(MoveRun { figures, metrics, outcome, samples, kept: sampled.kept.unwrap_or_default(), swing })
 }
 
-/// Puts the controller of a design, made for `model`, through an experiment along a reference that is shaped already; its input is not
-/// asked for. Positions are read exactly: a count more or less at a sample would make what comes out jump as parameters change.
+/// Puts the controller of a design, made for `model`, through an experiment along a reference that is shaped already;
+/// its input is not asked for. Positions are read exactly: a count more or less at a sample would make what comes out
+/// jump as parameters change.
 pub(crate) fn follow(
     stage: &Stage,
     model: &Stage,
@@ -444,8 +449,8 @@ fn larger(peak: &mut Peak, quantity: &Polynomial, part: (f64, f64), curve: &Curv
     }
 }
 
-/// Places and weights of Gauss and Legendre's rule of eight places on −1..1, one half of them: exact for polynomials of degree 15, and products
-/// of two [`Polynomial`]s have degree 14.
+/// Places and weights of Gauss and Legendre's rule of eight places on −1..1, one half of them: exact for polynomials of
+/// degree 15, and products of two [`Polynomial`]s have degree 14.
 const GAUSS: [(f64, f64); 4] = [
     (0.183_434_642_495_649_8, 0.362_683_783_378_362),
     (0.525_532_409_916_329, 0.313_706_645_877_887_3),

@@ -36,7 +36,8 @@ impl PidState {
         proportional * error + self.integral + derivative * self.slope
     }
 
-    /// Back-calculation: the integral follows what the limit leaves. Without a gain there is none: nothing would ever empty it again.
+    /// Back-calculation: the integral follows what the limit leaves. Without a gain there is none: nothing would ever
+    /// empty it again.
     pub fn limited(&mut self, excess: f64) {
         if self.gains.integral != 0.0 {
             self.integral += (self.every / self.gains.tracking).min(1.0) * excess;

@@ -1,4 +1,5 @@
-//! Input shapers for files of vibration: spectra, samples of an accelerometer, or the modes of a case; two spectra compared.
+//! Input shapers for files of vibration: spectra, samples of an accelerometer, or the modes of a case; two spectra
+//! compared.
 
 use super::compare::{Comparison, compare};
 use super::damping::{FittedMode, fitted};
@@ -94,8 +95,9 @@ pub enum Damping {
     Fitted,
 }
 
-/// Reads files of vibration (spectra, samples of an accelerometer, or cases), chooses shapers, and compares two spectra.
-/// Errors: more than two files that are not taken together, files that cannot be read, options that do not fit them.
+/// Reads files of vibration (spectra, samples of an accelerometer, or cases), chooses shapers, and compares two
+/// spectra. Errors: more than two files that are not taken together, files that cannot be read, options that do not fit
+/// them.
 ///
 /// ```no_run
 /// use taut::control::recommendation::{Question, recommend};

@@ -35,9 +35,10 @@ pub struct Resonance {
 
 /// The modes of a stage that move its cart: at every place along the travel if the spans follow the cart, else at one.
 ///
-/// The masses, springs and dampers are those of the sliding stage: M q̈ + C q̇ + K q = 0 with the viscous friction, the belt's
-/// damping and, where a free motor is fed by a voltage, its back-EMF. Frequencies are of K and M alone; damping ratios
-/// ζ = φᵀ C φ / (2 ω φᵀ M φ) hold for light damping. Modes that are damped so much that they do not vibrate are left out.
+/// The masses, springs and dampers are those of the sliding stage: M q̈ + C q̇ + K q = 0 with the viscous friction, the
+/// belt's damping and, where a free motor is fed by a voltage, its back-EMF. Frequencies are of K and M alone; damping
+/// ratios ζ = φᵀ C φ / (2 ω φᵀ M φ) hold for light damping. Modes that are damped so much that they do not vibrate are
+/// left out.
 pub fn resonances(stage: &Stage, drive: Drive) -> Result<Vec<Resonance>> {
     if stage.belt.model == BeltModel::Rigid {
         let error = Error::new("a rigid belt has no resonance").allowed("belt.model = \"elastic\" or \"two-mass\"");

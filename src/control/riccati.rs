@@ -1,10 +1,10 @@
 //! Riccati equations by structured doubling.
 //!
-//! The discrete one, X = Aᵀ X A − Aᵀ X B (R + Bᵀ X B)⁻¹ Bᵀ X A + Q, by the doubling algorithm of E. K.-W. Chu, H.-Y. Fan,
-//! W.-W. Lin and C.-S. Wang, "Structure-preserving algorithms for periodic discrete-time algebraic Riccati equations",
-//! International Journal of Control 77, 2004; the continuous one, Aᵀ X + X A − X G X + Q = 0, through Cayley's transform (the
-//! same, Linear Algebra and its Applications 396, 2005). States are scaled until X has a diagonal of ones, and the result is refined
-//! by Newton's method.
+//! The discrete one, X = Aᵀ X A − Aᵀ X B (R + Bᵀ X B)⁻¹ Bᵀ X A + Q, by the doubling algorithm of E. K.-W. Chu, H.-Y.
+//! Fan, W.-W. Lin and C.-S. Wang, "Structure-preserving algorithms for periodic discrete-time algebraic Riccati
+//! equations", International Journal of Control 77, 2004; the continuous one, Aᵀ X + X A − X G X + Q = 0, through
+//! Cayley's transform (the same, Linear Algebra and its Applications 396, 2005). States are scaled until X has a
+//! diagonal of ones, and the result is refined by Newton's method.
 
 use crate::error::{Error, Result};
 use nalgebra::{DMatrix, DVector};

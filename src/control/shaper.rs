@@ -1,10 +1,11 @@
 //! Input shapers: a command is sent as several smaller ones, so timed that the vibrations they excite cancel.
 //!
-//! Sources: ZV and ZVD by N. Singer, W. Seering, "Preshaping command inputs to reduce system vibration", *J. Dynamic Systems,
-//! Measurement, and Control* 112, 1990; EI by W. Singhose, W. Seering, N. Singer, "Residual vibration reduction using vector
-//! diagrams to generate shaped inputs", *J. Mechanical Design* 116, 1994; two- and three-hump EI by W. Singhose, L. Porter,
-//! T. Tuttle, N. Singer, "Vibration reduction using multi-hump input shapers", same journal as the first, 119, 1997. MZV is
-//! Klipper's: three impulses within three quarters of a period (its documentation, "Resonance Compensation").
+//! Sources: ZV and ZVD by N. Singer, W. Seering, "Preshaping command inputs to reduce system vibration", *J. Dynamic
+//! Systems, Measurement, and Control* 112, 1990; EI by W. Singhose, W. Seering, N. Singer, "Residual vibration
+//! reduction using vector diagrams to generate shaped inputs", *J. Mechanical Design* 116, 1994; two- and three-hump EI
+//! by W. Singhose, L. Porter, T. Tuttle, N. Singer, "Vibration reduction using multi-hump input shapers", same journal
+//! as the first, 119, 1997. MZV is Klipper's: three impulses within three quarters of a period (its documentation,
+//! "Resonance Compensation").
 
 use super::insensitive;
 use crate::error::{Error, Result};
@@ -103,7 +104,8 @@ impl Kind {
 /// Whose definitions of shapers, and whose rule to choose one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Firmware {
-    /// Klipper since 2025-09-16 (extra-insensitive shapers for a damped mode), 2025-10 (choice) and 2026-03-22 (parameters of MZV and EI).
+    /// Klipper since 2025-09-16 (extra-insensitive shapers for a damped mode), 2025-10 (choice) and 2026-03-22
+    /// (parameters of MZV and EI).
     #[default]
     Klipper,
     /// Klipper until 2025-08.
@@ -278,8 +280,9 @@ impl Pattern {
     }
 }
 
-/// Impulses (time in undamped periods, amplitude) at distances of so many damped periods: A_i = a_i e^{−ζ ω t_i} / Σ. At the last impulse all
-/// vibrations then weigh as they do without damping, so that those which cancel without it cancel with it.
+/// Impulses (time in undamped periods, amplitude) at distances of so many damped periods: A_i = a_i e^{−ζ ω t_i} / Σ.
+/// At the last impulse all vibrations then weigh as they do without damping, so that those which cancel without it
+/// cancel with it.
 fn weighted(amplitudes: &[f64], spacing: f64, zeta: f64) -> Vec<(f64, f64)> {
     let root = (1.0 - zeta * zeta).sqrt();
     let weight = |i: usize| (-2.0 * PI * zeta / root * spacing * i as f64).exp();
@@ -301,8 +304,9 @@ fn solved(form: Form, tolerance: f64, damping: f64) -> Result<Vec<(f64, f64)>> {
     })
 }
 
-/// Amplitudes without damping of n impulses over t periods that vanish at the frequency itself and at as many others at equal distances as they
-/// can: Σ A_i z^i = Π (z − e^{jθ_k}), θ_k = 2π/(n − 1) (t + k (n − 1 − 2t)/(n − 2)), k = 0 … n − 2. None if one is negative.
+/// Amplitudes without damping of n impulses over t periods that vanish at the frequency itself and at as many others at
+/// equal distances as they can: Σ A_i z^i = Π (z − e^{jθ_k}), θ_k = 2π/(n − 1) (t + k (n − 1 − 2t)/(n − 2)), k = 0 … n
+/// − 2. None if one is negative.
 fn modified(pulses: usize, duration: f64) -> Option<Vec<f64>> {
     let (n, t) = (pulses as f64, duration);
     if !(t >= 0.5 - 1e-9 && 2.0 * t < n - 1.0 - 1e-7) {
@@ -341,8 +345,8 @@ pub struct Shaper {
 }
 
 impl Shaper {
-    /// The shaper for a mode of undamped natural `frequency` (Hz, above 0) and `damping` ratio (0 to below 1), damped as Klipper did until
-    /// 2025-08; [`Shaper::formed`] has today's definitions.
+    /// The shaper for a mode of undamped natural `frequency` (Hz, above 0) and `damping` ratio (0 to below 1), damped
+    /// as Klipper did until 2025-08; [`Shaper::formed`] has today's definitions.
     pub fn new(kind: Kind, frequency: f64, damping: f64) -> Result<Self> {
         Self::formed(kind.into(), Firmware::Klipper202508, frequency, damping)
     }
@@ -372,8 +376,8 @@ impl Shaper {
         self.impulses.iter().map(|(t, a)| a * t).sum()
     }
 
-    /// Vibration that is left of a mode of that undamped natural `frequency` (Hz) and `damping` ratio, as part of what an
-    /// unshaped step leaves, both after the last impulse: see [`residual_vibration`].
+    /// Vibration that is left of a mode of that undamped natural `frequency` (Hz) and `damping` ratio, as part of what
+    /// an unshaped step leaves, both after the last impulse: see [`residual_vibration`].
     pub fn residual_vibration(&self, frequency: f64, damping: f64) -> f64 {
         residual_vibration(&self.impulses, frequency, damping)
     }
@@ -386,8 +390,8 @@ impl Shaper {
         right.max(0.5 * corner.acceleration * half)
     }
 
-    /// The greatest acceleration, m/s², at which [`Shaper::smoothing`] stays within `limit` (m) at a corner speed in m/s;
-    /// 0 if there is none.
+    /// The greatest acceleration, m/s², at which [`Shaper::smoothing`] stays within `limit` (m) at a corner speed in
+    /// m/s; 0 if there is none.
     pub fn max_acceleration(&self, limit: f64, corner_speed: f64) -> f64 {
         let (quarter, half) = self.corner_moments();
         let right = 2.0 * (limit / SQRT_2 - corner_speed * quarter.0) / quarter.1;
@@ -408,8 +412,8 @@ impl Shaper {
         (later, all)
     }
 
-    /// The frequencies about the shaper's own at which no mode with one of these damping ratios keeps more than `level` of
-    /// its vibration, as parts of the shaper's frequency; none if its own is not among them.
+    /// The frequencies about the shaper's own at which no mode with one of these damping ratios keeps more than `level`
+    /// of its vibration, as parts of the shaper's frequency; none if its own is not among them.
     pub fn insensitivity(&self, level: f64, dampings: &[f64]) -> Option<(f64, f64)> {
         const STEP: f64 = 1e-3;
         let f = self.frequency;
@@ -432,12 +436,13 @@ impl Shaper {
     }
 }
 
-/// A corner of a path, by which shapers are compared: how fast it is taken, and how hard the axis accelerates before and after.
+/// A corner of a path, by which shapers are compared: how fast it is taken, and how hard the axis accelerates before
+/// and after.
 ///
-/// A shaper replaces a motion x(t) by Σ A_i x(t − u_i), u_i counted from the middle of its impulses; where x(t) is straight
-/// that changes nothing, at a corner it cuts. At a right angle each axis has come with v t + a t²/2, and the way from the tip
-/// is √2 of one axis'; at a reversal the axis turns back with a t²/2. The greater of both is called smoothing. It compares
-/// shapers; what a workpiece shows depends on its real path.
+/// A shaper replaces a motion x(t) by Σ A_i x(t − u_i), u_i counted from the middle of its impulses; where x(t) is
+/// straight that changes nothing, at a corner it cuts. At a right angle each axis has come with v t + a t²/2, and the
+/// way from the tip is √2 of one axis'; at a reversal the axis turns back with a t²/2. The greater of both is called
+/// smoothing. It compares shapers; what a workpiece shows depends on its real path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corner {
     /// m/s².
@@ -453,8 +458,8 @@ impl Default for Corner {
     }
 }
 
-/// Vibration of a mode after a sequence of impulses (time in s, amplitude), as part of that after one impulse of their sum
-/// at the time of the last: undamped natural frequency in Hz, damping ratio from 0 to below 1.
+/// Vibration of a mode after a sequence of impulses (time in s, amplitude), as part of that after one impulse of their
+/// sum at the time of the last: undamped natural frequency in Hz, damping ratio from 0 to below 1.
 pub fn residual_vibration(impulses: &[(f64, f64)], frequency: f64, damping: f64) -> f64 {
     let (omega, zeta) = (2.0 * PI * frequency, damping);
     let omega_d = omega * (1.0 - zeta * zeta).sqrt();

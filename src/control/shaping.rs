@@ -1,7 +1,9 @@
-//! Which shaper, and at which frequency: the criterion by which Klipper chooses, on a spectrum or on the modes of a model.
+//! Which shaper, and at which frequency: the criterion by which Klipper chooses, on a spectrum or on the modes of a
+//! model.
 //!
-//! For every frequency of a grid a shaper leaves some vibration and costs some smoothing. Of each kind the frequency is taken
-//! that leaves the least vibration or hardly more, with the best score; and of all kinds the one with the clearly best score.
+//! For every frequency of a grid a shaper leaves some vibration and costs some smoothing. Of each kind the frequency is
+//! taken that leaves the least vibration or hardly more, with the best score; and of all kinds the one with the clearly
+//! best score.
 
 use super::resonance::Resonance;
 use super::shaper::{Corner, Firmware, Form, Kind, Pattern, Shaper, TOLERANCE, USUAL_DAMPING, check_damping};
@@ -57,8 +59,8 @@ pub struct Criterion {
 }
 
 impl Default for Criterion {
-    /// As Klipper's: designed for a damping ratio of 0.1, looked at from 0.075 to 0.15. ZVD is fitted, but not a candidate: it
-    /// is as long as EI and covers less.
+    /// As Klipper's: designed for a damping ratio of 0.1, looked at from 0.075 to 0.15. ZVD is fitted, but not a
+    /// candidate: it is as long as EI and covers less.
     fn default() -> Self {
         let forms: Vec<Form> = Kind::ALL.map(Form::from).to_vec();
         let candidates = forms.iter().copied().filter(|form| form.kind() != Kind::Zvd).collect();
@@ -121,7 +123,8 @@ pub struct Fitted {
 /// All kinds at their best, and the one to take.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
-    /// In the order of the criterion's forms, without those that `max_smoothing` excludes and those that there are not for its damping ratio.
+    /// In the order of the criterion's forms, without those that `max_smoothing` excludes and those that there are not
+    /// for its damping ratio.
     pub fitted: Vec<Fitted>,
     /// The place of the recommended one among them.
     pub recommended: usize,
@@ -137,7 +140,8 @@ impl Choice {
 }
 
 impl Target<'_> {
-    /// Vibration that a shaper leaves, of that without one: 0 to 1; of a spectrum what is above a twentieth of the highest peak.
+    /// Vibration that a shaper leaves, of that without one: 0 to 1; of a spectrum what is above a twentieth of the
+    /// highest peak.
     pub fn remaining(&self, shaper: &Shaper, dampings: &[f64]) -> f64 {
         match self {
             Target::Spectrum(spectrum) => of_spectrum(spectrum, shaper, dampings),
@@ -262,9 +266,10 @@ fn is_clearly_better(one: &Point, other: &Point) -> bool {
     1.2 * one.score < other.score || 1.05 * one.score < other.score && 1.1 * one.smoothing < other.smoothing
 }
 
-/// The rule since 2025-10: as before from shorter to longer; a longer one, too, where the best so far leaves more than is wanted and it leaves less;
-/// each is moved to where it leaves less and smooths less than the best so far, if there is such a frequency; and a ZV gives way to the first
-/// that leaves a tenth less, unless what vibrates is known from a model.
+/// The rule since 2025-10: as before from shorter to longer; a longer one, too, where the best so far leaves more than
+/// is wanted and it leaves less; each is moved to where it leaves less and smooths less than the best so far, if there
+/// is such a frequency; and a ZV gives way to the first that leaves a tenth less, unless what vibrates is known from a
+/// model.
 fn recommended(fitted: &mut [Tried], candidates: &[usize], wanted: Option<f64>, is_measured: bool) -> usize {
     let mut best = candidates[0];
     for &i in candidates {

@@ -5,8 +5,8 @@ use super::sampled::Speed;
 use crate::design::SlidingMode;
 use crate::signal::profile::Reference;
 
-/// A sliding-mode controller on the side of the encoder: σ = ė + λ e + κ ∫e dt (A. Hace et al., "Robust motion control and
-/// trajectory planning for planar laser cutting system", 2005, for belts).
+/// A sliding-mode controller on the side of the encoder: σ = ė + λ e + κ ∫e dt (A. Hace et al., "Robust motion control
+/// and trajectory planning for planar laser cutting system", 2005, for belts).
 ///
 /// With V = σ²/2 and M σ̇ = −M K sat(σ/Φ) + Δ the surface is reached, σ σ̇ < 0 for |σ| ≥ Φ, if K > |Δ|/M: [`required`].
 #[derive(Debug, Clone)]
@@ -52,8 +52,8 @@ impl SlidingState {
     }
 }
 
-/// The reaching gain K, m/s², that Lyapunov's condition needs while mass and friction of the axis are known to a share `spread`
-/// each, at up to this speed (m/s) and acceleration (m/s²) of the reference.
+/// The reaching gain K, m/s², that Lyapunov's condition needs while mass and friction of the axis are known to a share
+/// `spread` each, at up to this speed (m/s) and acceleration (m/s²) of the reference.
 ///
 /// |Δ| ≤ s (M (a + λ Φ) + b v + F_c) with λ Φ for the motion within the layer, and K > |Δ|/M.
 pub fn required(gains: &SlidingMode, rigid: &Rigid, spread: f64, speed: f64, acceleration: f64) -> f64 {

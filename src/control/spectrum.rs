@@ -36,8 +36,8 @@ impl Axis {
 
 /// Power spectral density over frequency, divided by frequency.
 ///
-/// A resonance test shakes the harder the higher the frequency; divided by the frequency, the density tells better what a
-/// move excites. This is the scale by which Klipper chooses shapers.
+/// A resonance test shakes the harder the higher the frequency; divided by the frequency, the density tells better what
+/// a move excites. This is the scale by which Klipper chooses shapers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spectrum {
     /// Hz, ascending, at most [`HIGHEST`].
@@ -101,7 +101,8 @@ impl Spectrum {
         self.density.iter().copied().fold(0.0, f64::max)
     }
 
-    /// Where it has its peaks: frequency (Hz) and density, by frequency. A peak stands out by a tenth of the highest at least.
+    /// Where it has its peaks: frequency (Hz) and density, by frequency. A peak stands out by a tenth of the highest at
+    /// least.
     pub fn peaks(&self) -> Vec<(f64, f64)> {
         let d = &self.density;
         let wanted = PROMINENCE * self.greatest();
@@ -128,7 +129,8 @@ impl Spectrum {
         (0..d.len()).filter(is_peak).map(|k| (self.frequency[k], d[k])).collect()
     }
 
-    /// The axis of the accelerometer that vibrates most at one of the spectrum's frequencies, and its part of the three.
+    /// The axis of the accelerometer that vibrates most at one of the spectrum's frequencies, and its part of the
+    /// three.
     pub fn main_axis(&self, frequency: f64) -> Option<(Axis, f64)> {
         let k = self.frequency.iter().position(|f| *f == frequency)?;
         let all: f64 = self.axes.iter().map(|axis| axis[k]).sum();
@@ -158,8 +160,8 @@ impl Spectrum {
     }
 }
 
-/// P(f) / f; a tenth of a hertz keeps it from infinity. Until 2025-08 without the lowest frequencies, today with what is below twice of them let
-/// down softly.
+/// P(f) / f; a tenth of a hertz keeps it from infinity. Until 2025-08 without the lowest frequencies, today with what
+/// is below twice of them let down softly.
 fn scaled(frequency: &[f64], density: &[f64], is_already: bool, firmware: Firmware) -> Vec<f64> {
     let one = |(f, p): (&f64, &f64)| match (*f, firmware) {
         (_, Firmware::Klipper) if is_already => *p,

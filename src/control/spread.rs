@@ -9,8 +9,8 @@ use crate::solve::{Ending, Flow, Solver};
 use crate::stage::Stage;
 use crate::trajectory::Trajectory;
 
-/// `stage` with one thing at a time that may be off, and all that is tied to it by nature, times 1 + `share` and times 1 − `share`;
-/// and what that is.
+/// `stage` with one thing at a time that may be off, and all that is tied to it by nature, times 1 + `share` and times
+/// 1 − `share`; and what that is.
 pub fn spread(stage: &Stage, share: f64) -> Vec<(String, Stage)> {
     let axis = |kind: &Free, word: &str, factor: f64| {
         let mut other = stage.clone();
@@ -36,8 +36,8 @@ pub struct Worst {
     pub axes: usize,
 }
 
-/// The same controller, made for `stage`, on axes of which each parameter is off by a `share`. None where `stop` said so, which is
-/// asked with every block of rows.
+/// The same controller, made for `stage`, on axes of which each parameter is off by a `share`. None where `stop` said
+/// so, which is asked with every block of rows.
 pub fn worst(
     stage: &Stage,
     design: &Design,

@@ -140,7 +140,8 @@ impl StateFeedbackState {
         let r = DMatrix::from_element(1, 1, 1.0 / (weights.command * weights.command));
         let regulator = riccati::discrete(&a, &b, &q, &r)?;
 
-        // The filter is the same problem transposed; what is unknown acts at the command, and as the same force at the cart.
+        // The filter is the same problem transposed; what is unknown acts at the command, and as the same force at the
+        // cart.
         let force = Rigid::of(stage).force_per_command();
         let mut noise = DMatrix::zeros(n, n);
         for (column, scale) in [(0, weights.disturbance), (1, weights.disturbance * force)] {

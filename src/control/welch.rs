@@ -6,12 +6,12 @@ use rustfft::num_complex::Complex;
 /// Form of the Kaiser window: its side lobes are 44 dB below the main one.
 pub(super) const BETA: f64 = 6.0;
 
-/// One-sided power spectral density of `values`, sampled `rate` times a second, in their unit squared per Hz: frequencies (Hz)
-/// and densities.
+/// One-sided power spectral density of `values`, sampled `rate` times a second, in their unit squared per Hz:
+/// frequencies (Hz) and densities.
 ///
-/// Segments of `length` samples that overlap by half, each less its mean and under a Kaiser window, are transformed, and their
-/// periodograms averaged. The densities times the distance of the frequencies sum to the variance, but for what the ends of
-/// the record lose. Empty if there is not one whole segment.
+/// Segments of `length` samples that overlap by half, each less its mean and under a Kaiser window, are transformed,
+/// and their periodograms averaged. The densities times the distance of the frequencies sum to the variance, but for
+/// what the ends of the record lose. Empty if there is not one whole segment.
 ///
 /// P. Welch, "The use of fast Fourier transform for the estimation of power spectra", *IEEE Trans. Audio and
 /// Electroacoustics* 15, 1967.

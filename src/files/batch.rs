@@ -15,11 +15,11 @@ taut was ended while it replaced the results in this folder: some of the files a
 Run the same command again; this file goes when all files are in place.
 ";
 
-/// Files that are being written for one folder. Dropped before [`Batch::place`], they are removed, and what stands in the
-/// folder still stands.
+/// Files that are being written for one folder. Dropped before [`Batch::place`], they are removed, and what stands in
+/// the folder still stands.
 ///
-/// They lie in a hidden folder `.K.taut.tmp` within it, locked as long as the program runs: the next batch for the folder
-/// removes what a killed program left.
+/// They lie in a hidden folder `.K.taut.tmp` within it, locked as long as the program runs: the next batch for the
+/// folder removes what a killed program left.
 #[derive(Debug)]
 pub struct Batch {
     root: PathBuf,
@@ -49,7 +49,8 @@ impl Batch {
         Ok(names)
     }
 
-    /// Gives all files their places, and removes `stale` ones that stand in the folder, with a marker beside them meanwhile.
+    /// Gives all files their places, and removes `stale` ones that stand in the folder, with a marker beside them
+    /// meanwhile.
     pub fn place(&self, stale: &[PathBuf]) -> Result<()> {
         let names = self.names()?;
         let places: Vec<PathBuf> = names.iter().map(|name| self.root.join(name)).collect();

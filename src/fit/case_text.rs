@@ -8,8 +8,8 @@ use crate::stage::Stage;
 use std::path::Path;
 
 impl Fit {
-    /// The text of the case with the estimates in place of what they were, and a table of how well they are known. Paths in
-    /// it are those of `case`; `name` stands in messages.
+    /// The text of the case with the estimates in place of what they were, and a table of how well they are known.
+    /// Paths in it are those of `case`; `name` stands in messages.
     ///
     /// Of what campaigns have for themselves, the values of the first; [`Fit::case_text_of`] has those of the others.
     pub fn case_text(&self, case: &Case, name: &Path) -> Result<String> {

@@ -1,4 +1,5 @@
-//! Combinations of undetermined parameters that are determined: their sums, ratios and products, with names and intervals.
+//! Combinations of undetermined parameters that are determined: their sums, ratios and products, with names and
+//! intervals.
 
 use super::identify::Directions;
 use super::problem::Problem;
@@ -22,8 +23,8 @@ pub struct Combination {
     pub interval: [f64; 2],
 }
 
-/// The determined combinations of `members`, of which `lost` directions are not determined: each of them with the one that moves most
-/// along what is lost, or where two directions are lost, with the two that do.
+/// The determined combinations of `members`, of which `lost` directions are not determined: each of them with the one
+/// that moves most along what is lost, or where two directions are lost, with the two that do.
 pub(super) fn of(
     problem: &Problem,
     directions: &Directions,
@@ -73,8 +74,8 @@ pub(super) fn of(
     found
 }
 
-/// The combination of two parameters that does not change when the second changes by 1 % and the first by `ratio` times that: its name,
-/// unit, value, and the relative change that a relative change of each makes of it.
+/// The combination of two parameters that does not change when the second changes by 1 % and the first by `ratio` times
+/// that: its name, unit, value, and the relative change that a relative change of each makes of it.
 fn named(
     problem: &Problem,
     names: &[String],

@@ -1,4 +1,5 @@
-//! Whether the controller of a case is the one that made a log: what it makes of the logged positions, beside the logged input.
+//! Whether the controller of a case is the one that made a log: what it makes of the logged positions, beside the
+//! logged input.
 
 use crate::case::Case;
 use crate::control::{Controller, Loop, Observation, Standard};
@@ -6,8 +7,8 @@ use crate::log::{Log, Quantity};
 use crate::signal::profile::Profile;
 use crate::stage::{EncoderPlace, Stage};
 
-/// The share of the logged input that the controller of `case` makes of reference and position of a log, 100 (1 − ‖u − û‖/‖u − ū‖); none
-/// without a controller, a reference or a position.
+/// The share of the logged input that the controller of `case` makes of reference and position of a log, 100 (1 − ‖u −
+/// û‖/‖u − ū‖); none without a controller, a reference or a position.
 pub(super) fn reproduced(case: &Case, log: &Log) -> Option<f64> {
     let (design, reference) = (case.controller.as_ref()?, log.reference.as_ref()?);
     let position = position(&case.stage, log)?;

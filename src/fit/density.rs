@@ -1,16 +1,17 @@
 //! The posterior density of a least-squares problem, on variables without bounds that are all about as wide as one.
 //!
-//! With ψ the residuals after the loss, T the inflation that the covariance has, π the priors and x(u) the change of variables:
+//! With ψ the residuals after the loss, T the inflation that the covariance has, π the priors and x(u) the change of
+//! variables:
 //!
 //! ```text
 //! ln p(u) = −Σ ρ(rᵢ(x)) / T + Σⱼ ln πⱼ(xⱼ) + Σⱼ ln |dxⱼ/duⱼ|        u = u₀ + S z
 //! ```
 //!
-//! x = l + eᵘ above a bound, h − eᵘ below one, l + (h − l)/(1 + e⁻ᵘ) between two, and u without any; S Sᵀ is the covariance at the
-//! fit, so that z is nearly standard normal. A path is a leapfrog along a slope; any slope that depends on the place alone leaves
-//! the draws right (Neal 2011, "MCMC using Hamiltonian dynamics", section 5.5), since they are taken by the density itself. So slopes
-//! are Jᵀψ with J = J₀ + Σ zₖ ∂J/∂zₖ about the fit, one simulation each, where that is near enough, and measured anew at each place
-//! otherwise.
+//! x = l + eᵘ above a bound, h − eᵘ below one, l + (h − l)/(1 + e⁻ᵘ) between two, and u without any; S Sᵀ is the
+//! covariance at the fit, so that z is nearly standard normal. A path is a leapfrog along a slope; any slope that
+//! depends on the place alone leaves the draws right (Neal 2011, "MCMC using Hamiltonian dynamics", section 5.5), since
+//! they are taken by the density itself. So slopes are Jᵀψ with J = J₀ + Σ zₖ ∂J/∂zₖ about the fit, one simulation
+//! each, where that is near enough, and measured anew at each place otherwise.
 
 use super::least_squares::{Bounds, Differences, Residuals};
 use crate::chance::uniform;
@@ -181,7 +182,8 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         density
     }
 
-    /// The Jacobian about the fit and, if they can be had, its derivatives along each z, over a standard error to each side.
+    /// The Jacobian about the fit and, if they can be had, its derivatives along each z, over a standard error to each
+    /// side.
     fn bent(&self, jacobian: DMatrix<f64>) -> Vec<DMatrix<f64>> {
         let n = self.errors.len();
         let mut problem = self.ingredients.problem.clone();
@@ -404,7 +406,8 @@ mod tests {
         }
     }
 
-    /// A bound through the middle of it leaves half of it: the quantiles are those of the truncated normal distribution.
+    /// A bound through the middle of it leaves half of it: the quantiles are those of the truncated normal
+    /// distribution.
     #[test]
     fn a_bound_cuts_the_posterior_off() {
         let free = ingredients(f64::NEG_INFINITY, vec![None, None], 1.0);

@@ -9,9 +9,11 @@ use crate::stage::Stage;
 use crate::trajectory::Column;
 use std::path::Path;
 
-/// The machine of `case` with each row of a file of draws: a column for everything that `plan` searches for, such as `cart.mass_kg`.
+/// The machine of `case` with each row of a file of draws: a column for everything that `plan` searches for, such as
+/// `cart.mass_kg`.
 ///
-/// Numbers that are none of the machine, a log's delay say, are passed over. Errors: a column that is not there, values that are missing.
+/// Numbers that are none of the machine, a log's delay say, are passed over. Errors: a column that is not there, values
+/// that are missing.
 pub fn machines(case: &Case, plan: &Plan, file: &Path) -> Result<Vec<Stage>> {
     let (parameters, columns) = drawn(case, plan, &[], file)?;
     let machine = |row: usize| {
@@ -22,7 +24,8 @@ pub fn machines(case: &Case, plan: &Plan, file: &Path) -> Result<Vec<Stage>> {
     Ok((0..columns.first().map_or(0, Vec::len)).map(machine).collect())
 }
 
-/// The draws themselves: what is free, and its values by draw. Keys that are set by others do not go along with any of it.
+/// The draws themselves: what is free, and its values by draw. Keys that are set by others do not go along with any of
+/// it.
 pub fn drawn(case: &Case, plan: &Plan, others: &[&str], file: &Path) -> Result<(Vec<Free>, Vec<Vec<f64>>)> {
     let parameters = parameters(&case.stage, plan, others)?;
     if parameters.is_empty() {

@@ -1,4 +1,5 @@
-//! Which single change of a machine explains logs that it does not meet: those of another day, after a repair, with another load.
+//! Which single change of a machine explains logs that it does not meet: those of another day, after a repair, with
+//! another load.
 
 use super::found::{Estimate, Work};
 use super::problem::Stop;
@@ -50,8 +51,8 @@ impl Drift {
     }
 }
 
-/// Changes one parameter of the machine after the other, each by itself, to meet the logs of `case`: what `plan` searches for, whatever
-/// else may be off, and delay, gain and offset of the input.
+/// Changes one parameter of the machine after the other, each by itself, to meet the logs of `case`: what `plan`
+/// searches for, whatever else may be off, and delay, gain and offset of the input.
 pub fn drift(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(&str) -> Flow) -> Result<Drift> {
     let none = nothing(plan);
     let quiet = &mut |_| Flow::Continue;

@@ -10,7 +10,8 @@ use crate::stage::Stage;
 pub struct Fit {
     /// The machine with the estimates; what is not determined is what the case says.
     pub stage: Stage,
-    /// The machine of each campaign, or log, that has parameters for itself: `stage` is the first. Empty where nothing is separate.
+    /// The machine of each campaign, or log, that has parameters for itself: `stage` is the first. Empty where nothing
+    /// is separate.
     pub parts: Vec<(String, Stage)>,
     /// The estimates: free parameters, then what all logs share.
     pub estimates: Vec<Estimate>,
@@ -36,8 +37,8 @@ pub struct Fit {
     pub decrement: f64,
     /// ½ Σ r² of the weighted residuals.
     pub cost: f64,
-    /// The cost that each start led to, in the first weights; the first start is that of the case, or what a regression makes
-    /// of it if that is nearer.
+    /// The cost that each start led to, in the first weights; the first start is that of the case, or what a regression
+    /// makes of it if that is nearer.
     pub starts: Vec<f64>,
     /// Steps of derivatives, in standard errors, where the order of events left none; 0 where the cost was smooth.
     pub coarse: f64,
@@ -84,8 +85,8 @@ pub struct Estimate {
     pub value: f64,
     /// Its standard error; infinite where it is not determined, none where it is at a bound.
     pub error: Option<f64>,
-    /// 95 % interval; infinite where it is not determined. At a bound it reaches from there to where it would without that
-    /// bound; none where even that cannot be said.
+    /// 95 % interval; infinite where it is not determined. At a bound it reaches from there to where it would without
+    /// that bound; none where even that cannot be said.
     pub interval: Option<[f64; 2]>,
     /// Its bounds.
     pub bounds: [f64; 2],

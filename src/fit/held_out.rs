@@ -21,7 +21,8 @@ pub(super) struct Known<'a> {
     pub shared: Vec<(Extra, f64)>,
 }
 
-/// A log beside `stage`: delay, gain and offsets are what the fitted logs say. Where it starts is fitted to the first `share` of its rows.
+/// A log beside `stage`: delay, gain and offsets are what the fitted logs say. Where it starts is fitted to the first
+/// `share` of its rows.
 pub(super) fn met(run: &Run, stage: &Stage, known: &Known, share: f64) -> LogFit {
     let is_start = |what| matches!(what, Nuisance::StartPosition | Nuisance::StartSpeed);
     let mut alone = run.clone();

@@ -1,9 +1,9 @@
 //! Identifiability: the sensitivity of all outputs to each parameter, and the combinations that change nothing.
 //!
 //! With J the derivatives of the weighted outputs with respect to relative changes of the parameters, and what else is
-//! fitted along projected out, J = U S Vᵀ: along vᵢ the outputs change by sᵢ standard deviations of white noise. How far off that
-//! combination may be, the noise that the residuals show says ([`super::noise`]); where that is more than [`LIMIT`], or where the
-//! outputs move by less than a machine shows ([`SHOWS`], [`MODEL`]), it is not determined.
+//! fitted along projected out, J = U S Vᵀ: along vᵢ the outputs change by sᵢ standard deviations of white noise. How
+//! far off that combination may be, the noise that the residuals show says ([`super::noise`]); where that is more than
+//! [`LIMIT`], or where the outputs move by less than a machine shows ([`SHOWS`], [`MODEL`]), it is not determined.
 
 use super::combinations::{self, Combination};
 use super::problem::Problem;
@@ -13,9 +13,9 @@ use nalgebra::{DMatrix, SVD};
 /// Relative standard error from which on a combination counts as not determined.
 pub const LIMIT: f64 = 1.0;
 
-/// Root mean square, as a share of what the converter rounds, of what a change by 100 % makes of a value: below that a combination
-/// counts as not determined however many values there are. Averages of thousands of values would tell it of a machine that is the
-/// model to a fraction of what one value shows, and no machine is.
+/// Root mean square, as a share of what the converter rounds, of what a change by 100 % makes of a value: below that a
+/// combination counts as not determined however many values there are. Averages of thousands of values would tell it of
+/// a machine that is the model to a fraction of what one value shows, and no machine is.
 pub const SHOWS: f64 = 0.2;
 
 /// The same as a share of how far the values range.
@@ -24,7 +24,8 @@ pub const MODEL: f64 = 2e-4;
 /// A parameter of which this much goes with a combination that is not determined is not determined either.
 const SHARE: f64 = 0.1;
 
-/// Singular values below this share of the greatest are rounding: differences are good to about 1e-9 of the largest column.
+/// Singular values below this share of the greatest are rounding: differences are good to about 1e-9 of the largest
+/// column.
 const ROUNDING: f64 = 1e-8;
 
 /// Iterations of a singular value decomposition before it is given up.
@@ -76,8 +77,8 @@ impl Identifiability {
         Some(Self::told(problem, &directions, x, deviation, &off, &of))
     }
 
-    /// For the noise that the residuals show: `off` is the relative standard error along each direction, `of` that of a combination of
-    /// directions.
+    /// For the noise that the residuals show: `off` is the relative standard error along each direction, `of` that of a
+    /// combination of directions.
     pub(super) fn told(
         problem: &Problem,
         directions: &Directions,
@@ -302,7 +303,8 @@ impl Directions {
     }
 }
 
-/// For each of the lost directions a parameter of its own that moves much along it: by elimination with the greatest pivots.
+/// For each of the lost directions a parameter of its own that moves much along it: by elimination with the greatest
+/// pivots.
 fn leads(v: &DMatrix<f64>, lost: &[usize]) -> Vec<usize> {
     let mut hidden = v.select_columns(lost);
     let mut leads = Vec::new();

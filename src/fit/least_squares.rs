@@ -6,13 +6,13 @@
 //! min ‖J d + r‖² + λ ‖D d‖²        D = greatest column norms of J so far (Moré 1978)
 //! ```
 //!
-//! by QR, with variables that would leave the box held at its edge. Nothing counts as converged but what passes the test of
-//! the projected gradient: the Gauss-Newton step in the variables that are free to move promises less than
+//! by QR, with variables that would leave the box held at its edge. Nothing counts as converged but what passes the
+//! test of the projected gradient: the Gauss-Newton step in the variables that are free to move promises less than
 //! `tolerance` of a standard error, and no variable at its bound is pushed inwards.
 //!
-//! Logs with dry friction make the cost kinked where sticks and slips change their order. Where no damped step helps and
-//! the test is not passed, derivatives over longer steps are tried, and then an evolution strategy that needs none, before it
-//! is called stalled.
+//! Logs with dry friction make the cost kinked where sticks and slips change their order. Where no damped step helps
+//! and the test is not passed, derivatives over longer steps are tried, and then an evolution strategy that needs none,
+//! before it is called stalled.
 
 use crate::chance::normal;
 use crate::solve::Flow;
@@ -23,8 +23,8 @@ use rand_pcg::rand_core::SeedableRng;
 /// Steps of coarse derivatives, in standard errors of a variable by itself, tried one after the other.
 const COARSER: [f64; 2] = [1.0, 10.0];
 
-/// So many standard errors from where it leads, a search takes derivatives over this part of a standard error: where the cost has
-/// kinks, they see past the small ones; where it has none, they are as good as others.
+/// So many standard errors from where it leads, a search takes derivatives over this part of a standard error: where
+/// the cost has kinks, they see past the small ones; where it has none, they are as good as others.
 const NEAR: f64 = 1.0;
 const FINE: f64 = 0.3;
 
@@ -38,8 +38,8 @@ const BARREN: usize = 8;
 /// Where the cost has kinks, the standard errors that the last step may promise: no step of any length fulfilled it.
 const KINK: f64 = 0.1;
 
-/// Two steps after each other that gain less than this many standard errors, and little of what they promised, are at a kink;
-/// and so are steps after which twice that is still promised.
+/// Two steps after each other that gain less than this many standard errors, and little of what they promised, are at a
+/// kink; and so are steps after which twice that is still promised.
 const SHOWS: f64 = 0.1;
 
 /// Residuals as a function of the variables.
@@ -84,7 +84,8 @@ pub enum Differences {
     /// To both sides.
     Central,
     /// To both sides by these steps. Where a body sticks and slips with every sample of its input, the outputs have a
-    /// kink for each of them; steps of about a standard error see the slope that matters and not that between two kinks.
+    /// kink for each of them; steps of about a standard error see the slope that matters and not that between two
+    /// kinks.
     Coarse(Vec<f64>),
 }
 
@@ -392,8 +393,8 @@ pub fn minimise(
     }
 }
 
-/// By how much standard errors are greater than those of as many independent residuals, roughly: √((1 + ρ)/(1 − ρ)) with ρ
-/// the correlation of neighbours, as if no fewer than ten residuals for each variable were independent.
+/// By how much standard errors are greater than those of as many independent residuals, roughly: √((1 + ρ)/(1 − ρ))
+/// with ρ the correlation of neighbours, as if no fewer than ten residuals for each variable were independent.
 fn inflation(residuals: &[f64], variables: usize) -> f64 {
     let own: f64 = residuals.iter().map(|r| r * r).sum();
     let next: f64 = residuals.windows(2).map(|pair| pair[0] * pair[1]).sum();
@@ -582,7 +583,8 @@ impl Linear {
         let mut wanted = DVector::zeros(rows + free.len());
         wanted.rows_mut(0, rows).copy_from(&right);
         for (column, &j) in free.iter().enumerate() {
-            // In units of D the columns are of like size. A little damping keeps what the rows do not determine at rest.
+            // In units of D the columns are of like size. A little damping keeps what the rows do not determine at
+            // rest.
             let unit = if scale[j] > 0.0 { 1.0 / scale[j] } else { 1.0 };
             matrix.view_mut((0, column), (rows, 1)).copy_from(&(self.r.column(j) * unit));
             matrix[(rows + column, column)] = f64::max(damping.sqrt(), 1e-11);
@@ -609,7 +611,8 @@ impl Linear {
         -(moved.dot(&self.qtr) + 0.5 * moved.norm_squared())
     }
 
-    /// Standard errors of the variables that are free, for residuals of this deviation; of one alone where they are not determined together.
+    /// Standard errors of the variables that are free, for residuals of this deviation; of one alone where they are not
+    /// determined together.
     fn errors(&self, held: &[bool], deviation: f64) -> Vec<f64> {
         (0..held.len()).map(|j| if held[j] || self.norm(j) == 0.0 { 0.0 } else { deviation / self.norm(j) }).collect()
     }

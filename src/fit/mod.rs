@@ -1,7 +1,7 @@
 //! Parameters from logs, and what the logs cannot tell.
 //!
-//! Output error: the model is put through every log's input, and what it would have shown is compared with what was seen,
-//! all logs at once. The recipe is [`fit`]; before it, [`check`] says what the logs can determine.
+//! Output error: the model is put through every log's input, and what it would have shown is compared with what was
+//! seen, all logs at once. The recipe is [`fit`]; before it, [`check`] says what the logs can determine.
 
 mod acceleration;
 mod case_text;

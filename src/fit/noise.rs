@@ -7,12 +7,13 @@
 //! cov x(t), x(u) = σ² e^{−|t−u|/τ} cos ω(t−u)
 //! ```
 //!
-//! with the derivatives J of the model, as a fit has moved its residuals along them: what is slow in noise looks like a change of a
-//! parameter, and a fit takes it away. So the likelihood is that of what no change of the parameters can make (restricted
-//! likelihood, H. D. Patterson and R. Thompson 1971), by a Kalman filter that takes all columns of J along with the residuals.
+//! with the derivatives J of the model, as a fit has moved its residuals along them: what is slow in noise looks like a
+//! change of a parameter, and a fit takes it away. So the likelihood is that of what no change of the parameters can
+//! make (restricted likelihood, H. D. Patterson and R. Thompson 1971), by a Kalman filter that takes all columns of J
+//! along with the residuals.
 //!
-//! How slow noise is cannot be told well by a short record, so no single answer is taken: over a grid of σ and τ each counts by its
-//! likelihood, and an interval holds 95 % of what all of them say together.
+//! How slow noise is cannot be told well by a short record, so no single answer is taken: over a grid of σ and τ each
+//! counts by its likelihood, and an interval holds 95 % of what all of them say together.
 
 use super::problem::Problem;
 use super::uncertainty::student_share;
@@ -112,7 +113,8 @@ pub(super) fn half_width(spreads: &[Spread], combination: &DVector<f64>) -> f64 
     spreads.iter().map(|spread| spread.half_width(combination).powi(2)).sum::<f64>().sqrt()
 }
 
-/// The spread that the noise of each quantity makes of the first columns of a Jacobian, which concern all runs; the others concern one.
+/// The spread that the noise of each quantity makes of the first columns of a Jacobian, which concern all runs; the
+/// others concern one.
 pub(super) fn spreads(
     problem: &Problem,
     residuals: &[f64],
@@ -128,7 +130,8 @@ pub(super) fn spreads(
     quantities.into_iter().filter_map(one).collect()
 }
 
-/// The rows of a quantity, taken together: as many as share an error of rounding, and so many that no more than [`BLOCKS`] remain.
+/// The rows of a quantity, taken together: as many as share an error of rounding, and so many that no more than
+/// [`BLOCKS`] remain.
 fn series(
     problem: &Problem,
     quantity: crate::log::Quantity,

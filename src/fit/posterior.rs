@@ -1,9 +1,10 @@
 //! Draws from the posterior of a fit's parameters: what priors and logs together leave possible.
 //!
-//! The likelihood is normal, with the deviation of each quantity that the fit found, or Huber's where the fit is robust. Residuals
-//! that are alike from sample to sample tell less than their number says: the logarithm of the likelihood is divided by the greatest
-//! factor by which the covariance of the fit grows for that reason, so that with flat priors and a model that is linear no interval is
-//! narrower than the fit's. How it is drawn from stands in `density.rs`.
+//! The likelihood is normal, with the deviation of each quantity that the fit found, or Huber's where the fit is
+//! robust. Residuals that are alike from sample to sample tell less than their number says: the logarithm of the
+//! likelihood is divided by the greatest factor by which the covariance of the fit grows for that reason, so that with
+//! flat priors and a model that is linear no interval is narrower than the fit's. How it is drawn from stands in
+//! `density.rs`.
 
 use super::Fit;
 use super::density::{Ingredients, Prior as OnVariable, Sampled, draw};
@@ -64,8 +65,8 @@ pub struct Credible {
 
 /// Draws from the posterior of the parameters of `plan` about `fit`, which was made of the same case and plan.
 ///
-/// `watch` sees how many draws are made, and may end it early. Errors: a fit that was interrupted, an estimate that is not
-/// determined, priors outside the bounds.
+/// `watch` sees how many draws are made, and may end it early. Errors: a fit that was interrupted, an estimate that is
+/// not determined, priors outside the bounds.
 pub fn posterior(case: &Case, plan: &Plan, fit: &Fit, effort: Effort, watch: &Watch) -> Result<Posterior> {
     if matches!(fit.ending, Ending::Interrupted | Ending::Failed) {
         return Err(Error::new("draws begin at a fit that has ended, and this one has not").next("fit it again"));
@@ -180,7 +181,8 @@ impl Posterior {
     }
 }
 
-/// The factor by which autocorrelated residuals widen the covariance of the fit, at most, and the variance of weighted residuals.
+/// The factor by which autocorrelated residuals widen the covariance of the fit, at most, and the variance of weighted
+/// residuals.
 fn inflation(problem: &Problem, residuals: &[f64], jacobian: &DMatrix<f64>, at: &[f64], bounds: &Bounds) -> (f64, f64) {
     let held: Vec<bool> = (0..at.len()).map(|j| at[j] <= bounds.low[j] || at[j] >= bounds.high[j]).collect();
     let squares: f64 = residuals.iter().map(|r| r * r).sum();

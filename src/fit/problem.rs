@@ -197,8 +197,8 @@ impl<'a> Problem<'a> {
             let windowed = plan.windows.is_some();
             if let Some(start) = first {
                 let free = initial_state || windowed;
-                // Positions count from where the log begins, unless the case says where that is; its first value says that
-                // no better than any other value says where the cart is.
+                // Positions count from where the log begins, unless the case says where that is; its first value says
+                // that no better than any other value says where the cart is.
                 let arm = position.map_or(1.0, |seen| if seen.quantity == Quantity::CartPosition { 1.0 } else { r });
                 let noise = arm * position.map_or(0.0, |seen| noise.of(seen.quantity));
                 let (unit, room) = if free { (1e-2 * wide, wide) } else { (noise, 6.0 * noise) };
@@ -261,8 +261,8 @@ impl<'a> Problem<'a> {
         Noise(noise)
     }
 
-    /// Weights before anything is fitted: one deviation for each quantity, a hundredth of how far it ranges, or what its
-    /// converter rounds if that is more.
+    /// Weights before anything is fitted: one deviation for each quantity, a hundredth of how far it ranges, or what
+    /// its converter rounds if that is more.
     pub(super) fn weigh_first(&mut self) {
         for quantity in self.quantities() {
             let seen = || self.runs.iter().flat_map(|run| &run.seen).filter(|seen| seen.quantity == quantity);
@@ -273,8 +273,9 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Weighs a quantity: each value with the variance σ² of the noise and of what rounding makes of m equal values in a row,
-    /// which is one error and not one for each: σ² + (m − 1) Δ²/12; or of m that go to and fro at rest: `rounding_at_rest`.
+    /// Weighs a quantity: each value with the variance σ² of the noise and of what rounding makes of m equal values in
+    /// a row, which is one error and not one for each: σ² + (m − 1) Δ²/12; or of m that go to and fro at rest:
+    /// `rounding_at_rest`.
     pub fn weigh(&mut self, quantity: Quantity, deviation: f64, rounding: bool) {
         for run in &mut self.runs {
             let fitted = run.fitted_rows;
@@ -295,8 +296,9 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// A first value is no better than any other: what is known of starts beforehand is as uncertain as this deviation of a position, as far
-    /// as noise that neighbouring values share can be more than what they differ by; beyond that it is the model that is off, and not the value.
+    /// A first value is no better than any other: what is known of starts beforehand is as uncertain as this deviation
+    /// of a position, as far as noise that neighbouring values share can be more than what they differ by; beyond that
+    /// it is the model that is off, and not the value.
     pub(super) fn doubt_starts(&mut self, quantity: Quantity, deviation: f64) {
         let r = self.stage.pulley_radius;
         for run in &mut self.runs {
@@ -393,7 +395,8 @@ impl<'a> Problem<'a> {
         self.units[j].slope(value)
     }
 
-    /// The change of the variable that counts as 100 %, of a machine like `stage`: where it may be zero, its value or a typical one.
+    /// The change of the variable that counts as 100 %, of a machine like `stage`: where it may be zero, its value or a
+    /// typical one.
     pub fn whole(&self, stage: &Stage, j: usize, x: f64) -> f64 {
         match self.units.get(j) {
             Some(Scale::Linear(unit)) => {
@@ -478,7 +481,8 @@ impl<'a> Problem<'a> {
         self.runs[..index].iter().map(Run::rows).sum()
     }
 
-    /// Residuals of the runs of a part of the logs, those of the others left as they are; of all of them without a part.
+    /// Residuals of the runs of a part of the logs, those of the others left as they are; of all of them without a
+    /// part.
     fn evaluate_part(&mut self, part: Option<usize>, x: &[f64], r: &mut [f64]) -> bool {
         let stages = self.stages(x);
         let mut bench = Bench::default();
@@ -599,8 +603,8 @@ fn scale(stage: &Stage, parameter: &Free, runs: &[Run]) -> Scale {
     }
 }
 
-/// A typical value of a quantity that may be zero: of friction a tenth of the motor's force at the greatest input; none where that
-/// depends on the machine alone, as the gain of an amplifier, which has whatever unit its input has.
+/// A typical value of a quantity that may be zero: of friction a tenth of the motor's force at the greatest input; none
+/// where that depends on the machine alone, as the gain of an amplifier, which has whatever unit its input has.
 fn typical(stage: &Stage, parameter: &Free, runs: &[Run]) -> Option<f64> {
     let most = runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
     let motor = &stage.motor;

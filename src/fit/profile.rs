@@ -1,7 +1,8 @@
 //! Profiles: how much worse the logs are met with one parameter held off its estimate and all others fitted anew.
 //!
-//! Where the model is linear, √ of the growth of the sum of squares is a straight line on either side, |p − p̂|/error on the
-//! scale of the search. A profile that is not says how far to trust the interval, and on which side it is too short.
+//! Where the model is linear, √ of the growth of the sum of squares is a straight line on either side, |p − p̂|/error
+//! on the scale of the search. A profile that is not says how far to trust the interval, and on which side it is too
+//! short.
 
 use super::least_squares::{Ending, Options, minimise};
 use super::problem::{Problem, Stop};
@@ -11,7 +12,8 @@ use crate::case::{Case, Plan};
 use crate::error::Result;
 use crate::solve::Flow;
 
-/// Where a parameter is held, in standard errors off its estimate; outwards, so that each starts where the one before it ended.
+/// Where a parameter is held, in standard errors off its estimate; outwards, so that each starts where the one before
+/// it ended.
 const AT: [[f64; 3]; 2] = [[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]];
 
 /// Most parameters that are profiled.
@@ -40,7 +42,8 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// The growth two standard errors below and above the estimate over that of a linear model; none where it was not held there.
+    /// The growth two standard errors below and above the estimate over that of a linear model; none where it was not
+    /// held there.
     pub fn bends(&self) -> [Option<f64>; 2] {
         let middle = self.linear.iter().position(|off| *off == 0.0).unwrap_or(0);
         let at = |mut rows: std::ops::Range<usize>| {
@@ -55,8 +58,8 @@ impl Profile {
     }
 }
 
-/// The profiles of what `fit` found for the parameters of `plan` in the logs of `case`, as many as `stop` and what they cost allow; a
-/// parameter that is at a bound or not determined has none.
+/// The profiles of what `fit` found for the parameters of `plan` in the logs of `case`, as many as `stop` and what they
+/// cost allow; a parameter that is at a bound or not determined has none.
 pub fn profiles(case: &Case, plan: &Plan, fit: &Fit, stop: Option<Stop>) -> Result<Vec<Profile>> {
     let mut problem = Problem::new(case, plan)?.stopped_by(stop);
     for &(quantity, deviation) in &fit.noise {
@@ -127,7 +130,8 @@ impl Bottom {
                     return None;
                 }
                 start = found.x;
-                // A linear model's cost grows by ½ (Δx/unit)², Δx = errors × off: in errors, whatever the residuals are autocorrelated.
+                // A linear model's cost grows by ½ (Δx/unit)², Δx = errors × off: in errors, whatever the residuals are
+                // autocorrelated.
                 let grown = (2.0 * (found.cost - self.cost)).max(0.0).sqrt() * unit / off;
                 points.push((problem.value(j, x), grown, errors.abs()));
             }

@@ -172,7 +172,8 @@ fn told(now: &Identifiability, found: &Identifiability) -> String {
     told.join("; ")
 }
 
-/// The Jacobian with the rows that an idea adds: every log once more, each with a start, a delay and offsets of its own that nobody knows.
+/// The Jacobian with the rows that an idea adds: every log once more, each with a start, a delay and offsets of its own
+/// that nobody knows.
 fn with_rows(
     problem: &Problem,
     idea: &Idea,

@@ -4,9 +4,9 @@
 //! τ_M = J φ̈ + B φ̇ + C sgn φ̇ + T₀                at the drive pulley, everything moving together
 //! ```
 //!
-//! τ_M follows from the logged input, φ̇ and φ̈ from the logged positions by derivatives of a Gaussian that weighs a few rows. This is the
-//! method of the inverse dynamic model (M. Gautier, W. Khalil 1990); noise in positions biases it, so it only says where a search
-//! may begin.
+//! τ_M follows from the logged input, φ̇ and φ̈ from the logged positions by derivatives of a Gaussian that weighs a
+//! few rows. This is the method of the inverse dynamic model (M. Gautier, W. Khalil 1990); noise in positions biases
+//! it, so it only says where a search may begin.
 
 use super::problem::Problem;
 use super::run::{Run, is_position};
@@ -91,7 +91,8 @@ fn add(run: &Run, output: usize, stage: &Stage, noise: f64, late: usize, rows: &
     for width in WIDTHS {
         let Some(found) = derived(&seen.values[..n], width, h) else { break };
         let size = (found.iter().map(|[_, a]| a * a).sum::<f64>() / found.len() as f64).sqrt();
-        // Deviation of white noise behind the second derivative of a Gaussian: σ √(3/(8 √π)) / w^(5/2), per interval squared
+        // Deviation of white noise behind the second derivative of a Gaussian: σ √(3/(8 √π)) / w^(5/2), per interval
+        // squared
         let trembles = noise * (3.0 / (8.0 * std::f64::consts::PI.sqrt())).sqrt() / width.powf(2.5) / (h * h);
         derivatives = Some((width, found));
         if trembles < NOISE * size {
@@ -158,7 +159,8 @@ pub(super) fn derived(values: &[f64], width: f64, h: f64) -> Option<Vec<[f64; 2]
 }
 
 impl Balance {
-    /// The values of the free parameters that make the machine's totals those of the balance, where that is a machine of its kind.
+    /// The values of the free parameters that make the machine's totals those of the balance, where that is a machine
+    /// of its kind.
     pub fn guess(&self, problem: &Problem) -> Vec<f64> {
         let mut values: Vec<f64> = problem.parameters.iter().map(|parameter| parameter.start).collect();
         let totals = [(Sum::Inertia, self.inertia), (Sum::Viscous, self.viscous), (Sum::Coulomb, self.coulomb)];

@@ -1,14 +1,14 @@
 //! The force that a model lacks: what would have to act on the cart beside it, so that it followed the log.
 //!
-//! With e the way of the cart in the log minus that of the model, M all that moves and b all that brakes in proportion to speed, as
-//! seen at the cart,
+//! With e the way of the cart in the log minus that of the model, M all that moves and b all that brakes in proportion
+//! to speed, as seen at the cart,
 //!
 //! ```text
 //! ΔF = M ë + b ė
 //! ```
 //!
-//! It is drawn beside position, speed, force of the motor and time: friction that changes along the travel shows in the first, another
-//! law in the second, a gain in the third and a drift in the last.
+//! It is drawn beside position, speed, force of the motor and time: friction that changes along the travel shows in the
+//! first, another law in the second, a gain in the third and a drift in the last.
 
 use super::regression::{derived, reach};
 use super::run::is_position;
@@ -57,7 +57,8 @@ impl ResidualForce {
     }
 }
 
-/// The force that a log lacks beside `stage`; none without an evenly sampled position, or where the model does not reach the end.
+/// The force that a log lacks beside `stage`; none without an evenly sampled position, or where the model does not
+/// reach the end.
 pub fn residual_force(stage: &Stage, log: &LogFit) -> Option<ResidualForce> {
     let output = log.outputs.iter().find(|output| is_position(output.quantity)).filter(|_| log.complete)?;
     let n = log.time.len();
@@ -93,7 +94,8 @@ pub fn residual_force(stage: &Stage, log: &LogFit) -> Option<ResidualForce> {
         let force: Vec<f64> =
             slopes.iter().map(|[speed, acceleration]| mass * acceleration + viscous * speed).collect();
         let size = (force.iter().map(|f| f * f).sum::<f64>() / force.len() as f64).sqrt();
-        // Deviation of white noise behind the second derivative of a Gaussian: σ √(3/(8 √π)) / w^(5/2), per interval squared
+        // Deviation of white noise behind the second derivative of a Gaussian: σ √(3/(8 √π)) / w^(5/2), per interval
+        // squared
         let trembles = mass * noise * (3.0 / (8.0 * std::f64::consts::PI.sqrt())).sqrt() / width.powf(2.5) / (h * h);
         found = Some((width, force));
         if trembles < NOISE * size {

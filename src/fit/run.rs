@@ -12,8 +12,8 @@ use crate::stage::{AmplifierMode, Stage};
 use crate::trajectory::{Grid, Trajectory};
 use std::sync::Arc;
 
-/// Share of an interval by which times may be off an even raster and still count as on it: the solver then answers at the
-/// raster's times. What that makes of a value is at most its rate of change times this share of an interval.
+/// Share of an interval by which times may be off an even raster and still count as on it: the solver then answers at
+/// the raster's times. What that makes of a value is at most its rate of change times this share of an interval.
 const EVEN: f64 = 1e-3;
 
 /// So often up and so often down, and that in every hundred, go values at rest that tremble.
@@ -231,7 +231,8 @@ impl Run {
 
     /// Has the controller of a case follow the reference of the log, instead of taking the input as logged.
     ///
-    /// A loop hides in its output what it makes up for, and shows it in its command: what was logged as the input is compared, too.
+    /// A loop hides in its output what it makes up for, and shows it in its command: what was logged as the input is
+    /// compared, too.
     pub fn close(&mut self, case: &Case, log: &Log) {
         if let (Some(design), Some(reference)) = (&case.controller, &log.reference) {
             let profile = Profile::sampled(&log.time, reference).shaped(&design.shaper);
@@ -531,11 +532,11 @@ fn alike(values: &[f64], step: f64) -> Vec<f64> {
     alike
 }
 
-/// Variance of what remains of rounding to this step in the mean of many values at rest, over all places of rest, where they
-/// tremble by a normal deviation σ: Δ²/12 without noise, as good as nothing from σ = Δ/2 on.
+/// Variance of what remains of rounding to this step in the mean of many values at rest, over all places of rest, where
+/// they tremble by a normal deviation σ: Δ²/12 without noise, as good as nothing from σ = Δ/2 on.
 ///
-/// The mean of a rounded value is off by Σₖ (−1)ᵏ Δ/(πk) e^(−2π²k²σ²/Δ²) sin(2πkx/Δ) (Widrow 1956); over all x that has the
-/// variance Σₖ Δ²/(2π²k²) e^(−4π²k²σ²/Δ²).
+/// The mean of a rounded value is off by Σₖ (−1)ᵏ Δ/(πk) e^(−2π²k²σ²/Δ²) sin(2πkx/Δ) (Widrow 1956); over all x that has
+/// the variance Σₖ Δ²/(2π²k²) e^(−4π²k²σ²/Δ²).
 pub fn rounding_at_rest(step: f64, deviation: f64) -> f64 {
     use std::f64::consts::PI;
     let term = |k: u32| {

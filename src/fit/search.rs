@@ -154,8 +154,8 @@ fn as_it_is(problem: &mut Problem) -> Minimum {
     }
 }
 
-/// Where a direction is not determined, the search ended anywhere along it: it is repeated with the parameter that moves most along it
-/// held where the case has it, and the point that this leads to is as good.
+/// Where a direction is not determined, the search ended anywhere along it: it is repeated with the parameter that
+/// moves most along it held where the case has it, and the point that this leads to is as good.
 fn hold_undetermined(
     problem: &mut Problem,
     best: &mut Minimum,
@@ -213,7 +213,8 @@ fn uniform(problem: &Problem) -> bool {
     weights.all(|w| (w / first - 1.0).abs() < 1e-3)
 }
 
-/// Whether what is known beforehand of the start could be as wrong as the residuals are: then it depends on their weight.
+/// Whether what is known beforehand of the start could be as wrong as the residuals are: then it depends on their
+/// weight.
 fn told_beforehand(problem: &Problem, noise: &[(Quantity, f64)]) -> bool {
     let most = noise.iter().map(|(_, deviation)| *deviation).fold(0.0, f64::max);
     let arm = problem.stage.pulley_radius.min(1.0);
@@ -237,8 +238,8 @@ fn first_guess(problem: &mut Problem) -> Vec<f64> {
     if cost(&guess) < cost(&start) { guess } else { start }
 }
 
-/// A point within the bounds, near enough to the start to be a machine of its kind: within a factor of ten, or for what may
-/// be zero, between zero and three times its start.
+/// A point within the bounds, near enough to the start to be a machine of its kind: within a factor of ten, or for what
+/// may be zero, between zero and three times its start.
 fn elsewhere(problem: &Problem, random: &mut Pcg64) -> Vec<f64> {
     let mut x = problem.start();
     let bounds = problem.bounds();

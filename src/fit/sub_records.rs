@@ -1,9 +1,9 @@
 //! Whether parts of the logs agree with the whole: errors of the model that no noise explains.
 //!
-//! A friction that drifts, or one of another law, leaves residuals that the parameters follow as far as they can: the estimates go
-//! where the integrated error is least, and noise says nothing of how far that is from the truth. So the logs are cut into windows,
-//! each with a start of its own, in which errors cannot add up, and the same parameters are fitted to all of them. With ĝ_c = J_cᵀ r_c
-//! of window c and A = (JᵀJ)⁻¹ the windows disagree by
+//! A friction that drifts, or one of another law, leaves residuals that the parameters follow as far as they can: the
+//! estimates go where the integrated error is least, and noise says nothing of how far that is from the truth. So the
+//! logs are cut into windows, each with a start of its own, in which errors cannot add up, and the same parameters are
+//! fitted to all of them. With ĝ_c = J_cᵀ r_c of window c and A = (JᵀJ)⁻¹ the windows disagree by
 //!
 //! ```text
 //! V = A (Σ_c ĝ_c ĝ_cᵀ) A G/(G−1)           (K.-Y. Liang and S. L. Zeger 1986)
@@ -100,7 +100,8 @@ pub(super) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &
         return None;
     }
     let wider = (student(windows - 1) / student(1_000_000)).powi(2);
-    // (|d| + h)² ≤ 2 (d² + h²), d being as far as an interval reaches; and windows are still long enough for half as much again.
+    // (|d| + h)² ≤ 2 (d² + h²), d being as far as an interval reaches; and windows are still long enough for half as
+    // much again.
     let added = (&shift * shift.transpose() / student(1_000_000).powi(2) + between * wider) * 3.0;
     Some(Disagreement { windows, length, off, added })
 }

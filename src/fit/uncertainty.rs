@@ -1,7 +1,8 @@
 //! How far the truth may be from an estimate: the covariance, for the noise that the residuals show.
 //!
-//! For white residuals it is s² (JᵀJ)⁻¹. Residuals that are alike from sample to sample tell less than their number says: with the
-//! covariance Σ of the noise it is (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹, for every Σ that the residuals allow ([`super::noise`]).
+//! For white residuals it is s² (JᵀJ)⁻¹. Residuals that are alike from sample to sample tell less than their number
+//! says: with the covariance Σ of the noise it is (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹, for every Σ that the residuals allow
+//! ([`super::noise`]).
 
 use super::identify::{Directions, Identifiability};
 use super::noise::{self, Spread, half_width};
@@ -22,7 +23,8 @@ pub struct Covariance {
     pub deviation: f64,
     /// Independent values minus variables.
     pub freedom: usize,
-    /// How many standard errors a 95 % interval reaches to each side; few degrees of freedom are in the standard errors.
+    /// How many standard errors a 95 % interval reaches to each side; few degrees of freedom are in the standard
+    /// errors.
     pub reach: f64,
 }
 
@@ -147,7 +149,8 @@ impl Judged {
 }
 
 impl Covariance {
-    /// At a minimum with these residuals and this Jacobian, its variables at bounds left out; none where they are not determined.
+    /// At a minimum with these residuals and this Jacobian, its variables at bounds left out; none where they are not
+    /// determined.
     pub fn new(problem: &Problem, residuals: &[f64], jacobian: &DMatrix<f64>, at_bound: &[bool]) -> Option<Self> {
         let free: Vec<usize> = (0..at_bound.len()).filter(|&j| !at_bound[j]).collect();
         inverse_of_square(&jacobian.select_columns(&free))?;
@@ -203,15 +206,16 @@ pub fn memory_of(residuals: &[f64], rows: &[usize]) -> f64 {
     if own > 0.0 { next / own } else { 0.0 }
 }
 
-/// The share of Student's t beyond ± `t`: by the normal distribution of a t that is made normal (D. L. Wallace 1959), to about 1e-3
-/// of itself from three degrees of freedom on.
+/// The share of Student's t beyond ± `t`: by the normal distribution of a t that is made normal (D. L. Wallace 1959),
+/// to about 1e-3 of itself from three degrees of freedom on.
 pub(super) fn student_share(t: f64, freedom: f64) -> f64 {
     let n = freedom.max(1.0);
     let z = (8.0 * n + 1.0) / (8.0 * n + 3.0) * (n * (t * t / n).ln_1p()).sqrt();
     libm::erfc(z / std::f64::consts::SQRT_2)
 }
 
-/// The value below which Student's t stays with 97.5 %, for so many degrees of freedom (Hill's expansion, to 1e-3 from 3 on).
+/// The value below which Student's t stays with 97.5 %, for so many degrees of freedom (Hill's expansion, to 1e-3 from
+/// 3 on).
 pub fn student(freedom: usize) -> f64 {
     let (z, n) = (1.959_963_985, freedom.max(1) as f64);
     match freedom {

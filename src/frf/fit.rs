@@ -6,9 +6,10 @@
 //! χ² = Σ |G − g Ĝ(s, τ, t_d)|² / E|ΔG|²  over coherent points
 //! ```
 //!
-//! is made least by Gauss and Newton's method, damped after Levenberg and Marquardt. One number τ stands for all spans, whose damping then is in
-//! proportion to their stiffness; g takes up what mass and friction of the model are off. Errors are those of the linearised problem, widened by the
-//! root of χ² per degree of freedom where the curves fit worse than noise allows.
+//! is made least by Gauss and Newton's method, damped after Levenberg and Marquardt. One number τ stands for all spans,
+//! whose damping then is in proportion to their stiffness; g takes up what mass and friction of the model are off.
+//! Errors are those of the linearised problem, widened by the root of χ² per degree of freedom where the curves fit
+//! worse than noise allows.
 
 use super::{Frf, Point};
 use crate::error::{Error, Result};
@@ -82,7 +83,8 @@ fn changed(stage: &Stage, known: &Known, x: &[f64]) -> Stage {
     stage
 }
 
-/// The same as Welch's averages see it: Σ |W|² Ĝ/Σ |W|² about each line, where the input is white. Of whole periods nothing is smeared.
+/// The same as Welch's averages see it: Σ |W|² Ĝ/Σ |W|² about each line, where the input is white. Of whole periods
+/// nothing is smeared.
 fn smeared(stage: &Stage, place: f64, delay: f64, frf: &Frf) -> Result<Vec<Complex<f64>>> {
     if frf.periodic {
         return model(stage, place, delay, frf);
@@ -175,7 +177,8 @@ pub fn fit(stage: &Stage, known: &Known, frfs: &[Frf]) -> Result<FrfFit> {
     }
     let ratio = stage.belt.damping.iter().zip(&stage.belt.stiffness).map(|(c, k)| c / k).sum::<f64>() / 3.0;
     let mut best: Option<(f64, Vec<f64>)> = None;
-    // Resonances that are far off hide from each other: from several stiffnesses and dampings, until noise explains what is left.
+    // Resonances that are far off hide from each other: from several stiffnesses and dampings, until noise explains
+    // what is left.
     for stiffness in [1.0, 0.6, 1.6, 0.35, 2.8] {
         if best.as_ref().is_some_and(|(least, _)| *least < ENOUGH * (2 * points) as f64) {
             break;

@@ -1,7 +1,7 @@
 //! Friction that changes along the travel.
 
-/// A factor on the cart's dry friction (Coulomb, breakaway and what lies between), over the cart's position: straight lines
-/// between points, the first and the last value held beyond them.
+/// A factor on the cart's dry friction (Coulomb, breakaway and what lies between), over the cart's position: straight
+/// lines between points, the first and the last value held beyond them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Along {
     points: Vec<[f64; 2]>,

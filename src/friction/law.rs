@@ -5,8 +5,9 @@ use std::f64::consts::{E, SQRT_2};
 
 /// How friction goes from the breakaway F_b down to Coulomb friction F_c as a body picks up speed; b v comes on top.
 ///
-/// Speeds are in m/s for a cart and rad/s for a pulley. The sources disagree on what they call "static force": Armstrong-Hélouvry,
-/// Canudas de Wit and Simscape mean F_b, the level at rest; the paper's F_s in eq. (14) is the height above F_c, F_b − F_c.
+/// Speeds are in m/s for a cart and rad/s for a pulley. The sources disagree on what they call "static force":
+/// Armstrong-Hélouvry, Canudas de Wit and Simscape mean F_b, the level at rest; the paper's F_s in eq. (14) is the
+/// height above F_c, F_b − F_c.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Law {
     /// At once: F_f = b v ± F_c, eq. (15).
@@ -92,8 +93,8 @@ impl Shape {
 
     /// The share of F_b − F_c that is left at q = v/v_s, q counted in the direction of motion.
     ///
-    /// A trial step may end beyond zero speed, q < 0, before its event is found. There the exponential goes on as it is, so
-    /// that the step is smooth, and from q = −1 on along its tangent, so that it does not overflow.
+    /// A trial step may end beyond zero speed, q < 0, before its event is found. There the exponential goes on as it
+    /// is, so that the step is smooth, and from q = −1 on along its tangent, so that it does not overflow.
     #[inline]
     pub(crate) fn share(self, q: f64) -> f64 {
         match self {

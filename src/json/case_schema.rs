@@ -1,7 +1,7 @@
 //! The JSON Schema of the case file, for editors: what can stand where, made from the table of parameters.
 //!
-//! It says what a reader refuses by its form: keys that are none, a text for a table. What depends on other values (a breakaway
-//! below the Coulomb friction) only reading says.
+//! It says what a reader refuses by its form: keys that are none, a text for a table. What depends on other values (a
+//! breakaway below the Coulomb friction) only reading says.
 
 use crate::log::PRESETS;
 use crate::parameter::{self, Fallback, Parameter};

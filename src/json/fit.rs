@@ -55,7 +55,8 @@ pub(super) fn group(group: &Group, estimates: &[Estimate], choices: &[String]) -
     })
 }
 
-/// Estimates and how the logs are met; `profiles` are those that were made and `posterior` is what was drawn, if anything was.
+/// Estimates and how the logs are met; `profiles` are those that were made and `posterior` is what was drawn, if
+/// anything was.
 pub fn fit(case: &Case, fit: &Fit, profiles: &[Profile], posterior: Option<Value>) -> Value {
     let parameters: Vec<Value> = fit
         .estimates

@@ -1,7 +1,9 @@
-//! The JSON Schema of each result, made from the tables in `src/json/results`: a line for each key, with its path, its type and what it is.
+//! The JSON Schema of each result, made from the tables in `src/json/results`: a line for each key, with its path, its
+//! type and what it is.
 //!
-//! In a path `[]` is each element of a list, `*` each key of a map, and a key that ends in `?` may be missing. Types are `text`, `number`,
-//! `whole`, `flag`, `any`, a list `[number]` and a map `{number}` of them; with `?` behind it, null is there where it has no value.
+//! In a path `[]` is each element of a list, `*` each key of a map, and a key that ends in `?` may be missing. Types
+//! are `text`, `number`, `whole`, `flag`, `any`, a list `[number]` and a map `{number}` of them; with `?` behind it,
+//! null is there where it has no value.
 
 use serde_json::{Map, Value, json};
 

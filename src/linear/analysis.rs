@@ -1,4 +1,5 @@
-//! All that is told of a stage's linear equations at once: matrices, poles, zeros, responses, resonance along the travel.
+//! All that is told of a stage's linear equations at once: matrices, poles, zeros, responses, resonance along the
+//! travel.
 
 use super::{Discrete, Hold, Operation, Place, Range, Response, StateSpace, Transfer};
 use super::{assumptions, places, sticks, travel};

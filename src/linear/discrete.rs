@@ -35,8 +35,8 @@ const MOST_DELAY: f64 = 100.0;
 
 /// `x[k+1] = A x[k] + b u[k]`, `y[k] = C x[k] + d u[k]`.
 ///
-/// With a first-order hold and with Tustin's rule x is not the state of the stage at the sample (it has a part of the input in it, or another
-/// scale); y is its output.
+/// With a first-order hold and with Tustin's rule x is not the state of the stage at the sample (it has a part of the
+/// input in it, or another scale); y is its output.
 #[derive(Debug, Clone)]
 pub struct Discrete {
     /// T, s.
@@ -61,10 +61,11 @@ pub struct Discrete {
 }
 
 impl StateSpace {
-    /// The model for a sample time T > 0, s, and an input that is late by `delay` ≥ 0, s, which needs a zero-order hold.
+    /// The model for a sample time T > 0, s, and an input that is late by `delay` ≥ 0, s, which needs a zero-order
+    /// hold.
     ///
-    /// With a zero-order hold A is e^{A T} and b is ∫ e^{A t} b dt, from one matrix exponential. A late input comes in two parts: of
-    /// u[k − l − 1] until the delay is over, of u[k − l] from then on.
+    /// With a zero-order hold A is e^{A T} and b is ∫ e^{A t} b dt, from one matrix exponential. A late input comes in
+    /// two parts: of u[k − l − 1] until the delay is over, of u[k − l] from then on.
     pub fn discrete(&self, sample_time: f64, hold: Hold, delay: f64) -> Result<Discrete> {
         let t = sample_time;
         let allowed = |what: String, allowed: &str| Err(Error::new(what).allowed(allowed));
@@ -169,7 +170,8 @@ fn held(a: &DMatrix<f64>, b: &DVector<f64>, t: f64) -> (DMatrix<f64>, DVector<f6
     (change.view((0, 0), (n, n)).into_owned(), column(n) * unit, column(n + 1) * (unit / size))
 }
 
-/// e^{A t} − I: a Taylor sum at t/2^k, ‖A‖ t/2^k ≤ 1/4, and k doublings P ← 2 P + P², which keep the relative accuracy of small changes.
+/// e^{A t} − I: a Taylor sum at t/2^k, ‖A‖ t/2^k ≤ 1/4, and k doublings P ← 2 P + P², which keep the relative accuracy
+/// of small changes.
 fn exponential(matrix: &DMatrix<f64>, t: f64) -> DMatrix<f64> {
     let doublings = (4.0 * norm(matrix) * t).log2().ceil().clamp(0.0, 1000.0) as i32;
     let x = matrix * (t / f64::from(doublings).exp2());
@@ -210,7 +212,8 @@ impl Discrete {
         solve(change, input, rows, &self.d, shift)
     }
 
-    /// Makes the input late by `whole` samples, and one more in part where `parts` gives what the older and the newer input do.
+    /// Makes the input late by `whole` samples, and one more in part where `parts` gives what the older and the newer
+    /// input do.
     fn delayed(
         &mut self,
         whole: usize,

@@ -1,7 +1,7 @@
 //! Eigenvalues of small real matrices whose entries differ by many powers of ten.
 //!
-//! A matrix is first taken apart where it is block triangular by a single row or column, then balanced, then brought to real
-//! Schur form by a bounded iteration; each eigenvalue is at last improved by its own two eigenvectors.
+//! A matrix is first taken apart where it is block triangular by a single row or column, then balanced, then brought to
+//! real Schur form by a bounded iteration; each eigenvalue is at last improved by its own two eigenvectors.
 
 use crate::error::{Error, Result};
 use nalgebra::linalg::Schur;
@@ -16,8 +16,8 @@ const MOST_TURNS: u32 = 8;
 /// Eigenvalues that are smaller than this share of the matrix' norm are zero: rounding alone makes them that large.
 pub(crate) const NOTHING: f64 = 1e-13;
 
-/// The diagonal D, of powers of two, for which rows and columns of D⁻¹ A D have norms of one size (Osborne 1960, Parlett and Reinsch
-/// 1969); scaling by powers of two rounds nothing.
+/// The diagonal D, of powers of two, for which rows and columns of D⁻¹ A D have norms of one size (Osborne 1960,
+/// Parlett and Reinsch 1969); scaling by powers of two rounds nothing.
 pub(crate) fn balance(matrix: &DMatrix<f64>) -> DVector<f64> {
     let n = matrix.nrows();
     let mut a = matrix.clone();
@@ -58,7 +58,8 @@ pub(crate) fn norm(matrix: &DMatrix<f64>) -> f64 {
     matrix.row_iter().map(|row| row.iter().map(|v| v.abs()).sum()).fold(0.0, f64::max)
 }
 
-/// The eigenvalues, conjugates side by side, the one of positive imaginary part first, those of least absolute value first.
+/// The eigenvalues, conjugates side by side, the one of positive imaginary part first, those of least absolute value
+/// first.
 ///
 /// Fails only if the matrix holds what is no number, or the iteration does not settle on any of its turned copies.
 pub(crate) fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
@@ -105,8 +106,8 @@ pub(crate) fn distance(values: &[Complex<f64>], of: usize) -> f64 {
     others.map(|(_, other)| (other - values[of]).norm()).fold(f64::INFINITY, f64::min)
 }
 
-/// Eigenvalues that stand on the diagonal, because all else in their row or column is zero, and the matrix without these rows and
-/// columns.
+/// Eigenvalues that stand on the diagonal, because all else in their row or column is zero, and the matrix without
+/// these rows and columns.
 fn taken_apart(matrix: &DMatrix<f64>) -> (Vec<Complex<f64>>, DMatrix<f64>) {
     let (mut values, mut rest) = (Vec::new(), matrix.clone());
     loop {
@@ -147,10 +148,11 @@ fn schur(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
         .next("change a value of the case a little"))
 }
 
-/// An eigenvalue s of M − s E, better than it is known; E is the unit matrix in its first `count` rows and zero in the others.
+/// An eigenvalue s of M − s E, better than it is known; E is the unit matrix in its first `count` rows and zero in the
+/// others.
 ///
-/// By its right and left vectors: (M − s E) x ≈ 0, yᴴ (M − s E) ≈ 0, s ← s + yᴴ (M − s E) x / yᴴ E x. `apart` is the distance to the next
-/// one: what would move it by a tenth of that is not believed.
+/// By its right and left vectors: (M − s E) x ≈ 0, yᴴ (M − s E) ≈ 0, s ← s + yᴴ (M − s E) x / yᴴ E x. `apart` is the
+/// distance to the next one: what would move it by a tenth of that is not believed.
 pub(crate) fn polished(matrix: &DMatrix<f64>, count: usize, s: Complex<f64>, apart: f64) -> Complex<f64> {
     let whole = matrix.map(|v| Complex::new(v, 0.0));
     let n = whole.nrows();

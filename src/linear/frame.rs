@@ -90,8 +90,8 @@ impl Frame {
         Self::new(stage, plant, kinds, false)
     }
 
-    /// The cart's position and stretches, so that what does not depend on where the axis is has coefficients that are exactly zero. The
-    /// outer frame where a body is held: then positions are stretches.
+    /// The cart's position and stretches, so that what does not depend on where the axis is has coefficients that are
+    /// exactly zero. The outer frame where a body is held: then positions are stretches.
     pub(super) fn inner(stage: &Stage, plant: &Mechanism, held: [bool; 3], speed: f64) -> Self {
         if held.contains(&true) {
             return Self::outer(stage, plant, held, speed);
@@ -120,7 +120,8 @@ impl Frame {
             }
             row
         };
-        // What moves with another body goes its way times a ratio; the rotor of a stiff gear goes with the drive pulley.
+        // What moves with another body goes its way times a ratio; the rotor of a stiff gear goes with the drive
+        // pulley.
         let led = |kind: fn(usize) -> Kind, j: usize| match j {
             ROTOR if !has_rotor(plant) => unit(kind(plant.leader(DRIVE)), plant.ratio(DRIVE)),
             body => unit(kind(plant.leader(body)), plant.ratio(body)),

@@ -1,13 +1,14 @@
 //! Linear analysis: what a control engineer's tools say about a stage.
 //!
-//! [`StateSpace::of`] writes the equations of a stage that slides as ẋ = A x + b u, y = C x + d u, from the same forms that
-//! the solvers use. From there: [poles](StateSpace::poles), [zeros](StateSpace::zeros), [`Response`] over frequency, resonance
-//! and anti-resonance [along the travel](travel), and [`Discrete`] models for a sample time.
+//! [`StateSpace::of`] writes the equations of a stage that slides as ẋ = A x + b u, y = C x + d u, from the same forms
+//! that the solvers use. From there: [poles](StateSpace::poles), [zeros](StateSpace::zeros), [`Response`] over
+//! frequency, resonance and anti-resonance [along the travel](travel), and [`Discrete`] models for a sample time.
 //!
-//! [`Natural`] has rigid and elastic modes of any mechanism, and [`GantryAnalysis`] those of a gantry over its working area.
+//! [`Natural`] has rigid and elastic modes of any mechanism, and [`GantryAnalysis`] those of a gantry over its working
+//! area.
 //!
-//! Dry friction that does not change with speed drops out while everything slides; while a body sticks it does not move at all, and
-//! [`Operation::held`] says so.
+//! Dry friction that does not change with speed drops out while everything slides; while a body sticks it does not move
+//! at all, and [`Operation::held`] says so.
 
 mod analysis;
 mod discrete;
@@ -41,8 +42,8 @@ impl StateSpace {
         eigen::eigenvalues(&self.inner.a)
     }
 
-    /// Invariant zeros of an output, 1/s, and its gain. Where an output does not see the axis' position, one of its zeros is 0 and
-    /// takes the integrator away. None for an output that there is not.
+    /// Invariant zeros of an output, 1/s, and its gain. Where an output does not see the axis' position, one of its
+    /// zeros is 0 and takes the integrator away. None for an output that there is not.
     pub fn zeros(&self, output: usize) -> Option<Result<Zeros>> {
         let d = *self.d.get(output)?;
         let row = |c: &DMatrix<f64>| c.row(output).transpose();

@@ -11,10 +11,11 @@ use nalgebra::{DMatrix, DVector};
 /// About what a stage is linearised.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Operation {
-    /// Speed of the cart, m/s, with which everything slides; negative is backward. Friction curves have their slope there, and bristles
-    /// are bent as they are in steady sliding.
+    /// Speed of the cart, m/s, with which everything slides; negative is backward. Friction curves have their slope
+    /// there, and bristles are bent as they are in steady sliding.
     pub speed: f64,
-    /// Where the cart is, m: spans that follow it are as stiff as there, friction that changes along the travel is as there.
+    /// Where the cart is, m: spans that follow it are as stiff as there, friction that changes along the travel is as
+    /// there.
     pub position: f64,
     /// Which of drive pulley, cart and idler pulley are held where they are.
     pub held: [bool; 3],
@@ -71,9 +72,10 @@ pub(super) struct Inner {
 impl StateSpace {
     /// The linear equations of `stage` about `operation`.
     ///
-    /// Parts that work piece by piece are taken as they are in undisturbed motion: amplifier within its limits, spans taut, end stops apart,
-    /// the driving flank of a gear with play in contact. A gear with losses is driven by the motor. How stiffness and friction change
-    /// with the cart's place is not followed: they are what they are at the place. Fails for a place where no span can be.
+    /// Parts that work piece by piece are taken as they are in undisturbed motion: amplifier within its limits, spans
+    /// taut, end stops apart, the driving flank of a gear with play in contact. A gear with losses is driven by the
+    /// motor. How stiffness and friction change with the cart's place is not followed: they are what they are at the
+    /// place. Fails for a place where no span can be.
     ///
     /// ```
     /// use taut::case::{Case, TEMPLATE};
@@ -225,7 +227,8 @@ impl Linear<'_> {
         self.plant.bodies[body].along.as_ref().map_or(1.0, |along| along.factor(self.operation.position))
     }
 
-    /// ∂F_f/∂v of a body's own friction beyond the viscous friction that stands in the equations, and ∂F_f/∂z of a bristle.
+    /// ∂F_f/∂v of a body's own friction beyond the viscous friction that stands in the equations, and ∂F_f/∂z of a
+    /// bristle.
     fn friction(&self, body: usize) -> (f64, f64) {
         let friction = &self.plant.bodies[body].friction;
         let v = self.speed(body);

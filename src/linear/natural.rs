@@ -1,11 +1,12 @@
-//! How any mechanism swings by itself while everything slides: rigid and elastic modes, their damping, and how the place changes them.
+//! How any mechanism swings by itself while everything slides: rigid and elastic modes, their damping, and how the
+//! place changes them.
 //!
 //! ```text
 //! M q̈ + C q̇ + K q = 0,   K = Aᵀ diag(k) A,   C = Aᵀ diag(c) A + B + n² K_t K_e / R
 //! ```
 //!
-//! over the bodies that move by themselves. Undamped modes are the eigenvectors of M^(−½) K M^(−½); as many of them are rigid as A leaves
-//! motions free, and of these the frequency is zero by construction.
+//! over the bodies that move by themselves. Undamped modes are the eigenvectors of M^(−½) K M^(−½); as many of them are
+//! rigid as A leaves motions free, and of these the frequency is zero by construction.
 
 use super::{Root, eigen};
 use crate::error::{Error, Result};
@@ -209,7 +210,8 @@ impl Matrices {
 fn poles(values: &[f64], damping: &DMatrix<f64>, free: usize) -> Result<Vec<Root>> {
     let n = values.len();
     let elastic = n - free;
-    // States: speeds of all modes, then ways of the elastic ones. A rigid way is an integrator, and nothing asks for it.
+    // States: speeds of all modes, then ways of the elastic ones. A rigid way is an integrator, and nothing asks for
+    // it.
     let a = DMatrix::from_fn(n + elastic, n + elastic, |i, j| match (i < n, j < n) {
         (true, true) => -damping[(i, j)],
         (true, false) => {
@@ -227,8 +229,8 @@ fn poles(values: &[f64], damping: &DMatrix<f64>, free: usize) -> Result<Vec<Root
     Ok(poles)
 }
 
-/// The same motions as sums of `shapes`, each of which moves one chosen body by one and the other chosen ones not at all; bodies that
-/// slide are chosen first.
+/// The same motions as sums of `shapes`, each of which moves one chosen body by one and the other chosen ones not at
+/// all; bodies that slide are chosen first.
 fn rigid(shapes: &DMatrix<f64>, slides: &dyn Fn(usize) -> bool) -> Vec<(usize, Vec<f64>)> {
     let mut left = shapes.clone();
     let count = left.ncols();

@@ -45,8 +45,8 @@ pub struct Transfer {
 }
 
 impl Transfer {
-    /// Integrators N from input to output (negative: it differentiates), and lim s^N G(s) for s → 0: the gain at zero frequency where N is
-    /// zero, the steady slope per unit of the input where N is one.
+    /// Integrators N from input to output (negative: it differentiates), and lim s^N G(s) for s → 0: the gain at zero
+    /// frequency where N is zero, the steady slope per unit of the input where N is one.
     pub fn low_frequency(&self) -> (i32, f64) {
         let zero = |values: &[Complex<f64>]| values.iter().filter(|v| v.norm() == 0.0).count() as i32;
         let order = zero(&self.poles) - zero(&self.zeros.values);
@@ -65,7 +65,8 @@ impl Transfer {
         }
     }
 
-    /// The phase at ω > 0, rad, followed from ω = 0 on: every zero of the left half plane turns by +π/2, every pole by −π/2.
+    /// The phase at ω > 0, rad, followed from ω = 0 on: every zero of the left half plane turns by +π/2, every pole by
+    /// −π/2.
     pub fn phase(&self, omega: f64) -> f64 {
         let turned = |omega: f64| -> f64 {
             let sum = |values: &[Complex<f64>]| -> f64 { values.iter().map(|v| turn(*v, omega)).sum() };
@@ -123,7 +124,8 @@ impl Range {
         }
     }
 
-    /// The frequencies, rad/s, rising; each pair among `roots` has points of its own, so that its peak or dip is drawn to its end.
+    /// The frequencies, rad/s, rising; each pair among `roots` has points of its own, so that its peak or dip is drawn
+    /// to its end.
     pub fn frequencies(&self, roots: &[Complex<f64>]) -> Vec<f64> {
         let (low, high) = (self.from.ln(), self.to.ln());
         let count = self.points.max(2);

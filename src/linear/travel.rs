@@ -22,8 +22,8 @@ pub struct Place {
     pub undamped_antiresonances: Vec<f64>,
 }
 
-/// Places spread evenly over the travel, or, where none is given, from a twentieth of span 2 before the idler pulley to a twentieth of span 1
-/// before the drive pulley; none where the stiffness does not depend on the place.
+/// Places spread evenly over the travel, or, where none is given, from a twentieth of span 2 before the idler pulley to
+/// a twentieth of span 1 before the drive pulley; none where the stiffness does not depend on the place.
 pub fn places(stage: &Stage, count: usize) -> Option<Vec<f64>> {
     let make = stage.belt.make.filter(|_| stage.belt.follows_cart)?;
     let [l1, l2, _] = make.spans;
@@ -62,7 +62,8 @@ pub fn travel(stage: &Stage, operation: Operation, positions: &[f64]) -> Result<
     positions.iter().map(place).collect()
 }
 
-/// The same masses and springs and nothing that takes energy: no friction, no damping, no back-EMF, a motor that is given its current.
+/// The same masses and springs and nothing that takes energy: no friction, no damping, no back-EMF, a motor that is
+/// given its current.
 pub fn undamped(stage: &Stage) -> Stage {
     let mut bare = stage.clone();
     let none = Friction { forward: Side::default(), backward: Side::default(), law: Law::Coulomb };

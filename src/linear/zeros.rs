@@ -1,8 +1,8 @@
 //! Invariant zeros of a system with one input and one output.
 //!
-//! The reduction of A. Emami-Naeini, P. Van Dooren, "Computation of zeros of linear multivariable systems", Automatica 18 (1982), which for
-//! one input and one output is: hold the output at zero, which costs one state, and look whether the input now decides what
-//! is left of the output; if not, again.
+//! The reduction of A. Emami-Naeini, P. Van Dooren, "Computation of zeros of linear multivariable systems", Automatica
+//! 18 (1982), which for one input and one output is: hold the output at zero, which costs one state, and look whether
+//! the input now decides what is left of the output; if not, again.
 
 use super::eigen::{NOTHING, balance, distance, norm, polished, rough, scaled, sort};
 use crate::error::Result;
@@ -14,16 +14,18 @@ const CANCELLED: f64 = 1e-11;
 /// The zeros of an output, and its gain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Zeros {
-    /// Where the output stays at zero though the state moves, rad/s (for a discrete-time system, 1); conjugates side by side.
+    /// Where the output stays at zero though the state moves, rad/s (for a discrete-time system, 1); conjugates side by
+    /// side.
     pub values: Vec<Complex<f64>>,
     /// Gain k in G(s) = k ∏ (s − z) / ∏ (s − p); zero where the input does not reach the output.
     pub gain: f64,
 }
 
-/// How many times y = c x + d u has to be differentiated until u shows in it, and by which factor it then does: d, c b, c A b, … until one is
-/// not zero; none if none is.
+/// How many times y = c x + d u has to be differentiated until u shows in it, and by which factor it then does: d, c b,
+/// c A b, … until one is not zero; none if none is.
 ///
-/// Best asked of a system whose coefficients are single numbers and no differences, so that what is zero is exactly that.
+/// Best asked of a system whose coefficients are single numbers and no differences, so that what is zero is exactly
+/// that.
 pub(crate) fn relative_degree(a: &DMatrix<f64>, b: &DVector<f64>, c: &DVector<f64>, d: f64) -> Option<(usize, f64)> {
     if d != 0.0 {
         return Some((0, d));
@@ -71,8 +73,8 @@ pub(crate) fn zeros(
             a = a.transpose();
             std::mem::swap(&mut b, &mut c);
         }
-        // With y = γ x_n = 0 what is left of the output is ẋ_n. Where one state alone is the output it only has to be put last, which
-        // rounds nothing.
+        // With y = γ x_n = 0 what is left of the output is ẋ_n. Where one state alone is the output it only has to be
+        // put last, which rounds nothing.
         if single(&c) {
             let place = c.iamax();
             a.swap_rows(place, n - 1);
@@ -107,8 +109,8 @@ pub(crate) fn zeros(
     Ok(Zeros { values, gain })
 }
 
-/// A system without the states that the output does not see or the input does not reach and that nothing else depends on; each of them is
-/// a zero that takes a pole away.
+/// A system without the states that the output does not see or the input does not reach and that nothing else depends
+/// on; each of them is a zero that takes a pole away.
 fn seen(
     mut a: DMatrix<f64>,
     mut b: DVector<f64>,

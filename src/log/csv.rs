@@ -1,8 +1,8 @@
 //! Columns of numbers from CSV, and every mistake told with its line.
 //!
-//! A row names the columns, or they go by number; they are parted by commas, semicolons, tabs or blanks. Blank lines and
-//! lines that start with `#`, `%` or `//` are passed over. Rows are read one at a time: a file may be larger than memory, a
-//! line not longer than 1 MiB.
+//! A row names the columns, or they go by number; they are parted by commas, semicolons, tabs or blanks. Blank lines
+//! and lines that start with `#`, `%` or `//` are passed over. Rows are read one at a time: a file may be larger than
+//! memory, a line not longer than 1 MiB.
 
 use super::lines::{Fields, Lines, open};
 use super::sheet::{ColumnId, Dialect, Request, Sheet, check_numbers};

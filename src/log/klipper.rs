@@ -1,4 +1,5 @@
-//! Files of Klipper's `data_logger.py`: messages of JSON, each ended by a byte 3, packed by gzip; all on the printer's clock.
+//! Files of Klipper's `data_logger.py`: messages of JSON, each ended by a byte 3, packed by gzip; all on the printer's
+//! clock.
 //!
 //! | column | what it is |
 //! |---|---|
@@ -7,9 +8,9 @@
 //! | `adxl345:NAME:x`, `:y`, `:z`; also lis2dw, mpu9250, icm20948 | an accelerometer, mm/s² |
 //! | `trapq:NAME:x`, `:y`, `:z`, and each with `_velocity`, `_accel` | what was commanded, mm, mm/s, mm/s² |
 //!
-//! Sensors have samples at times of their own. Rows are those of the sensor that is wanted first; other sensors are read between their
-//! samples on straight lines, as `readlog.py` does, and where one of them has none yet or no more there is no row. What was commanded is
-//! exact at any time.
+//! Sensors have samples at times of their own. Rows are those of the sensor that is wanted first; other sensors are
+//! read between their samples on straight lines, as `readlog.py` does, and where one of them has none yet or no more
+//! there is no row. What was commanded is exact at any time.
 
 use super::sheet::{ColumnId, Request, Sheet};
 use crate::error::{Error, Result};
@@ -234,7 +235,8 @@ impl Motion {
     }
 }
 
-/// Position, velocity or acceleration of what was commanded; before the first move its start, between moves the end of the last one.
+/// Position, velocity or acceleration of what was commanded; before the first move its start, between moves the end of
+/// the last one.
 fn commanded(moves: &[Motion], t: f64, axis: usize, rate: &str) -> f64 {
     let index = moves.partition_point(|motion| motion.begin <= t).saturating_sub(1);
     let Some(motion) = moves.get(index) else { return f64::NAN };

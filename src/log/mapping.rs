@@ -379,7 +379,8 @@ impl Columns<'_> {
         Ok(time[rows].to_vec())
     }
 
-    /// These times, the first of them in row `first`, from `start` (s) on. A time so far off that no difference is left is told.
+    /// These times, the first of them in row `first`, from `start` (s) on. A time so far off that no difference is left
+    /// is told.
     fn counted_from(&self, time: &[f64], start: f64, first: usize) -> Result<Vec<f64>> {
         let shifted: Vec<f64> = time.iter().map(|t| t - start).collect();
         let lost = (1..shifted.len()).find(|&k| !(shifted[k].is_finite() && shifted[k] > shifted[k - 1]));

@@ -1,7 +1,8 @@
 //! Columns from MATLAB files of versions 5 to 7, plain or compressed, of either byte order.
 //!
-//! Read are real arrays of any numeric class: a vector, or one column or row of a matrix as in `data(:,2)`. Text, structs, cells
-//! and objects are passed over and named where one is asked for. Files of version 7.3 are HDF5: they are refused with a remedy.
+//! Read are real arrays of any numeric class: a vector, or one column or row of a matrix as in `data(:,2)`. Text,
+//! structs, cells and objects are passed over and named where one is asked for. Files of version 7.3 are HDF5: they are
+//! refused with a remedy.
 //!
 //! After "MAT-File Format" (MathWorks, R2019b): a header of 128 bytes, then elements, each of type, size and data.
 
@@ -122,7 +123,8 @@ enum Which {
     Row(usize),
 }
 
-/// Where the numbers of a wanted variable are: within the variable, stored column by column, every `step`-th from `first` on.
+/// Where the numbers of a wanted variable are: within the variable, stored column by column, every `step`-th from
+/// `first` on.
 struct Part {
     variable: usize,
     first: usize,

@@ -16,7 +16,8 @@ pub struct Preset {
     pub title: &'static str,
     /// When the samples were taken: a column, and its unit.
     pub time: (Pick, &'static str),
-    /// Columns that there may be: key of the log's table, names of which the first that is there counts, and their unit.
+    /// Columns that there may be: key of the log's table, names of which the first that is there counts, and their
+    /// unit.
     pub columns: &'static [(&'static str, &'static [&'static str], In)],
     /// Lines that end the numbers.
     pub ends: &'static [End],

@@ -1,5 +1,5 @@
-//! Parts that work piece by piece beside the bodies: amplifiers with limits, springs that only pull or only push. Each is linear in each of
-//! its states; the conditions that lead from one to the other are linear forms.
+//! Parts that work piece by piece beside the bodies: amplifiers with limits, springs that only pull or only push. Each
+//! is linear in each of its states; the conditions that lead from one to the other are linear forms.
 
 use super::{AmplifierMode, Cause, Contact, Drive, Form, Guard, Limit, Mechanism, Mode, SPRINGS, SpringLaw, Switch};
 use std::f64::consts::PI;
@@ -101,8 +101,9 @@ impl Mechanism {
 
     // --- springs ----------------------------------------------------------------------------------------------------
 
-    /// Force of a spring in `mode`, N or N m: f = k s + c ṡ of one that pushes and pulls. One that only pulls carries T₀ more than
-    /// that, and nothing where it is slack: f = −T₀. One that only pushes has passed the side that it touches: f = k (s − s_side) + c ṡ.
+    /// Force of a spring in `mode`, N or N m: f = k s + c ṡ of one that pushes and pulls. One that only pulls carries
+    /// T₀ more than that, and nothing where it is slack: f = −T₀. One that only pushes has passed the side that it
+    /// touches: f = k (s − s_side) + c ṡ.
     pub fn spring_force(&self, spring: usize, mode: &Mode) -> Form {
         let part = &self.springs[spring];
         let whole = || Form::stretch(spring) * part.stiffness + self.stretch_rate(spring) * part.damping;

@@ -55,8 +55,8 @@ impl Mechanism {
         }
     }
 
-    /// All forces (N) or torques (N m) on a body, and on those that move with it, except friction, for a body that moves, or
-    /// is about to move, forward or backward: the inner brackets of eq. (16)-(18).
+    /// All forces (N) or torques (N m) on a body, and on those that move with it, except friction, for a body that
+    /// moves, or is about to move, forward or backward: the inner brackets of eq. (16)-(18).
     pub fn load(&self, body: usize, forward: bool, mode: &Mode) -> Form {
         self.load_by(&self.forces(mode), body, forward, mode)
     }
@@ -90,7 +90,8 @@ impl Mechanism {
             };
             load = load + self.current(index, mode) * (drive.motor.torque_constant * drive.motor.gear_ratio * e);
         }
-        // −Aᵀ f: for the axis −r f₁ + r f₃ (16), f₁ − f₂ (17), r f₂ − r f₃ (18), f being k₁ (r φ₁ − x) + c₁ (r φ̇₁ − ẋ) and so on
+        // −Aᵀ f: for the axis −r f₁ + r f₃ (16), f₁ − f₂ (17), r f₂ − r f₃ (18), f being k₁ (r φ₁ − x) + c₁ (r φ̇₁ − ẋ)
+        // and so on
         for (spring, part) in self.springs.iter().enumerate().rev() {
             for &(_, arm) in part.arms.iter().filter(|(other, _)| *other == body) {
                 let arm = arm * self.gear_share(body, spring, forward, mode);
@@ -100,7 +101,8 @@ impl Mechanism {
         load + Form::constant(self.bodies[body].force)
     }
 
-    /// By what the torque of a spring on a body is multiplied: 1, but 1/e for a rotor behind a compliant gear and loses power.
+    /// By what the torque of a spring on a body is multiplied: 1, but 1/e for a rotor behind a compliant gear and loses
+    /// power.
     fn gear_share(&self, body: usize, spring: usize, forward: bool, mode: &Mode) -> f64 {
         let is_behind = |drive: &usize| {
             let part = &self.drives[*drive];
@@ -112,8 +114,8 @@ impl Mechanism {
         }
     }
 
-    /// The torque whose sign tells how a gear with losses counts as carrying: T = K_t i − J_r n φ̈₁, what the motor hands to a stiff
-    /// gear, or that of a gear which gives way; nothing where the flanks tell it.
+    /// The torque whose sign tells how a gear with losses counts as carrying: T = K_t i − J_r n φ̈₁, what the motor
+    /// hands to a stiff gear, or that of a gear which gives way; nothing where the flanks tell it.
     fn gear_torque(&self, drive: usize, mode: &Mode, acceleration: &[Form; BODIES]) -> Option<Form> {
         let part = &self.drives[drive];
         if !part.loses() {
@@ -139,7 +141,8 @@ impl Mechanism {
         }
     }
 
-    /// Inertia of each body in `mode`, with what is geared to it: J₁ + e n² J_r, for the rotor turns n times as fast, behind the gear.
+    /// Inertia of each body in `mode`, with what is geared to it: J₁ + e n² J_r, for the rotor turns n times as fast,
+    /// behind the gear.
     fn inertia(&self, mode: &Mode) -> [f64; BODIES] {
         let mut inertia = [0.0; BODIES];
         for (inertia, body) in inertia.iter_mut().zip(&self.bodies) {
@@ -153,8 +156,8 @@ impl Mechanism {
         inertia
     }
 
-    /// Inertias by which springs give to one body what they take from another. A gear that gives way and loses power puts 1/e of its
-    /// torque on the rotor, J_r φ̈_r = τ − T/e, which is e J_r φ̈_r = e τ − T.
+    /// Inertias by which springs give to one body what they take from another. A gear that gives way and loses power
+    /// puts 1/e of its torque on the rotor, J_r φ̈_r = τ − T/e, which is e J_r φ̈_r = e τ − T.
     pub(crate) fn balanced_inertia(&self, equations: &Equations, mode: &Mode) -> [f64; BODIES] {
         let mut inertia = equations.inertia;
         for (index, drive) in self.drives.iter().enumerate().filter(|(_, drive)| drive.loses()) {
@@ -233,10 +236,11 @@ impl Mechanism {
         Equations { acceleration, current_rate, inertia, stiffness: self.stiffness_in(&mode), guards, load: loads }
     }
 
-    /// Friction force (N) or torque (N m) on a body: what its law gives while it slides, what holds it while it is stuck.
+    /// Friction force (N) or torque (N m) on a body: what its law gives while it slides, what holds it while it is
+    /// stuck.
     ///
-    /// `load` is all else that acts on the body: the least and the most of it, which differ only where a gear with losses
-    /// holds a share of its own.
+    /// `load` is all else that acts on the body: the least and the most of it, which differ only where a gear with
+    /// losses holds a share of its own.
     pub fn friction_value(&self, body: usize, motion: Motion, speed: f64, load: (f64, f64)) -> f64 {
         let law = self.friction(body);
         match motion {

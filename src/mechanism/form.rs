@@ -1,4 +1,5 @@
-//! Linear forms of the state: forces written as the paper writes them, and evaluated, differentiated and bounded by machine.
+//! Linear forms of the state: forces written as the paper writes them, and evaluated, differentiated and bounded by
+//! machine.
 
 use super::{BODIES, DRIVES, Layout, Mechanism, SPRINGS, State};
 use std::ops::{Add, Mul, Neg, Sub};

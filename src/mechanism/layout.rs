@@ -1,9 +1,9 @@
 //! Which quantities are the states of the solvers, and where what stands among them.
 //!
-//! A force of k (r φ₁ − x) computed from positions carries the rounding of those positions times k. With the stretch as a state it
-//! carries the rounding of the stretch, however far from the origin the machine is. So the lengths of springs that hang a
-//! pulley on other bodies stand in the places of the pulleys' angles, as long as they are independent; ways of bodies that slide
-//! are counted from where the run begins. For the axis, c = A′ q:
+//! A force of k (r φ₁ − x) computed from positions carries the rounding of those positions times k. With the stretch as
+//! a state it carries the rounding of the stretch, however far from the origin the machine is. So the lengths of
+//! springs that hang a pulley on other bodies stand in the places of the pulleys' angles, as long as they are
+//! independent; ways of bodies that slide are counted from where the run begins. For the axis, c = A′ q:
 //!
 //! ```text
 //! c = (r φ₁ − x,  x − x₀,  x − r φ₃,  φ_r − φ₁)
@@ -48,7 +48,8 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// That of a mechanism: bodies in their order, each with its coordinate and its speed, then the currents, then rotors.
+    /// That of a mechanism: bodies in their order, each with its coordinate and its speed, then the currents, then
+    /// rotors.
     pub(crate) fn new(mechanism: &Mechanism) -> Self {
         let bodies = mechanism.bodies.len();
         let held = mechanism.held_bodies().len();

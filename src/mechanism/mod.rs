@@ -6,8 +6,8 @@
 //! s = A q,   f = K s + C ṡ,   M q̈ = −Aᵀ f + G i − F_f(q̇) + F
 //! ```
 //!
-//! Friction, limits, slack and play make this piecewise linear; within one [`Mode`] it is linear, and [`Mechanism::equations`]
-//! gives it. Which bodies there are, and what they are called, is [`crate::stage`]'s to say.
+//! Friction, limits, slack and play make this piecewise linear; within one [`Mode`] it is linear, and
+//! [`Mechanism::equations`] gives it. Which bodies there are, and what they are called, is [`crate::stage`]'s to say.
 
 mod drive;
 mod elements;
@@ -263,7 +263,8 @@ pub struct State {
     pub current: [f64; DRIVES],
 }
 
-/// The roles of the parts of a machine, by their numbers. Who asks for figures asks here, and takes keys and names from the labels.
+/// The roles of the parts of a machine, by their numbers. Who asks for figures asks here, and takes keys and names from
+/// the labels.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Roles {
     /// Bodies that it is there to move.
@@ -294,7 +295,8 @@ pub struct Mechanism {
 }
 
 impl Mechanism {
-    /// The mechanism of these parts. Rotors stand behind all other bodies, and no list is longer than there is room for.
+    /// The mechanism of these parts. Rotors stand behind all other bodies, and no list is longer than there is room
+    /// for.
     pub fn new(bodies: Vec<Body>, springs: Vec<Spring>, drives: Vec<Drive>) -> Self {
         assert!(bodies.len() <= BODIES && springs.len() <= SPRINGS && drives.len() <= DRIVES);
         assert!(bodies.iter().is_sorted_by_key(|body| body.is_rotor));
@@ -342,8 +344,9 @@ impl Mechanism {
         0..self.bodies.iter().take_while(|body| !body.is_rotor).count()
     }
 
-    /// Friction of a body and of those that move with it, as far as it is b v ± F_c and a breakaway: what the equations of a mode have.
-    /// The friction of a body: one that never sticks has nothing but b v. None for a body that another leads.
+    /// Friction of a body and of those that move with it, as far as it is b v ± F_c and a breakaway: what the equations
+    /// of a mode have. The friction of a body: one that never sticks has nothing but b v. None for a body that another
+    /// leads.
     pub fn friction(&self, body: usize) -> &Friction {
         &self.friction[body].0
     }
@@ -366,7 +369,8 @@ impl Mechanism {
         self.springs[spring].arms.iter().map(|&(body, arm)| arm * position[body]).sum()
     }
 
-    /// How the length of a spring changes per way of each body that moves by itself; nothing where one body carries all its ends.
+    /// How the length of a spring changes per way of each body that moves by itself; nothing where one body carries all
+    /// its ends.
     pub fn leading_arms(&self, spring: usize) -> [f64; BODIES] {
         let (mut arms, mut size) = ([0.0; BODIES], 0.0);
         for &(body, arm) in &self.springs[spring].arms {
@@ -392,7 +396,8 @@ impl Mechanism {
         if layout.origin(start) == self.origin { Arc::clone(self) } else { Arc::new(self.seen_from(layout, start)) }
     }
 
-    /// The same with ways counted from where `start` is: ends and bounds move there, before anything is multiplied with them.
+    /// The same with ways counted from where `start` is: ends and bounds move there, before anything is multiplied with
+    /// them.
     pub(crate) fn seen_from(&self, layout: &Layout, start: &State) -> Self {
         let mut seen = self.clone();
         seen.origin = layout.origin(start);

@@ -98,8 +98,8 @@ impl Limit {
     }
 }
 
-/// Whether two elastic flanks touch, and on which side. A flank only pushes: one that its damper holds back from following
-/// carries nothing, though it has not left.
+/// Whether two elastic flanks touch, and on which side. A flank only pushes: one that its damper holds back from
+/// following carries nothing, though it has not left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Contact {
     /// The negative side carries.
@@ -187,8 +187,8 @@ pub enum Status {
 }
 
 impl Status {
-    /// As in the result files: a body −1 backward, 0 stuck, 1 forward, 2 free; a span 1 if slack; a limit, gear or stop the
-    /// side that binds or carries, or 0.
+    /// As in the result files: a body −1 backward, 0 stuck, 1 forward, 2 free; a span 1 if slack; a limit, gear or stop
+    /// the side that binds or carries, or 0.
     pub fn code(self) -> i8 {
         match self {
             Status::Motion(motion) => motion.code(),
@@ -245,12 +245,12 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// Room for the kinds that [`Cause::kind`] tells apart: two for each body, one for each gear, three each for a drive's limits and for a
-    /// spring.
+    /// Room for the kinds that [`Cause::kind`] tells apart: two for each body, one for each gear, three each for a
+    /// drive's limits and for a spring.
     pub(crate) const KINDS: usize = 2 * BODIES + 7 * DRIVES + 3 * SPRINGS;
 
-    /// Which condition it belongs to; breakaway forward stands with the body, breakaway backward, which may be of quite another size,
-    /// by itself.
+    /// Which condition it belongs to; breakaway forward stands with the body, breakaway backward, which may be of quite
+    /// another size, by itself.
     pub(crate) fn kind(self) -> usize {
         const GEAR: usize = 2 * BODIES;
         const LIMITS: usize = GEAR + DRIVES;
@@ -276,9 +276,9 @@ impl Cause {
         }
     }
 
-    /// Which of several conditions that have fallen at one instant is settled first: limits, flanks, spans and stops, which
-    /// follow from the state and the input alone; then the gears' torques, which follow from them; then bodies, which break away
-    /// with the load that all of these leave.
+    /// Which of several conditions that have fallen at one instant is settled first: limits, flanks, spans and stops,
+    /// which follow from the state and the input alone; then the gears' torques, which follow from them; then bodies,
+    /// which break away with the load that all of these leave.
     pub(crate) fn rank(self) -> u8 {
         match self {
             Cause::Leave(_) => 0,

@@ -50,7 +50,8 @@ impl Power {
 struct Strain {
     /// The way that its force follows.
     way: f64,
-    /// The strain that its energy follows: nothing where one that is not straight yet is pulled tight against its damping.
+    /// The strain that its energy follows: nothing where one that is not straight yet is pulled tight against its
+    /// damping.
     strain: f64,
     rate: f64,
 }
@@ -65,8 +66,8 @@ impl Mechanism {
 
     /// Energy stored at `state`, J: ½ Σ J q̇² + ½ L i², and what the springs hold.
     ///
-    /// A spring that pushes and pulls holds ½ k s², one that only pulls t²/2k, t being its tension without damping, and nothing if
-    /// slack; one that only pushes what it is pressed.
+    /// A spring that pushes and pulls holds ½ k s², one that only pulls t²/2k, t being its tension without damping, and
+    /// nothing if slack; one that only pushes what it is pressed.
     pub fn energy(&self, state: &State) -> f64 {
         let kinetic: f64 =
             (0..self.bodies.len()).map(|body| self.whole_inertia(body) * state.speed[body].powi(2)).sum();
@@ -112,7 +113,8 @@ impl Mechanism {
             power.stored += self.whole_inertia(body) * speed * acceleration[body];
         }
         for (index, spring) in self.springs.iter().enumerate() {
-            // Whatever a spring takes up and does not keep is lost in its damper; so is all that one holds that lets go early.
+            // Whatever a spring takes up and does not keep is lost in its damper; so is all that one holds that lets go
+            // early.
             let s = self.strain(index, state);
             let kept = spring.stiffness * s.strain;
             let force = if stiffness[index] > 0.0 { spring.stiffness * s.way + spring.damping * s.rate } else { 0.0 };

@@ -1,5 +1,5 @@
-//! The key figures of a gantry's run: where bridge and cart ended, how fast they went, what belts and motors took, how far they were from
-//! where the drives say, and when everything came to rest.
+//! The key figures of a gantry's run: where bridge and cart ended, how fast they went, what belts and motors took, how
+//! far they were from where the drives say, and when everything came to rest.
 
 use super::watch::{Sum, Watch, Watched};
 use super::{EventCount, Peak};
@@ -27,14 +27,16 @@ pub struct GantryMetrics {
     pub peak_error: [Peak; 2],
     /// Currents of the left and the right motor of largest magnitude, A.
     pub peak_current: [Peak; DRIVES],
-    /// Speeds of the left and the right motor behind its gear, of largest magnitude, rad/s: those of the pulleys where the gear is stiff.
+    /// Speeds of the left and the right motor behind its gear, of largest magnitude, rad/s: those of the pulleys where
+    /// the gear is stiff.
     pub peak_drive_speed: [Peak; DRIVES],
     /// Stretch of each span of largest magnitude, m, in the order of [`Routing::spans`](crate::stage::gantry::Routing).
     pub peak_stretch: Vec<Peak>,
-    /// Force in each span of largest magnitude, N, damping included, in the order of [`Routing::spans`](crate::stage::gantry::Routing).
+    /// Force in each span of largest magnitude, N, damping included, in the order of
+    /// [`Routing::spans`](crate::stage::gantry::Routing).
     pub peak_force: Vec<Peak>,
-    /// When everything came to rest, s, if it has; 0 if nothing ever moved. None while anything moves, and where a body has no dry friction
-    /// to stick by.
+    /// When everything came to rest, s, if it has; 0 if nothing ever moved. None while anything moves, and where a body
+    /// has no dry friction to stick by.
     pub stop_time: Option<f64>,
     /// Whether everything is at rest at the end: bodies and rotors.
     pub settled: bool,

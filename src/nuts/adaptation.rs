@@ -31,7 +31,7 @@ impl Steps {
         const KAPPA: f64 = 0.75;
         self.count += 1.0;
         let m = self.count;
-        // H̄ = (1 − 1/(m + t₀)) H̄ + (δ − α)/(m + t₀);  ln ε = μ − √m/γ H̄;  ln ε̄ = m^−κ ln ε + (1 − m^−κ) ln ε̄         (6)
+        // H̄ = (1 − 1/(m + t₀)) H̄ + (δ − α)/(m + t₀); ln ε = μ − √m/γ H̄; ln ε̄ = m^−κ ln ε + (1 − m^−κ) ln ε̄ (6)
         self.lack += (Self::WANTED - acceptance - self.lack) / (m + T0);
         let next = self.mu - sqrt(m) / GAMMA * self.lack;
         let eta = pow(m, -KAPPA);
@@ -45,8 +45,9 @@ impl Steps {
     }
 }
 
-/// After which draws the covariance is estimated from those since the last time: Stan's windows (Stan Reference Manual, "Automatic
-/// parameter tuning"): a start whose draws count nowhere, windows that double in length, an end for the step alone.
+/// After which draws the covariance is estimated from those since the last time: Stan's windows (Stan Reference Manual,
+/// "Automatic parameter tuning"): a start whose draws count nowhere, windows that double in length, an end for the step
+/// alone.
 pub struct Windows {
     /// Draws before which nothing is learnt.
     pub begin: usize,
@@ -77,8 +78,8 @@ impl Windows {
     }
 }
 
-/// L of the covariance of these draws, whose correlations are made smaller by as much as few draws of many variables overrate them;
-/// none where a variable did not move.
+/// L of the covariance of these draws, whose correlations are made smaller by as much as few draws of many variables
+/// overrate them; none where a variable did not move.
 pub fn factor(draws: &[Vec<f64>]) -> Option<DMatrix<f64>> {
     let n = draws.first()?.len();
     let count = draws.len() as f64;

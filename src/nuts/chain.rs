@@ -1,7 +1,9 @@
-//! One chain: Hoffman & Gelman, "The No-U-Turn Sampler", JMLR 15 (2014), with the draw taken along the whole path in proportion to
-//! the density and the criterion of Betancourt, "A Conceptual Introduction to Hamiltonian Monte Carlo", arXiv:1701.02434 (2017).
+//! One chain: Hoffman & Gelman, "The No-U-Turn Sampler", JMLR 15 (2014), with the draw taken along the whole path in
+//! proportion to the density and the criterion of Betancourt, "A Conceptual Introduction to Hamiltonian Monte Carlo",
+//! arXiv:1701.02434 (2017).
 //!
-//! With π the density, Σ an estimate of its covariance (the inverse of the mass matrix), p the momentum, Σ = L Lᵀ and r = Lᵀ p:
+//! With π the density, Σ an estimate of its covariance (the inverse of the mass matrix), p the momentum, Σ = L Lᵀ and r
+//! = Lᵀ p:
 //!
 //! ```text
 //! H = −ln π(q) + ½ pᵀ Σ p = −ln π(q) + ½ rᵀ r          r is drawn from the standard normal distribution
@@ -152,7 +154,8 @@ impl<'a> Chain<'a> {
         self.at.momentum.iter_mut().for_each(|r| *r = normal(random));
     }
 
-    /// Halves or doubles ε until one step changes the energy by about as much as is wanted of all (Hoffman & Gelman, algorithm 4).
+    /// Halves or doubles ε until one step changes the energy by about as much as is wanted of all (Hoffman & Gelman,
+    /// algorithm 4).
     pub fn find_step(&mut self) {
         let mut grows = None;
         for _ in 0..50 {
@@ -166,8 +169,8 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Goes to the next draw, and gives the mean probability of acceptance along the path; none if it was interrupted: then it
-    /// stays where it is.
+    /// Goes to the next draw, and gives the mean probability of acceptance along the path; none if it was interrupted:
+    /// then it stays where it is.
     pub fn draw(&mut self) -> Option<f64> {
         (self.diverged, self.accepted) = (false, [0.0; 2]);
         self.kick();
@@ -224,8 +227,8 @@ impl Stretch {
         let momenta = &first.momenta + &last.momenta;
         let [begin, end] = [&first.ends[0].momentum, &last.ends[1].momentum];
         let [seam_before, seam_after] = [&first.ends[1].momentum, &last.ends[0].momentum];
-        // A path goes on as long as p♯·Σp > 0 at both ends, where p♯ = M⁻¹ p (Betancourt, A.4.2); so must each half with the point
-        // beyond the seam. In r: rᵀ Σr.
+        // A path goes on as long as p♯·Σp > 0 at both ends, where p♯ = M⁻¹ p (Betancourt, A.4.2); so must each half
+        // with the point beyond the seam. In r: rᵀ Σr.
         let goes_on = |a: &DVector<f64>, b: &DVector<f64>, sum: &DVector<f64>| a.dot(sum) > 0.0 && b.dot(sum) > 0.0;
         let turned = !(goes_on(begin, end, &momenta)
             && goes_on(begin, seam_after, &(&first.momenta + seam_after))

@@ -151,7 +151,8 @@ fn belt(stage: &Stage, places: &[Place]) -> Option<Group> {
     Some(group)
 }
 
-/// By how much the cart gives way per force, the drive pulley held, m/N: the idler pulley turns freely between spans 2 and 3.
+/// By how much the cart gives way per force, the drive pulley held, m/N: the idler pulley turns freely between spans 2
+/// and 3.
 fn compliance(stage: &Stage, x: f64) -> f64 {
     let [mut k1, mut k2, k3] = stage.belt.stiffness;
     if let Some(make) = stage.belt.make.filter(|_| stage.belt.follows_cart) {

@@ -155,7 +155,8 @@ fn place(gantry: &Gantry, [x, y]: [f64; 2]) -> Result<Place> {
         }
         None => gantry.belts.stiffness.clone(),
     };
-    // K = Σ k a aᵀ over what bridge and cart do to the spans, the pulleys held; its inverse says by how much they give way.
+    // K = Σ k a aᵀ over what bridge and cart do to the spans, the pulleys held; its inverse says by how much they give
+    // way.
     let mut k = [[0.0; 2]; 2];
     for (&span, stiffness) in mechanism.roles.spans.iter().zip(&stiffness) {
         let arms = mechanism.leading_arms(span);

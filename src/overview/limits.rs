@@ -90,7 +90,8 @@ impl Power {
         Some((Self { force, voltage: volts, per_volt, brake }, words.join(" and ")))
     }
 
-    /// The speed at which the force is used up by Coulomb friction, viscous friction and a constant load against it, m/s.
+    /// The speed at which the force is used up by Coulomb friction, viscous friction and a constant load against it,
+    /// m/s.
     pub fn speed(&self, coulomb: f64, viscous: f64, against: f64) -> Option<f64> {
         let left = self.force - coulomb - against;
         if left <= 0.0 {

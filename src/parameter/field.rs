@@ -404,7 +404,8 @@ macro_rules! of_slide {
     };
 }
 
-/// A number of a body's friction: of the drive pulley in both kinds of machine, of what slides in a gantry, or of another body of an axis.
+/// A number of a body's friction: of the drive pulley in both kinds of machine, of what slides in a gantry, or of
+/// another body of an axis.
 macro_rules! of_friction {
     (field $body:ident, |$law:ident| $get:expr, |$new:ident, $value:ident| $set:expr) => {
         Field::number(

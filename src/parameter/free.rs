@@ -1,4 +1,5 @@
-//! Free parameters: numbers of a machine that a fit searches for, a sweep varies or that are off, with all that goes along.
+//! Free parameters: numbers of a machine that a fit searches for, a sweep varies or that are off, with all that goes
+//! along.
 
 use super::field::List;
 use super::{Field, Numbers, Off, Parameter, Sits, Sum, all, at_pulley};
@@ -60,9 +61,9 @@ pub type GivenBounds = [(String, [f64; 2])];
 const FAR: f64 = 100.0;
 
 impl Free {
-    /// The numbers that `name` stands for: a key of the case file, several joined by ` = `, which keep their present ratio (equal, where one of
-    /// them is zero), or a sum such as `total.viscous`, whose parts keep theirs. What goes along with a key is set by itself if it is
-    /// among `free`, the keys of all free parameters.
+    /// The numbers that `name` stands for: a key of the case file, several joined by ` = `, which keep their present
+    /// ratio (equal, where one of them is zero), or a sum such as `total.viscous`, whose parts keep theirs. What goes
+    /// along with a key is set by itself if it is among `free`, the keys of all free parameters.
     ///
     /// ```
     /// use taut::case::{Case, TEMPLATE};
@@ -198,8 +199,8 @@ pub fn values(machine: &dyn Numbers) -> Vec<(String, f64)> {
     all().filter_map(of).flatten().collect()
 }
 
-/// The keys of everything of a machine that may be off and is not zero. Directions and breakaways that have the same value, and drives
-/// that are alike, count once.
+/// The keys of everything of a machine that may be off and is not zero. Directions and breakaways that have the same
+/// value, and drives that are alike, count once.
 pub fn every(machine: &dyn Numbers) -> Vec<String> {
     let mut keys = Vec::new();
     for row in all().filter(|row| row.off != Off::No) {
@@ -270,7 +271,8 @@ fn follows_any(machine: &dyn Numbers, number: Number) -> bool {
     leads(machine, number).next().is_some()
 }
 
-/// The numbers that a number follows, as far as it has the same value: of the same body, the one that is asked first first.
+/// The numbers that a number follows, as far as it has the same value: of the same body, the one that is asked first
+/// first.
 fn leads<'a>(machine: &'a dyn Numbers, number: Number) -> impl Iterator<Item = Number> + 'a {
     let Number { row, index } = number;
     let own = number.value(machine);
@@ -303,8 +305,8 @@ fn leader(machine: &dyn Numbers, number: Number, is_free: &dyn Fn(&str) -> bool)
     leads(machine, number).find(is_free_itself).or_else(further)
 }
 
-/// The numbers that a key names, without those of a drive that are among `free` by themselves, and its row. Errors: a key that names none,
-/// or one that this machine has not.
+/// The numbers that a key names, without those of a drive that are among `free` by themselves, and its row. Errors: a
+/// key that names none, or one that this machine has not.
 fn numbers(machine: &dyn Numbers, key: &str, free: &[&str]) -> Result<(Vec<Number>, &'static Parameter)> {
     let row = machine.row(key).ok_or_else(|| unknown(machine, key))?;
     let sits = machine.sits(row);
@@ -363,8 +365,8 @@ fn numbers(machine: &dyn Numbers, key: &str, free: &[&str]) -> Result<(Vec<Numbe
     }
 }
 
-/// The least and the greatest value: as given for the name, or for any of the keys, which are so many times as large; else far from
-/// the start and within the range.
+/// The least and the greatest value: as given for the name, or for any of the keys, which are so many times as large;
+/// else far from the start and within the range.
 fn limits(
     name: &str,
     keys: &[(String, f64)],

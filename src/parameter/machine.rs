@@ -11,7 +11,8 @@ pub trait Numbers {
     /// Where it has the number of a row.
     fn sits(&self, row: &Parameter) -> Sits;
 
-    /// The value of a row, at a place where that is a list; none where the machine has no such part, or computes it from others.
+    /// The value of a row, at a place where that is a list; none where the machine has no such part, or computes it
+    /// from others.
     fn get(&self, row: &Parameter, index: usize) -> Option<f64>;
 
     /// Sets it, and what is computed from it; does nothing where the machine has no such part.

@@ -1,8 +1,8 @@
-//! The one table of parameters: every number a case file can hold, with its symbol, unit, default, range and meaning, where it
-//! sits in a machine, whether it may be off, and what it is tied to.
+//! The one table of parameters: every number a case file can hold, with its symbol, unit, default, range and meaning,
+//! where it sits in a machine, whether it may be off, and what it is tied to.
 //!
-//! Reading, range checks, free parameters of fits and sweeps, what `--spread` and `taut tune` take to be off, and documentation
-//! derive from it.
+//! Reading, range checks, free parameters of fits and sweeps, what `--spread` and `taut tune` take to be off, and
+//! documentation derive from it.
 
 mod field;
 mod free;
@@ -44,7 +44,8 @@ pub struct Parameter {
     pub gantry: Field<Gantry>,
     /// Whether it may be off where nobody names it, and with which others.
     pub off: Off,
-    /// The keys that it goes with as long as it has the same value and is not named itself, the one that is asked first first.
+    /// The keys that it goes with as long as it has the same value and is not named itself, the one that is asked first
+    /// first.
     pub follows: &'static [&'static str],
     /// The sum over the bodies that it is a part of.
     pub part: Option<(Sum, Arm)>,
@@ -57,8 +58,8 @@ pub enum Off {
     No,
     /// By itself, and only where everything is varied: positions are measured with it.
     Alone,
-    /// Together with all others of this name, which are tied to it by nature: one motor has one constant, and pulleys are of one
-    /// kind. `--vary all` varies each of them by itself.
+    /// Together with all others of this name, which are tied to it by nature: one motor has one constant, and pulleys
+    /// are of one kind. `--vary all` varies each of them by itself.
     With(&'static str),
 }
 
@@ -150,7 +151,8 @@ impl Arm {
 /// The unit of what is fed into the amplifier: V in voltage mode, A in current mode.
 pub const INPUT: &str = "V or A";
 
-/// The unit that a parameter has where the amplifier takes `input` (V or A): its own, or the one of two that fits, the first in volts.
+/// The unit that a parameter has where the amplifier takes `input` (V or A): its own, or the one of two that fits, the
+/// first in volts.
 pub fn unit_for(unit: &'static str, input: &str) -> &'static str {
     match unit.split_once(" or ") {
         Some((volts, amperes)) => {

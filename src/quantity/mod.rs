@@ -3,12 +3,15 @@
 //! This is the only place where units are converted. A quantity is a number and a unit expression:
 //!
 //! - numbers: `19.4`, `1.5e-3`, `5.5626×10^-6`, `2/3`; the decimal point is a point;
-//! - units with SI prefixes: `mm`, `kN`, `µH`, `GPa`, and those of the workshop: `in`, `lbf`, `ozf`, `rpm`, `deg`, `psi`;
+//! - units with SI prefixes: `mm`, `kN`, `µH`, `GPa`, and those of the workshop: `in`, `lbf`, `ozf`, `rpm`, `deg`,
+//!   `psi`;
 //! - products by a space, `*`, `·`, `.` or `-`; powers as `m^2`, `m²`, `m2` or `s^-1`;
-//! - a `/` divides by the one factor that follows it, so `N m/rad/s` is N m rad⁻¹ s⁻¹; after a `/` a product has to stand in
-//!   brackets: `V/(rad s)`. Whether `V/rad s` means `V/(rad s)` or `V s/rad` nobody can tell, so it is refused.
+//! - a `/` divides by the one factor that follows it, so `N m/rad/s` is N m rad⁻¹ s⁻¹; after a `/` a product has to
+//!   stand in brackets: `V/(rad s)`. Whether `V/rad s` means `V/(rad s)` or `V s/rad` nobody can tell, so it is
+//!   refused.
 //!
-//! Powers of ten are applied to the digits of the number itself: `"19.4 mm"` gives the same bits as the literal `0.0194`.
+//! Powers of ten are applied to the digits of the number itself: `"19.4 mm"` gives the same bits as the literal
+//! `0.0194`.
 
 mod cursor;
 mod dimension;
@@ -62,8 +65,8 @@ pub fn parse(text: &str) -> Result<Quantity> {
 
 /// Reads a quantity that is wanted in `unit` or anything convertible to it; the result is in SI.
 ///
-/// Radians may be left out, as they usually are: where `N m s/rad` is wanted, `N m s` will do. What counts turns is kept
-/// apart from what counts radians: 5 Hz is not accepted as an angular speed, nor 31.4 rad/s as a frequency.
+/// Radians may be left out, as they usually are: where `N m s/rad` is wanted, `N m s` will do. What counts turns is
+/// kept apart from what counts radians: 5 Hz is not accepted as an angular speed, nor 31.4 rad/s as a frequency.
 ///
 /// ```
 /// use taut::quantity::read;

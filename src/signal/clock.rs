@@ -80,7 +80,8 @@ impl Sequence {
         &self.slots
     }
 
-    /// Whose turn it is `now`, found by halving: a look-up costs the logarithm of the number of turns. None without turns.
+    /// Whose turn it is `now`, found by halving: a look-up costs the logarithm of the number of turns. None without
+    /// turns.
     pub(super) fn turn(&self, now: Now) -> Option<Turn<'_>> {
         // The first turn whose end, the start of the next, is not reached.
         let ends = self.starts.get(1..)?;

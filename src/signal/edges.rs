@@ -61,7 +61,8 @@ pub(super) fn triangle_value(now: Now, amplitude: f64, frequency: f64) -> f64 {
     if frequency == 0.0 || !now.resolves(0.5 / frequency.abs()) {
         return 0.0;
     }
-    // The share s of a period since the last upward crossing of zero, −½ to ½: u = 4 a s up to the peak at ¼, and so on.
+    // The share s of a period since the last upward crossing of zero, −½ to ½: u = 4 a s up to the peak at ¼, and so
+    // on.
     let (turns, rest) = product(frequency, now.t);
     let s = (turns - turns.round()) + rest;
     let s = if s > 0.25 {

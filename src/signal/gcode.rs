@@ -1,8 +1,9 @@
 //! Lists of moves in the manner of G-code: `G0 X10`, `G1 X50 F3000`, `G4 P200`.
 //!
-//! Of G-code it takes what an axis of its own can do: G0 (as fast as allowed), G1 (with a feed), G4 (a wait, P in ms or S in s), G20 and G21
-//! (inches, millimetres), G90 and G91 (absolute, relative). X is in millimetres and F in mm/min unless G20 says inches. Comments stand after
-//! `;` or in brackets. Every block stops exactly (G61): a corner at speed is no motion of a single axis.
+//! Of G-code it takes what an axis of its own can do: G0 (as fast as allowed), G1 (with a feed), G4 (a wait, P in ms or
+//! S in s), G20 and G21 (inches, millimetres), G90 and G91 (absolute, relative). X is in millimetres and F in mm/min
+//! unless G20 says inches. Comments stand after `;` or in brackets. Every block stops exactly (G61): a corner at speed
+//! is no motion of a single axis.
 
 use super::profile::{Leg, Limits};
 use crate::error::{Error, Result};

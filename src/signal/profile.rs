@@ -1,11 +1,12 @@
-//! References of motion: moves from rest to rest within limits of speed, acceleration, jerk and snap, one after another.
+//! References of motion: moves from rest to rest within limits of speed, acceleration, jerk and snap, one after
+//! another.
 //!
-//! The speed of a move over a distance D is D times a chain of moving averages, of lengths T₁ (speed), T₂ (acceleration), T₃
-//! (jerk) and T₄ (snap), as many as there are limits. With T₃ ≥ T₄, T₂ ≥ T₃ + T₄ and T₁ ≥ T₂ + T₃ + T₄ its peaks are D/T₁,
-//! D/(T₁T₂), D/(T₁T₂T₃) and D/(T₁T₂T₃T₄), and it takes T₁ + T₂ + T₃ + T₄. The shortest such lengths are found from the last to the first, each
-//! as long as the limits above it allow: the trapezoid, the seven segments of third order, and the fifteen of fourth
-//! (P. Lambrechts, M. Boerlage, M. Steinbuch, "Trajectory planning and feedforward design for electromechanical motion
-//! systems", Control Engineering Practice 13, 2005).
+//! The speed of a move over a distance D is D times a chain of moving averages, of lengths T₁ (speed), T₂
+//! (acceleration), T₃ (jerk) and T₄ (snap), as many as there are limits. With T₃ ≥ T₄, T₂ ≥ T₃ + T₄ and T₁ ≥ T₂ + T₃ +
+//! T₄ its peaks are D/T₁, D/(T₁T₂), D/(T₁T₂T₃) and D/(T₁T₂T₃T₄), and it takes T₁ + T₂ + T₃ + T₄. The shortest such
+//! lengths are found from the last to the first, each as long as the limits above it allow: the trapezoid, the seven
+//! segments of third order, and the fifteen of fourth (P. Lambrechts, M. Boerlage, M. Steinbuch, "Trajectory planning
+//! and feedforward design for electromechanical motion systems", Control Engineering Practice 13, 2005).
 
 use crate::error::{Error, Result};
 
@@ -60,7 +61,8 @@ impl Reference {
 pub struct Stroke {
     distance: f64,
     duration: f64,
-    /// Begin, and position and its derivatives there, of each piece of the first half; the last derivative is constant on it.
+    /// Begin, and position and its derivatives there, of each piece of the first half; the last derivative is constant
+    /// on it.
     pieces: Vec<(f64, [f64; 5])>,
 }
 
@@ -203,8 +205,8 @@ fn greatest(fits: impl Fn(f64) -> bool, distance: f64, limits: &[f64]) -> f64 {
     low
 }
 
-/// The pieces of the first half. The highest derivative jumps up or down at each sum of some of the lengths but T₁, and these come in
-/// the order of binary numbers: 0, T₄, T₃, T₃ + T₄, T₂, …; then it cruises.
+/// The pieces of the first half. The highest derivative jumps up or down at each sum of some of the lengths but T₁, and
+/// these come in the order of binary numbers: 0, T₄, T₃, T₃ + T₄, T₂, …; then it cruises.
 fn pieces(distance: f64, times: &[f64]) -> Vec<(f64, [f64; 5])> {
     let order = times.len();
     let height = distance / times.iter().product::<f64>();
@@ -292,8 +294,9 @@ impl Profile {
         Ok(Self { strokes, start, end: time, shaper: Vec::new(), samples: Vec::new() })
     }
 
-    /// A reference of which `positions` (m) at increasing `times` (s) are known: straight lines between them. Speed and acceleration
-    /// are those of the parabola through a sample and its neighbours; jerk and snap are not known, and zero.
+    /// A reference of which `positions` (m) at increasing `times` (s) are known: straight lines between them. Speed and
+    /// acceleration are those of the parabola through a sample and its neighbours; jerk and snap are not known, and
+    /// zero.
     pub fn sampled(times: &[f64], positions: &[f64]) -> Self {
         let n = times.len().min(positions.len());
         let samples = (0..n)

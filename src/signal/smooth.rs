@@ -1,7 +1,7 @@
 //! Sine, multisine and chirp: polynomials on stretches short enough to be exact to rounding.
 //!
-//! A sine of angular frequency ω on a stretch of length τ, interpolated at the eight Chebyshev nodes, is wrong by at most
-//! (ωτ/2)⁸ / (2⁷ 8!); 26 stretches to a period make that 1.0e-14.
+//! A sine of angular frequency ω on a stretch of length τ, interpolated at the eight Chebyshev nodes, is wrong by at
+//! most (ωτ/2)⁸ / (2⁷ 8!); 26 stretches to a period make that 1.0e-14.
 
 use super::clock::Now;
 use super::{DEGREE, Part, Tone};
@@ -87,8 +87,8 @@ impl Chirp {
         if now.reached(over) || over.is_nan() || !(from.is_finite() && to.is_finite()) {
             return 0.0;
         }
-        // Within a stretch of half length h the frequency changes too, by the phase (π (to − from)/over) h², which 89 √…
-        // keeps below 1e-4, where it adds no more than the 1e-14 above.
+        // Within a stretch of half length h the frequency changes too, by the phase (π (to − from)/over) h², which 89
+        // √… keeps below 1e-4, where it adds no more than the 1e-14 above.
         let fast = STRETCHES * from.abs().max(to.abs()) * over;
         let changing = 89.0 * ((to - from).abs() * over).sqrt();
         let n = fast.max(changing).max(1.0).ceil();
@@ -156,7 +156,8 @@ struct Nodes {
 fn nodes() -> &'static Nodes {
     static NODES: OnceLock<Nodes> = OnceLock::new();
     NODES.get_or_init(|| {
-        // x_j = cos((2j + 1) π/(2n)),   u(x) = Σ_k (2 − δ_k0)/n Σ_j u_j T_k(x_j) T_k(x),   T_k(x_j) = cos(k (2j + 1) π/(2n))
+        // x_j = cos((2j + 1) π/(2n)), u(x) = Σ_k (2 − δ_k0)/n Σ_j u_j T_k(x_j) T_k(x), T_k(x_j) = cos(k (2j + 1)
+        // π/(2n))
         let angle = |j: usize| (2 * j + 1) as f64 * PI / (2 * N) as f64;
         let x = std::array::from_fn(|j| angle(j).cos());
         let mut powers = [[0.0; N]; N];

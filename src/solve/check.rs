@@ -128,7 +128,8 @@ pub(super) fn piecewise_linear(mechanism: &Mechanism) -> Result<()> {
         .next("leave --solver out, or write --solver general: it takes all of these"))
 }
 
-/// The fastest rate, 1/s, that is known beforehand: of the currents, and of each body against all that holds or damps it.
+/// The fastest rate, 1/s, that is known beforehand: of the currents, and of each body against all that holds or damps
+/// it.
 pub(super) fn fastest_rate(mechanism: &Mechanism) -> f64 {
     let mut fastest: f64 = 0.0;
     for drive in &mechanism.drives {

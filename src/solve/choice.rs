@@ -30,8 +30,8 @@ pub struct Choice {
 }
 
 impl Choice {
-    /// The solver that is asked for, or else the one for this stage. Options that do not go with it are told by the names of
-    /// the command line.
+    /// The solver that is asked for, or else the one for this stage. Options that do not go with it are told by the
+    /// names of the command line.
     pub fn solver(&self, stage: &Stage) -> Result<Solver> {
         self.instead_of(Solver::of(stage))
     }

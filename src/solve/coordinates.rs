@@ -7,7 +7,8 @@
 use crate::friction::Motion;
 use crate::mechanism::{BODIES, Layout, Mode, Replaced, State};
 
-/// Parts of the last place by which positions at the start may contradict each other and still mean a belt without strain.
+/// Parts of the last place by which positions at the start may contradict each other and still mean a belt without
+/// strain.
 const LAST_PLACES: f64 = 4.0;
 
 /// Where a run begins, and the angles of pulleys at rest.
@@ -85,8 +86,8 @@ impl Coordinates {
         state
     }
 
-    /// The ways of a body whose place a length takes, row by row: `own` has that length, `others` gives coordinates of bodies, and ways of
-    /// those that are placed already.
+    /// The ways of a body whose place a length takes, row by row: `own` has that length, `others` gives coordinates of
+    /// bodies, and ways of those that are placed already.
     #[inline(always)]
     pub(crate) fn place<'v>(&self, replaced: &Replaced, own: &mut [f64], others: impl Fn(usize) -> &'v [f64]) {
         let body = replaced.body;

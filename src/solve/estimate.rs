@@ -18,9 +18,9 @@ type Sink<'a> = dyn FnMut(&Trajectory) -> Flow + 'a;
 
 /// Keeps some of a run's rows, and compares them with those of a second run.
 ///
-/// The error of a step is about in proportion to the tolerance, so the second run, with ten times the tolerance, is off by about ten
-/// times as much as the first: twice their difference is an estimate on the safe side. Where the motion is sensitive to its last digits
-/// (flanks that rattle, loads just at a breakaway) both differ by what that makes of them.
+/// The error of a step is about in proportion to the tolerance, so the second run, with ten times the tolerance, is off
+/// by about ten times as much as the first: twice their difference is an estimate on the safe side. Where the motion is
+/// sensitive to its last digits (flanks that rattle, loads just at a breakaway) both differ by what that makes of them.
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};
@@ -85,7 +85,8 @@ impl ErrorEstimate {
         self.rows += block.len() as u64;
     }
 
-    /// Runs it again with another tolerance and compares; `flow` is asked now and then whether to go on. None where it said no.
+    /// Runs it again with another tolerance and compares; `flow` is asked now and then whether to go on. None where it
+    /// said no.
     pub fn finish(
         self,
         stage: &Stage,

@@ -13,8 +13,8 @@ use std::sync::Arc;
 /// The interval that steps are computed fastest for, where none is named, s; and its halves, quarters and so on.
 const INTERVAL: f64 = 1e-3;
 
-/// A machine under way, which owns all that it needs: stepped, looked at, copied, sent elsewhere. A clone is its saved state, and goes on
-/// bit for bit as it would have.
+/// A machine under way, which owns all that it needs: stepped, looked at, copied, sent elsewhere. A clone is its saved
+/// state, and goes on bit for bit as it would have.
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};
@@ -111,14 +111,15 @@ impl Make for Exact<'_> {
 }
 
 impl Machine {
-    /// An axis at rest at the origin, its inputs zero. Errors: what makes no sense as a machine, or what the solver does not take.
+    /// An axis at rest at the origin, its inputs zero. Errors: what makes no sense as a machine, or what the solver
+    /// does not take.
     pub fn new(stage: &Stage, solver: Solver) -> Result<Self> {
         check::stage(stage)?;
         Self::of_mechanism(&stage.mechanism(), &State::default(), solver, INTERVAL)
     }
 
-    /// Any mechanism in `start` at time zero, its inputs zero. Steps of `interval`, s, and of its halves, quarters and so on are
-    /// computed fastest by the exact solver; others are as exact.
+    /// Any mechanism in `start` at time zero, its inputs zero. Steps of `interval`, s, and of its halves, quarters and
+    /// so on are computed fastest by the exact solver; others are as exact.
     pub fn of_mechanism(mechanism: &Mechanism, start: &State, solver: Solver, interval: f64) -> Result<Self> {
         if !(interval.is_finite() && interval > 0.0) {
             return Err(Error::new(format!("an interval of {interval:e} s cannot be")).allowed("above zero"));
@@ -155,8 +156,8 @@ impl Machine {
         self.engine.time()
     }
 
-    /// The input of a drive from now on, until another is set: a polynomial that has begun, or begins now. Inputs of several drives that are
-    /// set at one time act at once.
+    /// The input of a drive from now on, until another is set: a polynomial that has begun, or begins now. Inputs of
+    /// several drives that are set at one time act at once.
     pub fn set_input(&mut self, drive: usize, piece: &Piece) -> Result<()> {
         let drives = self.mechanism().drives.len();
         if drive >= drives {
@@ -174,7 +175,8 @@ impl Machine {
         Ok(())
     }
 
-    /// Goes on to `until`, s, and adds the events on the way to `events`. An early end is told, and where it stands then; it goes no further.
+    /// Goes on to `until`, s, and adds the events on the way to `events`. An early end is told, and where it stands
+    /// then; it goes no further.
     pub fn advance(&mut self, until: f64, events: &mut Vec<Event>) -> std::result::Result<(), Ending> {
         if std::mem::take(&mut self.is_set) {
             let degree = self.inputs.degree();

@@ -53,7 +53,8 @@ pub enum Solver {
 }
 
 impl Solver {
-    /// The general solver with the default tolerance: 3e-12 m on the paper's machine; [`ErrorEstimate`] says it for any run.
+    /// The general solver with the default tolerance: 3e-12 m on the paper's machine; [`ErrorEstimate`] says it for any
+    /// run.
     pub const GENERAL: Self = Self::General { tolerance: 1e-9 };
 
     /// The solver for this stage: the exact one where it can be.
@@ -90,7 +91,8 @@ pub struct Event {
     pub to: Status,
     /// The force (N) or torque (N m) on a body at that moment, friction apart; 0 for other parts.
     pub load: f64,
-    /// Whether rounding decided when it happened: a stop of a body whose speed tends to zero and in exact numbers never gets there.
+    /// Whether rounding decided when it happened: a stop of a body whose speed tends to zero and in exact numbers never
+    /// gets there.
     pub by_rounding: bool,
 }
 
@@ -103,8 +105,8 @@ impl Event {
         }
     }
 
-    /// Adds it to `events`, unless nothing that shows has changed. A part other than a body that passes through a state without
-    /// staying there goes straight.
+    /// Adds it to `events`, unless nothing that shows has changed. A part other than a body that passes through a state
+    /// without staying there goes straight.
     fn note(mut self, events: &mut Vec<Event>) {
         // A body that is at once what it was before has done nothing.
         let at_once = |e: &Event| self.time - e.time <= 4.0 * f64::EPSILON * self.time;
@@ -202,8 +204,8 @@ pub struct Outcome {
     pub ending: Ending,
     /// Its cost.
     pub cost: Cost,
-    /// By how much positions may be off: of the exact solver a bound of what rounding does; the general solver's is estimated by
-    /// [`ErrorEstimate`], Table 3 with a fixed step has none.
+    /// By how much positions may be off: of the exact solver a bound of what rounding does; the general solver's is
+    /// estimated by [`ErrorEstimate`], Table 3 with a fixed step has none.
     pub error: Option<PositionError>,
 }
 
@@ -261,8 +263,8 @@ pub enum Detail {
     None,
 }
 
-/// Runs one experiment after another on one stage after another, and keeps what can be used again: bit for bit what [`stream`] gives,
-/// sooner.
+/// Runs one experiment after another on one stage after another, and keeps what can be used again: bit for bit what
+/// [`stream`] gives, sooner.
 #[derive(Default)]
 pub struct Bench {
     mounted: Option<(Stage, Arc<Mechanism>)>,
@@ -338,7 +340,8 @@ pub fn simulate(stage: &Stage, experiment: &Experiment, solver: Solver) -> Resul
     Ok(Solution { trajectory, outcome })
 }
 
-/// Runs `experiment` on `stage` and hands its rows to `sink` in blocks, so that memory stays bounded however long it is.
+/// Runs `experiment` on `stage` and hands its rows to `sink` in blocks, so that memory stays bounded however long it
+/// is.
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};
@@ -398,8 +401,8 @@ fn run(stage: &Stage, experiment: &Experiment, solver: Solver, output: Output) -
     Ok(go(&mechanism, experiment, solver, exact::Known::default(), output)?.0)
 }
 
-/// Runs a mechanism along its inputs, and hands rows to `sink` and all that is between them to `observer`: what [`stream_observed`] does,
-/// for a machine that is no axis.
+/// Runs a mechanism along its inputs, and hands rows to `sink` and all that is between them to `observer`: what
+/// [`stream_observed`] does, for a machine that is no axis.
 pub fn stream_mechanism(
     mechanism: &Mechanism,
     course: &Course,

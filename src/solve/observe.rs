@@ -7,7 +7,8 @@ use crate::trajectory::Trajectory;
 /// Number of quantities in a [`Reading`].
 pub const QUANTITIES: usize = 12;
 
-/// The readings of a run at one instant, in the order of [`Mechanism::readings`], which of an axis is that of [`reading`]. SI units.
+/// The readings of a run at one instant, in the order of [`Mechanism::readings`], which of an axis is that of
+/// [`reading`]. SI units.
 pub type Reading = [f64; QUANTITIES];
 
 /// Places in a [`Reading`] of an axis.
@@ -61,7 +62,8 @@ impl Gap<'_> {
         middle + rise(half, bow)
     }
 
-    /// Whether the magnitude of any quantity is above its height at either end, and whether it can be above `factor` times that within.
+    /// Whether the magnitude of any quantity is above its height at either end, and whether it can be above `factor`
+    /// times that within.
     pub fn rises_above(&self, heights: &Reading, factor: f64) -> (bool, bool) {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
@@ -231,7 +233,8 @@ impl Polynomial {
         (2..TERMS).rev().fold(0.0, |sum, k| sum * s + (k * (k - 1)) as f64 * self.0[k])
     }
 
-    /// A bound of its magnitude on 0..1: the largest of its coefficients in Bernstein's form, b_k = Σ_j C(k, j)/C(n, j) c_j.
+    /// A bound of its magnitude on 0..1: the largest of its coefficients in Bernstein's form, b_k = Σ_j C(k, j)/C(n, j)
+    /// c_j.
     #[inline]
     pub fn bound(&self) -> f64 {
         let (low, high) = self.range();
@@ -341,10 +344,11 @@ impl Polynomial {
 
 /// Whoever is shown a run as it goes on: every instant of it, and not only those of its rows.
 ///
-/// The run comes in [`Gap`]s, each beginning where the last one ended; before and after a jump of the input or a change of mode are two gaps'
-/// ends. Whoever wants to know what is in a gap is shown it in smaller ones or as a [`Curve`].
+/// The run comes in [`Gap`]s, each beginning where the last one ended; before and after a jump of the input or a change
+/// of mode are two gaps' ends. Whoever wants to know what is in a gap is shown it in smaller ones or as a [`Curve`].
 pub trait Observe {
-    /// Takes the next gap, or one within the last that it wanted to see closer; says whether it wants to see closer into this one.
+    /// Takes the next gap, or one within the last that it wanted to see closer; says whether it wants to see closer
+    /// into this one.
     fn pass(&mut self, gap: &Gap) -> bool;
 
     /// Takes what is in a gap that it wanted to see closer.

@@ -1,11 +1,11 @@
 //! Matrix exponentials: what a linear system does in a given time.
 //!
-//! A vector holds `R` quantities that move and, behind them, constants, `C` in all. A matrix has `R` rows and `C` columns and
-//! is kept by columns, so that its product with a vector is a chain of scaled vector additions that the compiler turns
-//! into vector instructions. Products are never fused (no FMA): the same bits on every machine.
+//! A vector holds `R` quantities that move and, behind them, constants, `C` in all. A matrix has `R` rows and `C`
+//! columns and is kept by columns, so that its product with a vector is a chain of scaled vector additions that the
+//! compiler turns into vector instructions. Products are never fused (no FMA): the same bits on every machine.
 //!
-//! The long loops are compiled twice, for any processor and for those with AVX2, and the right one is chosen at run time: wider vectors do
-//! the same operations in the same order.
+//! The long loops are compiled twice, for any processor and for those with AVX2, and the right one is chosen at run
+//! time: wider vectors do the same operations in the same order.
 
 /// An `R` × `C` matrix: the rate of change ż = A z, or a change over some time, z(t + h) − z(t) = P z(t).
 #[derive(Debug, Clone)]

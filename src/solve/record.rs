@@ -160,7 +160,8 @@ impl<'a> Recorder<'a> {
         self.written = self.count;
     }
 
-    /// Adds the last row so many times more, or until the receiver wants no more; says how often. Nothing but time goes on.
+    /// Adds the last row so many times more, or until the receiver wants no more; says how often. Nothing but time goes
+    /// on.
     pub(crate) fn repeat(&mut self, times: u64) -> u64 {
         let mut left = times;
         while left > 0 && self.flow == Flow::Continue {

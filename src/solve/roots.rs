@@ -1,8 +1,8 @@
 //! The first place in (0, 1] where a polynomial becomes negative.
 //!
-//! Most are told by their coefficients: where c₀ and the negative ones add up to zero or more, Σ c_k sᵏ does not fall; where the coefficients
-//! change their sign once, there is one root above zero (Descartes), and the sign at the end says whether it lies in the interval. What
-//! is left is told by Bernstein coefficients.
+//! Most are told by their coefficients: where c₀ and the negative ones add up to zero or more, Σ c_k sᵏ does not fall;
+//! where the coefficients change their sign once, there is one root above zero (Descartes), and the sign at the end
+//! says whether it lies in the interval. What is left is told by Bernstein coefficients.
 
 use super::propagator::SERIES_TERMS;
 
@@ -152,8 +152,8 @@ fn halves_by_any<const N: usize>(b: &[f64; N]) -> ([f64; N], [f64; N]) {
     (left, right)
 }
 
-/// Newton's method kept within a bracket whose upper end is negative; halving where it would leave it. It begins where a straight line
-/// between the ends' values falls.
+/// Newton's method kept within a bracket whose upper end is negative; halving where it would leave it. It begins where
+/// a straight line between the ends' values falls.
 fn polish(c: &[f64], (mut low, above): (f64, f64), (mut high, below): (f64, f64)) -> f64 {
     let line = low + (high - low) * (above / (above - below));
     let mut s = if line > low && line < high { line } else { 0.5 * (low + high) };

@@ -1,21 +1,22 @@
 //! A bound of what rounding does to a run of the exact solver.
 //!
-//! A step z ← z + P z is off by a few units in the last place of its parts, and P, made by doubling, by one such unit for each
-//! radian of the fastest swing that it spans. Within a mode errors do not grow in the norm of the energy: friction, resistance
-//! and damping only take out of it. So after N steps and Φ radians speeds are off by at most about c ε (N + Φ) of the largest,
-//! and positions, which are their integrals, by
+//! A step z ← z + P z is off by a few units in the last place of its parts, and P, made by doubling, by one such unit
+//! for each radian of the fastest swing that it spans. Within a mode errors do not grow in the norm of the energy:
+//! friction, resistance and damping only take out of it. So after N steps and Φ radians speeds are off by at most about
+//! c ε (N + Φ) of the largest, and positions, which are their integrals, by
 //!
 //! ```text
 //! c ε (N + Φ) (v_max T + |x − x₀|_max) + 2 ε |x|_max
 //! ```
 //!
-//! The effect of an error on a decision (whether a body sticks, which flank touches first) is not in it: where that is uncertain the
-//! model's own answer is as uncertain, for parameters that differ in their last bit.
+//! The effect of an error on a decision (whether a body sticks, which flank touches first) is not in it: where that is
+//! uncertain the model's own answer is as uncertain, for parameters that differ in their last bit.
 
 use super::PositionError;
 use crate::mechanism::{Body, Layout, Mechanism};
 
-/// c: units in the last place of one step. The largest that independent solutions of random stages have shown is below one.
+/// c: units in the last place of one step. The largest that independent solutions of random stages have shown is below
+/// one.
 const UNITS: f64 = 8.0;
 
 /// The run so far, as far as the bound needs it.

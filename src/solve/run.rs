@@ -121,8 +121,8 @@ pub struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// A run of `experiment` on `stage`; the experiment's own input counts for nothing. Rows go to `sink` in blocks, all that is
-    /// between them to `observer`. Not for the paper's Table 3.
+    /// A run of `experiment` on `stage`; the experiment's own input counts for nothing. Rows go to `sink` in blocks,
+    /// all that is between them to `observer`. Not for the paper's Table 3.
     pub fn new(
         stage: &Stage,
         experiment: &Experiment,
@@ -181,7 +181,8 @@ impl<'a> Run<'a> {
         Self::of(&Arc::new(mechanism.clone()), &start, (solver, degree), Known::default(), output)
     }
 
-    /// Holds these inputs, one for each drive, from now until `until`, s, or to the end of the run; false if something ended it before.
+    /// Holds these inputs, one for each drive, from now until `until`, s, or to the end of the run; false if something
+    /// ended it before.
     pub fn hold(&mut self, inputs: &[f64], until: f64) -> bool {
         self.running.set_input(&Pieces::held(inputs, self.time, until));
         self.advance(until)

@@ -144,8 +144,8 @@ impl Stage {
         }
     }
 
-    /// How a span's length follows the cart: l₁ − x, l₂ + x; the drive pulley is at the positive end. Spans 2 and 3 in series are one of
-    /// their lengths together; their damping stays as it is at x = 0.
+    /// How a span's length follows the cart: l₁ − x, l₂ + x; the drive pulley is at the positive end. Spans 2 and 3 in
+    /// series are one of their lengths together; their damping stays as it is at x = 0.
     fn follows(&self, index: usize) -> Option<Follows> {
         let mut make = self.belt.make.filter(|_| self.belt.follows_cart)?;
         match self.belt.model {

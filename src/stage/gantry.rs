@@ -1,7 +1,7 @@
 //! Two motors and belts that move a cart in a plane: the H-frame, and CoreXY, as mechanisms.
 //!
-//! Coordinates are φ₁, φ₂ of the drive pulleys (left and right; A and B of CoreXY), x of the bridge and y of the cart on it. Idlers
-//! have neither inertia nor friction, and the bridge does not yaw. Rows of A, one a span:
+//! Coordinates are φ₁, φ₂ of the drive pulleys (left and right; A and B of CoreXY), x of the bridge and y of the cart
+//! on it. Idlers have neither inertia nor friction, and the bridge does not yaw. Rows of A, one a span:
 //!
 //! ```text
 //!  H-frame   φ₁   φ₂    x    y        CoreXY    φ_A  φ_B   x    y
@@ -85,8 +85,8 @@ impl Routing {
         }
     }
 
-    /// The place of bridge and cart by the drives minus the true one, each as a sum of stretches of spans, (span, weight):
-    /// r (φ₂ − φ₁)/2 − x = −(s_left + s_right)/2 and −r (φ₁ + φ₂)/2 − y = (s_right − s_left)/2 of the H-frame,
+    /// The place of bridge and cart by the drives minus the true one, each as a sum of stretches of spans, (span,
+    /// weight): r (φ₂ − φ₁)/2 − x = −(s_left + s_right)/2 and −r (φ₁ + φ₂)/2 − y = (s_right − s_left)/2 of the H-frame,
     /// r (φ_A ± φ_B)/2 − (x or y) = (s_A out ± s_B out)/2 of CoreXY.
     pub fn drive_error(self) -> [[(usize, f64); 2]; 2] {
         match self {
@@ -95,7 +95,8 @@ impl Routing {
         }
     }
 
-    /// The stretch of each span as a sum of those two that tell the drives' errors, (span, weight): the spans of one belt add up to nothing.
+    /// The stretch of each span as a sum of those two that tell the drives' errors, (span, weight): the spans of one
+    /// belt add up to nothing.
     pub fn stretches(self) -> &'static [&'static [(usize, f64)]] {
         match self {
             Routing::HFrame => &[&[(0, 1.0)], &[(1, 1.0)], &[(0, -1.0), (1, -1.0)]],
@@ -207,8 +208,8 @@ pub struct Gantry {
 }
 
 impl Gantry {
-    /// The angles of the pulleys with the belt without strain, rad: r φ₁ = −x − y and r φ₂ = x − y of the H-frame, r φ_A = x + y and
-    /// r φ_B = x − y of CoreXY.
+    /// The angles of the pulleys with the belt without strain, rad: r φ₁ = −x − y and r φ₂ = x − y of the H-frame, r
+    /// φ_A = x + y and r φ_B = x − y of CoreXY.
     pub fn angles(&self, x: f64, y: f64) -> [f64; 2] {
         let r = self.pulley_radius;
         match self.routing {
@@ -217,7 +218,8 @@ impl Gantry {
         }
     }
 
-    /// Where the angles of the drive pulleys say that bridge and cart are: the other direction of [`Gantry::angles`], m.
+    /// Where the angles of the drive pulleys say that bridge and cart are: the other direction of [`Gantry::angles`],
+    /// m.
     pub fn place(&self, [first, second]: [f64; 2]) -> [f64; 2] {
         let half = 0.5 * self.pulley_radius;
         match self.routing {
@@ -365,8 +367,9 @@ impl Gantry {
         rows.into_iter().enumerate().map(span).collect()
     }
 
-    /// Speeds of bridge and cart, currents of both drives, forces of the spans, the stretches that tell what the drives do not see and from
-    /// which those of all spans follow, and the speeds of the motors: of rotors that turn by themselves, or of their pulleys.
+    /// Speeds of bridge and cart, currents of both drives, forces of the spans, the stretches that tell what the drives
+    /// do not see and from which those of all spans follow, and the speeds of the motors: of rotors that turn by
+    /// themselves, or of their pulleys.
     fn readings(&self, mechanism: &Mechanism) -> Vec<Shown> {
         let mut readings =
             vec![Shown::Speed(BRIDGE, 1.0), Shown::Speed(CART, 1.0), Shown::Current(0), Shown::Current(1)];

@@ -1,7 +1,7 @@
 //! Data sheets: timing belts by their type, motors by their rating, a drive by its force.
 //!
-//! Every number of the table of belts stands in a catalogue, a data sheet or a published measurement, named beside it. What none of
-//! these says is left out.
+//! Every number of the table of belts stands in a catalogue, a data sheet or a published measurement, named beside it.
+//! What none of these says is left out.
 
 use super::Motor;
 
@@ -272,7 +272,8 @@ pub struct SimpleDrive {
 }
 
 impl SimpleDrive {
-    /// The motor that does the same at a pulley of radius `r`: of 1 ohm, so that its current is the voltage that is left.
+    /// The motor that does the same at a pulley of radius `r`: of 1 ohm, so that its current is the voltage that is
+    /// left.
     ///
     /// With R = 1 ohm, K_t = k_F r and K_e = d r / k_F, the force K_t (u − K_e v / r) / (R r) is k_F u − d v.
     pub fn motor(self, r: f64) -> Motor {

@@ -3,8 +3,8 @@
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
-/// A number of 64 bits from another, each of whose bits depends on all of its: the finaliser of SplitMix64 (Steele, Lea, Flood,
-/// "Fast splittable pseudorandom number generators", OOPSLA 2014).
+/// A number of 64 bits from another, each of whose bits depends on all of its: the finaliser of SplitMix64 (Steele,
+/// Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014).
 pub fn mixed(number: u64) -> u64 {
     let z = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -29,8 +29,9 @@ impl Uniform {
     }
 }
 
-/// Place `index` of a permutation of 0, 1, …, `count` − 1 that `key` stands for: a Feistel network on the next power of four, walked
-/// along its cycle until it is below `count` (J. Black, P. Rogaway, "Ciphers with arbitrary finite domains", CT-RSA 2002).
+/// Place `index` of a permutation of 0, 1, …, `count` − 1 that `key` stands for: a Feistel network on the next power of
+/// four, walked along its cycle until it is below `count` (J. Black, P. Rogaway, "Ciphers with arbitrary finite
+/// domains", CT-RSA 2002).
 pub fn permuted(index: u64, count: u64, key: u64) -> u64 {
     const ROUNDS: u64 = 6;
     let half = (64 - count.saturating_sub(1).leading_zeros()).div_ceil(2).max(1);

@@ -69,8 +69,8 @@ fn share_below(prior: Prior, value: f64) -> f64 {
     }
 }
 
-/// Two values that stand for a density where one thing is varied at a time: the ends of a uniform one, of others one deviation to
-/// either side.
+/// Two values that stand for a density where one thing is varied at a time: the ends of a uniform one, of others one
+/// deviation to either side.
 pub fn ends(prior: Prior) -> [f64; 2] {
     match prior {
         Prior::Uniform { low, high } => [high, low],

@@ -1,8 +1,9 @@
 //! Sobol' indices: which share of a figure's variance is whose.
 //!
-//! Two samples A and B of N machines, and those of A with parameter i from B. First order after A. Saltelli, P. Annoni, I. Azzini,
-//! F. Campolongo, M. Ratto, S. Tarantola, "Variance based sensitivity analysis of model output", Comput. Phys. Commun. 181 (2010),
-//! their table 2 (b); total order after M. J. W. Jansen, ibid. (f). Intervals by the bootstrap over the N blocks.
+//! Two samples A and B of N machines, and those of A with parameter i from B. First order after A. Saltelli, P. Annoni,
+//! I. Azzini, F. Campolongo, M. Ratto, S. Tarantola, "Variance based sensitivity analysis of model output", Comput.
+//! Phys. Commun. 181 (2010), their table 2 (b); total order after M. J. W. Jansen, ibid. (f). Intervals by the
+//! bootstrap over the N blocks.
 
 use super::chance::mixed;
 use crate::chance::quantile;
@@ -28,10 +29,11 @@ pub struct Estimate {
     pub interval: [f64; 2],
 }
 
-/// The indices of `parameters` parameters from a figure of all runs in their order: blocks of f(A), f(B), f(A with 1 from B), …
+/// The indices of `parameters` parameters from a figure of all runs in their order: blocks of f(A), f(B), f(A with 1
+/// from B), …
 ///
-/// Blocks in which a run failed are left out. None where fewer than two are left, or nothing varies. `replicates` resamplings, by
-/// `seed`, make the intervals.
+/// Blocks in which a run failed are left out. None where fewer than two are left, or nothing varies. `replicates`
+/// resamplings, by `seed`, make the intervals.
 pub fn indices(figures: &[f64], parameters: usize, replicates: usize, seed: u64) -> Option<Vec<Index>> {
     let whole = |block: &&[f64]| block.iter().all(|figure| figure.is_finite());
     let blocks: Vec<&[f64]> = figures.chunks_exact(parameters + 2).filter(whole).collect();

@@ -1,5 +1,5 @@
-//! The key figures of a run that a sweep keeps, as tables. Peaks are magnitudes: of a motion there and back the sign of the larger
-//! peak is chance, and shares of signed ones would mean nothing.
+//! The key figures of a run that a sweep keeps, as tables. Peaks are magnitudes: of a motion there and back the sign of
+//! the larger peak is chance, and shares of signed ones would mean nothing.
 
 use crate::control::MoveRun;
 use crate::mechanism::{Drive, Label, Mechanism};

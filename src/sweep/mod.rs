@@ -1,8 +1,9 @@
 //! Many runs with parameters varied.
 //!
-//! A [`Sweep`] is made of a case, of an axis or a gantry, that says what is varied ([`crate::case::Sweeping`]). Each of its runs is one
-//! machine, with every experiment and move of the case: row `i` follows from the case and `i` alone, bit for bit, so that rows can be computed in any order, in pieces,
-//! by any number of threads and machines. The kernel does no I/O and starts no thread.
+//! A [`Sweep`] is made of a case, of an axis or a gantry, that says what is varied ([`crate::case::Sweeping`]). Each of
+//! its runs is one machine, with every experiment and move of the case: row `i` follows from the case and `i` alone,
+//! bit for bit, so that rows can be computed in any order, in pieces, by any number of threads and machines. The kernel
+//! does no I/O and starts no thread.
 //!
 //! ```
 //! use taut::case::{Case, TEMPLATE};
@@ -144,7 +145,8 @@ pub struct Group {
     pub name: String,
     /// Its name as that of a file, with which those of its columns begin.
     pub file: String,
-    /// Whether it is a move in closed loop, and no experiment. The controller takes every machine for the one of the case.
+    /// Whether it is a move in closed loop, and no experiment. The controller takes every machine for the one of the
+    /// case.
     pub is_move: bool,
     /// Its figures, whose columns stand behind that of its status.
     pub figures: Vec<Figure>,
@@ -245,8 +247,8 @@ impl Sweep {
         self.sampling
     }
 
-    /// Whether the runs are blocks of k + 2 for Sobol' indices: the machine of a sample A, that of a sample B, and those of A with one
-    /// parameter after the other from B.
+    /// Whether the runs are blocks of k + 2 for Sobol' indices: the machine of a sample A, that of a sample B, and
+    /// those of A with one parameter after the other from B.
     pub fn indices(&self) -> bool {
         self.indices
     }
@@ -256,8 +258,8 @@ impl Sweep {
         &self.groups
     }
 
-    /// The columns of [`Sweep::rows`], without rows: `run`, the parameters, then a status and the figures of each experiment, whose
-    /// names begin with that of its files and a point: `5-v-pulse.peak_current`.
+    /// The columns of [`Sweep::rows`], without rows: `run`, the parameters, then a status and the figures of each
+    /// experiment, whose names begin with that of its files and a point: `5-v-pulse.peak_current`.
     pub fn columns(&self) -> &[Column] {
         &self.headings
     }
@@ -267,7 +269,8 @@ impl Sweep {
         1 + self.draws.as_ref().map_or(0, |draws| draws.free.len()) + self.parameters.len()
     }
 
-    /// The parameters of `count` runs from run `first` on: the first columns of [`Sweep::rows`]. Runs beyond the last are left out.
+    /// The parameters of `count` runs from run `first` on: the first columns of [`Sweep::rows`]. Runs beyond the last
+    /// are left out.
     pub fn values(&self, first: u64, count: usize) -> Trajectory {
         let mut table = Trajectory::with_capacity(&self.headings[..self.inputs()], count);
         let mut values = Vec::with_capacity(self.inputs());
@@ -295,8 +298,9 @@ impl Sweep {
         machine
     }
 
-    /// Runs `count` machines from run `first` on: a row for each, with its parameters, and of each experiment how it ended and its
-    /// figures, which are NaN where it did not reach its end. None where `stop` said so, which is asked before each run.
+    /// Runs `count` machines from run `first` on: a row for each, with its parameters, and of each experiment how it
+    /// ended and its figures, which are NaN where it did not reach its end. None where `stop` said so, which is asked
+    /// before each run.
     pub fn rows(&self, first: u64, count: usize, stop: &dyn Fn() -> bool) -> Option<Trajectory> {
         let mut table = Trajectory::with_capacity(&self.headings, count);
         let mut values = Vec::with_capacity(self.headings.len());
@@ -313,8 +317,8 @@ impl Sweep {
         Some(table)
     }
 
-    /// Runs one experiment of a machine, the number of its group, and hands every quantity over time to `sink` in blocks. Errors: a machine
-    /// that cannot be run.
+    /// Runs one experiment of a machine, the number of its group, and hands every quantity over time to `sink` in
+    /// blocks. Errors: a machine that cannot be run.
     pub fn stream(&self, run: u64, experiment: usize, sink: &mut dyn FnMut(&Trajectory) -> Flow) -> Result<Outcome> {
         match &self.subject {
             Subject::Axis(axis) => axis.stream(&self.with_run(&axis.stage, run), experiment, sink),

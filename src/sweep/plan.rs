@@ -14,8 +14,8 @@ use std::sync::Arc;
 const MOST_RUNS: u64 = 1 << 53;
 
 impl Sweep {
-    /// The sweep that `[sweep]` of an axis's case describes. Errors: nothing to vary, parameters that exclude each other, more of them than Sobol'
-    /// points have dimensions, a machine that cannot be run.
+    /// The sweep that `[sweep]` of an axis's case describes. Errors: nothing to vary, parameters that exclude each
+    /// other, more of them than Sobol' points have dimensions, a machine that cannot be run.
     pub fn new(case: &Case) -> Result<Self> {
         let plan = planned(case.sweep.as_ref())?;
         let draws = match &plan.from {

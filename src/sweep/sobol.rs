@@ -1,8 +1,9 @@
 //! Sobol' points by their index, scrambled as Owen does it.
 //!
-//! Direction numbers: S. Joe and F. Y. Kuo, "Constructing Sobol sequences with better two-dimensional projections", SIAM J. Sci.
-//! Comput. 30 (2008), their table `new-joe-kuo-6.21201`, its first 64 dimensions. Scrambling: A. B. Owen, "Randomly permuted
-//! (t, m, s)-nets and (t, s)-sequences" (1995): every bit is flipped by chance, and the chance depends on all bits before it.
+//! Direction numbers: S. Joe and F. Y. Kuo, "Constructing Sobol sequences with better two-dimensional projections",
+//! SIAM J. Sci. Comput. 30 (2008), their table `new-joe-kuo-6.21201`, its first 64 dimensions. Scrambling: A. B. Owen,
+//! "Randomly permuted (t, m, s)-nets and (t, s)-sequences" (1995): every bit is flipped by chance, and the chance
+//! depends on all bits before it.
 
 use super::chance::mixed;
 

@@ -66,8 +66,8 @@ impl Measured {
         self.spread.as_ref().is_some_and(|spread| spread.quantiles[0] < spread.quantiles[4])
     }
 
-    /// The parameters that matter most: place and how much, in descending order. Total indices where there are any, one at a time the
-    /// largest change, else rank correlations.
+    /// The parameters that matter most: place and how much, in descending order. Total indices where there are any, one
+    /// at a time the largest change, else rank correlations.
     pub fn influence(&self) -> Vec<(usize, f64)> {
         let mut all: Vec<(usize, f64)> = match &self.indices {
             Some(indices) => indices.iter().map(|index| index.total.value).enumerate().collect(),
@@ -87,8 +87,8 @@ impl Measured {
         all
     }
 
-    /// The same of those alone that the runs show: chance makes a rank correlation as large as the least of them once in a
-    /// thousand, the interval of an index excludes a hundredth, and a change one at a time is a change.
+    /// The same of those alone that the runs show: chance makes a rank correlation as large as the least of them once
+    /// in a thousand, the interval of an index excludes a hundredth, and a change one at a time is a change.
     pub fn shown_influence(&self) -> Vec<(usize, f64)> {
         let is_shown = |(place, much): &(usize, f64)| match &self.indices {
             Some(indices) => indices.get(*place).is_some_and(|index| index.total.interval[0] > 0.01),

@@ -1,9 +1,10 @@
 //! The times at which rows are put out, as a person would write them.
 
-/// The times at which rows are put out: 0, `every`, 2 `every`, … and `until`, which a last, shorter interval may lead to.
+/// The times at which rows are put out: 0, `every`, 2 `every`, … and `until`, which a last, shorter interval may lead
+/// to.
 ///
-/// A time is the number nearest to k times the interval as it was written: with 1 ms row 3 is at 0.003, where 3 × 0.001 in floating point
-/// is 0.003 only by luck, and with 1/3 s row 3 is at 1.
+/// A time is the number nearest to k times the interval as it was written: with 1 ms row 3 is at 0.003, where 3 × 0.001
+/// in floating point is 0.003 only by luck, and with 1/3 s row 3 is at 1.
 ///
 /// ```
 /// use taut::trajectory::Grid;

@@ -1,7 +1,7 @@
-//! A search over a whole region by differential evolution (R. Storn, K. Price, "Differential evolution – a simple and efficient heuristic for
-//! global optimization over continuous spaces", Journal of Global Optimization 11, 1997), with the mutation "current to p-best" of
-//! J. Zhang, A. C. Sanderson, "JADE: adaptive differential evolution with optional external archive", IEEE Trans. Evolutionary
-//! Computation 13, 2009.
+//! A search over a whole region by differential evolution (R. Storn, K. Price, "Differential evolution – a simple and
+//! efficient heuristic for global optimization over continuous spaces", Journal of Global Optimization 11, 1997), with
+//! the mutation "current to p-best" of J. Zhang, A. C. Sanderson, "JADE: adaptive differential evolution with optional
+//! external archive", IEEE Trans. Evolutionary Computation 13, 2009.
 
 use super::search::Found;
 use crate::chance::uniform;
@@ -15,8 +15,8 @@ const CROSSOVER: f64 = 0.9;
 /// Least and most of the factor of a mutation, F.
 const FACTORS: [f64; 2] = [0.4, 0.9];
 
-/// The members after so many generations, the best first. `function` is asked for the value at a point and told the one to beat: what is no
-/// better may be given as any value that is not below it.
+/// The members after so many generations, the best first. `function` is asked for the value at a point and told the one
+/// to beat: what is no better may be given as any value that is not below it.
 pub fn evolve(
     mut members: Vec<Found>,
     generations: usize,

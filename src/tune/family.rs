@@ -1,4 +1,5 @@
-//! All the axes that a controller may meet: parameters that are off, loads, places along the travel; and the worst of them.
+//! All the axes that a controller may meet: parameters that are off, loads, places along the travel; and the worst of
+//! them.
 
 use super::margins::{Margins, Plant};
 use crate::case::{Case, Tuning};
@@ -55,7 +56,8 @@ impl Unknown {
     }
 }
 
-/// The name of what a parameter varies with: K_t and K_e of one motor are one number in SI units, and pulleys of one make are alike.
+/// The name of what a parameter varies with: K_t and K_e of one motor are one number in SI units, and pulleys of one
+/// make are alike.
 fn kin(name: &str) -> String {
     let first = name.split(" = ").next().unwrap_or(name);
     first.replace("back_emf_constant", "torque_constant").replace("idler_pulley.", "drive_pulley.")
@@ -101,8 +103,8 @@ pub enum Source {
 }
 
 impl Family {
-    /// That of a case. Its machines are a Latin hypercube: within a spread all values are as likely, within the interval of a fit they are
-    /// normal. With `tuning.corners` the worst corner of all intervals joins them.
+    /// That of a case. Its machines are a Latin hypercube: within a spread all values are as likely, within the
+    /// interval of a fit they are normal. With `tuning.corners` the worst corner of all intervals joins them.
     pub fn of(case: &Case, tuning: &Tuning) -> Result<Self> {
         let stage = case.stage.clone();
         let keys: Vec<&str> = case.known.iter().flat_map(|known| known.name.split(" = ")).collect();
@@ -235,8 +237,8 @@ impl Family {
         if words.is_empty() { "as the file has it".into() } else { words.join(", ") }
     }
 
-    /// The corner at which `badness` is largest, and its margins: from the axis as it is taken for and from what each unknown does by
-    /// itself, and from the worst of some draws, one coordinate after another as long as it gets worse.
+    /// The corner at which `badness` is largest, and its margins: from the axis as it is taken for and from what each
+    /// unknown does by itself, and from the worst of some draws, one coordinate after another as long as it gets worse.
     pub fn worst(
         &self,
         design: &Design,

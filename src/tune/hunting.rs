@@ -31,8 +31,8 @@ pub struct Hunt {
     pub watched: f64,
 }
 
-/// Watches the closed loop after a slow reversal; none if the cart comes to rest. A loop that is not stable hunts as well, and needs
-/// nothing of what is listed.
+/// Watches the closed loop after a slow reversal; none if the cart comes to rest. A loop that is not stable hunts as
+/// well, and needs nothing of what is listed.
 pub fn hunting(stage: &Stage, design: &Design) -> Result<Option<Hunt>> {
     let watched = watch(stage, design);
     let Some((amplitude, period)) = swing(stage, design, stage, watched)? else { return Ok(None) };

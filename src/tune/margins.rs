@@ -1,11 +1,12 @@
 //! Margins of a sampled loop: what its sensitivity is over all frequencies, and whether it is stable.
 //!
-//! The loop is broken at the measured position, a current loop being closed; with a current loop the loop broken at the command counts
-//! as well. Held commands, delay and filters are in it exactly.
+//! The loop is broken at the measured position, a current loop being closed; with a current loop the loop broken at the
+//! command counts as well. Held commands, delay and filters are in it exactly.
 //!
-//! The peaks of |S| and |T| stand at poles of the closed loop, which no grid knows beforehand. So a grid that is dense about the poles of
-//! the axis is first divided wherever L or 1 + L turns by much from one point to the next, which it does about every lightly damped
-//! pole of the closed loop; then every local maximum is followed to its top, and every crossing to where it is.
+//! The peaks of |S| and |T| stand at poles of the closed loop, which no grid knows beforehand. So a grid that is dense
+//! about the poles of the axis is first divided wherever L or 1 + L turns by much from one point to the next, which it
+//! does about every lightly damped pole of the closed loop; then every local maximum is followed to its top, and every
+//! crossing to where it is.
 
 use crate::control::feedback::Feedback;
 use crate::control::measures_cart;
@@ -144,12 +145,14 @@ pub struct Margins {
     pub crossover: f64,
     /// Where |S| rises above 1/√2, the first time, rad/s.
     pub bandwidth: f64,
-    /// Where the way from the reference to the cart, T x/y without feed-forward, falls below 1/√2, the first time, rad/s.
+    /// Where the way from the reference to the cart, T x/y without feed-forward, falls below 1/√2, the first time,
+    /// rad/s.
     pub tracking: f64,
-    /// √(1/π ∫ |S G/ω|² dω) from 2π 0.1 Hz on: root of the integral over time of the squared cart position, m √s, after a step of 1 V or 1 A
-    /// at the command.
+    /// √(1/π ∫ |S G/ω|² dω) from 2π 0.1 Hz on: root of the integral over time of the squared cart position, m √s, after
+    /// a step of 1 V or 1 A at the command.
     pub disturbance: f64,
-    /// √(1/π ∫ |S/ω|² dω) from 2π 0.1 Hz on, √s: the same of the error after a step of 1 m of the reference, per metre, without feed-forward.
+    /// √(1/π ∫ |S/ω|² dω) from 2π 0.1 Hz on, √s: the same of the error after a step of 1 m of the reference, per metre,
+    /// without feed-forward.
     pub following: f64,
 }
 
@@ -426,8 +429,8 @@ fn between(a: &Open, b: &Open, share: f64) -> Open {
     }
 }
 
-/// Nyquist's criterion: F(z) = (1 + L)(1 − 1/z)^m, with m poles at z = 1, turns by π (P − Z) from θ = 0 to π, P poles of the axis
-/// and Z of the closed loop being outside.
+/// Nyquist's criterion: F(z) = (1 + L)(1 − 1/z)^m, with m poles at z = 1, turns by π (P − Z) from θ = 0 to π, P poles
+/// of the axis and Z of the closed loop being outside.
 fn stable(plant: &Plant, points: &[(f64, Open)]) -> bool {
     let [(w0, first), (w1, second), ..] = points else { return false };
     let is_number = |v: Complex<f64>| v.re.is_finite() && v.im.is_finite() && v != Complex::ZERO;

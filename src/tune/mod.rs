@@ -1,8 +1,8 @@
-//! Gains and filters for a structure, by the moves they make: settling, error and current at worst over a family of machines that can be,
-//! while the sensitivity of the sampled loop stays within its limits there.
+//! Gains and filters for a structure, by the moves they make: settling, error and current at worst over a family of
+//! machines that can be, while the sensitivity of the sampled loop stays within its limits there.
 //!
-//! The recipe is [`tune`]; [`evaluate`] judges without a search. What is found is rounded to four digits, and everything that is said
-//! holds for the rounded gains.
+//! The recipe is [`tune`]; [`evaluate`] judges without a search. What is found is rounded to four digits, and
+//! everything that is said holds for the rounded gains.
 
 mod evolution;
 mod family;
@@ -178,8 +178,8 @@ fn some_of(verdict: &Verdict) -> Vec<usize> {
 }
 
 impl Work<'_> {
-    /// The design that is best by the objective over all machines, one that makes no move worse before any other; and what other balances
-    /// choose.
+    /// The design that is best by the objective over all machines, one that makes no move worse before any other; and
+    /// what other balances choose.
     fn chosen(
         &mut self,
         archive: &[work::Tried],
@@ -235,7 +235,8 @@ impl Work<'_> {
 }
 
 impl Work<'_> {
-    /// The best design so far on the whole family, searched on from with the machines that are worst for it, too, as long as there are new ones.
+    /// The best design so far on the whole family, searched on from with the machines that are worst for it, too, as
+    /// long as there are new ones.
     fn polished(
         &mut self,
         finalists: &[work::Finalist],
@@ -268,8 +269,8 @@ impl Work<'_> {
         Ok(leading)
     }
 
-    /// The best design with no figure worse than before, by differential evolution in the layouts of filters that came nearest to that; each time on
-    /// the machines, too, on which a figure was worse.
+    /// The best design with no figure worse than before, by differential evolution in the layouts of filters that came
+    /// nearest to that; each time on the machines, too, on which a figure was worse.
     fn kept(
         &mut self,
         finalists: &[work::Finalist],

@@ -24,8 +24,8 @@ const SHARES: [f64; 2] = [0.1, 0.7];
 const COUNTS: f64 = 5.0;
 const WINDOW: f64 = 50e-6;
 
-/// The moves of a case; where it has none a standard set: a short and a long move as quick as travel and limits allow, and a slow
-/// reversal.
+/// The moves of a case; where it has none a standard set: a short and a long move as quick as travel and limits allow,
+/// and a slow reversal.
 pub fn of(case: &Case, design: &Design) -> Result<Vec<Move>> {
     if case.moves.is_empty() { standard(&case.stage, design) } else { Ok(case.moves.clone()) }
 }

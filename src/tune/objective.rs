@@ -1,14 +1,16 @@
 //! How good a controller is: its moves on all axes of the family, in one number.
 //!
-//! Of each move three figures count, each on the axis that is the worst one for it once the bad end of the central 95 % is left out:
-//! the largest error E of the cart, the time S from the end of the profile until the cart stays within its window w, and the root mean
-//! square I of the current. With the duration D of the profile, the current I₀ that it asks of the axis as the file has it, and M moves
+//! Of each move three figures count, each on the axis that is the worst one for it once the bad end of the central 95 %
+//! is left out: the largest error E of the cart, the time S from the end of the profile until the cart stays within its
+//! window w, and the root mean square I of the current. With the duration D of the profile, the current I₀ that it asks
+//! of the axis as the file has it, and M moves
 //!
 //! ```text
 //! ln J = 1/M Σ [ a_e ln(1 + E/w) + a_s ln(1 + S/D) + a_i ln(I/I₀) ]
 //! ```
 //!
-//! An axis on which the cart is not within its window at the end of the run, t_end, but away by e, has S = (t_end − D)(1 + ln(1 + e/w)).
+//! An axis on which the cart is not within its window at the end of the run, t_end, but away by e, has S = (t_end −
+//! D)(1 + ln(1 + e/w)).
 
 use super::family::{Corner, Family};
 use crate::case::{Cost, Move};

@@ -8,13 +8,13 @@ use std::f64::consts::PI;
 /// By what factor each inner loop of a cascade is quicker than the one around it.
 pub const CASCADE: f64 = 4.0;
 
-/// The design with the gains that put the poles of M ẍ + d ẋ = g u where `bandwidth` (Hz) and `damping` ζ say, delay and sampling
-/// apart; none for a structure that has no such gains. A gain that is zero in the design stays zero.
+/// The design with the gains that put the poles of M ẍ + d ẋ = g u where `bandwidth` (Hz) and `damping` ζ say, delay
+/// and sampling apart; none for a structure that has no such gains. A gain that is zero in the design stays zero.
 ///
-/// PID: with an integral all three poles, (s + ζω₀)(s² + 2ζω₀ s + ω₀²), ω₀ = 2π f; without one s² + 2ζω₀ s + ω₀². Cascade: K_v = ω₀, the
-/// speed loop s² + 2ζω_v s + ω_v² with ω_v = 4 ω₀ (without its integral the pole −ω_v), and the current loop −4 ω_v, or
-/// −1/(2 (T/2 + delay)) where sampling allows no more. A damping that the drag of the axis exceeds by itself takes a twentieth of the
-/// gain, for a search to change.
+/// PID: with an integral all three poles, (s + ζω₀)(s² + 2ζω₀ s + ω₀²), ω₀ = 2π f; without one s² + 2ζω₀ s + ω₀².
+/// Cascade: K_v = ω₀, the speed loop s² + 2ζω_v s + ω_v² with ω_v = 4 ω₀ (without its integral the pole −ω_v), and the
+/// current loop −4 ω_v, or −1/(2 (T/2 + delay)) where sampling allows no more. A damping that the drag of the axis
+/// exceeds by itself takes a twentieth of the gain, for a search to change.
 pub fn place(design: &Design, stage: &Stage, bandwidth: f64, damping: f64) -> Option<Design> {
     let rigid = Rigid::of(stage);
     let (mass, w) = (rigid.mass, 2.0 * PI * bandwidth);

@@ -19,7 +19,8 @@ const WIDTH: f64 = 0.7;
 /// Most notches, those of the file with them.
 const NOTCHES: usize = 2;
 
-/// Starts for a design: placements about `bandwidth` (Hz), and for a PID Skogestad's rule. State feedback begins with its own weights and slower filters.
+/// Starts for a design: placements about `bandwidth` (Hz), and for a PID Skogestad's rule. State feedback begins with
+/// its own weights and slower filters.
 pub fn starts(
     design: &Design,
     stage: &Stage,
@@ -44,7 +45,8 @@ pub fn starts(
 
 /// Skogestad's rule for k e^{−θs}/(s (τ s + 1)) with τ_c = θ: K_c = 1/(2 k θ), τ_I = 8 θ, τ_D = τ, in series.
 ///
-/// S. Skogestad, "Simple analytic rules for model reduction and PID controller tuning", Journal of Process Control 13 (2003).
+/// S. Skogestad, "Simple analytic rules for model reduction and PID controller tuning", Journal of Process Control 13
+/// (2003).
 fn simc(design: &Design, stage: &Stage) -> Option<Design> {
     let Structure::Pid(old) = &design.structure else { return None };
     let rigid = Rigid::of(stage);
@@ -68,8 +70,8 @@ fn simc(design: &Design, stage: &Stage) -> Option<Design> {
     Some(Design { structure, ..design.clone() })
 }
 
-/// The design with filters added in the ways that are tried, the plain one first: `modes` are frequencies of the axis below half the sampling
-/// rate, Hz, the lowest first.
+/// The design with filters added in the ways that are tried, the plain one first: `modes` are frequencies of the axis
+/// below half the sampling rate, Hz, the lowest first.
 pub fn layouts(design: &Design, modes: &[f64]) -> Vec<Design> {
     let mut all = vec![design.clone()];
     let notch = |frequency: f64| Filter::Notch { frequency, depth: DEPTH, damping: WIDTH };

@@ -1,4 +1,5 @@
-//! A search without derivatives (J. A. Nelder, R. Mead, "A simplex method for function minimization", The Computer Journal 7, 1965).
+//! A search without derivatives (J. A. Nelder, R. Mead, "A simplex method for function minimization", The Computer
+//! Journal 7, 1965).
 
 /// The result of a search.
 #[derive(Debug, Clone, PartialEq)]
@@ -9,8 +10,8 @@ pub struct Found {
     pub value: f64,
 }
 
-/// From a point, with a simplex of edge `step`, until it is smaller than `accuracy` or `most` values were asked for. What is no number is
-/// as bad as can be.
+/// From a point, with a simplex of edge `step`, until it is smaller than `accuracy` or `most` values were asked for.
+/// What is no number is as bad as can be.
 pub fn minimise(
     start: &[f64],
     step: f64,

@@ -15,7 +15,8 @@ const SATURATED: f64 = 0.5;
 const LOUD: f64 = 0.25;
 const CYCLES: f64 = 4.0;
 
-/// Growth of that swing from the first half of the rest to the second from which on it grows, and the least share of the limit.
+/// Growth of that swing from the first half of the rest to the second from which on it grows, and the least share of
+/// the limit.
 const GROWS: f64 = 1.5;
 const LEAST: f64 = 0.1;
 

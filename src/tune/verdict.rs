@@ -21,7 +21,8 @@ pub struct Verdict {
     pub design: Design,
     /// Its margins on the axis as it is taken for.
     pub nominal: Margins,
-    /// The axis on which its sensitivity is furthest beyond its limits, or nearest to them, once the bad end is left out.
+    /// The axis on which its sensitivity is furthest beyond its limits, or nearest to them, once the bad end is left
+    /// out.
     pub corner: Corner,
     /// The margins there.
     pub worst: Margins,

@@ -1,4 +1,5 @@
-//! The search: many designs by what steps of command and reference do within the limits, which needs no run; the best of them by moves.
+//! The search: many designs by what steps of command and reference do within the limits, which needs no run; the best
+//! of them by moves.
 
 use super::evolution::evolve;
 use super::family::{Family, modes_along};
@@ -32,8 +33,8 @@ const MOVES: usize = 30;
 const FIRST: f64 = 0.25;
 const FURTHER: f64 = 0.12;
 
-/// Members and generations of differential evolution, how far members are scattered about the best (natural logarithm of gains), and how often it
-/// is done again with an axis more.
+/// Members and generations of differential evolution, how far members are scattered about the best (natural logarithm
+/// of gains), and how often it is done again with an axis more.
 const MEMBERS: usize = 12;
 const GENERATIONS: usize = 8;
 const SCATTER: f64 = 0.4;
@@ -132,7 +133,8 @@ impl<'a> Work<'a> {
         margins.excess(self.tuning.sensitivity, self.tuning.complementary)
     }
 
-    /// The machine on which a design is worst, once the bad end is left out, and its margins; and how many are not stable.
+    /// The machine on which a design is worst, once the bad end is left out, and its margins; and how many are not
+    /// stable.
     pub fn limits(&self, design: &Design) -> Result<(usize, Margins, usize)> {
         let feedback = self.feedback(design)?;
         let mut all: Vec<(usize, Margins)> =
@@ -171,13 +173,15 @@ impl<'a> Work<'a> {
         for plant in self.set.iter().map(|&place| &self.plants[place]).chain(&self.more) {
             let margins = Margins::roughly(plant, &feedback);
             most = most.max(self.excess(&margins));
-            // What a step at the command does, and a step of the reference: the one alone would do without a position gain.
+            // What a step at the command does, and a step of the reference: the one alone would do without a position
+            // gain.
             slow = slow.max(margins.disturbance * margins.following);
         }
         ((most / WITHIN - 1.0).max(0.0), slow)
     }
 
-    /// Modes of the axis that a command swings, each in the middle of where it goes along the travel, Hz; and the first anti-resonance.
+    /// Modes of the axis that a command swings, each in the middle of where it goes along the travel, Hz; and the first
+    /// anti-resonance.
     pub fn modes(&self) -> Result<(Vec<f64>, Option<f64>)> {
         let places = modes_along(&self.case.stage, &self.family.places)?;
         let swing = places.iter().filter_map(|place| place.undamped_antiresonances.first().copied()).reduce(f64::min);
@@ -253,7 +257,8 @@ impl<'a> Work<'a> {
         Ok((found, placed))
     }
 
-    /// A start that keeps the limits on all machines: with its loop made slower as long as it does not. And the share of its speed.
+    /// A start that keeps the limits on all machines: with its loop made slower as long as it does not. And the share
+    /// of its speed.
     fn softened(&mut self, start: &Design, own: usize) -> Result<Option<(Design, f64)>> {
         let mut factor = 1.0;
         while factor > 1e-3 && !(self.stop)() {
@@ -305,8 +310,8 @@ impl<'a> Work<'a> {
         Ok(between(near))
     }
 
-    /// The figures of a design on these machines, and ln J by the balance of the search; as soon as it is at least `bar`, those of the machines that were
-    /// looked at until then: another machine makes no figure at worst smaller.
+    /// The figures of a design on these machines, and ln J by the balance of the search; as soon as it is at least
+    /// `bar`, those of the machines that were looked at until then: another machine makes no figure at worst smaller.
     fn run(&self, design: &Design, some: &[usize], weighed: &Weighed, bar: f64) -> (Vec<AtWorst>, f64) {
         let mut seen: Vec<Vec<MoveFigures>> = vec![Vec::new(); self.moves.len()];
         let mut found = (Vec::new(), f64::INFINITY);
@@ -329,8 +334,8 @@ impl<'a> Work<'a> {
         found
     }
 
-    /// Searches by moves on the machines `some`: with the simplex from each of the best finalists, then with differential evolution about the best.
-    /// All that was run and keeps the limits on the set.
+    /// Searches by moves on the machines `some`: with the simplex from each of the best finalists, then with
+    /// differential evolution about the best. All that was run and keeps the limits on the set.
     pub fn by_moves(&mut self, finalists: &[Finalist], some: &[usize], cost: Cost) -> Result<Vec<Tried>> {
         let weighed = Weighed { cost, bars: None };
         let mut archive: Vec<Tried> = Vec::new();
@@ -393,8 +398,8 @@ impl<'a> Work<'a> {
         Ok((value, powers))
     }
 
-    /// Differential evolution about the best designs of a layout that were run, once more where what it finds passes a limit on an axis that
-    /// was not looked at.
+    /// Differential evolution about the best designs of a layout that were run, once more where what it finds passes a
+    /// limit on an axis that was not looked at.
     pub fn evolved(
         &mut self,
         finalists: &[Finalist],
@@ -491,8 +496,8 @@ impl<'a> Work<'a> {
         archive.extend(own);
     }
 
-    /// A design without those of its added filters, from number `own` on, without which the limits hold and it is as good: `is_as_good` is
-    /// asked with what it was and is.
+    /// A design without those of its added filters, from number `own` on, without which the limits hold and it is as
+    /// good: `is_as_good` is asked with what it was and is.
     pub fn pruned(
         &mut self,
         mut verdict: Verdict,
@@ -547,7 +552,8 @@ impl<'a> Work<'a> {
     }
 }
 
-/// A design with a slower loop: of a PID or a cascade as if time went by more slowly, of state feedback with less weight on errors.
+/// A design with a slower loop: of a PID or a cascade as if time went by more slowly, of state feedback with less
+/// weight on errors.
 fn slower(design: &Design, own: usize, stage: &crate::stage::Stage, factor: f64) -> Design {
     if factor == 1.0 {
         return design.clone();

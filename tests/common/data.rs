@@ -1,5 +1,6 @@
-//! Files that are not part of the project. A test that lacks one does nothing, and is counted as ignored by `cargo xtask test`: its
-//! name is appended to the file that `TAUT_IGNORED` names. With `TAUT_REQUIRE=all` it fails instead.
+//! Files that are not part of the project. A test that lacks one does nothing, and is counted as ignored by
+//! `cargo xtask test`: its name is appended to the file that `TAUT_IGNORED` names. With `TAUT_REQUIRE=all` it fails
+//! instead.
 
 use std::fs::OpenOptions;
 use std::io::Write;
@@ -25,7 +26,8 @@ pub fn of_case(path: &Path) -> bool {
     named.into_iter().all(|file| data([file]).is_some())
 }
 
-/// The trajectories that `authorities/verify.py` compares with, too: in the folder that `TAUT_REFERENCE` names, or `data/reference`.
+/// The trajectories that `authorities/verify.py` compares with, too: in the folder that `TAUT_REFERENCE` names, or
+/// `data/reference`.
 pub fn reference() -> Option<PathBuf> {
     let here = || Path::new(env!("CARGO_MANIFEST_DIR")).join("data/reference");
     let folder = std::env::var_os("TAUT_REFERENCE").map_or_else(here, PathBuf::from);

@@ -6,8 +6,8 @@ use taut::friction::{Friction, Side};
 use taut::signal::Signal;
 use taut::stage::{Amplifier, AmplifierMode, Belt, BeltModel, Cart, EndStop, GearPlay, Motor, Pulley, Stage, Travel};
 
-/// As many random cases, the same ones in every run: of a law on sensitive machines a few in a hundred thousand miss their
-/// tolerance because an error of the last bit has grown. `PROPTEST_RNG_SEED=…` draws others, `TAUT_CASES=…` more.
+/// As many random cases, the same ones in every run: of a law on sensitive machines a few in a hundred thousand miss
+/// their tolerance because an error of the last bit has grown. `PROPTEST_RNG_SEED=…` draws others, `TAUT_CASES=…` more.
 pub fn cases(count: u32) -> ProptestConfig {
     let from_environment = ProptestConfig::default();
     ProptestConfig {
@@ -105,7 +105,8 @@ fn now_and_then<T: std::fmt::Debug + Clone>(value: impl Strategy<Value = T>) -> 
     prop::option::weighted(0.4, value)
 }
 
-/// Such machines with limits, backlash, slack spans, end stops, and reduced models; with `Symmetric` ones that have a mirror image.
+/// Such machines with limits, backlash, slack spans, end stops, and reduced models; with `Symmetric` ones that have a
+/// mirror image.
 pub fn equipped(dry: Dry) -> impl Strategy<Value = Stage> {
     let limits = (now_and_then(0.5..10.0_f64), now_and_then(decades(0.3, 6.0)), now_and_then(decades(20.0, 2000.0)));
     let gear = now_and_then((

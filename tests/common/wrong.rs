@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Every file of `folder` with this extension, of which there are at least so many, gives exactly its message; `None` is no
-/// message. `UPDATE_EXPECT=1` writes the messages again.
+/// Every file of `folder` with this extension, of which there are at least so many, gives exactly its message; `None`
+/// is no message. `UPDATE_EXPECT=1` writes the messages again.
 pub fn every_message(folder: &str, extension: &str, least: usize, message: impl Fn(&Path) -> Option<String>) {
     let mut files: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.retain(|file| file.extension().is_some_and(|e| e == extension));

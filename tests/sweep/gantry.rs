@@ -78,8 +78,8 @@ fn most(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, |most: f64, value| most.max(value.abs()))
 }
 
-/// Everything off at once, on machines with spans that go slack, gears with play and end stops, too: figures against those of rows every
-/// 20 µs, which miss the tops of the peaks by at most so much.
+/// Everything off at once, on machines with spans that go slack, gears with play and end stops, too: figures against
+/// those of rows every 20 µs, which miss the tops of the peaks by at most so much.
 #[test]
 fn figures_are_those_of_the_columns() {
     let more = [
@@ -244,7 +244,8 @@ const PARTS: [&[&str]; 3] = [
     &["belt={ modulus = 1048576, section = 0.0078125, spans = [8, 16, 32], follows_cart = true }"],
 ];
 
-/// Sets each number of each gantry to a quarter of its value: it is read back, and a case file that says so is the same machine.
+/// Sets each number of each gantry to a quarter of its value: it is read back, and a case file that says so is the same
+/// machine.
 #[test]
 fn every_number_is_set_where_a_case_file_has_it() {
     let mut seen = 0;

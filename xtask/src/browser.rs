@@ -32,8 +32,8 @@ const REPORTS: [(&str, &[&str]); 12] = [
     ("fit", &["fit", "stages/sollmann-jouaneh/identification/linear-5v.toml"]),
 ];
 
-/// Makes the reports and looks at them; false where one is not as it should be. Where there is no browser, or no node to drive it, and
-/// neither can be installed, the tests are ignored, unless `TAUT_REQUIRE=all` is set.
+/// Makes the reports and looks at them; false where one is not as it should be. Where there is no browser, or no node
+/// to drive it, and neither can be installed, the tests are ignored, unless `TAUT_REQUIRE=all` is set.
 pub fn test(counts: &mut Counts) -> Result<bool, String> {
     let browser = match browser() {
         Ok(browser) => browser,

@@ -1,7 +1,9 @@
-//! `cargo xtask counts [--keep]`: how many instructions eight standard works take, against those that are kept in `benches/counts.txt`.
+//! `cargo xtask counts [--keep]`: how many instructions eight standard works take, against those that are kept in
+//! `benches/counts.txt`.
 //!
-//! Times depend on what else a machine does; instructions do not. valgrind runs `examples/counts.rs` and counts those of each work. It knows
-//! AVX2 and nothing wider. The counts hold for one compiler, which the file names; another one is told, and its counts are compared all the same.
+//! Times depend on what else a machine does; instructions do not. valgrind runs `examples/counts.rs` and counts those
+//! of each work. It knows AVX2 and nothing wider. The counts hold for one compiler, which the file names; another one
+//! is told, and its counts are compared all the same.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,6 +1,8 @@
-//! `cargo xtask data [--from DIR]`: other people's measurements, from a folder or from where they are published, into `data/`.
+//! `cargo xtask data [--from DIR]`: other people's measurements, from a folder or from where they are published, into
+//! `data/`.
 //!
-//! A file is kept only if it is the one that the tests were written with, by its SHA-256; it appears whole or not at all.
+//! A file is kept only if it is the one that the tests were written with, by its SHA-256; it appears whole or not at
+//! all.
 
 mod zip;
 
@@ -34,8 +36,8 @@ const fn file(path: &'static str, sha256: &'static str, url: &'static str) -> Fi
 const CED: &str =
     "https://www.it.uu.se/research/publications/reports/2017-024/CoupledElectricDrivesDataSetAndReferenceModels.zip";
 
-/// All of them. The addresses were put together from repository, commit and path, or from the report's number; what was tried of the
-/// download is a server of the tests.
+/// All of them. The addresses were put together from repository, commit and path, or from the report's number; what was
+/// tried of the download is a server of the tests.
 const FILES: [File; 8] = [
     file(
         "pendulepi/february.csv",

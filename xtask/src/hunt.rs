@@ -1,4 +1,5 @@
-//! `cargo xtask hunt`: looks for what is wrong with larger means than the tests have, each part with a seed and a budget.
+//! `cargo xtask hunt`: looks for what is wrong with larger means than the tests have, each part with a seed and a
+//! budget.
 
 mod faults;
 mod mutants;
@@ -43,7 +44,8 @@ pub const USAGE: &str = "cargo xtask hunt [--part stages|readers|faults|mutants]
                        [--stages N [--threads N] [--json]] [--seconds B] [--kills N] [--mutants N [--list | --only K]]";
 
 impl Hunt {
-    /// From the words behind `hunt`. The size of a part names it, too; without any all parts but the mutants, which take hours.
+    /// From the words behind `hunt`. The size of a part names it, too; without any all parts but the mutants, which
+    /// take hours.
     pub fn new(words: &[&str]) -> Result<Self, String> {
         let mut hunt = Self {
             parts: Vec::new(),

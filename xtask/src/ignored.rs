@@ -1,4 +1,5 @@
-//! Tests that did nothing because a file is not there: they append their name and the file to a list, which is shown and counted.
+//! Tests that did nothing because a file is not there: they append their name and the file to a list, which is shown
+//! and counted.
 
 use std::fs;
 use std::path::{Path, PathBuf};

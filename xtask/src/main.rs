@@ -1,7 +1,7 @@
-//! The project's own chores: `cargo xtask test` checks all that can be checked, `cargo xtask python` the Python package alone,
-//! `cargo xtask browser` the reports alone, `cargo xtask data` fetches other people's measurements, `cargo xtask hunt` looks for what is
-//! wrong with larger means, `cargo xtask coverage` and `cargo xtask faults` make the tables of docs/fit.md, `cargo xtask counts` counts the
-//! instructions of standard works.
+//! The project's own chores: `cargo xtask test` checks all that can be checked, `cargo xtask python` the Python package
+//! alone, `cargo xtask browser` the reports alone, `cargo xtask data` fetches other people's measurements,
+//! `cargo xtask hunt` looks for what is wrong with larger means, `cargo xtask coverage` and `cargo xtask faults` make
+//! the tables of docs/fit.md, `cargo xtask counts` counts the instructions of standard works.
 
 mod browser;
 mod counts;
@@ -180,7 +180,8 @@ fn cargo(arguments: &[&str]) -> Command {
     command
 }
 
-/// Builds the program `taut` as the tests of the workspace do, after which there is nothing left to do; none where that fails.
+/// Builds the program `taut` as the tests of the workspace do, after which there is nothing left to do; none where that
+/// fails.
 fn build_program(counts: &mut Counts) -> Result<Option<PathBuf>, String> {
     if !run(cargo(&["test", "--workspace", "--no-run", "--test", "all"]), counts)? {
         return Ok(None);
@@ -199,7 +200,8 @@ struct Counts {
 }
 
 impl Counts {
-    /// Adds what a line such as `test result: ok. 5 passed; 0 failed; …`, or pytest's `5 passed, 1 skipped in 0.1s`, reports.
+    /// Adds what a line such as `test result: ok. 5 passed; 0 failed; …`, or pytest's `5 passed, 1 skipped in 0.1s`,
+    /// reports.
     fn take(&mut self, line: &str) {
         let pytest = line.ends_with('s') && line.contains(" in ") && line.starts_with(|c: char| c.is_ascii_digit());
         if !line.starts_with("test result: ") && !pytest {

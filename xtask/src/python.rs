@@ -1,4 +1,5 @@
-//! The Python package: built as a wheel, installed into an environment of its own under `target/python`, and tested there.
+//! The Python package: built as a wheel, installed into an environment of its own under `target/python`, and tested
+//! there.
 
 use crate::Counts;
 use std::path::{Path, PathBuf};

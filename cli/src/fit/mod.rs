@@ -84,7 +84,8 @@ pub fn run(args: &Args) -> Outcome {
     finished.finish(common, folder)
 }
 
-/// The search, then profiles and draws where they are wanted; Ctrl-C leaves out the rest. None where it came before any result.
+/// The search, then profiles and draws where they are wanted; Ctrl-C leaves out the rest. None where it came before any
+/// result.
 fn find(args: &Args, case: &Case, plan: &Plan, interrupt: &Interrupt) -> Result<Option<Found>> {
     let (common, is_stopped) = (&args.common, || interrupt.signal().is_some());
     let (progress, mut steps) = (Progress::new("simulating the logs", None, common.quiet), 0);

@@ -116,7 +116,8 @@ impl Belt {
     }
 }
 
-/// Eq. (12) over eq. (13) with l the whole span, for a toothed section `ratio` times the plain one on `share` of the length.
+/// Eq. (12) over eq. (13) with l the whole span, for a toothed section `ratio` times the plain one on `share` of the
+/// length.
 pub fn series_over_plain(ratio: f64, share: f64) -> f64 {
     toothed_section(1.0, ratio, share)
 }

@@ -125,7 +125,8 @@ pub struct Linear {
     pub corrected_x3: f64,
     /// Its x₁ there times r, m.
     pub corrected_end: f64,
-    /// Final position by the matrices of eq. (1)-(4) and the matrix exponential, m: an independent path to the same number.
+    /// Final position by the matrices of eq. (1)-(4) and the matrix exponential, m: an independent path to the same
+    /// number.
     pub by_exponential: f64,
     /// r K_t/R · V · T/(B₁ + B₂ + b r² + K_t K_e/R) for 5 V and Table 1, m: where every linear set must end.
     pub closed_form: f64,

@@ -1,7 +1,7 @@
 //! The paper's sentences, each with the numbers that decide it.
 //!
-//! The meaning of the paper's words, once for all: "by far" is five times, "minor" and "marginal" less than a tenth, "not
-//! appreciable" less than a hundredth, "the same" less than a thousandth.
+//! The meaning of the paper's words, once for all: "by far" is five times, "minor" and "marginal" less than a tenth,
+//! "not appreciable" less than a hundredth, "the same" less than a thousandth.
 
 use super::claims::{Claim, Kind::Statement, Rule};
 use super::findings::Findings;

@@ -160,7 +160,8 @@ pub struct Table3 {
     pub exact_creep: f64,
     /// Distance that the cart goes in half a second at the edge of the band, 0.01 rad/s, m.
     pub band_edge: f64,
-    /// Acceleration of the drive pulley at the very start of the 5 V pulse, rad/s²: with sign(0) = 0, and with friction.
+    /// Acceleration of the drive pulley at the very start of the 5 V pulse, rad/s²: with sign(0) = 0, and with
+    /// friction.
     pub start: (f64, f64),
 }
 

@@ -121,7 +121,8 @@ fn axis(args: &Simulate, path: &Path, case: &Case) -> Outcome {
     finished.finish(common, folder)
 }
 
-/// The files that will be written, but for plots: `brought` are those of the case's inputs, `experiments` the names of the runs' own.
+/// The files that will be written, but for plots: `brought` are those of the case's inputs, `experiments` the names of
+/// the runs' own.
 fn names(
     args: &Simulate,
     brought: impl Iterator<Item = String>,

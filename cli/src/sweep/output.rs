@@ -11,8 +11,8 @@ use taut::Result;
 use taut::trajectory::ParquetWriter;
 use taut::trajectory::{CsvWriter, Trajectory};
 
-/// Writes the rows and what is written beside them; returns the names of those that have their places, or none where it was
-/// interrupted.
+/// Writes the rows and what is written beside them; returns the names of those that have their places, or none where it
+/// was interrupted.
 pub fn write(work: &Work, target: &Target, store: &Store) -> std::result::Result<Option<Vec<String>>, Failure> {
     let Some(rows) = options::rows(target) else { return Ok(Some(Vec::new())) };
     let mut files = vec![rows.clone()];

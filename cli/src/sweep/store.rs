@@ -1,7 +1,8 @@
 //! Finished rows, in chunks: each a file that appears whole, so that an interrupted sweep resumes.
 //!
-//! Beside the file of the rows stands a folder `….parts` with a manifest, which says of which sweep these parts are, and a file for
-//! each chunk: its columns one after another as doubles, little end first. The folder goes when the rows are written.
+//! Beside the file of the rows stands a folder `….parts` with a manifest, which says of which sweep these parts are,
+//! and a file for each chunk: its columns one after another as doubles, little end first. The folder goes when the rows
+//! are written.
 
 use super::Work;
 use super::options::{self, PARTS, beside};
@@ -221,7 +222,8 @@ fn chunk(work: &Work, threads: usize) -> u64 {
     ((CHUNK_TIME / each) as u64).clamp(1, LARGEST).min(fair).next_power_of_two()
 }
 
-/// A hash of everything that rows follow from: the text of the case with what the command line changed, and the files it names.
+/// A hash of everything that rows follow from: the text of the case with what the command line changed, and the files
+/// it names.
 fn fingerprint(work: &Work) -> Result<String> {
     let mut bytes = work.case.text().as_bytes().to_vec();
     for path in work.case.files().iter().map(|file| &file.path) {

@@ -1,7 +1,8 @@
 //! The summary of all runs: how each figure is spread, and which parameters it depends on.
 //!
-//! Columns are read back one at a time, so memory does not grow with their number. Shares are exact up to [`MOST_VALUES`] runs; of
-//! more runs every second one is taken, every third, and so on. Rank correlations are those of at most [`MOST_RANKED`] runs.
+//! Columns are read back one at a time, so memory does not grow with their number. Shares are exact up to
+//! [`MOST_VALUES`] runs; of more runs every second one is taken, every third, and so on. Rank correlations are those of
+//! at most [`MOST_RANKED`] runs.
 
 use super::Work;
 use super::store::Store;

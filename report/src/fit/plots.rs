@@ -10,14 +10,16 @@ pub const MOST_LOGS: usize = 6;
 /// Logs in one overlay.
 const MOST_OVERLAID: usize = 60;
 
-/// The logs that are drawn: those whose residuals are largest beside what the fit takes as their deviation, the worst first.
+/// The logs that are drawn: those whose residuals are largest beside what the fit takes as their deviation, the worst
+/// first.
 pub fn worst<'a>(logs: &'a [LogFit], noise: &[(Quantity, f64)]) -> Vec<&'a LogFit> {
     let mut logs: Vec<(f64, &LogFit)> = logs.iter().map(|log| (misfit(log, noise), log)).collect();
     logs.sort_by(|a, b| b.0.total_cmp(&a.0));
     logs.into_iter().take(MOST_LOGS).map(|(_, log)| log).collect()
 }
 
-/// The largest RMSE of a log's outputs, each over the deviation of its quantity; infinite where the model does not reach the end.
+/// The largest RMSE of a log's outputs, each over the deviation of its quantity; infinite where the model does not
+/// reach the end.
 fn misfit(log: &LogFit, noise: &[(Quantity, f64)]) -> f64 {
     if !log.complete {
         return f64::INFINITY;

@@ -137,7 +137,8 @@ pub fn unit_for(sizes: impl Iterator<Item = f64>, unit: &str) -> (String, f64) {
     }
 }
 
-/// How experiments of several logs, or logs of several windows, are met; empty where that is no other than each log, or all together.
+/// How experiments of several logs, or logs of several windows, are met; empty where that is no other than each log, or
+/// all together.
 pub fn by_experiment(fit: &Fit) -> Vec<Together> {
     let all = together(&fit.logs, |log| log.experiment().to_string());
     let mut names: Vec<&str> = all.iter().map(|one| one.name.as_str()).collect();

@@ -84,7 +84,8 @@ fn frequency(work: &Work) -> Result<Vec<Named>> {
     ])
 }
 
-/// Magnitude and phase of L before and after on the axis as it is taken for, with the crossover after and the modes along the travel marked.
+/// Magnitude and phase of L before and after on the axis as it is taken for, with the crossover after and the modes
+/// along the travel marked.
 fn bode(work: &Work) -> Result<Figure> {
     let tuned = work.tuned;
     let nominal = tuned.family.nominal();

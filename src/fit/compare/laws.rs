@@ -12,7 +12,8 @@ use toml_edit::{Array, DocumentMut, InlineTable, Item, Value};
 /// Points of friction along the travel.
 const POINTS: usize = 7;
 
-/// Share of the Coulomb friction that a Stribeck curve begins above it, and share of the greatest speed over which it falls.
+/// Share of the Coulomb friction that a Stribeck curve begins above it, and share of the greatest speed over which it
+/// falls.
 const ABOVE: f64 = 0.2;
 const FALL: f64 = 0.05;
 
@@ -82,7 +83,8 @@ pub(super) fn body(plan: &Plan) -> &'static str {
     if count("drive_pulley") > count("cart") { "drive_pulley" } else { "cart" }
 }
 
-/// The case with this law above `sided` friction or not, beginning at the machine `from`, and what is searched for in it.
+/// The case with this law above `sided` friction or not, beginning at the machine `from`, and what is searched for in
+/// it.
 pub(super) fn with(
     case: &Case,
     name: &Path,

@@ -1,9 +1,10 @@
 //! Which friction law and which windows: those whose fit to some of the records predicts the others best.
 //!
-//! A law with more parameters meets the records that it is fitted to better, and others worse once it fits what does not come again.
-//! So each candidate is fitted with a part of the records left out, and judged by its error there. With e_cf the squared error of
-//! candidate c in part f, the one with the fewest parameters is chosen whose mean error exceeds that of the best by no more than a
-//! standard error of the differences e_cf − e_bf (the rule of one standard error, L. Breiman and others 1984).
+//! A law with more parameters meets the records that it is fitted to better, and others worse once it fits what does
+//! not come again. So each candidate is fitted with a part of the records left out, and judged by its error there. With
+//! e_cf the squared error of candidate c in part f, the one with the fewest parameters is chosen whose mean error
+//! exceeds that of the best by no more than a standard error of the differences e_cf − e_bf (the rule of one standard
+//! error, L. Breiman and others 1984).
 
 mod laws;
 mod parts;

@@ -9,8 +9,8 @@ use std::sync::Arc;
 /// From so many logs on, whole logs are held out; of fewer, each is cut into blocks.
 const FEWEST_LOGS: usize = 4;
 
-/// How many parts logs are taken in, into how many blocks fewer logs are cut, and the fewest samples of a block: errors add up along a
-/// block as they do along a record, so blocks are long.
+/// How many parts logs are taken in, into how many blocks fewer logs are cut, and the fewest samples of a block: errors
+/// add up along a block as they do along a record, so blocks are long.
 const FOLDS: usize = 5;
 const BLOCKS: usize = 4;
 const SAMPLES: usize = 60;
@@ -21,7 +21,8 @@ pub(super) struct Fold {
     pub held_out: Vec<Experiment>,
 }
 
-/// The records in parts: each is held out once. The flag says that logs were cut, so that their parts have starts of their own.
+/// The records in parts: each is held out once. The flag says that logs were cut, so that their parts have starts of
+/// their own.
 pub(super) struct Parts {
     pub folds: Vec<Fold>,
     pub is_cut: bool,

@@ -114,8 +114,8 @@ fn stamp(column: &ColumnDescriptor) -> Option<&'static str> {
     }
 }
 
-/// The first values of a column; NaN where there is none. Time stamps count from the first, so that a double holds them.
-/// Where they have to increase, they end with the first that does not.
+/// The first values of a column; NaN where there is none. Time stamps count from the first, so that a double holds
+/// them. Where they have to increase, they end with the first that does not.
 fn column(reader: &SerializedFileReader<File>, place: usize, length: usize, ordered: bool) -> ParquetResult<Vec<f64>> {
     let schema = reader.metadata().file_metadata().schema_descr();
     let descriptor = schema.column(place);

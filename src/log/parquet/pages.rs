@@ -1,6 +1,8 @@
-//! How large the pages of a column are once unpacked, before one is: the reader takes the memory that a page's header asks for.
+//! How large the pages of a column are once unpacked, before one is: the reader takes the memory that a page's header
+//! asks for.
 //!
-//! A page begins with a structure of Thrift's compact protocol, of which fields 2 and 3 are its sizes unpacked and packed.
+//! A page begins with a structure of Thrift's compact protocol, of which fields 2 and 3 are its sizes unpacked and
+//! packed.
 
 use super::damaged;
 use crate::error::{Error, Result};

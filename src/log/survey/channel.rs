@@ -172,7 +172,8 @@ impl Channel {
         [self.least, self.greatest].into_iter().filter_map(at).collect()
     }
 
-    /// Where an input that takes many values stays at its extreme, far longer than anywhere else: one that only switches does so by nature.
+    /// Where an input that takes many values stays at its extreme, far longer than anywhere else: one that only
+    /// switches does so by nature.
     fn find_flat(&self, values: &[f64], time: &[f64]) -> Vec<Clipped> {
         let tolerance = 1e-9 * self.span();
         let is_extreme = |x: f64| (x - self.least).abs() <= tolerance || (x - self.greatest).abs() <= tolerance;

@@ -1,7 +1,7 @@
 //! The survey of a log before anything is fitted to it: its clock, its columns, its motion, and its faults.
 //!
-//! Nothing here changes a log. Speeds are estimated where only positions were measured, to tell rest, reversals and steady
-//! motion apart, and are used for nothing else.
+//! Nothing here changes a log. Speeds are estimated where only positions were measured, to tell rest, reversals and
+//! steady motion apart, and are used for nothing else.
 
 mod channel;
 mod motion;

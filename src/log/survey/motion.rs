@@ -137,7 +137,8 @@ impl Motion {
         steady
     }
 
-    /// A gap in motion, or over a change of the input: a model that is put through the log does not know what was fed in there.
+    /// A gap in motion, or over a change of the input: a model that is put through the log does not know what was fed
+    /// in there.
     pub(super) fn across_gaps(&self, log: &Log, timing: &Timing) -> Option<Note> {
         let wide = log.input.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
         let moving = |k: usize| self.speed.get(k).is_some_and(|v| v.abs() > SLOW * self.peak_speed);

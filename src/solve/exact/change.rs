@@ -7,7 +7,8 @@ use crate::mechanism::{AmplifierMode, Cause, Limit, Mode, Part, Status, Switch, 
 use crate::solve::{Ending, Event};
 use std::sync::Arc;
 
-/// Events allowed at once, per simulated second, and in all: more is an accumulation, not a machine, or fills the memory.
+/// Events allowed at once, per simulated second, and in all: more is an accumulation, not a machine, or fills the
+/// memory.
 const EVENTS_AT_LEAST: f64 = 1e5;
 const EVENTS_PER_SECOND: f64 = 1e7;
 const EVENTS_AT_MOST: f64 = 2e7;
@@ -120,7 +121,8 @@ impl<const N: usize> Core<N> {
         self.take_up_mode();
     }
 
-    /// Whether a body stops where rounding decides: its speed tends to zero for ever, and nothing slows it down any more.
+    /// Whether a body stops where rounding decides: its speed tends to zero for ever, and nothing slows it down any
+    /// more.
     fn is_by_rounding(&mut self, cause: Cause) -> bool {
         let Cause::Stop(body) = cause else { return false };
         self.common.rounding.see(&self.largest);

@@ -1,25 +1,28 @@
 //! The kernels: what is compiled for vectors of one size each, and which of them a machine takes.
 //!
-//! A page for somebody who has never seen vector instructions. What the exact solver does all day is to multiply a matrix with a vector: the
-//! state z after an interval is z + P z, its rate is A z, the values of all guards are G z. A processor can add or multiply four numbers at
-//! once, if they lie side by side in memory and the program says so. The compiler says so by itself where three things hold:
+//! A page for somebody who has never seen vector instructions. What the exact solver does all day is to multiply a
+//! matrix with a vector: the state z after an interval is z + P z, its rate is A z, the values of all guards are G z. A
+//! processor can add or multiply four numbers at once, if they lie side by side in memory and the program says so. The
+//! compiler says so by itself where three things hold:
 //!
-//! - **The length is known when it compiles.** A vector here has `N` places, `N` being 8, 12, 16, 20 or 32 and never just "some". So every
-//!   function of the solver exists five times, and [`in_kernel`] picks the smallest that has room for a machine: 8 for an axis of three bodies
-//!   with its input held (six states, u, and a one for what is constant). What is left over is zero, and costs as much as anything else.
-//! - **What is summed lies apart.** A sum of eight numbers waits for itself seven times. So matrices are kept by columns: to the vector of
-//!   sums is added first column times z₁, then second column times z₂; the eight sums of a vector are eight chains that do not wait for each
-//!   other. The guards of a mode stand side by side in the same way, eight to a group, and so do the forms whose squares make up the energy.
-//! - **Nobody asks on the way.** A condition in the innermost loop keeps the compiler from it. Zeros are multiplied like other numbers; what
-//!   is rare (a guard below zero, an event) is looked for afterwards.
+//! - **The length is known when it compiles.** A vector here has `N` places, `N` being 8, 12, 16, 20 or 32 and never
+//!   just "some". So every function of the solver exists five times, and [`in_kernel`] picks the smallest that has room
+//!   for a machine: 8 for an axis of three bodies with its input held (six states, u, and a one for what is constant).
+//!   What is left over is zero, and costs as much as anything else.
+//! - **What is summed lies apart.** A sum of eight numbers waits for itself seven times. So matrices are kept by
+//!   columns: to the vector of sums is added first column times z₁, then second column times z₂; the eight sums of a
+//!   vector are eight chains that do not wait for each other. The guards of a mode stand side by side in the same way,
+//!   eight to a group, and so do the forms whose squares make up the energy.
+//! - **Nobody asks on the way.** A condition in the innermost loop keeps the compiler from it. Zeros are multiplied
+//!   like other numbers; what is rare (a guard below zero, an event) is looked for afterwards.
 //!
-//! The same source is compiled twice, for any processor (two numbers at once) and for those with AVX2 (four), and the choice is made where
-//! the program runs. Both do the same operations in the same order, and multiply and add are two roundings in both (no FMA), so that they
-//! give the same bits. Where this can be seen: [`crate::solve::propagator`] (the products), `matrices.rs` (guards and energy),
-//! [`crate::solve::record`] (columns).
+//! The same source is compiled twice, for any processor (two numbers at once) and for those with AVX2 (four), and the
+//! choice is made where the program runs. Both do the same operations in the same order, and multiply and add are two
+//! roundings in both (no FMA), so that they give the same bits. Where this can be seen: [`crate::solve::propagator`]
+//! (the products), `matrices.rs` (guards and energy), [`crate::solve::record`] (columns).
 //!
-//! How a vector is laid out is the mechanism's to say ([`crate::mechanism::Layout`] and [`super::Space`]): nothing here knows an axis from a
-//! gantry.
+//! How a vector is laid out is the mechanism's to say ([`crate::mechanism::Layout`] and [`super::Space`]): nothing here
+//! knows an axis from a gantry.
 
 use super::ModeMatrices;
 use crate::mechanism::{BODIES, DRIVES};

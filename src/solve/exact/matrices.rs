@@ -12,11 +12,13 @@ pub(super) use guards::{Room, Watch};
 pub(super) use shown::Shown;
 use std::sync::{Arc, OnceLock};
 
-/// The places of the vector z of the exact solver: the state in the solver's coordinates, the inputs with their derivatives, and a one.
+/// The places of the vector z of the exact solver: the state in the solver's coordinates, the inputs with their
+/// derivatives, and a one.
 #[derive(Debug, Clone)]
 pub(in crate::solve) struct Space {
     pub(in crate::solve) layout: Layout,
-    /// Order of the highest derivative of an input that is carried along: 0 for held inputs, 1 for straight ones, [`DEGREE`] for smooth ones.
+    /// Order of the highest derivative of an input that is carried along: 0 for held inputs, 1 for straight ones,
+    /// [`DEGREE`] for smooth ones.
     pub(in crate::solve) highest: usize,
 }
 
@@ -148,7 +150,8 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
 }
 
 impl<const N: usize> ModeMatrices<N> {
-    /// Those of a mode and an interval, among those that are known, or new ones, which are added; and whether they are new.
+    /// Those of a mode and an interval, among those that are known, or new ones, which are added; and whether they are
+    /// new.
     pub(super) fn of(
         known: &mut Vec<Arc<Self>>,
         mechanism: &Mechanism,
@@ -210,8 +213,8 @@ impl<const N: usize> ModeMatrices<N> {
             }
         }
 
-        // The current does g i φ̇ of work, and its own rate is −δ i − β φ̇. With the weight w = g/β on its share ½ w i² in V the
-        // two cancel. Where there is no β to speak of, a large weight leaves next to nothing.
+        // The current does g i φ̇ of work, and its own rate is −δ i − β φ̇. With the weight w = g/β on its share ½ w i²
+        // in V the two cancel. Where there is no β to speak of, a large weight leaves next to nothing.
         let inertia = mechanism.balanced_inertia(&equations, mode);
         let (mut magnetic, mut growth, mut decays, mut coupled) = ([0.0; DRIVES], 0.0, 0.0, false);
         for (index, drive) in mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.has_current_state()) {
@@ -238,8 +241,8 @@ impl<const N: usize> ModeMatrices<N> {
             coupled |= exchange > 0.0 && moves != 0.0;
         }
 
-        // What a condition watches and no spring holds is bounded by a small stiffness κ that is not there: it feeds V, at
-        // a rate of ½ √(κ Σ arm²/m).
+        // What a condition watches and no spring holds is bounded by a small stiffness κ that is not there: it feeds V,
+        // at a rate of ½ √(κ Σ arm²/m).
         let mut stiffness = equations.stiffness;
         for (j, spring) in mechanism.springs.iter().enumerate() {
             let watched = equations.guards.iter().any(|guard| guard.form.stretch[j] != 0.0) && !at_rest[j];
@@ -438,8 +441,8 @@ impl<const N: usize> ModeMatrices<N> {
         self.forcing.iter().zip(rate).fold(0.0, |sum, (forcing, rate)| sum + forcing * rate)
     }
 
-    /// How fast the guards can change while ż has at most this size times `grow`, the inputs add at most `push` to it, and change at most
-    /// at this rate.
+    /// How fast the guards can change while ż has at most this size times `grow`, the inputs add at most `push` to it,
+    /// and change at most at this rate.
     #[inline]
     pub(super) fn steepness(&self, (size, push): (Size, f64), grow: f64, rate: &[f64; DRIVES], steepness: &mut Values) {
         // As `Size` parts them.
@@ -519,8 +522,9 @@ impl<const N: usize> ModeMatrices<N> {
         self.rate.absolute().rate(&z.map(f64::abs)).map(|size| ROUNDING * size)
     }
 
-    /// The first coefficient of a guard along the series from z over `distance`, from `first` on, that is more than rounding; those before
-    /// it count as zero, however many there are. The terms of the series are sums of parts of the size |A|ᵏ |z| dᵏ/k!.
+    /// The first coefficient of a guard along the series from z over `distance`, from `first` on, that is more than
+    /// rounding; those before it count as zero, however many there are. The terms of the series are sums of parts of
+    /// the size |A|ᵏ |z| dᵏ/k!.
     pub(super) fn first_term(
         &self,
         guard: &Watch<N>,

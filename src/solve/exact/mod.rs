@@ -1,12 +1,14 @@
 //! The exact solver: modes and matrix exponentials.
 //!
-//! Within a mode the stage is linear and a step is a product with e^{A h}. A mode may be left only when one of its guards
-//! becomes negative, so the solver moves in the largest steps on which no guard can, by a bound that holds for
-//! certain, and looks closer (halves the step, and at last expands the state into a Taylor series) only where the bound does not decide.
+//! Within a mode the stage is linear and a step is a product with e^{A h}. A mode may be left only when one of its
+//! guards becomes negative, so the solver moves in the largest steps on which no guard can, by a bound that holds for
+//! certain, and looks closer (halves the step, and at last expands the state into a Taylor series) only where the bound
+//! does not decide.
 //!
 //! The bound. y = ż obeys ẏ = A y + b u̇, and friction, resistance and damping only take energy away, so its energy
-//! V(y) = ½ Σ m a² + ½ Σ k (Δv)² + ½ w L (di/dt)² can only grow by the input's rate: √(2V)(τ) ≤ √(2V)(0) + |b|·|u̇|·τ. A guard
-//! g = w·z therefore changes no faster than |w|·√(2V), |w| being the norm dual to V; and likewise its slope, with ẏ.
+//! V(y) = ½ Σ m a² + ½ Σ k (Δv)² + ½ w L (di/dt)² can only grow by the input's rate: √(2V)(τ) ≤ √(2V)(0) + |b|·|u̇|·τ.
+//! A guard g = w·z therefore changes no faster than |w|·√(2V), |w| being the norm dual to V; and likewise its slope,
+//! with ẏ.
 
 mod change;
 mod kernel;
@@ -60,14 +62,15 @@ pub(super) struct Common {
     /// The interval whose halves there are matrices for, s.
     h: f64,
     pub(super) mode: Mode,
-    /// How many leading Taylor coefficients of a sliding body's speed are zero by definition, because it starts from rest:
-    /// 1 where it is accelerated, 2 where the load has only just reached its friction. The same for all else that is watched.
+    /// How many leading Taylor coefficients of a sliding body's speed are zero by definition, because it starts from
+    /// rest: 1 where it is accelerated, 2 where the load has only just reached its friction. The same for all else that
+    /// is watched.
     fresh: [u8; Cause::KINDS],
     is_fresh: bool,
     /// By how much the load on a stuck body may pass its breakaway before it counts: what rounding can do to the load.
-    /// Without it a body that comes to rest just at its limit would chatter on the last bit. The same for all else that is
-    /// watched where it is zero but for rounding, and would count as wrong in either state.
-    /// The place behind the others stays zero.
+    /// Without it a body that comes to rest just at its limit would chatter on the last bit. The same for all else that
+    /// is watched where it is zero but for rounding, and would count as wrong in either state. The place behind the
+    /// others stays zero.
     tolerance: [f64; Cause::KINDS + 1],
     /// Whether the input has changed, and what rounding does to the loads on stuck bodies is to be looked at anew.
     at_edge: bool,
@@ -114,8 +117,8 @@ impl Common {
 }
 
 impl<const N: usize> Core<N> {
-    /// That of a machine at rest in its mode in `start`. `known` are modes made ready for intervals of any length; `end` is how far it
-    /// is to go, to tell whether it gets there.
+    /// That of a machine at rest in its mode in `start`. `known` are modes made ready for intervals of any length;
+    /// `end` is how far it is to go, to tell whether it gets there.
     pub(super) fn new(
         mechanism: Arc<Mechanism>,
         space: Arc<Space>,
@@ -350,8 +353,8 @@ impl<const N: usize> Core<N> {
         }
     }
 
-    /// Advances by `distance`, at most an interval; stops at the first guard that falls and says why. `looked` says that it has just
-    /// been looked at where it stands.
+    /// Advances by `distance`, at most an interval; stops at the first guard that falls and says why. `looked` says
+    /// that it has just been looked at where it stands.
     pub(super) fn advance(&mut self, mut distance: f64, mut looked: bool) -> Option<Cause> {
         let law = Arc::clone(&self.matrices);
         if self.common.is_fresh && distance > 0.0 {

@@ -9,7 +9,8 @@ use std::sync::Arc;
 /// The error of a curve that is allowed in the middle, as a share of the largest value seen of that quantity.
 const OFF: f64 = 1e-9;
 
-/// Curves of a run that are looked at closer at most: what swings more often than that between its rows is not seen whole.
+/// Curves of a run that are looked at closer at most: what swings more often than that between its rows is not seen
+/// whole.
 const MOST_CURVES: u64 = 2_000_000;
 
 /// Room for what a cubic is off where it only tells whether to look closer.
@@ -21,7 +22,8 @@ const SAME: f64 = 1e-10;
 /// Curves in a row that are right before longer ones are tried.
 const RIGHT: u32 = 32;
 
-/// An instant as an observer sees it; rates, and the terms of curves that begin or end there, are made ready when they are first wanted.
+/// An instant as an observer sees it; rates, and the terms of curves that begin or end there, are made ready when they
+/// are first wanted.
 struct Sight<const N: usize> {
     z: [f64; N],
     value: Reading,
@@ -88,7 +90,8 @@ impl<const N: usize> Run<'_, N> {
         )
     }
 
-    /// Shows the interval of `length` that began at `begin` and has led to `end`; says whether the observer wants to see closer.
+    /// Shows the interval of `length` that began at `begin` and has led to `end`; says whether the observer wants to
+    /// see closer.
     fn show(&mut self, shown: &Shown<N>, begin: f64, length: f64, end: &[f64; N], bow: &Reading) -> bool {
         let to = self.read(shown, end);
         let from = match self.watching.now {
@@ -107,7 +110,8 @@ impl<const N: usize> Run<'_, N> {
         self.recorder.observer.as_mut().is_some_and(|observer| observer.pass(&gap))
     }
 
-    /// Moves on to `end`, `length` from now, in the present mode, and shows the way there; says whether it was looked at closer.
+    /// Moves on to `end`, `length` from now, in the present mode, and shows the way there; says whether it was looked
+    /// at closer.
     pub(super) fn move_shown(
         &mut self,
         law: &ModeMatrices<N>,
@@ -126,7 +130,8 @@ impl<const N: usize> Run<'_, N> {
         closer
     }
 
-    /// Shows a way of any length that begins at `z`, in parts that there are matrices for and a rest that a series tells.
+    /// Shows a way of any length that begins at `z`, in parts that there are matrices for and a rest that a series
+    /// tells.
     fn show_closer(&mut self, law: &ModeMatrices<N>, mut z: [f64; N], mut begin: f64, mut length: f64) {
         for level in 0..=law.finest {
             // What a sum of times is off by makes no difference here.
@@ -146,7 +151,8 @@ impl<const N: usize> Run<'_, N> {
         }
     }
 
-    /// Shows an interval of h/2^level from `z` on in parts so short that cubics tell where there is something to see; returns its end.
+    /// Shows an interval of h/2^level from `z` on in parts so short that cubics tell where there is something to see;
+    /// returns its end.
     fn show_level(&mut self, law: &ModeMatrices<N>, z: [f64; N], begin: f64, level: usize) -> [f64; N] {
         let fine = self.watching.level.saturating_sub(1).clamp(level, law.finest);
         let (parts, length) = (1_u64 << (fine - level).min(60), law.length(fine));
@@ -164,8 +170,8 @@ impl<const N: usize> Run<'_, N> {
         from.z
     }
 
-    /// Whether the observer wants to see closer what a cubic tells of a way: with slopes a and b at its ends and d between, it is off a
-    /// straight line by s (1 − s) ((a − d)(1 − s) − (b − d) s).
+    /// Whether the observer wants to see closer what a cubic tells of a way: with slopes a and b at its ends and d
+    /// between, it is off a straight line by s (1 − s) ((a − d)(1 − s) − (b − d) s).
     fn asks(&mut self, law: &ModeMatrices<N>, from: &mut Sight<N>, to: &mut Sight<N>, begin: f64, length: f64) -> bool {
         let (from_slope, to_slope) = (self.slope(law, from), self.slope(law, to));
         let bow: Reading = std::array::from_fn(|q| {
@@ -228,7 +234,8 @@ impl<const N: usize> Run<'_, N> {
         law.shown(&self.core.common.mechanism, &self.core.common.space).change(rate)
     }
 
-    /// A reading and its first three derivatives, each times h to its order and over its factorial: q, q̇ h, q̈ h²/2, q⃛ h³/6.
+    /// A reading and its first three derivatives, each times h to its order and over its factorial: q, q̇ h, q̈ h²/2,
+    /// q⃛ h³/6.
     fn terms(&self, law: &ModeMatrices<N>, sight: &mut Sight<N>, length: f64) -> [Reading; 4] {
         let slope = self.slope(law, sight);
         let higher = || {

@@ -1,9 +1,10 @@
 //! The general solver: any friction law, and spans that follow the cart.
 //!
-//! Between mode changes and edges of the input the equations are smooth, and an adaptive formula of order eight (Dormand and
-//! Prince's DOP853, from a library) integrates them. The modes and their guards are those of the exact solver. Each
-//! step's dense output is a polynomial, and so are the guards along it: their first fall is searched for as the exact solver does, so
-//! that two crossings within a step are seen; the step is then taken again up to the event.
+//! Between mode changes and edges of the input the equations are smooth, and an adaptive formula of order eight
+//! (Dormand and Prince's DOP853, from a library) integrates them. The modes and their guards are those of the exact
+//! solver. Each step's dense output is a polynomial, and so are the guards along it: their first fall is searched for
+//! as the exact solver does, so that two crossings within a step are seen; the step is then taken again up to the
+//! event.
 
 mod fall;
 mod model;
@@ -87,8 +88,8 @@ pub(super) struct Core {
     stretch: Stretch,
     /// Where it stands, counted from the beginning of the stretch, s.
     tau: f64,
-    /// By how much the load on a stuck body may pass its limit before it counts, and for a moment after it has changed what any
-    /// other part is watched by.
+    /// By how much the load on a stuck body may pass its limit before it counts, and for a moment after it has changed
+    /// what any other part is watched by.
     slack: [f64; Cause::KINDS],
     /// The same for a gear's torque, and the largest torque that it has carried, N m at the motor's shaft.
     torque_slack: [f64; DRIVES],
@@ -135,8 +136,8 @@ struct Hit {
 }
 
 impl Core {
-    /// That of a machine in `start`; `tolerance` is the error allowed in each step, relative and, of small quantities, absolute;
-    /// `fastest` is its fastest rate, 1/s, and `end` how far it is to go.
+    /// That of a machine in `start`; `tolerance` is the error allowed in each step, relative and, of small quantities,
+    /// absolute; `fastest` is its fastest rate, 1/s, and `end` how far it is to go.
     pub(super) fn new(
         mechanism: &Mechanism,
         layout: Layout,
@@ -344,14 +345,16 @@ impl Core {
         self.enter();
     }
 
-    /// By how much the load on a body at rest may pass its breakaway on either side before it counts: what rounding may do to it.
+    /// By how much the load on a body at rest may pass its breakaway on either side before it counts: what rounding may
+    /// do to it.
     fn tolerances_at_rest(&self, body: usize, input: &[f64; DRIVES]) -> [(Cause, f64); 2] {
         let noise = 2.0 * self.model.noise(body, &self.mode, &self.y, input);
         [(Cause::BreakForward(body), true), (Cause::BreakBackward(body), false)]
             .map(|(cause, forward)| (cause, noise.max(1e-12 * self.model.breakaway(body, forward, &self.y))))
     }
 
-    /// Whether a body stops where the tolerance decides: what still slows it down is less than the formula may be off by.
+    /// Whether a body stops where the tolerance decides: what still slows it down is less than the formula may be off
+    /// by.
     fn is_by_tolerance(&self, cause: Cause) -> bool {
         let Cause::Stop(body) = cause else { return false };
         let field = Field::new(&self.model, &self.mode, &self.stretch);

@@ -13,7 +13,8 @@ use std::sync::Arc;
 /// Most quantities that are integrated: coordinates and speeds, currents, bristles.
 pub(super) const MOST: usize = 3 * BODIES + DRIVES;
 
-/// The integrated quantities: coordinates and speeds in the order of [`Layout`], currents that are states, rotors, then bristles.
+/// The integrated quantities: coordinates and speeds in the order of [`Layout`], currents that are states, rotors, then
+/// bristles.
 pub(super) type Vector = [f64; MOST];
 
 /// Most conditions watched at once: two for each body, one for each gear, two for each limit and for each spring.
@@ -61,8 +62,8 @@ pub(super) struct Model {
 /// The additions to the linear equations.
 #[derive(Clone, Copy, Default)]
 struct Added {
-    /// Forces and torques on each body that moves by itself: of springs that follow, and, to be taken off, friction beyond b v ± F_c of
-    /// all that moves with it.
+    /// Forces and torques on each body that moves by itself: of springs that follow, and, to be taken off, friction
+    /// beyond b v ± F_c of all that moves with it.
     load: [f64; BODIES],
     friction: [f64; BODIES],
     /// Rates of the bristles.
@@ -485,8 +486,8 @@ impl FirstOrderSystem for Field<'_> {
             }
         }
         if !rate.iter().sum::<f64>().is_finite() {
-            // A trial step that leads nowhere: what is no number fails every test of the error, so the step is refused and a
-            // shorter one tried.
+            // A trial step that leads nowhere: what is no number fails every test of the error, so the step is refused
+            // and a shorter one tried.
             rate.fill(f64::NAN);
         }
     }

@@ -1,7 +1,8 @@
 //! A block of rows, column by column: states as they come, and all that follows from them.
 //!
-//! Every column is a form of columns before it, and is computed for all rows of one mode at once, so that the loops become vector
-//! instructions; they are compiled twice, as those of [`crate::solve::propagator`] are, and give the same bits.
+//! Every column is a form of columns before it, and is computed for all rows of one mode at once, so that the loops
+//! become vector instructions; they are compiled twice, as those of [`crate::solve::propagator`] are, and give the same
+//! bits.
 
 use super::sheet::{Elements, Held, Sheets};
 use super::{BLOCK, Detail, Extra, Segment};

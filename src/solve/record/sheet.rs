@@ -1,10 +1,12 @@
-//! The columns of rows of one mode, made ready once: the forms of forces, currents and voltages, and the quantities that stand still.
+//! The columns of rows of one mode, made ready once: the forms of forces, currents and voltages, and the quantities
+//! that stand still.
 
 use super::columns::{Places, Sum};
 use crate::friction::Motion;
 use crate::mechanism::{DriveMode, Mechanism, Mode, SpringLaw, What};
 
-/// Forces of springs, currents and voltages of drives: the same in all modes in which amplifiers, gears, belt and stops do the same.
+/// Forces of springs, currents and voltages of drives: the same in all modes in which amplifiers, gears, belt and stops
+/// do the same.
 pub(super) struct Elements {
     mode: Mode,
     pub(super) force: Vec<Sum>,

@@ -1,7 +1,8 @@
 //! The tests themselves: 100 small changes of the source, drawn by seed, each of which a test should notice.
 //!
-//! All of them are built into one copy of the library, each behind a switch that a variable of the environment turns; so the
-//! copy is built once, and the tests that concern a change are run with it alone. A change that does not compile is drawn again.
+//! All of them are built into one copy of the library, each behind a switch that a variable of the environment turns;
+//! so the copy is built once, and the tests that concern a change are run with it alone. A change that does not compile
+//! is drawn again.
 
 mod change;
 mod copy;
@@ -10,7 +11,8 @@ use change::Change;
 use copy::{Ended, Program, Tree};
 use std::time::Instant;
 
-/// The places that are changed, and the programs of tests that concern them, the quickest to fail first. `lib` are the tests within the library.
+/// The places that are changed, and the programs of tests that concern them, the quickest to fail first. `lib` are the
+/// tests within the library.
 const AREAS: [(&str, &[&str]); 4] = [
     ("src/solve", SOLVER),
     ("src/friction", SOLVER),

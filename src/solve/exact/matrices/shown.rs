@@ -80,7 +80,8 @@ impl<const N: usize> ModeMatrices<N> {
         self.shown.get_or_init(|| Box::new(Shown::new(self, mechanism, space)))
     }
 
-    /// By how much readings can be off a straight line over any `interval` within the next `length`, `y` being ż now: with bounds of |u̇| and
+    /// By how much readings can be off a straight line over any `interval` within the next `length`, `y` being ż now:
+    /// with bounds of |u̇| and
     /// |ü| of each input, |q̈| interval²/8.
     pub(in crate::solve) fn bow(
         &self,
