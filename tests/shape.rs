@@ -183,8 +183,8 @@ fn cubic(points: &[(f64, f64)]) -> [f64; 4] {
 type Published = (Kind, f64, &'static [[f64; 4]], &'static [[f64; 4]]);
 
 /// The polynomials that Singhose, Porter, Tuttle and Singer (1997) publish, cubic in the damping ratio, for a tolerance
-/// of 5 %; times in undamped periods. Klipper has taken them since 2025-09. Two of the numbers are misprints there: of
-/// the third amplitude of two humps the constant 0.34089, with which the sum is 1.0005, and of the last time of three
+/// of 5 %; times in undamped periods. Klipper has taken them since 2025-09, and in its table they were read, not in the
+/// paper. Two of the numbers are misprints there: of the third amplitude of two humps the constant 0.34089, with which the sum is 1.0005, and of the last time of three
 /// humps the sign of the quadratic term.
 const PUBLISHED_CUBICS: [Published; 2] = [
     (
