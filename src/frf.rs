@@ -228,7 +228,7 @@ fn points(
     let mut all = Vec::new();
     for k in first..lines {
         let (yr, ur, rr) = (sum(y, r, k), sum(u, r, k), power[k]);
-        if !(plain(k) > least) || ur.norm() == 0.0 {
+        if plain(k).is_nan() || plain(k) <= least || ur.norm() == 0.0 {
             continue;
         }
         let g = yr / ur;

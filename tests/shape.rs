@@ -167,13 +167,10 @@ fn cubic(points: &[(f64, f64)]) -> [f64; 4] {
         }
     }
     for i in 0..4 {
-        for k in 0..4 {
-            if k != i {
-                let factor = rows[k][i] / rows[i][i];
-                for j in 0..5 {
-                    rows[k][j] -= factor * rows[i][j];
-                }
-            }
+        let own = rows[i];
+        for (_, row) in rows.iter_mut().enumerate().filter(|(k, _)| *k != i) {
+            let factor = row[i] / own[i];
+            row.iter_mut().zip(own).for_each(|(value, own)| *value -= factor * own);
         }
     }
     [0, 1, 2, 3].map(|i| rows[i][4] / rows[i][i])

@@ -61,7 +61,7 @@ pub fn fitted(spectrum: &Spectrum) -> Option<FittedMode> {
     let pairs = spectrum.frequency.iter().copied().zip(spectrum.density.iter().copied());
     let bins: Vec<(f64, f64)> = pairs.filter(|(f, p)| (low..=high).contains(f) && *p > 0.0).collect();
     let width = spectrum.frequency.get(1)? - spectrum.frequency[0];
-    if bins.len() < FEWEST || !(width > 0.0) {
+    if bins.len() < FEWEST || width.is_nan() || width <= 0.0 {
         return None;
     }
     let kernel = kernel();
@@ -136,10 +136,10 @@ fn squares(bins: &[(f64, f64)], kernel: &[(f64, f64)], width: f64, f0: f64, zeta
     }
     let determinant = gg * cc - gc * gc;
     let (mut a, mut c) = ((gp * cc - cp * gc) / determinant, (cp * gg - gp * gc) / determinant);
-    if !(c >= 0.0) {
+    if c.is_nan() || c < 0.0 {
         (a, c) = (gp / gg, 0.0);
     }
-    if !(a > 0.0) {
+    if a.is_nan() || a <= 0.0 {
         return f64::INFINITY;
     }
     bins.iter().zip(&seen).map(|((_, p), g)| ((p - a * g - c) / p).powi(2)).sum()

@@ -38,7 +38,7 @@ fn places(text: &mut String, overview: &Overview) {
     }
     let _ = write!(text, "\n{}\n", bold(if is_axis { "Along the travel" } else { "Over the working area" }));
     for (k, row) in rows(overview).iter().enumerate() {
-        let cells: Vec<String> = row.iter().map(|cell| format!("{cell:>15}")).collect();
+        let cells: Vec<String> = row.iter().map(|cell| format!("{cell:>12}")).collect();
         let line = format!("  {}", cells.concat());
         let _ = writeln!(text, "{}", if k == 0 { line.to_lowercase().replace("hz", "Hz") } else { line });
     }
