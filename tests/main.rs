@@ -22,6 +22,7 @@ mod frf;
 mod gantry;
 mod gantry_laws;
 mod general;
+mod golden;
 mod hard;
 mod instant;
 mod laws;

@@ -101,8 +101,8 @@ pub fn closed_loop(setup: &Setup) -> Result<MoveRun> {
 }
 
 /// The same of a search that runs it a thousand times: of the figures the cart's error, settling and the root mean
-/// square of the current, equal to those of [`closed_loop`] (the current to rounding, the others to the last bit), and how
-/// it ended.
+/// square of the current, equal to those of [`closed_loop`] (root mean squares to rounding, the others to the last bit), and
+/// how it ended.
 pub(crate) fn closed_loop_briefly(setup: &Setup) -> Result<(Figures, solve::Ending)> {
     let mut controller = Standard::new(setup.design, setup.model)?;
     let profile = setup.profile.clone().shaped(&setup.design.shaper);

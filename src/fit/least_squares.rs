@@ -14,11 +14,9 @@
 //! and the test is not passed, derivatives over longer steps are tried, and then an evolution strategy that needs none,
 //! before it is called stalled.
 
-use crate::chance::normal;
+use super::cmaes;
 use crate::solve::Flow;
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
-use rand_pcg::Pcg64;
-use rand_pcg::rand_core::SeedableRng;
+use nalgebra::{DMatrix, DVector};
 
 /// Steps of coarse derivatives, in standard errors of a variable by itself, tried one after the other.
 const COARSER: [f64; 2] = [1.0, 10.0];
@@ -403,8 +401,8 @@ fn inflation(residuals: &[f64], variables: usize) -> f64 {
     ((1.0 + rho) / (1.0 - rho)).min(most.max(1.0)).sqrt()
 }
 
-/// Searches around a kink by evolution (CMA-ES, Hansen 2016) in coordinates in which the smooth part of the cost is a
-/// sphere with the standard error for its unit; whether that lowered the cost by more than rounding.
+/// Searches around a kink by CMA-ES in coordinates in which the smooth part of the cost is a sphere with the standard
+/// error for its unit; whether that lowered the cost by more than rounding.
 fn evolve(
     problem: &mut dyn Residuals,
     best: &mut Minimum,
@@ -422,78 +420,29 @@ fn evolve(
     let r = model.r.select_columns(&free).qr().unpack_r();
     let Some(unit) = r.solve_upper_triangular(&DMatrix::identity(n, n)) else { return false };
     let unit = unit * deviation;
-    let size = n as f64;
-    // Hansen's default constants.
-    let lambda = 4 + (3.0 * size.ln()).floor() as usize;
-    let mu = lambda / 2;
-    let raw: Vec<f64> = (0..mu).map(|i| (lambda as f64 / 2.0 + 0.5).ln() - (i as f64 + 1.0).ln()).collect();
-    let sum: f64 = raw.iter().sum();
-    let weights: Vec<f64> = raw.iter().map(|w| w / sum).collect();
-    let mass = 1.0 / weights.iter().map(|w| w * w).sum::<f64>();
-    let along = (4.0 + mass / size) / (size + 4.0 + 2.0 * mass / size);
-    let paced = (mass + 2.0) / (size + mass + 5.0);
-    let one = 2.0 / ((size + 1.3).powi(2) + mass);
-    let rest = f64::min(1.0 - one, 2.0 * (mass - 2.0 + 1.0 / mass) / ((size + 2.0).powi(2) + mass));
-    let damp = 1.0 + 2.0 * f64::max(0.0, ((mass - 1.0) / (size + 1.0)).sqrt() - 1.0) + paced;
-    let expected = size.sqrt() * (1.0 - 1.0 / (4.0 * size) + 1.0 / (21.0 * size * size));
-
     let before = best.cost;
     let centre = best.x.clone();
-    let mut mean = DVector::zeros(n);
-    let mut pace = best.decrement.clamp(0.3, 10.0) / size.sqrt();
-    let mut shape = DMatrix::<f64>::identity(n, n);
-    let (mut path, mut drift) = (DVector::<f64>::zeros(n), DVector::<f64>::zeros(n));
-    let mut random = Pcg64::seed_from_u64(1);
+    let sigma = best.decrement.clamp(0.3, 10.0) / (n as f64).sqrt();
     let mut trial = vec![0.0; best.residuals.len()];
-    let generations = (60 * n + 60) / lambda;
-    let (shows, mut fruitful) = (0.5 * (SHOWS * deviation).powi(2), 0);
-    for generation in 1..=generations {
-        let Some(eigen) = SymmetricEigen::try_new(shape.clone(), 1e-14, 1000) else { break };
-        let lengths = eigen.eigenvalues.map(|value| value.max(1e-20).sqrt());
-        if pace * lengths.max() < 0.01 || generation > fruitful + BARREN {
-            break;
+    let shows = 0.5 * (SHOWS * deviation).powi(2);
+    cmaes::search(n, sigma, BARREN, &mut |point| {
+        let step = &unit * point;
+        let mut x = centre.clone();
+        for (i, &j) in free.iter().enumerate() {
+            x[j] = (x[j] + step[i]).clamp(bounds.low[j], bounds.high[j]);
         }
-        let mut born: Vec<(f64, DVector<f64>)> = Vec::with_capacity(lambda);
-        for _ in 0..lambda {
-            let z = DVector::from_fn(n, |_, _| normal(&mut random));
-            let y = &eigen.eigenvectors * z.component_mul(&lengths);
-            let step = &unit * (&mean + &y * pace);
-            let mut x = centre.clone();
-            for (i, &j) in free.iter().enumerate() {
-                x[j] = (x[j] + step[i]).clamp(bounds.low[j], bounds.high[j]);
-            }
-            best.evaluations += 1;
-            let good = problem.evaluate(&x, &mut trial);
-            let cost = if good { cost_of(&trial, huber) } else { f64::INFINITY };
-            if cost < best.cost {
-                if best.cost - cost > shows {
-                    fruitful = generation;
-                }
-                best.cost = cost;
-                best.x = x;
-                best.residuals.copy_from_slice(&trial);
-            }
-            born.push((cost, y));
+        best.evaluations += 1;
+        let good = problem.evaluate(&x, &mut trial);
+        let cost = if good { cost_of(&trial, huber) } else { f64::INFINITY };
+        let is_better = cost < best.cost;
+        let is_fruitful = is_better && best.cost - cost > shows;
+        if is_better {
+            best.cost = cost;
+            best.x = x;
+            best.residuals.copy_from_slice(&trial);
         }
-        if born.iter().all(|(cost, _)| cost.is_infinite()) {
-            break;
-        }
-        born.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let step = weights.iter().zip(&born).fold(DVector::zeros(n), |sum, (w, (_, y))| sum + y * *w);
-        mean += &step * pace;
-        let white = &eigen.eigenvectors * (eigen.eigenvectors.tr_mul(&step)).component_div(&lengths);
-        path = path * (1.0 - paced) + white * (paced * (2.0 - paced) * mass).sqrt();
-        let calm = path.norm() / (1.0 - (1.0 - paced).powi(2 * generation as i32)).sqrt()
-            < (1.4 + 2.0 / (size + 1.0)) * expected;
-        drift =
-            drift * (1.0 - along) + if calm { step * (along * (2.0 - along) * mass).sqrt() } else { DVector::zeros(n) };
-        shape *= 1.0 - one - rest + if calm { 0.0 } else { one * along * (2.0 - along) };
-        shape += &drift * drift.transpose() * one;
-        for (w, (_, y)) in weights.iter().zip(&born) {
-            shape += y * y.transpose() * (rest * w);
-        }
-        pace *= ((paced / damp) * (path.norm() / expected - 1.0)).exp();
-    }
+        (cost, is_fruitful)
+    });
     best.cost < before * (1.0 - 1e-6)
 }
 

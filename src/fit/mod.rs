@@ -6,6 +6,7 @@
 mod acceleration;
 mod case_text;
 mod check;
+mod cmaes;
 mod combinations;
 pub mod compare;
 mod controller;
