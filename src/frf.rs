@@ -136,7 +136,8 @@ pub fn estimate(log: &Log, cut: &Cut) -> Result<Vec<Frf>> {
         }
         let points = points(&u, &y, &r, every, length, periodic);
         if points.is_empty() {
-            return Err(wrong("the input does not change".into()).next("excite the axis: see taut design"));
+            return Err(wrong("the input does not change".into())
+                .next("excite the axis with a sweep, noise or several sines at once"));
         }
         let (segments, closed) = (u.len(), reference.is_some());
         let (name, quantity) = (log.name.clone(), output.quantity);
@@ -152,9 +153,10 @@ pub fn estimate(log: &Log, cut: &Cut) -> Result<Vec<Frf>> {
 fn segments(samples: usize, every: f64, cut: &Cut) -> Result<(usize, usize)> {
     if let Some(period) = cut.period {
         let length = (period / every).round() as usize;
-        if ((length as f64 * every) / period - 1.0).abs() > 1e-4 || length < SHORTEST {
+        let is_whole = ((length as f64 * every) / period - 1.0).abs() <= 1e-4;
+        if !is_whole || !(SHORTEST..=LONGEST).contains(&length) {
             return Err(Error::new(format!("a period of {period} s is no whole number of samples of {every} s"))
-                .allowed(format!("{SHORTEST} samples or more"))
+                .allowed(format!("{SHORTEST} to {LONGEST} samples"))
                 .next("give the period of the input exactly"));
         }
         return Ok((length, length));

@@ -208,3 +208,29 @@ fn what_cannot_be_measured_is_told() {
     let none = measure(&empty, &plain, known);
     assert!(none.unwrap_err().what.contains("no log to measure a response from"));
 }
+
+/// A period of 1e300 s asked for more memory than there is, which ended the program.
+#[test]
+fn a_period_longer_than_any_log_is_refused() {
+    let time: Vec<f64> = (0..2000).map(|k| 1e-3 * f64::from(k)).collect();
+    let input: Vec<f64> = time.iter().map(|t| (40.0 * t).sin()).collect();
+    let log = Log {
+        name: "made".into(),
+        file: "made.csv".into(),
+        outputs: vec![Output { quantity: Quantity::DriveAngle, absolute: false, values: input.clone() }],
+        time,
+        input,
+        added: None,
+        hold: taut::signal::Hold::Zero,
+        reference: None,
+        ended: None,
+    };
+    for cut in [
+        Cut { segment: None, period: Some(1e300) },
+        Cut { segment: None, period: Some(1e9) },
+        Cut { segment: Some(1e300), period: None },
+    ] {
+        let error = estimate(&log, &cut).unwrap_err().to_string();
+        assert!(error.contains("65536"), "{error}");
+    }
+}

@@ -16,7 +16,7 @@ const SPECTRA: [&str; 2] =
     ["target/browser/resonances_x_20210701_223821.csv", "target/browser/resonances_x_20210821_152037.csv"];
 
 /// The reports that are looked at: a name, and the command that makes it.
-const REPORTS: [(&str, &[&str]); 12] = [
+const REPORTS: [(&str, &[&str]); 14] = [
     ("simulate", &["simulate", "stages/sollmann-jouaneh/table4.toml"]),
     // More rows than a page holds.
     ("long", &["simulate", "stages/sollmann-jouaneh/table4.toml", "--set", "experiment.0.every=0.05ms"]),
@@ -29,6 +29,8 @@ const REPORTS: [(&str, &[&str]); 12] = [
     ("shape", &["shape", "stages/printer-axis/printer-axis.toml"]),
     ("spectra", &["shape", SPECTRA[0], SPECTRA[1]]),
     ("paper", &["paper"]),
+    ("show", &["show", "stages/printer-axis/printer-axis.toml"]),
+    ("check", &["check", "stages/sollmann-jouaneh/identification/linear-5v.toml"]),
     ("fit", &["fit", "stages/sollmann-jouaneh/identification/linear-5v.toml"]),
 ];
 
