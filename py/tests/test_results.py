@@ -3,6 +3,7 @@
 import json
 import os
 import subprocess
+from html import escape
 
 import numpy as np
 import pytest
@@ -80,7 +81,7 @@ def test_what_follows_from_the_numbers_is_the_command_lines(root):
         shown = taut.show(root / file)
         assert shown.data == program(root, "show", file)
         assert all(shown[key] == value for key, (value, _) in shown.rows.items())
-        assert "no such" not in shown and shown.data["title"] in shown._repr_html_()
+        assert "no such" not in shown and escape(shown.data["title"]) in shown._repr_html_()
 
 
 def test_models_go_to_python_control(case):

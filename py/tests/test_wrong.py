@@ -528,7 +528,8 @@ def test_fits_with_nonsense(case, tmp_path):
     fit = fitted.fit()
     for value in WRONG:
         allowed(lambda: fit[value], told("fit[]", value))
-        if value not in (None, "", [], ()):
+        # None and nothing at all are the default laws, which take long.
+        if value is not None and not (hasattr(value, "__len__") and len(value) == 0):
             allowed(lambda: fitted.compare(value), told("compare", value))
         allowed(lambda: fitted.frf(segment=value), told("frf", segment=value))
         allowed(lambda: fitted.frf(period=value), told("frf", period=value))
