@@ -11,7 +11,6 @@ use std::hint::black_box;
 use std::time::Instant;
 use taut::case::{Case, Experiment, GantryCase, TEMPLATE};
 use taut::control::{Controller, Loop, Observation, close};
-use taut::friction::{Law, Shape};
 use taut::mechanism::Mechanism;
 use taut::signal::profile::{Leg, Limits, Profile};
 use taut::signal::{Hold, Signal};
@@ -52,7 +51,7 @@ fn works() -> taut::Result<Vec<Work>> {
         ("run", run(common::table4(), pulse.clone(), Solver::Exact)),
         ("sweep", sweep()?),
         ("closed-loop", closed()?),
-        ("stribeck", run(stribeck(), pulse.clone(), Solver::GENERAL)),
+        ("stribeck", run(common::with_stribeck(common::table4()), pulse.clone(), Solver::GENERAL)),
         ("geared", run(geared(), pulse, Solver::Exact)),
         ("h-frame", h_frame()?),
         ("stepping", stepping()?),
@@ -69,23 +68,6 @@ fn run(stage: Stage, experiment: Experiment, solver: Solver) -> Box<dyn Fn() -> 
         });
         outcome.expect("the machine is sound").events.len() as f64
     })
-}
-
-/// The Table 4 machine with a Stribeck curve on top of each Coulomb friction, as `examples/speed.rs` has it.
-fn stribeck() -> Stage {
-    let mut stage = common::table4();
-    let r = stage.pulley_radius;
-    let bodies = [
-        (&mut stage.drive_pulley.friction, 0.05 / r),
-        (&mut stage.cart.friction, 0.05),
-        (&mut stage.idler_pulley.friction, 0.05 / r),
-    ];
-    for (friction, velocity) in bodies {
-        friction.forward.breakaway = 1.3 * friction.forward.coulomb;
-        friction.backward.breakaway = 1.3 * friction.backward.coulomb;
-        friction.law = Law::Stribeck { velocity, shape: Shape::Gaussian };
-    }
-    stage
 }
 
 /// The Table 4 machine with an inductance, limits of voltage and current, and a gear that loses, gives way and has

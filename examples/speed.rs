@@ -13,7 +13,6 @@ mod common;
 use std::hint::black_box;
 use std::time::Instant;
 use taut::case::Experiment;
-use taut::friction::{Law, Shape};
 use taut::signal::Signal;
 use taut::solve::{Flow, Solver, simulate, stream};
 use taut::stage::Stage;
@@ -30,27 +29,11 @@ struct Problem {
 }
 
 fn problems() -> [Problem; 2] {
-    let [coulomb, stribeck] = [common::table4(), with_curve(common::table4())];
+    let [coulomb, stribeck] = [common::table4(), common::with_stribeck(common::table4())];
     [
         Problem { name: "coulomb", stage: coulomb, at_rest: CART_AT_REST[0] },
         Problem { name: "stribeck", stage: stribeck, at_rest: CART_AT_REST[1] },
     ]
-}
-
-/// F_s = 0.3 F_c on top of each body's Coulomb friction, v_s = 0.05 m/s at the belt.
-fn with_curve(mut stage: Stage) -> Stage {
-    let r = stage.pulley_radius;
-    let bodies = [
-        (&mut stage.drive_pulley.friction, 0.05 / r),
-        (&mut stage.cart.friction, 0.05),
-        (&mut stage.idler_pulley.friction, 0.05 / r),
-    ];
-    for (friction, velocity) in bodies {
-        friction.forward.breakaway = 1.3 * friction.forward.coulomb;
-        friction.backward.breakaway = 1.3 * friction.backward.coulomb;
-        friction.law = Law::Stribeck { velocity, shape: Shape::Gaussian };
-    }
-    stage
 }
 
 /// Seconds per call, the best: what the machine can do when nothing else disturbs it.

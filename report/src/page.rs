@@ -206,6 +206,21 @@ impl Page {
         self
     }
 
+    /// The end of every report of a case: its text under this name, `words` about it, and the version that ran it.
+    pub fn case(&mut self, words: &str, name: &str, text: &str) {
+        self.section("The case");
+        if !words.is_empty() {
+            self.prose(words);
+        }
+        self.embed(name, text);
+        self.version();
+    }
+
+    /// The version of taut at the very end.
+    pub fn version(&mut self) {
+        self.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
+    }
+
     /// A line at the very end.
     pub fn footer(&mut self, text: impl Render) {
         self.footer = Some(text.render());

@@ -9,7 +9,7 @@ pub mod random;
 pub mod wrong;
 
 use taut::case::{Experiment, Initial};
-use taut::friction::Friction;
+use taut::friction::{Friction, Law, Shape};
 use taut::signal::Signal;
 use taut::stage::{Amplifier, AmplifierMode, Belt, Cart, Motor, Pulley, Stage};
 
@@ -60,4 +60,20 @@ pub fn table4() -> Stage {
 /// An experiment from rest with an output every millisecond.
 pub fn experiment(input: Signal, until: f64) -> Experiment {
     Experiment { name: "test".into(), input, until, every: 1e-3, initial: Initial::default(), log: None }
+}
+
+/// F_s = 0.3 F_c on top of each body's Coulomb friction, v_s = 0.05 m/s at the belt.
+pub fn with_stribeck(mut stage: Stage) -> Stage {
+    let r = stage.pulley_radius;
+    let bodies = [
+        (&mut stage.drive_pulley.friction, 0.05 / r),
+        (&mut stage.cart.friction, 0.05),
+        (&mut stage.idler_pulley.friction, 0.05 / r),
+    ];
+    for (friction, velocity) in bodies {
+        friction.forward.breakaway = 1.3 * friction.forward.coulomb;
+        friction.backward.breakaway = 1.3 * friction.backward.coulomb;
+        friction.law = Law::Stribeck { velocity, shape: Shape::Gaussian };
+    }
+    stage
 }

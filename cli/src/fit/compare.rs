@@ -1,6 +1,6 @@
 //! `taut fit --compare`: friction laws and windows by what they predict.
 
-use super::table;
+use super::{is_held_back, led, status, table};
 use crate::args::Fit as Args;
 use crate::command::{Finished, Report};
 use crate::failure::{Outcome, Status};
@@ -11,7 +11,6 @@ use crate::terminal::bold;
 use std::fmt::Write;
 use std::time::Instant;
 use taut::case::{Case, Plan};
-use taut::fit::Ending;
 use taut::fit::compare::{Comparison, FrictionLaw, Setting, compare};
 use taut::json;
 use taut::solve::Flow;
@@ -46,16 +45,14 @@ pub fn run(args: &Args, case: &Case, plan: &Plan) -> Outcome {
     let json = json::comparison(&compared);
     let own = &compared.case;
     let text = format!("{}{}", shown(&compared), table::text(own, &found, begin.elapsed()));
-    let held_back = found.fit.warnings().next().is_some() && !args.anyway;
     let advice = match common.out.is_some() {
         true => "something warns; --anyway writes it all the same",
         false => "add --out DIR for fitted.toml, compare.json, fit.json and a report",
     };
-    let folder = folder.filter(|_| !held_back);
+    let folder = folder.filter(|_| !is_held_back(&found.fit, args));
     let mut finished = Finished::new("fit", ("compare.json", json::text(&json)), text, advice);
     if let Some(folder) = &folder {
-        let text = found.fit.case_text(own, &args.case)?;
-        let text = folder::leading(&text, &Case::from_text(&args.case, &text)?.files, folder.root())?;
+        let text = led(&found.fit.case_text(own, &args.case)?, args, folder)?;
         if !common.no_report {
             let page = page_with(own, &found, &text, |page| section(page, &compared));
             finished.report = Some(Report { page, pictures: Vec::new() });
@@ -63,12 +60,7 @@ pub fn run(args: &Args, case: &Case, plan: &Plan) -> Outcome {
         finished.files.push(("fitted.toml".into(), text));
         finished.files.push(("fit.json".into(), json::text(&json::fit(own, &found.fit, &[], None))));
     }
-    finished.status = match (interrupt.signal(), found.fit.ending) {
-        (Some(signal), _) => Status::Interrupted(signal),
-        (None, _) if !found.fit.is_reliable() => Status::Incomplete,
-        (None, Ending::Converged | Ending::Stalled) => Status::Done,
-        (None, _) => Status::Incomplete,
-    };
+    finished.status = status(&found, &interrupt);
     finished.finish(common, folder)
 }
 

@@ -9,10 +9,10 @@ use crate::progress::Progress;
 use crate::terminal::bold;
 use std::fmt::Write;
 use taut::case::{Case, Plan};
-use taut::fit::{Drift, Together, drift};
+use taut::fit::{Drift, drift};
 use taut::json;
 use taut::solve::Flow;
-use taut_report::fit::drift::{error, page, verdict, words};
+use taut_report::fit::drift::{fitted, page, verdict, words};
 
 /// Changes that the terminal shows.
 const SHOWN: usize = 15;
@@ -45,7 +45,6 @@ pub fn run(args: &Args, case: &Case, plan: &Plan) -> Outcome {
 fn text(case: &Case, found: &Drift) -> String {
     let mut text = format!("{}\n{}\n", bold(&case.title), verdict(found));
     let _ = write!(text, "\n{}\n", bold("Single changes, all else as the case has it"));
-    let fitted = |all: &[Together]| -> Vec<String> { all.iter().filter(|one| !one.held_out).map(error).collect() };
     let mut rows = vec![[
         "as it is".to_string(),
         String::new(),

@@ -15,7 +15,7 @@ use crate::terminal;
 use std::time::Instant;
 use taut::Result;
 use taut::case::{Case, Plan};
-use taut::fit::{Ending, Posterior, fit, profiles};
+use taut::fit::{Ending, Fit, Posterior, fit, profiles};
 use taut::json;
 use taut::solve::Flow;
 use taut::trajectory::CsvWriter;
@@ -46,16 +46,14 @@ pub fn run(args: &Args) -> Outcome {
     let fit = &found.fit;
     let json = json::fit(&case, fit, &found.profiles, found.drawn.as_ref().map(json::posterior));
     // A folder that is left here leaves nothing behind.
-    let held_back = fit.warnings().next().is_some() && !args.anyway;
-    let folder = folder.filter(|_| !held_back);
+    let folder = folder.filter(|_| !is_held_back(fit, args));
     let advice = match common.out.is_some() {
         true => "something warns; --anyway writes it all the same",
         false => "add --out DIR for fitted.toml, fit.json and a report",
     };
     let mut finished = Finished::new("fit", ("fit.json", json::text(&json)), table::text(&case, &found, took), advice);
     if let Some(folder) = &folder {
-        let text = fit.case_text(&case, &args.case)?;
-        let text = folder::leading(&text, &Case::from_text(&args.case, &text)?.files, folder.root())?;
+        let text = led(&fit.case_text(&case, &args.case)?, args, folder)?;
         if let Some(drawn) = &found.drawn {
             write_draws(folder, drawn).map_err(Failure::work)?;
         }
@@ -65,8 +63,7 @@ pub fn run(args: &Args) -> Outcome {
         finished.files.push(("fitted.toml".into(), text));
         // What other campaigns have for themselves.
         for (part, (name, _)) in fit.parts.iter().enumerate().skip(1) {
-            let text = fit.case_text_of(&case, &args.case, part)?;
-            let text = folder::leading(&text, &Case::from_text(&args.case, &text)?.files, folder.root())?;
+            let text = led(&fit.case_text_of(&case, &args.case, part)?, args, folder)?;
             finished.files.push((part_file(name), text));
         }
     }
@@ -74,14 +71,29 @@ pub fn run(args: &Args) -> Outcome {
         let told = "interrupted before the first draw: there is no posterior";
         finished.remarks.push(Remark::Error(told.into()));
     }
-    finished.status = match (interrupt.signal(), fit.ending) {
+    finished.status = status(&found, &interrupt);
+    finished.finish(common, folder)
+}
+
+/// Whether a warning keeps the result from being written.
+fn is_held_back(fit: &Fit, args: &Args) -> bool {
+    fit.warnings().next().is_some() && !args.anyway
+}
+
+/// The text of a case with estimates for a folder of results: its paths lead from there to the same files.
+fn led(text: &str, args: &Args, folder: &Folder) -> Result<String> {
+    folder::leading(text, &Case::from_text(&args.case, text)?.files, folder.root())
+}
+
+/// How it ended.
+fn status(found: &Found, interrupt: &Interrupt) -> Status {
+    match (interrupt.signal(), found.fit.ending) {
         (Some(signal), _) => Status::Interrupted(signal),
         (None, _) if found.drawn.as_ref().is_some_and(|drawn| !drawn.doubts().is_empty()) => Status::Incomplete,
-        (None, _) if !fit.is_reliable() => Status::Incomplete,
+        (None, _) if !found.fit.is_reliable() => Status::Incomplete,
         (None, Ending::Converged | Ending::Stalled) => Status::Done,
         (None, _) => Status::Incomplete,
-    };
-    finished.finish(common, folder)
+    }
 }
 
 /// The search, then profiles and draws where they are wanted; Ctrl-C leaves out the rest. None where it came before any

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from . import _html, _plots
 from ._optional import needed
-from .table import Table
+from .table import Table, frame
 
 if TYPE_CHECKING:
     import control
@@ -20,11 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .case import Case
-
-
-def _frame(columns: dict[str, Any]) -> pandas.DataFrame:
-    frame: pandas.DataFrame = needed("pandas", "pandas", "to_pandas()").DataFrame(columns)
-    return frame
 
 
 @dataclass(frozen=True)
@@ -55,7 +50,7 @@ class Check:
 
     def to_pandas(self) -> pandas.DataFrame:
         """A pandas.DataFrame of the parameters and their relative standard errors (1 is 100 %)."""
-        return _frame({"parameter": list(self.errors), "relative_error": list(self.errors.values())})
+        return frame({"parameter": list(self.errors), "relative_error": list(self.errors.values())})
 
     def plot(self, *, ax: Axes | None = None) -> Figure:
         """How well each parameter would be known, as bars; what is not determined reaches the end of the scale."""
@@ -136,7 +131,7 @@ class FitLog:
         columns: dict[str, Any] = {"time_s": self.time}
         for name, residual in self.residuals.items():
             columns |= {f"{name}_measured": self.measured[name], f"{name}_model": self.model[name], f"{name}_residual": residual}
-        return _frame(columns)
+        return frame(columns)
 
     def plot(self, *, ax: Axes | Sequence[Axes] | None = None) -> Figure:
         """Log and model over time, and the residuals below: two panels for each output, or as many ``ax``."""
@@ -184,7 +179,7 @@ class Fit:
         """A pandas.DataFrame of the estimates: value, standard error, interval, unit, and whether at a bound."""
         each = list(self.estimates.values())
         low, high = ([None if e.interval_95 is None else e.interval_95[k] for e in each] for k in (0, 1))
-        return _frame(
+        return frame(
             {
                 "parameter": [e.name for e in each],
                 "value": [e.value for e in each],
@@ -284,7 +279,7 @@ class Tuned:
                         "of": worst["axes"],
                     }
                 )
-        return _frame({key: [row[key] for row in rows] for key in (rows[0] if rows else {})})
+        return frame({key: [row[key] for row in rows] for key in (rows[0] if rows else {})})
 
     def plot(self, *, ax: Axes | None = None) -> Figure:
         """The worst cart error of each move over the family, before and after."""
@@ -323,7 +318,7 @@ class Comparison:
     def to_pandas(self) -> pandas.DataFrame:
         """A pandas.DataFrame of laws and windows: parameters, and RMSE on held-out parts and in training."""
         rows = self.data["candidates"]
-        return _frame({key: [row[key] for row in rows] for key in ("name", "parameters", "held_out_rmse", "training_rmse")})
+        return frame({key: [row[key] for row in rows] for key in ("name", "parameters", "held_out_rmse", "training_rmse")})
 
     def plot(self, *, ax: Axes | None = None) -> Figure:
         """The error on held-out parts and in training, for each law and window."""
@@ -357,7 +352,7 @@ class Drift:
     def to_pandas(self) -> pandas.DataFrame:
         """A pandas.DataFrame of single changes: parameter, from, to, and the share of the squares that is left."""
         rows = self.data["changes"]
-        return _frame({key: [row[key] for row in rows] for key in ("name", "from", "to", "left")})
+        return frame({key: [row[key] for row in rows] for key in ("name", "from", "to", "left")})
 
     def plot(self, *, ax: Axes | None = None) -> Figure:
         """The share of the squares that each single change leaves."""
@@ -432,7 +427,7 @@ class Modes:
         columns: dict[str, Any] = {"frequency_Hz": self.frequency}
         for name, (magnitude, phase) in self.responses.items():
             columns |= {f"{name}_magnitude": magnitude, f"{name}_phase_deg": phase}
-        return _frame(columns)
+        return frame(columns)
 
     def plot(self, output: str | None = None, *, ax: Axes | Sequence[Axes] | None = None) -> Figure:
         """Bode diagram of one output (the first unless said): magnitude above, phase below, or both into two ``ax``."""
@@ -484,7 +479,7 @@ class Shown:
     def to_pandas(self) -> pandas.DataFrame:
         """A pandas.DataFrame of all quantities: key, name, value and SI unit."""
         rows = [row for group in self.data["groups"] for row in group["rows"]]
-        return _frame({key: [row[key] for row in rows] for key in ("key", "name", "value", "unit")})
+        return frame({key: [row[key] for row in rows] for key in ("key", "name", "value", "unit")})
 
     def plot(self, *, ax: Axes | None = None) -> Figure:
         """Natural frequencies at each place along the travel, without damping."""
@@ -526,7 +521,7 @@ class FrequencyResponses:
                 columns.setdefault(name, []).extend([one[name]] * count)
             for name in ("frequency_Hz", "real", "imaginary", "radius", "coherence"):
                 columns.setdefault(name, []).extend(one[name])
-        return _frame(columns)
+        return frame(columns)
 
     def response(self, number: int = 0) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
         """Frequencies (Hz) and complex values of a response, by its number."""
@@ -587,7 +582,7 @@ class GantryModes:
         rows = self.data["elastic"]
         bodies = list(dict.fromkeys(body for row in rows for body in row["shape_at_belt"]))
         columns = {key: [row[key] for row in rows] for key in ("frequency_Hz", "damping_ratio")}
-        return _frame(columns | {body: [row["shape_at_belt"].get(body) for row in rows] for body in bodies})
+        return frame(columns | {body: [row["shape_at_belt"].get(body) for row in rows] for body in bodies})
 
     def plot(self, mode: int = 0, *, ax: Axes | None = None) -> Figure:
         """The frequency of an elastic mode over the working area; where it is the same everywhere, all modes as bars."""

@@ -8,8 +8,8 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from . import _checks, _html, _native, _plots
-from ._optional import needed
 from ._toml import change
+from .table import frame
 
 if TYPE_CHECKING:
     import pandas
@@ -39,10 +39,7 @@ class Shape:
         """A pandas.DataFrame of the shapers: frequency (Hz), vibration that is left, smoothing (m), acceleration up to (m/s^2)."""
         rows = self.data["shapers"]
         keys = ("shaper", "frequency", "vibration", "smoothing", "max_acceleration", "candidate")
-        frame: pandas.DataFrame = needed("pandas", "pandas", "to_pandas()").DataFrame(
-            {key: [row[key] for row in rows] for key in keys}
-        )
-        return frame
+        return frame({key: [row[key] for row in rows] for key in keys})
 
     def plot(self, *, ax: Axes | None = None) -> Figure:
         """The vibration that each shaper leaves; over a measured spectrum the spectrum, with the shapers' frequencies."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,6 +107,12 @@ class Table(Mapping[str, NDArray[np.float64]]):
     def _repr_html_(self) -> str:
         rows = [(name, unit, float(self[name].min()), float(self[name].max())) for name, unit, _ in self._names if self.rows]
         return _html.table(f"{self.rows} rows", ("column", "unit", "least", "greatest"), rows)
+
+
+def frame(columns: Mapping[str, Any]) -> pandas.DataFrame:
+    """A pandas.DataFrame of these columns."""
+    made: pandas.DataFrame = needed("pandas", "pandas", "to_pandas()").DataFrame(dict(columns))
+    return made
 
 
 def arrow_table(arrays: Mapping[str, NDArray[np.float64]], names: Sequence[tuple[str, str, str]]) -> pyarrow.Table:

@@ -34,9 +34,7 @@ pub fn page(case: &Case, found: &Check) -> Page {
     for log in &found.logs {
         shown(log, true).lines().for_each(|line| page.prose(line.trim()));
     }
-    page.section("The case");
-    page.embed("case.toml", &case.text);
-    page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
+    page.case("", "case.toml", &case.text);
     page
 }
 

@@ -5,8 +5,13 @@ use crate::{Cell, Page, Table};
 use taut::case::Case;
 use taut::fit::{Change, Drift, Together};
 
+/// The errors of the fitted logs, each with its unit.
+pub fn fitted(all: &[Together]) -> Vec<String> {
+    all.iter().filter(|one| !one.held_out).map(error).collect()
+}
+
 /// An error with its unit.
-pub fn error(one: &Together) -> String {
+fn error(one: &Together) -> String {
     if one.rmse.is_finite() { value(one.rmse, one.quantity.unit(), 4) } else { "–".into() }
 }
 
@@ -46,7 +51,6 @@ pub fn page(case: &Case, found: &Drift) -> Page {
     for heading in ["Parameter", "From", "To", "Change"] {
         rows = rows.column(heading, "");
     }
-    let fitted = |all: &[Together]| -> Vec<String> { all.iter().filter(|one| !one.held_out).map(error).collect() };
     for quantity in found.quantities() {
         rows = rows.column(format!("RMSE of {}", quantity.name().replace('_', " ")), "");
     }
@@ -60,8 +64,6 @@ pub fn page(case: &Case, found: &Drift) -> Page {
         rows.row(row(words(change), fitted(&change.errors), format!("{:.2} %", 100.0 * change.left)));
     }
     page.table(&rows);
-    page.section("The case");
-    page.embed("case.toml", &case.text);
-    page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
+    page.case("", "case.toml", &case.text);
     page
 }

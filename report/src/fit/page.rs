@@ -62,7 +62,7 @@ pub fn page_with(case: &Case, found: &Found, text: &str, first: impl FnOnce(&mut
     residual(&mut page, fit);
     page.section("The case with the estimates");
     page.embed("fitted.toml", text);
-    page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
+    page.version();
     page
 }
 

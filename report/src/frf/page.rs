@@ -34,6 +34,6 @@ pub fn page(case: &Case, found: &Measurement, figures: &[(String, Figure)]) -> P
         page.figure(figure);
     }
     page.embed("Case file", &case.text);
-    page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
+    page.version();
     page
 }

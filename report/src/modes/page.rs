@@ -58,9 +58,7 @@ pub fn page(analysis: &Analysis, figures: &[Named]) -> Page {
         }
         page.table(&rows);
     }
-    page.section("The case");
-    page.embed("case.toml", &analysis.case.text);
-    page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
+    page.case("", "case.toml", &analysis.case.text);
     page
 }
 

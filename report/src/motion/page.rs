@@ -4,7 +4,7 @@ use super::Tried;
 use super::rows::{controller, lines};
 use crate::drawing::stage_drawing;
 use crate::page::{Callout, Cell, Page, Table};
-use crate::simulate::{Named, early_end};
+use crate::simulate::{Named, early_end, figures_table};
 use taut::control::drives::drive_gains;
 
 /// The page; `text` is the case that repeats the moves.
@@ -18,11 +18,7 @@ pub fn page(tried: &Tried, text: &str, figures: &[Vec<Named>]) -> Page {
         if let Some(told) = early_end(&done.run.outcome.ending) {
             page.callout(Callout::Fails, "The whole move", format!("This move {told}."));
         }
-        let mut rows = Table::new("").column("Quantity", "").column("Value", "");
-        for (name, value) in lines(tried, done) {
-            rows.row([Cell::from(name), Cell::from(value.replace('-', "−"))]);
-        }
-        page.table(&rows);
+        page.table(&figures_table(lines(tried, done)));
         for (_, figure) in figures {
             page.figure(figure);
         }
@@ -34,9 +30,6 @@ pub fn page(tried: &Tried, text: &str, figures: &[Vec<Named>]) -> Page {
         rows.row([Cell::from(gain.system), gain.name.into(), Cell::number(gain.value, 5), gain.unit.into()]);
     }
     page.table(&rows);
-    page.section("The case");
-    page.prose("This text repeats the moves.");
-    page.embed("case.toml", text);
-    page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
+    page.case("This text repeats the moves.", "case.toml", text);
     page
 }

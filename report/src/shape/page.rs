@@ -33,7 +33,7 @@ pub fn page(found: &Findings, figures: &[(String, Figure)]) -> Page {
     for (_, figure) in figures.iter().filter(|(name, _)| name == "compared") {
         page.figure(figure);
     }
-    page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
+    page.version();
     page
 }
 

@@ -66,8 +66,6 @@ pub fn page(case: &Opened, overview: &Overview, figures: &[Named]) -> Page {
         page.table(&places);
         figures.iter().for_each(|(_, figure)| page.figure(figure));
     }
-    page.section("The case");
-    page.embed("case.toml", case.text());
-    page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
+    page.case("", "case.toml", case.text());
     page
 }

@@ -10,6 +10,7 @@ mod rows;
 
 pub use band::Band;
 pub use curves::{Curves, Samples, Way, decimator};
+pub(crate) use page::figures_table;
 pub use page::page;
 pub use plots::{Named, figures, named};
 pub use rows::{accuracy, cost, early_end, events, hidden, lines, plain, solver_words, speed, time, travel, value};

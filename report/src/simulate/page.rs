@@ -21,7 +21,7 @@ pub fn page(case: &Case, text: &str, solver: Solver, runs: &[Run], figures: &[Ve
     for (run, figures) in runs.iter().zip(figures) {
         experiment(&mut page, run, figures, solver);
     }
-    repeated(&mut page, text);
+    page.case("This text repeats the run.", "case.toml", text);
     page
 }
 
@@ -34,14 +34,6 @@ pub fn how(solver: Solver) -> &'static str {
             "Solved with the friction function of the paper's Table 3 and a fixed step: a reproduction, not exact."
         }
     }
-}
-
-/// The case, and the version that ran it.
-pub fn repeated(page: &mut Page, text: &str) {
-    page.section("The case");
-    page.prose("This text repeats the run.");
-    page.embed("case.toml", text);
-    page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
 }
 
 /// The key figures, a row for each.

@@ -44,9 +44,6 @@ pub fn page(title: &str, sweep: &Sweep, summary: &Summary, text: &str, figures: 
             figures.next();
         }
     }
-    page.section("The case");
-    page.prose("This text repeats the sweep.");
-    page.embed("case.toml", text);
-    page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
+    page.case("This text repeats the sweep.", "case.toml", text);
     page
 }

@@ -49,10 +49,7 @@ pub fn page(work: &Work, text: &str, figures: &[(String, Figure)]) -> Page {
     }
     page.section("Limit cycles at rest");
     page.table(&rows(&[("Hunting".into(), told::hunt(&tuned.before.hunt), told::hunt(&tuned.after.hunt))]));
-    page.section("The case");
-    page.prose("This text has the tuned gains.");
-    page.embed("tuned.toml", text);
-    page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
+    page.case("This text has the tuned gains.", "tuned.toml", text);
     page
 }
 

@@ -55,8 +55,6 @@ pub fn page(analysis: &GantryAnalysis, planes: &[Named]) -> Page {
     for (_, plane) in planes {
         page.plane(plane);
     }
-    page.section("The case");
-    page.embed("case.toml", &analysis.case.text);
-    page.footer(format!("taut {}", env!("CARGO_PKG_VERSION")));
+    page.case("", "case.toml", &analysis.case.text);
     page
 }

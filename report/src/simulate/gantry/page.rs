@@ -5,7 +5,7 @@ use super::rows::{early_end, lines, machine};
 use crate::gantry::gantry_drawing;
 use crate::page::{Callout, Page};
 use crate::plane::Plane;
-use crate::simulate::page::{events, figures_table, how, repeated};
+use crate::simulate::page::{events, figures_table, how};
 use crate::simulate::plots::Named;
 use taut::case::GantryCase;
 use taut::mechanism::Mechanism;
@@ -29,11 +29,11 @@ pub fn page(
         "In plan view with positive directions; lengths are not to scale. In the model the bridge does not yaw, and idlers have \
          neither inertia nor friction.",
     );
+    let setting = Setting { case, mechanism: &mechanism, solver };
     for ((run, figures), way) in runs.iter().zip(figures).zip(ways) {
-        let setting = Setting { case, mechanism: &mechanism, solver };
         experiment(&mut page, &setting, run, figures, way.as_ref());
     }
-    repeated(&mut page, text);
+    page.case("This text repeats the run.", "case.toml", text);
     page
 }
 
