@@ -246,6 +246,21 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
         );
         all.push(finding(Grade::Note, "disagreement", text));
     }
+    if let Some(found) = &fit.other_law {
+        let moved = fit.estimates.iter().zip(&found.off).filter(|(_, off)| **off > 1.0);
+        let moved: Vec<String> = moved.map(|(estimate, off)| format!("{} by {off:.1}", estimate.name)).collect();
+        let moved = match moved.is_empty() {
+            true => "it would move no parameter by more than its standard error".to_string(),
+            false => {
+                format!("it would move, in standard errors, {}; the intervals are widened by that", moved.join(", "))
+            }
+        };
+        let text = format!(
+            "the residuals speak for {} ({:.1} standard errors): {moved}; `taut fit --compare` tries other laws",
+            found.words, found.standard_errors
+        );
+        all.push(finding(Grade::Note, "other_law", text));
+    }
     all
 }
 

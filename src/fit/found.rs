@@ -1,7 +1,7 @@
 //! The result of a fit, and how well it is known.
 
 use super::scores::LogFit;
-use super::{Combination, Disagreement, Ending, Finding, Grade, Identifiability};
+use super::{Combination, Disagreement, Ending, Finding, Grade, Identifiability, OtherLaw};
 use crate::log::Quantity;
 use crate::stage::Stage;
 
@@ -27,6 +27,8 @@ pub struct Fit {
     pub choices: Vec<Vec<String>>,
     /// Parts of the logs that say otherwise than the whole, by more than noise would make of it.
     pub disagreement: Option<Disagreement>,
+    /// A friction law that the case does not have and the residuals speak for.
+    pub other_law: Option<OtherLaw>,
     /// Findings on logs and search, warnings first.
     pub findings: Vec<Finding>,
     /// The variables of the search where it ended.

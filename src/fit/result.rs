@@ -127,6 +127,7 @@ pub(super) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
             .collect(),
         identifiability,
         disagreement: judged.and_then(|judged| judged.disagreement.clone()),
+        other_law: judged.and_then(|judged| judged.other_law.clone()),
         findings: Vec::new(),
         point: best.x.clone(),
         ending: best.ending,

@@ -300,6 +300,11 @@ impl Run {
         self.time.last().unwrap_or(&0.0) / (self.time.len().max(2) - 1) as f64
     }
 
+    /// Whether a controller makes its input.
+    pub fn is_closed(&self) -> bool {
+        self.closed.is_some()
+    }
+
     /// Whether it is solved at its own times.
     pub fn is_even(&self) -> bool {
         self.even
@@ -410,11 +415,19 @@ impl Run {
         if !self.predict(bench, stage, extras, &quantities, &mut columns) {
             return false;
         }
+        self.compare(&columns, extras, out)
+    }
+
+    /// Weighted residuals of what a model answered, one column for each output; false where it is too short.
+    pub(super) fn compare(&self, columns: &[Vec<f64>], extras: &[f64], out: &mut [f64]) -> bool {
+        if columns.iter().any(|column| column.len() != self.time.len()) {
+            return false;
+        }
         let n = self.time.len();
         for (out, own) in out[self.seen.len() * n..].iter_mut().zip(self.beforehand(extras)) {
             *out = own;
         }
-        for (i, (seen, column)) in self.seen.iter().zip(&columns).enumerate() {
+        for (i, (seen, column)) in self.seen.iter().zip(columns).enumerate() {
             let bias = self.bias(i, extras);
             let out = &mut out[i * n..(i + 1) * n];
             for k in 0..n {
@@ -449,7 +462,7 @@ fn solve_slot(signal: Signal, lasts: f64) -> crate::signal::Slot {
 }
 
 /// The column of a run that an output is compared with.
-fn column(block: &Trajectory, quantity: Quantity) -> &[f64] {
+pub(super) fn column(block: &Trajectory, quantity: Quantity) -> &[f64] {
     let name = quantity.name();
     let other = match name {
         "motor_voltage" => "voltage",

@@ -4,7 +4,7 @@ use super::least_squares::{Differences, Ending, Minimum, Options, Residuals, min
 use super::problem::{Problem, ROUNDING, Stop, extent};
 use super::regression::regression;
 use super::uncertainty::Judged;
-use super::{Work, sub_records};
+use super::{Work, other_laws, sub_records};
 use crate::case::{Case, Plan};
 use crate::chance;
 use crate::error::{Error, Result};
@@ -34,13 +34,13 @@ pub(super) struct Searched<'a> {
 }
 
 impl Searched<'_> {
-    /// The information of the logs there, and whether their parts agree; none if numbers fail.
+    /// The information of the logs there, and whether their parts agree and their law is the right one; none if numbers fail.
     pub fn judged(&self, case: &Case, plan: &Plan) -> Option<Judged> {
         let Minimum { residuals, jacobian, x, at_bound, .. } = &self.best;
         let mut judged = Judged::new(&self.problem, residuals, jacobian, x, at_bound)?;
-        if let Some(disagreement) = sub_records::disagreement(case, plan, self, &judged) {
-            judged.widen(disagreement);
-        }
+        let disagreement = sub_records::disagreement(case, plan, self, &judged);
+        let other_law = other_laws::other_law(self, &judged);
+        judged.widen(disagreement, other_law);
         Some(judged)
     }
 }

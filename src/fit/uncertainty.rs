@@ -6,12 +6,13 @@
 
 use super::identify::{Directions, Identifiability};
 use super::noise::{self, Spread, half_width};
+use super::other_laws::OtherLaw;
 use super::problem::Problem;
 use super::sub_records::Disagreement;
 use nalgebra::{DMatrix, DVector};
 
 /// Standard deviations that 95 % of a normal distribution keep to.
-const NORMAL: f64 = 1.959_963_985;
+pub(super) const NORMAL: f64 = 1.959_963_985;
 
 /// Covariance of the variables that are free, in their order; none if they are not determined.
 pub struct Covariance {
@@ -38,6 +39,8 @@ pub(super) struct Judged {
     pub spreads: Vec<Spread>,
     /// Parts of the logs that say otherwise.
     pub disagreement: Option<Disagreement>,
+    /// The law that the residuals speak for.
+    pub other_law: Option<OtherLaw>,
 }
 
 impl Judged {
@@ -110,20 +113,23 @@ impl Judged {
             _ => 0.0,
         });
         let covariance = Covariance { free, matrix, deviation, freedom: freedom.round() as usize, reach: NORMAL };
-        Some(Self { identifiability, covariance, inflation, spreads, disagreement: None })
+        Some(Self { identifiability, covariance, inflation, spreads, disagreement: None, other_law: None })
     }
 }
 
 impl Judged {
-    /// Adds what parts of the logs say otherwise.
-    pub fn widen(&mut self, disagreement: Disagreement) {
-        let globals = disagreement.added.nrows();
-        for (a, &i) in self.covariance.free.iter().enumerate().filter(|(_, i)| **i < globals) {
-            for (b, &j) in self.covariance.free.iter().enumerate().filter(|(_, j)| **j < globals) {
-                self.covariance.matrix[(a, b)] += disagreement.added[(i, j)];
+    /// Adds what parts of the logs say otherwise, and what another law would change.
+    pub fn widen(&mut self, disagreement: Option<Disagreement>, other_law: Option<OtherLaw>) {
+        let added = disagreement.iter().map(|found| &found.added).chain(other_law.iter().map(|found| &found.added));
+        for added in added {
+            let globals = added.nrows();
+            for (a, &i) in self.covariance.free.iter().enumerate().filter(|(_, i)| **i < globals) {
+                for (b, &j) in self.covariance.free.iter().enumerate().filter(|(_, j)| **j < globals) {
+                    self.covariance.matrix[(a, b)] += added[(i, j)];
+                }
             }
         }
-        self.disagreement = Some(disagreement);
+        (self.disagreement, self.other_law) = (disagreement, other_law);
     }
 
     /// The autocorrelation of the residuals, in words.

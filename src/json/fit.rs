@@ -130,6 +130,12 @@ pub fn fit(case: &Case, fit: &Fit, profiles: &[Profile], posterior: Option<Value
             "length_s": number(found.length),
             "standard_errors": found.off.iter().map(|off| number(*off)).collect::<Vec<_>>(),
         })),
+        "other_law": fit.other_law.as_ref().map(|found| json!({
+            "body": found.body,
+            "words": found.words,
+            "standard_errors": number(found.standard_errors),
+            "moves_standard_errors": found.off.iter().map(|off| number(*off)).collect::<Vec<_>>(),
+        })),
         "correlation": correlation,
         "residual_deviation": fit.noise.iter().map(|(quantity, deviation)| json!({
             "quantity": quantity.name(), "unit": quantity.unit(), "value": number(*deviation),
