@@ -8,6 +8,7 @@ mod bombs;
 mod case;
 mod case_documentation;
 mod case_mutations;
+mod collocation;
 mod combinations;
 mod common;
 mod compare;

@@ -135,8 +135,8 @@ impl Machine {
             Solver::General { tolerance } => {
                 let fastest = check::fastest_rate(mechanism);
                 general::check(fastest, 0.0, tolerance)?;
-                let reach = (tolerance, fastest, f64::INFINITY);
-                Box::new(general::Core::new(mechanism, Layout::new(mechanism), start, reach))
+                let (layout, steps) = (Layout::new(mechanism), (interval, f64::INFINITY));
+                Box::new(general::Core::new(mechanism, layout, start, (tolerance, fastest), steps))
             }
             Solver::Table3 { .. } => {
                 return Err(Error::new("the paper's Table 3 is not stepped from outside")

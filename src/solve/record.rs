@@ -59,6 +59,8 @@ pub(crate) struct Recorder<'a> {
     taken: Option<u64>,
     /// One for each row, or none at all where the linear equations say everything.
     extra: Vec<Extra>,
+    /// That of the last row of the block before.
+    last_extra: Option<Extra>,
     sheets: Sheets,
     block: Trajectory,
     sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
@@ -100,6 +102,7 @@ impl<'a> Recorder<'a> {
             segments: Vec::new(),
             taken: None,
             extra: Vec::new(),
+            last_extra: None,
             sheets: Sheets::default(),
             sink,
             observer,
@@ -158,6 +161,9 @@ impl<'a> Recorder<'a> {
     fn write_out(&mut self) {
         self.columns.repeat(self.written, self.count);
         self.written = self.count;
+        if let Some(last) = self.extra.last().copied() {
+            self.extra.resize(self.count, last);
+        }
     }
 
     /// Adds the last row so many times more, or until the receiver wants no more; says how often. Nothing but time goes
@@ -169,6 +175,7 @@ impl<'a> Recorder<'a> {
                 // The last row has just been handed on: its numbers stand yet.
                 self.columns.begin_with(self.last);
                 self.written = 1;
+                self.extra.extend(self.last_extra);
             }
             let more = left.min((BLOCK - self.count) as u64);
             self.count += more as usize;
@@ -183,6 +190,9 @@ impl<'a> Recorder<'a> {
     /// Adds the next row: a whole state, of a recorder of rows of [`STATE`] numbers.
     pub(crate) fn push_state(&mut self, inner: &State, input: &[f64; DRIVES], extra: Option<Extra>) {
         if self.detail != Detail::None {
+            if self.written != self.count {
+                self.write_out();
+            }
             self.extra.extend(extra);
         }
         let mut row = [0.0; STATE];
@@ -244,6 +254,7 @@ impl<'a> Recorder<'a> {
         // What comes next is in the mode of the last.
         self.segments.drain(..self.segments.len().saturating_sub(1));
         self.segments.iter_mut().for_each(|segment| segment.start = 0);
+        self.last_extra = self.extra.last().copied();
         self.extra.clear();
     }
 }

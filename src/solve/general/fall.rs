@@ -1,99 +1,107 @@
-//! Where a quantity that is known at eight places of a step first turns negative.
+//! Where a guard that is told by a series over a step first turns negative.
 
+use super::radau::{POINTS, TERMS};
+use crate::solve::propagator::SERIES_TERMS;
 use crate::solve::roots;
 
-/// Places within a step, its ends among them: as many as a polynomial of degree 7, the step's dense output, is told by.
-pub(super) const NODES: usize = 8;
-
-/// From values at k/7 to the coefficients of the polynomial through them: rows of the inverse of V_{kj} = (k/7)ʲ.
-const COEFFICIENTS: [[f64; NODES]; NODES] = inverse();
-
-/// Gauss-Jordan elimination with exchange of rows.
-const fn inverse() -> [[f64; NODES]; NODES] {
-    let mut v = [[0.0; NODES]; NODES];
-    let mut w = [[0.0; NODES]; NODES];
-    let mut k = 0;
-    while k < NODES {
-        let mut power = 1.0;
-        let mut j = 0;
-        while j < NODES {
-            v[k][j] = power;
-            power *= k as f64 / (NODES - 1) as f64;
-            j += 1;
-        }
-        w[k][k] = 1.0;
-        k += 1;
-    }
-    let mut column = 0;
-    while column < NODES {
-        let (mut best, mut row) = (column, column);
-        while row < NODES {
-            if v[row][column].abs() > v[best][column].abs() {
-                best = row;
-            }
-            row += 1;
-        }
-        (v[column], v[best]) = (v[best], v[column]);
-        (w[column], w[best]) = (w[best], w[column]);
-        let pivot = v[column][column];
-        let mut j = 0;
-        while j < NODES {
-            v[column][j] /= pivot;
-            w[column][j] /= pivot;
-            j += 1;
-        }
-        row = 0;
-        while row < NODES {
-            let factor = v[row][column];
-            if row != column && factor != 0.0 {
-                j = 0;
-                while j < NODES {
-                    v[row][j] -= factor * v[column][j];
-                    w[row][j] -= factor * w[column][j];
-                    j += 1;
-                }
-            }
-            row += 1;
-        }
-        column += 1;
-    }
-    w
-}
-
-/// The polynomial through values at k/7.
-pub(super) fn through(values: &[f64; NODES]) -> [f64; NODES] {
-    COEFFICIENTS.map(|row| row.iter().zip(values).fold(0.0, |sum, (c, v)| sum + c * v))
-}
-
-/// The place in [0, 1] where what has these values at k/7 first turns negative, and its slope there.
-pub(super) fn first_fall(values: &[f64; NODES]) -> Option<(f64, f64)> {
+/// Whether what has these values at the points of a step can turn negative within. A quartic leaves the range of its
+/// values at the points by at most their spread; what swings by up to four radians within the step adds to that.
+pub(super) fn may_fall(values: &[f64; POINTS]) -> bool {
     let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
-    // The polynomial leaves the range of its values by at most (Λ − 1)/2 < 5 times their spread, Λ = 10.9 being the
-    // Lebesgue constant of eight equally spaced places.
-    if low > 5.0 * (high - low) {
-        return None;
+    // What is no number may do anything.
+    !(low > 5.0 * (high - low) || (low == high && low >= 0.0))
+}
+
+/// The place in (0, 1] where Σ c_k sᵏ, `order` being the highest power, first turns negative.
+pub(super) fn first_fall(c: &[f64; TERMS], order: usize) -> Option<f64> {
+    if order < SERIES_TERMS {
+        return roots::first_fall(&c[..=order]);
     }
-    let mut c = through(values);
-    c[0] = c[0].max(0.0);
-    let s = roots::first_fall(&c)?;
-    let slope = c.iter().enumerate().skip(1).rev().fold(0.0, |sum, (k, c)| sum * s + k as f64 * c);
-    Some((s, slope))
+    // Over half the step the powers beyond say nothing any more.
+    let mut first = *c;
+    let mut scale = 1.0;
+    for c in &mut first[..=order] {
+        *c *= scale;
+        scale *= 0.5;
+    }
+    if let Some(s) = roots::first_fall(&first[..SERIES_TERMS]) {
+        return Some(0.5 * s);
+    }
+    // Σ c_k (1 + s)ᵏ, of the first half's coefficients
+    let mut second = first;
+    for i in 0..order {
+        for k in (i..order).rev() {
+            second[k] += second[k + 1];
+        }
+    }
+    second[0] = second[0].max(0.0);
+    roots::first_fall(&second[..SERIES_TERMS]).map(|s| 0.5 + 0.5 * s)
+}
+
+/// The place near `s` where Σ c_k sᵏ is zero, by Newton's method; no farther than the reach of the series.
+pub(super) fn zero_near(c: &[f64; TERMS], order: usize, mut s: f64) -> f64 {
+    for _ in 0..8 {
+        let (mut value, mut slope) = (0.0, 0.0);
+        for c in c[..=order].iter().rev() {
+            slope = slope * s + value;
+            value = value * s + c;
+        }
+        let next = (s - value / slope).clamp(0.0, 1.05);
+        // Where it only touches there is no slope to follow.
+        if slope >= 0.0 || !next.is_finite() || (next - s).abs() > 0.25 {
+            return s;
+        }
+        let done = (next - s).abs() <= f64::EPSILON * s;
+        s = next;
+        if done {
+            break;
+        }
+    }
+    s
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn sampled(f: impl Fn(f64) -> f64) -> [f64; NODES] {
-        std::array::from_fn(|k| f(k as f64 / (NODES - 1) as f64))
+    fn coefficients(list: &[f64]) -> [f64; TERMS] {
+        std::array::from_fn(|k| list.get(k).copied().unwrap_or(0.0))
     }
 
     #[test]
     fn a_touch_between_the_ends_is_seen() {
-        // Below zero only from 0.50 to 0.52; positive at all eight places.
-        let values = sampled(|s| (s - 0.50) * (s - 0.52));
-        assert!(values.iter().all(|&v| v > 0.0));
-        let (s, slope) = first_fall(&values).unwrap();
-        assert!((s - 0.5).abs() < 1e-9 && (slope + 0.02).abs() < 1e-9, "{s} {slope}");
+        // Below zero only from 0.50 to 0.52; positive at all points.
+        let c = coefficients(&[0.5 * 0.52, -1.02, 1.0]);
+        for order in [2, TERMS - 1] {
+            let s = first_fall(&c, order).unwrap();
+            assert!((s - 0.5).abs() < 1e-12, "{s}");
+        }
+        let values = super::super::radau::PLACES.map(|s| (s - 0.50) * (s - 0.52));
+        assert!(values.iter().all(|&v| v > 0.0) && may_fall(&values));
+    }
+
+    /// cos 4 s falls at π/8; e^{−4 s} − e^{−3} only in the second half, at 3/4.
+    #[test]
+    fn long_series_are_searched_by_halves() {
+        let mut term = 1.0;
+        let cosine: [f64; TERMS] = std::array::from_fn(|k| {
+            let now = if k % 2 == 0 { term } else { 0.0 };
+            if k % 2 == 1 {
+                term *= -16.0 / (k as f64 * (k as f64 + 1.0));
+            }
+            now
+        });
+        let s = first_fall(&cosine, TERMS - 1).unwrap();
+        assert!((s - std::f64::consts::PI / 8.0).abs() < 1e-14, "{s}");
+        assert!((zero_near(&cosine, TERMS - 1, 0.4) - s).abs() < 1e-14);
+        let mut term = 1.0;
+        let mut decay: [f64; TERMS] = std::array::from_fn(|k| {
+            let now = term;
+            term *= -4.0 / (k + 1) as f64;
+            now
+        });
+        decay[0] -= (-3.0_f64).exp();
+        let s = first_fall(&decay, TERMS - 1).unwrap();
+        assert!((s - 0.75).abs() < 1e-12, "{s}");
     }
 }

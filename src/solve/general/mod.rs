@@ -1,15 +1,21 @@
 //! The general solver: any friction law, and spans that follow the cart.
 //!
-//! Between mode changes and edges of the input the equations are smooth, and an adaptive formula of order eight
-//! (Dormand and Prince's DOP853, from a library) integrates them. The modes and their guards are those of the exact
-//! solver. Each step's dense output is a polynomial, and so are the guards along it: their first fall is searched for
-//! as the exact solver does, so that two crossings within a step are seen; the step is then taken again up to the
-//! event.
+//! The modes, their linear equations and their guards are those of the exact solver. What laws and belts add to them is
+//! told within a step by quartics of time, which collocation finds ([`step`]); with them the equations are linear again,
+//! and solved as exactly as the exact solver does ([`linear`]): a step is a product of matrices, or a Taylor series
+//! along which guards are searched for their first fall, so that two crossings within a step are seen. A step with an
+//! event in it is taken again up to the event.
 
 mod fall;
+mod field;
+mod linear;
 mod model;
+mod radau;
 mod run;
 mod shown;
+mod sources;
+mod step;
+mod stepping;
 mod stretch;
 
 use super::coordinates::Coordinates;
@@ -25,14 +31,12 @@ use crate::mechanism::{
 };
 use crate::mechanism::{Form, What};
 use crate::signal::DEGREE;
-use fall::NODES;
-use ivp::dense::StepInterpolant;
-use ivp::methods::{DOP853, Tolerance};
-use ivp::prelude::FirstOrderSystem;
-use ivp::solout::{ControlFlag, SolOut};
-use model::{Field, MOST, Model, Vector};
+use field::Field;
+use linear::Set;
+use model::{MOST, Model, Vector};
 pub(super) use run::Run;
 use std::sync::Arc;
+use step::Room;
 use stretch::Stretch;
 
 /// Events allowed at once, and per simulated second: more is an accumulation, not a machine.
@@ -55,7 +59,7 @@ pub(super) fn check(fastest: f64, until: f64, tolerance: f64) -> Result<()> {
             .allowed("from 1e-14 to 0.01")
             .next("take 1e-9, the default"));
     }
-    let steps = fastest * until / REACH;
+    let steps = fastest * until / radau::REACH;
     if steps > MOST_STEPS {
         return Err(Error::new(format!(
             "the general solver would need some {steps:.0e} steps: something here changes within {:.0e} s",
@@ -67,24 +71,33 @@ pub(super) fn check(fastest: f64, until: f64, tolerance: f64) -> Result<()> {
     Ok(())
 }
 
-/// h·|λ| up to which the formula is stable.
-const REACH: f64 = 6.0;
-
-/// h·|λ| of the first step after an event or an edge.
-const FIRST: f64 = 0.3;
+/// A mode made ready, and steps of it.
+#[derive(Clone)]
+struct Known {
+    field: Arc<Field>,
+    /// By their lengths, with how often each was taken.
+    sets: Vec<(Arc<Set>, u32)>,
+}
 
 /// A machine under way: its state, its mode, and what is needed to go on. A clone of it goes on in the same way.
 #[derive(Clone)]
 pub(super) struct Core {
     model: Arc<Model>,
     pub(super) coordinates: Coordinates,
-    solver: DOP853,
-    /// The step to begin with after an event or an edge, s.
-    first_step: f64,
+    /// Steps are this long, or halves, quarters, doubles of it, and end on multiples of their length, s.
+    interval: f64,
+    /// The length that the next step may have by the last one's error, s.
+    step: f64,
+    /// The time in which the fastest of the machine changes, s.
+    moment: f64,
     relative: f64,
     absolute: Vector,
     y: Vector,
     pub(super) mode: Mode,
+    known: Vec<Known>,
+    /// The number of the present mode among them.
+    present: usize,
+    room: Option<Box<Room>>,
     stretch: Stretch,
     /// Where it stands, counted from the beginning of the stretch, s.
     tau: f64,
@@ -101,17 +114,29 @@ pub(super) struct Core {
     pub(super) events: Vec<Event>,
     /// How many events were handed on before those.
     handed_on: usize,
-    modes: Vec<Mode>,
     /// How many modes have been taken up.
     taken: u64,
     pub(super) cost: Cost,
     pub(super) trouble: Option<Ending>,
 }
 
-/// Whoever is told of each step: of what is integrated, from where to where, and the states within.
+/// A step that was taken, as far as it counts: to its end, or to the first event in it.
+struct Way<'a> {
+    stretch: &'a Stretch,
+    /// Where it begins and where it ends, and where it would have ended.
+    from: f64,
+    until: f64,
+    to: f64,
+    begin: &'a Vector,
+    /// Whether nothing moves.
+    rests: bool,
+    dense: &'a dyn Fn(f64) -> Vector,
+}
+
+/// Whoever is told of each step.
 trait Witness {
-    /// Sees the way from the state `begin` at `from` to `until`, of a step that went to `to`.
-    fn see(&mut self, core: &mut Core, field: &Field, way: (f64, f64, f64), begin: &Vector, at: &dyn Fn(f64) -> Vector);
+    /// Sees a step.
+    fn see(&mut self, core: &mut Core, way: &Way);
 
     /// Whether to go on.
     fn ask(&mut self) -> bool;
@@ -121,7 +146,7 @@ trait Witness {
 struct Nobody;
 
 impl Witness for Nobody {
-    fn see(&mut self, _: &mut Core, _: &Field, _: (f64, f64, f64), _: &Vector, _: &dyn Fn(f64) -> Vector) {}
+    fn see(&mut self, _: &mut Core, _: &Way) {}
 
     fn ask(&mut self) -> bool {
         true
@@ -137,12 +162,13 @@ struct Hit {
 
 impl Core {
     /// That of a machine in `start`; `tolerance` is the error allowed in each step, relative and, of small quantities,
-    /// absolute; `fastest` is its fastest rate, 1/s, and `end` how far it is to go.
+    /// absolute; `fastest` is its fastest rate, 1/s, `interval` what its steps fit into, and `end` how far it is to go.
     pub(super) fn new(
         mechanism: &Mechanism,
         layout: Layout,
         start: &State,
-        (tolerance, fastest, end): (f64, f64, f64),
+        (tolerance, fastest): (f64, f64),
+        (interval, end): (f64, f64),
     ) -> Self {
         let (mut coordinates, inner) = Coordinates::new(&layout, start);
         let seen = Arc::new(mechanism.seen_from(&layout, start));
@@ -172,22 +198,21 @@ impl Core {
                 absolute[place] = tolerance * friction.forward.breakaway.max(friction.backward.breakaway) / stiffness;
             }
         }
-        let first_step = FIRST / fastest;
+        let model = Arc::new(model);
+        let field = Arc::new(Field::new(&model, &mode));
         Self {
-            model: Arc::new(model),
+            model,
             coordinates,
-            // It is stopped from outside: by its observer.
-            solver: DOP853 {
-                max_steps: usize::MAX - 1,
-                stiff_test: usize::MAX,
-                first_step: Some(first_step),
-                ..DOP853::default()
-            },
-            first_step,
+            interval,
+            step: f64::INFINITY,
+            moment: 1.0 / fastest,
             relative: tolerance,
             absolute,
             y,
             mode,
+            known: vec![Known { field, sets: Vec::new() }],
+            present: 0,
+            room: None,
             stretch: Stretch::of(Pieces::held(&[], 0.0, 0.0), f64::INFINITY),
             tau: 0.0,
             slack: [0.0; Cause::KINDS],
@@ -199,9 +224,8 @@ impl Core {
             end,
             events: Vec::new(),
             handed_on: 0,
-            modes: vec![mode],
             taken: 0,
-            cost: Cost::default(),
+            cost: Cost { modes: 1, ..Cost::default() },
             trouble: None,
         }
     }
@@ -210,68 +234,16 @@ impl Core {
         self.stretch.begin + self.tau
     }
 
-    /// Takes up a new stretch of the inputs.
-    fn take_up(&mut self, stretch: Stretch, continues: bool) {
-        self.cost.pieces += stretch.pieces() as u64;
-        if !continues {
-            self.solver.first_step = Some(self.first_step);
-        }
+    /// Takes up new inputs.
+    fn take_up(&mut self, stretch: Stretch) {
+        self.cost.pieces += 1;
         (self.stretch, self.tau) = (stretch, 0.0);
         self.resolve();
     }
 
-    /// Advances to the end of the stretch, event by event.
-    fn reach(&mut self, witness: &mut dyn Witness) {
-        while self.tau < self.stretch.length() && self.trouble.is_none() {
-            let stretch = self.stretch.clone();
-            let Some(hit) = self.integrate(&stretch, witness) else { continue };
-            self.y = hit.y;
-            self.tau = hit.tau;
-            self.solver.first_step = Some(self.first_step);
-            self.change(hit.cause);
-            self.resolve();
-        }
-    }
-
-    /// Integrates to the end of the stretch, or to the first guard that falls.
-    fn integrate(&mut self, stretch: &Stretch, witness: &mut dyn Witness) -> Option<Hit> {
-        let model = Arc::clone(&self.model);
-        let field = Field::new(&model, &self.mode, stretch);
-        let length = stretch.length();
-        if length - self.tau <= 64.0 * f64::EPSILON * length {
-            // What is left is no step, but rounding.
-            self.tau = length;
-            return None;
-        }
-        let mut solver = DOP853 { max_step: Some(stretch.longest_step()), ..self.solver.clone() };
-        // The formula looks at its longest step only from its second one on.
-        let longest = stretch.longest_step().min(length - self.tau);
-        solver.first_step = solver.first_step.map(|step| step.min(longest));
-        let (relative, absolute, y) = (self.relative(), self.absolute(), self.y);
-        let (from, size) = (self.tau, self.model.size);
-        let mut observer =
-            Observer { watches: field.watches(), run: self, field: &field, witness, values: Vec::new(), hit: None };
-        let result = solver.solve(&field, from, &y[..size], length, relative, absolute, Some(&mut observer));
-        let hit = observer.hit;
-        self.cost.evaluations += field.evaluations();
-        match result {
-            Ok(result) if result.is_ok() && hit.is_none() && self.trouble.is_none() => {
-                self.tau = length;
-                self.solver.first_step = Some(result.h.abs().max(self.first_step));
-            }
-            Ok(result) if result.is_ok() => {}
-            // Not even the smallest step will do: this is no motion any more.
-            _ => self.trouble = Some(Ending::Diverged { time: stretch.begin + self.tau }),
-        }
-        hit
-    }
-
-    fn relative(&self) -> Tolerance {
-        Tolerance::Scalar(self.relative)
-    }
-
-    fn absolute(&self) -> Tolerance {
-        Tolerance::Vector(self.absolute[..self.model.size].to_vec())
+    /// The present mode made ready.
+    fn field(&self) -> Arc<Field> {
+        Arc::clone(&self.known[self.present].field)
     }
 
     /// The motion of a body at zero speed under its present load.
@@ -357,12 +329,10 @@ impl Core {
     /// by.
     fn is_by_tolerance(&self, cause: Cause) -> bool {
         let Cause::Stop(body) = cause else { return false };
-        let field = Field::new(&self.model, &self.mode, &self.stretch);
-        let mut rate = [0.0; MOST];
-        field.derivative(self.tau, &self.y, &mut rate[..self.model.size]);
+        let rate = self.field().rate(&self.input(), &self.y);
         let place = self.model.speed(body);
         // Within the time in which the fastest of it changes.
-        rate[place].abs() * self.first_step / FIRST <= self.absolute[place]
+        rate[place].abs() * self.moment <= self.absolute[place]
     }
 
     /// Lets a part other than a body do something else.
@@ -383,11 +353,11 @@ impl Core {
         }
         self.enter();
         // What has just become a condition on this part is zero but for what the integrator may be off by.
-        let field = Field::new(&self.model, &self.mode, &self.stretch);
-        let guards = field.guards(self.tau, &self.y);
-        for (index, cause) in field.watches().into_iter().enumerate() {
+        let (field, input) = (self.field(), self.input());
+        let guards = field.guards(&input, &self.y);
+        for (index, cause) in field.watches.iter().enumerate() {
             if cause.is_of_same_part(Cause::Switch(switch)) {
-                let error = self.relative * field.size(index, self.tau, &self.y);
+                let error = self.relative * field.size(index, &input, &self.y);
                 let error = if self.changes > TURNS_AT_ONCE { 10.0 * error } else { error };
                 let zero = guards[index].abs() <= 4.0 * error;
                 self.slack[cause.kind()] = if zero { f64::max(-guards[index], 0.0) + error } else { 0.0 };
@@ -398,9 +368,13 @@ impl Core {
     fn enter(&mut self) {
         self.taken += 1;
         self.coordinates.hold(&self.model.layout, &self.mode, &self.model.inner(&self.y));
-        if !self.modes.contains(&self.mode) {
-            self.modes.push(self.mode);
-        }
+        let known = self.known.iter().position(|known| known.field.mode == self.mode);
+        self.present = known.unwrap_or_else(|| {
+            let field = Arc::new(Field::new(&self.model, &self.mode));
+            self.known.push(Known { field, sets: Vec::new() });
+            self.cost.modes += 1;
+            self.known.len() - 1
+        });
     }
 
     /// Changes modes, without time passing, until every load that is held can be.
@@ -417,15 +391,15 @@ impl Core {
             }
         }
         for _ in 0..CHANGES_AT_ONCE {
-            let field = Field::new(&self.model, &self.mode, &self.stretch);
-            let guards = field.guards(self.tau, &self.y);
+            let field = self.field();
+            let guards = field.guards(&self.input(), &self.y);
             let falls = |&(cause, value): &(Cause, f64)| match cause {
                 // A speed tells by itself, over the next step.
                 Cause::Stop(_) => false,
                 Cause::GearTorque(drive) => value < -self.torque_slack[drive],
                 cause => value < -self.slack[cause.kind()],
             };
-            let fallen = field.watches().into_iter().zip(guards).filter(falls).min_by_key(|(cause, _)| cause.rank());
+            let fallen = field.watches.iter().copied().zip(guards).filter(falls).min_by_key(|(cause, _)| cause.rank());
             match fallen {
                 Some((cause, _)) => {
                     self.change(cause);
@@ -467,7 +441,7 @@ impl Engine for Core {
     }
 
     fn take_input(&mut self, pieces: &Pieces) {
-        self.take_up(Stretch::of(*pieces, f64::INFINITY), false);
+        self.take_up(Stretch::of(*pieces, f64::INFINITY));
     }
 
     /// Steps are as short as the inputs need by themselves.
@@ -508,153 +482,5 @@ impl Engine for Core {
     /// Nothing is known of it while it goes; [`super::ErrorEstimate`] has it of a run.
     fn error(&self) -> Option<PositionError> {
         None
-    }
-}
-
-/// Looks at every step: finds the guard that falls first, and shows the way until there.
-struct Observer<'r> {
-    run: &'r mut Core,
-    field: &'r Field<'r>,
-    witness: &'r mut dyn Witness,
-    watches: Vec<Cause>,
-    /// The conditions at the nodes of a step.
-    values: Vec<[f64; NODES]>,
-    hit: Option<Hit>,
-}
-
-impl SolOut for Observer<'_> {
-    fn solout(&mut self, from: f64, to: &mut f64, y: &mut [f64], dense: Option<&StepInterpolant<'_>>) -> ControlFlag {
-        let (to, Some(dense)) = (*to, dense) else { return ControlFlag::Continue };
-        let size = y.len();
-        let mut end = [0.0; MOST];
-        end[..size].copy_from_slice(y);
-        if !end.iter().sum::<f64>().is_finite() {
-            self.run.trouble = Some(Ending::Diverged { time: self.field.stretch.begin + from });
-            return ControlFlag::Interrupt;
-        }
-        let run = &mut *self.run;
-        run.cost.steps += 1;
-        let time = self.field.stretch.begin + to;
-        if run.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS) {
-            run.trouble = run.pace.too_stiff(run.cost.steps, time, run.end);
-        }
-        let begin = self.run.y;
-        let at = |tau: f64| {
-            let mut y = [0.0; MOST];
-            dense.interpolate(tau, &mut y[..size]);
-            y
-        };
-        self.hit = self.first_fall(from, to, &begin, &end, &at);
-        let until = self.hit.as_ref().map_or(to, |hit| hit.tau);
-        self.witness.see(self.run, self.field, (from, until, to), &begin, &at);
-        let asks = self.run.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS);
-        if (asks || self.run.trouble.is_some()) && !self.witness.ask() && self.run.trouble.is_none() {
-            self.run.trouble = Some(Ending::Interrupted { time });
-        }
-        self.run.y = end;
-        self.run.tau = to;
-        if self.hit.is_some() || self.run.trouble.is_some() { ControlFlag::Interrupt } else { ControlFlag::Continue }
-    }
-}
-
-impl Observer<'_> {
-    /// The first guard to fall between `from` and `to`, and the state there.
-    fn first_fall(
-        &mut self,
-        from: f64,
-        to: f64,
-        begin: &Vector,
-        end: &Vector,
-        at: &impl Fn(f64) -> Vector,
-    ) -> Option<Hit> {
-        if self.watches.is_empty() {
-            return None;
-        }
-        self.run.cost.looks += 1;
-        let mut values = std::mem::take(&mut self.values);
-        values.resize(self.watches.len(), [0.0; NODES]);
-        for node in 0..NODES {
-            let tau = from + (to - from) * node as f64 / (NODES - 1) as f64;
-            let guards = match node {
-                0 => self.field.guards(from, begin),
-                7 => self.field.guards(to, end),
-                _ => self.field.guards(tau, &at(tau)),
-            };
-            for (values, guard) in values.iter_mut().zip(guards) {
-                values[node] = guard;
-            }
-        }
-        for (values, watch) in values.iter().zip(&self.watches) {
-            if let Cause::GearTorque(drive) = *watch {
-                let run = &mut self.run;
-                run.torque[drive] = values.iter().fold(run.torque[drive], |most, value| most.max(value.abs()));
-                // What was told by nothing but rounding is told by the step.
-                run.torque_slack[drive] = run.relative * run.torque[drive];
-            }
-        }
-        let mut first: Option<(f64, f64, usize, f64)> = None;
-        for (index, watch) in self.watches.iter().enumerate() {
-            let run = &self.run;
-            let slack = match *watch {
-                // What the integrator may be off by is no stop, least of all where a body has just begun to slide.
-                Cause::Stop(body) => run.absolute[run.model.speed(body)],
-                Cause::GearTorque(drive) => run.torque_slack[drive],
-                cause => run.slack[cause.kind()],
-            };
-            if let Some((s, slope)) = fall::first_fall(&values[index].map(|value| value + slack))
-                && first.is_none_or(|(earliest, ..)| s < earliest)
-            {
-                first = Some((s, slope, index, slack));
-            }
-        }
-        if first.is_none() {
-            // A part that has clearly left its edge is watched to the last bit again.
-            for (index, cause) in self.watches.iter().enumerate() {
-                let slack = &mut self.run.slack[cause.kind()];
-                if matches!(cause, Cause::Switch(_)) && values[index][NODES - 1] > 10.0 * *slack {
-                    *slack = 0.0;
-                }
-            }
-        }
-        self.values = values;
-        let (s, slope, index, slack) = first?;
-        // A speed that has fallen through is looked for where it was zero.
-        let slack = if matches!(self.watches[index], Cause::Stop(_)) { 0.0 } else { slack };
-        let mut tau = from + s * (to - from);
-        let mut y = self.leap(from, begin, tau);
-        // Newton's method along the formula itself, which is more accurate than its dense output.
-        for _ in 0..3 {
-            let value = self.field.guards(tau, &y)[index] + slack;
-            let change = -value * (to - from) / slope;
-            if !(slope < 0.0 && change.abs() <= 0.01 * (to - from)) || change.abs() <= 1e-15 + f64::EPSILON * tau {
-                break;
-            }
-            tau = (tau + change).clamp(from, to);
-            y = self.leap(from, begin, tau);
-        }
-        Some(Hit { tau, y, cause: self.watches[index] })
-    }
-
-    /// One step of the formula to where it is wanted.
-    fn leap(&self, from: f64, begin: &Vector, to: f64) -> Vector {
-        if to <= from {
-            return *begin;
-        }
-        let solver = DOP853 { first_step: Some(to - from), dense_output: true, ..self.run.solver.clone() };
-        let mut arrival = Arrival(*begin);
-        let y = &begin[..self.run.model.size];
-        let (relative, absolute) = (self.run.relative(), self.run.absolute());
-        let _ = solver.solve(self.field, from, y, to, relative, absolute, Some(&mut arrival));
-        arrival.0
-    }
-}
-
-/// Keeps the state at the end of a step.
-struct Arrival(Vector);
-
-impl SolOut for Arrival {
-    fn solout(&mut self, _: f64, _: &mut f64, y: &mut [f64], _: Option<&StepInterpolant<'_>>) -> ControlFlag {
-        self.0[..y.len()].copy_from_slice(y);
-        ControlFlag::Continue
     }
 }

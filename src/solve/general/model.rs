@@ -1,13 +1,8 @@
-//! The equations as the integrator sees them: the linear ones of a mode, and what a law or a belt adds to them.
+//! A machine made ready for the general solver: what its laws and its belt add to the linear equations of a mode.
 
-use super::stretch::Stretch;
 use crate::friction::{Friction, Law, Motion};
-use crate::mechanism::{
-    BODIES, Cause, DRIVES, Equations, Form, Layout, Mechanism, Mode, ROUNDING, SPRINGS, State, Switch,
-};
+use crate::mechanism::{BODIES, DRIVES, Follows, Form, Layout, Mechanism, Mode, SPRINGS, State};
 use crate::solve::record::Extra;
-use ivp::prelude::FirstOrderSystem;
-use std::cell::Cell;
 use std::sync::Arc;
 
 /// Most quantities that are integrated: coordinates and speeds, currents, bristles.
@@ -21,24 +16,85 @@ pub(super) type Vector = [f64; MOST];
 pub(super) const MOST_GUARDS: usize = 2 * BODIES + 5 * DRIVES + 2 * SPRINGS;
 
 /// A spring that follows the bodies.
-struct Following {
-    spring: usize,
+pub(super) struct Following {
+    pub(super) spring: usize,
     /// Its length from the integrated quantities: places and weights.
-    terms: Vec<(usize, f64)>,
+    pub(super) terms: Vec<(usize, f64)>,
     /// By how much its force acts on each body that moves by itself.
-    arms: Vec<(usize, f64)>,
+    pub(super) arms: Vec<(usize, f64)>,
 }
 
 /// A body whose own friction is not that of the linear equations, be it moved by another or not.
-struct Curved {
-    body: usize,
+pub(super) struct Curved {
+    pub(super) body: usize,
     /// The body that it moves with, and its way per way of that one.
-    leader: usize,
-    ratio: f64,
-    friction: Friction,
+    pub(super) leader: usize,
+    pub(super) ratio: f64,
+    pub(super) friction: Friction,
     /// Where its speed stands, and the deflection of its bristles, if it has them.
-    speed: usize,
-    bristle: Option<usize>,
+    pub(super) speed: usize,
+    pub(super) bristle: Option<usize>,
+}
+
+/// A law at one speed in one motion: the friction beyond that of the linear equations, how it changes with the speed,
+/// and what it does to bristles.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Sliding {
+    /// Beyond what is in the linear equations; of bristles, without what they carry.
+    pub(super) beyond: f64,
+    /// Its derivative by the speed, and by the factor along the travel.
+    pub(super) slope: f64,
+    pub(super) by_factor: f64,
+    /// σ₀ |v|/g(v), 1/s, and its derivative by the speed.
+    pub(super) slip: f64,
+    pub(super) slip_slope: f64,
+}
+
+impl Curved {
+    /// The law at `v`, dry friction being multiplied by `factor`. The speed is counted in the direction of motion:
+    /// where a trial step overshoots, the law goes on smoothly.
+    #[inline(always)]
+    pub(super) fn sliding(&self, motion: Motion, v: f64, factor: f64, slopes: bool) -> Sliding {
+        let friction = &self.friction;
+        let (forward, speed) = match motion {
+            // Held, neither body nor bristles move.
+            Motion::Stuck => return Sliding::default(),
+            Motion::Forward => (true, v),
+            Motion::Backward => (false, -v),
+            Motion::Free => (v >= 0.0, v.abs()),
+        };
+        let sign = if forward { 1.0 } else { -1.0 };
+        let side = friction.side(forward);
+        // In the equations there is b v of this direction; of a body that is free, b v of the forward one.
+        let viscous = match motion {
+            Motion::Free => side.viscous - friction.forward.viscous,
+            Motion::Forward | Motion::Backward | Motion::Stuck => 0.0,
+        };
+        let steeper = || friction.slope(v) - side.viscous;
+        match friction.law {
+            // Nothing but b v.
+            Law::Coulomb | Law::Stribeck { .. } if motion == Motion::Free => Sliding::default(),
+            // In the equations there is ± F_c, too.
+            Law::Coulomb | Law::Stribeck { .. } => {
+                let dry = friction.dry(forward, speed);
+                let slope = if slopes { factor * steeper() } else { 0.0 };
+                let beyond = sign * (factor * dry - side.coulomb);
+                Sliding { beyond, slope, by_factor: sign * dry, ..Sliding::default() }
+            }
+            Law::Smooth { .. } => {
+                let dry = friction.dry(forward, speed);
+                let slope = if slopes { factor * steeper() + viscous } else { 0.0 };
+                let beyond = sign * (factor * dry) + viscous * v;
+                Sliding { beyond, slope, by_factor: sign * dry, ..Sliding::default() }
+            }
+            Law::LuGre { stiffness, .. } => {
+                let dry = factor * friction.dry(forward, speed);
+                let slip = stiffness * speed / dry;
+                let slip_slope = if slopes { sign * (stiffness - slip * factor * steeper()) / dry } else { 0.0 };
+                Sliding { beyond: viscous * v, slope: viscous, by_factor: 0.0, slip, slip_slope }
+            }
+        }
+    }
 }
 
 /// A machine made ready for the integrator.
@@ -49,25 +105,12 @@ pub(super) struct Model {
     place: [usize; BODIES],
     /// Where the currents stand that are states.
     pub(super) current: [Option<usize>; DRIVES],
-    /// Number of integrated quantities.
-    pub(super) size: usize,
     /// Where a body's bristle deflection stands, if it has one.
     pub(super) bristle: [Option<usize>; BODIES],
     /// Whether anything is added to the linear equations at all.
     pub(super) adds: bool,
-    curved: Vec<Curved>,
-    following: Vec<Following>,
-}
-
-/// The additions to the linear equations.
-#[derive(Clone, Copy, Default)]
-struct Added {
-    /// Forces and torques on each body that moves by itself: of springs that follow, and, to be taken off, friction
-    /// beyond b v ± F_c of all that moves with it.
-    load: [f64; BODIES],
-    friction: [f64; BODIES],
-    /// Rates of the bristles.
-    bristle: [f64; BODIES],
+    pub(super) curved: Vec<Curved>,
+    pub(super) following: Vec<Following>,
 }
 
 impl Model {
@@ -109,11 +152,11 @@ impl Model {
             }
         });
         let following = following.collect();
-        Self { mechanism, layout, place, current, size, bristle, adds, curved, following }
+        Self { mechanism, layout, place, current, bristle, adds, curved, following }
     }
 
     /// Coefficients of the integrated quantities in a form that are not zero.
-    fn terms(&self, form: &Form) -> impl Iterator<Item = (usize, f64)> + use<> {
+    pub(super) fn terms(&self, form: &Form) -> impl Iterator<Item = (usize, f64)> + use<> {
         let mut row = [0.0; MOST];
         let on = self.layout.on_coordinates(form);
         for body in 0..self.mechanism.bodies.len() {
@@ -173,20 +216,31 @@ impl Model {
     /// By how much a body's dry friction is multiplied where it is.
     #[inline(always)]
     fn factor(&self, body: usize, y: &[f64]) -> f64 {
+        self.factor_at(body, || y[self.coordinate(body)])
+    }
+
+    /// The same at a place that is told if it matters.
+    #[inline(always)]
+    pub(super) fn factor_at(&self, body: usize, coordinate: impl FnOnce() -> f64) -> f64 {
         match &self.mechanism.bodies[body].along {
-            Some(along) => along.factor(self.mechanism.origin[body] + y[self.coordinate(body)]),
+            Some(along) => along.factor(self.mechanism.origin[body] + coordinate()),
             None => 1.0,
         }
     }
 
     /// The force of a spring beyond k s + c ṡ with the stiffness at the origin, taut or not: (k(q) − k) s.
     #[inline]
-    fn beyond(&self, following: &Following, y: &[f64]) -> f64 {
-        let spring = &self.mechanism.springs[following.spring];
-        let Some(follows) = &spring.follows else { return 0.0 };
-        let stiffness = follows.stiffness(|body| self.mechanism.origin[body] + y[self.coordinate(body)]);
+    pub(super) fn beyond(&self, following: &Following, y: &[f64]) -> f64 {
         let length: f64 = following.terms.iter().map(|&(place, weight)| weight * y[place]).sum();
-        (stiffness - spring.stiffness) * length
+        self.stiffer(following.spring, |body| y[self.coordinate(body)]) * length
+    }
+
+    /// By how much a spring is stiffer than at the origin: k(q) − k.
+    #[inline(always)]
+    pub(super) fn stiffer(&self, spring: usize, coordinate: impl Fn(usize) -> f64) -> f64 {
+        let spring = &self.mechanism.springs[spring];
+        let stiffness = |follows: &Follows| follows.stiffness(|body| self.mechanism.origin[body] + coordinate(body));
+        spring.follows.as_ref().map_or(0.0, |follows| stiffness(follows) - spring.stiffness)
     }
 
     /// The loads of the springs that follow on each body that moves by itself, −Aᵀ f; a slack one has none.
@@ -236,54 +290,28 @@ impl Model {
         self.curved.iter().filter(|curved| curved.leader == leader).map(of).sum()
     }
 
-    /// The additions of the laws and the belt to the linear equations, and how the bristles move.
-    #[inline(always)]
-    fn added(&self, mode: &Mode, y: &[f64]) -> Added {
-        let mut added = Added { load: self.loads(mode, y), ..Added::default() };
+    /// Friction beyond b v ± F_c on each body that moves by itself, of all that moves with it.
+    fn friction(&self, mode: &Mode, y: &[f64]) -> [f64; BODIES] {
+        let mut friction = [0.0; BODIES];
         for curved in &self.curved {
-            let (friction, bristle) = self.beyond_straight(curved, mode.motion[curved.body], y);
             // Power is conserved: F = ρ τ
-            added.friction[curved.leader] += curved.ratio * friction;
-            added.bristle[curved.body] = bristle;
+            friction[curved.leader] += curved.ratio * self.beyond_straight(curved, mode.motion[curved.body], y);
         }
-        added
+        friction
     }
 
-    /// The difference of a body's own friction from that of the linear equations, and how fast its bristles bend.
+    /// The difference of a body's own friction from that of the linear equations.
     #[inline(always)]
-    fn beyond_straight(&self, curved: &Curved, motion: Motion, y: &[f64]) -> (f64, f64) {
-        let (body, friction, v) = (curved.body, &curved.friction, y[curved.speed]);
-        // The speed counted in the direction of motion: where a trial step overshoots, the law goes on smoothly.
-        let (forward, speed) = match motion {
-            // Held, neither body nor bristles move.
-            Motion::Stuck => return (0.0, 0.0),
-            Motion::Forward => (true, v),
-            Motion::Backward => (false, -v),
-            Motion::Free => (v >= 0.0, v.abs()),
-        };
-        let sign = if forward { 1.0 } else { -1.0 };
-        let side = friction.side(forward);
-        // In the equations there is b v of this direction; of a body that is free, b v of the forward one.
-        let viscous = match motion {
-            Motion::Free => (side.viscous - friction.forward.viscous) * v,
-            Motion::Forward | Motion::Backward | Motion::Stuck => 0.0,
-        };
-        match friction.law {
-            // Nothing but b v.
-            Law::Coulomb | Law::Stribeck { .. } if motion == Motion::Free => (0.0, 0.0),
-            // In the equations there is ± F_c, too.
-            Law::Coulomb | Law::Stribeck { .. } => {
-                (sign * (self.factor(body, y) * friction.dry(forward, speed) - side.coulomb), 0.0)
+    pub(super) fn beyond_straight(&self, curved: &Curved, motion: Motion, y: &[f64]) -> f64 {
+        let (v, factor) = (y[curved.speed], self.factor(curved.body, y));
+        let sliding = curved.sliding(motion, v, factor, false);
+        match (curved.friction.law, curved.bristle) {
+            (Law::LuGre { stiffness, damping, .. }, Some(place)) if motion != Motion::Stuck => {
+                // ż = v − σ₀ |v| z / g(v), and σ₀ z + σ₁ ż
+                let rate = v - sliding.slip * y[place];
+                sliding.beyond + stiffness * y[place] + damping * rate
             }
-            Law::Smooth { .. } => (sign * (self.factor(body, y) * friction.dry(forward, speed)) + viscous, 0.0),
-            Law::LuGre { stiffness, damping, .. } => {
-                let dry = self.factor(body, y) * friction.dry(forward, speed);
-                let z = curved.bristle.map_or(0.0, |place| y[place]);
-                // ż = v − σ₀ |v| z / g(v)
-                let rate = v - stiffness * speed * z / dry;
-                // σ₀ z + σ₁ ż
-                (stiffness * z + damping * rate + viscous, rate)
-            }
+            _ => sliding.beyond,
         }
     }
 
@@ -291,7 +319,7 @@ impl Model {
     pub(super) fn extra(&self, mode: &Mode, y: &[f64]) -> Extra {
         let mut extra = Extra::default();
         if self.adds {
-            extra.friction = self.added(mode, y).friction;
+            extra.friction = self.friction(mode, y);
             for following in self.following.iter().filter(|following| !mode.slack[following.spring]) {
                 extra.force[following.spring] = self.beyond(following, y);
             }
@@ -300,195 +328,5 @@ impl Model {
             }
         }
         extra
-    }
-}
-
-/// Linear forms of the integrated quantities and the inputs, without what counts for nothing in them.
-#[derive(Default)]
-struct Rows {
-    terms: Vec<(usize, f64)>,
-    /// Where the terms of each end; its constant part, and its coefficients of the inputs.
-    rows: Vec<(usize, f64, [f64; DRIVES])>,
-}
-
-impl Rows {
-    fn push(&mut self, model: &Model, form: &Form) {
-        self.terms.extend(model.terms(form));
-        self.rows.push((self.terms.len(), form.constant, form.input));
-    }
-
-    /// Their values.
-    #[inline(always)]
-    fn values<'r>(&'r self, y: &'r [f64], input: &'r [f64; DRIVES]) -> impl Iterator<Item = f64> + 'r {
-        let mut begin = 0;
-        self.rows.iter().map(move |&(end, constant, on_input)| {
-            let terms = &self.terms[begin..end];
-            begin = end;
-            let sum = terms.iter().fold(0.0, |sum, &(place, coefficient)| sum + coefficient * y[place]);
-            on_input.iter().zip(input).fold(sum + constant, |sum, (coefficient, input)| sum + coefficient * input)
-        })
-    }
-}
-
-/// A speed that changes: where it stands, the body that leads, its way per way of that one, and what moves with both.
-struct Moving {
-    place: usize,
-    leader: usize,
-    ratio: f64,
-    mass: f64,
-}
-
-/// The equations of one mode under one stretch of the inputs: ẏ = f(τ, y), τ counted from the beginning of the stretch.
-pub(super) struct Field<'a> {
-    model: &'a Model,
-    mode: Mode,
-    equations: Equations,
-    /// Rates of the quantities that move, by the linear equations, and where these stand.
-    rates: Rows,
-    places: Vec<usize>,
-    /// The conditions, by the linear equations.
-    guards: Rows,
-    /// Inertia that moves with each body, per unit of its leader's way.
-    mass: [f64; BODIES],
-    /// Bodies that are not held.
-    moving: Vec<Moving>,
-    pub(super) stretch: &'a Stretch,
-    evaluations: Cell<u64>,
-}
-
-impl<'a> Field<'a> {
-    pub(super) fn new(model: &'a Model, mode: &Mode, stretch: &'a Stretch) -> Self {
-        let mechanism = &*model.mechanism;
-        let equations = mechanism.equations(*mode);
-        let (mut mass, mut rates, mut places) = ([1.0; BODIES], Rows::default(), Vec::with_capacity(model.size));
-        let mut add = |place: usize, rate: &Form| {
-            rates.push(model, rate);
-            places.push(place);
-        };
-        for (body, mass) in mass.iter_mut().enumerate().take(mechanism.bodies.len()) {
-            *mass = mechanism.mass(mechanism.leader(body), &equations.inertia);
-            if mode.motion[body] != Motion::Stuck {
-                add(model.speed(body), &equations.acceleration[body]);
-            }
-            let mut way = model.layout.rate(mechanism, body);
-            for (speed, motion) in way.speed.iter_mut().zip(mode.motion) {
-                if motion == Motion::Stuck {
-                    *speed = 0.0;
-                }
-            }
-            add(model.coordinate(body), &way);
-        }
-        for (place, rate) in model.current.iter().zip(&equations.current_rate) {
-            place.iter().for_each(|&place| add(place, rate));
-        }
-        let mut guards = Rows::default();
-        equations.guards.iter().for_each(|guard| guards.push(model, &guard.form));
-        let moves = |&body: &usize| mode.motion[body] != Motion::Stuck;
-        let moving = (0..mechanism.bodies.len()).filter(moves).map(|body| {
-            let (leader, ratio) = mechanism.bodies[body].leader;
-            Moving { place: model.speed(body), leader, ratio, mass: mass[body] }
-        });
-        let (moving, evaluations) = (moving.collect(), Cell::new(0));
-        Self { model, mode: *mode, equations, rates, places, guards, mass, moving, stretch, evaluations }
-    }
-
-    pub(super) fn evaluations(&self) -> u64 {
-        self.evaluations.get()
-    }
-
-    /// The inputs at τ.
-    pub(super) fn input(&self, tau: f64) -> [f64; DRIVES] {
-        self.stretch.input(tau)
-    }
-
-    /// The guards that are watched.
-    pub(super) fn watches(&self) -> Vec<Cause> {
-        self.equations.guards.iter().map(|guard| guard.cause).collect()
-    }
-
-    /// The size of the parts of a guard's value, which bounds the effect of an error of a part.
-    pub(super) fn size(&self, index: usize, tau: f64, y: &[f64]) -> f64 {
-        let form = &self.equations.guards[index].form;
-        form.noise(&self.model.layout, &self.model.inner(y), &self.input(tau)) / ROUNDING
-    }
-
-    /// The values that must not become negative, in the order of [`Field::watches`].
-    pub(super) fn guards(&self, tau: f64, y: &[f64]) -> [f64; MOST_GUARDS] {
-        let model = self.model;
-        let mechanism = &*model.mechanism;
-        let input = self.input(tau);
-        let mut values = [0.0; MOST_GUARDS];
-        values.iter_mut().zip(self.guards.values(y, &input)).for_each(|(value, of)| *value = of);
-        if !model.adds {
-            return values;
-        }
-        let own = |cause: &Cause| !matches!(cause, Cause::Stop(_) | Cause::Leave(_));
-        if !self.equations.guards.iter().any(|guard| own(&guard.cause)) {
-            return values;
-        }
-        let added = model.added(&self.mode, y);
-        for (value, guard) in values.iter_mut().zip(&self.equations.guards) {
-            *value += match guard.cause {
-                // a(x) F_b − (load + what the belt adds − what bent bristles hold)
-                Cause::BreakForward(body) => {
-                    let load = added.load[body] - model.bristle_force(body, y);
-                    model.breakaway(body, true, y) - mechanism.friction(body).forward.breakaway - load
-                }
-                Cause::BreakBackward(body) => {
-                    let load = added.load[body] - model.bristle_force(body, y);
-                    model.breakaway(body, false, y) - mechanism.friction(body).backward.breakaway + load
-                }
-                Cause::GearTorque(drive) if !mechanism.drives[drive].has_rotor() => {
-                    let part = &mechanism.drives[drive];
-                    let sign = if self.mode.drive[drive].torque_positive { 1.0 } else { -1.0 };
-                    let change = match self.mode.motion[part.pulley] {
-                        Motion::Stuck => 0.0,
-                        _ => {
-                            let leader = mechanism.leader(part.pulley);
-                            let added = added.load[leader] - added.friction[leader];
-                            mechanism.ratio(part.pulley) * added / self.mass[part.pulley]
-                        }
-                    };
-                    -sign * part.motor.rotor_inertia * part.motor.gear_ratio * change
-                }
-                // A tension that follows the bodies.
-                Cause::Switch(Switch::Span(spring, slack)) => {
-                    let own = model.following.iter().find(|following| following.spring == spring);
-                    let beyond = own.map_or(0.0, |own| model.beyond(own, y));
-                    if slack { beyond } else { -beyond }
-                }
-                // Neither laws nor spans that follow bear on these.
-                Cause::Stop(_) | Cause::GearTorque(_) | Cause::Switch(_) | Cause::Leave(_) => 0.0,
-            };
-        }
-        values
-    }
-}
-
-impl FirstOrderSystem for Field<'_> {
-    fn derivative(&self, tau: f64, y: &[f64], rate: &mut [f64]) {
-        self.evaluations.set(self.evaluations.get() + 1);
-        let model = self.model;
-        let input = self.input(tau);
-        rate.fill(0.0);
-        self.places.iter().zip(self.rates.values(y, &input)).for_each(|(place, value)| rate[*place] = value);
-        if model.adds {
-            let added = model.added(&self.mode, y);
-            for &Moving { place, leader, ratio, mass } in &self.moving {
-                // J φ̈ = what is linear + what the belt adds − what the law adds
-                let change = (added.load[leader] - added.friction[leader]) / mass;
-                rate[place] += ratio * change;
-            }
-            for (place, bristle) in model.bristle.iter().zip(added.bristle) {
-                if let Some(place) = place {
-                    rate[*place] = bristle;
-                }
-            }
-        }
-        if !rate.iter().sum::<f64>().is_finite() {
-            // A trial step that leads nowhere: what is no number fails every test of the error, so the step is refused
-            // and a shorter one tried.
-            rate.fill(f64::NAN);
-        }
     }
 }

@@ -1,24 +1,21 @@
 //! A run of the general solver: a machine, and a recorder of its rows.
 
-use super::model::{Field, Vector};
+use super::model::Vector;
 use super::shown::Shown;
 use super::stretch::Stretch;
-use super::{Core, Witness};
-use crate::mechanism::{Layout, Mechanism, State};
-use crate::signal::Signal;
+use super::{Core, Way, Witness};
+use crate::mechanism::{DRIVES, Layout, Mechanism, State};
 use crate::solve::inputs::Pieces;
 use crate::solve::machine::Engine;
 use crate::solve::observe::Output;
 use crate::solve::record::{Recorder, STATE};
 use crate::solve::run::{Running, Start};
-use crate::solve::{Ending, Flow, Grid, Outcome};
+use crate::solve::{Detail, Ending, Flow, Grid, Outcome};
 
 /// A run under way.
 pub(in crate::solve) struct Run<'a> {
     core: Core,
     rows: Rows<'a>,
-    /// Whether an input has been taken up.
-    has_input: bool,
 }
 
 /// Where the rows go, and what is shown.
@@ -37,17 +34,12 @@ impl<'a> Run<'a> {
         output: Output<'a>,
     ) -> Self {
         let grid = Grid::new(start.every, start.until);
-        let core = Core::new(mechanism, Layout::new(mechanism), &start.state, (tolerance, fastest, grid.end()));
+        let (layout, steps) = (Layout::new(mechanism), (grid.interval(), grid.end()));
+        let core = Core::new(mechanism, layout, &start.state, (tolerance, fastest), steps);
         let layout = &core.model.layout;
         let input = |drive| layout.states + drive;
         let recorder = Recorder::new(&core.model.mechanism, layout, (STATE, &input), grid, output);
-        Self { core, rows: Rows { grid, recorder, shown: None }, has_input: false }
-    }
-
-    fn take_up(&mut self, stretch: Stretch) {
-        let continues = self.has_input && stretch.continues(&self.core.stretch);
-        self.has_input = true;
-        self.core.take_up(stretch, continues);
+        Self { core, rows: Rows { grid, recorder, shown: None } }
     }
 
     /// Notices that the receiver wants no more.
@@ -60,12 +52,7 @@ impl<'a> Run<'a> {
 
 impl Running for Run<'_> {
     fn set_input(&mut self, pieces: &Pieces) {
-        self.take_up(Stretch::of(*pieces, self.rows.grid.end()));
-    }
-
-    fn set_signals(&mut self, signals: &[Signal], time: f64) -> f64 {
-        self.take_up(Stretch::new(signals, time, self.rows.grid.end()));
-        self.core.stretch.end
+        self.core.take_up(Stretch::of(*pieces, self.rows.grid.end()));
     }
 
     fn advance(&mut self, until: f64) -> bool {
@@ -93,16 +80,13 @@ impl Running for Run<'_> {
         }
         if self.core.trouble.is_none() {
             let core = &self.core;
-            let field = Field::new(&core.model, &core.mode, &core.stretch);
-            let (tau, y) = (core.tau, core.y);
-            self.rows.put_out(core, &field, tau, &y);
+            self.rows.put_out(core, &core.input(), &core.y);
             self.heed();
         }
         self.rows.end_shown(&self.core);
         self.rows.recorder.finish();
         let core = &mut self.core;
         core.cost.samples = self.rows.recorder.rows;
-        core.cost.modes = core.modes.len() as u64;
         let ending = match (core.trouble, self.rows.recorder.flow) {
             (Some(trouble), _) => trouble,
             (None, Flow::Stop) => Ending::Interrupted { time: core.time() },
@@ -113,40 +97,42 @@ impl Running for Run<'_> {
 }
 
 impl Rows<'_> {
-    /// Puts out the row that is at `tau`.
-    fn put_out(&mut self, core: &Core, field: &Field, tau: f64, y: &Vector) {
+    /// Puts out a row.
+    fn put_out(&mut self, core: &Core, input: &[f64; DRIVES], y: &Vector) {
         let model = &core.model;
         self.recorder.segment(core.taken, &core.coordinates, &core.mode);
         let extra = model.adds.then(|| model.extra(&core.mode, y));
-        self.recorder.push_state(&model.inner(y), &field.input(tau), extra);
+        self.recorder.push_state(&model.inner(y), input, extra);
     }
 }
 
 impl Witness for Rows<'_> {
-    fn see(
-        &mut self,
-        core: &mut Core,
-        field: &Field,
-        (from, until, to): (f64, f64, f64),
-        begin: &Vector,
-        at: &dyn Fn(f64) -> Vector,
-    ) {
-        self.show(core, field, (from, until), begin, at);
+    fn see(&mut self, core: &mut Core, way: &Way) {
+        self.show(core, way);
         // A row on an edge or an event shows what comes after it.
-        let stretch = field.stretch;
+        let stretch = way.stretch;
         let near = (8.0 * f64::EPSILON * stretch.end).min(1e-9 * self.grid.interval());
-        let until = if until >= stretch.length() { stretch.length() - near } else { until };
-        loop {
-            let row = self.recorder.next_row();
-            let tau = self.grid.time(row) - stretch.begin;
-            if row > self.grid.intervals() || tau >= until {
+        let grid = self.grid;
+        let is_within = |row: u64| {
+            let tau = grid.time(row) - stretch.begin;
+            (row <= grid.intervals() && tau < way.until - near).then_some(tau)
+        };
+        while let Some(tau) = is_within(self.recorder.next_row()) {
+            let y = if tau <= way.from + near { *way.begin } else { (way.dense)(tau) };
+            self.put_out(core, &stretch.input(tau), &y);
+            if way.rests {
+                // One row, again and again.
+                let row = self.recorder.next_row();
+                let more = (row..).take_while(|row| is_within(*row).is_some()).count() as u64;
+                match self.recorder.detail {
+                    Detail::None => self.recorder.skip(more),
+                    Detail::Full | Detail::Lean => _ = self.recorder.repeat(more),
+                }
                 break;
             }
-            let y = if tau <= from { *begin } else { at(tau) };
-            self.put_out(core, field, tau, &y);
         }
         if self.recorder.flow == Flow::Stop && core.trouble.is_none() {
-            core.trouble = Some(Ending::Interrupted { time: stretch.begin + to });
+            core.trouble = Some(Ending::Interrupted { time: stretch.begin + way.to });
         }
     }
 

@@ -1,12 +1,31 @@
-//! The view of an observer on a run: each step of the formula as the polynomial that it is.
+//! The view of an observer on a run: each step as a polynomial.
 
-use super::Core;
-use super::fall::{NODES, through};
-use super::model::{Field, Model, Vector};
+use super::model::{Model, Vector};
+use super::radau::inverse;
 use super::run::Rows;
+use super::{Core, Way};
 use crate::mechanism::{DRIVES, Mechanism, Mode, Shown as Quantity};
 use crate::solve::machine::Engine;
-use crate::solve::observe::{Curve, Gap, QUANTITIES, Reading, Readout};
+use crate::solve::observe::{Curve, Gap, QUANTITIES, Reading, Readout, TERMS};
+
+/// Places within a step at which it is shown, its ends among them: as many as a curve has terms.
+const PLACES: usize = TERMS;
+
+/// From values at k/7 to the coefficients of the polynomial through them.
+const COEFFICIENTS: [[f64; PLACES]; PLACES] = {
+    let mut places = [0.0; PLACES];
+    let mut k = 0;
+    while k < PLACES {
+        places[k] = k as f64 / (PLACES - 1) as f64;
+        k += 1;
+    }
+    inverse(places)
+};
+
+/// The polynomial through values at k/7.
+fn through(values: &[f64; PLACES]) -> [f64; PLACES] {
+    COEFFICIENTS.map(|row| row.iter().zip(values).fold(0.0, |sum, (c, v)| sum + c * v))
+}
 
 /// The readings in a mode, for the mode that was entered last.
 pub(super) struct Shown {
@@ -25,32 +44,26 @@ impl Shown {
 }
 
 impl Rows<'_> {
-    /// Shows the step from `from` to `until`.
-    pub(super) fn show(
-        &mut self,
-        core: &Core,
-        field: &Field,
-        (from, until): (f64, f64),
-        begin: &Vector,
-        at: &dyn Fn(f64) -> Vector,
-    ) {
+    /// Shows a step.
+    pub(super) fn show(&mut self, core: &Core, way: &Way) {
         if self.recorder.observer.is_none() {
             return;
         }
         let (model, mode) = (&*core.model, &core.mode);
         let readout = Shown::of(&mut self.shown, &model.mechanism, mode);
-        let mut nodes = [[0.0; QUANTITIES]; NODES];
+        let (from, until) = (way.from, way.until);
+        let mut nodes = [[0.0; QUANTITIES]; PLACES];
         for (node, values) in nodes.iter_mut().enumerate() {
-            let tau = from + (until - from) * node as f64 / (NODES - 1) as f64;
-            let y = if node == 0 { *begin } else { at(tau) };
-            *values = read(readout, model, mode, &y, &field.input(tau));
+            let tau = from + (until - from) * node as f64 / (PLACES - 1) as f64;
+            let y = if node == 0 { *way.begin } else { (way.dense)(tau) };
+            *values = read(readout, model, mode, &y, &way.stretch.input(tau));
         }
-        let (begin, length) = (field.stretch.begin + from, until - from);
+        let (begin, length) = (way.stretch.begin + from, until - from);
         let bow = [f64::INFINITY; QUANTITIES];
-        let gap = Gap { begin, length, from: &nodes[0], to: &nodes[NODES - 1], bow: &bow, mode };
+        let gap = Gap { begin, length, from: &nodes[0], to: &nodes[PLACES - 1], bow: &bow, mode };
         let Some(observer) = &mut self.recorder.observer else { return };
         if observer.pass(&gap) && length > 0.0 {
-            let mut terms = [[0.0; QUANTITIES]; NODES];
+            let mut terms = [[0.0; QUANTITIES]; PLACES];
             for q in 0..QUANTITIES {
                 for (term, value) in terms.iter_mut().zip(through(&nodes.map(|node| node[q]))) {
                     term[q] = value;

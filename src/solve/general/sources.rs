@@ -1,0 +1,239 @@
+//! The forces of a mode that are not linear: what friction laws and springs that follow the bodies add.
+//!
+//! Bristles are told at the nodes of a step along with their force. With a_i = σ₀ |v_i|/g(v_i) and Radau's matrix R,
+//! ż = v − a z is a linear system for the deflections at the nodes, whatever a is:
+//!
+//! ```text
+//! z_i + h Σ_j R_ij a_j z_j = z₀ + h Σ_j R_ij v_j
+//! ```
+
+use super::model::{Curved, Model, Sliding, Vector};
+use super::radau::{Lane, NODES, RADAU};
+use crate::friction::{Law, Motion};
+
+/// A force, with the arguments that it depends on by their numbers.
+pub(super) enum Source {
+    /// Of the law of a body, by the number among those with a law of their own.
+    Friction {
+        curved: usize,
+        motion: Motion,
+        speed: usize,
+        /// Its coordinate, where friction changes along the travel.
+        way: Option<usize>,
+    },
+    /// Of a spring, by the number among those that follow.
+    Spring {
+        following: usize,
+        length: usize,
+        /// Bodies that it follows, with their coordinates.
+        ways: Vec<(usize, usize)>,
+    },
+}
+
+/// The deflections of bristles at the nodes.
+pub(super) type Bristles = [Lane; crate::mechanism::BODIES];
+
+/// How a force at each node changes with an argument at each node.
+pub(super) type Slopes = [Lane; NODES];
+
+impl Source {
+    /// The force at the beginning of a step.
+    pub(super) fn at_begin(&self, model: &Model, mode: &crate::mechanism::Mode, y: &Vector) -> f64 {
+        match self {
+            Source::Friction { curved, .. } => {
+                let curved = &model.curved[*curved];
+                model.beyond_straight(curved, mode.motion[curved.body], y)
+            }
+            Source::Spring { following, .. } => model.beyond(&model.following[*following], y),
+        }
+    }
+
+    /// The force at the nodes of a step of length `h` from `y` on; deflections of its bristles go to `bristles`.
+    #[inline(always)]
+    pub(super) fn at_nodes(
+        &self,
+        model: &Model,
+        h: f64,
+        y: &Vector,
+        arguments: &[Lane],
+        bristles: &mut Bristles,
+    ) -> Lane {
+        match self {
+            &Source::Friction { curved, motion, speed, way } => {
+                let curved = &model.curved[curved];
+                let law = |i: usize| {
+                    let factor = model.factor_at(curved.body, || way.map_or(0.0, |way| arguments[way][i]));
+                    curved.sliding(motion, arguments[speed][i], factor, false)
+                };
+                let mut force = [0.0; NODES];
+                match (curved.friction.law, curved.bristle) {
+                    (Law::LuGre { stiffness, damping, .. }, Some(place)) => {
+                        let laws: [Sliding; NODES] = std::array::from_fn(law);
+                        let v = &arguments[speed];
+                        let bent = Bent::new(h, &laws).deflections(h, y[place], v);
+                        bristles[curved.body] = bent;
+                        for (i, force) in force.iter_mut().enumerate() {
+                            // σ₀ z + σ₁ ż
+                            let rate = v[i] - laws[i].slip * bent[i];
+                            *force = laws[i].beyond + stiffness * bent[i] + damping * rate;
+                        }
+                    }
+                    _ => force.iter_mut().enumerate().for_each(|(i, force)| *force = law(i).beyond),
+                }
+                force
+            }
+            Source::Spring { following, length, ways } => {
+                let spring = model.following[*following].spring;
+                std::array::from_fn(|i| {
+                    let way =
+                        |body: usize| ways.iter().find(|(b, _)| *b == body).map_or(0.0, |(_, a)| arguments[*a][i]);
+                    model.stiffer(spring, way) * arguments[*length][i]
+                })
+            }
+        }
+    }
+
+    /// How it changes with each argument.
+    pub(super) fn slopes(
+        &self,
+        model: &Model,
+        h: f64,
+        arguments: &[Lane],
+        bristles: &Bristles,
+        each: &mut dyn FnMut(usize, &Slopes),
+    ) {
+        let diagonal = |of: &dyn Fn(usize) -> f64| -> Slopes {
+            std::array::from_fn(|i| std::array::from_fn(|j| if i == j { of(i) } else { 0.0 }))
+        };
+        match self {
+            &Source::Friction { curved, motion, speed, way } => {
+                let curved = &model.curved[curved];
+                let coordinate = |i: usize| way.map_or(0.0, |way| arguments[way][i]);
+                let factor = |i: usize| model.factor_at(curved.body, || coordinate(i));
+                let laws: [Sliding; NODES] =
+                    std::array::from_fn(|i| curved.sliding(motion, arguments[speed][i], factor(i), true));
+                // The slope of the factor: straight lines.
+                const STEP: f64 = 1e-9;
+                let steep = |i: usize| {
+                    let there = model.factor_at(curved.body, || coordinate(i) + STEP);
+                    (there - factor(i)) / STEP
+                };
+                match curved.friction.law {
+                    Law::LuGre { .. } => {
+                        let bent = &bristles[curved.body];
+                        let matrix = Bent::new(h, &laws);
+                        each(speed, &matrix.slopes(h, curved, &laws, |q| 1.0 - laws[q].slip_slope * bent[q], 1.0));
+                        if let Some(way) = way {
+                            let by_way = |q: usize| laws[q].slip * steep(q) / factor(q) * bent[q];
+                            each(way, &matrix.slopes(h, curved, &laws, by_way, 0.0));
+                        }
+                    }
+                    Law::Coulomb | Law::Stribeck { .. } | Law::Smooth { .. } => {
+                        each(speed, &diagonal(&|i| laws[i].slope));
+                        if let Some(way) = way {
+                            each(way, &diagonal(&|i| laws[i].by_factor * steep(i)));
+                        }
+                    }
+                }
+            }
+            Source::Spring { following, length, ways } => {
+                let part = &model.following[*following];
+                let way = |body: usize, i: usize| {
+                    ways.iter().find(|(b, _)| *b == body).map_or(0.0, |(_, argument)| arguments[*argument][i])
+                };
+                let stiffer = |i: usize| model.stiffer(part.spring, |body| way(body, i));
+                each(*length, &diagonal(&stiffer));
+                let Some(follows) = &model.mechanism.springs[part.spring].follows else { return };
+                let own = model.mechanism.springs[part.spring].stiffness;
+                for &(body, argument) in ways {
+                    // k = E A/l, dk/dq = −k a/l = −k² a/(E A)
+                    let arm: f64 = follows.arms.iter().filter(|(b, _)| *b == body).map(|(_, arm)| arm).sum();
+                    let steep = |i: usize| {
+                        let k = stiffer(i) + own;
+                        -k * k * arm / follows.rigidity * arguments[*length][i]
+                    };
+                    each(argument, &diagonal(&steep));
+                }
+            }
+        }
+    }
+}
+
+/// The matrix of the deflections at the nodes, I + h R diag(a), parted in two triangles.
+struct Bent {
+    parts: Slopes,
+    order: [usize; NODES],
+}
+
+impl Bent {
+    fn new(h: f64, laws: &[Sliding; NODES]) -> Self {
+        let mut parts: Slopes = std::array::from_fn(|i| {
+            std::array::from_fn(|j| h * RADAU[i][j] * laws[j].slip + if i == j { 1.0 } else { 0.0 })
+        });
+        let order = decompose(&mut parts);
+        Self { parts, order }
+    }
+
+    fn solve(&self, right: &Lane) -> Lane {
+        let mut x: Lane = self.order.map(|row| right[row]);
+        for i in 1..NODES {
+            for j in 0..i {
+                x[i] -= self.parts[i][j] * x[j];
+            }
+        }
+        for i in (0..NODES).rev() {
+            for j in i + 1..NODES {
+                x[i] -= self.parts[i][j] * x[j];
+            }
+            x[i] /= self.parts[i][i];
+        }
+        x
+    }
+
+    fn deflections(&self, h: f64, begin: f64, v: &Lane) -> Lane {
+        let right = RADAU.map(|row| begin + h * row.iter().zip(v).fold(0.0, |sum, (weight, v)| sum + weight * v));
+        self.solve(&right)
+    }
+
+    /// Slopes of the force where the rate of the bristles at node q changes by `by`(q) beside what their deflection
+    /// makes, and `direct` says whether b v changes, too.
+    fn slopes(
+        &self,
+        h: f64,
+        curved: &Curved,
+        laws: &[Sliding; NODES],
+        by: impl Fn(usize) -> f64,
+        direct: f64,
+    ) -> Slopes {
+        let Law::LuGre { stiffness, damping, .. } = curved.friction.law else { return [[0.0; NODES]; NODES] };
+        let mut slopes = [[0.0; NODES]; NODES];
+        for q in 0..NODES {
+            let by = by(q);
+            let bent = self.solve(&std::array::from_fn(|i| h * RADAU[i][q] * by));
+            for (i, slopes) in slopes.iter_mut().enumerate() {
+                let own = if i == q { by } else { 0.0 };
+                let rate = own - laws[i].slip * bent[i];
+                slopes[q] = stiffness * bent[i] + damping * rate + if i == q { direct * laws[i].slope } else { 0.0 };
+            }
+        }
+        slopes
+    }
+}
+
+/// Parts a matrix in two triangles with exchange of rows; what was where.
+fn decompose(matrix: &mut Slopes) -> [usize; NODES] {
+    let mut order: [usize; NODES] = std::array::from_fn(|i| i);
+    for k in 0..NODES {
+        let best = (k..NODES).fold(k, |best, i| if matrix[i][k].abs() > matrix[best][k].abs() { i } else { best });
+        matrix.swap(k, best);
+        order.swap(k, best);
+        for i in k + 1..NODES {
+            let factor = matrix[i][k] / matrix[k][k];
+            matrix[i][k] = factor;
+            for j in k + 1..NODES {
+                matrix[i][j] -= factor * matrix[k][j];
+            }
+        }
+    }
+    order
+}

@@ -1,0 +1,327 @@
+//! From step to step: lengths by the error, guards along the way, events.
+
+use super::fall;
+use super::field::Field;
+use super::linear::Set;
+use super::model::Vector;
+use super::radau::{POINTS, REACH, TERMS};
+use super::step::{Begin, Guess, Room, SOURCES};
+use super::stretch::Stretch;
+use super::{Core, Hit, STEPS_BETWEEN_QUESTIONS, Way, Witness};
+use crate::mechanism::Cause;
+use crate::solve::Ending;
+use std::cell::RefCell;
+use std::sync::Arc;
+
+/// The error of the cubic that is allowed, as a multiple of what the quartic may be off by.
+const CUBIC: f64 = 10.0;
+
+/// Steps are so much shorter than their error asks for, and at most so much shorter or longer at once.
+const SAFETY: f64 = 0.85;
+const SHRINK: f64 = 0.1;
+const GROW: f64 = 4.0;
+
+/// Lengths of steps of one mode that are kept.
+const KEPT: usize = 48;
+
+/// The guard that falls first in a step: where, as a share of it, and which; and what is forgiven it.
+struct Fall {
+    share: f64,
+    index: usize,
+    slack: f64,
+}
+
+/// A length that a step may have, and where it ends; whether it is one of those that are met again.
+struct Length {
+    h: f64,
+    to: f64,
+    regular: bool,
+}
+
+impl Core {
+    /// Advances to the end of the stretch, event by event.
+    pub(super) fn reach(&mut self, witness: &mut dyn Witness) {
+        while self.tau < self.stretch.length() && self.trouble.is_none() {
+            let Some(hit) = self.integrate(witness) else { continue };
+            (self.y, self.tau) = (hit.y, hit.tau);
+            self.change(hit.cause);
+            self.resolve();
+        }
+    }
+
+    /// Goes to the end of the stretch, or to the first guard that falls.
+    fn integrate(&mut self, witness: &mut dyn Witness) -> Option<Hit> {
+        let (field, stretch) = (self.field(), self.stretch);
+        let mut room = self.room.take().unwrap_or_else(|| Box::new(Room::new()));
+        let evaluations = room.evaluations;
+        // The forces begin anew with each mode.
+        let mut guess = Guess::Constant;
+        let mut forces = [0.0; SOURCES];
+        field.forces(&self.y, &mut forces);
+        room.forces.iter_mut().zip(forces).for_each(|(force, value)| force[0] = value);
+        let mut hit = None;
+        while hit.is_none() && self.trouble.is_none() {
+            if stretch.length() - self.tau <= 64.0 * f64::EPSILON * stretch.length() {
+                // What is left is no step, but rounding.
+                self.tau = stretch.length();
+                break;
+            }
+            hit = self.step(&field, &stretch, &mut room, &mut guess, witness);
+        }
+        self.cost.evaluations += room.evaluations - evaluations;
+        self.room = Some(room);
+        hit
+    }
+
+    /// Takes one step; the guard that fell in it, if one did.
+    fn step(
+        &mut self,
+        field: &Field,
+        stretch: &Stretch,
+        room: &mut Room,
+        guess: &mut Guess,
+        witness: &mut dyn Witness,
+    ) -> Option<Hit> {
+        let (begin, from) = (self.y, self.tau);
+        let allowed = self.allowed(field);
+        loop {
+            let length = self.length(field, stretch);
+            let (set, whole) = self.set(field, &length);
+            room.guess(field.sources.len(), guess.of(set.h));
+            let input = stretch.inputs(from, set.h);
+            let start = Begin { y: &begin, input: &input, degree: stretch.degree, allowed: &allowed };
+            let error = room.solve(field, self.present as u64, &set, &start, whole).map(|error| error / CUBIC);
+            let end = error.map(|_| room.end(field, &set, &start));
+            let least = set.h <= 256.0 * f64::EPSILON * (stretch.begin + from).max(self.moment);
+            match (error, end) {
+                (Some(error), Some(end)) if (error <= 1.0 || least) && end.iter().sum::<f64>().is_finite() => {
+                    *guess = Guess::After(set.h);
+                    // The error is of fifth order. A step that had to be short says little of much longer ones.
+                    self.step = (SAFETY * set.h * error.powf(-0.2)).min(self.step.max(GROW * set.h));
+                    return self.take(room, (field, stretch, &set), &start, (from, length.to), end, witness);
+                }
+                (Some(error), Some(_)) if error > 1.0 && !least => {
+                    self.step = set.h * (SAFETY * error.powf(-0.2)).clamp(SHRINK, 0.9);
+                    *guess = Guess::Within(set.h);
+                }
+                _ if least => {
+                    // Not even the smallest step will do: this is no motion any more.
+                    self.trouble = Some(Ending::Diverged { time: stretch.begin + from });
+                    return None;
+                }
+                _ => {
+                    self.step = 0.25 * set.h;
+                    *guess = Guess::Constant;
+                }
+            }
+        }
+    }
+
+    /// By how much each argument may be off in a step.
+    fn allowed(&self, field: &Field) -> Vec<f64> {
+        let of = |&place: &usize| self.absolute[place] + self.relative * self.y[place].abs();
+        field.measured.iter().map(of).collect()
+    }
+
+    /// The length of the next step: halves, quarters, doubles of the interval that end on multiples of themselves, or
+    /// what is left to such a multiple or to the end of the stretch.
+    fn length(&self, field: &Field, stretch: &Stretch) -> Length {
+        let left = stretch.length() - self.tau;
+        let most = self.step.min(REACH / field.linear.norm);
+        let regular = self.interval * f64::exp2((most / self.interval).log2().floor().clamp(-1000.0, 1000.0));
+        let time = stretch.begin + self.tau;
+        let near = 8.0 * f64::EPSILON * time + 1e-9 * regular;
+        let mut to = ((time + near) / regular).floor() * regular + regular;
+        let mut h = to - time;
+        if h < 0.25 * regular && h + regular <= most {
+            (to, h) = (to + regular, h + regular);
+        }
+        if !(h < left - near) {
+            let is_whole = (left - regular).abs() <= near.min(1e-12 * regular + 8.0 * f64::EPSILON * time);
+            return Length { h: if is_whole { regular } else { left }, to: stretch.length(), regular: is_whole };
+        }
+        // What the sum of times is off by.
+        let is_whole = (h - regular).abs() <= 8.0 * f64::EPSILON * (time + h);
+        Length { h: if is_whole { regular } else { h }, to: to - stretch.begin, regular: is_whole }
+    }
+
+    /// What a step of this length makes of the mode, and whether it is worth its columns.
+    fn set(&mut self, field: &Field, length: &Length) -> (Arc<Set>, bool) {
+        let known = &mut self.known[self.present].sets;
+        let near = 8.0 * f64::EPSILON * (self.stretch.begin + self.tau).max(length.h);
+        let fits = |set: &Set| match length.regular {
+            true => set.h == length.h,
+            false => (set.h - length.h).abs() <= near.min(1e-9 * length.h),
+        };
+        if let Some((set, times)) = known.iter_mut().find(|(set, _)| fits(set)) {
+            *times += 1;
+            return (Arc::clone(set), *times > 2);
+        }
+        let set = Arc::new(Set::new(&field.linear, length.h));
+        self.cost.propagators += 1;
+        if known.len() == KEPT {
+            known.remove(0);
+        }
+        known.push((Arc::clone(&set), 1));
+        (set, false)
+    }
+
+    /// Takes a step that was solved, as far as no guard falls.
+    fn take(
+        &mut self,
+        room: &mut Room,
+        (field, stretch, set): (&Field, &Stretch, &Set),
+        start: &Begin,
+        (from, to): (f64, f64),
+        end: Vector,
+        witness: &mut dyn Witness,
+    ) -> Option<Hit> {
+        self.cost.steps += 1;
+        let time = stretch.begin + to;
+        if self.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS) {
+            self.trouble = self.pace.too_stiff(self.cost.steps, time, self.end);
+        }
+        let is_expanded = set.full(&field.linear, start.degree, false).is_none();
+        let mut dense = Dense { field, start, h: set.h, is_expanded };
+        let fall = self.first_fall(room, &mut dense, set);
+        let mut hit = fall.map(|fall| self.up_to(room, &mut dense, from, &fall));
+        if let Some(hit) = &mut hit {
+            hit.tau = hit.tau.min(to);
+        }
+        let until = hit.as_ref().map_or(to, |hit| hit.tau);
+        let rests = end == *start.y
+            && stretch.degree == 0
+            && field.rate(&stretch.input(from), start.y).iter().all(|rate| *rate == 0.0);
+        {
+            let inside = RefCell::new((&mut *room, dense));
+            let at = |tau: f64| {
+                let (room, dense) = &mut *inside.borrow_mut();
+                dense.at(room, (tau - from) / dense.h)
+            };
+            witness.see(self, &Way { stretch, from, until, to, begin: start.y, rests, dense: &at });
+        }
+        let asks = self.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS);
+        if (asks || self.trouble.is_some()) && !witness.ask() && self.trouble.is_none() {
+            self.trouble = Some(Ending::Interrupted { time });
+        }
+        (self.y, self.tau) = (end, to);
+        hit
+    }
+
+    /// The first guard to fall in a step.
+    fn first_fall(&mut self, room: &mut Room, dense: &mut Dense, set: &Set) -> Option<Fall> {
+        let (field, start) = (dense.field, dense.start);
+        let mut first: Option<Fall> = None;
+        let mut coefficients = [0.0; TERMS];
+        for (index, &cause) in field.watches.iter().enumerate() {
+            let shift = if field.shifted { field.shift(cause, start.y) } else { 0.0 };
+            let told = room.guard_at_points(field, set, start, index).map(|at_points| at_points.map(|g| g + shift));
+            let is_told = told.is_none();
+            let values: [f64; POINTS] = told.unwrap_or_else(|| {
+                dense.guard(room, index, shift, &mut coefficients);
+                Room::at_points(&coefficients, room.series.order)
+            });
+            if let Cause::GearTorque(drive) = cause {
+                self.torque[drive] = values.iter().fold(self.torque[drive], |most, value| most.max(value.abs()));
+                // What was told by nothing but rounding is told by the step.
+                self.torque_slack[drive] = self.relative * self.torque[drive];
+            }
+            let slack = match cause {
+                // What the laws' error may do is no stop, least of all where a body has just begun to slide.
+                Cause::Stop(body) => self.absolute[self.model.speed(body)],
+                Cause::GearTorque(drive) => self.torque_slack[drive],
+                cause => self.slack[cause.kind()],
+            };
+            let own = &mut self.slack[cause.kind()];
+            if matches!(cause, Cause::Switch(_)) && values[POINTS - 1] > 10.0 * *own {
+                // A part that has clearly left its edge is watched to the last bit again.
+                *own = 0.0;
+            }
+            if !fall::may_fall(&values.map(|value| value + slack)) {
+                continue;
+            }
+            self.cost.looks += 1;
+            if !is_told {
+                dense.guard(room, index, shift, &mut coefficients);
+            }
+            coefficients[0] = (coefficients[0] + slack).max(0.0);
+            if let Some(share) = fall::first_fall(&coefficients, room.series.order)
+                && first.as_ref().is_none_or(|earliest| share < earliest.share)
+            {
+                first = Some(Fall { share, index, slack });
+            }
+        }
+        first
+    }
+
+    /// The state at a fall: the step is taken again up to there, until it ends at the fall.
+    fn up_to(&mut self, room: &mut Room, dense: &mut Dense, from: f64, fall: &Fall) -> Hit {
+        let (field, cause) = (dense.field, dense.field.watches[fall.index]);
+        let begin = dense.start.y;
+        let shift = if field.shifted { field.shift(cause, begin) } else { 0.0 };
+        // A speed that has fallen through is looked for where it was zero.
+        let slack = if matches!(cause, Cause::Stop(_)) { 0.0 } else { fall.slack };
+        let mut coefficients = [0.0; TERMS];
+        let mut place = |room: &mut Room, dense: &mut Dense, share: f64| {
+            dense.guard(room, fall.index, shift + slack, &mut coefficients);
+            fall::zero_near(&coefficients, room.series.order, share)
+        };
+        let mut share = place(room, dense, fall.share);
+        let is_linear = |room: &Room| room.forces[..field.sources.len()].iter().flatten().all(|force| *force == 0.0);
+        for _ in 0..4 {
+            let h = share * dense.h;
+            if is_linear(room) || (share - 1.0).abs() < 1e-4 || h <= 64.0 * f64::EPSILON * from.max(self.moment) {
+                break;
+            }
+            let before = room.clone();
+            let set = Set::new(&field.linear, h);
+            let input = self.stretch.inputs(from, h);
+            let start = Begin { input: &input, ..*dense.start };
+            room.guess(field.sources.len(), Guess::Within(dense.h).of(h));
+            if room.solve(field, self.present as u64, &set, &start, false).is_none() {
+                // The longer step was good enough.
+                *room = before;
+                break;
+            }
+            room.expand(field, h, &start);
+            dense.h = h;
+            dense.is_expanded = true;
+            share = place(room, dense, 1.0);
+        }
+        let states = room.series.at(field.linear.size, share);
+        let y = room.with_bristles(field, begin, &states, share);
+        Hit { tau: from + share * dense.h, y, cause }
+    }
+}
+
+/// A step that was solved, at any place.
+struct Dense<'a> {
+    field: &'a Field,
+    start: &'a Begin<'a>,
+    h: f64,
+    /// Whether the room has its series.
+    is_expanded: bool,
+}
+
+impl Dense<'_> {
+    fn expand(&mut self, room: &mut Room) {
+        if !self.is_expanded {
+            room.expand(self.field, self.h, self.start);
+            self.is_expanded = true;
+        }
+    }
+
+    /// The state at the share `s`.
+    fn at(&mut self, room: &mut Room, s: f64) -> Vector {
+        self.expand(room);
+        let states = room.series.at(self.field.linear.size, s);
+        room.with_bristles(self.field, self.start.y, &states, s)
+    }
+
+    /// A guard along the step, by powers of its share.
+    fn guard(&mut self, room: &mut Room, index: usize, shift: f64, coefficients: &mut [f64; TERMS]) {
+        self.expand(room);
+        room.guard_along(self.field, self.start, index, coefficients);
+        coefficients[0] += shift;
+    }
+}
