@@ -13,6 +13,7 @@ mod controller;
 mod density;
 mod drawn;
 mod drift;
+pub mod experiment_design;
 mod findings;
 mod found;
 mod held_out;
