@@ -14,11 +14,12 @@ fn main() {
         let begin = Instant::now();
         let name = path.rsplit('/').next().unwrap_or(&path).trim_end_matches(".toml").to_string();
         let found = Case::read(&path).and_then(|case| tune(&case, &case.tune.clone().unwrap_or_default(), &|| false));
-        match found {
-            Ok(tuned) => println!("{}", row(&name, &tuned)),
+        match &found {
+            Ok(tuned) => println!("{}", row(&name, tuned)),
             Err(error) => println!("| {name} | – | | | | | {} |", error.what),
         }
-        eprintln!("{name}: {:.1} s", begin.elapsed().as_secs_f64());
+        let samples = found.as_ref().map_or(0, |tuned| tuned.samples);
+        eprintln!("{name}: {:.1} s, {:.1} million samples", begin.elapsed().as_secs_f64(), 1e-6 * samples as f64);
     }
 }
 

@@ -109,6 +109,30 @@ impl Default for Request {
     }
 }
 
+impl Request {
+    /// That its numbers can be.
+    fn checked(&self) -> Result<()> {
+        let sizes = [
+            ("duration", Some(self.duration)),
+            ("interval between samples", self.every),
+            ("greatest input", self.input),
+            ("greatest current", self.current),
+            ("travel", self.travel),
+        ];
+        for (name, value) in sizes.iter().filter_map(|(name, value)| value.map(|value| (name, value))) {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(Error::new(format!("a {name} of {value} cannot be")).allowed("above 0"));
+            }
+        }
+        for (name, value) in [("margin", self.margin), ("doubt", self.doubt)] {
+            if !(0.0..=0.9).contains(&value) {
+                return Err(Error::new(format!("a {name} of {value} cannot be")).allowed("0 to 0.9"));
+            }
+        }
+        Ok(())
+    }
+}
+
 /// A request with all that follows from the case.
 pub(super) struct Task<'a> {
     pub case: Case,
@@ -147,6 +171,7 @@ pub fn design(case: &Case, request: &Request, stop: Stop, watch: &mut dyn FnMut(
 
 impl<'a> Task<'a> {
     fn new(case: &Case, request: &Request, stop: Stop<'a>) -> Result<Self> {
+        request.checked()?;
         let every = request.every.unwrap_or_else(|| usual_interval(case));
         if request.duration < 10.0 * every || request.duration / every > MOST_ROWS {
             return Err(Error::new(format!(

@@ -5,7 +5,9 @@ use crate::case::Case;
 use crate::chance::uniform;
 use crate::error::{Error, Result};
 use crate::fit::problem::{Stop, parameters};
+use crate::fit::run::is_position;
 use crate::fit::{Ending, fit};
+use crate::log::Quantity;
 use crate::solve::Flow;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
@@ -39,9 +41,15 @@ pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, sto
         if stop() {
             break;
         }
+        // Somewhere within a step of a converter, so that rounding is another each time.
+        let mut initial = found.initial;
+        let off = uniform(&mut random) * step(&task);
+        initial.cart_position += off;
+        initial.drive_angle += off / case.stage.pulley_radius;
+        initial.idler_angle += off / case.stage.pulley_radius;
         let noise = task.seed.wrapping_add(1 + k as u64);
         let experiment = task
-            .experiment(&found.name, &found.shape.signal(), found.initial, noise)
+            .experiment(&found.name, &found.shape.signal(), initial, noise)
             .ok_or_else(|| Error::new("the designed experiment cannot be simulated"))?;
         let mut own = Case { experiments: vec![experiment], ..task.case.clone() };
         for free in &frees {
@@ -71,4 +79,11 @@ pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, sto
         }
     };
     Ok(frees.iter().zip(seen).map(told).filter(|one| one.fits > 0).collect())
+}
+
+/// The coarsest step of a position that is recorded, m at the cart.
+fn step(task: &Task) -> f64 {
+    let arm = |quantity: Quantity| if quantity == Quantity::CartPosition { 1.0 } else { task.case.stage.pulley_radius };
+    let positions = task.measured.iter().filter(|channel| is_position(channel.quantity));
+    positions.map(|channel| arm(channel.quantity) * channel.step.unwrap_or(0.0)).fold(0.0, f64::max)
 }
