@@ -285,6 +285,9 @@ pub struct Tune {
     /// Let each parameter of the axis be off by this share, whatever the file says: 20%
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub spread: Option<f64>,
+    /// Take the machines from the draws of `taut fit --posterior`, whatever the file says of how far they are off
+    #[arg(long, value_name = "FILE", conflicts_with = "spread")]
+    pub draws: Option<PathBuf>,
     #[command(flatten)]
     pub common: Common,
 }

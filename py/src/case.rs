@@ -291,11 +291,13 @@ impl Case {
         spread: Option<f64>,
         corners: bool,
         judged: bool,
+        draws: Option<PathBuf>,
     ) -> PyResult<(Py<PyAny>, Py<Case>)> {
         let case = self.axis(py)?;
         let mut tuning = case.tune.clone().unwrap_or_default();
         tuning.spread = spread.or(tuning.spread);
         tuning.corners = corners;
+        tuning.draws = draws;
         let interrupt = Interrupt::listen();
         let found = unlocked(py, || match judged {
             true => evaluate(case, &tuning),

@@ -12,6 +12,7 @@ mod margins;
 mod moves;
 mod objective;
 mod placement;
+mod reference;
 mod rules;
 mod search;
 pub mod trouble;
@@ -25,6 +26,7 @@ pub use hunting::{Hunt, hunting};
 pub use margins::{Answer, Margins, Open, Plant, loops};
 pub use objective::{AtWorst, BALANCES, Balance, MoveFigures, look, objective};
 pub use placement::{first, place};
+pub use reference::evolved;
 pub use search::{Found, minimise, minimise_below};
 pub use verdict::{Forced, Judgement, Limit, MoveVerdict, Verdict};
 

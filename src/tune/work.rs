@@ -84,9 +84,17 @@ pub(super) struct Finalist {
     /// The design that it was made from, the number of its filters, and the powers that lead to it.
     start: Design,
     own: usize,
-    powers: Vec<f64>,
+    pub powers: Vec<f64>,
     /// ln of what steps do.
     value: f64,
+}
+
+impl Finalist {
+    /// A design as it is, with `own` filters that are not searched.
+    pub fn at(design: &Design, own: usize) -> Self {
+        let powers = vec![0.0; searched(design, own)];
+        Self { design: design.clone(), start: design.clone(), own, powers, value: f64::INFINITY }
+    }
 }
 
 /// A design that was run.
@@ -256,14 +264,8 @@ impl<'a> Work<'a> {
         found.sort_by(|a, b| a.value.total_cmp(&b.value));
         found.truncate(FINALISTS);
         if is_given_good {
-            let count = searched(given, given.filters.len());
-            found.push(Finalist {
-                design: given.clone(),
-                start: given.clone(),
-                own: given.filters.len(),
-                powers: vec![0.0; count],
-                value: self.on_set(given).1.ln(),
-            });
+            let value = self.on_set(given).1.ln();
+            found.push(Finalist { value, ..Finalist::at(given, given.filters.len()) });
         }
         Ok((found, placed))
     }
@@ -377,7 +379,7 @@ impl<'a> Work<'a> {
     /// ln J of a finalist with these powers, by moves on the machines `some`, and what it is beyond the limits on the
     /// set, of which `slack` is allowed; what keeps them and is below the bar joins the archive. Infinite once the
     /// search is to end.
-    fn of_moves(
+    pub fn of_moves(
         &mut self,
         (finalist, layout, powers): (&Finalist, usize, &[f64]),
         some: &[usize],

@@ -238,14 +238,24 @@ class Case:
         )
         return Designed(data, self._of(case))
 
-    def tune(self, *, spread: float | None = None, corners: bool = False, evaluate: bool = False) -> Tuned:
+    def tune(
+        self,
+        *,
+        spread: float | None = None,
+        corners: bool = False,
+        evaluate: bool = False,
+        draws: str | PathLike[str] | None = None,
+    ) -> Tuned:
         """Finds gains and filters for the case's controller, judged by moves over a family of machines that can exist.
 
         ``spread`` is by which share parameters may be off (0.1 is 10 %; that of [tune] unless said, 0 for the machine of the file
-        alone); with ``corners`` all of them are off at once in the worst directions. With ``evaluate`` nothing is searched for: the
+        alone); with ``corners`` all of them are off at once in the worst directions; ``draws`` is a file of draws from the posterior of
+        a fit, of which the machines are taken instead. With ``evaluate`` nothing is searched for: the
         gains of the file are judged. Ctrl-C ends it.
         """
-        data, case = self._native.tune(_checks.number("spread", spread), bool(corners), bool(evaluate))
+        data, case = self._native.tune(
+            _checks.number("spread", spread), bool(corners), bool(evaluate), None if draws is None else _checks.path(draws)
+        )
         return Tuned(data, self._of(case))
 
     def with_log(
