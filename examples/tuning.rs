@@ -1,24 +1,99 @@
-//! `taut tune` on each of these cases, as a table: before and after at worst over the family, verdict, the limit that
-//! forces it, time.
+//! `taut tune` on each of these cases, as a table: before and after at worst over the family, verdict, the limit that is
+//! active where it is worse, processor time; with `--evolution N` how far J is from what a differential evolution of N
+//! generations finds.
 //!
-//! cargo run --release --example tuning -- stages/sollmann-jouaneh/controllers/*.toml
+//! cargo run --release --example tuning -- [--evolution N] [--drawn N] stages/sollmann-jouaneh/controllers/*.toml
+//!
+//! `--drawn N` also tunes N machines that are drawn: masses, friction, belt and motor of the first case off by up to a
+//! factor of two.
 
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::SeedableRng;
 use std::time::Instant;
 use taut::case::Case;
-use taut::tune::{Tuned, Verdict, tune};
+use taut::chance::uniform;
+use taut::tune::{Tuned, Verdict, evolved, tune};
+
+/// What is drawn, and as factors of what.
+const DRAWN: [&str; 7] = [
+    "cart.mass",
+    "cart.friction.viscous",
+    "cart.friction.coulomb",
+    "motor.resistance",
+    "drive_pulley.inertia",
+    "idler_pulley.inertia",
+    "motor.torque_constant",
+];
 
 fn main() {
-    println!("| case | verdict | J | cart error at worst, mm | axes that settle | current at worst, A | forced by |");
-    println!("|---|---|---|---|---|---|---|");
-    for path in std::env::args().skip(1) {
-        let begin = Instant::now();
-        let name = path.rsplit('/').next().unwrap_or(&path).trim_end_matches(".toml").to_string();
-        let found = Case::read(&path).and_then(|case| tune(&case, &case.tune.clone().unwrap_or_default(), &|| false));
-        match found {
-            Ok(tuned) => println!("{}", row(&name, &tuned)),
-            Err(error) => println!("| {name} | – | | | | | {} |", error.what),
+    let mut args = std::env::args().skip(1);
+    let (mut generations, mut drawn, mut paths) = (0, 0, Vec::new());
+    while let Some(arg) = args.next() {
+        let mut number = || args.next().and_then(|text| text.parse().ok()).unwrap_or(0);
+        match &arg[..] {
+            "--evolution" => generations = number(),
+            "--drawn" => drawn = number(),
+            _ => paths.push(arg),
         }
-        eprintln!("{name}: {:.1} s", begin.elapsed().as_secs_f64());
+    }
+    let more = if generations > 0 { " J by evolution |" } else { "" };
+    println!(
+        "| case | verdict | J | cart error at worst, mm | axes that settle | current at worst, A | active limit | time, s |{more}"
+    );
+    println!("|---|---|---|---|---|---|---|---|{}", if generations > 0 { "---|" } else { "" });
+    for path in &paths {
+        let name = path.rsplit('/').next().unwrap_or(path).trim_end_matches(".toml").to_string();
+        one(&name, Case::read(path), generations);
+    }
+    for k in 0..drawn {
+        one(&format!("drawn {}", k + 1), machine(&paths[0], k as u64), generations);
+    }
+}
+
+/// A machine that is drawn: what the first case has, each number times a factor from a half to two.
+fn machine(path: &str, seed: u64) -> taut::Result<Case> {
+    let base = Case::read(path)?;
+    let mut random = Pcg64::seed_from_u64(400 + seed);
+    let mut changes = Vec::new();
+    for key in DRAWN {
+        let factor = 2f64.powf(2.0 * uniform(&mut random) - 1.0);
+        if let Some(value) = taut::parameter::value(&base.stage, key) {
+            changes.push(format!("{key}={}", factor * value));
+        }
+    }
+    let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
+    Case::read_with(path, &changes)
+}
+
+/// Tunes a case and prints its row.
+fn one(name: &str, case: taut::Result<Case>, generations: usize) {
+    let found = case.and_then(|case| {
+        let tuning = case.tune.clone().unwrap_or_default();
+        let begin = Instant::now();
+        let tuned = tune(&case, &tuning, &|| false)?;
+        let took = begin.elapsed().as_secs_f64();
+        eprintln!("{name}: {took:.1} s, {:.1} million samples", 1e-6 * tuned.samples as f64);
+        let other = match generations {
+            0 => None,
+            _ => Some(evolved(&case, &tuning, &tuned, generations, &|| false)?),
+        };
+        Ok((tuned, took, other))
+    });
+    match found {
+        Ok((tuned, took, other)) => println!("{} {took:.1} |{}", row(name, &tuned), beside(&tuned, other)),
+        Err(error) => println!("| {name} | – | | | | | {} | |", error.what),
+    }
+}
+
+/// What the evolution found, and by how much the tuning is worse (better, below zero).
+fn beside(tuned: &Tuned, other: Option<Option<Verdict>>) -> String {
+    match other {
+        None => String::new(),
+        Some(None) => " none |".into(),
+        Some(Some(verdict)) => {
+            let worse = 100.0 * ((tuned.after.objective - verdict.objective).exp() - 1.0);
+            format!(" {:.3} ({worse:+.1} %) |", verdict.objective.exp())
+        }
     }
 }
 

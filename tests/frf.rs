@@ -113,6 +113,18 @@ fn closed_loop_by_the_reference() {
 }
 
 /// Of whole periods nothing leaks: without noise the response is the model's.
+/// Of logs in closed loop only 78 % of the circles below 20 Hz held the truth: the window smears the way from the
+/// reference to the input, which rises there, by some per cent, of which circles of noise know nothing.
+#[test]
+fn circles_at_low_frequencies_in_closed_loop_hold_the_truth() {
+    let truth = model(&stage(), 0.6e-3);
+    let log = log(&truth, &white(60_000, 0.05), Some(25.0), 5e-5, 60_000);
+    let cut = Cut { segment: Some(1.024), period: None };
+    let frf = &estimate(&log, &cut).unwrap()[0];
+    let (share, count, off) = held(frf, &truth, [2.9, 20.0]);
+    assert!(frf.closed && count >= 15 && share >= 0.85 && off < 0.004, "{share} of {count}, {off}");
+}
+
 #[test]
 fn periods_are_exact() {
     let truth = model(&stage(), 0.6e-3);

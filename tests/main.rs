@@ -17,6 +17,7 @@ mod cost;
 mod definitions;
 mod definitions_control;
 mod elements;
+mod experiment_design;
 mod fit;
 mod free;
 mod frf;

@@ -5,9 +5,10 @@ use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use taut::control::recommendation::Damping;
 use taut::control::shaper::{Firmware, Form};
+use taut::fit::experiment_design::{Criterion, Kind as InputKind};
 use taut::quantity;
 use taut::solve::{Choice, Kind as SolverKind, Method, Solver};
-use taut::stage::Stage;
+use taut::stage::{Channel, Quantity, Stage};
 
 /// Belt-driven axes: described in a file, simulated exactly.
 #[derive(Debug, Parser)]
@@ -42,6 +43,7 @@ pub enum Command {
     Shape(Shape),
     Modes(Modes),
     Frf(Frf),
+    Design(Design),
     Schema(Schema),
     Completions(Completions),
     Man(Man),
@@ -62,6 +64,7 @@ impl Command {
             Self::Shape(args) => args.common.json,
             Self::Modes(args) => args.common.json,
             Self::Frf(args) => args.common.json,
+            Self::Design(args) => args.common.json,
             Self::Init(_) | Self::Schema(_) | Self::Completions(_) | Self::Man(_) => false,
         }
     }
@@ -282,6 +285,9 @@ pub struct Tune {
     /// Let each parameter of the axis be off by this share, whatever the file says: 20%
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub spread: Option<f64>,
+    /// Take the machines from the draws of `taut fit --posterior`, whatever the file says of how far they are off
+    #[arg(long, value_name = "FILE", conflicts_with = "spread")]
+    pub draws: Option<PathBuf>,
     #[command(flatten)]
     pub common: Common,
 }
@@ -492,6 +498,118 @@ pub struct Frf {
     #[command(flatten)]
     pub common: Common,
 }
+
+/// Design an experiment: the input that determines parameters best within travel, input and current.
+///
+/// Searches among trapezoids there and back, sines one after another, a sine of changing frequency, sums of sines and
+/// binary sequences for the input whose log makes the standard errors of the parameters smallest: as a fit of such a log
+/// would say, with the encoder and the recorder of the case. Prints the experiment as the case file has it, the
+/// standard error that it promises of each parameter, and what it cannot determine. With --out it writes designed.toml,
+/// the case with the experiment in it, design.json and a report.
+#[derive(Debug, clap::Args)]
+#[command(after_help = DESIGN)]
+pub struct Design {
+    /// The case file; - is standard input
+    pub case: PathBuf,
+    /// The parameters that count, separated by commas [default: the free ones of [fit]]
+    #[arg(long = "for", value_name = "KEY", value_delimiter = ',')]
+    pub names: Vec<String>,
+    /// The inputs to choose among, separated by commas [default: all of them]
+    #[arg(long = "input", value_enum, value_name = "INPUT", value_delimiter = ',')]
+    pub kinds: Vec<InputName>,
+    /// What is made small: the volume of the confidence ellipsoid, or the mean square of the errors
+    #[arg(long, value_enum, default_value = "d")]
+    pub criterion: CriterionName,
+    /// Length of the experiment
+    #[arg(long, value_name = "TIME", value_parser = seconds, default_value = "4s")]
+    pub duration: f64,
+    /// Between samples [default: as [measurement] or the experiments say, or 1 ms]
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
+    pub every: Option<f64>,
+    /// Share of each limit that is left free
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value = "10%")]
+    pub margin: f64,
+    /// By which share each free parameter may be off, and the limits still hold
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value = "20%")]
+    pub doubt: f64,
+    /// Greatest input, such as "5 V" [default: the amplifier's limit, or the most of the case's experiments]
+    #[arg(long, value_name = "INPUT")]
+    pub amplitude: Option<String>,
+    /// Greatest current, such as "3 A" [default: amplifier.current_limit]
+    #[arg(long, value_name = "CURRENT", value_parser = amperes)]
+    pub current: Option<f64>,
+    /// Way that the cart may take, such as "0.4 m" [default: [travel], or the most of the case's experiments]
+    #[arg(long, value_name = "LENGTH", value_parser = length)]
+    pub travel: Option<f64>,
+    /// A quantity that is measured, and the standard deviation of its noise, such as drive_angle=1mrad, as often as
+    /// needed [default: [encoder] and [measurement], or what the logs show]
+    #[arg(long = "measure", value_name = "QUANTITY=NOISE", value_parser = channel)]
+    pub measured: Vec<Channel>,
+    /// Also simulate so many logs and fit each: whether the promises hold
+    #[arg(long, value_name = "LOGS", value_parser = count)]
+    pub verify: Option<usize>,
+    /// Which points the search begins with
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// An input to choose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum InputName {
+    /// There and back
+    Trapezoid,
+    /// Sines one after another
+    Sweep,
+    /// A sine of changing frequency
+    Chirp,
+    /// A sum of sines
+    Multisine,
+    /// A pseudo-random binary sequence
+    Prbs,
+}
+
+impl InputName {
+    /// For the library.
+    pub fn kind(self) -> InputKind {
+        match self {
+            Self::Trapezoid => InputKind::Trapezoid,
+            Self::Sweep => InputKind::Sweep,
+            Self::Chirp => InputKind::Chirp,
+            Self::Multisine => InputKind::Multisine,
+            Self::Prbs => InputKind::Prbs,
+        }
+    }
+}
+
+/// What a design makes small.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum CriterionName {
+    /// The volume of the confidence ellipsoid
+    D,
+    /// The mean square of the relative errors
+    A,
+}
+
+impl CriterionName {
+    /// For the library.
+    pub fn criterion(self) -> Criterion {
+        match self {
+            Self::D => Criterion::D,
+            Self::A => Criterion::A,
+        }
+    }
+}
+
+const DESIGN: &str = "\
+Examples:
+  taut design axis.toml
+  taut design axis.toml --for cart.mass,cart.friction.coulomb --travel \"0.4 m\" --amplitude \"6 V\" --out designed
+  taut design axis.toml --input trapezoid --duration 2s --verify 20
+  taut design axis.toml --json | jq '.parameters[] | {name, relative_error}'
+
+Exit status 1: a parameter that counts is not determined by the best experiment that was found.";
 
 /// Say how a machine swings: poles, zeros, frequency response, resonance along the travel.
 ///
@@ -704,6 +822,25 @@ fn number(text: &str, unit: &str) -> Result<f64, String> {
 
 fn metres(text: &str) -> Result<f64, String> {
     number(text, "m")
+}
+
+fn length(text: &str) -> Result<f64, String> {
+    positive(text, "m", "length above zero, such as \"0.4 m\",")
+}
+
+fn amperes(text: &str) -> Result<f64, String> {
+    positive(text, "A", "current above zero, such as \"3 A\",")
+}
+
+/// A measured quantity and its noise: `drive_angle=1mrad`.
+fn channel(text: &str) -> Result<Channel, String> {
+    let names = || Quantity::ALL.map(Quantity::name).join(", ");
+    let (name, noise) = text.split_once('=').ok_or("a quantity and its noise are needed, such as drive_angle=1mrad")?;
+    let quantity = Quantity::ALL.into_iter().find(|quantity| quantity.name() == name.trim());
+    let quantity =
+        quantity.ok_or_else(|| format!("`{}` is no measured quantity; there are {}", name.trim(), names()))?;
+    let noise = positive(noise.trim(), quantity.unit(), "standard deviation above zero")?;
+    Ok(Channel { quantity, step: None, noise, range: None })
 }
 
 fn metres_per_second(text: &str) -> Result<f64, String> {

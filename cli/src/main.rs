@@ -3,6 +3,7 @@
 mod args;
 mod check;
 mod command;
+mod design;
 mod failure;
 mod fit;
 mod folder;
@@ -46,6 +47,7 @@ fn main() -> ExitCode {
         Command::Sweep(args) => sweep::run(&args),
         Command::Modes(args) => modes::run(&args),
         Command::Frf(args) => frf::run(&args),
+        Command::Design(args) => design::run(&args),
         Command::Schema(args) => manual::schema(&args),
         Command::Completions(args) => manual::completions(&args),
         Command::Man(args) => manual::run(&args),

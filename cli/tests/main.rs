@@ -3,6 +3,7 @@
 
 mod commands;
 mod common_options;
+mod design;
 mod documents;
 mod endings;
 mod faults;

@@ -9,16 +9,19 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::path::PathBuf;
 use std::sync::Arc;
+use taut::Error;
 use taut::case::{GantryCase, InputFile, Opened, Plan, TEMPLATE};
 use taut::files::{Inputs, write_atomically};
 use taut::fit::compare::{FrictionLaw, Setting, compare};
+use taut::fit::experiment_design::{Criterion, Kind, Request, design, verify};
 use taut::fit::{Posterior, Profile, check, drift, fit, posterior, profiles};
 use taut::frf::{Cut, Known, measure};
 use taut::json;
 use taut::linear::{Analysis, GantryAnalysis};
 use taut::nuts::Effort;
 use taut::overview::Overview;
-use taut::solve::{Choice, Flow, Kind, Method};
+use taut::solve::{Choice, Flow, Kind as SolverKind, Method};
+use taut::stage::{Channel, Quantity};
 use taut::tune::{evaluate, tune};
 
 /// Draws that tune a chain.
@@ -144,7 +147,7 @@ impl Case {
         step: Option<f64>,
         method: Option<&str>,
     ) -> PyResult<Vec<runs::Run>> {
-        let kinds = [("exact", Kind::Exact), ("general", Kind::General), ("table3", Kind::Table3)];
+        let kinds = [("exact", SolverKind::Exact), ("general", SolverKind::General), ("table3", SolverKind::Table3)];
         let methods = [("rk4", Method::RungeKutta4), ("dp5", Method::DormandPrince5)];
         let solver = solver.map(|name| one_of("solver", name, &kinds)).transpose()?;
         let method = method.map(|name| one_of("method", name, &methods)).transpose()?;
@@ -215,6 +218,72 @@ impl Case {
         value::json(py, &guarded(|| json::frf(case, &found))?)
     }
 
+    /// Designs an experiment: what `--json` prints, and the case with the experiment in it.
+    #[allow(clippy::too_many_arguments)]
+    fn design(
+        &self,
+        py: Python<'_>,
+        names: Vec<String>,
+        inputs: Vec<String>,
+        criterion: &str,
+        times: (f64, Option<f64>),
+        shares: (f64, f64),
+        limits: (Option<f64>, Option<f64>, Option<f64>),
+        measured: Vec<(String, f64)>,
+        verified: u32,
+        seed: u64,
+    ) -> PyResult<(Py<PyAny>, Py<Self>)> {
+        let case = self.axis(py)?;
+        let kind = |word: &String| {
+            let kinds = Kind::ALL.map(Kind::word).join(", ");
+            let found = Kind::ALL.into_iter().find(|kind| kind.word() == word);
+            found.ok_or_else(|| Error::new(format!("there is no input \"{word}\"")).allowed(kinds))
+        };
+        let channel = |(name, noise): &(String, f64)| {
+            let names = Quantity::ALL.map(Quantity::name).join(", ");
+            let quantity = Quantity::ALL.into_iter().find(|quantity| quantity.name() == name);
+            let quantity = quantity
+                .ok_or_else(|| Error::new(format!("there is no measured quantity \"{name}\"")).allowed(names))?;
+            match *noise > 0.0 && noise.is_finite() {
+                true => Ok(Channel { quantity, step: None, noise: *noise, range: None }),
+                false => Err(Error::new(format!("{noise} is no standard deviation of {name}")).allowed("above 0")),
+            }
+        };
+        let criterion = match criterion {
+            "d" => Ok(Criterion::D),
+            "a" => Ok(Criterion::A),
+            other => Err(Error::new(format!("there is no criterion \"{other}\"")).allowed("d, a")),
+        };
+        let ((duration, every), (margin, doubt), (input, current, travel)) = (times, shares, limits);
+        let request = Request {
+            names,
+            kinds: inputs.iter().map(kind).collect::<taut::Result<_>>().told(py)?,
+            criterion: criterion.told(py)?,
+            duration,
+            every,
+            margin,
+            doubt,
+            input,
+            current,
+            travel,
+            measured: measured.iter().map(channel).collect::<taut::Result<_>>().told(py)?,
+            seed,
+        };
+        let interrupt = Interrupt::listen();
+        let stop = || interrupt.stop();
+        let found = unlocked(py, || {
+            let found = design(case, &request, &stop, &mut |_| {})?;
+            let checked = verify(case, &request, &found, verified as usize, &stop)?;
+            Ok((found, checked))
+        });
+        interrupt.finish()?;
+        let (found, checked) = found?.map_err(|error: Error| error.in_file(&self.path)).told(py)?;
+        let text = guarded(|| found.case_text(case, &self.path))?.told(py)?;
+        let changed = Self::from_text(py, self.path.clone(), &text, Vec::new())?;
+        let told = guarded(|| json::design(case, &found, &checked))?;
+        Ok((value::json(py, &told)?.unbind(), Py::new(py, changed)?))
+    }
+
     /// Tunes the controller, or judges it as it is: what `--json` prints, and the case with the gains that were found.
     fn tune(
         &self,
@@ -222,11 +291,13 @@ impl Case {
         spread: Option<f64>,
         corners: bool,
         judged: bool,
+        draws: Option<PathBuf>,
     ) -> PyResult<(Py<PyAny>, Py<Case>)> {
         let case = self.axis(py)?;
         let mut tuning = case.tune.clone().unwrap_or_default();
         tuning.spread = spread.or(tuning.spread);
         tuning.corners = corners;
+        tuning.draws = draws;
         let interrupt = Interrupt::listen();
         let found = unlocked(py, || match judged {
             true => evaluate(case, &tuning),

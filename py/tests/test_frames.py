@@ -40,6 +40,7 @@ def test_every_result_plots_into_axes_of_ones_own(case, root, moving):
         (1, lambda ax: gantry.plot(ax=ax)),
         (1, lambda ax: moving.tune(evaluate=True).plot(ax=ax)),
         (1, lambda ax: case.show().plot(ax=ax)),
+        (1, lambda ax: case.design(["cart.mass"], inputs=["trapezoid"], duration=0.5).plot(ax=ax)),
         (1, lambda ax: taut.shape(root / "stages/printer-axis/printer-axis.toml").plot(ax=ax)),
         (1, lambda ax: fit.compare("viscous").plot(ax=ax)),
     ]
@@ -80,6 +81,16 @@ def test_every_result_goes_to_pandas(case, root, moving):
     joined = runs.to_pandas()
     assert joined.shape[0] == sum(run.rows for run in runs)
     assert joined.loc["5 V pulse"]["cart_position_m"].iloc[-1] == runs["5 V pulse"]["cart_position"][-1]
+
+
+def test_a_design_is_that_of_the_program(case, root, tmp_path):
+    case.save(tmp_path / "axis.toml")
+    told = program(root, "design", str(tmp_path / "axis.toml"), "--for", "cart.mass", "--input", "trapezoid", "--duration", "0.5")
+    designed = taut.read(tmp_path / "axis.toml").design(["cart.mass"], inputs=["trapezoid"], duration=0.5)
+    assert designed.data == told
+    assert designed.toml in designed.case.text and "designed" in designed.case.experiments
+    assert 0 < designed.errors["cart.mass"] < 0.01
+    assert list(designed.to_pandas()["name"]) == ["cart.mass"] and "cart.mass" in designed._repr_html_()
 
 
 def test_a_fit_has_its_samples_and_residuals(root):

@@ -537,6 +537,22 @@ def test_fits_with_nonsense(case, tmp_path):
         case.drift()
 
 
+def test_designs_with_nonsense(short):
+    names = ["cart.mass"]
+    options = ("duration", "every", "margin", "doubt", "amplitude", "current", "travel", "verify", "criterion", "inputs", "measured")
+    for value in THINGS:
+        for option in options:
+            call = {"duration": 0.02, "inputs": ["trapezoid"], "travel": 0.05, option: value}
+            allowed(lambda: short.design(names, **call), told("design", **call))
+        allowed(lambda: short.design(value, duration=0.02, inputs=["trapezoid"]), told("design", value))
+    with pytest.raises(taut.Error, match=r'there is no input "square"\n  allowed: trapezoid, sweep, chirp, multisine, prbs'):
+        short.design(names, inputs=["square"])
+    with pytest.raises(taut.Error, match=r"a duration of NaN cannot be\n  allowed: above 0"):
+        short.design(names, duration=float("nan"))
+    with pytest.raises(taut.Error, match=r"`cart.mas`"):
+        short.design(["cart.mas"])
+
+
 def test_tunings_and_logs_with_nonsense(short, moving):
     for value in WRONG:
         if not isinstance(value, (int, float)):
@@ -607,7 +623,7 @@ def test_everything_public_is_called_here():
     source = pathlib.Path(__file__).read_text(encoding="utf-8")
     called = {
         "Case": [
-            "changed", "check", "compare", "copy", "drift", "fit", "frf", "get", "modes", "move", "save", "show", "simulate", "sweep",
+            "changed", "check", "compare", "copy", "design", "drift", "fit", "frf", "get", "modes", "move", "save", "show", "simulate", "sweep",
             "tune", "update", "with_log",
         ],  # fmt: skip
         "Run": ["plot", "write"],

@@ -23,6 +23,7 @@
 mod axis;
 pub mod check;
 pub mod decimate;
+pub mod design;
 pub mod diagram;
 pub mod drawing;
 mod embed;

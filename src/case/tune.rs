@@ -6,6 +6,7 @@ use super::reader::{Field, Table};
 use super::tree::Kind;
 use crate::design::{Design, Structure};
 use crate::error::Result;
+use std::path::PathBuf;
 
 /// The goal of `taut tune`.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,6 +29,8 @@ pub struct Tuning {
     pub places: usize,
     /// Whether all parameters may be at their ends at once, and no axis is left out.
     pub corners: bool,
+    /// Draws of `taut fit --posterior`, of which the family is made instead.
+    pub draws: Option<PathBuf>,
 }
 
 impl Default for Tuning {
@@ -43,6 +46,7 @@ impl Default for Tuning {
             loads: vec![0.0],
             places: 7,
             corners: false,
+            draws: None,
         }
     }
 }
@@ -144,6 +148,7 @@ pub(super) fn tuning(root: &Table, design: Option<&Design>, moves: &[Move]) -> R
         },
         places: table.number("places")? as usize,
         corners: false,
+        draws: None,
     }))
 }
 

@@ -7,8 +7,9 @@ use super::observer::DisturbanceState;
 use super::state_feedback::{Parts, StateFeedbackState};
 use crate::design::{Cascade, Design, Pid, Structure};
 use crate::error::{Error, Result};
+use crate::linear::{SMALL, solve_shifted};
 use crate::stage::Stage;
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DVector};
 use std::f64::consts::PI;
 
 /// The controller of a design as D u = −(N_y y + N_i i), with y the measured position and i the measured current at a
@@ -126,26 +127,14 @@ fn cascade(gains: &Cascade, t: f64, z: Complex<f64>, change: Complex<f64>) -> (C
 impl Parts {
     /// N_y, D₀ and N_u of the command before filters: v D₀ = −(N_y y + N_u u).
     fn at(&self, z: Complex<f64>, change: Complex<f64>) -> (Complex<f64>, Complex<f64>, Complex<f64>) {
-        let n = self.phi.nrows();
-        let complex = |v: &DVector<f64>| v.map(|v| Complex::new(v, 0.0));
+        let n = self.estimate.nrows();
         let inverse = z.inv();
         // x̂⁺ = (I − L m) x̂ + L y,  z x̂ = Φ x̂⁺ + Γ₀ z^{−d} u + Γ₁ z^{−d−1} u
-        let correct = DMatrix::identity(n, n) - &self.kalman * self.measured.transpose();
-        let mut shifted = (&self.phi * &correct).map(|v| Complex::new(-v, 0.0));
-        for i in 0..n {
-            shifted[(i, i)] += z;
-        }
         let lag = inverse.powi(self.lag as i32);
-        let from_input = complex(&self.now) * lag + complex(&self.before) * (lag * inverse);
-        let from_position = complex(&(&self.phi * &self.kalman));
-        let lu = shifted.lu();
-        let gain = complex(&self.gain.rows(0, n).into_owned());
-        let correct = correct.map(|v| Complex::new(v, 0.0));
-        let seen = |from: &DVector<Complex<f64>>| match lu.solve(from) {
-            Some(x) => gain.dot(&(&correct * x)),
-            None => Complex::new(f64::NAN, f64::NAN),
-        };
-        let mut position = seen(&from_position) + self.gain.rows(0, n).dot(&self.kalman);
+        // kᵀ (I − L m) (z I − Φ (I − L m))⁻¹, a row for both that it is asked of
+        let row = self.resolved(z);
+        let seen = |from: &dyn Fn(usize) -> Complex<f64>| (0..n).map(|i| row[i] * from(i)).sum::<Complex<f64>>();
+        let mut position = seen(&|i| Complex::new(self.corrected[i], 0.0)) + self.direct;
         if let Some(integral) = self.integral {
             position += Complex::new(integral * self.every, 0.0) / change;
         }
@@ -153,6 +142,23 @@ impl Parts {
         for i in 0..self.pending {
             delayed += inverse.powi(i as i32 + 1) * self.gain[n + i];
         }
-        (position, delayed, seen(&from_input))
+        (position, delayed, seen(&|i| lag * self.now[i] + lag * inverse * self.before[i]))
+    }
+
+    /// The row kᵀ (I − L m) times the resolvent of the estimate; no numbers on a pole.
+    fn resolved(&self, z: Complex<f64>) -> Vec<Complex<f64>> {
+        let n = self.estimate.nrows();
+        let mut row: Vec<Complex<f64>> = self.row.iter().map(|v| Complex::new(*v, 0.0)).collect();
+        let solved = match n <= SMALL {
+            true => solve_shifted(&self.estimate, z, true, &mut row),
+            false => {
+                let mut shifted = self.estimate.transpose().map(|v| Complex::new(-v, 0.0));
+                (0..n).for_each(|i| shifted[(i, i)] += z);
+                let found = shifted.lu().solve(&DVector::from_column_slice(&row));
+                row = found.iter().flat_map(|found| found.iter().copied()).collect();
+                row.len() == n
+            }
+        };
+        if solved { row } else { vec![Complex::new(f64::NAN, f64::NAN); n] }
     }
 }

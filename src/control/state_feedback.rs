@@ -47,11 +47,15 @@ pub struct StateFeedbackState {
 #[derive(Debug, Clone)]
 pub(super) struct Parts {
     pub every: f64,
-    pub phi: DMatrix<f64>,
+    /// Φ (I − L m), of the estimate from one sample to the next.
+    pub estimate: DMatrix<f64>,
+    /// (I − L m)ᵀ k, of the estimate before a sample to the command.
+    pub row: DVector<f64>,
+    /// Φ L, of the measured position to the estimate; and k L, straight to the command.
+    pub corrected: DVector<f64>,
+    pub direct: f64,
     pub now: DVector<f64>,
     pub before: DVector<f64>,
-    pub measured: DVector<f64>,
-    pub kalman: DVector<f64>,
     pub gain: DVector<f64>,
     pub pending: usize,
     /// Samples from a command to the one that takes over within a sample.
@@ -63,13 +67,17 @@ pub(super) struct Parts {
 impl StateFeedbackState {
     /// Its matrices.
     pub(super) fn parts(&self) -> Parts {
+        let n = self.phi.nrows();
+        let correct = DMatrix::identity(n, n) - &self.kalman * self.measured.transpose();
+        let own = self.gain.rows(0, n);
         Parts {
             every: self.every,
-            phi: self.phi.clone(),
+            estimate: &self.phi * &correct,
+            row: correct.tr_mul(&own),
+            corrected: &self.phi * &self.kalman,
+            direct: own.dot(&self.kalman),
             now: self.now.clone(),
             before: self.before.clone(),
-            measured: self.measured.clone(),
-            kalman: self.kalman.clone(),
             gain: self.gain.clone(),
             pending: self.pending,
             lag: self.lag(),

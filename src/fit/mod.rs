@@ -14,6 +14,7 @@ mod density;
 mod drawn;
 mod drift;
 mod drifting;
+pub mod experiment_design;
 mod findings;
 mod found;
 mod held_out;

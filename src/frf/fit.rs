@@ -61,9 +61,21 @@ pub struct FrfFit {
     pub mode: Option<(f64, f64)>,
 }
 
-/// Distances in lines, and the power of Hann's window there, (sin πδ/(πδ (1 − δ²)))²: through it a spectrum is seen.
-const WINDOW: [(f64, f64); 7] =
-    [(-1.5, 0.0288), (-1.0, 0.25), (-0.5, 0.7205), (0.0, 1.0), (0.5, 0.7205), (1.0, 0.25), (1.5, 0.0288)];
+/// Distances in lines, and what a spectrum is seen through: the power of Hann's window P(δ) = (sin πδ/(πδ (1 − δ²)))²
+/// without its second moment, (4/3) P(δ) − (P(δ − 1) + P(δ + 1))/6, to either side.
+const WINDOW: [(f64, f64); 11] = [
+    (-2.5, -0.0048),
+    (-2.0, -0.0417),
+    (-1.5, -0.0817),
+    (-1.0, 0.1667),
+    (-0.5, 0.8358),
+    (0.0, 1.25),
+    (0.5, 0.8358),
+    (1.0, 0.1667),
+    (1.5, -0.0817),
+    (2.0, -0.0417),
+    (2.5, -0.0048),
+];
 
 /// ln s, ln τ, t_d, ln g.
 const UNKNOWNS: usize = 4;
@@ -83,7 +95,7 @@ fn changed(stage: &Stage, known: &Known, x: &[f64]) -> Stage {
     stage
 }
 
-/// The same as Welch's averages see it: Σ |W|² Ĝ/Σ |W|² about each line, where the input is white. Of whole periods
+/// The same as the averages see it: Σ W Ĝ/Σ W about each line, where the input is white. Of whole periods
 /// nothing is smeared.
 fn smeared(stage: &Stage, place: f64, delay: f64, frf: &Frf) -> Result<Vec<Complex<f64>>> {
     if frf.periodic {

@@ -5,6 +5,7 @@
 mod case_schema;
 mod check;
 mod comparison;
+mod design;
 mod drift;
 mod fit;
 mod frf;
@@ -23,6 +24,7 @@ mod tune;
 pub use case_schema::case_schema;
 pub use check::check;
 pub use comparison::comparison;
+pub use design::design;
 pub use drift::drift;
 pub use fit::fit;
 pub use frf::frf;

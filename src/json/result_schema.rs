@@ -11,6 +11,7 @@ use serde_json::{Map, Value, json};
 const RESULTS: &[(&str, &str, &str)] = &[
     ("check", "`taut check`", include_str!("results/check.txt")),
     ("compare", "`taut fit --compare`", include_str!("results/compare.txt")),
+    ("design", "`taut design`", include_str!("results/design.txt")),
     ("drift", "`taut fit --drift`", include_str!("results/drift.txt")),
     ("error", "An error, under --json", include_str!("results/error.txt")),
     ("files", "What a folder of results holds: files.json", include_str!("results/files.txt")),

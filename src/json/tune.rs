@@ -107,7 +107,7 @@ fn verdict(tuned: &Tuned, verdict: &Verdict) -> Value {
         "unstable": { "axes": verdict.unstable.0, "of": verdict.unstable.1 },
         "moves": verdict.moves.iter().map(motion).collect::<Vec<_>>(),
         "hunting": verdict.hunt.as_ref().map(|hunt| json!({
-            "amplitude_m": hunt.amplitude, "period_s": hunt.period, "needs": hunt.needs, "watched_s": hunt.watched,
+            "amplitude_m": hunt.amplitude, "period_s": hunt.period, "irregular": hunt.irregular, "needs": hunt.needs, "watched_s": hunt.watched,
         })),
     })
 }

@@ -184,6 +184,51 @@ impl StateSpace {
     }
 }
 
+/// Most states of a system that is solved without memory of its own: one is asked at some hundred thousand frequencies.
+pub const SMALL: usize = 12;
+
+/// Puts (s I − A)⁻¹ x in the place of x, or with the transposed matrix, by elimination with partial pivoting; false on a
+/// pole. For up to [`SMALL`] states.
+pub fn solve_shifted(a: &DMatrix<f64>, s: Complex<f64>, transposed: bool, x: &mut [Complex<f64>]) -> bool {
+    let n = a.nrows();
+    let mut rows = [[Complex::ZERO; SMALL]; SMALL];
+    for i in 0..n {
+        for j in 0..n {
+            rows[i][j] = Complex::new(-if transposed { a[(j, i)] } else { a[(i, j)] }, 0.0);
+        }
+        rows[i][i] += s;
+    }
+    for k in 0..n {
+        let size = |row: &[Complex<f64>; SMALL]| row[k].norm_sqr();
+        let pivot = (k..n).max_by(|&i, &j| size(&rows[i]).total_cmp(&size(&rows[j]))).unwrap_or(k);
+        rows.swap(k, pivot);
+        x.swap(k, pivot);
+        let lead = rows[k][k];
+        if !(lead.norm_sqr() > 0.0) {
+            return false;
+        }
+        let inverse = lead.inv();
+        let (above, below) = rows.split_at_mut(k + 1);
+        for (row, i) in below.iter_mut().zip(k + 1..n) {
+            let factor = row[k] * inverse;
+            if factor != Complex::ZERO {
+                for j in k + 1..n {
+                    row[j] -= factor * above[k][j];
+                }
+                x[i] = x[i] - factor * x[k];
+            }
+        }
+    }
+    for k in (0..n).rev() {
+        let mut value = x[k];
+        for j in k + 1..n {
+            value -= rows[k][j] * x[j];
+        }
+        x[k] = value / rows[k][k];
+    }
+    true
+}
+
 /// C (s I − A)⁻¹ b + d; no number on a pole.
 pub(super) fn solve(
     a: &DMatrix<f64>,
@@ -192,8 +237,17 @@ pub(super) fn solve(
     d: &DVector<f64>,
     s: Complex<f64>,
 ) -> Vec<Complex<f64>> {
-    if a.nrows() == 0 {
+    let n = a.nrows();
+    if n == 0 {
         return d.iter().map(|d| Complex::new(*d, 0.0)).collect();
+    }
+    if n <= SMALL {
+        let mut x = [Complex::ZERO; SMALL];
+        x.iter_mut().zip(b.iter()).for_each(|(x, b)| *x = Complex::new(*b, 0.0));
+        return match solve_shifted(a, s, false, &mut x[..n]) {
+            true => (0..d.len()).map(|i| (0..n).map(|j| x[j] * c[(i, j)]).sum::<Complex<f64>>() + d[i]).collect(),
+            false => vec![Complex::new(f64::NAN, f64::NAN); d.len()],
+        };
     }
     let mut shifted = a.map(|v| Complex::new(-v, 0.0));
     for i in 0..a.nrows() {

@@ -3,16 +3,18 @@
 
 use super::margins::{Margins, Plant};
 use crate::case::{Case, Tuning};
-use crate::chance::{normal_quantile, uniform};
+use crate::chance::{normal_quantile, quantile, uniform};
 use crate::control::feedback::Feedback;
 use crate::design::Design;
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::fit::drawn;
 use crate::linear::{Operation, Place, places, travel};
 use crate::number::engineering;
 use crate::parameter::{self, Free, kinds};
 use crate::stage::Stage;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
+use std::path::Path;
 
 /// Share by which parameters are off where nothing else is said.
 pub const SPREAD: f64 = 0.2;
@@ -53,6 +55,14 @@ impl Unknown {
         let value = self.free.start + off.abs() * (end - self.free.start);
         // Draws of a fit go beyond the ends of its interval, but never through zero.
         if self.free.start > 0.0 { value.max(1e-3 * self.free.start) } else { value }
+    }
+}
+
+impl Unknown {
+    /// How far off it is with this value: what [`Unknown::value`] takes.
+    fn off(&self, value: f64) -> f64 {
+        let from = value - self.free.start;
+        if from < 0.0 { from / (self.free.start - self.low) } else { from / (self.high - self.free.start) }
     }
 }
 
@@ -98,6 +108,8 @@ pub struct Family {
 pub enum Source {
     /// The intervals of a fit.
     Fit,
+    /// So many draws from the posterior of a fit.
+    Posterior(usize),
     /// A share of each parameter.
     Spread(f64),
 }
@@ -106,6 +118,9 @@ impl Family {
     /// That of a case. Its machines are a Latin hypercube: within a spread all values are as likely, within the
     /// interval of a fit they are normal. With `tuning.corners` the worst corner of all intervals joins them.
     pub fn of(case: &Case, tuning: &Tuning) -> Result<Self> {
+        if let Some(file) = &tuning.draws {
+            return Self::of_draws(case, tuning, file);
+        }
         let stage = case.stage.clone();
         let keys: Vec<&str> = case.known.iter().flat_map(|known| known.name.split(" = ")).collect();
         let (mut unknowns, source) = match tuning.spread {
@@ -140,6 +155,41 @@ impl Family {
         Ok(family)
     }
 
+    /// That of the draws of a posterior: machines that the logs allow, with what they say of parameters together, at
+    /// places and with loads that are drawn.
+    fn of_draws(case: &Case, tuning: &Tuning, file: &Path) -> Result<Self> {
+        let plan = case.fit.as_ref().ok_or_else(|| {
+            Error::new("draws are of what a fit searched for, and this case has no [fit]")
+                .in_file(file)
+                .next("use --draws with the fitted.toml of the same folder, or with the case that was fitted")
+        })?;
+        let (frees, columns) = drawn(case, plan, &[], file)?;
+        let rows = columns.first().map_or(0, Vec::len);
+        let unknown = |(place, (free, column)): (usize, (Free, &Vec<f64>))| {
+            let mut sorted = column.clone();
+            sorted.sort_by(f64::total_cmp);
+            // The machine of the file lies between, if only just.
+            let least = 1e-6 * free.start.abs().max(f64::MIN_POSITIVE);
+            let low = quantile(&sorted, 0.025).min(free.start - least);
+            let high = quantile(&sorted, 0.975).max(free.start + least);
+            Unknown { name: free.name.clone(), low, high, free, with: place }
+        };
+        let unknowns: Vec<Unknown> = frees.into_iter().zip(&columns).enumerate().map(unknown).collect();
+        let (places, loads) = (along(case, tuning.places), tuning.loads.clone());
+        let (stage, source) = (case.stage.clone(), Source::Posterior(rows));
+        let mut family = Self { places, loads, stage, unknowns, source, machines: Vec::new(), corners: tuning.corners };
+        let count = MACHINES.min(rows);
+        family.machines = family.drawn(count);
+        let first = family.machines.len() - count;
+        for k in 0..count {
+            let row = k * rows / count;
+            for (j, column) in columns.iter().enumerate() {
+                family.machines[first + k].off[j] = family.unknowns[j].off(column[row]);
+            }
+        }
+        Ok(family)
+    }
+
     /// The axis of the file with each load, and `count` axes of a Latin hypercube over what is off, loads and places.
     fn drawn(&self, count: usize) -> Vec<Corner> {
         let nominal = self.nominal();
@@ -157,7 +207,7 @@ impl Family {
         let off: Vec<Vec<f64>> = self.unknowns.iter().map(|_| column()).collect();
         let share = |u: f64| match self.source {
             Source::Spread(_) => 2.0 * u - 1.0,
-            Source::Fit => normal_quantile(u) / normal_quantile(0.975),
+            Source::Fit | Source::Posterior(_) => normal_quantile(u) / normal_quantile(0.975),
         };
         let (first, last) = (self.places.first().copied(), self.places.last().copied());
         let (from, to) = (first.unwrap_or_default(), last.unwrap_or_default());
@@ -223,7 +273,9 @@ impl Family {
     /// The corner in words: what is off, the load, the place.
     pub fn words(&self, corner: &Corner) -> String {
         let words = |unknown: &Unknown, off: f64| match self.source {
-            Source::Fit => format!("{} {}", unknown.name, engineering(unknown.value(off), unknown.free.unit, 4)),
+            Source::Fit | Source::Posterior(_) => {
+                format!("{} {}", unknown.name, engineering(unknown.value(off), unknown.free.unit, 4))
+            }
             Source::Spread(_) => format!("{} {:+.0} %", unknown.name, 100.0 * (unknown.value(off) - 1.0)),
         };
         let off = |(unknown, &off): (&Unknown, &f64)| (off != 0.0).then(|| words(unknown, off));

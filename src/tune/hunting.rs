@@ -15,6 +15,9 @@ const WAY: f64 = 10e-3;
 /// Its speed, m/s.
 const SPEED: f64 = 20e-3;
 
+/// Standard deviation of the intervals between swings, as a share of their mean, from which on they are irregular.
+const IRREGULAR: f64 = 0.25;
+
 /// Longest watch, s.
 const LONGEST: f64 = 60.0;
 
@@ -25,6 +28,8 @@ pub struct Hunt {
     pub amplitude: f64,
     /// s.
     pub period: f64,
+    /// Whether intervals from one swing to the next differ by more than a quarter of their mean.
+    pub irregular: bool,
     /// Without each of these it comes to rest.
     pub needs: Vec<&'static str>,
     /// How long it was watched at rest, s.
@@ -35,7 +40,7 @@ pub struct Hunt {
 /// well, and needs nothing of what is listed.
 pub fn hunting(stage: &Stage, design: &Design) -> Result<Option<Hunt>> {
     let watched = watch(stage, design);
-    let Some((amplitude, period)) = swing(stage, design, stage, watched)? else { return Ok(None) };
+    let Some(Swing { amplitude, period, irregular }) = swing(stage, design, stage, watched)? else { return Ok(None) };
     let mut needs = Vec::new();
     let mut without = |word: &'static str, stage_without: &Stage, design: &Design| -> Result<()> {
         if swing(stage_without, design, stage, watched)?.is_none() {
@@ -54,11 +59,16 @@ pub fn hunting(stage: &Stage, design: &Design) -> Result<Option<Hunt>> {
     if other != *stage {
         without("breakaway above Coulomb friction", &other, design)?;
     }
+    if stage.motor.gear_play.is_some() {
+        let mut other = stage.clone();
+        other.motor.gear_play = None;
+        without("play in the gear", &other, design)?;
+    }
     if let Some(encoder) = stage.encoder {
         let finer = Stage { encoder: Some(Encoder { lines: 1e6 * encoder.lines, ..encoder }), ..stage.clone() };
         without("encoder counts", &finer, design)?;
     }
-    Ok(Some(Hunt { amplitude, period, needs, watched }))
+    Ok(Some(Hunt { amplitude, period, irregular, needs, watched }))
 }
 
 fn friction(stage: &Stage, change: fn(&mut Side)) -> Stage {
@@ -102,8 +112,15 @@ fn watch(stage: &Stage, design: &Design) -> f64 {
     if ramp.is_finite() { (20.0 * ramp).clamp(4.0, LONGEST) } else { 10.0 }
 }
 
-/// Half of what the cart goes to and fro at rest (m) and how long that takes (s); none if it rests or dies out.
-fn swing(stage: &Stage, design: &Design, model: &Stage, watched: f64) -> Result<Option<(f64, f64)>> {
+/// A swing at rest: half of what the cart goes to and fro, m, how long that takes, s, and whether not always as long.
+struct Swing {
+    amplitude: f64,
+    period: f64,
+    irregular: bool,
+}
+
+/// The swing of the cart at rest; none if it rests or dies out.
+fn swing(stage: &Stage, design: &Design, model: &Stage, watched: f64) -> Result<Option<Swing>> {
     let limits = Limits { speed: SPEED, acceleration: 0.2, jerk: None, snap: None };
     // From 0, to the side that has more room.
     let way = stage.travel.map_or(WAY, |travel| match travel.max >= -travel.min {
@@ -148,7 +165,10 @@ fn swing(stage: &Stage, design: &Design, model: &Stage, watched: f64) -> Result<
     }
     match (upward.first(), upward.last()) {
         (Some(first), Some(last)) if upward.len() > 2 => {
-            Ok(Some((0.5 * size, (last - first) / (upward.len() - 1) as f64)))
+            let period = (last - first) / (upward.len() - 1) as f64;
+            let off = upward.windows(2).map(|pair| (pair[1] - pair[0] - period).powi(2)).sum::<f64>();
+            let irregular = (off / (upward.len() - 1) as f64).sqrt() > IRREGULAR * period;
+            Ok(Some(Swing { amplitude: 0.5 * size, period, irregular }))
         }
         _ => Ok(None),
     }

@@ -229,9 +229,14 @@ impl Open {
         (self.position / (self.position + 1.0)).norm()
     }
 
+    /// T x/y: from the reference to the cart, without feed-forward.
+    pub fn reference_to_cart(&self) -> Complex<f64> {
+        self.position / (self.position + 1.0) * self.cart
+    }
+
     /// |T x/y|.
     fn tracking(&self) -> f64 {
-        (self.position / (self.position + 1.0) * self.cart).norm()
+        self.reference_to_cart().norm()
     }
 }
 

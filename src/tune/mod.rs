@@ -12,6 +12,7 @@ mod margins;
 mod moves;
 mod objective;
 mod placement;
+mod reference;
 mod rules;
 mod search;
 pub mod trouble;
@@ -25,7 +26,8 @@ pub use hunting::{Hunt, hunting};
 pub use margins::{Answer, Margins, Open, Plant, loops};
 pub use objective::{AtWorst, BALANCES, Balance, MoveFigures, look, objective};
 pub use placement::{first, place};
-pub use search::{Found, minimise};
+pub use reference::evolved;
+pub use search::{Found, minimise, minimise_below};
 pub use verdict::{Forced, Judgement, Limit, MoveVerdict, Verdict};
 
 use crate::case::{Case, Cost, Move, Tuning};
@@ -72,6 +74,8 @@ pub struct Tuned {
     pub holds: bool,
     /// Rounds, and designs that were tried; none of an evaluation.
     pub work: (usize, usize),
+    /// Samples of moves that were simulated.
+    pub samples: u64,
     /// The first mode of a belt that has no damping at all, Hz.
     pub undamped: Option<f64>,
     /// Modes of the axis that a command swings, each in the middle of where it goes along the travel, Hz.
@@ -187,6 +191,9 @@ impl Work<'_> {
         before: &Verdict,
         leading: Verdict,
     ) -> Result<(Verdict, Vec<Choice>)> {
+        if (self.stop)() {
+            return Ok((leading, Vec::new()));
+        }
         let figures = before.at_worst();
         let rank = |verdict: &Verdict| (compare(before, verdict) == Judgement::Worse, verdict.objective);
         let is_better = |one: &Verdict, other: &Verdict| rank(one) < rank(other);
@@ -247,7 +254,7 @@ impl Work<'_> {
     ) -> Result<Verdict> {
         let weighed = work::Weighed { cost, bars: None };
         for _ in 0..POLISHED {
-            if (self.stop)() {
+            if (self.stop)() || self.is_spent() {
                 break;
             }
             let Some(design) = self.best_of(archive, cost, &BALANCES[1], None, TRIES)? else { break };
@@ -283,8 +290,10 @@ impl Work<'_> {
         let figures = before.at_worst();
         let weighed = work::Weighed { cost, bars: Some(&figures) };
         let mut latest = after.clone();
+        // What makes no figure worse may cost as much as the best did.
+        self.most = self.spent.get() + self.most / 2;
         for _ in 0..KEPT {
-            if (self.stop)() {
+            if (self.stop)() || self.is_spent() {
                 break;
             }
             for place in latest.worse_on(before) {
@@ -321,7 +330,8 @@ fn ended(work: &Work, before: Verdict, after: Verdict, choices: Vec<Choice>, pla
     let after = if before.design == after.design { before.clone() } else { work.watched(after)? };
     let breaks = work.excess(&before.worst) > 1.0;
     let forced = (judgement == Judgement::Worse && breaks && work.excess(&after.worst) <= 1.0)
-        .then(|| forced(work.family, &after, work.tuning));
+        .then(|| forced(work.family, &after, work.tuning))
+        .flatten();
     let belt = &work.case.stage.belt;
     let modes = work.modes().map(|(modes, _)| modes).unwrap_or_default();
     let is_undamped = belt.model != BeltModel::Rigid && belt.damping.iter().all(|damping| *damping == 0.0);
@@ -334,6 +344,7 @@ fn ended(work: &Work, before: Verdict, after: Verdict, choices: Vec<Choice>, pla
         moves: work.moves.to_vec(),
         holds: work.excess(&after.worst) <= 1.0,
         work: (work.rounds, work.tried),
+        samples: work.spent.get(),
         undamped: modes.first().copied().filter(|_| is_undamped),
         modes,
         before,

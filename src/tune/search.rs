@@ -19,11 +19,23 @@ pub fn minimise(
     most: usize,
     function: &mut dyn FnMut(&[f64]) -> f64,
 ) -> Found {
+    minimise_below(start, step, accuracy, most, &mut |x, _| function(x))
+}
+
+/// The same of a function that is told the value to beat: what is no better may be given as any value that is not below
+/// it, and the search takes the same way.
+pub fn minimise_below(
+    start: &[f64],
+    step: f64,
+    accuracy: f64,
+    most: usize,
+    function: &mut dyn FnMut(&[f64], f64) -> f64,
+) -> Found {
     let n = start.len();
     let mut asked = 0;
-    let mut value = |x: &[f64]| {
+    let mut value = |x: &[f64], bar: f64| {
         asked += 1;
-        let value = function(x);
+        let value = function(x, bar);
         (if value.is_nan() { f64::INFINITY } else { value }, asked)
     };
     let mut simplex: Vec<(Vec<f64>, f64)> = Vec::with_capacity(n + 1);
@@ -32,7 +44,7 @@ pub fn minimise(
         if i > 0 {
             x[i - 1] += step;
         }
-        let v = value(&x).0;
+        let v = value(&x, f64::INFINITY).0;
         simplex.push((x, v));
     }
     loop {
@@ -44,7 +56,7 @@ pub fn minimise(
         let along =
             |factor: f64| -> Vec<f64> { centre.iter().zip(&last.0).map(|(c, w)| c + factor * (c - w)).collect() };
         let reflected = along(1.0);
-        let (at_reflected, count) = value(&reflected);
+        let (at_reflected, count) = value(&reflected, last.1);
         if width < accuracy || count >= most {
             if at_reflected < simplex[0].1 {
                 simplex[0] = (reflected, at_reflected);
@@ -54,7 +66,7 @@ pub fn minimise(
         }
         if at_reflected < simplex[0].1 {
             let expanded = along(2.0);
-            let at_expanded = value(&expanded).0;
+            let at_expanded = value(&expanded, at_reflected).0;
             simplex[n] = if at_expanded < at_reflected { (expanded, at_expanded) } else { (reflected, at_reflected) };
             continue;
         }
@@ -63,7 +75,7 @@ pub fn minimise(
             continue;
         }
         let contracted = along(if at_reflected < last.1 { 0.5 } else { -0.5 });
-        let at_contracted = value(&contracted).0;
+        let at_contracted = value(&contracted, last.1.min(at_reflected)).0;
         if at_contracted < last.1.min(at_reflected) {
             simplex[n] = (contracted, at_contracted);
             continue;
@@ -71,7 +83,7 @@ pub fn minimise(
         let best = simplex[0].0.clone();
         for (x, v) in &mut simplex[1..] {
             x.iter_mut().zip(&best).for_each(|(x, b)| *x = b + 0.5 * (*x - b));
-            *v = value(x).0;
+            *v = value(x, f64::INFINITY).0;
         }
     }
 }
@@ -87,6 +99,15 @@ mod tests {
         let found = minimise(&[-1.2, 1.0], 0.3, 1e-8, 2000, &mut valley);
         assert!(found.value < 1e-12, "{found:?}");
         assert!((found.x[0] - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn what_is_no_better_need_not_be_known() {
+        let valley = |x: &[f64]| (1.0 - x[0]).powi(2) + 100.0 * (x[1] - x[0] * x[0]).powi(2);
+        let whole = minimise(&[-1.2, 1.0], 0.3, 1e-8, 500, &mut |x| valley(x));
+        // Of what is not below the bar only that it is not.
+        let mut short = |x: &[f64], bar: f64| if valley(x) < bar { valley(x) } else { bar + 1e3 };
+        assert_eq!(minimise_below(&[-1.2, 1.0], 0.3, 1e-8, 500, &mut short), whole);
     }
 
     #[test]

@@ -99,10 +99,10 @@ impl Limit {
     }
 }
 
-/// The limit that keeps the gains from being as they were.
+/// The limit that is active at gains that are worse than those before.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Forced {
-    /// The limit that is reached.
+    /// The limit that is active there.
     pub limit: Limit,
     /// Where, Hz: the mode of the axis that stands there, or the top itself.
     pub mode: f64,
@@ -138,7 +138,8 @@ impl Verdict {
 impl Work<'_> {
     /// A verdict with its limit cycle at rest.
     pub fn watched(&self, verdict: Verdict) -> Result<Verdict> {
-        let hunt = if verdict.nominal.stable { hunting(&self.case.stage, &verdict.design)? } else { None };
+        let hunt =
+            if verdict.nominal.stable && !(self.stop)() { hunting(&self.case.stage, &verdict.design)? } else { None };
         Ok(Verdict { hunt, ..verdict })
     }
 
@@ -156,6 +157,9 @@ impl Work<'_> {
                 (corner, worst) = (found.clone(), margins);
             }
             machines.push(found);
+        }
+        for motion in self.moves {
+            (0..machines.len()).for_each(|_| self.spend(design, motion));
         }
         let all = look_at_all(self.family, &machines, &self.case.stage, design, self.moves)?;
         let left_out = self.family.left_out(machines.len());
@@ -206,9 +210,15 @@ pub(super) fn compare(before: &Verdict, after: &Verdict) -> Judgement {
     if after.objective < before.objective - SAME || holds_more { Judgement::Better } else { Judgement::Unchanged }
 }
 
-/// The limit that a design has come to.
-pub(super) fn forced(family: &Family, after: &Verdict, tuning: &Tuning) -> Forced {
+/// Share of a limit from which on it is active: gains are rounded, and a search on the grid keeps 2 % away.
+const ACTIVE: f64 = 0.96;
+
+/// The limit that is active at a design, if one is: a search that only failed to find better gains proves nothing.
+pub(super) fn forced(family: &Family, after: &Verdict, tuning: &Tuning) -> Option<Forced> {
     let worst = &after.worst;
+    if worst.excess(tuning.sensitivity, tuning.complementary) < ACTIVE {
+        return None;
+    }
     let is_sensitivity = worst.sensitivity / tuning.sensitivity >= worst.complementary / tuning.complementary;
     let (limit, omega) = match is_sensitivity {
         true => (Limit::Sensitivity, worst.at),
@@ -216,5 +226,5 @@ pub(super) fn forced(family: &Family, after: &Verdict, tuning: &Tuning) -> Force
     };
     let there = modes_along(&family.stage_at(&after.corner), &[after.corner.place]).unwrap_or_default();
     let modes: Vec<f64> = there.iter().flat_map(|place| place.undamped_resonances.iter().copied()).collect();
-    Forced { limit, mode: mode_at(omega, &modes), place: after.corner.place }
+    Some(Forced { limit, mode: mode_at(omega, &modes), place: after.corner.place })
 }

@@ -7,7 +7,7 @@ use super::gains::{self, rounded, searched, shaped};
 use super::margins::{Margins, Plant};
 use super::objective::{AtWorst, BALANCES, Balance, MoveFigures, look, objective};
 use super::rules::{layouts, starts};
-use super::search::{Found, minimise};
+use super::search::{Found, minimise, minimise_below};
 use super::verdict::Verdict;
 use crate::case::{Case, Cost, Move, Tuning};
 use crate::chance::uniform;
@@ -16,6 +16,7 @@ use crate::design::Design;
 use crate::error::Result;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
+use std::cell::Cell;
 use std::f64::consts::PI;
 
 /// Share of the limits that a search on the grid keeps to: tops between its points and rounding are in the rest.
@@ -40,8 +41,13 @@ const GENERATIONS: usize = 8;
 const SCATTER: f64 = 0.4;
 const EVOLVED: usize = 2;
 
-/// Designs from which a search by moves begins.
+/// Designs that are looked at by moves before any is searched from, and how much worse than the best (ln J) one may be
+/// and still be searched from.
 const FINALISTS: usize = 3;
+const NEAR: f64 = 0.3;
+
+/// Samples of moves that a search may simulate: a few seconds of a processor.
+const SAMPLES: u64 = 6_000_000;
 
 /// Share by which filters that are added have to make the cost smaller.
 const PAYS: f64 = 0.02;
@@ -65,6 +71,9 @@ pub(super) struct Work<'a> {
     more: Vec<Plant>,
     pub tried: usize,
     pub rounds: usize,
+    /// Samples of moves that were simulated, and most that a search may ask for.
+    pub spent: Cell<u64>,
+    pub most: u64,
     pub stop: &'a dyn Fn() -> bool,
 }
 
@@ -75,9 +84,17 @@ pub(super) struct Finalist {
     /// The design that it was made from, the number of its filters, and the powers that lead to it.
     start: Design,
     own: usize,
-    powers: Vec<f64>,
+    pub powers: Vec<f64>,
     /// ln of what steps do.
     value: f64,
+}
+
+impl Finalist {
+    /// A design as it is, with `own` filters that are not searched.
+    pub fn at(design: &Design, own: usize) -> Self {
+        let powers = vec![0.0; searched(design, own)];
+        Self { design: design.clone(), start: design.clone(), own, powers, value: f64::INFINITY }
+    }
 }
 
 /// A design that was run.
@@ -121,6 +138,8 @@ impl<'a> Work<'a> {
             more: Vec::new(),
             tried: 0,
             rounds: 0,
+            spent: Cell::new(0),
+            most: SAMPLES,
             stop,
         })
     }
@@ -245,14 +264,8 @@ impl<'a> Work<'a> {
         found.sort_by(|a, b| a.value.total_cmp(&b.value));
         found.truncate(FINALISTS);
         if is_given_good {
-            let count = searched(given, given.filters.len());
-            found.push(Finalist {
-                design: given.clone(),
-                start: given.clone(),
-                own: given.filters.len(),
-                powers: vec![0.0; count],
-                value: self.on_set(given).1.ln(),
-            });
+            let value = self.on_set(given).1.ln();
+            found.push(Finalist { value, ..Finalist::at(given, given.filters.len()) });
         }
         Ok((found, placed))
     }
@@ -319,6 +332,7 @@ impl<'a> Work<'a> {
         for &place in some.iter().rev() {
             let stage = self.family.stage_at(&self.family.machines[place]);
             for (all, motion) in seen.iter_mut().zip(self.moves) {
+                self.spend(design, motion);
                 let Ok(one) = look(&stage, &self.case.stage, design, motion) else {
                     return (Vec::new(), f64::INFINITY);
                 };
@@ -347,6 +361,8 @@ impl<'a> Work<'a> {
         }
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut best: Option<(f64, usize)> = None;
+        let least = ranked.first().map_or(f64::INFINITY, |(value, _)| *value);
+        ranked.retain(|(value, _)| *value <= least + NEAR);
         for (_, layout) in ranked.into_iter().take(FINALISTS) {
             let from = finalists[layout].powers.clone();
             let (value, _) = self.moved(finalists, layout, &from, (some, FIRST), &weighed, &mut archive)?;
@@ -360,6 +376,42 @@ impl<'a> Work<'a> {
         Ok(archive)
     }
 
+    /// ln J of a finalist with these powers, by moves on the machines `some`, and what it is beyond the limits on the
+    /// set, of which `slack` is allowed; what keeps them and is below the bar joins the archive. Infinite once the
+    /// search is to end.
+    pub fn of_moves(
+        &mut self,
+        (finalist, layout, powers): (&Finalist, usize, &[f64]),
+        some: &[usize],
+        weighed: &Weighed,
+        (slack, bar): (f64, f64),
+        archive: &mut Vec<Tried>,
+    ) -> f64 {
+        if (self.stop)() || self.is_spent() {
+            return f64::INFINITY;
+        }
+        let design = rounded(&shaped(&finalist.start, finalist.own, powers));
+        let beyond = self.on_set(&design).0;
+        if beyond > slack {
+            return 1e3 + beyond.min(1e6);
+        }
+        let (worst, value) = self.run(&design, some, weighed, bar - STEEP * beyond);
+        if beyond == 0.0 && value < bar {
+            archive.push(Tried { design, worst, layout, powers: powers.to_vec() });
+        }
+        value + STEEP * beyond
+    }
+
+    /// Counts the samples of a move.
+    pub fn spend(&self, design: &Design, motion: &Move) {
+        self.spent.set(self.spent.get() + (motion.until / design.every) as u64);
+    }
+
+    /// Whether the samples of moves that a search may ask for are used up.
+    pub fn is_spent(&self) -> bool {
+        self.spent.get() >= self.most
+    }
+
     /// One search by moves with the simplex; its value, and the powers.
     fn moved(
         &mut self,
@@ -370,23 +422,11 @@ impl<'a> Work<'a> {
         weighed: &Weighed,
         archive: &mut Vec<Tried>,
     ) -> Result<(f64, Vec<f64>)> {
-        let (start, own) = (&finalists[layout].start, finalists[layout].own);
-        let mut value = |x: &[f64]| {
-            if (self.stop)() {
-                return f64::INFINITY;
-            }
-            let design = rounded(&shaped(start, own, x));
-            let beyond = self.on_set(&design).0;
-            if beyond > 0.05 {
-                return 1e3 + beyond.min(1e6);
-            }
-            let (worst, value) = self.run(&design, some, weighed, f64::INFINITY);
-            if beyond == 0.0 {
-                archive.push(Tried { design, worst, layout, powers: x.to_vec() });
-            }
-            value + STEEP * beyond
-        };
-        let found = minimise(from, step, 1e-3, MOVES, &mut value);
+        let finalist = &finalists[layout];
+        let (start, own) = (&finalist.start, finalist.own);
+        // A simplex goes along the edge of the limits: a little beyond is allowed, and costs.
+        let mut value = |x: &[f64], bar: f64| self.of_moves((finalist, layout, x), some, weighed, (0.05, bar), archive);
+        let found = minimise_below(from, step, 1e-3, MOVES, &mut value);
         let (mut value, mut powers) = (found.value, found.x);
         if self.passes(&rounded(&shaped(start, own, &powers)))? {
             powers = self.pulled(start, own, from, &powers)?;
@@ -408,8 +448,12 @@ impl<'a> Work<'a> {
         weighed: &Weighed,
         archive: &mut Vec<Tried>,
     ) -> Result<()> {
-        let (start, own) = (&finalists[layout].start, finalists[layout].own);
+        let finalist = &finalists[layout];
+        let (start, own) = (&finalist.start, finalist.own);
         for round in 0..EVOLVED {
+            if self.is_spent() {
+                return Ok(());
+            }
             let mut known: Vec<Found> = Vec::new();
             for tried in archive.iter().filter(|tried| tried.layout == layout) {
                 let value = self.valued(weighed.cost, &BALANCES[1], &tried.worst, weighed.bars);
@@ -423,21 +467,9 @@ impl<'a> Work<'a> {
                 let x = best.x.iter().map(|x| x + SCATTER * (2.0 * uniform(&mut random) - 1.0)).collect();
                 known.push(Found { x, value: f64::INFINITY });
             }
-            let mut value = |x: &[f64], bar: f64| {
-                if (self.stop)() {
-                    return f64::INFINITY;
-                }
-                let design = rounded(&shaped(start, own, x));
-                let beyond = self.on_set(&design).0;
-                if beyond > 0.0 {
-                    return 1e3 + beyond.min(1e6);
-                }
-                let (worst, value) = self.run(&design, some, weighed, bar);
-                if value < bar {
-                    archive.push(Tried { design, worst, layout, powers: x.to_vec() });
-                }
-                value
-            };
+            // Members of a population are told apart by moves alone: what is beyond the limits is none.
+            let mut value =
+                |x: &[f64], bar: f64| self.of_moves((finalist, layout, x), some, weighed, (0.0, bar), archive);
             for member in &mut known {
                 member.value = value(&member.x, f64::INFINITY);
             }
@@ -505,6 +537,9 @@ impl<'a> Work<'a> {
         is_as_good: &dyn Fn(&Verdict, &Verdict) -> bool,
     ) -> Result<Verdict> {
         for place in (own..verdict.design.filters.len()).rev() {
+            if (self.stop)() {
+                break;
+            }
             let mut design = verdict.design.clone();
             design.filters.remove(place);
             if self.passes(&design)? {

@@ -16,7 +16,7 @@ const SPECTRA: [&str; 2] =
     ["target/browser/resonances_x_20210701_223821.csv", "target/browser/resonances_x_20210821_152037.csv"];
 
 /// The reports that are looked at: a name, and the command that makes it.
-const REPORTS: [(&str, &[&str]); 14] = [
+const REPORTS: [(&str, &[&str]); 15] = [
     ("simulate", &["simulate", "stages/sollmann-jouaneh/table4.toml"]),
     // More rows than a page holds.
     ("long", &["simulate", "stages/sollmann-jouaneh/table4.toml", "--set", "experiment.0.every=0.05ms"]),
@@ -30,6 +30,19 @@ const REPORTS: [(&str, &[&str]); 14] = [
     ("spectra", &["shape", SPECTRA[0], SPECTRA[1]]),
     ("paper", &["paper"]),
     ("show", &["show", "stages/printer-axis/printer-axis.toml"]),
+    (
+        "design",
+        &[
+            "design",
+            "stages/sollmann-jouaneh/table4.toml",
+            "--for",
+            "cart.mass",
+            "--input",
+            "trapezoid",
+            "--measure",
+            "drive_angle=1mrad",
+        ],
+    ),
     ("check", &["check", "stages/sollmann-jouaneh/identification/linear-5v.toml"]),
     ("fit", &["fit", "stages/sollmann-jouaneh/identification/linear-5v.toml"]),
 ];

@@ -95,6 +95,7 @@ fn tuning(args: &Args, case: &Case) -> Tuning {
     let mut tuning = case.tune.clone().unwrap_or_default();
     tuning.spread = args.spread.or(tuning.spread);
     tuning.corners = args.corners;
+    tuning.draws = args.draws.clone();
     tuning
 }
 

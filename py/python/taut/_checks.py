@@ -20,6 +20,14 @@ def number(name: str, value: Any) -> float | None:
         raise ValueError(f"{name}: this number is too large for a float") from None
 
 
+def given(name: str, value: Any) -> float:
+    """A number that cannot be left out."""
+    found = number(name, value)
+    if found is None:
+        raise TypeError(f"{name}: a number in SI units is wanted, and no NoneType")
+    return found
+
+
 def whole(name: str, value: Any, least: int, most: int = 2**63 - 1) -> int:
     """A whole number from ``least`` to ``most``."""
     try:

@@ -125,7 +125,21 @@ class Case:
     def frf(
         self, segment: float | None, period: float | None, at: float | None, delay: float | None
     ) -> dict[str, Any]: ...
-    def tune(self, spread: float | None, corners: bool, judged: bool) -> tuple[dict[str, Any], Case]: ...
+    def design(
+        self,
+        names: list[str],
+        inputs: list[str],
+        criterion: str,
+        times: tuple[float, float | None],
+        shares: tuple[float, float],
+        limits: tuple[float | None, float | None, float | None],
+        measured: list[tuple[str, float]],
+        verified: int,
+        seed: int,
+    ) -> tuple[dict[str, Any], Case]: ...
+    def tune(
+        self, spread: float | None, corners: bool, judged: bool, draws: str | None
+    ) -> tuple[dict[str, Any], Case]: ...
     def compare(self, laws: list[str], windows: list[float | None] | None) -> tuple[dict[str, Any], Case]: ...
     def drift(self) -> dict[str, Any]: ...
     def modes(

@@ -10,7 +10,7 @@ from . import _checks, _html, _native
 from ._logs import write_log
 from ._toml import change
 from ._toml import written as toml
-from .results import Check, Comparison, Drift, Fit, FitLog, FrequencyResponses, GantryModes, LinearModel, Modes, Shown, Tuned
+from .results import Check, Comparison, Designed, Drift, Fit, FitLog, FrequencyResponses, GantryModes, LinearModel, Modes, Shown, Tuned
 from .runs import Run, Runs
 from .sweeps import sweep
 from .table import Table
@@ -199,14 +199,63 @@ class Case:
             self._native.frf(n("segment", segment), n("period", period), n("at", at), n("delay", delay))
         )
 
-    def tune(self, *, spread: float | None = None, corners: bool = False, evaluate: bool = False) -> Tuned:
+    def design(
+        self,
+        names: Sequence[str] | None = None,
+        *,
+        inputs: Sequence[str] | None = None,
+        criterion: str = "d",
+        duration: float = 4.0,
+        every: float | None = None,
+        margin: float = 0.1,
+        doubt: float = 0.2,
+        amplitude: float | None = None,
+        current: float | None = None,
+        travel: float | None = None,
+        measured: Mapping[str, float] | None = None,
+        verify: int = 0,
+        seed: int = 1,
+    ) -> Designed:
+        """The experiment that determines the named parameters best (those of [fit] unless named) within travel, input and current.
+
+        ``inputs`` are those to choose among: ``trapezoid``, ``sweep``, ``chirp``, ``multisine``, ``prbs``; ``criterion`` is ``d`` or
+        ``a``; ``margin`` is the share of each limit that is left free, ``doubt`` that by which each parameter may be off and the limits
+        hold; ``measured`` has quantities with the standard deviations of their noise. ``verify`` logs are simulated and fitted. Ctrl-C
+        ends it with the best so far.
+        """
+        n = _checks.number
+        noises = [(_checks.text("measured", name), n(f"measured[{name!r}]", noise) or 0.0) for name, noise in dict(measured or {}).items()]
+        data, case = self._native.design(
+            _checks.names("names", names),
+            _checks.names("inputs", inputs),
+            _checks.text("criterion", criterion),
+            (_checks.given("duration", duration), n("every", every)),
+            (_checks.given("margin", margin), _checks.given("doubt", doubt)),
+            (n("amplitude", amplitude), n("current", current), n("travel", travel)),
+            noises,
+            _checks.whole("verify", verify, 0, 100_000),
+            _checks.whole("seed", seed, 0),
+        )
+        return Designed(data, self._of(case))
+
+    def tune(
+        self,
+        *,
+        spread: float | None = None,
+        corners: bool = False,
+        evaluate: bool = False,
+        draws: str | PathLike[str] | None = None,
+    ) -> Tuned:
         """Finds gains and filters for the case's controller, judged by moves over a family of machines that can exist.
 
         ``spread`` is by which share parameters may be off (0.1 is 10 %; that of [tune] unless said, 0 for the machine of the file
-        alone); with ``corners`` all of them are off at once in the worst directions. With ``evaluate`` nothing is searched for: the
+        alone); with ``corners`` all of them are off at once in the worst directions; ``draws`` is a file of draws from the posterior of
+        a fit, of which the machines are taken instead. With ``evaluate`` nothing is searched for: the
         gains of the file are judged. Ctrl-C ends it.
         """
-        data, case = self._native.tune(_checks.number("spread", spread), bool(corners), bool(evaluate))
+        data, case = self._native.tune(
+            _checks.number("spread", spread), bool(corners), bool(evaluate), None if draws is None else _checks.path(draws)
+        )
         return Tuned(data, self._of(case))
 
     def with_log(

@@ -236,6 +236,46 @@ class Fit:
 
 
 @dataclass(frozen=True)
+class Designed:
+    """An experiment that was designed, and what it promises."""
+
+    data: dict[str, Any]
+    """What ``taut design --json`` prints."""
+    case: Case
+    """The case with the experiment in it."""
+
+    @property
+    def toml(self) -> str:
+        """The experiment as the case file has it."""
+        return str(self.data["toml"])
+
+    @property
+    def errors(self) -> dict[str, float | None]:
+        """The standard error that is promised of each parameter, SI; None where the experiment does not determine it."""
+        return {row["name"]: row["standard_error"] for row in self.data["parameters"]}
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A pandas.DataFrame of the parameters: value, standard error, relative error, whether determined."""
+        keys = ("name", "unit", "value", "standard_error", "relative_error", "determined", "counts")
+        return frame({key: [row[key] for row in self.data["parameters"]] for key in keys})
+
+    def plot(self, *, ax: Axes | None = None) -> Figure:
+        """The relative error of the best input of each kind, in per cent."""
+        figure, (axis,) = _plots.panels(ax, 1, height=3.0)
+        rows = self.data["inputs"]
+        axis.barh([row["input"] for row in rows][::-1], [100 * (row["mean_relative_error"] or 0) for row in rows][::-1])
+        _plots.finished(axis, f"mean relative error ({self.data['criterion']}), %", "")
+        return figure
+
+    def __repr__(self) -> str:
+        return f"<taut.Designed {self.data['title']!r}: {self.data['words']}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(row["name"], row["value"], row["standard_error"], row["unit"]) for row in self.data["parameters"]]
+        return _html.table(self.data["words"], ("parameter", "value", "standard error", "unit"), rows)
+
+
+@dataclass(frozen=True)
 class Tuned:
     """A controller that was tuned or judged, and what its moves come to over a family of machines."""
 

@@ -5,6 +5,9 @@ use super::rows::{self as told, Row};
 use crate::{Callout, Cell, Figure, Page, Table};
 use taut::tune::Judgement;
 
+/// Figures of the loop, which stand before those of the moves.
+const LOOPS: usize = 5;
+
 /// The page; `text` is the tuned case.
 pub fn page(work: &Work, text: &str, figures: &[(String, Figure)]) -> Page {
     let tuned = work.tuned;
@@ -29,13 +32,13 @@ pub fn page(work: &Work, text: &str, figures: &[(String, Figure)]) -> Page {
     page.subsection("At worst");
     page.table(&rows(&told::margins(&tuned.before.worst, &tuned.after.worst)));
     page.prose(format!("Before: {}. After: {worst}.", tuned.family.words(&tuned.before.corner)));
-    for (_, figure) in figures.iter().take(3) {
+    for (_, figure) in figures.iter().take(LOOPS) {
         page.figure(figure);
     }
     if !tuned.after.moves.is_empty() {
         page.section("Moves");
         page.table(&rows(&told::moves(work)));
-        for (_, figure) in figures.iter().skip(3) {
+        for (_, figure) in figures.iter().skip(LOOPS) {
             page.figure(figure);
         }
     }

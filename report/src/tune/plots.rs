@@ -3,13 +3,14 @@
 use super::Work;
 use crate::simulate::{Named, decimator};
 use crate::{Axis, Colour, Figure, Panel, Series, Style};
+use nalgebra::Complex;
 use std::f64::consts::PI;
 use taut::Result;
 use taut::case::Move;
 use taut::control::feedback::Feedback;
 use taut::control::{Loop, Rows, Standard, stream};
 use taut::solve::{Flow, Solver};
-use taut::tune::{Corner, Verdict, loops};
+use taut::tune::{Corner, Open, Verdict, loops};
 
 /// The largest |L| that is drawn: more of it would hide the point −1.
 const FAR: f64 = 3.0;
@@ -21,6 +22,8 @@ const BELOW_PEAK: f64 = 30.0;
 pub fn figures(work: &Work) -> Result<Vec<(String, Figure)>> {
     let mut figures: Vec<(String, Figure)> = frequency(work)?.into_iter().map(|(n, f)| (n.to_string(), f)).collect();
     figures.push(("bode".into(), bode(work)?));
+    figures.push(("closed-loop".into(), closed(work)?));
+    figures.push(("step".into(), step(work)?));
     for motion in &work.tuned.moves {
         figures.push((format!("{}-before-and-after", motion.file_name()), moved(work, motion)?));
     }
@@ -126,6 +129,89 @@ fn bode(work: &Work) -> Result<Figure> {
     Ok(figure)
 }
 
+/// The loops before and after on the axis as it is taken for, those alone that are stable: frequencies, rad/s, and the
+/// way from the reference to the cart without feed-forward.
+fn ways(work: &Work) -> Result<Vec<(&'static str, Colour, Vec<f64>, Vec<Complex<f64>>)>> {
+    let nominal = work.tuned.family.nominal();
+    let both = [("before", &work.tuned.before, Colour::Amber), ("after", &work.tuned.after, Colour::Blue)];
+    let mut all = Vec::new();
+    for (name, verdict, colour) in both.into_iter().filter(|(_, verdict, _)| verdict.nominal.stable) {
+        let feedback = Feedback::new(&verdict.design, &work.case.stage)?;
+        let plant = work.tuned.family.plant(&nominal, &verdict.design, &feedback.corners())?;
+        let way = loops(&plant, &feedback).iter().map(Open::reference_to_cart).collect();
+        all.push((name, colour, plant.frequency, way));
+    }
+    Ok(all)
+}
+
+/// The closed loop over frequency, with -3 dB and the modes marked.
+fn closed(work: &Work) -> Result<Figure> {
+    let mut magnitude = Panel::new(Axis::new("|x/y|, dB", ""));
+    let mut last = 1.0_f64;
+    for (name, colour, frequency, way) in ways(work)? {
+        let hertz: Vec<f64> = frequency.iter().map(|omega| omega / (2.0 * PI)).collect();
+        last = hertz.last().copied().unwrap_or(last).max(last);
+        let decibels: Vec<f64> = way.iter().map(|way| 20.0 * way.norm().max(1e-6).log10()).collect();
+        magnitude = magnitude.series(Series::new(name, hertz, decibels).colour(colour));
+    }
+    let mut figure = Figure::new("From the reference to the cart", Axis::new("Frequency", "Hz").logarithmic())
+        .panel(magnitude.horizontal(-3.0, "−3 dB"))
+        .view(0.1, last)
+        .caption(
+            "The closed loop without feed-forward, on the axis as the file has it; a loop that is not stable has none.",
+        );
+    for (number, mode) in work.tuned.modes.iter().filter(|mode| **mode < last).enumerate() {
+        figure = figure.vertical(*mode, format!("mode {}", number + 1));
+    }
+    Ok(figure)
+}
+
+/// Samples of a step response that are shown, at most, and how long it is: times the inverse of the slowest bandwidth.
+const SHOWN: usize = 600;
+const LONG: f64 = 2.0;
+
+/// The step of the closed loop.
+fn step(work: &Work) -> Result<Figure> {
+    let every = work.tuned.after.design.every;
+    let both = [&work.tuned.before, &work.tuned.after];
+    let slowest = both.iter().map(|verdict| verdict.nominal.tracking / (2.0 * PI)).filter(|hertz| *hertz > 0.0);
+    let until = LONG / slowest.fold(f64::INFINITY, f64::min);
+    let until = if until.is_finite() && until > 0.0 { until.min(20.0) } else { 1.0 };
+    let mut panel = Panel::new(Axis::new("Cart, per step", ""));
+    for (name, colour, frequency, way) in ways(work)? {
+        let (time, values) = step_response(&frequency, &way, every, until);
+        panel = panel.series(Series::new(name, time, values).colour(colour));
+    }
+    Ok(Figure::new("Step of the reference", Axis::new("Time", "s")).panel(panel.horizontal(1.0, "")).caption(
+        "The cart after a step of the reference, without feed-forward and limits: the sampled loop while everything slides, on the axis as \
+         the file has it.",
+    ))
+}
+
+/// The step response of a sampled way H with no pole outside the unit circle, sums of its pulse response
+/// h[k] = 2T/π ∫ Re H cos(ωkT) dω from 0 to π/T, Re H straight from one frequency to the next.
+fn step_response(frequency: &[f64], way: &[Complex<f64>], every: f64, until: f64) -> (Vec<f64>, Vec<f64>) {
+    let samples = ((until / every) as usize).clamp(2, 20_000);
+    let stride = samples.div_ceil(SHOWN);
+    let (mut time, mut values, mut sum) = (vec![0.0], vec![0.0], 0.0);
+    for k in 1..samples {
+        let t = k as f64 * every;
+        // ∫ (a + b ω) cos ωt dω = [(a + b ω) sin ωt/t] + b [cos ωt]/t²
+        let mut integral = way[0].re * (frequency[0] * t).sin() / t;
+        for (w, h) in frequency.windows(2).zip(way.windows(2)) {
+            let slope = (h[1].re - h[0].re) / (w[1] - w[0]);
+            integral += (h[1].re * (w[1] * t).sin() - h[0].re * (w[0] * t).sin()) / t;
+            integral += slope * ((w[1] * t).cos() - (w[0] * t).cos()) / (t * t);
+        }
+        sum += 2.0 * every / PI * integral;
+        if k % stride == 0 {
+            time.push(t);
+            values.push(sum);
+        }
+    }
+    (time, values)
+}
+
 /// The cart's error in a move, before and after, and the command.
 fn moved(work: &Work, motion: &Move) -> Result<Figure> {
     let stage = &work.case.stage;
@@ -154,4 +240,24 @@ fn moved(work: &Work, motion: &Move) -> Result<Figure> {
         .panel(command)
         .vertical(motion.profile.end(), "end of the profile")
         .caption("By how much the cart is off, and what it takes, on the axis as the file has it."))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_step_of_a_sampled_lag_is_its_own() {
+        // H(z) = (1 − a)/(z − a): s[k] = 1 − aᵏ
+        let (every, a) = (1e-3, 0.98_f64);
+        let frequency: Vec<f64> =
+            (0..=4000).map(|i| PI / every * 10f64.powf(-6.0 + 6.0 * f64::from(i) / 4000.0)).collect();
+        let way: Vec<Complex<f64>> =
+            frequency.iter().map(|w| (Complex::new(0.0, w * every).exp() - a).inv() * (1.0 - a)).collect();
+        let (time, values) = step_response(&frequency, &way, every, 0.3);
+        for (t, value) in time.iter().zip(&values) {
+            let exact = 1.0 - a.powf((t / every).round());
+            assert!((value - exact).abs() < 2e-3, "{t}: {value} {exact}");
+        }
+    }
 }

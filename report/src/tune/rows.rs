@@ -161,8 +161,9 @@ pub fn hunt(hunt: &Option<Hunt>) -> String {
     match hunt {
         None => "none after a slow reversal".into(),
         Some(hunt) => format!(
-            "cart ± {} every {} s; {}",
+            "cart ± {} {} {} s; {}",
             length(hunt.amplitude),
+            if hunt.irregular { "irregularly, on average every" } else { "every" },
             number(hunt.period, ""),
             match &hunt.needs[..] {
                 [] => "whatever is left out".into(),
@@ -177,6 +178,9 @@ pub fn family(work: &Work) -> String {
     let family = &work.tuned.family;
     let off = match family.source {
         Source::Fit => format!("{} parameters within the 95 % intervals of the fit", family.unknowns.len()),
+        Source::Posterior(draws) => {
+            format!("{} parameters as drawn from the posterior, {draws} draws", family.unknowns.len())
+        }
         Source::Spread(share) => format!("{} parameters ± {} %", family.unknowns.len(), number(100.0 * share, "")),
     };
     let places = match &family.places[..] {

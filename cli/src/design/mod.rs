@@ -1,0 +1,93 @@
+//! `taut design`: an experiment that determines parameters best.
+
+mod table;
+
+use crate::args::Design as Args;
+use crate::command::{Finished, Report};
+use crate::failure::{Outcome, Status};
+use crate::folder::{self, Folder};
+use crate::interrupt::Interrupt;
+use crate::progress::Progress;
+use taut::case::Case;
+use taut::fit::experiment_design::{Designed, Request, design, verify};
+use taut::json;
+use taut::{Error, Result, quantity};
+use taut_report::design::{figure, page};
+
+/// Reads the case, designs, writes, tells.
+pub fn run(args: &Args) -> Outcome {
+    let common = &args.common;
+    let case = common.case(&args.case)?;
+    let request = request(args, &case)?;
+    let names = ["designed.toml", "design.json", "report.html"];
+    let folder = Folder::wanted(common, || folder::inputs(&args.case, &case.files), names)?;
+    if let Some(folder) = &folder {
+        folder::leading(&case.text, &case.files, folder.root())?;
+    }
+    let interrupt = Interrupt::listen();
+    let stop = || interrupt.signal().is_some();
+    let progress = Progress::new("looking at inputs", None, common.quiet);
+    let found = design(&case, &request, &stop, &mut |kind| progress.tell(|| kind.to_string()));
+    let found = found.map_err(|error| error.in_file(&args.case))?;
+    let verified = match args.verify.filter(|_| !stop()) {
+        Some(logs) => {
+            progress.tell(|| "fitting simulated logs".into());
+            verify(&case, &request, &found, logs, &stop)?
+        }
+        None => Vec::new(),
+    };
+    progress.clear();
+    let whole = found.case_text(&case, &args.case)?;
+    let data = json::text(&json::design(&case, &found, &verified));
+    let advice = "add --out DIR for the case with the experiment in it, and a report";
+    let text = table::text(&case.title, &found, &verified);
+    let mut finished = Finished::new("design", ("design.json", data), text, advice);
+    if let Some(folder) = &folder {
+        let text = folder::leading(&whole, &Case::from_text(&args.case, &whole)?.files, folder.root())?;
+        if common.reports() {
+            let figure = figure(&case, &found)?;
+            let page = page(&case, &found, &verified, &figure, &text);
+            finished.report = Some(Report { page, pictures: vec![("designed".into(), figure.into())] });
+        }
+        finished.files.push(("designed.toml".into(), text));
+    }
+    finished.status = status(&found, &interrupt);
+    finished.finish(common, folder)
+}
+
+fn status(found: &Designed, interrupt: &Interrupt) -> Status {
+    match interrupt.signal() {
+        Some(signal) => Status::Interrupted(signal),
+        None if found.promises.iter().any(|promise| promise.wanted && !promise.is_determined()) => Status::Incomplete,
+        None => Status::Done,
+    }
+}
+
+/// What the command line asks for.
+fn request(args: &Args, case: &Case) -> Result<Request> {
+    let input = args.amplitude.as_deref().map(|text| {
+        let unit = case.stage.amplifier.mode.unit();
+        let value = match text.trim().parse() {
+            Ok(number) => number,
+            Err(_) => quantity::read(text, unit).map_err(|error| Error::new(format!("--amplitude: {}", error.what)))?,
+        };
+        match value > 0.0 && f64::is_finite(value) {
+            true => Ok(value),
+            false => Err(Error::new(format!("--amplitude {text} is no size")).allowed(format!("above 0 {unit}"))),
+        }
+    });
+    Ok(Request {
+        names: args.names.clone(),
+        kinds: args.kinds.iter().map(|kind| kind.kind()).collect(),
+        criterion: args.criterion.criterion(),
+        duration: args.duration,
+        every: args.every,
+        margin: args.margin,
+        doubt: args.doubt,
+        input: input.transpose()?,
+        current: args.current,
+        travel: args.travel,
+        measured: args.measured.clone(),
+        seed: args.seed,
+    })
+}

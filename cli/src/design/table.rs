@@ -1,0 +1,52 @@
+//! The result on the terminal.
+
+use crate::terminal::bold;
+use std::fmt::Write;
+use taut::fit::experiment_design::{Designed, Verified};
+use taut_report::design::{heading, inputs, limits, measured, own, promises, verified};
+
+/// The text on the terminal.
+pub fn text(title: &str, found: &Designed, checked: &[Verified]) -> String {
+    let mut text = format!("{}\n\n{}\n", bold(title), bold("The experiment"));
+    let _ = writeln!(text, "{}\n\n{}", heading(found), found.toml());
+    let mut part = |heading: &str, rows: String| {
+        let _ = write!(text, "{}\n{rows}\n", bold(heading));
+    };
+    let promised = "Standard errors that it promises, all others free";
+    part(promised, format!("{}  {}\n", columns(&promises(found)), measured(found)));
+    for (group, choices) in &found.undetermined {
+        let choices: String = choices.iter().map(|choice| format!("  - {choice}\n")).collect();
+        part("Not determined", format!("  {}\n{choices}", group.words));
+    }
+    if !checked.is_empty() {
+        let heading =
+            "Fits of simulated logs: errors over the promise (root mean square, mean), 95 % intervals that hold";
+        part(heading, columns(&verified(checked)));
+    }
+    let heading = format!(
+        "Reached and limit; {:.0} % is left free, also with a parameter off by {:.0} %",
+        100.0 * found.limits.margin,
+        100.0 * found.doubt
+    );
+    part(&heading, columns(&limits(found)));
+    part(
+        &format!("Mean relative error of the best of each input ({})", found.criterion.word()),
+        columns(&inputs(found)),
+    );
+    if !found.own.is_empty() {
+        part("The case's own experiments, measured in the same way", columns(&own(found)));
+    }
+    text
+}
+
+/// Rows with their columns below each other.
+fn columns<const N: usize>(rows: &[[String; N]]) -> String {
+    let wide: Vec<usize> =
+        (0..N).map(|k| rows.iter().map(|row| row[k].chars().count()).max().unwrap_or_default()).collect();
+    let mut text = String::new();
+    for row in rows {
+        let cells: Vec<String> = row.iter().zip(&wide).map(|(cell, wide)| format!("{cell:<wide$}")).collect();
+        let _ = writeln!(text, "  {}", cells.join("  ").trim_end());
+    }
+    text
+}

@@ -1,0 +1,349 @@
+//! The inputs to choose among, each a few numbers.
+
+use crate::signal::{Signal, Slot, Tone};
+use std::f64::consts::PI;
+
+/// A kind of input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// There and back in trapezoids, every other one smaller.
+    Trapezoid,
+    /// Sines one after another, whole periods of each.
+    Sweep,
+    /// A sine whose frequency rises or falls steadily.
+    Chirp,
+    /// A sum of sines.
+    Multisine,
+    /// A pseudo-random binary sequence.
+    Prbs,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Kind; 5] = [Kind::Trapezoid, Kind::Sweep, Kind::Chirp, Kind::Multisine, Kind::Prbs];
+
+    /// In a word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Trapezoid => "trapezoid",
+            Self::Sweep => "sweep",
+            Self::Chirp => "chirp",
+            Self::Multisine => "multisine",
+            Self::Prbs => "prbs",
+        }
+    }
+
+    /// Numbers that a search varies, the amplitude first.
+    pub(super) fn numbers(self) -> usize {
+        match self {
+            Self::Trapezoid | Self::Sweep => 5,
+            Self::Multisine => 4,
+            Self::Chirp | Self::Prbs => 3,
+        }
+    }
+}
+
+/// The room that a search has.
+pub(super) struct Room {
+    /// Greatest input, V or A.
+    pub input: f64,
+    /// Length, s.
+    pub duration: f64,
+    /// Lowest and highest frequency, Hz.
+    pub frequencies: [f64; 2],
+}
+
+/// Share of an experiment at its end in which the input is zero: how the axis comes to rest is seen, too.
+const REST: f64 = 0.08;
+
+/// Most trapezoids there and back, sines of a sweep, and sines of a multisine.
+const CYCLES: f64 = 8.0;
+const SINES: f64 = 8.0;
+const TONES: f64 = 20.0;
+
+/// Most bits of a binary sequence.
+const BITS: f64 = 400.0;
+
+/// An input of a kind, its numbers rounded to what is written.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Shape {
+    /// From zero in `ramp` to ± `amplitude`, held for `hold`, back in `ramp`, nothing for `rest`; forward, then
+    /// backward, so often.
+    Trapezoid {
+        /// Greatest value.
+        amplitude: f64,
+        /// s.
+        ramp: f64,
+        /// s.
+        hold: f64,
+        /// s.
+        rest: f64,
+        /// Of every other time there and back, the share of the amplitude.
+        ratio: f64,
+        /// Times there and back.
+        cycles: usize,
+    },
+    /// Sines from one frequency to the other, equally far apart in their logarithm.
+    Sweep {
+        /// Of the greatest.
+        amplitude: f64,
+        /// Hz.
+        from: f64,
+        /// Hz.
+        to: f64,
+        /// How many.
+        sines: usize,
+        /// Amplitude ∝ frequency to this power.
+        tilt: f64,
+        /// About how long each lasts, s.
+        each: f64,
+    },
+    /// A sine whose frequency changes steadily.
+    Chirp {
+        /// Peak.
+        amplitude: f64,
+        /// Hz.
+        from: f64,
+        /// Hz.
+        to: f64,
+        /// s.
+        over: f64,
+    },
+    /// Equal sines with Schroeder's phases.
+    Multisine {
+        /// Of each.
+        amplitude: f64,
+        /// Hz.
+        from: f64,
+        /// Hz.
+        to: f64,
+        /// How many.
+        tones: usize,
+        /// s.
+        lasts: f64,
+    },
+    /// ± `amplitude`.
+    Prbs {
+        /// Height.
+        amplitude: f64,
+        /// Length of a bit, s.
+        bit: f64,
+        /// Which sequence.
+        seed: u64,
+        /// s.
+        lasts: f64,
+    },
+}
+
+/// To four digits.
+fn round(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}
+
+/// Between two positive numbers, on a logarithmic scale.
+fn between(share: f64, low: f64, high: f64) -> f64 {
+    low * (high / low).max(1.0).powf(share)
+}
+
+impl Shape {
+    /// That of a kind at a point of the unit cube.
+    pub(super) fn at(kind: Kind, share: &[f64], room: &Room) -> Self {
+        let &Room { input, duration, frequencies: [low, high] } = room;
+        let busy = duration * (1.0 - REST);
+        let amplitude = round(between(share[0], 0.05 * input, input));
+        let frequency = |share: f64| round(between(share, low, high));
+        let apart = |a: f64, b: f64| if a < b { (a, b) } else { (b, round(a.max(b * 1.05))) };
+        match kind {
+            Kind::Trapezoid => {
+                let cycles = between(share[1], 1.0, CYCLES).round();
+                let half = busy / (2.0 * cycles);
+                let (ramp, rest) = (0.45 * between(share[2], 0.002, 1.0), 0.6 * share[3]);
+                let [ramp, rest] = [round(ramp * half * (1.0 - rest)), round(rest * half)];
+                let hold = round(half - rest - 2.0 * ramp);
+                let ratio = round(0.2 + 0.8 * share[4]);
+                Self::Trapezoid { amplitude, ramp, hold, rest, ratio, cycles: cycles as usize }
+            }
+            Kind::Sweep => {
+                let sines = between(share[3], 1.0, SINES).round();
+                let (from, to) = (frequency(share[1]), frequency(share[2]));
+                let each = round(busy / sines);
+                Self::Sweep { amplitude, from, to, sines: sines as usize, tilt: round(share[4]), each }
+            }
+            Kind::Chirp => {
+                Self::Chirp { amplitude, from: frequency(share[1]), to: frequency(share[2]), over: round(busy) }
+            }
+            Kind::Multisine => {
+                let (from, to) = apart(frequency(share[1]), frequency(share[2]));
+                let tones = between(share[3], 2.0, TONES).round() as usize;
+                Self::Multisine { amplitude, from, to, tones, lasts: round(busy) }
+            }
+            Kind::Prbs => {
+                let least = (0.5 / high).max(duration / BITS);
+                let bit = round(between(share[1], least, 0.25 * duration));
+                let seed = 1 + (share[2] * 9.0).floor() as u64;
+                Self::Prbs { amplitude, bit, seed, lasts: round(busy) }
+            }
+        }
+    }
+
+    /// Its kind.
+    pub fn kind(&self) -> Kind {
+        match self {
+            Self::Trapezoid { .. } => Kind::Trapezoid,
+            Self::Sweep { .. } => Kind::Sweep,
+            Self::Chirp { .. } => Kind::Chirp,
+            Self::Multisine { .. } => Kind::Multisine,
+            Self::Prbs { .. } => Kind::Prbs,
+        }
+    }
+
+    /// The same with another amplitude.
+    pub(super) fn scaled(mut self, factor: f64) -> Self {
+        match &mut self {
+            Self::Trapezoid { amplitude, .. }
+            | Self::Sweep { amplitude, .. }
+            | Self::Chirp { amplitude, .. }
+            | Self::Multisine { amplitude, .. }
+            | Self::Prbs { amplitude, .. } => *amplitude = round(*amplitude * factor),
+        }
+        self
+    }
+
+    /// Times and values of the corners of a trapezoid.
+    pub(super) fn corners(&self) -> Vec<[f64; 2]> {
+        let &Self::Trapezoid { amplitude, ramp, hold, rest, ratio, cycles } = self else { return Vec::new() };
+        let (mut points, mut t) = (vec![[0.0, 0.0]], 0.0);
+        for half in 0..2 * cycles {
+            let size = if half / 2 % 2 == 0 { amplitude } else { round(amplitude * ratio) };
+            let value = if half % 2 == 0 { size } else { -size };
+            for (takes, next) in [(ramp, value), (hold, value), (ramp, 0.0), (rest, 0.0)] {
+                if takes > 0.0 {
+                    t = format!("{:.6}", t + takes).parse().unwrap_or(t + takes);
+                    points.push([t, next]);
+                }
+            }
+        }
+        points
+    }
+
+    /// The sines of a sweep: amplitude, frequency, how long.
+    pub(super) fn sines(&self) -> Vec<[f64; 3]> {
+        let &Self::Sweep { amplitude, from, to, sines, tilt, each } = self else { return Vec::new() };
+        let most = from.max(to);
+        let one = |k: usize| {
+            let share = if sines > 1 { k as f64 / (sines - 1) as f64 } else { 0.0 };
+            let frequency = round(from * (to / from).powf(share));
+            let periods = (each * frequency).round().max(1.0);
+            [round(amplitude * (frequency / most).powf(tilt)), frequency, round(periods / frequency)]
+        };
+        let mut left = each * sines as f64 * 1.02;
+        let mut all = (0..sines).map(one).collect::<Vec<_>>();
+        // Slow sines that last longer than their share push the last ones out.
+        all.retain(|[_, _, lasts]| {
+            left -= lasts;
+            left >= 0.0
+        });
+        all
+    }
+
+    /// As an input of the solver.
+    pub fn signal(&self) -> Signal {
+        let ended = |signal: Signal, lasts: f64| {
+            let nothing = Slot { signal: Signal::Step { value: 0.0, at: 0.0 }, lasts: f64::INFINITY };
+            Signal::sequence(vec![Slot { signal, lasts }, nothing])
+        };
+        match *self {
+            Self::Trapezoid { .. } => Signal::Table { points: self.corners() },
+            Self::Sweep { .. } => {
+                let slot = |[amplitude, frequency, lasts]: [f64; 3]| Slot {
+                    signal: Signal::Sine { amplitude, frequency, phase: 0.0, offset: 0.0 },
+                    lasts,
+                };
+                let mut slots: Vec<Slot> = self.sines().into_iter().map(slot).collect();
+                slots.push(Slot { signal: Signal::Step { value: 0.0, at: 0.0 }, lasts: f64::INFINITY });
+                Signal::sequence(slots)
+            }
+            Self::Chirp { amplitude, from, to, over } => Signal::Chirp { amplitude, from, to, over },
+            Self::Multisine { amplitude, from, to, tones, lasts } => {
+                let n = tones as f64;
+                let tone = |i: usize| {
+                    let k = (i + 1) as f64;
+                    let frequency = from + (to - from) * i as f64 / (n - 1.0);
+                    // φ_k = −π k (k − 1) / N, as the case file has them
+                    Tone { amplitude, frequency, phase: -PI * k * (k - 1.0) / n }
+                };
+                ended(Signal::Multisine { tones: (0..tones).map(tone).collect() }, lasts)
+            }
+            Self::Prbs { amplitude, bit, seed, lasts } => ended(Signal::Prbs { amplitude, bit, seed }, lasts),
+        }
+    }
+
+    /// As the case file has it; `unit` is that of the amplifier's input.
+    pub fn toml(&self, unit: &str) -> String {
+        match *self {
+            Self::Trapezoid { .. } => {
+                let points: Vec<String> = self.corners().iter().map(|[t, u]| format!("[{t}, {u}]")).collect();
+                let lines: Vec<String> = points.chunks(5).map(|points| format!("    {}", points.join(", "))).collect();
+                format!("{{ table = [\n{},\n] }}", lines.join(",\n"))
+            }
+            Self::Sweep { .. } => {
+                let one = |[amplitude, frequency, lasts]: [f64; 3]| {
+                    format!(
+                        "    {{ sine = \"{amplitude} {unit}\", frequency = \"{frequency} Hz\", lasts = \"{lasts} s\" }},\n"
+                    )
+                };
+                format!("{{ sequence = [\n{}] }}", self.sines().into_iter().map(one).collect::<String>())
+            }
+            Self::Chirp { amplitude, from, to, over } => format!(
+                "{{ chirp = \"{amplitude} {unit}\", from = \"{from} Hz\", to = \"{to} Hz\", over = \"{over} s\" }}"
+            ),
+            Self::Multisine { amplitude, from, to, tones, lasts } => format!(
+                "{{ sequence = [\n    {{ multisine = \"{amplitude} {unit}\", from = \"{from} Hz\", to = \"{to} Hz\", \
+                 tones = {tones}, lasts = \"{lasts} s\" }},\n] }}"
+            ),
+            Self::Prbs { amplitude, bit, seed, lasts } => format!(
+                "{{ sequence = [\n    {{ prbs = \"{amplitude} {unit}\", bit = \"{bit} s\", seed = {seed}, lasts = \"{lasts} s\" }},\n] }}"
+            ),
+        }
+    }
+
+    /// In words.
+    pub fn words(&self, unit: &str) -> String {
+        let shown = |value: f64, unit: &str| crate::number::engineering_typed(value, unit, 3);
+        match *self {
+            Self::Trapezoid { amplitude, ramp, hold, ratio, cycles, .. } => {
+                let times = if cycles == 1 { "once".to_string() } else { format!("{cycles} times") };
+                let other = match cycles {
+                    1 => String::new(),
+                    _ => format!(", every other one with {:.0} % of it", 100.0 * ratio),
+                };
+                format!(
+                    "trapezoids there and back, {times}: {} in {}, held for {}{other}",
+                    shown(amplitude, unit),
+                    shown(ramp, "s"),
+                    shown(hold, "s")
+                )
+            }
+            Self::Sweep { amplitude, .. } => {
+                let sines: Vec<String> = self.sines().iter().map(|[_, f, _]| shown(*f, "Hz")).collect();
+                format!("sines one after another, {} at most: {}", shown(amplitude, unit), sines.join(", "))
+            }
+            Self::Chirp { amplitude, from, to, over } => format!(
+                "a sine of {} from {} to {} in {}",
+                shown(amplitude, unit),
+                shown(from, "Hz"),
+                shown(to, "Hz"),
+                shown(over, "s")
+            ),
+            Self::Multisine { amplitude, from, to, tones, .. } => format!(
+                "{tones} sines of {} at once, from {} to {}",
+                shown(amplitude, unit),
+                shown(from, "Hz"),
+                shown(to, "Hz")
+            ),
+            Self::Prbs { amplitude, bit, .. } => {
+                format!("a pseudo-random binary sequence of ± {}, {} a bit", shown(amplitude, unit), shown(bit, "s"))
+            }
+        }
+    }
+}
