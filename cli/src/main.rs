@@ -18,6 +18,7 @@ mod progress;
 mod shape;
 mod show;
 mod simulate;
+mod studio;
 mod sweep;
 mod terminal;
 mod tune;
@@ -46,6 +47,7 @@ fn main() -> ExitCode {
         Command::Sweep(args) => sweep::run(&args),
         Command::Modes(args) => modes::run(&args),
         Command::Frf(args) => frf::run(&args),
+        Command::Studio(args) => studio::run(&args),
         Command::Schema(args) => manual::schema(&args),
         Command::Completions(args) => manual::completions(&args),
         Command::Man(args) => manual::run(&args),

@@ -1,0 +1,29 @@
+// @ts-check
+// A state as a link: everything stands behind the `#`, which browsers keep to themselves.
+
+/** @param {Uint8Array} bytes @param {"compress"|"expand"} way @returns {Promise<Uint8Array>} */
+async function through(bytes, way) {
+  const stream = way === "compress" ? new CompressionStream("deflate-raw") : new DecompressionStream("deflate-raw");
+  return new Uint8Array(await new Response(new Blob([/** @type {BlobPart} */ (bytes)]).stream().pipeThrough(stream)).arrayBuffer());
+}
+
+/** The fragment of a state. @param {Object} state @returns {Promise<string>} */
+export async function fragment(state) {
+  const bytes = await through(new TextEncoder().encode(JSON.stringify(state)), "compress");
+  let text = "";
+  for (const byte of bytes) text += String.fromCharCode(byte);
+  return "#state=" + btoa(text).replace(/\+/g, "-").replace(/\//g, "_").replace(/=+$/, "");
+}
+
+/** The state of a fragment; null where it holds none that can be read. @param {string} hash @returns {Promise<any>} */
+export async function stateOf(hash) {
+  const found = /[#&]state=([\w-]+)/.exec(hash);
+  if (!found) return null;
+  try {
+    const text = atob(found[1].replace(/-/g, "+").replace(/_/g, "/"));
+    const bytes = await through(Uint8Array.from(text, c => c.charCodeAt(0)), "expand");
+    return JSON.parse(new TextDecoder().decode(bytes));
+  } catch {
+    return null;
+  }
+}

@@ -1,0 +1,1 @@
+//! The studio as a server: who is let in, what is refused, how it ends.
