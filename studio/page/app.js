@@ -54,6 +54,27 @@ export class App {
     this.sent = 0;
     this.needsDescription = true;
     this.lastEdit = 0;
+    /** The run that is on the screen. @type {Answer | null} */
+    this.drawn = null;
+    /** Tells those who do not see the page; `main.js` says how. @type {(text: string) => void} */
+    this.say = () => {};
+    /** Tells everyone, what is grave until the next word. @type {(text: string, isGrave?: boolean) => void} */
+    this.notify = () => {};
+    /** Goes to a view. @type {(key: string) => void} */
+    this.show = () => {};
+  }
+
+  /** Plays, or pauses. */
+  play() {
+    this.isPlaying = !this.isPlaying;
+    if (this.isPlaying && this.cursor >= this.until) this.cursor = 0;
+    this.tell("play");
+  }
+
+  /** What a link holds. */
+  snapshot() {
+    const {text, name, experiment, view, cursor, window, factor, rate} = this;
+    return {text, name, experiment, view, cursor, window, factor, rate};
   }
 
   /** @param {What} what @param {() => void} listener */

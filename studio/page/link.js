@@ -1,10 +1,26 @@
 // @ts-check
 // A state as a link: everything stands behind the `#`, which browsers keep to themselves.
 
+/** Bytes of a state at most: a link is from anywhere, and a few of its letters can mean gigabytes. */
+const MOST = 4 << 20;
+
 /** @param {Uint8Array} bytes @param {"compress"|"expand"} way @returns {Promise<Uint8Array>} */
 async function through(bytes, way) {
   const stream = way === "compress" ? new CompressionStream("deflate-raw") : new DecompressionStream("deflate-raw");
-  return new Uint8Array(await new Response(new Blob([/** @type {BlobPart} */ (bytes)]).stream().pipeThrough(stream)).arrayBuffer());
+  const reader = new Blob([/** @type {BlobPart} */ (bytes)]).stream().pipeThrough(stream).getReader();
+  const parts = [];
+  let length = 0;
+  for (;;) {
+    const {done, value} = await reader.read();
+    if (done) break;
+    parts.push(value);
+    length += value.length;
+    if (length > MOST) throw new Error("this state is too long");
+  }
+  const whole = new Uint8Array(length);
+  let at = 0;
+  for (const part of parts) { whole.set(part, at); at += part.length; }
+  return whole;
 }
 
 /** The fragment of a state. @param {Object} state @returns {Promise<string>} */

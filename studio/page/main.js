@@ -12,7 +12,7 @@ import * as tour from "./tour.js";
 /** Each view has a key, a name, and a function that makes it once; it listens to the app for the rest. */
 const VIEWS = [motion, modes, gallery, tour];
 
-const app = /** @type {any} */ (new App());
+const app = new App();
 /** For tests, and for the curious. */
 /** @type {any} */ (window).studio = app;
 const find = id => /** @type {any} */ (document.getElementById(id));
@@ -53,15 +53,10 @@ app.show = key => {
   }
   app.tell("view");
 };
-app.play = () => {
-  app.isPlaying = !app.isPlaying;
-  if (app.isPlaying && app.cursor >= app.until) app.cursor = 0;
-  app.tell("play");
-};
-
 // ---- The case
 
 app.on("run", () => {
+  if (!app.run) return;
   find("title").textContent = app.run.head.title;
   document.title = `${app.run.head.title} · taut studio`;
 });
@@ -79,7 +74,8 @@ find("reset").onclick = () => app.reset();
 const act = (id, work) => {
   find(id).addEventListener("click", async () => {
     find("menu").open = false;
-    try { await work(); } catch (error) {
+    try { await work(); } catch (caught) {
+      const error = /** @type {Error} */ (caught);
       const {what, next} = error instanceof Mistake ? error.mistake : {what: error.message, next: ""};
       app.notify([what, next].filter(Boolean).join("; "), true);
     }
@@ -97,12 +93,13 @@ act("report", async () => {
   download(`${fileName(app.name.replace(/\.toml$/, ""))}-report.html`, head.html, "text/html");
 });
 act("csv", () => {
+  if (!app.run) return;
   const {columns} = app.run, names = [...columns.keys()];
   let text = names.join(",") + "\n";
-  for (let i = 0; i < columns.get("time").length; i++) text += names.map(name => columns.get(name)[i]).join(",") + "\n";
+  const values = [...columns.values()];
+  for (let i = 0; i < values[0].length; i++) text += values.map(column => column[i]).join(",") + "\n";
   download(`${fileName(app.run.head.title)}.csv`, text, "text/csv");
 });
-app.snapshot = () => ({text: app.text, name: app.name, experiment: app.experiment, view: app.view, cursor: app.cursor, window: app.window, factor: app.factor, rate: app.rate});
 act("link", async () => {
   const hash = await fragment(app.snapshot());
   history.replaceState(null, "", hash);

@@ -37,7 +37,6 @@ function sides(root, app) {
     panel.hidden = k !== chosen;
     tabs[k].setAttribute("aria-selected", String(k === chosen));
     tabs[k].tabIndex = k === chosen ? 0 : -1;
-    if (k === chosen) app.side = panels[k].key;
   });
   const list = element("div", {role: "tablist", "aria-label": "The case", onkeydown: event => {
     const now = tabs.indexOf(event.target), next = {ArrowRight: now + 1, ArrowLeft: now - 1}[event.key];
@@ -114,7 +113,10 @@ function bar(app) {
 class Stage {
   /** @param {HTMLElement} root @param {App} app */
   constructor(root, app) {
-    Object.assign(this, {root, app, shape: "", frame: 0});
+    this.root = root;
+    this.app = app;
+    this.shape = "";
+    this.frame = 0;
     /** @type {import("./stage.js").Drawing | null} */
     this.drawing = null;
     /** @type {import("./stage.js").Extent | null} */

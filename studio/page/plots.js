@@ -93,7 +93,7 @@ class Plot {
     this.isStates = panel.key === "state";
     /** @type {{low: number, high: number} | null} */
     this.range = null;
-    /** @type {{x: number, window: [number, number], pans: boolean} | null} */
+    /** @type {{x: number, to?: number, window: [number, number], pans: boolean} | null} */
     this.press = null;
     this.canvas = element("canvas", {"aria-hidden": "true"});
     this.over = element("canvas", {class: "over", "aria-hidden": "true"});
@@ -355,8 +355,8 @@ class Plot {
 
   drawCursor() {
     const {app, colours} = this.plots, pen = this.pen(this.over), x = this.across(app.cursor);
-    const box = this.press && !this.press.pans && this.press.to !== undefined ? this.press : null;
-    if (box) {
+    const box = this.press;
+    if (box && !box.pans && box.to !== undefined) {
       pen.fillStyle = colours.blue;
       pen.globalAlpha = 0.12;
       pen.fillRect(Math.min(box.x, box.to), TOP, Math.abs(box.to - box.x), this.height - TOP - BOTTOM);
