@@ -2,6 +2,7 @@
 
 mod case;
 mod curves;
+mod friction;
 mod gallery;
 mod modes;
 mod open;
