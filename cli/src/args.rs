@@ -25,6 +25,7 @@ const STATUS: &str = "\
 Start with:
   taut init axis.toml
   taut simulate axis.toml --out results
+  taut studio axis.toml
 
 Exit status: 0 done, 1 the work could not be done or its result is not to be relied on,
 2 the input was wrong, 130 ended by Ctrl-C.";
@@ -44,6 +45,7 @@ pub enum Command {
     Modes(Modes),
     Frf(Frf),
     Design(Design),
+    Studio(Studio),
     Schema(Schema),
     Completions(Completions),
     Man(Man),
@@ -65,7 +67,7 @@ impl Command {
             Self::Modes(args) => args.common.json,
             Self::Frf(args) => args.common.json,
             Self::Design(args) => args.common.json,
-            Self::Init(_) | Self::Schema(_) | Self::Completions(_) | Self::Man(_) => false,
+            Self::Init(_) | Self::Studio(_) | Self::Schema(_) | Self::Completions(_) | Self::Man(_) => false,
         }
     }
 }
@@ -79,6 +81,26 @@ impl Command {
 pub struct Paper {
     #[command(flatten)]
     pub common: Common,
+}
+
+/// Open a page in the browser where the axis is alive: seen, dragged, compared.
+///
+/// Serves this computer alone, until Ctrl-C ends it. The first line printed is the address of the page, with the token
+/// that lets a browser in.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  taut studio\n  taut studio axis.toml\n  taut studio axis.toml --port 8080 --no-open"
+)]
+pub struct Studio {
+    /// The case file, which the page can save; or a link that a studio gave
+    #[arg(value_name = "CASE|LINK")]
+    pub case: Option<String>,
+    /// Port of the server; a free one if not said
+    #[arg(long, value_name = "N")]
+    pub port: Option<u16>,
+    /// Do not open a browser
+    #[arg(long)]
+    pub no_open: bool,
 }
 
 /// Print the JSON Schema of the case file or of a result, so that editors complete and check.

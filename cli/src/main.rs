@@ -19,6 +19,7 @@ mod progress;
 mod shape;
 mod show;
 mod simulate;
+mod studio;
 mod sweep;
 mod terminal;
 mod tune;
@@ -48,6 +49,7 @@ fn main() -> ExitCode {
         Command::Modes(args) => modes::run(&args),
         Command::Frf(args) => frf::run(&args),
         Command::Design(args) => design::run(&args),
+        Command::Studio(args) => studio::run(&args),
         Command::Schema(args) => manual::schema(&args),
         Command::Completions(args) => manual::completions(&args),
         Command::Man(args) => manual::run(&args),

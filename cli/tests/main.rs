@@ -15,6 +15,7 @@ mod paper;
 mod schemas;
 mod shape;
 mod show;
+mod studio;
 mod sweep;
 
 /// A file that is no module here would not be run, and nobody would notice.

@@ -2,10 +2,9 @@
 
 use super::figure::Figure;
 use super::plane::Plane;
-use super::svg::PALETTE;
+use super::svg::{PALETTE, Paint};
 use super::{embed, layout, plot, together};
 use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
-use std::fmt::Write;
 use std::path::Path;
 use taut::error::Result;
 use taut::files::write_atomically;
@@ -338,6 +337,11 @@ impl Page {
         self.push(words(markup));
     }
 
+    /// What stands between header and footer, for a page of one's own that has [`style`] and [`script`].
+    pub fn body(&self) -> &str {
+        &self.body
+    }
+
     /// The whole file. Nothing in it asks for another.
     pub fn html(&self) -> String {
         let nav = self.contents.len() >= 4;
@@ -383,23 +387,41 @@ fn words(text: impl Render) -> Markup {
     PreEscaped(together::numbers_and_units(&text.render().into_string()))
 }
 
-/// The script without its indentation and without the lines that are remarks.
-fn script() -> String {
+/// The styles of a page's body within an element of the class `report`, and the palette; `data-theme` of the root, which
+/// is `light` or `dark`, goes before the system's theme.
+pub fn style() -> String {
+    let palette = format!(
+        ":root{{{0}}}@media screen and (prefers-color-scheme:dark){{:root:not([data-theme=light]){{{1}}}}}\
+         @media screen{{:root[data-theme=dark]{{{1}}}}}{2}",
+        variables(|paint| paint.light),
+        variables(|paint| paint.dark),
+        classes()
+    );
+    format!("{palette}.report{{{}}}", include_str!("page.css"))
+}
+
+/// The script without its indentation and without the lines that are remarks. It brings the figures of its document to
+/// life; those that come later, by `tautFigures(element)`.
+pub fn script() -> String {
     let lines = include_str!("plot.js").lines().map(str::trim_start);
     lines.filter(|line| !line.is_empty() && !line.starts_with("//")).flat_map(|line| [line, "\n"]).collect()
 }
 
 /// The palette as variables for both themes, paper always light, and the classes that pictures use.
 fn colours() -> String {
-    let list = |pick: fn(&super::svg::Paint) -> &'static str| -> String {
-        PALETTE.iter().map(|p| format!("--{}:{};", p.class, pick(p))).collect()
-    };
-    let (light, dark) = (list(|p| p.light), list(|p| p.dark));
-    let mut css = format!(":root{{{light}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}");
-    for p in &PALETTE {
-        let _ = write!(css, ".s-{0}{{stroke:var(--{0})}}.f-{0}{{fill:var(--{0})}}", p.class);
-    }
-    css
+    let (light, dark) = (variables(|paint| paint.light), variables(|paint| paint.dark));
+    format!(":root{{{light}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}{}", classes())
+}
+
+fn variables(pick: fn(&Paint) -> &'static str) -> String {
+    PALETTE.iter().map(|paint| format!("--{}:{};", paint.class, pick(paint))).collect()
+}
+
+fn classes() -> String {
+    PALETTE
+        .iter()
+        .map(|p| format!(".s-{0}{{stroke:var(--{0})}}.f-{0}{{fill:var(--{0})}}.t-{0}{{color:var(--{0})}}", p.class))
+        .collect()
 }
 
 /// A picture without its own style sheet: on a page, the page's applies.

@@ -193,6 +193,8 @@ class Plot {
     if (axis !== undefined) linked.set(axis, this.siblings);
     this.siblings.push(this);
     figure.classList.add("live");
+    // A picture with switches in it is no picture any more.
+    this.svg.setAttribute("role", "group");
     this.listen();
     if (this.stage.clientWidth) this.draw();
     seen.observe(figure);
@@ -427,7 +429,7 @@ class Plot {
       .map(({u, v, series}) => `<circle class="f-${series.colour} s-paper" cx="${pixels(u)}" cy="${pixels(v)}" r="3.6" stroke-width="1.4"/>`);
     const last = L.panels[L.panels.length - 1], x = pixels(this.across(at));
     this.over(svgPath(`M${x} ${L.panels[0].top}V${last.top + last.height}`, "axis", 'stroke-width="1"') + dots.join(""));
-    const row = ({series, P, y}) => `<div><i style="color:var(--${series.colour})"></i>`
+    const row = ({series, P, y}) => `<div><i class="t-${series.colour}"></i>`
       + `${escaped(series.name || P.panel.label)}<b>${withUnit(y, P.panel.unit)}</b></div>`;
     this.tip.innerHTML = `<div>${escaped(spec.x.label)}<b>${withUnit(at, spec.x.unit)}</b></div>${found.slice(0, 14).map(row).join("")}`;
     this.placeTip();
@@ -624,8 +626,11 @@ class Plot {
   }
 }
 
-for (const figure of document.querySelectorAll("figure.plot")) {
-  // A figure that cannot be brought to life stays the picture that it is.
-  try { figure.plot = new Plot(figure); } catch (error) { console.error(error); }
+// Brings what is below an element to life. A figure where that fails stays the picture that it is.
+function bring(root) {
+  for (const figure of root.querySelectorAll("figure.plot:not(.live)"))
+    try { figure.plot = new Plot(figure); } catch (error) { console.error(error); }
 }
+bring(document);
+window.tautFigures = bring;
 })();

@@ -1,7 +1,7 @@
 //! The value of a case under a key: the other direction of `--set`.
 
 use super::tree::{Kind, Node, Source};
-use super::{Case, GantryCase, set};
+use super::{Case, GantryCase, Opened, set};
 use crate::error::{Error, Result};
 use crate::parameter::{self, Fallback, Parameter};
 use crate::quantity;
@@ -141,4 +141,130 @@ fn row(section: &str) -> Option<&'static Parameter> {
         let first = rows.next()?;
         rows.all(|other| other.unit == first.unit).then_some(first)
     })
+}
+
+/// A number of a case, with its row in the table of parameters.
+#[derive(Debug, Clone)]
+pub struct Number {
+    /// Its key, as `--set` names it.
+    pub key: String,
+    /// Its row.
+    pub row: &'static Parameter,
+    /// Its SI unit.
+    pub unit: &'static str,
+    /// Its value in SI.
+    pub value: f64,
+    /// How the text has it: none where it is a default that the text does not name, empty for a bare number.
+    pub written: Option<String>,
+}
+
+impl Opened {
+    /// Every number of the case that the table of parameters has: those of its text in the text's order, then the
+    /// machine's numbers that have a default and do not stand there.
+    ///
+    /// ```
+    /// use taut::case::{Opened, TEMPLATE};
+    /// let numbers = Opened::from_text_with("axis.toml", TEMPLATE, &[])?.numbers()?;
+    /// let find = |key: &str| numbers.iter().find(|number| number.key == key).unwrap();
+    /// assert_eq!(find("drive_pulley.radius").value, 0.0194);
+    /// assert_eq!(find("experiment.0.input.for").unit, "s");
+    /// assert!(find("motor.inductance").written.is_none());
+    /// # Ok::<(), taut::Error>(())
+    /// ```
+    pub fn numbers(&self) -> Result<Vec<Number>> {
+        let tree = Source::new(Path::new(""), self.text().to_string()).tree()?;
+        let mut numbers = Vec::new();
+        let machine: &dyn parameter::Numbers = match self {
+            Opened::Axis(case) => {
+                let same = |section: &str| section.to_string();
+                let unit = case.stage.amplifier.mode.unit();
+                collect(&tree, ("", ""), &Rows { input_unit: |_| unit, place: &same }, &mut numbers);
+                &case.stage
+            }
+            Opened::Gantry(case) => {
+                let unit = |section: &str| {
+                    let right = section.split('.').any(|step| step == "right");
+                    case.gantry.amplifiers[usize::from(right)].mode.unit()
+                };
+                collect(&tree, ("", ""), &Rows { input_unit: unit, place: &of_gantry }, &mut numbers);
+                &case.gantry
+            }
+        };
+        let unwritten = parameter::values(machine).into_iter().filter_map(|(key, value)| {
+            let row = machine.row(&key)?;
+            let has_default = matches!(row.default, Fallback::Value(_)) && value.is_finite();
+            let whole = |number: &Number| key.starts_with(&format!("{}.", number.key)) || number.key == key;
+            let sits = matches!(machine.sits(row), parameter::Sits::Machine(..));
+            let is_new = sits && has_default && !numbers.iter().any(whole);
+            is_new.then_some(Number { row, unit: row.unit, value, written: None, key })
+        });
+        let unwritten: Vec<Number> = unwritten.collect();
+        numbers.extend(unwritten);
+        Ok(numbers)
+    }
+}
+
+/// Adds the numbers below `node`, which stands under `key`; `section` is the key without places in lists.
+fn collect<U: Fn(&str) -> &'static str>(
+    node: &Node,
+    (key, section): (&str, &str),
+    rows: &Rows<U>,
+    numbers: &mut Vec<Number>,
+) {
+    let below = |key: &str, step: &str| if key.is_empty() { step.to_string() } else { format!("{key}.{step}") };
+    match &node.kind {
+        Kind::Table(entries) => {
+            // Keys in quotes name experiments and parameters of plans: they are no numbers of a machine.
+            let is_bare = |key: &str| key.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-');
+            for entry in entries.iter().filter(|entry| is_bare(&entry.key)) {
+                collect(&entry.node, (&below(key, &entry.key), &below(section, &entry.key)), rows, numbers);
+            }
+        }
+        Kind::List(nodes) | Kind::Tables(nodes) => {
+            for (place, node) in nodes.iter().enumerate() {
+                collect(node, (&below(key, &place.to_string()), section), rows, numbers);
+            }
+        }
+        Kind::Float(_) | Kind::Integer(_) | Kind::Text(_) => {
+            let place = (rows.place)(section);
+            let found = row(&place).or_else(|| row(place.strip_prefix("experiment.")?));
+            let Some(row) = found else { return };
+            let unit = parameter::unit_for(row.unit, (rows.input_unit)(section));
+            let (value, written) = match &node.kind {
+                Kind::Float(value) => (*value, String::new()),
+                Kind::Integer(value) => (*value as f64, String::new()),
+                Kind::Text(text) => match quantity::read(text, unit) {
+                    Ok(value) => (value, text.clone()),
+                    Err(_) => return,
+                },
+                Kind::Bool(_) | Kind::Date | Kind::List(_) | Kind::Tables(_) | Kind::Table(_) => return,
+            };
+            numbers.push(Number { key: key.to_string(), row, unit, value, written: Some(written) });
+        }
+        Kind::Bool(_) | Kind::Date => {}
+    }
+}
+
+impl Number {
+    /// The change that gives it another value, as `--set` takes it: in the unit that the text has, to six digits.
+    ///
+    /// ```
+    /// use taut::case::{Opened, TEMPLATE};
+    /// let case = Opened::from_text_with("axis.toml", &TEMPLATE.replace("0.0194 m", "19.4 mm"), &[])?;
+    /// let radius = case.numbers()?.into_iter().find(|number| number.key == "drive_pulley.radius").unwrap();
+    /// assert_eq!(radius.change(0.02), "drive_pulley.radius=20 mm");
+    /// # Ok::<(), taut::Error>(())
+    /// ```
+    pub fn change(&self, value: f64) -> String {
+        let text = match self.written.as_deref().map(quantity::parse) {
+            _ if self.row.range.whole => quantity::shortest(value.round()),
+            Some(Ok(given)) if !given.unit.is_empty() => {
+                let factor = quantity::conversion(&given.unit).map_or(1.0, |(_, factor)| factor);
+                format!("{} {}", quantity::rounded(value / factor), given.unit)
+            }
+            None if !self.unit.is_empty() => format!("{} {}", quantity::rounded(value), self.unit),
+            _ => quantity::rounded(value),
+        };
+        format!("{}={text}", self.key)
+    }
 }

@@ -23,7 +23,7 @@ mod tune;
 pub use bounds::LARGEST_FILE;
 pub use fit::{Nuisances, Per, Plan, Prior, Scope, matches};
 pub use gantry::{GantryCase, GantryExperiment, Opened};
-pub use get::Given;
+pub use get::{Given, Number};
 pub use motion::Move;
 pub use sweep::{Kinds, Origin, Sampling, Sweeping, Variation};
 pub use template::{TEMPLATE, Template, gantry_template};

@@ -1,4 +1,5 @@
-//! Reports in a browser: made with the program, opened and used in headless Chromium by `report/browser/check.mjs`.
+//! Reports in a browser: made with the program, opened and used in headless Chromium by `report/browser/check.mjs`; and
+//! the studio, by `report/browser/studio.mjs`.
 
 use crate::Counts;
 use std::fs;
@@ -72,10 +73,20 @@ pub fn test(counts: &mut Counts) -> Result<bool, String> {
         }
     }
     let mut check = Command::new("node");
-    check.arg(Path::new(FOLDER).join("check.mjs")).arg(browser).arg(&reports).arg(&shots);
+    check.arg(Path::new(FOLDER).join("check.mjs")).arg(&browser).arg(&reports).arg(&shots);
     let looked = crate::run(check, counts)?;
+    let studio = studio(&taut, &browser, &shots, counts)?;
     println!("pictures of all pages: {}", shots.display());
-    Ok(looked)
+    Ok(looked && studio)
+}
+
+/// The studio: the types of its page, and the page in use.
+fn studio(taut: &Path, browser: &Path, shots: &Path, counts: &mut Counts) -> Result<bool, String> {
+    let mut types = Command::new("node");
+    types.arg(Path::new(FOLDER).join("node_modules/typescript/bin/tsc")).args(["-p", "studio/page/tsconfig.json"]);
+    let mut used = Command::new("node");
+    used.arg(Path::new(FOLDER).join("studio.mjs")).arg(browser).arg(taut).arg(shots);
+    Ok(crate::run(types, counts)? && crate::run(used, counts)?)
 }
 
 /// A spectrum with a peak there, and a smaller one above it, as Klipper writes them.
@@ -101,7 +112,9 @@ fn browser() -> Result<PathBuf, String> {
     if !is_installed() {
         let done = Command::new("npm").args(["ci", "--ignore-scripts", "--silent"]).current_dir(FOLDER).status();
         if !done.is_ok_and(|status| status.success()) {
-            return Err(format!("playwright-core (npm ci in {FOLDER}, from the npm registry)"));
+            return Err(format!(
+                "playwright-core, typescript and axe-core (npm ci in {FOLDER}, from the npm registry)"
+            ));
         }
     }
     let found = || ["chromium", "chromium-browser", "google-chrome"].into_iter().find_map(path_of);

@@ -1,0 +1,563 @@
+//! The studio as a server: who is let in, what is refused or bounded, and how it ends. The page itself is tried in a
+//! browser by `cargo xtask browser`.
+
+use serde_json::{Value, json};
+use std::fs;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A server that runs, and ends with the test.
+struct Studio {
+    child: Child,
+    port: u16,
+    token: String,
+}
+
+impl Drop for Studio {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Studio {
+    fn start(words: &[&str]) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_taut"));
+        command.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+        let mut child = command.arg("studio").args(words).arg("--no-open").stdout(Stdio::piped()).spawn().unwrap();
+        let mut line = String::new();
+        BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
+        let rest = line.strip_prefix("http://127.0.0.1:").unwrap_or_else(|| panic!("the first line is {line}"));
+        let (port, token) = rest.trim().split_once("/?token=").unwrap();
+        Self { child, port: port.parse().unwrap(), token: token.to_string() }
+    }
+
+    fn connect(&self) -> TcpStream {
+        let stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(45))).unwrap();
+        stream
+    }
+
+    fn host(&self) -> String {
+        format!("Host: 127.0.0.1:{}", self.port)
+    }
+
+    fn origin(&self) -> String {
+        format!("Origin: http://127.0.0.1:{}", self.port)
+    }
+
+    /// The answer to a request with these lines of head.
+    fn ask(&self, first: &str, lines: &[&str]) -> String {
+        let mut stream = self.connect();
+        write!(stream, "{first} HTTP/1.1\r\n{}\r\nConnection: close\r\n\r\n", lines.join("\r\n")).unwrap();
+        let mut answer = Vec::new();
+        let _ = stream.read_to_end(&mut answer);
+        String::from_utf8_lossy(&answer).into_owned()
+    }
+
+    /// The cookie that the token is exchanged for.
+    fn cookie(&self) -> String {
+        let answer = self.ask(&format!("GET /?token={}", self.token), &[&self.host()]);
+        let cookie = answer.lines().find_map(|line| line.strip_prefix("set-cookie: ")).unwrap();
+        format!("Cookie: {}", cookie.split(';').next().unwrap())
+    }
+
+    fn page(&self) -> Page {
+        let mut stream = self.connect();
+        let status = handshake(&mut stream, &[&self.host(), &self.origin(), &self.cookie()]);
+        assert_eq!(status, 101);
+        Page { stream, last: 0 }
+    }
+}
+
+/// Asks for a socket; the status of the answer.
+fn handshake(stream: &mut TcpStream, lines: &[&str]) -> u16 {
+    write!(
+        stream,
+        "GET /socket HTTP/1.1\r\n{}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n\
+         Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n",
+        lines.join("\r\n")
+    )
+    .unwrap();
+    let mut head = Vec::new();
+    let mut byte = [0];
+    while !head.ends_with(b"\r\n\r\n") && stream.read(&mut byte).is_ok_and(|n| n == 1) {
+        head.push(byte[0]);
+    }
+    String::from_utf8_lossy(&head).split(' ').nth(1).and_then(|status| status.parse().ok()).unwrap_or(0)
+}
+
+/// A page's socket.
+struct Page {
+    stream: TcpStream,
+    last: u64,
+}
+
+impl Page {
+    /// Sends a masked text frame.
+    fn send_text(&mut self, text: &str) {
+        let mut frame = vec![0x81];
+        match text.len() {
+            n @ 0..126 => frame.push(0x80 | n as u8),
+            n if n < 65536 => frame.extend([0x80 | 126, (n >> 8) as u8, n as u8]),
+            n => {
+                frame.push(0x80 | 127);
+                frame.extend((n as u64).to_be_bytes());
+            }
+        }
+        // A mask of zeros leaves the text as it is.
+        frame.extend([0; 4]);
+        frame.extend(text.bytes());
+        let _ = self.stream.write_all(&frame);
+    }
+
+    /// Asks for something; returns the number of the request.
+    fn ask(&mut self, act: &str, mut body: Value) -> u64 {
+        self.last += 1;
+        body["id"] = json!(self.last);
+        body["do"] = json!(act);
+        self.send_text(&body.to_string());
+        self.last
+    }
+
+    /// The next answer: its head, and its columns.
+    fn answer(&mut self) -> Option<(Value, Vec<Vec<f64>>)> {
+        let (kind, frame) = self.frame()?;
+        if kind != 2 {
+            return None;
+        }
+        let length = u32::from_le_bytes(frame[..4].try_into().unwrap()) as usize;
+        assert_eq!((4 + length) % 8, 0, "columns begin at a multiple of eight bytes");
+        let head: Value = serde_json::from_slice(&frame[4..4 + length]).unwrap();
+        let mut at = 4 + length;
+        let mut columns = Vec::new();
+        for column in head["columns"].as_array().into_iter().flatten() {
+            let rows = column["rows"].as_u64().unwrap() as usize;
+            let bytes = &frame[at..at + 8 * rows];
+            columns.push(bytes.chunks(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect());
+            at += 8 * rows;
+        }
+        assert_eq!(at, frame.len());
+        Some((head, columns))
+    }
+
+    /// Kind and content of the next frame of the server.
+    fn frame(&mut self) -> Option<(u8, Vec<u8>)> {
+        let mut head = [0; 2];
+        self.stream.read_exact(&mut head).ok()?;
+        let length = match head[1] & 0x7f {
+            126 => {
+                let mut more = [0; 2];
+                self.stream.read_exact(&mut more).ok()?;
+                u64::from(u16::from_be_bytes(more))
+            }
+            127 => {
+                let mut more = [0; 8];
+                self.stream.read_exact(&mut more).ok()?;
+                u64::from_be_bytes(more)
+            }
+            n => u64::from(n),
+        };
+        let mut content = vec![0; length as usize];
+        self.stream.read_exact(&mut content).ok()?;
+        Some((head[0] & 0x0f, content))
+    }
+
+    fn result(&mut self, act: &str, body: Value) -> Value {
+        let id = self.ask(act, body);
+        let (head, _) = self.answer().unwrap();
+        assert_eq!(head["id"], json!(id));
+        head
+    }
+}
+
+const TABLE4: &str = "stages/sollmann-jouaneh/table4.toml";
+
+fn text(path: &str) -> String {
+    fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../").to_string() + path).unwrap()
+}
+
+fn status(answer: &str) -> u16 {
+    answer.split(' ').nth(1).and_then(|status| status.parse().ok()).unwrap_or(0)
+}
+
+fn assert_protected(answer: &str) {
+    for head in [
+        "content-security-policy: default-src 'none'",
+        "x-content-type-options: nosniff",
+        "referrer-policy: no-referrer",
+    ] {
+        assert!(answer.contains(head), "no {head} in {answer}");
+    }
+}
+
+#[test]
+fn without_the_token_every_path_is_refused_with_a_page_that_says_where_the_address_is() {
+    let studio = Studio::start(&[TABLE4]);
+    let wrong = format!("/?token={}", "0".repeat(studio.token.len()));
+    for path in ["/", "/index.html", "/main.js", "/report.css", "/nothing", "/socket", "/?token=", "/?token=x", &wrong]
+    {
+        let answer = studio.ask(&format!("GET {path}"), &[&studio.host()]);
+        assert_eq!(status(&answer), 403, "{path}: {answer}");
+        assert!(answer.contains("first line that <code>taut studio</code> printed"), "{answer}");
+        assert!(!answer.contains(&studio.token));
+        assert_protected(&answer);
+    }
+    let answer = studio.ask("POST /upload?name=a", &[&studio.host(), &studio.origin(), "Content-Length: 0"]);
+    assert_eq!(status(&answer), 403);
+    // The cookie of another server, or of none.
+    let other = Studio::start(&[]);
+    for cookie in [other.cookie(), format!("Cookie: taut-studio-{}=", studio.port), "Cookie: ;;=;".into()] {
+        assert_eq!(status(&studio.ask("GET /", &[&studio.host(), &cookie])), 403, "{cookie}");
+    }
+}
+
+#[test]
+fn the_token_is_exchanged_for_a_cookie_with_the_port_in_its_name() {
+    let studio = Studio::start(&[TABLE4]);
+    let answer = studio.ask(&format!("GET /?token={}", studio.token), &[&studio.host()]);
+    assert_eq!(status(&answer), 303);
+    assert!(answer.contains("location: /\r\n"), "{answer}");
+    let cookie = answer.lines().find(|line| line.starts_with("set-cookie")).unwrap();
+    assert!(cookie.contains(&format!("taut-studio-{}=", studio.port)), "{cookie}");
+    assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict") && !cookie.contains(&studio.token));
+    assert_protected(&answer);
+    let cookie = studio.cookie();
+    for (path, wanted) in [("/", 200), ("/main.js", 200), ("/report.js", 200), ("/nothing", 404)] {
+        let answer = studio.ask(&format!("GET {path}"), &[&studio.host(), &cookie]);
+        assert_eq!(status(&answer), wanted, "{path}");
+        assert_protected(&answer);
+    }
+}
+
+#[test]
+fn other_names_and_other_pages_are_refused() {
+    let studio = Studio::start(&[]);
+    let (cookie, port) = (studio.cookie(), studio.port);
+    let wrong_port = port.wrapping_add(1);
+    for host in
+        ["evil.example".into(), format!("evil.example:{port}"), "127.0.0.1".into(), format!("127.0.0.1:{wrong_port}")]
+    {
+        let answer = studio.ask("GET /", &[&format!("Host: {host}"), &cookie]);
+        assert_eq!(status(&answer), 403, "{host}");
+        // With the token, too: that is DNS rebinding.
+        let answer = studio.ask(&format!("GET /?token={}", studio.token), &[&format!("Host: {host}")]);
+        assert_eq!(status(&answer), 403, "{host}");
+    }
+    assert_eq!(status(&studio.ask("GET /", &[&cookie])), 403);
+    for origin in ["http://evil.example", "null", "https://127.0.0.1", &format!("http://127.0.0.1:{wrong_port}")] {
+        let origin = format!("Origin: {origin}");
+        assert_eq!(status(&studio.ask("GET /", &[&studio.host(), &cookie, &origin])), 403, "{origin}");
+        assert_eq!(handshake(&mut studio.connect(), &[&studio.host(), &cookie, &origin]), 403, "{origin}");
+    }
+    // A socket and a file without the word of a browser.
+    assert_eq!(handshake(&mut studio.connect(), &[&studio.host(), &cookie]), 403);
+    let lines = [&*studio.host(), &cookie, "Content-Length: 0"];
+    assert_eq!(status(&studio.ask("POST /upload?name=a", &lines)), 403);
+    let cross = [&*studio.host(), &cookie, &studio.origin(), "Sec-Fetch-Site: cross-site", "Content-Length: 0"];
+    assert_eq!(status(&studio.ask("POST /upload?name=a", &cross)), 403);
+}
+
+#[test]
+fn paths_lead_to_the_page_alone() {
+    let studio = Studio::start(&[]);
+    let cookie = studio.cookie();
+    let paths = [
+        "/../Cargo.toml",
+        "/%2e%2e/Cargo.toml",
+        "//etc/passwd",
+        "/..%2f..%2fetc/passwd",
+        "/main.js/../../x",
+        "/main.js%00",
+    ];
+    for path in paths {
+        assert_eq!(status(&studio.ask(&format!("GET {path}"), &[&studio.host(), &cookie])), 404, "{path}");
+    }
+    for first in ["DELETE /", "PUT /main.js", "POST /"] {
+        let answer = studio.ask(first, &[&studio.host(), &cookie, &studio.origin(), "Content-Length: 0"]);
+        assert_eq!(status(&answer), 405, "{first}");
+    }
+}
+
+#[test]
+fn a_file_that_a_page_sends_stays_in_its_folder_and_goes_with_the_server() {
+    let mut studio = Studio::start(&[]);
+    let cookie = studio.cookie();
+    let mut stream = studio.connect();
+    let head = format!(
+        "POST /upload?name=../../../log.csv HTTP/1.1\r\n{}\r\n{}\r\n{cookie}\r\nContent-Length: 5\r\nConnection: close\r\n\r\n",
+        studio.host(),
+        studio.origin()
+    );
+    stream.write_all(head.as_bytes()).unwrap();
+    stream.write_all(b"a,b\n1").unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    let path = answer.split("\"path\":\"").nth(1).unwrap().split('"').next().unwrap().to_string();
+    assert!(path.ends_with("log.csv") && !path.contains(".."), "{path}");
+    assert_eq!(fs::read_to_string(&path).unwrap(), "a,b\n1");
+    terminate(&mut studio);
+    assert!(!std::path::Path::new(&path).exists());
+}
+
+#[test]
+fn a_body_beyond_the_bound_is_refused_before_it_is_read() {
+    let studio = Studio::start(&[]);
+    let lines = [&*studio.host(), &studio.cookie(), &studio.origin(), "Content-Length: 99999999999"];
+    assert_eq!(status(&studio.ask("POST /upload?name=a", &lines)), 413);
+    let fields = "X: y\r\n".repeat(20_000);
+    let answer = studio.ask("GET /", &[&studio.host(), fields.trim_end()]);
+    assert_eq!(status(&answer), 431, "{answer}");
+}
+
+#[test]
+fn a_slow_client_is_given_up() {
+    let studio = Studio::start(&[]);
+    let cookie = studio.cookie();
+    let mut body = studio.connect();
+    write!(
+        body,
+        "POST /upload?name=a HTTP/1.1\r\n{}\r\n{}\r\n{cookie}\r\nContent-Length: 10\r\n\r\nx",
+        studio.host(),
+        studio.origin()
+    )
+    .unwrap();
+    let mut head = studio.connect();
+    head.write_all(b"GET / HTTP/1.1\r\nHost:").unwrap();
+    let begun = Instant::now();
+    let mut answer = Vec::new();
+    let _ = head.read_to_end(&mut answer);
+    assert!(begun.elapsed() < Duration::from_secs(20), "half a head was waited for {:?}", begun.elapsed());
+    let mut first = [0; 12];
+    body.read_exact(&mut first).unwrap();
+    assert_eq!(&first, b"HTTP/1.1 408");
+}
+
+#[test]
+fn malformed_frames_end_one_socket_and_nothing_else() {
+    let studio = Studio::start(&[]);
+    let frames: [&[u8]; 6] = [
+        &[0x81, 0x05, b'h', b'e', b'l', b'l', b'o'], // without a mask
+        &[0x8f, 0x80, 0, 0, 0, 0],                   // of no known kind
+        &[0xf1, 0x80, 0, 0, 0, 0],                   // with reserved bits
+        &[0x81, 0xff, 0x7f, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0], // of 2^63 bytes
+        &[0x82, 0x81, 0, 0, 0, 0, 7],                // binary
+        &[0x81, 0x82, 0, 0, 0, 0, 0xff, 0xfe],       // not UTF-8
+    ];
+    for frame in frames {
+        let mut page = studio.page();
+        page.stream.write_all(frame).unwrap();
+        while let Some((kind, _)) = page.frame() {
+            assert_eq!(kind, 8, "{frame:x?} is answered");
+        }
+    }
+    let mut page = studio.page();
+    for (text, told) in [
+        ("{", "this message is not JSON"),
+        ("[1]", "no JSON object"),
+        ("{\"id\": -1, \"do\": \"run\"}", "no `id`"),
+        ("{\"id\": 1, \"do\": \"fly\"}", "nothing called \"fly\""),
+        ("{\"id\": 1, \"do\": \"run\"}", "has no text `text`"),
+        ("{\"id\": 1, \"do\": \"run\", \"text\": \"\\u0000\"}", "zero byte"),
+        ("{\"id\": 1, \"do\": \"section\", \"text\": \"\"}", "empty"),
+    ] {
+        page.send_text(text);
+        let (head, _) = page.answer().unwrap();
+        let what = head["error"]["what"].as_str().unwrap_or_default();
+        assert!(what.contains(told), "{text}: {head}");
+    }
+    assert!(page.result("open", json!({}))["text"].is_string());
+}
+
+#[test]
+fn a_run_has_the_json_of_the_command_and_its_columns() {
+    let studio = Studio::start(&[TABLE4]);
+    let mut page = studio.page();
+    let opened = page.result("open", json!({}));
+    assert_eq!(opened["text"].as_str().unwrap(), text(TABLE4));
+    page.ask("run", json!({ "text": opened["text"], "set": [["cart.mass", 0.5]], "describe": true }));
+    let (head, columns) = page.answer().unwrap();
+    assert!(head["text"].as_str().unwrap().contains("mass     = \"0.5 kg\""));
+    assert_eq!(columns[0].len(), 1001);
+    let command = Command::new(env!("CARGO_BIN_EXE_taut"))
+        .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+        .args(["simulate", TABLE4, "--set", "cart.mass=0.5 kg", "--experiment", "5 V pulse", "--json"])
+        .output()
+        .unwrap();
+    let wanted: Value = serde_json::from_slice(&command.stdout).unwrap();
+    assert_eq!(head["result"], wanted);
+    let mass = head["parameters"].as_array().unwrap().iter().find(|one| one["key"] == "cart.mass").unwrap();
+    assert_eq!((&mass["value"], &mass["unit"], &mass["written"]), (&json!(0.5), &json!("kg"), &json!("0.5 kg")));
+    // What is wrong has its line.
+    let wrong = text(TABLE4).replace("mass     =", "masss    =");
+    let error = page.result("run", json!({ "text": wrong }))["error"].clone();
+    assert_eq!((&error["line"], &error["column"]), (&json!(24), &json!(1)), "{error}");
+    assert_eq!(error["next"], "did you mean `mass`?");
+}
+
+#[test]
+fn a_section_goes_through_the_rows_of_the_run() {
+    let studio = Studio::start(&[]);
+    let mut page = studio.page();
+    let cases = [
+        "stages/sollmann-jouaneh/table4.toml",
+        "stages/h-frame/h-frame.toml",
+        "stages/printer-axis/printer-axis.toml",
+        "stages/laser-gantry/laser-gantry.toml",
+    ];
+    for case in cases {
+        page.ask("run", json!({ "text": text(case) }));
+        let (run, rows) = page.answer().unwrap();
+        let last = rows[0].len() / 2;
+        let first = last / 2;
+        let points = 2 * (last - first) + 1;
+        let body = json!({ "text": text(case), "from": rows[0][first], "to": rows[0][last], "points": points });
+        page.ask("section", body);
+        let (section, fine) = page.answer().unwrap();
+        assert_eq!(fine.first().map(Vec::len), Some(points), "{case}: {section}");
+        for (k, column) in run["columns"].as_array().unwrap().iter().enumerate() {
+            let name = column["name"].as_str().unwrap();
+            let size = rows[k].iter().fold(0.0_f64, |size, value| size.max(value.abs()));
+            for row in first..=last {
+                let (a, b) = (rows[k][row], fine[k][2 * (row - first)]);
+                assert!((a - b).abs() <= 1e-7 * size, "{case}: {name} at {}: {a} and {b}", rows[0][row]);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_newest_of_what_waits_is_done_and_each_request_is_answered() {
+    let studio = Studio::start(&[]);
+    let mut page = studio.page();
+    let case = text(TABLE4);
+    for k in 1..=100 {
+        page.ask("run", json!({ "text": case, "set": [["cart.mass", 0.01 * f64::from(k)]] }));
+    }
+    let (mut open, mut last) = (100, Value::Null);
+    while open > 0 {
+        let (head, _) = page.answer().unwrap();
+        open -= 1;
+        if head["id"] == 100 {
+            last = head;
+        }
+    }
+    assert!(last["text"].as_str().unwrap().contains("mass     = \"1 kg\""), "{last}");
+}
+
+/// Work of a page that was closed went on, and kept the threads from the others.
+#[test]
+fn the_work_of_a_closed_page_stops() {
+    let studio = Studio::start(&[]);
+    let long =
+        text(TABLE4).replace("{ pulse = \"5 V\", for = \"0.25 s\" }", "{ sine = \"5 V\", frequency = \"50 Hz\" }");
+    let long = long.replace("until = \"1 s\"", "until = \"1e7 s\"").replace("every = \"1 ms\"", "every = \"0.1 s\"");
+    for _ in 0..10 {
+        let mut page = studio.page();
+        page.ask("run", json!({ "text": long }));
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let begun = Instant::now();
+    let mut page = studio.page();
+    assert!(page.result("run", json!({ "text": text(TABLE4) }))["error"].is_null());
+    assert!(begun.elapsed() < Duration::from_secs(8), "the threads were free after {:?}", begun.elapsed());
+}
+
+#[test]
+fn a_thousand_connections_are_bounded_and_the_server_answers_after_them() {
+    let studio = Studio::start(&[]);
+    let mut open = Vec::new();
+    let mut pages = 0;
+    let lines = [studio.host(), studio.origin(), studio.cookie()];
+    for _ in 0..140 {
+        let mut stream = studio.connect();
+        if handshake(&mut stream, &lines.each_ref().map(String::as_str)) == 101 {
+            pages += 1;
+        }
+        open.push(stream);
+    }
+    assert_eq!(pages, 128);
+    // As many as this process may have, up to a thousand.
+    while open.len() < 1000 {
+        let Ok(stream) = TcpStream::connect(("127.0.0.1", studio.port)) else { break };
+        open.push(stream);
+    }
+    assert!(open.len() > 700, "{} connections", open.len());
+    drop(open);
+    let begun = Instant::now();
+    while status(&studio.ask("GET /", &[&studio.host(), &lines[2]])) != 200 {
+        assert!(begun.elapsed() < Duration::from_secs(10), "no answer after the flood");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+/// Asks the server to end; how long it took, and its exit status.
+fn terminate(studio: &mut Studio) -> (Duration, Option<i32>) {
+    let begun = Instant::now();
+    let asked = Command::new("kill").args(["-TERM", &studio.child.id().to_string()]).status().unwrap();
+    assert!(asked.success());
+    let status = studio.child.wait().unwrap();
+    (begun.elapsed(), status.code())
+}
+
+#[test]
+fn it_ends_within_two_seconds_with_sockets_open_and_work_under_way() {
+    let mut studio = Studio::start(&[TABLE4]);
+    let mut pages: Vec<Page> = (0..5).map(|_| studio.page()).collect();
+    let long = text(TABLE4).replace("until = \"1 s\"", "until = \"1e7 s\"");
+    for page in &mut pages {
+        page.ask("run", json!({ "text": long }));
+    }
+    let half = studio.connect();
+    std::thread::sleep(Duration::from_millis(100));
+    let (took, status) = terminate(&mut studio);
+    assert!(took < Duration::from_secs(2), "it took {took:?}");
+    assert_eq!(status, Some(0));
+    drop(half);
+}
+
+#[test]
+fn the_case_is_saved_whole_and_never_over_what_somebody_else_wrote() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("axis.toml");
+    fs::write(&path, text(TABLE4)).unwrap();
+    let studio = Studio::start(&[path.to_str().unwrap()]);
+    let mut page = studio.page();
+    let heavier = text(TABLE4).replace("0.362 kg", "0.5 kg");
+    assert!(page.result("save", json!({ "text": heavier }))["saved"].is_string());
+    assert_eq!(fs::read_to_string(&path).unwrap(), heavier);
+    fs::write(&path, "# mine\n").unwrap();
+    let error = page.result("save", json!({ "text": heavier }))["error"].clone();
+    let told = "this file was changed by something else since it was opened, and nothing was written";
+    assert_eq!(error["what"], told);
+    assert_eq!(fs::read_to_string(&path).unwrap(), "# mine\n");
+    fs::remove_file(&path).unwrap();
+    let error = page.result("save", json!({ "text": heavier }))["error"].clone();
+    assert_eq!(error["what"], "this file is not there any more, and nothing was written");
+    // Without a case there is no file to write.
+    let error = Studio::start(&[]).page().result("save", json!({ "text": heavier }))["error"].clone();
+    assert_eq!(error["what"], "no case was named on the command line, and the page writes no other file");
+}
+
+#[test]
+fn what_cannot_be_served_is_told() {
+    let run = |words: &[&str]| {
+        let output =
+            Command::new(env!("CARGO_BIN_EXE_taut")).arg("studio").args(words).arg("--no-open").output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    let (status, told) = run(&["nowhere.toml"]);
+    assert_eq!(status, Some(2));
+    assert_eq!(
+        told,
+        "error: nowhere.toml: this case file cannot be read: there is no such file\n  next: check the path, or write a new case \
+         with `taut init`\n"
+    );
+    let other = Studio::start(&[]);
+    let (status, told) = run(&["--port", &other.port.to_string()]);
+    assert_eq!(status, Some(2));
+    assert!(told.starts_with(&format!("error: --port: port {} cannot be taken: ", other.port)), "{told}");
+    assert!(told.ends_with("next: leave --port away for a free one, or name another\n"), "{told}");
+}

@@ -1,0 +1,449 @@
+// Uses the studio in a browser as a person would; cargo xtask browser runs this.
+//
+//   node studio.mjs BROWSER TAUT SHOTS
+//
+// TAUT is the program; it is run in the folder of the project. Pictures go to SHOTS.
+import {spawn} from "node:child_process";
+import {copyFileSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync} from "node:fs";
+import {createRequire} from "node:module";
+import {tmpdir} from "node:os";
+import {join} from "node:path";
+import {chromium} from "playwright-core";
+
+const [program, taut, shots] = process.argv.slice(2);
+mkdirSync(shots, {recursive: true});
+const axe = createRequire(import.meta.url).resolve("axe-core/axe.min.js");
+const TABLE4 = "stages/sollmann-jouaneh/table4.toml";
+
+let passed = 0, failed = 0;
+async function test(name, work) {
+  const pages = [];
+  try {
+    await work(async (...given) => { const page = await open(...given); pages.push(page); return page; });
+    for (const {trouble} of pages) expect(!trouble.length, trouble.join("; "));
+    passed++;
+  } catch (error) {
+    failed++;
+    console.log(`studio: ${name} ... FAILED\n  ${String(error.stack || error).split("\n").slice(0, 6).join("\n  ")}`);
+  }
+  for (const {context} of pages) await context.close();
+}
+function expect(holds, told) {
+  if (!holds) throw new Error(told);
+}
+
+// ---- Servers and pages
+
+const servers = [];
+async function serve(words) {
+  const child = spawn(taut, ["studio", ...words, "--no-open"], {stdio: ["ignore", "pipe", "inherit"]});
+  servers.push(child);
+  const address = await new Promise(done => child.stdout.once("data", data => done(String(data).split("\n")[0])));
+  return {child, address};
+}
+
+const asRoot = process.getuid && process.getuid() === 0;
+const browser = await chromium.launch({executablePath: program, args: ["--disable-background-networking", ...(asRoot ? ["--no-sandbox"] : [])]});
+const common = await serve([TABLE4]);
+
+async function open(address = common.address, options = {}) {
+  const context = await browser.newContext({viewport: {width: 1400, height: 950}, colorScheme: "light", ...options});
+  const page = await context.newPage(), trouble = [];
+  page.on("console", message => { if (["error", "warning"].includes(message.type())) trouble.push("console: " + message.text()); });
+  page.on("pageerror", error => trouble.push("error: " + error.message));
+  const local = url => /^(http|ws):\/\/127\.0\.0\.1:/.test(url) || /^(data|blob):/.test(url);
+  page.on("request", request => { if (!local(request.url())) trouble.push("asked for " + request.url()); });
+  page.on("websocket", socket => { if (!local(socket.url())) trouble.push("asked for " + socket.url()); });
+  await page.goto(address);
+  await page.waitForFunction(() => window.studio && window.studio.run && document.querySelector(".live-plot"), null, {timeout: 15_000});
+  await settled(page);
+  return {page, trouble, context};
+}
+
+const settled = page => page.evaluate(() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done))));
+
+// Until the page shows what was asked for last.
+const quiet = page => page.waitForFunction(() => !window.studio.wire.isBusy, null, {timeout: 15_000}).then(() => settled(page));
+const value = (page, key) => page.evaluate(key => window.studio.parameters.find(one => one.key === key).value, key);
+const picture = (page, panel = "position") => page.evaluate(panel => document.querySelector(`[data-panel="${panel}"] canvas`).toDataURL(), panel);
+const row = (page, key) => page.locator(`.row[data-key="${key}"]`);
+
+// ---- What a person does
+
+await test("loads within a second, shows the machine, its plots and its parameters", async open => {
+  const begun = performance.now(), {page} = await open();
+  const took = performance.now() - begun;
+  // Of a browser that is warm and a server that may be built for debugging, on a busy computer.
+  expect(took < 5000, `the first picture came after ${took} ms`);
+  expect((await page.title()).startsWith("Sollmann & Jouaneh"), await page.title());
+  expect((await page.locator(".live-plot").count()) === 9, `${await page.locator(".live-plot").count()} plots`);
+  expect((await page.locator(".row").count()) > 25, `${await page.locator(".row").count()} parameters`);
+  expect((await page.locator(".stage-box svg .teeth").count()) === 3, "no belt is drawn");
+  expect(/token/.test(page.url()) === false, `the address still holds the token: ${page.url()}`);
+  expect((await page.locator(".glance dt").allInnerTexts()).includes("largest acceleration"), "nothing at a glance");
+});
+
+await test("a drag of a slider simulates, and the last picture is of the last value", async open => {
+  const {page} = await open();
+  const before = await picture(page), slider = row(page, "cart.friction.viscous").locator("input[type=range]");
+  await slider.scrollIntoViewIfNeeded();
+  const box = await slider.boundingBox();
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+  await page.mouse.down();
+  for (let k = 1; k <= 20; k++) await page.mouse.move(box.x + box.width * (0.5 + 0.02 * k), box.y + box.height / 2);
+  await page.mouse.up();
+  await quiet(page);
+  const shown = Number(await row(page, "cart.friction.viscous").locator("input[type=text]").inputValue());
+  expect(shown > 30, `the slider says ${shown}`);
+  expect((await value(page, "cart.friction.viscous")) === shown, `the run has ${await value(page, "cart.friction.viscous")}, the field ${shown}`);
+  expect((await page.evaluate(() => window.studio.text)).includes(`viscous = "${shown} N s/m"`), "the text does not have it");
+  expect((await picture(page)) !== before, "the picture is the old one");
+  await page.click("#undo");
+  await quiet(page);
+  expect((await value(page, "cart.friction.viscous")) === 19.0424, "undo does not undo a whole drag");
+  await page.click("#redo");
+  await quiet(page);
+  expect((await value(page, "cart.friction.viscous")) === shown, "redo does not redo");
+  await page.click("#reset");
+  await quiet(page);
+  expect((await page.evaluate(() => window.studio.text)) === readFileSync(TABLE4, "utf8"), "reset does not bring the case back");
+});
+
+await test("random drags end with the run of the last value", async open => {
+  const {page} = await open();
+  const lost = await page.evaluate(async () => {
+    const app = window.studio;
+    let lost = 0;
+    for (let drag = 0; drag < 60; drag++) {
+      let last = 0;
+      for (let k = 0; k < 1 + (drag * 7) % 13; k++) {
+        last = Number((0.2 + ((drag * 31 + k * 17) % 97) / 60).toPrecision(4));
+        app.drag("cart.mass", last);
+        if (k % 3 === 0) await new Promise(done => setTimeout(done, (drag * 5 + k) % 9));
+      }
+      app.drop();
+      while (app.wire.isBusy) await new Promise(done => setTimeout(done, 2));
+      const value = app.parameters.find(one => one.key === "cart.mass").value;
+      if (value !== last || !app.text.includes(`"${last} kg"`)) lost++;
+    }
+    return lost;
+  });
+  expect(lost === 0, `${lost} of 60 last values are lost`);
+});
+
+await test("a broken case is marked at its line, and the last picture stays", async open => {
+  const {page} = await open();
+  await page.click("#tab-case");
+  const text = await page.locator("#text").inputValue(), before = await page.evaluate(() => window.studio.run.head.text);
+  await page.locator("#text").fill(text.replace("mass     =", "masss    ="));
+  await quiet(page);
+  const told = await page.locator("#mistake").innerText();
+  expect(/Line 24, column 1/.test(told) && /did you mean `mass`/.test(told), told);
+  expect(await page.locator(".line-mark").isVisible(), "no line is marked");
+  expect((await page.evaluate(() => window.studio.run.head.text)) === before, "the picture went");
+  expect((await page.locator("#text").getAttribute("aria-invalid")) === "true", "the field is not called invalid");
+  await page.screenshot({path: join(shots, "studio-mistake.png")});
+  await page.locator("#text").fill(text.replace('"0.362 kg"', '"0.724 kg"'));
+  await quiet(page);
+  expect(!(await page.locator(".line-mark").isVisible()) && (await page.locator("#mistake").innerText()) === "", "the mark stays");
+  expect((await value(page, "cart.mass")) === 0.724, "the slider does not follow the text");
+});
+
+await test("the cursor is shared by the drawing and all plots, and a zoom is computed anew", async open => {
+  const {page} = await open();
+  const cart = () => page.locator(".stage-box svg").getAttribute("aria-label");
+  const at = await cart();
+  await page.locator("#scrub").evaluate(input => { input.value = "2000"; input.dispatchEvent(new Event("input")); });
+  await settled(page);
+  expect((await cart()) !== at, "the drawing does not follow");
+  expect((await page.locator("#clock").innerText()) === "200\u00a0ms", await page.locator("#clock").innerText());
+  const values = await page.locator("[data-panel=position] .value").allInnerTexts();
+  expect(values.every(text => Number(text) > 30), `the values say ${values}`);
+  const area = page.locator("[data-panel=error] .area");
+  await area.scrollIntoViewIfNeeded();
+  const box = await area.boundingBox(), wide = box.width - 78;
+  await page.mouse.move(box.x + 66 + 0.24 * wide, box.y + 60);
+  await page.mouse.down();
+  await page.mouse.move(box.x + 66 + 0.3 * wide, box.y + 60, {steps: 4});
+  await page.mouse.up();
+  await quiet(page);
+  const seen = await page.evaluate(() => [window.studio.window, window.studio.section.columns.get("time").length]);
+  expect(Math.abs(seen[0][0] - 0.24) < 0.01 && Math.abs(seen[0][1] - 0.3) < 0.01 && seen[1] === 2001, JSON.stringify(seen));
+  await page.screenshot({path: join(shots, "studio-zoom.png")});
+  for (let k = 0; k < 6; k++) await page.evaluate(() => { const [a, b] = window.studio.window; window.studio.look([a + 0.4 * (b - a), a + 0.45 * (b - a)]); });
+  await quiet(page);
+  const span = await page.evaluate(() => { const times = window.studio.section.columns.get("time"); return times[times.length - 1] - times[0]; });
+  expect(span < 2e-9 * 1.01 + 1e-9, `far in, the section is ${span} s long`);
+  await page.locator("#all").click();
+  await settled(page);
+  expect((await page.evaluate(() => window.studio.window)) === null, "the whole run does not come back");
+});
+
+await test("it plays, pauses, and is slow down to a microsecond", async open => {
+  const {page} = await open();
+  await page.locator("#rate").selectOption("0.000001");
+  await page.locator("#play").click();
+  await page.waitForFunction(() => window.studio.cursor > 3e-7);
+  const label = await page.locator("#play").getAttribute("aria-label");
+  await page.locator("#play").click();
+  expect(label === "Pause", label);
+  const rows = await page.evaluate(() => window.studio.section && window.studio.section.columns.get("time").length);
+  expect(rows === 2001, "in slow motion nothing is computed finer");
+  const now = await page.evaluate(() => window.studio.cursor);
+  expect(now < 1e-3, `it ran to ${now} s`);
+  await page.waitForTimeout(100);
+  expect((await page.evaluate(() => window.studio.cursor)) === now, "it does not pause");
+});
+
+await test("runs are pinned, compared and unpinned", async open => {
+  const {page} = await open();
+  const before = await picture(page);
+  await page.click("#pin");
+  await page.evaluate(() => { window.studio.drag("cart.mass", 3); window.studio.drop(); });
+  await quiet(page);
+  expect((await page.locator("#unpin").innerText()) === "Unpin 1", "nothing is pinned");
+  const compared = await picture(page, "speed");
+  await page.click("#before");
+  await page.click("#unpin");
+  await settled(page);
+  expect((await picture(page, "speed")) !== compared && compared !== before, "the pictures are the same");
+});
+
+await test("a state is a link that opens elsewhere", async open => {
+  const {page} = await open();
+  await page.evaluate(() => { window.studio.drag("cart.mass", 0.5); window.studio.drop(); window.studio.factor = 1000; });
+  await quiet(page);
+  await page.evaluate(() => { window.studio.look([0.1, 0.2]); });
+  await page.click("#menu summary");
+  await page.click("#link");
+  await page.waitForFunction(() => location.hash.startsWith("#state="));
+  const hash = await page.evaluate(() => location.hash);
+  const other = await serve([]), there = await open(other.address + hash);
+  await quiet(there.page);
+  expect((await value(there.page, "cart.mass")) === 0.5, "the case is another");
+  const state = await there.page.evaluate(() => [window.studio.window, window.studio.factor, window.studio.path]);
+  expect(state[0] && Math.abs(state[0][0] - 0.1) < 1e-9 && state[1] === 1000, JSON.stringify(state));
+  // A link is no file: nothing can be saved.
+  expect(state[2] === "" && !(await there.page.locator("#save").isVisible()), "a linked case can be saved");
+  const broken = await open(common.address + "#state=AAAA");
+  expect((await value(broken.page, "cart.mass")) === 0.362, "a broken link does not open the case");
+});
+
+await test("the case of the command line is saved, and not over what somebody else wrote", async open => {
+  const folder = mkdtempSync(join(tmpdir(), "taut-studio-test-")), path = join(folder, "axis.toml");
+  copyFileSync(TABLE4, path);
+  const {address} = await serve([path]), {page, trouble} = await open(address);
+  await page.evaluate(() => { window.studio.drag("cart.mass", 0.5); window.studio.drop(); });
+  await quiet(page);
+  await page.keyboard.press("Control+s");
+  await page.waitForFunction(() => /Saved/.test(document.querySelector("#notice").textContent));
+  expect(readFileSync(path, "utf8") === readFileSync(TABLE4, "utf8").replace("0.362 kg", "0.5 kg"), "the file is not as it should be");
+  writeFileSync(path, "# mine\n");
+  await page.click("#menu summary");
+  await page.click("#save");
+  await page.waitForFunction(() => /changed by something else/.test(document.querySelector("#notice").textContent));
+  expect(readFileSync(path, "utf8") === "# mine\n", "it was written over");
+  expect(!trouble.length, trouble.join("; "));
+  rmSync(folder, {recursive: true});
+});
+
+await test("the report, the rows and a plot can be kept", async open => {
+  const {page} = await open();
+  const kept = async work => { const [download] = await Promise.all([page.waitForEvent("download"), work()]); return readFileSync(await download.path(), "utf8"); };
+  await page.click("#menu summary");
+  const report = await kept(() => page.click("#report"));
+  expect(report.startsWith("<!DOCTYPE html>") && report.includes("10 V pulse"), report.slice(0, 200));
+  await page.click("#menu summary");
+  const csv = await kept(() => page.click("#csv"));
+  expect(csv.startsWith("time,drive_travel,cart_position") && csv.trim().split("\n").length === 1002, csv.slice(0, 200));
+  const keep = page.locator("[data-panel=position] .keep");
+  await keep.locator("summary").click();
+  const svg = await kept(() => keep.locator("button", {hasText: "SVG"}).click());
+  expect(svg.startsWith("<svg") && svg.includes("<polyline"), svg.slice(0, 200));
+});
+
+await test("gallery, tour and frequencies lead where they say", async open => {
+  const {page} = await open();
+  await page.click("#go-gallery");
+  await page.waitForSelector(".gallery li");
+  const count = await page.locator(".gallery li").count();
+  expect(count === 10, `${count} machines`);
+  await page.screenshot({path: join(shots, "studio-gallery.png")});
+  await page.locator(".gallery button", {hasText: "core-xy/core-xy.toml"}).click();
+  await quiet(page);
+  expect((await page.title()).startsWith("CoreXY"), await page.title());
+  await page.click("#go-modes");
+  await page.waitForSelector("#view-modes h2");
+  await page.click("#go-tour");
+  await page.waitForSelector("#tour-show");
+  for (let stop = 0; ; stop++) {
+    const words = await page.locator(".tour .lead").innerText();
+    expect(words.length > 60, words);
+    for (const button of await page.locator(".tries button").all()) {
+      await button.click();
+      await quiet(page);
+      const state = await page.evaluate(() => [window.studio.view, window.studio.mistake && window.studio.mistake.text, window.studio.pending.size]);
+      expect(state[0] === "motion" && !state[1], `stop ${stop}: ${JSON.stringify(state)}`);
+      await page.click("#go-tour");
+    }
+    if (await page.locator("#tour-next").isDisabled()) { expect(stop === 5, `the tour has ${stop + 1} stops`); break; }
+    await page.click("#tour-next");
+  }
+  await page.evaluate(() => window.studio.show("motion"));
+});
+
+await test("frequencies are those of the case as it is", async open => {
+  const {page} = await open();
+  await page.click("#go-modes");
+  await page.waitForSelector("#view-modes figure.live");
+  const before = await page.locator("#view-modes table").first().innerText();
+  await page.evaluate(() => { window.studio.drag("cart.mass", 2); window.studio.drop(); });
+  await quiet(page);
+  await page.waitForFunction(before => document.querySelector("#view-modes table").innerText !== before, before);
+  await page.screenshot({path: join(shots, "studio-modes.png")});
+});
+
+await test("the keyboard reaches and moves everything", async open => {
+  const {page} = await open();
+  const reached = new Set();
+  await page.keyboard.press("Tab");
+  expect((await page.evaluate(() => document.activeElement.className)) === "skip", "the first stop is not the way to the machine");
+  for (let k = 0; k < 250; k++) {
+    const name = await page.evaluate(() => { const e = document.activeElement; return e.id || e.getAttribute("aria-label") || e.textContent.slice(0, 30); });
+    reached.add(name);
+    await page.keyboard.press("Tab");
+  }
+  for (const name of ["go-tour", "menu", "theme", "tab-parameters", "find", "play", "scrub", "rate", "factor", "experiment", "pin", "Position over time", "Stick and slip over time"])
+    expect(reached.has(name) || (name === "menu" && reached.has("Case")), `${name} is not reached: ${[...reached].join(" | ")}`);
+  await page.locator("[data-panel=speed] .area").focus();
+  for (let k = 0; k < 10; k++) await page.keyboard.press("ArrowRight");
+  await settled(page);
+  const told = await page.locator("#said").innerText();
+  expect(/100 ms: drive r φ₁′ 22\d.*mm\/s, cart x′/.test(told.replace("\u00a0", " ")), told);
+  await page.keyboard.press("+");
+  await quiet(page);
+  expect((await page.evaluate(() => window.studio.window)) !== null, "+ does not zoom");
+  await page.keyboard.press("0");
+  await settled(page);
+  expect((await page.evaluate(() => window.studio.window)) === null, "0 does not go back");
+  await row(page, "cart.mass").locator("input[type=range]").focus();
+  await page.keyboard.press("ArrowRight");
+  await quiet(page);
+  expect((await value(page, "cart.mass")) > 0.362, "an arrow does not move a slider");
+  await page.keyboard.press("Control+z");
+  await quiet(page);
+  expect((await value(page, "cart.mass")) === 0.362, "Ctrl-Z does not undo");
+});
+
+await test("each plot has a name, a description, and its values as a table", async open => {
+  const {page} = await open();
+  const plots = await page.locator(".live-plot").all();
+  for (const plot of plots) {
+    const area = plot.locator(".area");
+    const [name, words] = [await area.getAttribute("aria-label"), await area.getAttribute("aria-description")];
+    expect(name.length > 10 && words.length > 30, `${name}: ${words}`);
+    await plot.locator(".data summary").click();
+    await plot.locator(".data tbody tr").first().waitFor();
+    const rows = await plot.locator(".data tbody tr").count(), heads = await plot.locator(".data th").count();
+    expect(rows === 50 && heads >= 2, `${name}: ${rows} rows of ${heads}`);
+    const cells = await plot.locator(".data td").allInnerTexts();
+    expect(cells.every(text => text.length && text !== "\u2013"), `${name}: an empty cell`);
+    const before = await plot.locator(".value").first().innerText();
+    await area.focus();
+    await page.keyboard.press("End");
+    await settled(page);
+    await page.keyboard.press("Home");
+    await settled(page);
+    expect((await plot.locator(".value").first().innerText()).length > 0, `${name}: no value at the cursor, ${before} before`);
+  }
+  const tree = await page.locator("body").ariaSnapshot();
+  for (const word of ["tablist", "slider \"Time\"", "application \"Position over time\"", "img \"The axis: cart at"]) expect(tree.includes(word), `the tree lacks ${word}`);
+});
+
+for (const [width, height] of [[1400, 950], [820, 1100], [390, 844]]) {
+  for (const colorScheme of ["light", "dark"]) {
+    for (const [name, path] of [["axis", TABLE4], ["gantry", "stages/h-frame/h-frame.toml"]]) {
+      await test(`${name} at ${width} pixels, ${colorScheme}`, async open => {
+        const {page} = await open(common.address, {viewport: {width, height}, colorScheme, hasTouch: width < 500});
+        await page.evaluate(text => window.studio.open(text, {name: "test.toml"}), readFileSync(path, "utf8"));
+        await quiet(page);
+        await page.evaluate(() => window.studio.seek(0.1));
+        await settled(page);
+        await page.screenshot({path: join(shots, `studio-${name}-${width}-${colorScheme}.png`)});
+        await page.screenshot({path: join(shots, `studio-${name}-${width}-${colorScheme}-whole.png`), fullPage: true});
+        const {scroll, wide} = await page.evaluate(() => ({scroll: document.documentElement.scrollWidth, wide: document.documentElement.clientWidth}));
+        expect(scroll <= wide, `scrolls sideways: ${scroll} pixels on ${wide}`);
+      });
+    }
+  }
+}
+
+await test("the theme is chosen, and is all that is remembered", async open => {
+  const {page, context} = await open();
+  const paper = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+  const light = await paper();
+  await page.locator("#theme").selectOption("dark");
+  expect((await paper()) !== light, "nothing changes");
+  await page.evaluate(() => { window.studio.drag("cart.mass", 2); window.studio.drop(); });
+  await quiet(page);
+  await page.reload();
+  await page.waitForFunction(() => window.studio && window.studio.run);
+  expect((await paper()) !== light, "the theme is forgotten");
+  expect((await value(page, "cart.mass")) === 0.362, "the case is remembered");
+  const stored = await page.evaluate(() => [Object.keys(localStorage).join(), Object.keys(sessionStorage).length, document.cookie]);
+  expect(stored[0] === "theme" && stored[1] === 0 && stored[2] === "", JSON.stringify(stored));
+  const {cookies} = await context.storageState();
+  expect(cookies.length === 1 && cookies[0].httpOnly && cookies[0].sameSite === "Strict", JSON.stringify(cookies));
+});
+
+await test("axe finds nothing serious", async open => {
+  // The page's own policy lets no foreign script in, so it is evaluated.
+  for (const colorScheme of ["light", "dark"]) {
+    const {page} = await open(common.address, {colorScheme});
+    await page.evaluate(readFileSync(axe, "utf8"));
+    for (const view of ["motion", "modes", "gallery", "tour"]) {
+      await page.evaluate(view => window.studio.show(view), view);
+      await quiet(page);
+      for (const tab of view === "motion" ? ["parameters", "case", "results"] : [null]) {
+        if (tab) await page.click(`#tab-${tab}`);
+        const found = await page.evaluate(() => window.axe.run({resultTypes: ["violations"]}));
+        const grave = found.violations.filter(one => ["serious", "critical"].includes(one.impact));
+        const told = grave.map(one => `${one.id}: ${one.nodes.slice(0, 3).map(node => node.html.slice(0, 160)).join(" | ")}`);
+        expect(!grave.length, `${view} ${tab || ""}, ${colorScheme}: ${told.join("; ")}`);
+      }
+    }
+  }
+});
+
+await test("two studios and several tabs keep apart", async open => {
+  const other = await serve(["stages/h-frame/h-frame.toml"]);
+  const first = await open(), {page, context} = first;
+  const second = await context.newPage();
+  await second.goto(other.address);
+  await second.waitForFunction(() => window.studio && window.studio.run);
+  const third = await context.newPage();
+  await third.goto(common.address);
+  await third.waitForFunction(() => window.studio && window.studio.run);
+  await page.evaluate(() => { window.studio.drag("cart.mass", 1); window.studio.drop(); });
+  await quiet(page);
+  expect((await value(third, "cart.mass")) === 0.362 && (await second.title()).startsWith("H-frame"), "tabs share a state");
+  await page.reload();
+  await page.waitForFunction(() => window.studio && window.studio.run);
+});
+
+await test("when the server ends, the page says so and keeps its text", async open => {
+  const {address, child} = await serve([TABLE4]), {page, trouble} = await open(address);
+  const begun = Date.now();
+  child.kill("SIGTERM");
+  await new Promise(done => child.once("exit", done));
+  expect(Date.now() - begun < 2000, `it took ${Date.now() - begun} ms to end`);
+  await page.waitForFunction(() => /does not answer/.test(document.querySelector("#notice").textContent));
+  expect((await page.evaluate(() => window.studio.text)).includes("0.362 kg"), "the text went");
+  // The browser itself tells of sockets that find nobody.
+  trouble.length = 0;
+});
+
+await browser.close();
+for (const child of servers) child.kill("SIGTERM");
+console.log(`test result: ${failed ? "FAILED" : "ok"}. ${passed} passed; ${failed} failed; the studio in a browser`);
+process.exit(failed ? 1 : 0);

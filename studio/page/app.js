@@ -1,0 +1,300 @@
+// @ts-check
+// The state of a page: the case text and its history, the run that it gives, what is compared with it, and what is
+// looked at. Views listen and draw; nothing here computes a motion.
+import {Wire, Mistake} from "./wire.js";
+
+/** @typedef {import("./wire.js").Answer} Answer */
+/** @typedef {"run"|"text"|"mistake"|"cursor"|"window"|"compare"|"play"|"opened"|"view"|"theme"} What */
+
+const MOST_UNDO = 200, MOST_PINS = 6;
+
+export class App {
+  constructor() {
+    this.wire = new Wire();
+    /** @type {Map<What, Array<() => void>>} */
+    this.listeners = new Map();
+    this.path = "";
+    this.name = "studio.toml";
+    /** What the case was opened as. */
+    this.original = "";
+    /** The text that changes start from. */
+    this.base = "";
+    /** The text as it is shown. */
+    this.text = "";
+    /** Changes of a drag under way, keys to SI values. @type {Map<string, number>} */
+    this.pending = new Map();
+    /** @type {string[]} */
+    this.past = [];
+    /** @type {string[]} */
+    this.future = [];
+    this.experiment = 0;
+    /** @type {Answer | null} */
+    this.run = null;
+    /** @type {any[]} */
+    this.parameters = [];
+    /** @type {any} what is wrong with the text, with its place */
+    this.mistake = null;
+    /** The run before the last change. @type {Answer | null} */
+    this.before = null;
+    this.showsBefore = true;
+    /** @type {{name: string, answer: Answer}[]} */
+    this.pins = [];
+    /** The part of time that is seen; null for all. @type {[number, number] | null} */
+    this.window = null;
+    /** Rows of the window, or around the cursor in slow motion, at a finer interval. @type {Answer | null} */
+    this.section = null;
+    this.cursor = 0;
+    this.isPlaying = false;
+    /** Seconds of the machine for one second of the watcher. */
+    this.rate = 0.1;
+    /** By how much stretch and error are magnified. */
+    this.factor = 100;
+    this.view = "motion";
+    this.gesture = false;
+    this.sent = 0;
+    this.needsDescription = true;
+    this.lastEdit = 0;
+    /** The run that is on the screen. @type {Answer | null} */
+    this.drawn = null;
+    /** Tells those who do not see the page; `main.js` says how. @type {(text: string) => void} */
+    this.say = () => {};
+    /** Tells everyone, what is grave until the next word. @type {(text: string, isGrave?: boolean) => void} */
+    this.notify = () => {};
+    /** Goes to a view. @type {(key: string) => void} */
+    this.show = () => {};
+  }
+
+  /** Plays, or pauses. */
+  play() {
+    this.isPlaying = !this.isPlaying;
+    if (this.isPlaying && this.cursor >= this.until) this.cursor = 0;
+    this.tell("play");
+  }
+
+  /** What a link holds. */
+  snapshot() {
+    const {text, name, experiment, view, cursor, window, factor, rate} = this;
+    return {text, name, experiment, view, cursor, window, factor, rate};
+  }
+
+  /** @param {What} what @param {() => void} listener */
+  on(what, listener) {
+    const listeners = this.listeners.get(what) || [];
+    listeners.push(listener);
+    this.listeners.set(what, listeners);
+  }
+
+  /** @param {...What} whats */
+  tell(...whats) {
+    for (const what of whats) for (const listener of this.listeners.get(what) || []) listener();
+  }
+
+  /** The end of the run, s. */
+  get until() { return this.run ? this.run.head.until : 1; }
+
+  // ---- The text and its history
+
+  /** Opens a case. @param {string} text @param {{name?: string, path?: string, experiment?: number}} [of] */
+  open(text, {name = "studio.toml", path = "", experiment = 0} = {}) {
+    Object.assign(this, {
+      name, path, experiment, original: text, base: text, text, past: [], future: [], before: null, pins: [], window: null,
+      section: null, cursor: 0, isPlaying: false, needsDescription: true, run: null, mistake: null,
+    });
+    this.pending.clear();
+    this.tell("text", "window", "compare", "play", "cursor");
+    this.ask(() => this.tell("opened"));
+  }
+
+  /** Remembers the text as it is, to be undone to. */
+  remember() {
+    if (this.past[this.past.length - 1] !== this.text) this.past.push(this.text);
+    if (this.past.length > MOST_UNDO) this.past.shift();
+    this.future = [];
+    this.before = this.run;
+  }
+
+  /** A new text, typed or from elsewhere. @param {string} text @param {boolean} [typed] */
+  edit(text, typed = false) {
+    if (text === this.text) return;
+    const now = performance.now();
+    // What is typed in one go is undone in one go.
+    if (!typed || now - this.lastEdit > 1500) this.remember();
+    this.lastEdit = typed ? now : 0;
+    this.base = this.text = text;
+    this.pending.clear();
+    this.needsDescription = true;
+    this.tell("text");
+    this.ask();
+  }
+
+  /** A parameter under a slider. @param {string} key @param {number} value in SI */
+  drag(key, value) {
+    if (!this.gesture) { this.gesture = true; this.remember(); }
+    this.pending.set(key, value);
+    this.ask();
+  }
+
+  /** The end of a drag. */
+  drop() { this.gesture = false; }
+
+  undo() { this.turn(this.past, this.future); }
+  redo() { this.turn(this.future, this.past); }
+  reset() { if (this.text !== this.original) this.edit(this.original); }
+
+  /** @param {string[]} from @param {string[]} to */
+  turn(from, to) {
+    const text = from.pop();
+    if (text === undefined) return;
+    to.push(this.text);
+    this.before = this.run;
+    this.base = this.text = text;
+    this.pending.clear();
+    this.needsDescription = true;
+    this.tell("text");
+    this.ask();
+  }
+
+  // ---- Runs
+
+  /** The case as requests name it. */
+  body() { return {text: this.base, set: [...this.pending], experiment: this.experiment}; }
+
+  /** Asks for the run of the case as it is now. @param {() => void} [then] */
+  ask(then) {
+    this.sent++;
+    let asked = this.sent;
+    this.wire.newest("run", () => {
+      asked = this.sent;
+      return {...this.body(), describe: this.needsDescription};
+    }, (answer, error) => {
+      // Something newer is on its way.
+      if (asked === this.sent || answer) this.take(answer, error, asked === this.sent);
+      if (then) then();
+    });
+  }
+
+  /** @param {Answer | null} answer @param {Error | null} error @param {boolean} isLast */
+  take(answer, error, isLast) {
+    if (!answer) {
+      const mistake = error instanceof Mistake ? error.mistake : {what: String(error && error.message), next: ""};
+      this.mistake = mistake;
+      this.tell("mistake");
+      return;
+    }
+    this.mistake = null;
+    this.run = answer;
+    this.experiment = answer.head.experiment;
+    if (answer.head.parameters) { this.parameters = answer.head.parameters; this.needsDescription = false; }
+    else {
+      const values = new Map(answer.head.values);
+      for (const parameter of this.parameters) {
+        const value = values.get(parameter.key);
+        if (value !== undefined) parameter.value = value;
+      }
+    }
+    if (isLast) {
+      // What was dragged is part of the text now.
+      this.text = answer.head.text;
+      if (!this.gesture) { this.base = this.text; this.pending.clear(); }
+      this.tell("text");
+    }
+    if (this.cursor > this.until) this.cursor = this.until;
+    if (this.window) this.refine(); else if (this.section) this.section = null;
+    this.tell("mistake", "run");
+  }
+
+  /** @param {number} experiment */
+  choose(experiment) {
+    Object.assign(this, {experiment, before: null, pins: [], window: null, section: null, cursor: 0});
+    this.tell("window", "cursor", "compare");
+    this.ask();
+  }
+
+  // ---- What is compared
+
+  pin() {
+    if (!this.run) return;
+    this.pins.push({name: `run ${this.pins.length + 1}`, answer: this.run});
+    if (this.pins.length > MOST_PINS) this.pins.shift();
+    this.tell("compare");
+  }
+
+  unpin() { this.pins = []; this.before = null; this.tell("compare"); }
+
+  // ---- What is looked at
+
+  /** @param {number} time */
+  seek(time) {
+    this.cursor = Math.max(0, Math.min(this.until, time));
+    this.tell("cursor");
+  }
+
+  /** Shows a part of time, or all. @param {[number, number] | null} window */
+  look(window) {
+    if (window) {
+      const least = Math.max(1e-9, 1e-11 * this.until);
+      let [from, to] = window;
+      if (to - from < least) { const middle = (from + to) / 2; from = middle - least / 2; to = middle + least / 2; }
+      from = Math.max(0, from);
+      to = Math.min(this.until, to);
+      window = from <= 0 && to >= this.until ? null : [from, to];
+    }
+    this.window = window;
+    if (window) this.refine(); else this.section = null;
+    this.tell("window");
+  }
+
+  /** Asks for the rows of the window at a finer interval. */
+  refine() {
+    this.wire.newest("section", () => {
+      const [from, to] = this.window || [0, this.until];
+      return {...this.body(), from, to, points: 2001};
+    }, answer => {
+      if (!answer || !this.window) return;
+      this.section = answer;
+      this.tell("window");
+    });
+  }
+
+  /** Rows around the cursor for slow motion. @param {number} from @param {number} to */
+  lens(from, to) {
+    this.wire.newest("section", () => ({...this.body(), from, to, points: 2001}), answer => {
+      if (answer) this.section = answer;
+    });
+  }
+
+  /** The value of a curve at a time, between rows along a line. @param {string} name @param {number} time */
+  value(name, time) {
+    for (const answer of [this.section, this.run]) {
+      const times = answer && answer.columns.get("time"), values = answer && answer.columns.get(name);
+      if (!times || !values || !times.length || time < times[0] || time > times[times.length - 1]) continue;
+      const i = Math.min(times.length - 1, lowerBound(times, time));
+      if (i === 0 || times[i] === time) return values[i];
+      const share = (time - times[i - 1]) / (times[i] - times[i - 1]);
+      return values[i - 1] + share * (values[i] - values[i - 1]);
+    }
+    const last = this.run && this.run.columns.get(name);
+    return last && last.length ? last[last.length - 1] : 0;
+  }
+
+  /** The state of a body at a time: no line leads from stuck to sliding. @param {string} name @param {number} time */
+  state(name, time) {
+    for (const answer of [this.section, this.run]) {
+      const times = answer && answer.columns.get("time"), values = answer && answer.columns.get(name);
+      if (!times || !values || !times.length || time < times[0] || time > times[times.length - 1]) continue;
+      const i = Math.min(times.length - 1, lowerBound(times, time));
+      return times[i] === time || i === 0 ? values[i] : values[i - 1];
+    }
+    return 0;
+  }
+}
+
+/** The first index whose value is not below. @param {Float64Array} x @param {number} value */
+export function lowerBound(x, value) {
+  let from = 0, to = x.length;
+  while (from < to) {
+    const middle = (from + to) >> 1;
+    if (x[middle] < value) from = middle + 1; else to = middle;
+  }
+  return from;
+}

@@ -1,0 +1,177 @@
+// @ts-check
+// Puts the page together: views, the case's menu, keys, themes, links.
+import {App} from "./app.js";
+import {element, download, fileName} from "./format.js";
+import {fragment, stateOf} from "./link.js";
+import {Mistake} from "./wire.js";
+import * as motion from "./motion.js";
+import * as modes from "./modes.js";
+import * as gallery from "./gallery.js";
+import * as tour from "./tour.js";
+
+/** Each view has a key, a name, and a function that makes it once; it listens to the app for the rest. */
+const VIEWS = [motion, modes, gallery, tour];
+
+const app = new App();
+/** For tests, and for the curious. */
+/** @type {any} */ (window).studio = app;
+const find = id => /** @type {any} */ (document.getElementById(id));
+
+// ---- Words to everyone
+
+app.say = text => { find("said").textContent = text; };
+let notice = 0;
+app.notify = (text, isGrave = false) => {
+  const place = find("notice");
+  place.textContent = text;
+  place.hidden = false;
+  place.classList.toggle("grave", isGrave);
+  clearTimeout(notice);
+  if (!isGrave) notice = setTimeout(() => { place.hidden = true; }, 6000);
+};
+app.wire.changed = isOpen => {
+  if (isOpen) { if (find("notice").dataset.gone) { delete find("notice").dataset.gone; find("notice").hidden = true; } return; }
+  find("notice").dataset.gone = "1";
+  app.notify("The server does not answer any more: start taut studio again. The text of this page is still here to be downloaded.", true);
+};
+
+// ---- Views
+
+const main = find("main");
+for (const view of VIEWS) {
+  const section = element("section", {id: `view-${view.key}`, class: "view", "aria-label": view.name, hidden: true});
+  main.append(section);
+  view.mount(section, app);
+  find("views").append(element("button", {type: "button", id: `go-${view.key}`, onclick: () => app.show(view.key)}, view.name));
+}
+app.show = key => {
+  app.view = VIEWS.some(view => view.key === key) ? key : "motion";
+  for (const view of VIEWS) {
+    find(`view-${view.key}`).hidden = view.key !== app.view;
+    const button = find(`go-${view.key}`);
+    if (view.key === app.view) button.setAttribute("aria-current", "page"); else button.removeAttribute("aria-current");
+  }
+  app.tell("view");
+};
+// ---- The case
+
+app.on("run", () => {
+  if (!app.run) return;
+  find("title").textContent = app.run.head.title;
+  document.title = `${app.run.head.title} · taut studio`;
+});
+app.on("text", () => {
+  find("undo").disabled = !app.past.length;
+  find("redo").disabled = !app.future.length;
+  find("reset").disabled = app.text === app.original;
+  find("save").hidden = !app.path;
+});
+find("undo").onclick = () => app.undo();
+find("redo").onclick = () => app.redo();
+find("reset").onclick = () => app.reset();
+
+/** Does a thing of the menu, closes it, and tells what went wrong. */
+const act = (id, work) => {
+  find(id).addEventListener("click", async () => {
+    find("menu").open = false;
+    try { await work(); } catch (caught) {
+      const error = /** @type {Error} */ (caught);
+      const {what, next} = error instanceof Mistake ? error.mistake : {what: error.message, next: ""};
+      app.notify([what, next].filter(Boolean).join("; "), true);
+    }
+  });
+};
+act("save", async () => {
+  await app.wire.ask("save", {text: app.text});
+  app.original = app.text;
+  app.tell("text");
+  app.notify(`Saved to ${app.path}`);
+});
+act("download", () => download(app.name, app.text, "application/toml"));
+act("report", async () => {
+  const {head} = await app.wire.ask("report", {text: app.text});
+  download(`${fileName(app.name.replace(/\.toml$/, ""))}-report.html`, head.html, "text/html");
+});
+act("csv", () => {
+  if (!app.run) return;
+  const {columns} = app.run, names = [...columns.keys()];
+  let text = names.join(",") + "\n";
+  const values = [...columns.values()];
+  for (let i = 0; i < values[0].length; i++) text += values.map(column => column[i]).join(",") + "\n";
+  download(`${fileName(app.run.head.title)}.csv`, text, "text/csv");
+});
+act("link", async () => {
+  const hash = await fragment(app.snapshot());
+  history.replaceState(null, "", hash);
+  try { await navigator.clipboard.writeText(location.href); } catch { /* it stands in the address bar */ }
+  app.notify("The address of this page holds this state now. Open it elsewhere with: taut studio LINK");
+});
+act("tab", async () => { window.open("/" + (await fragment(app.snapshot())), "_blank"); });
+find("file").addEventListener("change", async () => {
+  const [file] = find("file").files;
+  if (!file) return;
+  if (file.size > 2 << 20) { app.notify("A case file may have 2 MB.", true); return; }
+  app.open(await file.text(), {name: file.name});
+  find("menu").open = false;
+  find("file").value = "";
+  app.show("motion");
+});
+document.addEventListener("click", event => {
+  for (const menu of document.querySelectorAll("details.menu[open]")) if (!menu.contains(/** @type {Node} */ (event.target))) /** @type {any} */ (menu).open = false;
+});
+
+// ---- Keys
+
+document.addEventListener("keydown", event => {
+  const target = /** @type {HTMLElement} */ (event.target), isText = target.matches("textarea, input[type=text], input[type=search]");
+  if ((event.ctrlKey || event.metaKey) && !event.altKey) {
+    const key = event.key.toLowerCase();
+    if (key === "z" && !event.shiftKey) app.undo();
+    else if (key === "y" || (key === "z" && event.shiftKey)) app.redo();
+    else if (key === "s") { if (app.path) find("save").click(); else find("download").click(); }
+    else return;
+    event.preventDefault();
+    return;
+  }
+  if (event.key === "Escape") for (const menu of document.querySelectorAll("details.menu[open]")) { /** @type {any} */ (menu).open = false; /** @type {any} */ (menu.firstElementChild).focus(); }
+  if (event.key === " " && !isText && !target.closest("button, summary, select, a, label, [role=application], details")) { app.play(); event.preventDefault(); }
+});
+
+// ---- Themes: the one thing that is remembered
+
+const theme = find("theme");
+const setTheme = value => {
+  if (value) document.documentElement.dataset.theme = value; else delete document.documentElement.dataset.theme;
+  theme.value = value;
+  app.tell("theme");
+};
+theme.addEventListener("change", () => {
+  setTheme(theme.value);
+  try { localStorage.setItem("theme", theme.value); } catch { /* private windows */ }
+});
+try { setTheme(localStorage.getItem("theme") || ""); } catch { setTheme(""); }
+
+// ---- The beginning
+
+async function begin() {
+  const state = await stateOf(location.hash);
+  const {head} = await app.wire.ask("open");
+  if (state && typeof state.text === "string") {
+    app.open(state.text, {name: String(state.name || "linked.toml"), experiment: Number(state.experiment) || 0});
+    if (Number.isFinite(state.factor)) app.factor = state.factor;
+    if (Number.isFinite(state.rate)) app.rate = state.rate;
+    app.show(state.view);
+    let isFirst = true;
+    app.on("opened", () => {
+      if (!isFirst) return;
+      isFirst = false;
+      if (Array.isArray(state.window) && state.window.length === 2) app.look(state.window.map(Number));
+      if (Number.isFinite(state.cursor)) app.seek(state.cursor);
+    });
+  } else {
+    app.open(head.text, {name: head.name, path: head.path || ""});
+    app.show("motion");
+  }
+}
+addEventListener("hashchange", () => { if (location.hash.includes("state=")) begin(); });
+begin().catch(error => app.notify(String(error.message || error), true));

@@ -1,0 +1,219 @@
+// @ts-check
+// The view of the motion: the machine above its plots, the parameters and the text beside them.
+import {element, number, time as timeText} from "./format.js";
+import {drawing, extent} from "./stage.js";
+import {Plots} from "./plots.js";
+import {Parameters} from "./parameters.js";
+import {Editor} from "./editor.js";
+
+/** @typedef {import("./app.js").App} App */
+
+export const key = "motion", name = "Motion";
+
+/** Slow motion, in seconds of the machine for one of the watcher. */
+const RATES = [1, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 1e-3, 1e-4, 1e-5, 1e-6];
+
+/** @param {HTMLElement} root @param {App} app */
+export function mount(root, app) {
+  root.classList.add("motion");
+  const side = element("aside", {class: "side", "aria-label": "The case"});
+  const stage = element("section", {class: "stage-box", "aria-label": "The machine"});
+  const plots = element("div", {class: "plots", id: "plots"});
+  const glance = element("section", {class: "glance", "aria-labelledby": "glance-title"}, element("h2", {id: "glance-title"}, "At a glance"));
+  root.append(side, element("div", {class: "centre"}, stage, bar(app), element("section", {"aria-label": "Plots"}, plots), glance));
+  sides(side, app);
+  new Stage(stage, app);
+  new Plots(plots, app);
+  new Glance(glance, app);
+}
+
+/** Parameters and text, of which a narrow page shows one. @param {HTMLElement} root @param {App} app */
+function sides(root, app) {
+  const panels = [["parameters", "Parameters"], ["case", "Case text"], ["results", "Results"]].map(([key, title]) => ({
+    key, title, panel: element("div", {role: "tabpanel", id: `side-${key}`, "aria-labelledby": `tab-${key}`, class: "side-panel"}),
+  }));
+  const tabs = panels.map(({key, title}, k) => element("button", {type: "button", role: "tab", id: `tab-${key}`, "aria-controls": `side-${key}`, onclick: () => choose(k)}, title));
+  const choose = chosen => panels.forEach(({panel}, k) => {
+    panel.hidden = k !== chosen;
+    tabs[k].setAttribute("aria-selected", String(k === chosen));
+    tabs[k].tabIndex = k === chosen ? 0 : -1;
+  });
+  const list = element("div", {role: "tablist", "aria-label": "The case", onkeydown: event => {
+    const now = tabs.indexOf(event.target), next = {ArrowRight: now + 1, ArrowLeft: now - 1}[event.key];
+    if (next === undefined) return;
+    const k = (next + tabs.length) % tabs.length;
+    choose(k);
+    tabs[k].focus();
+  }}, ...tabs);
+  const problem = element("button", {type: "button", class: "problem", hidden: true, onclick: () => { choose(1); }});
+  root.append(list, problem, ...panels.map(({panel}) => panel));
+  new Parameters(panels[0].panel, app);
+  new Editor(panels[1].panel, app);
+  new Results(panels[2].panel, app);
+  choose(0);
+  app.on("mistake", () => {
+    problem.hidden = !app.mistake;
+    if (app.mistake) problem.textContent = `${app.mistake.line ? `Line ${app.mistake.line}: ` : ""}${app.mistake.what}`;
+  });
+}
+
+/** Experiment, playing, and what is compared. @param {App} app */
+function bar(app) {
+  const play = element("button", {type: "button", id: "play", class: "play", onclick: () => app.play()});
+  const scrub = element("input", {type: "range", id: "scrub", min: 0, max: 10000, step: 1, "aria-label": "Time",
+    oninput: () => { app.isPlaying = false; app.tell("play"); app.seek(from() + (Number(scrub.value) / 10000) * span()); }});
+  const clock = element("output", {class: "clock", id: "clock"});
+  const rate = element("select", {id: "rate", "aria-label": "Slow motion", onchange: () => { app.rate = Number(rate.value); app.tell("play"); }},
+    ...RATES.map(value => element("option", {value}, value === 1 ? "as it is" : `${number(1 / value)} × slower`)));
+  const factor = element("input", {type: "range", id: "factor", min: 0, max: 40, step: 1, "aria-label": "Magnification of stretch and error", oninput: () => {
+    app.factor = Number((10 ** (Number(factor.value) / 10)).toPrecision(2));
+    factorTold.textContent = `× ${number(app.factor)}`;
+    app.tell("cursor");
+  }});
+  const factorTold = element("output", {}, `× ${app.factor}`);
+  factor.value = String(10 * Math.log10(app.factor));
+  const experiment = element("select", {id: "experiment", "aria-label": "Experiment", onchange: () => app.choose(Number(experiment.value))});
+  const before = element("button", {type: "button", "aria-pressed": "true", id: "before", onclick: () => {
+    app.showsBefore = !app.showsBefore;
+    before.setAttribute("aria-pressed", String(app.showsBefore));
+    app.tell("compare");
+  }}, "Before");
+  const pin = element("button", {type: "button", id: "pin", onclick: () => app.pin()}, "Pin");
+  const unpin = element("button", {type: "button", id: "unpin", hidden: true, onclick: () => app.unpin()}, "Unpin");
+  const all = element("button", {type: "button", id: "all", hidden: true, onclick: () => app.look(null)}, "Whole run");
+  const from = () => (app.window ? app.window[0] : 0), span = () => (app.window ? app.window[1] - app.window[0] : app.until);
+  const show = () => {
+    scrub.value = String(Math.round((10000 * (app.cursor - from())) / span()));
+    clock.textContent = timeText(app.cursor, Math.min(span() / 1000, app.isPlaying ? app.rate / 60 : 1));
+    scrub.setAttribute("aria-valuetext", clock.textContent);
+  };
+  app.on("cursor", show);
+  app.on("window", () => { all.hidden = !app.window; show(); });
+  app.on("compare", () => { unpin.hidden = !app.pins.length; unpin.textContent = `Unpin ${app.pins.length}`; });
+  app.on("play", () => {
+    play.textContent = app.isPlaying ? "❚❚" : "▶";
+    play.setAttribute("aria-label", app.isPlaying ? "Pause" : "Play");
+    rate.value = String(app.rate);
+  });
+  app.on("run", () => {
+    const names = app.run ? app.run.head.experiments.map(({name}) => name) : [];
+    if (names.join("\n") !== experiment.dataset.names) {
+      experiment.dataset.names = names.join("\n");
+      experiment.replaceChildren(...names.map((name, k) => element("option", {value: k}, name)));
+    }
+    experiment.value = String(app.experiment);
+    show();
+  });
+  app.tell("play");
+  return element("div", {class: "transport", role: "toolbar", "aria-label": "Time"},
+    play, scrub, clock, rate, element("label", {class: "factor", title: "Stretch and error on the drawing are magnified"}, element("span", {class: "quiet"}, "stretch"), factor, factorTold),
+    element("span", {class: "gap"}), experiment, before, pin, unpin, all);
+}
+
+class Stage {
+  /** @param {HTMLElement} root @param {App} app */
+  constructor(root, app) {
+    this.root = root;
+    this.app = app;
+    this.shape = "";
+    this.frame = 0;
+    /** @type {import("./stage.js").Drawing | null} */
+    this.drawing = null;
+    /** @type {import("./stage.js").Extent | null} */
+    this.extent = null;
+    app.on("run", () => this.build());
+    app.on("cursor", () => this.later());
+    app.on("play", () => { if (app.isPlaying) this.start(); });
+  }
+
+  build() {
+    const {run} = this.app;
+    if (!run) return;
+    const {scene} = run.head, shape = JSON.stringify(scene);
+    if (shape !== this.shape) {
+      this.shape = shape;
+      this.drawing = drawing(scene);
+      this.root.replaceChildren(this.drawing.root);
+    }
+    this.extent = extent(run, scene);
+    this.later();
+  }
+
+  later() {
+    if (this.frame) return;
+    this.frame = requestAnimationFrame(() => { this.frame = 0; this.move(); });
+  }
+
+  move() {
+    const {app} = this;
+    if (!this.drawing || !this.extent || !app.run) return;
+    this.drawing.move(name => app.value(name, app.cursor), name => app.state(name, app.cursor), app.factor, this.extent);
+  }
+
+  /** Plays until the end, or until it is paused. */
+  start() {
+    const {app} = this;
+    let last = performance.now(), asked = NaN;
+    const go = now => {
+      if (!app.isPlaying) return;
+      const step = Math.min(0.1, (now - last) / 1000) * app.rate, end = app.window ? app.window[1] : app.until;
+      last = now;
+      let next = app.cursor + step;
+      if (next >= end) next = app.window ? app.window[0] : 0;
+      // In slow motion there are many pictures between two rows: those around the cursor are computed finer.
+      if (!app.window && app.run && app.rate * 50 < app.until / 50) {
+        const span = 6 * app.rate;
+        if (!(next >= asked && next < asked + 0.7 * span)) {
+          asked = next;
+          app.lens(Math.max(0, next - 0.05 * span), Math.min(app.until, next + span));
+        }
+      }
+      app.seek(next);
+      requestAnimationFrame(go);
+    };
+    requestAnimationFrame(go);
+  }
+}
+
+/** What follows from the numbers of the machine. */
+class Glance {
+  /** @param {HTMLElement} root @param {App} app */
+  constructor(root, app) {
+    this.body = element("div", {class: "cards"});
+    root.append(this.body);
+    app.on("run", () => {
+      const overview = app.run && app.run.head.overview;
+      if (!overview) { this.body.replaceChildren(); return; }
+      const card = ({name, rows}) => element("div", {class: "card"}, element("h3", {}, name), element("dl", {},
+        ...rows.flatMap(row => [element("dt", {title: row.how || null}, row.name), element("dd", {}, row.value)])));
+      const [head, ...places] = overview.places;
+      const table = places.length ? element("div", {class: "card wide"}, element("h3", {}, "Along the travel"), element("div", {class: "scroll", tabindex: "0", role: "group", "aria-label": "Along the travel"},
+        element("table", {}, element("thead", {}, element("tr", {}, ...head.map(text => element("th", {scope: "col"}, text)))),
+          element("tbody", {}, ...places.map(row => element("tr", {}, ...row.map(text => element("td", {}, text)))))))) : null;
+      const notes = overview.notes.length ? element("div", {class: "card wide"}, element("h3", {}, "To be known"), element("ul", {}, ...overview.notes.map(note => element("li", {}, note)))) : null;
+      this.body.replaceChildren(...[...overview.groups.map(card), table, notes].filter(Boolean));
+    });
+  }
+}
+
+/** Key figures and events of the run. */
+class Results {
+  /** @param {HTMLElement} root @param {App} app */
+  constructor(root, app) {
+    const figures = element("dl", {class: "figures"}), events = element("div", {class: "events"});
+    const ending = element("p", {class: "mistake", hidden: true});
+    root.append(ending, element("h2", {}, "Key figures"), figures, element("h2", {}, "Events"), events);
+    app.on("run", () => {
+      if (!app.run) return;
+      const {rows, ending: told, events: all, events_left_out: left} = app.run.head;
+      ending.hidden = !told;
+      ending.textContent = told ? `This run ${told}.` : "";
+      figures.replaceChildren(...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
+      if (root.hidden && all.length > 100) return;
+      const shown = all.slice(0, 200);
+      events.replaceChildren(...shown.map(event => element("button", {type: "button", class: "event", onclick: () => { app.isPlaying = false; app.tell("play"); app.seek(event.time); }},
+        element("span", {}, timeText(event.time, 1e-9)), element("span", {}, event.part), element("span", {class: "quiet"}, `${event.from} → ${event.to}`))),
+      ...(all.length + left > shown.length ? [element("p", {class: "quiet"}, `${all.length + left - shown.length} more`)] : all.length ? [] : [element("p", {class: "quiet"}, "None.")]));
+    });
+  }
+}

@@ -1,0 +1,533 @@
+// @ts-check
+// The plots of a run on canvases: all share the part of time that is seen, and the cursor. Each can be used by keys, and
+// has its values as a table.
+import {element, number, time as timeText, download, fileName} from "./format.js";
+import {lowerBound} from "./app.js";
+
+/** @typedef {import("./app.js").App} App */
+/** @typedef {import("./wire.js").Answer} Answer */
+
+const COLOURS = ["blue", "verm", "green", "purple", "amber", "sky"];
+const LEFT = 66, RIGHT = 12, TOP = 8, BOTTOM = 24, HEIGHT = 170, TABLE_ROWS = 50;
+const DASHES = [[], [], [7, 4], [2, 3]];
+/** States of a body: stuck, forward, backward, and sliding without dry friction. */
+const STATES = new Map([[0, ["stuck", "grey"]], [1, ["forward", "blue"]], [-1, ["backward", "verm"]], [2, ["sliding", "green"]]]);
+
+/** A round step for about so many ticks. @param {number} span @param {number} wanted */
+function step(span, wanted) {
+  const rough = span / Math.max(1, wanted), power = 10 ** Math.floor(Math.log10(rough));
+  return power * (/** @type {number} */ ([1, 2, 5, 10].find(m => rough / power <= m * 1.0001)));
+}
+
+/** @param {number} low @param {number} high @param {number} wanted @returns {number[]} */
+function ticks(low, high, wanted) {
+  const by = step(high - low, wanted), found = [];
+  if (!(by > 0)) return found;
+  for (let i = Math.ceil(low / by - 1e-6); i * by <= high + 1e-6 * by && found.length < 50; i++) found.push(i * by);
+  return found;
+}
+
+export class Plots {
+  /** @param {HTMLElement} root @param {App} app */
+  constructor(root, app) {
+    this.root = root;
+    this.app = app;
+    /** @type {Plot[]} */
+    this.plots = [];
+    this.shape = "";
+    this.colours = {};
+    /** The states strip and its like are not to be hidden by what a panel is called. */
+    app.on("run", () => { this.build(); this.later(); });
+    for (const what of /** @type {const} */ (["window", "compare", "cursor"])) app.on(what, () => this.later(what === "cursor"));
+    app.on("theme", () => { this.readColours(); this.later(); });
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { this.readColours(); this.later(); });
+    new ResizeObserver(() => this.later()).observe(root);
+    this.readColours();
+    this.frame = 0;
+    this.onlyCursor = true;
+  }
+
+  readColours() {
+    const style = getComputedStyle(document.documentElement);
+    for (const name of [...COLOURS, "ink", "grey", "axis", "grid", "soft", "paper", "mark"])
+      this.colours[name] = style.getPropertyValue("--" + name).trim() || "#888";
+  }
+
+  /** Makes a plot for each panel, where they are others than before. */
+  build() {
+    const {run} = this.app;
+    if (!run) return;
+    const panels = run.head.panels.filter(panel => panel.title);
+    const shape = JSON.stringify(panels.map(panel => [panel.key, panel.curves]));
+    if (shape === this.shape) { this.plots.forEach((plot, i) => { plot.panel = panels[i]; }); return; }
+    this.shape = shape;
+    this.plots = panels.map(panel => new Plot(panel, this));
+    this.root.replaceChildren(...this.plots.map(plot => plot.figure));
+  }
+
+  /** Draws with the next picture. @param {boolean} [onlyCursor] */
+  later(onlyCursor = false) {
+    if (!onlyCursor) this.onlyCursor = false;
+    if (this.frame) return;
+    this.frame = requestAnimationFrame(() => {
+      this.frame = 0;
+      const all = !this.onlyCursor;
+      this.onlyCursor = true;
+      if (!this.root.clientWidth) return;
+      for (const plot of this.plots) { if (all) plot.draw(); plot.drawCursor(); }
+      this.app.drawn = this.app.run;
+    });
+  }
+
+  /** The part of time that is seen. @returns {[number, number]} */
+  get seen() { return this.app.window || [0, this.app.until]; }
+}
+
+class Plot {
+  /** @param {any} panel @param {Plots} plots */
+  constructor(panel, plots) {
+    this.panel = panel;
+    this.plots = plots;
+    /** @type {Set<string>} */
+    this.hidden = new Set();
+    this.isStates = panel.key === "state";
+    /** @type {{low: number, high: number} | null} */
+    this.range = null;
+    /** @type {{x: number, to?: number, window: [number, number], pans: boolean} | null} */
+    this.press = null;
+    this.canvas = element("canvas", {"aria-hidden": "true"});
+    this.over = element("canvas", {class: "over", "aria-hidden": "true"});
+    const words = `${panel.words}${panel.unit ? ", in " + panel.unit : ""}. Arrow keys move the cursor, with Shift they slide what is seen; plus, minus and 0 zoom.`;
+    this.area = element("div", {
+      class: "area", tabindex: "0", role: "application", "aria-roledescription": "plot", "aria-label": `${panel.title} over time`,
+      "aria-description": words,
+    }, this.canvas, this.over);
+    this.legend = element("div", {class: "legend"});
+    this.values = [];
+    panel.curves.forEach((curve, k) => this.addEntry(curve, k));
+    const table = element("details", {class: "data", ontoggle: () => this.fill(table)}, element("summary", {}, "Values"));
+    this.table = table;
+    const keep = element("details", {class: "menu keep"}, element("summary", {"aria-label": `Keep ${panel.title}`}, "Keep"),
+      element("div", {},
+        element("button", {type: "button", onclick: () => this.png()}, "PNG"),
+        element("button", {type: "button", onclick: () => download(this.fileName("svg"), this.svg(), "image/svg+xml")}, "SVG"),
+        element("button", {type: "button", onclick: () => download(this.fileName("csv"), this.csv(), "text/csv")}, "CSV")));
+    this.figure = element("figure", {class: "live-plot", "data-panel": panel.key},
+      element("figcaption", {}, element("h3", {}, panel.title, panel.unit ? element("span", {class: "quiet"}, " " + panel.unit) : ""), this.legend, keep),
+      this.area, table);
+    this.listen();
+  }
+
+  addEntry(curve, k) {
+    const value = element("output", {class: "value"});
+    this.values.push(value);
+    const colour = this.isStates ? "ink" : COLOURS[k % COLOURS.length];
+    const entry = element("button", {
+      type: "button", role: "switch", "aria-checked": "true", class: "entry", onclick: () => {
+        if (!this.hidden.delete(curve.key)) this.hidden.add(curve.key);
+        entry.setAttribute("aria-checked", String(!this.hidden.has(curve.key)));
+        this.plots.later();
+      },
+    }, element("i", {class: `t-${colour}${DASHES[k % 4].length ? " dashed" : ""}`}), curve.name);
+    this.legend.append(element("span", {}, entry, value));
+  }
+
+  fileName(ending) { return `${fileName(this.plots.app.run ? this.plots.app.run.head.title : "run")}-${this.panel.key}.${ending}`; }
+
+  // ---- Drawing
+
+  get width() { return Math.max(200, this.area.clientWidth); }
+  get height() { return this.isStates ? 26 + 22 * this.panel.curves.length + BOTTOM : HEIGHT + BOTTOM; }
+  across(time) { const [a, b] = this.plots.seen; return LEFT + (this.width - LEFT - RIGHT) * (time - a) / (b - a); }
+  timeAt(x) { const [a, b] = this.plots.seen; return a + (b - a) * (x - LEFT) / (this.width - LEFT - RIGHT); }
+  up(value) { const {low, high} = this.range || {low: 0, high: 1}; return TOP + (this.height - TOP - BOTTOM) * (high - value) / (high - low); }
+
+  /** @param {HTMLCanvasElement} canvas */
+  pen(canvas) {
+    const k = window.devicePixelRatio || 1, {width, height} = this;
+    if (canvas.width !== Math.round(width * k) || canvas.height !== Math.round(height * k)) {
+      canvas.width = Math.round(width * k);
+      canvas.height = Math.round(height * k);
+      canvas.style.height = height + "px";
+    }
+    const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    pen.setTransform(k, 0, 0, k, 0, 0);
+    pen.clearRect(0, 0, width, height);
+    return pen;
+  }
+
+  /** What is drawn below one another: pins, the run before, the run itself. */
+  layers() {
+    const {app} = this.plots;
+    const layers = app.pins.map(pin => ({answer: pin.answer, style: "pin"}));
+    if (app.showsBefore && app.before && app.before !== app.run) layers.push({answer: app.before, style: "before"});
+    if (app.run) layers.push({answer: app.run, style: "now"});
+    return layers;
+  }
+
+  /** The rows of a curve that are seen: those of the finer section where there is one for all of it. */
+  rows(answer, key) {
+    const {app} = this.plots, [from, to] = this.plots.seen;
+    if (answer === app.run && app.window && app.section) {
+      const {head, columns} = app.section;
+      if (head.from <= from + 1e-9 * (to - from) && head.to >= to - 1e-9 * (to - from) && columns.get(key))
+        return {x: columns.get("time"), y: columns.get(key)};
+    }
+    return {x: answer.columns.get("time"), y: answer.columns.get(key)};
+  }
+
+  draw() {
+    const pen = this.pen(this.canvas);
+    if (this.isStates) this.drawStates(pen); else this.drawCurves(pen);
+    if (this.table.open) this.fill(this.table);
+  }
+
+  /** The range of what is seen; it changes only where it has to, so that a drag does not shake the axis. */
+  fit() {
+    const {scale} = this.panel, [from, to] = this.plots.seen;
+    let low = Infinity, high = -Infinity;
+    for (const {answer} of this.layers()) {
+      for (const {key} of this.panel.curves) {
+        if (this.hidden.has(key)) continue;
+        const {x, y} = this.rows(answer, key);
+        if (!x || !y) continue;
+        const first = Math.max(0, lowerBound(x, from) - 1), last = Math.min(x.length, lowerBound(x, to) + 2);
+        for (let i = first; i < last; i++) {
+          const value = y[i] * scale;
+          if (value < low) low = value;
+          if (value > high) high = value;
+        }
+      }
+    }
+    if (!(high >= low)) { low = 0; high = 1; }
+    const least = Math.max(1e-9 * Math.max(Math.abs(low), Math.abs(high)), 1e-12);
+    if (high - low < least) { const m = (high + low) / 2; low = m - Math.max(least, Math.abs(m) * 0.1, 1e-9); high = m + Math.max(least, Math.abs(m) * 0.1, 1e-9); }
+    const {range} = this, span = high - low;
+    if (range && low >= range.low && high <= range.high && span > 0.55 * (range.high - range.low)) return;
+    const by = step(span, 4), grown = 0.04 * span;
+    this.range = {low: Math.floor((low - grown) / (by / 2)) * (by / 2), high: Math.ceil((high + grown) / (by / 2)) * (by / 2)};
+  }
+
+  /** @param {CanvasRenderingContext2D} pen */
+  drawCurves(pen) {
+    this.fit();
+    const {colours, app} = this.plots, {width, height} = this, range = /** @type {{low: number, high: number}} */ (this.range);
+    this.grid(pen, ticks(range.low, range.high, 4).map(value => [this.up(value), number(value, 6)]));
+    pen.save();
+    pen.beginPath();
+    pen.rect(LEFT, TOP - 2, width - LEFT - RIGHT, height - TOP - BOTTOM + 4);
+    pen.clip();
+    this.marks(pen);
+    for (const {answer, style} of this.layers()) {
+      this.panel.curves.forEach(({key}, k) => {
+        if (this.hidden.has(key)) return;
+        const {x, y} = this.rows(answer, key);
+        if (!x || !y) return;
+        pen.strokeStyle = style === "pin" ? colours.axis : colours[COLOURS[k % COLOURS.length]];
+        pen.globalAlpha = style === "now" ? (app.mistake ? 0.35 : 1) : style === "before" ? 0.45 : 0.5;
+        pen.lineWidth = style === "now" ? 1.8 : 1.1;
+        pen.setLineDash(style === "before" ? [3, 3] : DASHES[k % 4]);
+        this.curve(pen, x, y);
+      });
+    }
+    pen.restore();
+  }
+
+  /** Draws what is seen of a curve: all points, or the least and greatest of those that share a pixel.
+   * @param {CanvasRenderingContext2D} pen @param {Float64Array} x @param {Float64Array} y */
+  curve(pen, x, y) {
+    const [from, to] = this.plots.seen, {scale} = this.panel, {low, high} = /** @type {any} */ (this.range);
+    const kx = (this.width - LEFT - RIGHT) / (to - from), ky = (this.height - TOP - BOTTOM) / (high - low);
+    const first = Math.max(0, lowerBound(x, from) - 1), last = Math.min(x.length, lowerBound(x, to) + 1);
+    const together = Math.max(1, Math.floor((last - first) / (2 * (this.width - LEFT - RIGHT))));
+    pen.beginPath();
+    for (let i = first; i < last; i += together) {
+      let least = i, greatest = i;
+      const end = Math.min(last, i + together);
+      for (let j = i + 1; j < end; j++) {
+        if (y[j] < y[least]) least = j;
+        if (y[j] > y[greatest]) greatest = j;
+      }
+      const a = Math.min(least, greatest), b = Math.max(least, greatest);
+      pen.lineTo(LEFT + (x[a] - from) * kx, TOP + (high - y[a] * scale) * ky);
+      if (b !== a) pen.lineTo(LEFT + (x[b] - from) * kx, TOP + (high - y[b] * scale) * ky);
+    }
+    pen.stroke();
+    if (last - first < (this.width - LEFT) / 9 && pen.globalAlpha === 1) {
+      pen.fillStyle = pen.strokeStyle;
+      for (let i = first; i < last; i++) {
+        pen.beginPath();
+        pen.arc(LEFT + (x[i] - from) * kx, TOP + (high - y[i] * scale) * ky, 2.1, 0, 7);
+        pen.fill();
+      }
+    }
+  }
+
+  /** Lines at the events. @param {CanvasRenderingContext2D} pen */
+  marks(pen) {
+    const {app, colours} = this.plots, [from, to] = this.plots.seen;
+    if (!app.run) return;
+    const seen = app.run.head.events.filter(event => event.time >= from && event.time <= to);
+    if (seen.length > 120) return;
+    pen.strokeStyle = colours.grid;
+    pen.lineWidth = 1;
+    pen.setLineDash([2, 2]);
+    for (const event of seen) {
+      const x = this.across(event.time);
+      pen.beginPath();
+      pen.moveTo(x, TOP);
+      pen.lineTo(x, this.height - BOTTOM);
+      pen.stroke();
+    }
+    pen.setLineDash([]);
+  }
+
+  /** A strip for each body, and the events on it. @param {CanvasRenderingContext2D} pen */
+  drawStates(pen) {
+    const {app, colours} = this.plots, {width, height} = this;
+    this.grid(pen, []);
+    if (!app.run) return;
+    pen.save();
+    pen.font = "12px system-ui, sans-serif";
+    this.panel.curves.forEach(({key, name}, k) => {
+      const {x, y} = this.rows(app.run, key), top = TOP + 6 + 22 * k;
+      pen.fillStyle = colours.grey;
+      pen.textAlign = "right";
+      pen.fillText(name.split(" ")[0], LEFT - 8, top + 11);
+      if (this.hidden.has(key) || !x || !y) return;
+      const from = Math.max(0, lowerBound(x, this.plots.seen[0]) - 1), to = Math.min(x.length - 1, lowerBound(x, this.plots.seen[1]) + 1);
+      for (let i = from; i < to;) {
+        let j = i;
+        while (j < to && y[j] === y[i]) j++;
+        const [, colour] = STATES.get(y[i]) || ["", "grey"];
+        const a = Math.max(LEFT, this.across(x[i])), b = Math.min(width - RIGHT, this.across(x[j]));
+        pen.fillStyle = colours[colour];
+        pen.globalAlpha = y[i] === 0 ? 0.28 : 0.75;
+        if (b > a) pen.fillRect(a, y[i] === 0 ? top + 5 : top, b - a, y[i] === 0 ? 5 : 15);
+        i = j;
+      }
+      pen.globalAlpha = 1;
+    });
+    pen.strokeStyle = colours.ink;
+    pen.lineWidth = 1;
+    for (const {time, body} of app.run.head.events) {
+      const x = this.across(time), place = body === null ? -1 : body;
+      if (x < LEFT || x > width - RIGHT || place < 0) continue;
+      pen.beginPath();
+      pen.moveTo(x, TOP + 4 + 22 * place);
+      pen.lineTo(x, TOP + 23 + 22 * place);
+      pen.stroke();
+    }
+    pen.restore();
+    void height;
+  }
+
+  /** @param {CanvasRenderingContext2D} pen @param {[number, string][]} rows */
+  grid(pen, rows) {
+    const {colours} = this.plots, {width, height} = this, [from, to] = this.plots.seen, bottom = height - BOTTOM;
+    pen.font = "12px system-ui, sans-serif";
+    pen.lineWidth = 1;
+    pen.setLineDash([]);
+    pen.globalAlpha = 1;
+    pen.strokeStyle = colours.grid;
+    pen.fillStyle = colours.grey;
+    pen.textAlign = "right";
+    for (const [y, text] of rows) {
+      line(pen, LEFT, y, width - RIGHT, y);
+      pen.fillText(text, LEFT - 8, y + 4);
+    }
+    pen.textAlign = "center";
+    const by = step(to - from, (width - LEFT) / 80);
+    for (const value of ticks(from, to, (width - LEFT) / 80)) {
+      const x = this.across(value);
+      line(pen, x, TOP, x, bottom);
+      // Far in, what counts is the distance from the left.
+      const text = to - from < 1e-3 * Math.abs(from) ? "+" + timeText(value - from, by) : timeText(value, by);
+      if (x < width - 16) pen.fillText(text, Math.max(LEFT, x), bottom + 16);
+    }
+    if (to - from < 1e-3 * Math.abs(from)) {
+      pen.textAlign = "left";
+      pen.fillText(number(from, 9) + " s", 2, bottom + 16);
+    }
+    pen.strokeStyle = colours.axis;
+    line(pen, LEFT, bottom, width - RIGHT, bottom);
+  }
+
+  drawCursor() {
+    const {app, colours} = this.plots, pen = this.pen(this.over), x = this.across(app.cursor);
+    const box = this.press;
+    if (box && !box.pans && box.to !== undefined) {
+      pen.fillStyle = colours.blue;
+      pen.globalAlpha = 0.12;
+      pen.fillRect(Math.min(box.x, box.to), TOP, Math.abs(box.to - box.x), this.height - TOP - BOTTOM);
+      pen.globalAlpha = 1;
+    }
+    if (x >= LEFT - 0.5 && x <= this.width - RIGHT + 0.5) {
+      pen.strokeStyle = colours.ink;
+      pen.globalAlpha = 0.55;
+      line(pen, x, TOP, x, this.height - BOTTOM);
+      pen.globalAlpha = 1;
+    }
+    this.panel.curves.forEach(({key}, k) => {
+      const text = this.words(key, k);
+      if (this.values[k].textContent !== text) this.values[k].textContent = text;
+      if (this.isStates || this.hidden.has(key) || x < LEFT || x > this.width - RIGHT) return;
+      pen.fillStyle = colours[COLOURS[k % COLOURS.length]];
+      pen.beginPath();
+      pen.arc(x, this.up(app.value(key, app.cursor) * this.panel.scale), 3, 0, 7);
+      pen.fill();
+    });
+  }
+
+  /** The value of a curve at the cursor. */
+  words(key, _k) {
+    const {app} = this.plots;
+    if (this.isStates) return (STATES.get(app.state(key, app.cursor)) || [""])[0];
+    return number(app.value(key, app.cursor) * this.panel.scale, 5);
+  }
+
+  // ---- Pointers and keys
+
+  listen() {
+    const {area, plots} = this, {app} = plots;
+    const spot = event => event.clientX - area.getBoundingClientRect().left;
+    area.addEventListener("pointerdown", event => {
+      if (event.button) return;
+      this.press = {x: spot(event), window: plots.seen, pans: event.shiftKey || event.pointerType === "touch"};
+      if (event.pointerType !== "touch") area.setPointerCapture(event.pointerId);
+    });
+    area.addEventListener("pointermove", event => {
+      const x = spot(event), {press} = this;
+      if (!press) { if (!app.isPlaying && event.pointerType === "mouse") app.seek(this.timeAt(x)); return; }
+      if (press.pans && app.window && event.pointerType !== "touch") {
+        const by = (press.x - x) / (this.width - LEFT - RIGHT) * (press.window[1] - press.window[0]);
+        this.slide(press.window, by);
+      } else if (!press.pans) {
+        press.to = Math.max(LEFT, Math.min(this.width - RIGHT, x));
+        this.drawCursor();
+      }
+    });
+    const release = event => {
+      const x = spot(event), {press} = this;
+      this.press = null;
+      if (!press || event.type === "pointercancel") return;
+      if (!press.pans && Math.abs(x - press.x) > 8) app.look(/** @type {[number, number]} */ ([this.timeAt(press.x), this.timeAt(press.to)].sort((a, b) => a - b)));
+      else if (Math.abs(x - press.x) <= 8) { app.isPlaying = false; app.tell("play"); app.seek(this.timeAt(x)); }
+      plots.later(true);
+    };
+    area.addEventListener("pointerup", release);
+    area.addEventListener("pointercancel", release);
+    area.addEventListener("dblclick", () => app.look(null));
+    area.addEventListener("wheel", event => {
+      if (!(event.ctrlKey || event.metaKey)) return;
+      event.preventDefault();
+      this.zoom(Math.exp(0.002 * event.deltaY), this.timeAt(spot(event)));
+    }, {passive: false});
+    area.addEventListener("keydown", event => this.key(event));
+  }
+
+  slide([from, to], by) {
+    const {app} = this.plots, span = to - from, start = Math.max(0, Math.min(app.until - span, from + by));
+    app.look([start, start + span]);
+  }
+
+  zoom(factor, about) {
+    const [from, to] = this.plots.seen;
+    this.plots.app.look([about - (about - from) * factor, about + (to - about) * factor]);
+  }
+
+  key(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const {app} = this.plots, [from, to] = this.plots.seen, span = to - from;
+    const go = by => () => {
+      if (event.shiftKey) { if (app.window) this.slide([from, to], 15 * by * span / 100); return; }
+      const start = app.cursor < from || app.cursor > to ? from : app.cursor;
+      app.seek(Math.max(from, Math.min(to, start + by * span / 100)));
+      this.say();
+    };
+    const acts = {
+      ArrowLeft: go(-1), ArrowRight: go(1), PageUp: go(-10), PageDown: go(10),
+      Home: () => { app.seek(from); this.say(); }, End: () => { app.seek(to); this.say(); },
+      "+": () => this.zoom(0.6, app.cursor), "=": () => this.zoom(0.6, app.cursor), "-": () => this.zoom(1 / 0.6, app.cursor),
+      "0": () => app.look(null), Escape: () => app.look(null),
+    };
+    if (!acts[event.key]) return;
+    acts[event.key]();
+    event.preventDefault();
+  }
+
+  /** Tells the values at the cursor to those who do not see them. */
+  say() {
+    const {app} = this.plots, [from, to] = this.plots.seen;
+    const values = this.panel.curves.filter(({key}) => !this.hidden.has(key)).map(({key, name}, k) => `${name} ${this.words(key, k)}${this.panel.unit ? " " + this.panel.unit : ""}`);
+    app.say(`${timeText(app.cursor, (to - from) / 100)}: ${values.join(", ")}`);
+  }
+
+  // ---- The same as a table, and for elsewhere
+
+  /** Rows that are seen, evenly chosen. @param {number} most */
+  chosen(most) {
+    const {app} = this.plots, [from, to] = this.plots.seen;
+    if (!app.run) return [];
+    const columns = this.panel.curves.map(({key}) => this.rows(app.run, key));
+    const x = columns.length ? columns[0].x : null;
+    if (!x) return [];
+    const first = lowerBound(x, from), last = Math.min(x.length, lowerBound(x, to * (1 + 1e-15)) + 1), count = last - first, found = [];
+    const rows = Math.min(most, count);
+    for (let k = 0; k < rows; k++) {
+      const i = first + (rows < 2 ? 0 : Math.round(k * (count - 1) / (rows - 1)));
+      found.push([x[i], ...columns.map(({y}) => (y ? y[i] * (this.isStates ? 1 : this.panel.scale) : NaN))]);
+    }
+    return found;
+  }
+
+  fill(details) {
+    if (!details.open) return;
+    const unit = this.panel.unit ? ` (${this.panel.unit})` : "";
+    const head = ["time (s)", ...this.panel.curves.map(curve => curve.name + unit)].map(text => element("th", {scope: "col"}, text));
+    const cell = (value, k) => element("td", {}, this.isStates && k ? (STATES.get(value) || [""])[0] : number(value, 7));
+    const rows = this.chosen(TABLE_ROWS).map(row => element("tr", {}, ...row.map(cell)));
+    const table = element("div", {class: "scroll", tabindex: "0", role: "group", "aria-label": `Values of ${this.panel.title}`},
+      element("table", {}, element("thead", {}, element("tr", {}, ...head)), element("tbody", {}, ...rows)));
+    details.replaceChildren(details.firstElementChild, table);
+  }
+
+  csv() {
+    const head = ["time_s", ...this.panel.curves.map(({key}) => key + (this.panel.unit ? "_" + this.panel.unit.replace(/[ /]/g, "_").replace("µ", "u") : ""))];
+    return [head, ...this.chosen(Infinity)].map(row => row.join(",") + "\n").join("");
+  }
+
+  png() {
+    const canvas = document.createElement("canvas"), {colours} = this.plots;
+    canvas.width = this.canvas.width;
+    canvas.height = this.canvas.height;
+    const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    pen.fillStyle = colours.paper;
+    pen.fillRect(0, 0, canvas.width, canvas.height);
+    pen.drawImage(this.canvas, 0, 0);
+    canvas.toBlob(blob => { if (blob) download(this.fileName("png"), blob, "image/png"); });
+  }
+
+  /** The curves as lines with axes. */
+  svg() {
+    const {colours} = this.plots, {width, height} = this, [from, to] = this.plots.seen;
+    const lines = this.panel.curves.map(({key, name}, k) => {
+      const rows = this.chosen(4000).map(row => `${this.across(row[0]).toFixed(2)},${(this.isStates ? TOP + 20 + 22 * k - 8 * row[k + 1] : this.up(row[k + 1])).toFixed(2)}`);
+      return this.hidden.has(key) ? "" : `<polyline fill="none" stroke="${colours[COLOURS[k % COLOURS.length]]}" stroke-width="1.6" points="${rows.join(" ")}"><title>${name}</title></polyline>`;
+    });
+    const text = (x, y, anchor, words) => `<text x="${x.toFixed(1)}" y="${y.toFixed(1)}" text-anchor="${anchor}" font-family="sans-serif" font-size="12" fill="${colours.grey}">${words}</text>`;
+    const {low, high} = this.range || {low: 0, high: 1};
+    const rows = this.isStates ? [] : ticks(low, high, 4).map(value => text(LEFT - 8, this.up(value) + 4, "end", number(value, 6)));
+    const steps = ticks(from, to, 8).map(value => text(this.across(value), height - 6, "middle", timeText(value, step(to - from, 8))));
+    const frame = `<rect x="${LEFT}" y="${TOP}" width="${width - LEFT - RIGHT}" height="${height - TOP - BOTTOM}" fill="none" stroke="${colours.axis}"/>`;
+    return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${width} ${height}" width="${width}" height="${height}"><rect width="100%" height="100%" fill="${colours.paper}"/>${frame}${rows.join("")}${steps.join("")}${lines.join("")}</svg>\n`;
+  }
+}
+
+/** @param {CanvasRenderingContext2D} pen @param {number} x1 @param {number} y1 @param {number} x2 @param {number} y2 */
+function line(pen, x1, y1, x2, y2) {
+  pen.beginPath();
+  pen.moveTo(Math.round(x1) + 0.5, Math.round(y1) + 0.5);
+  pen.lineTo(Math.round(x2) + 0.5, Math.round(y2) + 0.5);
+  pen.stroke();
+}

@@ -1,0 +1,56 @@
+//! The files of the page, carried by the program.
+
+use axum::body::Body;
+use axum::http::header::{self, HeaderValue};
+use axum::http::{StatusCode, Uri};
+use axum::response::Response;
+
+/// Path, type and content.
+type Asset = (&'static str, &'static str, &'static str);
+
+const HTML: &str = "text/html; charset=utf-8";
+const CSS: &str = "text/css; charset=utf-8";
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+
+macro_rules! page {
+    ($($path:literal: $kind:expr),* $(,)?) => {
+        &[$((concat!("/", $path), $kind, include_str!(concat!("../page/", $path)))),*]
+    };
+}
+
+const ASSETS: &[Asset] = page![
+    "index.html": HTML,
+    "style.css": CSS,
+    "icon.svg": "image/svg+xml",
+    "app.js": SCRIPT,
+    "editor.js": SCRIPT,
+    "format.js": SCRIPT,
+    "gallery.js": SCRIPT,
+    "link.js": SCRIPT,
+    "main.js": SCRIPT,
+    "modes.js": SCRIPT,
+    "motion.js": SCRIPT,
+    "parameters.js": SCRIPT,
+    "plots.js": SCRIPT,
+    "stage.js": SCRIPT,
+    "tour.js": SCRIPT,
+    "wire.js": SCRIPT,
+];
+
+/// The file at a path; `/` is the page itself.
+pub async fn serve(uri: Uri) -> Response {
+    let path = if uri.path() == "/" { "/index.html" } else { uri.path() };
+    let found = ASSETS.iter().find(|(known, _, _)| *known == path);
+    let (status, kind, content) = match found {
+        Some((_, kind, content)) => (StatusCode::OK, *kind, (*content).to_string()),
+        None if path == "/report.css" => (StatusCode::OK, CSS, taut_report::page::style()),
+        None if path == "/report.js" => (StatusCode::OK, SCRIPT, taut_report::page::script()),
+        None => {
+            (StatusCode::NOT_FOUND, HTML, "<!DOCTYPE html><title>taut studio</title><p>There is no such page.\n".into())
+        }
+    };
+    let mut response = Response::new(Body::from(content));
+    *response.status_mut() = status;
+    response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static(kind));
+    response
+}

@@ -1,0 +1,15 @@
+//! The studio: a server on this computer alone, and a page where an axis is seen, dragged and fitted in a browser.
+//!
+//! `server` listens and ends, `guard` lets nobody else in, `socket` talks to a page, `work` answers it with what the
+//! library computes. The page is in `studio/page`: plain modules that hold no physics.
+
+mod address;
+mod assets;
+mod guard;
+mod message;
+mod server;
+mod socket;
+mod state;
+mod work;
+
+pub use server::{Options, serve};

@@ -1,0 +1,72 @@
+//! The case of a request, with its changes.
+
+use super::Context;
+use crate::message::Request;
+use serde_json::{Value, json};
+use taut::case::{Number, Opened};
+use taut::error::{Error, Result};
+use taut::parameter::Fallback;
+
+/// The case: `text`, changed by `set`, a list of keys and SI values, and by `changes`, a list of `KEY=VALUE`.
+pub fn opened(request: &Request, context: &Context) -> Result<Opened> {
+    let (name, text) = (context.state.name(), request.text("text")?);
+    let mut changes: Vec<String> =
+        request.list("changes").iter().filter_map(Value::as_str).map(str::to_string).collect();
+    if !request.list("set").is_empty() {
+        let numbers = Opened::from_text_with(name, text, &[])?.numbers()?;
+        for pair in request.list("set") {
+            changes.push(change(&numbers, pair)?);
+        }
+    }
+    let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
+    Opened::from_text_with(name, text, &changes)
+}
+
+/// The change that `[key, value]` means, the value in SI.
+fn change(numbers: &[Number], pair: &Value) -> Result<String> {
+    let wrong = || Error::new("an element of `set` is a key and a number, such as [\"cart.mass\", 0.5]");
+    let (key, value) = (pair[0].as_str().ok_or_else(wrong)?, pair[1].as_f64().ok_or_else(wrong)?);
+    match numbers.iter().find(|number| number.key == key) {
+        Some(number) => Ok(number.change(value)),
+        None => Err(Error::new(format!("this case has no number `{key}`"))),
+    }
+}
+
+/// The numbers of a case with what the table of parameters says of them.
+pub fn parameters(numbers: &[Number]) -> Value {
+    let one = |number: &Number| {
+        let Number { key, row, unit, value, written } = number;
+        let default = match row.default {
+            Fallback::Value(value) => json!(value),
+            Fallback::Required | Fallback::Words(_) => Value::Null,
+        };
+        let limit = |value: f64| if value.abs() >= 1e15 { Value::Null } else { json!(value) };
+        json!({
+            "key": key,
+            "symbol": row.symbol,
+            "unit": taut::number::pretty_unit(unit),
+            "value": value,
+            "written": written,
+            "shown": taut::number::engineering(*value, unit, 6),
+            "default": default,
+            "low": limit(row.range.low),
+            "high": limit(row.range.high),
+            "whole": row.range.whole,
+            "allowed": row.range.describe(unit),
+            "sentence": row.sentence,
+            "example": taut::quantity::read(row.example, unit).ok(),
+        })
+    };
+    Value::Array(numbers.iter().map(one).collect())
+}
+
+/// The place in a list that a request names as `experiment`: its first where it names none.
+pub fn chosen(request: &Request, count: usize) -> Result<usize> {
+    let place = request.number("experiment").unwrap_or(0.0);
+    if count == 0 {
+        return Err(
+            Error::new("this case has no experiments").next("add [[experiment]] with name, input, until, every")
+        );
+    }
+    Ok((place.max(0.0) as usize).min(count - 1))
+}

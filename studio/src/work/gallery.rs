@@ -1,0 +1,36 @@
+//! The machines that come with the program.
+
+use super::Context;
+use super::scene::scene;
+use crate::message::{Reply, Request};
+use serde_json::{Value, json};
+use taut::case::Opened;
+use taut::error::Result;
+
+macro_rules! stages {
+    ($($path:literal),* $(,)?) => { &[$(($path, include_str!(concat!("../../../stages/", $path)))),*] };
+}
+
+/// Their case files, none of which names another file.
+const STAGES: &[(&str, &str)] = stages![
+    "sollmann-jouaneh/table4.toml",
+    "sollmann-jouaneh/table1.toml",
+    "sollmann-jouaneh/table2.toml",
+    "printer-axis/printer-axis.toml",
+    "laser-gantry/laser-gantry.toml",
+    "two-mass/two-mass.toml",
+    "h-frame/h-frame.toml",
+    "h-frame/follows.toml",
+    "core-xy/core-xy.toml",
+    "core-xy/follows.toml",
+];
+
+/// All of them: path, title, text, and what their pictures need.
+pub fn gallery(_: &Request, _: &Context) -> Result<Reply> {
+    let one = |(path, text): &(&str, &str)| {
+        let case = Opened::from_text_with(path, text, &[])?;
+        Ok(json!({ "path": path, "title": case.title(), "text": text, "scene": scene(&case) }))
+    };
+    let stages = STAGES.iter().map(one).collect::<Result<Vec<Value>>>()?;
+    Ok(Reply::of(json!({ "stages": stages })))
+}

@@ -1,0 +1,31 @@
+//! How the machine swings: the page of `taut modes`.
+
+use super::{Context, friction};
+use super::case::opened;
+use crate::message::{Reply, Request};
+use serde_json::json;
+use taut::case::Opened;
+use taut::error::Result;
+use taut::linear::{Analysis, GantryAnalysis, Question};
+use taut_report::modes;
+
+/// Poles, zeros, frequency responses, and how they change along the travel, as a part of a page and as data; and friction
+/// over speed, up to `speed`, m/s.
+pub fn modes(request: &Request, context: &Context) -> Result<Reply> {
+    let case = opened(request, context)?;
+    let speed = request.number("speed").filter(|speed| *speed > 0.0).unwrap_or(1.0);
+    let friction = friction::page(&case, speed);
+    let (page, result) = match &case {
+        Opened::Axis(case) => {
+            let analysis = Analysis::of(case, &Question::default())?;
+            let figures = modes::figures(&analysis);
+            (modes::page(&analysis, &figures), taut::json::modes(&analysis))
+        }
+        Opened::Gantry(case) => {
+            let analysis = GantryAnalysis::of(case)?;
+            let figures = modes::gantry::planes(&analysis);
+            (modes::gantry::page(&analysis, &figures), taut::json::gantry_modes(&analysis))
+        }
+    };
+    Ok(Reply::of(json!({ "html": format!("{}{}", page.body(), friction.body()), "result": result })))
+}

@@ -1,0 +1,238 @@
+//! One experiment simulated: what every move of a slider asks for.
+
+use super::Context;
+use super::case::{chosen, opened, parameters};
+use super::curves::{Kept, bodies, panels, told};
+use super::scene::scene;
+use crate::message::{Reply, Request};
+use serde_json::{Value, json};
+use std::time::Instant;
+use taut::case::{Case, Experiment, GantryCase, GantryExperiment, Opened};
+use taut::error::Result;
+use taut::json::{GantrySimulation, Simulation};
+use taut::metrics::{GantryMeter, Meter};
+use taut::overview::Overview;
+use taut::reduction::Reduction;
+use taut::solve::{self, Course, Detail, Outcome, Solver, stream_mechanism, stream_observed};
+use taut_report::simulate::{self, Curves};
+
+/// Rows of a picture: of a longer run every second one is computed, every third, …
+const ROWS: u64 = 4000;
+
+/// Events that are told.
+const EVENTS: usize = 2000;
+
+/// Simulates `experiment` of the case; with `describe`, the answer says what there is, too.
+pub fn run(request: &Request, context: &Context) -> Result<Reply> {
+    let case = opened(request, context)?;
+    let begun = Instant::now();
+    let (simulated, kept) = match &case {
+        Opened::Axis(case) => axis(&case.experiments, request, |place| axis_run(case, place, context))?,
+        Opened::Gantry(case) => axis(&case.experiments, request, |place| gantry_run(case, place, context))?,
+    };
+    let took = begun.elapsed();
+    let numbers = case.numbers()?;
+    let mut reply = Reply::of(json!({
+        "title": case.title(),
+        "text": case.text(),
+        "experiments": names(&case),
+        "experiment": simulated.place,
+        "until": simulated.until,
+        "values": numbers.iter().map(|number| json!([number.key, number.value])).collect::<Vec<_>>(),
+        "rows": simulated.rows,
+        "ending": simulated.early,
+        "events": simulated.outcome.events.iter().take(EVENTS).map(event).collect::<Vec<_>>(),
+        "events_left_out": simulated.outcome.events.len().saturating_sub(EVENTS),
+        "scene": scene(&case),
+        "columns": kept.told(),
+        "panels": simulated.panels,
+        "bodies": bodies(&case),
+        "result": simulated.json,
+        "took_s": took.as_secs_f64(),
+    }));
+    if request.flag("describe") {
+        reply.head.insert("parameters".into(), parameters(&numbers));
+    }
+    reply.head.insert("overview".into(), overview(&case));
+    reply.columns = kept.columns;
+    Ok(reply)
+}
+
+/// A run, as it is told.
+struct Simulated {
+    place: usize,
+    until: f64,
+    rows: Value,
+    early: Option<String>,
+    outcome: Outcome,
+    panels: Value,
+    json: Value,
+}
+
+/// Runs the experiment that the request names, of either kind of machine.
+fn axis<E>(
+    experiments: &[E],
+    request: &Request,
+    run: impl FnOnce(usize) -> Result<(Simulated, Kept)>,
+) -> Result<(Simulated, Kept)> {
+    run(chosen(request, experiments.len())?)
+}
+
+/// The interval of a picture's rows, s.
+pub fn interval(every: f64, rows: u64) -> f64 {
+    every * rows.div_ceil(ROWS).max(1) as f64
+}
+
+fn axis_run(case: &Case, place: usize, context: &Context) -> Result<(Simulated, Kept)> {
+    let (stage, experiment) = (&case.stage, &case.experiments[place]);
+    let opened = Opened::Axis(Box::new(case.clone()));
+    let panels = panels(&opened, &stage.mechanism().columns);
+    let shown = Experiment { every: interval(experiment.every, experiment.samples()), ..experiment.clone() };
+    let solver = Solver::of(stage);
+    let mut kept = Kept::new(&panels);
+    let run = simulate_axis(case, &shown, solver, context, &mut Keep::Columns(&mut kept))?;
+    let lines = simulate::lines(&run, solver);
+    let json = serde_json::to_value(Simulation::new(case, solver, &[run.told()])).unwrap_or_default();
+    let simulated = Simulated {
+        place,
+        until: experiment.until,
+        rows: lines_told(lines.into_iter().filter(|(name, _)| *name != "cost")),
+        early: simulate::early_end(&run.outcome.ending),
+        outcome: run.outcome,
+        panels: told(&panels),
+        json,
+    };
+    Ok((simulated, kept))
+}
+
+/// Where rows go.
+pub enum Keep<'a> {
+    /// To the page.
+    Columns(&'a mut Kept),
+    /// To the plots of a report.
+    Curves,
+}
+
+/// Runs an experiment of an axis, stopped when nobody waits for it.
+pub fn simulate_axis<'a>(
+    case: &Case,
+    experiment: &'a Experiment,
+    solver: Solver,
+    context: &Context,
+    keep: &mut Keep,
+) -> Result<simulate::Run<'a>> {
+    let begun = Instant::now();
+    let stage = &case.stage;
+    let mut meter = Meter::new(stage, experiment);
+    let mut curves = matches!(keep, Keep::Curves).then(|| Curves::new(stage));
+    let outcome = stream_observed(stage, experiment, solver, &mut meter, &mut |block| {
+        if let Keep::Columns(kept) = keep {
+            kept.take(block);
+        }
+        if let Some(curves) = &mut curves {
+            curves.take(block);
+        }
+        context.flow()
+    })?;
+    let metrics = meter.finish(&outcome.events);
+    let reduction = Reduction::of(stage, experiment, solver)?;
+    let (model, took) = (stage.belt.model, begun.elapsed());
+    Ok(simulate::Run {
+        experiment,
+        outcome,
+        metrics,
+        curves,
+        samples: None,
+        band: None,
+        model,
+        reduction,
+        files: Vec::new(),
+        took,
+    })
+}
+
+fn gantry_run(case: &GantryCase, place: usize, context: &Context) -> Result<(Simulated, Kept)> {
+    let experiment = &case.experiments[place];
+    let opened = Opened::Gantry(Box::new(case.clone()));
+    let panels = panels(&opened, &case.gantry.mechanism().columns);
+    let shown = GantryExperiment { every: interval(experiment.every, experiment.samples()), ..experiment.clone() };
+    let mut kept = Kept::new(&panels);
+    let (run, solver) = simulate_gantry(case, &shown, context, &mut Keep::Columns(&mut kept))?;
+    let json = GantrySimulation::new(case, solver, &[run.told()]);
+    let simulated = Simulated {
+        place,
+        until: experiment.until,
+        rows: lines_told(
+            simulate::gantry::lines(&run, &case.gantry, solver).into_iter().filter(|(name, _)| *name != "cost"),
+        ),
+        early: simulate::gantry::early_end(&run, &case.gantry),
+        panels: told(&panels),
+        json: serde_json::to_value(json).unwrap_or_default(),
+        outcome: run.outcome,
+    };
+    Ok((simulated, kept))
+}
+
+/// Runs an experiment of a gantry, stopped when nobody waits for it.
+pub fn simulate_gantry<'a>(
+    case: &GantryCase,
+    experiment: &'a GantryExperiment,
+    context: &Context,
+    keep: &mut Keep,
+) -> Result<(simulate::gantry::Run<'a>, Solver)> {
+    let begun = Instant::now();
+    let mechanism = case.gantry.mechanism();
+    let solver = Solver::of_mechanism(&mechanism);
+    let mut meter = GantryMeter::new(&case.gantry);
+    let mut curves = matches!(keep, Keep::Curves).then(|| simulate::gantry::curves(&case.gantry));
+    let shown = (Detail::Full, Some(&mut meter as &mut dyn solve::Observe));
+    let outcome = stream_mechanism(&mechanism, &Course::of(experiment), solver, shown, &mut |block| {
+        if let Keep::Columns(kept) = keep {
+            kept.take(block);
+        }
+        if let Some((curves, way)) = &mut curves {
+            curves.take(block);
+            way.take(block);
+        }
+        context.flow()
+    })?;
+    let metrics = meter.finish(&outcome.events);
+    let took = begun.elapsed();
+    Ok((simulate::gantry::Run { experiment, outcome, metrics, curves, files: Vec::new(), took }, solver))
+}
+
+/// Names and lengths of the experiments.
+fn names(case: &Opened) -> Value {
+    let one = |name: &str, until: f64| json!({ "name": name, "until": until });
+    match case {
+        Opened::Axis(case) => case.experiments.iter().map(|e| one(&e.name, e.until)).collect(),
+        Opened::Gantry(case) => case.experiments.iter().map(|e| one(&e.name, e.until)).collect(),
+    }
+}
+
+fn lines_told<N: AsRef<str>>(lines: impl Iterator<Item = (N, String)>) -> Value {
+    lines.map(|(name, value)| json!([name.as_ref(), value.replace('-', "−")])).collect()
+}
+
+fn event(event: &solve::Event) -> Value {
+    json!({
+        "time": event.time,
+        "part": event.part.name(),
+        "body": event.body(),
+        "from": event.from.word(),
+        "to": event.to.word(),
+    })
+}
+
+/// What follows from the numbers at a glance: groups of names and values.
+fn overview(case: &Opened) -> Value {
+    let Ok(overview) = Overview::of(case) else { return Value::Null };
+    let row = |row: &taut::overview::Row| json!({ "key": row.key, "name": row.name, "value": taut_report::show::value(row), "how": row.how });
+    let groups: Vec<Value> = overview
+        .groups
+        .iter()
+        .map(|group| json!({ "name": group.name, "rows": group.rows.iter().map(row).collect::<Vec<_>>() }))
+        .collect();
+    let notes: Vec<&str> = overview.notes.iter().map(|note| note.text.as_str()).collect();
+    json!({ "groups": groups, "places": taut_report::show::rows(&overview), "notes": notes })
+}

@@ -1,0 +1,39 @@
+//! What the drawing of a machine needs beside its motion: lengths that do not change.
+
+use serde_json::{Value, json};
+use taut::case::Opened;
+use taut::stage::Travel;
+use taut::stage::gantry::Routing;
+
+/// Kind, radius and travels, m.
+pub fn scene(case: &Opened) -> Value {
+    let travel = |travel: Option<Travel>| travel.map(|travel| [travel.min, travel.max]);
+    match case {
+        Opened::Axis(case) => {
+            let stage = &case.stage;
+            json!({
+                "kind": "axis",
+                "radius": stage.pulley_radius,
+                "x": travel(stage.travel),
+                "spans": ["span1_force", "span2_force", "span3_force"],
+                "pretension": stage.belt.pretension,
+            })
+        }
+        Opened::Gantry(case) => {
+            let gantry = &case.gantry;
+            let spans: Vec<String> =
+                gantry.routing.spans().iter().map(|label| format!("{}_force", label.key)).collect();
+            json!({
+                "kind": match gantry.routing {
+                    Routing::HFrame => "h-frame",
+                    Routing::CoreXy => "core-xy",
+                },
+                "radius": gantry.pulley_radius,
+                "x": travel(gantry.bridge.travel),
+                "y": travel(gantry.cart.travel),
+                "spans": spans,
+                "pretension": gantry.belts.pretension,
+            })
+        }
+    }
+}

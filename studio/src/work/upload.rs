@@ -1,0 +1,65 @@
+//! Files that a page sends: they lie in a folder of the server's own until it ends.
+
+use crate::state::State;
+use axum::body::to_bytes;
+use axum::extract::{Request, State as Shared};
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+/// Bytes of a file.
+const FILE: usize = 64 << 20;
+
+/// Bytes of all files together.
+const ALL: usize = 512 << 20;
+
+/// How long a file may take.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// Takes the body as a file; answers with its path, as a case can name it.
+pub async fn take(Shared(state): Shared<Arc<State>>, request: Request) -> Response {
+    let length = request.headers().get(header::CONTENT_LENGTH).and_then(|value| value.to_str().ok()?.parse().ok());
+    if length.is_some_and(|length: usize| length > FILE) {
+        return too_large();
+    }
+    let name = name(request.uri().query().unwrap_or_default());
+    let body = match tokio::time::timeout(PATIENCE, to_bytes(request.into_body(), FILE)).await {
+        Err(_) => return (StatusCode::REQUEST_TIMEOUT, "the file came too slowly\n").into_response(),
+        Ok(Err(_)) => return too_large(),
+        Ok(Ok(body)) => body,
+    };
+    if state.uploaded.fetch_add(body.len(), Ordering::Relaxed) + body.len() > ALL {
+        state.uploaded.fetch_sub(body.len(), Ordering::Relaxed);
+        return too_large();
+    }
+    let write = || {
+        let folder = state.uploads()?;
+        // Each in a folder of its own, so that two of the same name do not meet.
+        let place = (0..).map(|k| folder.join(k.to_string())).find(|place| std::fs::create_dir(place).is_ok());
+        let path = place.unwrap_or(folder).join(name);
+        std::fs::write(&path, &body).map(|()| path)
+    };
+    match write() {
+        Ok(path) => axum_json(&serde_json::json!({ "path": path.display().to_string() })),
+        Err(e) => (StatusCode::INSUFFICIENT_STORAGE, format!("the file cannot be kept: {e}\n")).into_response(),
+    }
+}
+
+fn axum_json(value: &serde_json::Value) -> Response {
+    ([(header::CONTENT_TYPE, "application/json")], value.to_string()).into_response()
+}
+
+fn too_large() -> Response {
+    let told = format!("a file may have {} MB, and all together {} MB\n", FILE >> 20, ALL >> 20);
+    (StatusCode::PAYLOAD_TOO_LARGE, told).into_response()
+}
+
+/// The name of the file after `name=`: what could lead elsewhere is left out.
+fn name(query: &str) -> String {
+    let given = query.split('&').find_map(|pair| pair.strip_prefix("name=")).unwrap_or_default();
+    let plain: String = given.chars().filter(|c| c.is_ascii_alphanumeric() || "._-".contains(*c)).take(100).collect();
+    let plain = plain.trim_start_matches('.');
+    if plain.is_empty() { "file".to_string() } else { plain.to_string() }
+}
