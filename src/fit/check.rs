@@ -3,7 +3,7 @@
 use super::identify::{Group, Identifiability};
 use super::proposals::{Proposal, proposals};
 use super::regression::{Balance, regression};
-use super::{Fit, search, told};
+use super::{Fit, Stop, search, told};
 use crate::case::{Case, Plan};
 use crate::error::Result;
 use crate::log::Survey;
@@ -37,7 +37,17 @@ impl Check {
 
 /// Looks at the logs of a case: by a fit, whose verdict it gives.
 pub fn check(case: &Case, plan: &Plan) -> Result<Check> {
-    let found = search(case, plan, None, &mut |_| Flow::Continue)?;
+    check_watched(case, plan, None, &mut |_, _| Flow::Continue)
+}
+
+/// The same; `watch` sees the variables and the cost after each step, and `stop` ends the search with the best so far.
+pub fn check_watched(
+    case: &Case,
+    plan: &Plan,
+    stop: Option<Stop>,
+    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
+) -> Result<Check> {
+    let found = search(case, plan, stop, watch)?;
     let judged = found.judged(case, plan);
     let experiments = judged.as_ref().map_or(Vec::new(), |judged| proposals(&found, judged));
     let noise: Vec<String> = found

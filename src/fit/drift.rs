@@ -55,7 +55,7 @@ impl Drift {
 /// searches for, whatever else may be off, and delay, gain and offset of the input.
 pub fn drift(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(&str) -> Flow) -> Result<Drift> {
     let none = nothing(plan);
-    let quiet = &mut |_| Flow::Continue;
+    let quiet = &mut |_: &[f64], _| Flow::Continue;
     watch("the machine as it is");
     let found = search(case, &none, stop, quiet)?;
     let unchanged = errors(&found);

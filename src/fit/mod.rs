@@ -35,7 +35,7 @@ mod search;
 mod sub_records;
 mod uncertainty;
 
-pub use check::{Check, check};
+pub use check::{Check, check, check_watched};
 pub use combinations::Combination;
 pub use drawn::{drawn, machines};
 pub use drift::{Change, Drift, drift};
@@ -65,6 +65,16 @@ use crate::solve::Flow;
 ///
 /// `watch` sees the cost after each step; `stop` ends the search, which then gives the best so far.
 pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f64) -> Flow) -> Result<Fit> {
+    fit_watched(case, plan, stop, &mut |_, cost| watch(cost))
+}
+
+/// The same; `watch` sees the variables after each step, too, as a [`Problem`] of this case and plan has them.
+pub fn fit_watched(
+    case: &Case,
+    plan: &Plan,
+    stop: Option<Stop>,
+    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
+) -> Result<Fit> {
     let found = search(case, plan, stop, watch)?;
     let judged = found.judged(case, plan);
     Ok(told(case, plan, &found, judged.as_ref()))

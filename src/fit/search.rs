@@ -50,11 +50,9 @@ pub(super) fn search<'a>(
     case: &Case,
     plan: &Plan,
     stop: Option<Stop<'a>>,
-    watch: &mut dyn FnMut(f64) -> Flow,
+    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
 ) -> Result<Searched<'a>> {
     let mut problem = Problem::new(case, plan)?.stopped_by(stop);
-
-    let mut watch = |_: &[f64], cost: f64| watch(cost);
     let mut work = Work::default();
     let mut descend = |problem: &mut Problem, x: &[f64], options: &Options| {
         let options = Options { rounding: problem.rounding(), ..*options };
@@ -62,7 +60,7 @@ pub(super) fn search<'a>(
         if x.is_empty() {
             return as_it_is(problem);
         }
-        let minimum = minimise(problem, x, &bounds, &options, &mut watch);
+        let minimum = minimise(problem, x, &bounds, &options, &mut *watch);
         work.iterations += minimum.iterations;
         work.evaluations += minimum.evaluations;
         minimum
@@ -129,7 +127,7 @@ pub(super) fn search<'a>(
     let options =
         Options { huber: if plan.huber { HUBER } else { f64::INFINITY }, rounding: problem.rounding(), ..whole };
     if best.ending != Ending::Interrupted {
-        hold_undetermined(&mut problem, &mut best, &options, &mut watch, &mut work);
+        hold_undetermined(&mut problem, &mut best, &options, watch, &mut work);
     }
     work.simulations = problem.simulations;
     Ok(Searched { problem, best, noise, starts, work })

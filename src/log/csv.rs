@@ -98,6 +98,39 @@ pub(super) fn heading(file: &Path, wanted: &[&str]) -> Result<Option<Vec<String>
     Ok(None)
 }
 
+/// The names of all columns: those above the first row of numbers, or the places of the columns where nothing names
+/// them.
+pub(super) fn names(file: &Path) -> Result<Vec<ColumnId>> {
+    let mut lines = Lines::new(file, open(file)?);
+    let request = Request::complete(&[]);
+    let mut above: Vec<String> = Vec::new();
+    for _ in 0..PREAMBLE {
+        if !lines.advance()? {
+            break;
+        }
+        let candidate = Layout::candidate(&lines, &lines.text, &request, &[])?;
+        let names = candidate.names;
+        let numbers = names.iter().filter(|text| numeric(text)).count();
+        // A column of words may stand among those of numbers.
+        if numbers == 0 || 2 * names.iter().filter(|text| numeric(text) || is_missing(text)).count() < names.len() {
+            // Units may stand between the names and the numbers.
+            if above.len() != names.len() {
+                above = names;
+            }
+            continue;
+        }
+        let remark = Layout::candidate(&lines, &lines.remark, &request, &[])?.names;
+        let named = |those: &[String]| those.len() == names.len() && those.iter().all(|name| !numeric(name));
+        let there = if named(&above) { above } else { remark };
+        let place = |k: usize| there.get(k).filter(|name| named(&there) && !name.is_empty());
+        return Ok((0..names.len())
+            .map(|k| place(k).map_or(ColumnId::Number(k + 1), |name| ColumnId::Name(name.clone())))
+            .collect());
+    }
+    let error = Error::new("no line of this file has numbers in columns").in_file(file);
+    Err(error.allowed("a row that names the columns, then rows of numbers").next("check that the recording was saved"))
+}
+
 /// The place of a field in a file.
 #[derive(Debug, Clone)]
 pub(super) struct Locator {

@@ -244,7 +244,7 @@ const IN_NAMES: [&str; 22] = [
 ];
 
 /// A unit other than SI at the end of a name, if it is one of the wanted dimension.
-fn suspected(name: &str, wanted: &str) -> Option<&'static str> {
+pub(super) fn suspected(name: &str, wanted: &str) -> Option<&'static str> {
     let parts: Vec<&str> = name.split('_').collect();
     let last = parts.last().copied().unwrap_or_default();
     // As in cart_speed_mm_s.

@@ -132,6 +132,27 @@ struct Part {
     length: usize,
 }
 
+/// The names of all vectors of numbers, and of the columns of matrices.
+pub(super) fn names(file: &Path, beginning: &[u8]) -> Result<Vec<ColumnId>> {
+    if is_hdf5(beginning) || beginning.starts_with(b"MATLAB 7.3") || !is_version_5(beginning) {
+        // The reader says what is wrong with it.
+        return read(file, beginning, &Request::complete(&[ColumnId::from("time")])).map(|_| Vec::new());
+    }
+    let variables = Input::open(file)?.variables().map_err(|error| unreadable(file, &error))?;
+    let mut names = Vec::new();
+    for variable in variables.iter().filter(|variable| variable.is_numeric() && !variable.complex) {
+        let &[rows, columns] = &variable.dimensions[..] else { continue };
+        match (rows.min(columns), rows >= columns) {
+            (0, _) => {}
+            (1, _) if rows.max(columns) > 1 => names.push(ColumnId::Name(variable.name.clone())),
+            (1, _) => {}
+            (few, true) => names.extend((1..=few).map(|k| ColumnId::Name(format!("{}(:,{k})", variable.name)))),
+            (few, false) => names.extend((1..=few).map(|k| ColumnId::Name(format!("{}({k},:)", variable.name)))),
+        }
+    }
+    Ok(names)
+}
+
 impl Wanted {
     fn new(file: &Path, id: &ColumnId) -> Result<Self> {
         let ColumnId::Name(text) = id else {

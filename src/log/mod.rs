@@ -2,6 +2,7 @@
 
 mod accelerometer;
 mod csv;
+mod guess;
 #[cfg(feature = "json")]
 mod klipper;
 mod lines;
@@ -15,6 +16,7 @@ mod survey;
 
 pub use crate::stage::Quantity;
 pub use accelerometer::{Accelerometer, read_accelerometer};
+pub use guess::{Guess, Looked, Seen, look};
 pub use mapping::{Clock, Mapping, Source, Unit};
 pub use presets::{End, In, PRESETS, Pick, Preset};
 pub use sheet::{ColumnId, Dialect, Filter};

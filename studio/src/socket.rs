@@ -163,7 +163,7 @@ impl Page {
             let id = request.id;
             let tell = |step: Value| {
                 // A page that is behind misses a step, and gets the next.
-                let _ = progress.try_send(Reply::of(json!({ "progress": step })).frame(Some(id)));
+                progress.try_send(Reply::of(json!({ "progress": step })).frame(Some(id))).is_ok()
             };
             let context = Context::new(&state, &stop, &tell);
             let frame = work::answer(&request, &context).frame(Some(id));

@@ -224,7 +224,7 @@ impl Course<'_> {
 
     /// The fit to all logs, and its errors over whole logs with their starts fitted.
     fn whole(&mut self, case: &Case, plan: &Plan) -> Result<(Stage, Vec<(Quantity, f64)>)> {
-        let found = search(case, plan, self.stop, &mut |_| Flow::Continue)?;
+        let found = search(case, plan, self.stop, &mut |_, _| Flow::Continue)?;
         self.work.add(&found.work);
         let stages = found.problem.stages(&found.best.x);
         let known = known(&found);
@@ -241,7 +241,7 @@ impl Course<'_> {
         let mut plan = Plan { held_out: Vec::new(), separate: Vec::new(), ..plan.clone() };
         plan.nuisance.initial_state |= self.parts.is_cut;
         let own = Case { experiments: fitted.clone(), ..case.clone() };
-        let found = search(&own, &plan, self.stop, &mut |_| Flow::Continue)?;
+        let found = search(&own, &plan, self.stop, &mut |_, _| Flow::Continue)?;
         self.work.add(&found.work);
         let stage = found.problem.stage_at(&found.best.x);
         let known = known(&found);
@@ -338,7 +338,7 @@ impl Course<'_> {
             let read = Case::from_text_with(self.name, &text, &changes)?;
             case = Case { experiments: self.case.experiments.clone(), stage: case.stage, ..read };
         }
-        let found = search(&case, &plan, self.stop, &mut |_| Flow::Continue)?;
+        let found = search(&case, &plan, self.stop, &mut |_, _| Flow::Continue)?;
         self.work.add(&found.work);
         let judged = found.judged(&case, &plan);
         let fit = told(&case, &plan, &found, judged.as_ref());

@@ -19,6 +19,14 @@ use std::path::Path;
 /// Rows that are read at a time.
 const BLOCK: usize = 8192;
 
+/// The names of all columns.
+pub(super) fn names(file: &Path) -> Result<Vec<ColumnId>> {
+    let input = File::open(file).map_err(|error| unreadable(file, &error))?;
+    let reader = SerializedFileReader::new(input).map_err(|error| damaged(file, &error))?;
+    let schema = reader.metadata().file_metadata().schema_descr();
+    Ok(schema.columns().iter().map(|column| ColumnId::Name(column.path().string())).collect())
+}
+
 /// Reads the wanted columns.
 pub(super) fn read(file: &Path, request: &Request<'_>) -> Result<Sheet> {
     let input = File::open(file).map_err(|error| unreadable(file, &error))?;

@@ -48,6 +48,11 @@ impl Panel {
         self
     }
 
+    /// Whether it is more than what the drawing needs.
+    pub fn is_plotted(&self) -> bool {
+        !self.title.is_empty()
+    }
+
     /// A column as it is.
     fn column(self, column: &str, name: &str) -> Self {
         self.curve(column, name, &[(column, 1.0)])

@@ -19,6 +19,8 @@ const STAGES: &[(&str, &str)] = stages![
     "printer-axis/printer-axis.toml",
     "laser-gantry/laser-gantry.toml",
     "two-mass/two-mass.toml",
+    "pendulepi/pendulepi.toml",
+    "sollmann-jouaneh/controllers/pid.toml",
     "h-frame/h-frame.toml",
     "h-frame/follows.toml",
     "core-xy/core-xy.toml",

@@ -1,9 +1,11 @@
 //! What a page can ask for: each act is a row of [`ACTS`] and a function from a request to a reply.
 
 mod case;
+mod closed;
 mod curves;
 mod friction;
 mod gallery;
+mod logs;
 mod modes;
 mod open;
 pub mod pool;
@@ -12,6 +14,9 @@ mod run;
 mod save;
 mod scene;
 mod section;
+mod shape;
+mod sweep;
+mod toml;
 pub mod upload;
 
 use crate::message::{Reply, Request};
@@ -29,7 +34,6 @@ pub enum Pace {
     /// Milliseconds: one at a time for each page, the newest wins.
     Quick,
     /// Seconds and more: on a thread of its own, with progress; `cancel` stops it.
-    #[allow(dead_code)]
     Long,
 }
 
@@ -44,6 +48,15 @@ const ACTS: &[Act] = &[
     ("gallery", Pace::Quick, gallery::gallery),
     ("save", Pace::Quick, save::save),
     ("report", Pace::Quick, report::report),
+    ("columns", Pace::Quick, logs::columns),
+    ("check", Pace::Long, logs::check),
+    ("fit", Pace::Long, logs::fit),
+    ("controllers", Pace::Quick, closed::controllers),
+    ("loop", Pace::Quick, closed::closed),
+    ("tune", Pace::Long, closed::tuned),
+    ("shape", Pace::Long, shape::shape),
+    ("sweep", Pace::Long, sweep::sweep),
+    ("traces", Pace::Quick, sweep::traces),
 ];
 
 /// A quick work is stopped after this time: a picture that takes longer is none to drag.
@@ -55,15 +68,14 @@ pub struct Context<'a> {
     pub state: &'a State,
     /// Set when nobody wants the answer any more.
     stop: &'a AtomicBool,
-    /// Tells the page how far a long work is.
-    #[allow(dead_code)]
-    pub progress: &'a dyn Fn(Value),
+    /// Tells the page how far a long work is; false where it is behind, and misses this step.
+    pub progress: &'a (dyn Fn(Value) -> bool + Sync),
     begun: Instant,
 }
 
 impl<'a> Context<'a> {
     /// That of a work that begins now.
-    pub fn new(state: &'a State, stop: &'a AtomicBool, progress: &'a dyn Fn(Value)) -> Self {
+    pub fn new(state: &'a State, stop: &'a AtomicBool, progress: &'a (dyn Fn(Value) -> bool + Sync)) -> Self {
         Self { state, stop, progress, begun: Instant::now() }
     }
 

@@ -8,12 +8,14 @@ use crate::message::{Reply, Request};
 use serde_json::{Value, json};
 use std::time::Instant;
 use taut::case::{Case, Experiment, GantryCase, GantryExperiment, Opened};
+use taut::control::Loop;
 use taut::error::Result;
 use taut::json::{GantrySimulation, Simulation};
 use taut::metrics::{GantryMeter, Meter};
 use taut::overview::Overview;
 use taut::reduction::Reduction;
 use taut::solve::{self, Course, Detail, Outcome, Solver, stream_mechanism, stream_observed};
+use taut_report::motion::Tried;
 use taut_report::simulate::{self, Curves};
 
 /// Rows of a picture: of a longer run every second one is computed, every third, …
@@ -27,6 +29,9 @@ pub fn run(request: &Request, context: &Context) -> Result<Reply> {
     let case = opened(request, context)?;
     let begun = Instant::now();
     let (simulated, kept) = match &case {
+        Opened::Axis(case) if case.experiments.is_empty() && !case.moves.is_empty() => {
+            axis(&case.moves, request, |place| move_run(case, place, context))?
+        }
         Opened::Axis(case) => axis(&case.experiments, request, |place| axis_run(case, place, context))?,
         Opened::Gantry(case) => axis(&case.experiments, request, |place| gantry_run(case, place, context))?,
     };
@@ -102,6 +107,24 @@ fn axis_run(case: &Case, place: usize, context: &Context) -> Result<(Simulated, 
         panels: told(&panels),
         json,
     };
+    Ok((simulated, kept))
+}
+
+/// A move in closed loop, of a case that has no experiments.
+fn move_run(case: &Case, place: usize, context: &Context) -> Result<(Simulated, Kept)> {
+    let (design, moves) = case.moves_named(context.state.name(), &[])?;
+    let opened = Opened::Axis(Box::new(case.clone()));
+    let panels = panels(&opened, &case.stage.mechanism().columns);
+    let mut kept = Kept::new(&panels);
+    let done = super::closed::moved(case, design, moves[place], context, &mut |block| kept.take(block))?;
+    let timing = Loop::of(design);
+    let json = taut::json::moves(&case.title, design.structure.name(), &timing, &case.stage, &[done.told()]);
+    let tried = Tried { case, design, done: vec![done] };
+    let rows = lines_told(taut_report::motion::lines(&tried, &tried.done[0]).into_iter());
+    let outcome = tried.done.into_iter().next().map(|done| done.run.outcome);
+    let Some(outcome) = outcome else { return Err(taut::Error::new("there is no such move")) };
+    let early = simulate::early_end(&outcome.ending);
+    let simulated = Simulated { place, until: moves[place].until, rows, early, outcome, panels: told(&panels), json };
     Ok((simulated, kept))
 }
 
@@ -205,6 +228,7 @@ pub fn simulate_gantry<'a>(
 fn names(case: &Opened) -> Value {
     let one = |name: &str, until: f64| json!({ "name": name, "until": until });
     match case {
+        Opened::Axis(case) if case.experiments.is_empty() => case.moves.iter().map(|m| one(&m.name, m.until)).collect(),
         Opened::Axis(case) => case.experiments.iter().map(|e| one(&e.name, e.until)).collect(),
         Opened::Gantry(case) => case.experiments.iter().map(|e| one(&e.name, e.until)).collect(),
     }

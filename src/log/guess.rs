@@ -1,0 +1,265 @@
+//! A first look at a file: which columns it has, and what they seem to be.
+//!
+//! A guess is by names, and by how values go on from row to row. It is there to be corrected: nothing is read by it.
+
+use super::mapping::suspected;
+use super::presets::{In, PRESETS, Preset};
+use super::sheet::{ColumnId, Request, Sheet};
+use super::{Quantity, csv, lines, matlab};
+use crate::error::{Error, Result};
+use std::path::Path;
+
+/// Columns that are looked at.
+const MOST: usize = 64;
+
+/// What a file has.
+#[derive(Debug, Clone)]
+pub struct Looked {
+    /// Its columns, in the file's order.
+    pub columns: Vec<Seen>,
+    /// What they seem to be.
+    pub guess: Guess,
+}
+
+/// A column of a file.
+#[derive(Debug, Clone)]
+pub struct Seen {
+    /// By its name, or by its place where nothing names it.
+    pub id: ColumnId,
+    /// The unit that the file states.
+    pub unit: Option<String>,
+    /// Its numbers as they stand, NaN where one is missing; none where they are words.
+    pub values: Vec<f64>,
+}
+
+/// What columns seem to be.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Guess {
+    /// The recorder that made the file, where its columns are called as those of one.
+    pub preset: Option<&'static str>,
+    /// Key of a log's table, the place of its column, and the unit by its name.
+    pub columns: Vec<(&'static str, usize, Option<String>)>,
+    /// The place of the column that tells runs apart.
+    pub split: Option<usize>,
+}
+
+impl Guess {
+    /// The place of the column under a key.
+    pub fn column(&self, key: &str) -> Option<usize> {
+        self.columns.iter().find(|(own, ..)| *own == key).map(|(_, place, _)| *place)
+    }
+}
+
+/// Parts of names by which columns are known, the most telling first: lower case, by key of a log's table.
+const NAMES: &[(&str, &[&str])] = &[
+    ("input", &["voltage", "volt", "pwm", "command", "control", "duty", "input", "u", "vir", "effort"]),
+    ("cart_position", &["cart_position", "cart", "carriage", "position", "pos", "x", "y"]),
+    ("cart_speed", &["cart_speed", "velocity", "vel", "speed"]),
+    ("drive_angle", &["drive_angle", "angle", "theta", "phi", "encoder", "qm", "steps"]),
+    ("drive_speed", &["drive_speed", "omega", "rpm"]),
+    ("motor_current", &["motor_current", "current", "amps", "ampere", "iq", "i"]),
+    ("motor_voltage", &["motor_voltage"]),
+    ("cart_acceleration", &["acceleration", "accel", "acc"]),
+    ("reference", &["reference", "setpoint", "target", "desired", "ref"]),
+];
+
+/// Names of clocks.
+const CLOCKS: &[&str] = &["time", "timestamp", "t", "clock", "seconds", "millis", "micros"];
+
+/// Reads all columns of a file, and guesses what they are.
+pub fn look(file: &Path) -> Result<Looked> {
+    let mut ids = names(file)?;
+    ids.truncate(MOST);
+    if ids.is_empty() {
+        return Err(Error::new("this file has no columns of numbers").in_file(file));
+    }
+    let columns = match read(file, &ids) {
+        Ok(columns) => columns,
+        // One of them holds words, or has another length: each by itself.
+        Err(_) => {
+            let one = |id: &ColumnId| {
+                let alone = read(file, std::slice::from_ref(id)).ok().and_then(|mut read| read.pop());
+                alone.unwrap_or(Seen { id: id.clone(), unit: None, values: Vec::new() })
+            };
+            ids.iter().map(one).collect()
+        }
+    };
+    if columns.iter().all(|column| column.values.is_empty()) {
+        // What is wrong with them all is told of the first.
+        read(file, &ids[..1])?;
+    }
+    let guess = guess(file, &columns);
+    Ok(Looked { columns, guess })
+}
+
+fn names(file: &Path) -> Result<Vec<ColumnId>> {
+    let beginning = lines::beginning(file)?;
+    if matlab::is_matlab(file, &beginning) {
+        return matlab::names(file, &beginning);
+    }
+    #[cfg(feature = "parquet")]
+    if beginning.starts_with(b"PAR1") {
+        return super::parquet::names(file);
+    }
+    #[cfg(feature = "json")]
+    if beginning.starts_with(&[0x1f, 0x8b]) {
+        return Ok(super::klipper::names(file)?.into_iter().map(ColumnId::Name).collect());
+    }
+    csv::names(file)
+}
+
+fn read(file: &Path, ids: &[ColumnId]) -> Result<Vec<Seen>> {
+    let preset = PRESETS.iter().find(|preset| preset.is_messages);
+    let request = Request { complete: 0, units_row: true, preset, ..Request::complete(ids) };
+    let mut sheet = Sheet::read(file, &request)?;
+    let columns = std::mem::take(&mut sheet.columns);
+    let all = ids.iter().zip(sheet.units).zip(columns);
+    Ok(all.map(|((id, unit), values)| Seen { id: id.clone(), unit, values }).collect())
+}
+
+/// By a preset whose columns are there, else by names.
+fn guess(file: &Path, columns: &[Seen]) -> Guess {
+    let mut guess =
+        PRESETS.iter().find_map(|preset| of_preset(preset, file, columns)).unwrap_or_else(|| by_name(columns));
+    guess.split = guess.column("time").and_then(|time| split(&columns[time].values, time, columns));
+    guess
+}
+
+/// What a preset says, where the file has its clock and something that it measures.
+fn of_preset(preset: &'static Preset, file: &Path, columns: &[Seen]) -> Option<Guess> {
+    let place = |id: &ColumnId| columns.iter().position(|column| column.id == *id);
+    let mut known = Vec::new();
+    for (key, id, of) in preset.columns_of(file).ok()? {
+        let unit = match of {
+            In::Unit(unit) => Some(unit.to_string()),
+            In::Own | In::MotorTurns | In::MotorSteps => None,
+        };
+        known.push((key, place(&id)?, unit));
+    }
+    let is_measured = |key: &str| Quantity::ALL.iter().any(|quantity| quantity.name() == key);
+    let found = known.iter().any(|(key, ..)| is_measured(key)) && known.iter().any(|(key, ..)| *key == "time");
+    found.then_some(Guess { preset: Some(preset.name), columns: known, split: None })
+}
+
+fn by_name(columns: &[Seen]) -> Guess {
+    let mut guess = Guess::default();
+    let clock = |column: &Seen| rises(&column.values) && rank(&words(column), CLOCKS).is_some();
+    let first = columns.iter().position(clock).or_else(|| columns.iter().position(|column| rises(&column.values)));
+    if let Some(place) = first {
+        guess.columns.push(("time", place, unit(&columns[place], "s").or_else(|| by_step(&columns[place]))));
+    }
+    for (key, names) in NAMES {
+        let free = |place: &usize| !guess.columns.iter().any(|(_, taken, _)| taken == place);
+        let ranked = (0..columns.len()).filter(free).filter_map(|place| {
+            let column = &columns[place];
+            Some((rank(&words(column), names)?, place)).filter(|_| !column.values.is_empty())
+        });
+        if let Some((_, place)) = ranked.min() {
+            let wanted = match *key {
+                "input" => "V",
+                "reference" => "m",
+                key => Quantity::ALL.iter().find(|quantity| quantity.name() == key).map_or("", |one| one.unit()),
+            };
+            guess.columns.push((key, place, unit(&columns[place], wanted)));
+        }
+    }
+    guess
+}
+
+/// The unit that a column's name ends in, where the file states none.
+fn unit(column: &Seen, wanted: &str) -> Option<String> {
+    let Some(name) = column.id.name().filter(|_| column.unit.is_none()) else { return None };
+    suspected(name, wanted).map(str::to_string)
+}
+
+/// The unit of a clock without a name for it, by the step between its rows: recorders take a sample every 10 µs to 0.1 s.
+fn by_step(column: &Seen) -> Option<String> {
+    let mut steps: Vec<f64> =
+        column.values.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
+    if steps.is_empty() || column.unit.is_some() {
+        return None;
+    }
+    let middle = steps.len() / 2;
+    match *steps.select_nth_unstable_by(middle, f64::total_cmp).1 {
+        step if step > 500.0 => Some("us".into()),
+        step if step >= 0.5 => Some("ms".into()),
+        _ => None,
+    }
+}
+
+/// A name in lower case, what is between brackets left out, and the words that it is made of.
+fn words(column: &Seen) -> Vec<String> {
+    let name = column.id.name().unwrap_or_default().to_lowercase();
+    let name = name.split(['[', '(']).next().unwrap_or_default().trim().to_string();
+    let mut words: Vec<String> = name.split(|c: char| !c.is_alphanumeric()).map(str::to_string).collect();
+    words.insert(0, name);
+    words
+}
+
+/// The first of these that is a word of a name: the less, the more telling.
+fn rank(words: &[String], known: &[&str]) -> Option<usize> {
+    known.iter().position(|known| words.iter().any(|word| word == known))
+}
+
+/// Whether nearly all rows are above the one before: a clock may begin anew with each run.
+fn rises(values: &[f64]) -> bool {
+    let up = values.windows(2).filter(|pair| pair[1] > pair[0]).count();
+    values.len() > 2 && up as f64 >= 0.97 * (values.len() - 1) as f64
+}
+
+/// The column that changes where the clock goes back, and nowhere else.
+fn split(time: &[f64], clock: usize, columns: &[Seen]) -> Option<usize> {
+    let back: Vec<usize> = (1..time.len()).filter(|&k| time[k] <= time[k - 1]).collect();
+    let tells = |column: &Seen| {
+        let values = &column.values;
+        let changes = (1..values.len()).filter(|&k| values[k].to_bits() != values[k - 1].to_bits());
+        values.len() == time.len() && changes.eq(back.iter().copied())
+    };
+    (0..columns.len()).find(|&place| place != clock && !back.is_empty() && tells(&columns[place]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn looked(name: &str, text: &str) -> Looked {
+        let file = std::env::temp_dir().join(format!("taut-guess-{}-{name}", std::process::id()));
+        std::fs::write(&file, text).unwrap();
+        let found = look(&file).unwrap();
+        std::fs::remove_file(file).unwrap();
+        found
+    }
+
+    #[test]
+    fn runs_of_one_file_are_told_apart_by_the_column_that_changes_with_them() {
+        let mut text = "pwm,time_us,position\n".to_string();
+        for pwm in [50, -50, 60] {
+            (0..40).for_each(|k| text += &format!("{pwm},{},{}\n", 5000 * k, 0.01 * f64::from(k)));
+        }
+        let found = looked("runs.csv", &text);
+        let guess = &found.guess;
+        assert_eq!(found.columns[2].values.len(), 120);
+        assert_eq!(guess.columns[0], ("time", 1, Some("us".into())));
+        assert_eq!((guess.column("input"), guess.column("cart_position"), guess.split), (Some(0), Some(2), Some(0)));
+    }
+
+    #[test]
+    fn units_and_words_of_names_are_used() {
+        let text =
+            "# made by hand\nTime [ms]; Motor Current (mA); u; angle_deg\n0;1;0;0\n1;2;5;0.1\n2;3;5;0.3\n3;3;5;0.6\n";
+        let found = looked("units.csv", text);
+        assert_eq!(found.columns[0].unit.as_deref(), Some("ms"));
+        let guess = &found.guess;
+        assert_eq!(guess.column("motor_current"), Some(1));
+        assert_eq!(guess.column("input"), Some(2));
+        assert!(guess.columns.contains(&("drive_angle", 3, Some("deg".into()))));
+        assert_eq!(guess.split, None);
+    }
+
+    #[test]
+    fn columns_without_names_go_by_their_places() {
+        let found = looked("bare.csv", "0 5 0\n1 5 0.1\n2 5 0.3\n3 5 0.5\n");
+        assert_eq!(found.columns[1].id, ColumnId::Number(2));
+        assert_eq!(found.guess.columns, [("time", 0, Some("ms".into()))]);
+    }
+}

@@ -1,0 +1,244 @@
+//! Loops that are closed: a move and the loop's margins for what sliders ask, and the tuning.
+
+use super::Context;
+use super::case::{opened, parameters};
+use super::run::interval;
+use crate::message::{Reply, Request};
+use serde_json::{Value, json};
+use std::cell::Cell;
+use std::f64::consts::PI;
+use std::time::{Duration, Instant};
+use taut::case::{Case, Given, Move, Opened, Tuning};
+use taut::control::feedback::Feedback;
+use taut::control::{Loop, Rows, Standard, stream};
+use taut::design::Design;
+use taut::error::{Error, Result};
+use taut::solve::Solver;
+use taut::trajectory::Trajectory;
+use taut::tune::{Family, Margins, Verdict, loops, trouble, tune};
+use taut_report::motion::{Done, Tried};
+use taut_report::tune::{Work, figures, page};
+
+/// Time between two steps of progress.
+const STEPS: Duration = Duration::from_millis(100);
+
+macro_rules! controllers {
+    ($($path:literal),* $(,)?) => { &[$(($path, include_str!(concat!("../../../stages/sollmann-jouaneh/controllers/", $path)))),*] };
+}
+
+/// Controllers to begin with, from the bundled cases.
+const CONTROLLERS: &[(&str, &str)] = controllers![
+    "pid.toml",
+    "pid-rigid.toml",
+    "pid-elastic.toml",
+    "pid-observer.toml",
+    "cascade.toml",
+    "cascade-current.toml",
+    "lqi.toml",
+    "lqg.toml",
+    "sliding.toml",
+    "fuzzy-pd.toml",
+    "fuzzy-pi.toml",
+];
+
+/// The controllers to begin with: name, and the table `[controller]` on one line, in SI units; and the moves of their case.
+pub fn controllers(_: &Request, _: &Context) -> Result<Reply> {
+    let one = |(path, text): &(&str, &str)| {
+        let case = Case::from_text(path, text)?;
+        let told = |key: &str| case.value(key).map(|given| written(&given));
+        Ok(json!({ "name": case.title, "file": path, "controller": told("controller")?, "moves": told("move")? }))
+    };
+    Ok(Reply::of(json!({ "controllers": CONTROLLERS.iter().map(one).collect::<Result<Vec<_>>>()? })))
+}
+
+/// A value of a case on one line.
+fn written(given: &Given) -> String {
+    match given {
+        Given::Number(value) => format!("{value:?}"),
+        Given::Whole(value) => value.to_string(),
+        Given::Text(text) => super::toml::toml(&json!(text)),
+        Given::Truth(truth) => truth.to_string(),
+        Given::List(all) => format!("[{}]", all.iter().map(written).collect::<Vec<_>>().join(", ")),
+        Given::Table(all) => {
+            let pairs: Vec<String> = all.iter().map(|(key, value)| format!("{key} = {}", written(value))).collect();
+            format!("{{ {} }}", pairs.join(", "))
+        }
+    }
+}
+
+/// The case of a request, which has to be an axis, with `changes`; and its text with them.
+fn axis(request: &Request, context: &Context) -> Result<Case> {
+    match opened(request, context)? {
+        Opened::Axis(case) => Ok(*case),
+        Opened::Gantry(_) => {
+            let error = Error::new("a controller moves an axis, and this case is a gantry");
+            Err(error.next("open the case of an axis"))
+        }
+    }
+}
+
+/// One move and the margins of its loop: what every move of a gain's slider asks for.
+pub fn closed(request: &Request, context: &Context) -> Result<Reply> {
+    let case = axis(request, context)?;
+    let begun = Instant::now();
+    let (design, moves) = case.moves_named(context.state.name(), &[])?;
+    let place = (request.number("move").unwrap_or(0.0).max(0.0) as usize).min(moves.len() - 1);
+    let motion = moves[place];
+    let mut kept = Columns::default();
+    let done = moved(&case, design, motion, context, &mut |block| kept.take(block))?;
+    let tried = Tried { case: &case, design, done: vec![done] };
+    let done = &tried.done[0];
+    let lines = taut_report::motion::lines(&tried, done);
+    let told = taut::json::moves(&case.title, design.structure.name(), &Loop::of(design), &case.stage, &[done.told()]);
+    let opened = Opened::Axis(Box::new(case.clone()));
+    let mut reply = Reply::of(json!({
+        "title": case.title,
+        "text": case.text,
+        "moves": moves.iter().map(|one| json!({ "name": one.name, "until": one.until })).collect::<Vec<_>>(),
+        "move": place,
+        "until": motion.until,
+        "profile_end": motion.profile.end(),
+        "controller": taut_report::motion::controller(design, &case.stage),
+        "rows": lines.iter().map(|(name, value)| json!([name, value.replace('-', "−")])).collect::<Vec<_>>(),
+        "ending": taut_report::simulate::early_end(&done.run.outcome.ending),
+        "trouble": done.trouble.as_ref().map(|trouble| &trouble.words),
+        "result": told,
+        "parameters": parameters(&opened.numbers()?),
+    }));
+    match nyquist(&case, design) {
+        Ok((margins, limit, curves)) => {
+            let rows = taut_report::tune::margins(&margins, &margins);
+            let rows: Vec<Value> = rows.iter().map(|(name, value, _)| json!([name, value])).collect();
+            reply.head.insert("margins".into(), json!({ "rows": rows, "limit": limit, "stable": margins.stable }));
+            for (name, values) in ["hertz", "re", "im", "sensitivity", "complementary"].into_iter().zip(curves) {
+                kept.put(name, values);
+            }
+        }
+        // Some controllers are not linear: there is no L to show.
+        Err(error) => {
+            reply.head.insert("margins".into(), json!({ "without": error.what }));
+        }
+    }
+    reply.head.insert("columns".into(), kept.told());
+    reply.head.insert("took_s".into(), json!(begun.elapsed().as_secs_f64()));
+    reply.columns = kept.values;
+    Ok(reply)
+}
+
+/// Runs a move, its rows to `sink`.
+pub fn moved<'a>(
+    case: &'a Case,
+    design: &Design,
+    motion: &'a Move,
+    context: &Context,
+    sink: &mut dyn FnMut(&Trajectory),
+) -> Result<Done<'a>> {
+    let stage = &case.stage;
+    let mut controller = Standard::new(design, stage)?;
+    let profile = motion.profile.clone().shaped(&design.shaper);
+    let count = (motion.until / motion.every).ceil().max(1.0) as u64;
+    let rows =
+        Rows { until: motion.until, every: interval(motion.every, count).min(motion.until), window: motion.window };
+    let mut take = |block: &Trajectory| {
+        sink(block);
+        context.flow()
+    };
+    let run = stream(stage, &mut controller, &Loop::of(design), &profile, &rows, Solver::of(stage), false, &mut take)?;
+    let trouble = trouble::trouble(stage, design, &run, motion.profile.target());
+    Ok(Done { motion, run, curves: None, worst: None, trouble, files: Vec::new() })
+}
+
+/// The margins on the axis as the file has it, the limit of Ms, and frequency, Re L, Im L, |S| and |T|.
+fn nyquist(case: &Case, design: &Design) -> Result<(Margins, f64, [Vec<f64>; 5])> {
+    let tuning = case.tune.clone().unwrap_or_default();
+    let feedback = Feedback::new(design, &case.stage)?;
+    let family = Family::of(case, &tuning)?;
+    let plant = family.plant(&family.nominal(), design, &feedback.corners())?;
+    let margins = Margins::of(&plant, &feedback);
+    let open = loops(&plant, &feedback);
+    let of = |value: &dyn Fn(&taut::tune::Open) -> f64| open.iter().map(value).collect::<Vec<f64>>();
+    let curves = [
+        plant.frequency.iter().map(|omega| omega / (2.0 * PI)).collect(),
+        of(&|l| l.position.re),
+        of(&|l| l.position.im),
+        of(&|l| (l.position + 1.0).inv().norm()),
+        of(&|l| (l.position / (l.position + 1.0)).norm()),
+    ];
+    Ok((margins, tuning.sensitivity, curves))
+}
+
+/// Columns by name.
+#[derive(Default)]
+struct Columns {
+    names: Vec<&'static str>,
+    values: Vec<Vec<f64>>,
+}
+
+/// The columns of a move that are shown.
+const SHOWN: [&str; 6] = ["time", "reference", "cart_position", "cart_error", "voltage", "motor_current"];
+
+impl Columns {
+    fn take(&mut self, block: &Trajectory) {
+        if self.names.is_empty() {
+            SHOWN.iter().for_each(|name| self.put(name, Vec::new()));
+        }
+        for (name, values) in SHOWN.iter().zip(&mut self.values) {
+            values.extend_from_slice(block.get(name).unwrap_or(&[]));
+        }
+    }
+
+    fn put(&mut self, name: &'static str, values: Vec<f64>) {
+        self.names.push(name);
+        self.values.push(values);
+    }
+
+    fn told(&self) -> Value {
+        let pairs = self.names.iter().zip(&self.values);
+        pairs.map(|(name, values)| json!({ "name": name, "rows": values.len() })).collect()
+    }
+}
+
+/// Tunes the controller: the page of `taut tune`, and the text with the gains.
+pub fn tuned(request: &Request, context: &Context) -> Result<Reply> {
+    let case = axis(request, context)?;
+    let mut tuning: Tuning = case.tune.clone().unwrap_or_default();
+    tuning.spread = request.number("spread").or(tuning.spread);
+    let (begun, looks, last) = (Instant::now(), Cell::new(0u64), Cell::new(Instant::now()));
+    let stop = || {
+        looks.set(looks.get() + 1);
+        if last.get().elapsed() > STEPS {
+            last.set(Instant::now());
+            (context.progress)(json!({ "designs": looks.get(), "took_s": begun.elapsed().as_secs_f64() }));
+        }
+        context.is_stopped()
+    };
+    let tuned = match tune(&case, &tuning, &stop) {
+        Err(_) if context.is_stopped() => return Err(Error::new("stopped before any gains were found")),
+        tuned => tuned?,
+    };
+    let work = Work { case: &case, tuning: &tuning, tuned: &tuned };
+    let text = tuned.case_text(&case, context.state.name())?;
+    let page = page(&work, &text, &figures(&work)?);
+    let worst = |verdict: &Verdict| verdict.moves.iter().map(|one| point(&one.at_worst)).collect::<Vec<_>>();
+    let choices = tuned.choices.iter().map(|choice| {
+        json!({ "name": choice.name, "chosen": choice.chosen, "worst": choice.worst.iter().map(point).collect::<Vec<_>>() })
+    });
+    Ok(Reply::of(json!({
+        "html": page.body(),
+        "result": taut::json::tuned(&case, &tuning, &tuned),
+        "text": text,
+        "verdict": taut_report::tune::verdict(&work),
+        "moves": tuned.moves.iter().map(|one| &one.name).collect::<Vec<_>>(),
+        "before": worst(&tuned.before),
+        "after": worst(&tuned.after),
+        "choices": choices.collect::<Vec<_>>(),
+        "stopped": context.is_stopped(),
+        "took_s": begun.elapsed().as_secs_f64(),
+    })))
+}
+
+/// A move at worst: error (m), settling (s), current (A).
+fn point(worst: &taut::tune::AtWorst) -> Value {
+    let number = |value: f64| value.is_finite().then_some(value);
+    json!({ "error": number(worst.error.0), "settles": worst.settles.1.then_some(worst.settles.0), "current": number(worst.current) })
+}
