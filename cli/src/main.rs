@@ -3,6 +3,7 @@
 mod args;
 mod check;
 mod command;
+mod export;
 mod failure;
 mod fit;
 mod folder;
@@ -46,6 +47,7 @@ fn main() -> ExitCode {
         Command::Sweep(args) => sweep::run(&args),
         Command::Modes(args) => modes::run(&args),
         Command::Frf(args) => frf::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Schema(args) => manual::schema(&args),
         Command::Completions(args) => manual::completions(&args),
         Command::Man(args) => manual::run(&args),
