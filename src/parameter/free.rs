@@ -206,7 +206,7 @@ pub fn own(machine: &dyn Numbers) -> Vec<(String, &'static Parameter)> {
         let is_one = matches!(machine.sits(row), Sits::Machine(..));
         let numbers = present(machine, row).filter(|(number, _)| !follows_any(machine, *number));
         let numbers: Vec<Number> = numbers.map(|(number, _)| number).filter(|_| is_one).collect();
-        numbers.into_iter().map(|number| (number.key(machine), row))
+        numbers.into_iter().map(move |number| (number.key(machine), row))
     };
     all().flat_map(of).collect()
 }

@@ -311,9 +311,8 @@ pub(super) fn shown(engine: &dyn Engine, into: &mut [f64]) {
 fn friction(engine: &dyn Engine, body: usize, state: &State) -> f64 {
     let (mechanism, mode, extra) = (engine.mechanism(), engine.mode(), engine.extra());
     // What holds a body at rest is what acts on it, least and most by the way that a gear with losses counts.
-    let load = |positive: bool, forward: bool| {
-        engine.value(&mechanism.load(body, forward, &mode.with_torque(positive)))
-    };
+    let load =
+        |positive: bool, forward: bool| engine.value(&mechanism.load(body, forward, &mode.with_torque(positive)));
     let all = [load(true, true), load(true, false), load(false, true), load(false, false)];
     let least = all.iter().fold(f64::INFINITY, |a: f64, b| a.min(*b));
     let most = all.iter().fold(f64::NEG_INFINITY, |a: f64, b| a.max(*b));

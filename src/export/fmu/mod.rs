@@ -9,7 +9,7 @@ mod model;
 mod resource;
 
 pub use archive::Archive;
-pub use description::{Version, build_description, description};
+pub use description::{Version, description};
 pub use model::{Causality, Kind, Model, Role, Variability, Variable};
 pub use resource::resource;
 

@@ -5,10 +5,8 @@ use crate::case::Opened;
 use crate::chance::hash;
 use crate::design::Design;
 use crate::error::{Error, Result};
-use crate::mechanism::{
-    Amplifier, AmplifierMode, DRIVES, Drive, Heading, Label, Mechanism, Motor, Shown, State,
-};
-use crate::parameter::{self, Free, INPUT, Numbers, Parameter, unit_for};
+use crate::mechanism::{Amplifier, AmplifierMode, DRIVES, Drive, Heading, Label, Mechanism, Motor, Shown, State};
+use crate::parameter::{self, Free, Numbers, Parameter, unit_for};
 use crate::solve::{Dynamics, Quantity, check_stage};
 use crate::stage::gantry::Gantry;
 use crate::stage::{Stage, axis};
@@ -404,13 +402,7 @@ impl Model {
                 kind,
                 start: quantity.map(|quantity| self.quantities[quantity].1),
                 quantity,
-                ..plain(
-                    OUTPUTS + column as u32,
-                    &name,
-                    &words(heading, mechanism),
-                    heading.unit,
-                    Role::Output(column),
-                )
+                ..plain(OUTPUTS + column as u32, &name, &words(heading, mechanism), heading.unit, Role::Output(column))
             });
         }
         if let Some(design) = &self.design {
@@ -614,4 +606,3 @@ fn words(heading: &Heading, mechanism: &Mechanism) -> String {
         Shown::Counts(b, _) => format!("Counts of the encoder at the {}.", body(b)),
     }
 }
-
