@@ -147,18 +147,25 @@ impl Instance {
             return Err(Refusal::error("there is no machine to move"));
         };
         let mut events: Vec<Event> = Vec::new();
-        let before = stops.then(|| machine.clone());
+        let (from, before) = (machine.time(), stops.then(|| machine.clone()));
         let mut ended = machine.advance(until, &mut events);
+        // What inputs bring about where the step begins is known to whoever set them, and no reason to stop there.
+        events.retain(|event| event.time > from);
         let first = events.first().map(|event| event.time).filter(|time| *time < until);
         if let (Some(before), Some(first)) = (before, first) {
-            **machine = *before;
-            events.clear();
-            ended = Ok(());
-            let mut at = first;
-            // The event may lie a last bit behind its own time.
-            while ended.is_ok() && events.is_empty() && at < until {
-                ended = machine.advance(at.max(machine.time()), &mut events);
-                at += BITS * f64::EPSILON * first.abs().max(f64::MIN_POSITIVE / f64::EPSILON);
+            // The event may lie some last bits behind its own time; a machine that is taken so little further does not
+            // move, so that each try begins where the step does.
+            let mut beyond = BITS * f64::EPSILON * first.abs();
+            loop {
+                let at = (first + beyond).min(until);
+                **machine = (*before).clone();
+                events.clear();
+                ended = machine.advance(at, &mut events);
+                events.retain(|event| event.time > from);
+                if ended.is_err() || !events.is_empty() || at >= until {
+                    break;
+                }
+                beyond = 2.0 * beyond + f64::MIN_POSITIVE;
             }
             if ended.is_ok() {
                 self.time = self.begin + machine.time();

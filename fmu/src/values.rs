@@ -186,9 +186,12 @@ impl Instance {
             match (place(&self.model, role), role, quantity) {
                 (Some(place), ..) => {
                     let input = &mut self.inputs[place];
-                    (input.since, input.coefficients) = (self.time, [0.0; DEGREE + 1]);
-                    input.coefficients[0] = value;
-                    self.is_set = true;
+                    let mut held = [0.0; DEGREE + 1];
+                    held[0] = value;
+                    // One that is held at this value already goes on.
+                    if input.coefficients != held {
+                        (input.since, input.coefficients, self.is_set) = (self.time, held, true);
+                    }
                 }
                 (None, Role::Parameter(index, _), _) => {
                     copy.get_or_insert_with(|| (self.parameters.clone(), self.quantities.clone()));
