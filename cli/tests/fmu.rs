@@ -54,7 +54,8 @@ fn unpacked(bytes: &[u8]) -> Vec<(String, Vec<u8>)> {
 #[test]
 fn the_archive_has_all_that_an_importer_looks_for() {
     let folder = TempDir::new().unwrap();
-    for (fmi, version, icon) in [("3", Version::Three, "terminalsAndIcons/icon.png"), ("2", Version::Two, "model.png")] {
+    for (fmi, version, icon) in [("3", Version::Three, "terminalsAndIcons/icon.png"), ("2", Version::Two, "model.png")]
+    {
         let out = folder.path().join(format!("axis-{fmi}.fmu"));
         let output = taut(&[TABLE4, "--fmi", fmi, "--json", "--out", out.to_str().unwrap()]).output().unwrap();
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
@@ -71,7 +72,9 @@ fn the_archive_has_all_that_an_importer_looks_for() {
         assert_eq!(file("resources/case.toml"), Some(&fs::read(Path::new("..").join(TABLE4)).unwrap()[..]));
         assert!(file("documentation/licenses/license.txt").unwrap().starts_with(b"MIT License"));
         let description = String::from_utf8(file("modelDescription.xml").unwrap().to_vec()).unwrap();
-        for wanted in ["name=\"command\"", "name=\"cart.mass\"", "unit=\"kg\"", "displayUnit=\"mm\"", "stepSize=\"0.001\""] {
+        for wanted in
+            ["name=\"command\"", "name=\"cart.mass\"", "unit=\"kg\"", "displayUnit=\"mm\"", "stepSize=\"0.001\""]
+        {
             assert!(description.contains(wanted), "{wanted} in\n{description}");
         }
         // One case is one file, to the bit.

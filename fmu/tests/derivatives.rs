@@ -5,8 +5,7 @@ use taut_fmu::fmi3;
 
 fn derivative(unit: &Unit, pointer: *mut std::ffi::c_void, unknown: &str, known: &str) -> f64 {
     let (unknown, known, seed, mut into) = (unit.reference(unknown), unit.reference(known), 2.0, f64::NAN);
-    let status =
-        unsafe { fmi3::fmi3GetDirectionalDerivative(pointer, &unknown, 1, &known, 1, &seed, 1, &mut into, 1) };
+    let status = unsafe { fmi3::fmi3GetDirectionalDerivative(pointer, &unknown, 1, &known, 1, &seed, 1, &mut into, 1) };
     assert_eq!(status, OK);
     into / seed
 }

@@ -145,8 +145,7 @@ impl Session<'_> {
             bytes.truncate(bytes.len() - 8 * random.below(2) as usize);
         }
         let mut state = std::ptr::null_mut();
-        let status =
-            unsafe { fmi3::fmi3DeserializeFMUState(self.pointer, bytes.as_ptr(), bytes.len(), &mut state) };
+        let status = unsafe { fmi3::fmi3DeserializeFMUState(self.pointer, bytes.as_ptr(), bytes.len(), &mut state) };
         if status == 0 {
             self.states.push(state);
         }

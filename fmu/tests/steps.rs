@@ -97,7 +97,9 @@ fn a_hundred_random_sequences_of_steps_end_where_the_solver_does() {
 #[test]
 fn events_end_steps_only_where_the_importer_asked_for_both() {
     let unit = Unit::of("sollmann-jouaneh/table4.toml", false);
-    for (events, early, stops) in [(false, false, false), (false, true, false), (true, false, false), (true, true, true)] {
+    for (events, early, stops) in
+        [(false, false, false), (false, true, false), (true, false, false), (true, true, true)]
+    {
         let instance = unit.three(events, early);
         instance.start();
         if events {
@@ -182,8 +184,7 @@ fn a_state_as_bytes_goes_on_bit_for_bit_in_another_instance() {
         // Bytes that are cut off, or of another machine, are refused.
         let mut other = std::ptr::null_mut();
         for wrong in [&bytes[..size - 8], &bytes[..size - 3], &bytes[8..], &[]] {
-            let status =
-                unsafe { fmi3::fmi3DeserializeFMUState(two.pointer, wrong.as_ptr(), wrong.len(), &mut other) };
+            let status = unsafe { fmi3::fmi3DeserializeFMUState(two.pointer, wrong.as_ptr(), wrong.len(), &mut other) };
             assert_eq!(status, crate::unit::ERROR);
         }
     }

@@ -102,9 +102,7 @@ impl Unit {
         let uri = CString::new(format!("file://{}", self.folder.path().to_str().unwrap())).unwrap();
         let null: *const c_char = std::ptr::null();
         let _ = null;
-        unsafe {
-            fmi2::fmi2Instantiate(c"one".as_ptr(), kind, token.as_ptr(), uri.as_ptr(), std::ptr::null(), 0, 0)
-        }
+        unsafe { fmi2::fmi2Instantiate(c"one".as_ptr(), kind, token.as_ptr(), uri.as_ptr(), std::ptr::null(), 0, 0) }
     }
 }
 

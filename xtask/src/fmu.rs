@@ -35,7 +35,8 @@ pub fn run(words: &[&str]) -> Result<(), String> {
 
 /// The target that this compiler builds for.
 fn host() -> Result<String, String> {
-    let told = Command::new("rustc").arg("-vV").output().map_err(|error| format!("rustc cannot be started: {error}"))?;
+    let told =
+        Command::new("rustc").arg("-vV").output().map_err(|error| format!("rustc cannot be started: {error}"))?;
     let text = String::from_utf8_lossy(&told.stdout).into_owned();
     let host = text.lines().find_map(|line| line.strip_prefix("host: "));
     host.map(str::to_string).ok_or_else(|| "rustc does not say what it builds for".into())
