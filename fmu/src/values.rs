@@ -17,11 +17,10 @@ pub(crate) const SET: [Phase; 5] =
 /// The share of a value by which derivatives look to either side: the equations of a mode are linear, or smooth.
 const ASIDE: f64 = 1e-6;
 
-/// Machine and mode as the equations of an integrator.
 impl Instance {
-    fn variable(&self, reference: u32, kind: Kind) -> Told<Variable> {
+    fn variable(&self, reference: u32, kind: Kind) -> Told<&Variable> {
         match self.model.variable(reference) {
-            Some(variable) if variable.kind == kind => Ok(variable.clone()),
+            Some(variable) if variable.kind == kind => Ok(variable),
             Some(variable) => Err(Refusal::error(format!("{} is of another type", variable.name))),
             None => Err(Refusal::error(format!(
                 "there is no variable {reference}; allowed: the value references of modelDescription.xml"
@@ -32,8 +31,15 @@ impl Instance {
     /// Real values.
     pub fn reals(&mut self, references: &[u32], into: &mut [f64]) -> Told<()> {
         for (into, reference) in into.iter_mut().zip(references) {
-            let role = self.variable(*reference, Kind::Real)?.role;
-            *into = self.real(role)?;
+            let variable = self.variable(*reference, Kind::Real)?;
+            let (role, quantity) = (variable.role, variable.quantity);
+            // Ways and speeds are not changed by inputs at once, and need none of the other columns.
+            let quantity = quantity.map(|index| self.model.quantities[index].0);
+            *into = match (&self.plant, quantity) {
+                (Plant::Machine(machine), Some(Quantity::Position(body))) => machine.state().position[body] + 0.0,
+                (Plant::Machine(machine), Some(Quantity::Speed(body))) => machine.state().speed[body] + 0.0,
+                _ => self.real(role)?,
+            };
         }
         Ok(())
     }
@@ -178,7 +184,7 @@ impl Instance {
             if !value.is_finite() {
                 return Err(Refusal::error(format!("{} cannot be {value}; allowed: any finite number", variable.name)));
             }
-            self.may_set(&variable)?;
+            self.may_set(variable)?;
             roles.push((variable.role, variable.quantity, *value));
         }
         let mut renews = false;
@@ -278,7 +284,7 @@ impl Instance {
     pub fn directional(&mut self, unknowns: &[u32], knowns: &[u32], seed: &[f64], into: &mut [f64]) -> Told<()> {
         let mut moved = Vec::new();
         for (reference, seed) in knowns.iter().zip(seed) {
-            let variable = self.variable(*reference, Kind::Real)?;
+            let variable = self.variable(*reference, Kind::Real)?.clone();
             let value = self.real(variable.role)?;
             let is_known =
                 place(&self.model, variable.role).is_some() || (variable.quantity.is_some() && self.exchanges());
