@@ -53,6 +53,7 @@
 //! - [`fit`]: parameters from logs, and what the logs cannot tell.
 //! - [`sweep`]: many runs with parameters varied.
 //! - [`tune`]: gains of a controller, good for the worst axis that parameters, loads and places can make.
+//! - [`export`]: machines and controllers as texts for other tools.
 //! - `json`: results as data (feature `json`).
 //!
 //! # Features
@@ -65,6 +66,7 @@ pub mod chance;
 pub mod control;
 pub mod design;
 pub mod error;
+pub mod export;
 pub mod files;
 pub mod fit;
 pub mod frf;

@@ -4,6 +4,7 @@ mod args;
 mod check;
 mod command;
 mod design;
+mod export;
 mod failure;
 mod fit;
 mod folder;
@@ -50,6 +51,7 @@ fn main() -> ExitCode {
         Command::Frf(args) => frf::run(&args),
         Command::Design(args) => design::run(&args),
         Command::Studio(args) => studio::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Schema(args) => manual::schema(&args),
         Command::Completions(args) => manual::completions(&args),
         Command::Man(args) => manual::run(&args),

@@ -8,6 +8,7 @@ mod documents;
 mod endings;
 mod faults;
 mod fit;
+mod fmu;
 mod frf;
 mod gantry;
 mod outputs;

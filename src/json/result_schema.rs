@@ -14,6 +14,8 @@ const RESULTS: &[(&str, &str, &str)] = &[
     ("design", "`taut design`", include_str!("results/design.txt")),
     ("drift", "`taut fit --drift`", include_str!("results/drift.txt")),
     ("error", "An error, under --json", include_str!("results/error.txt")),
+    ("export", "`taut export json`: a model as data", include_str!("results/export.txt")),
+    ("exported", "`taut export` to other targets", include_str!("results/exported.txt")),
     ("files", "What a folder of results holds: files.json", include_str!("results/files.txt")),
     ("fit", "`taut fit`", include_str!("results/fit.txt")),
     ("frf", "`taut frf`", include_str!("results/frf.txt")),

@@ -6,12 +6,14 @@
 //! along which guards are searched for their first fall, so that two crossings within a step are seen. A step with an
 //! event in it is taken again up to the event.
 
+mod dynamics;
 mod fall;
 mod field;
 mod linear;
 mod model;
 mod radau;
 mod run;
+mod saved;
 mod shown;
 mod sources;
 mod step;
@@ -23,6 +25,7 @@ use super::inputs::Pieces;
 use super::machine::Engine;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
 use super::record::Extra;
+use super::saved::{Pass, Passed};
 use super::{Cost, Ending, Event, PositionError};
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
@@ -31,6 +34,7 @@ use crate::mechanism::{
 };
 use crate::mechanism::{Form, What};
 use crate::signal::DEGREE;
+pub use dynamics::{Dynamics, Quantity};
 use field::Field;
 use linear::Set;
 use model::{MOST, Model, Vector};
@@ -368,6 +372,11 @@ impl Core {
     fn enter(&mut self) {
         self.taken += 1;
         self.coordinates.hold(&self.model.layout, &self.mode, &self.model.inner(&self.y));
+        self.make_ready();
+    }
+
+    /// Has the equations of the mode at hand.
+    fn make_ready(&mut self) {
         let known = self.known.iter().position(|known| known.field.mode == self.mode);
         self.present = known.unwrap_or_else(|| {
             let field = Arc::new(Field::new(&self.model, &self.mode));
@@ -477,6 +486,14 @@ impl Engine for Core {
 
     fn extra(&self) -> Extra {
         self.model.extra(&self.mode, &self.y)
+    }
+
+    fn replace(&mut self, mechanism: &Mechanism) {
+        Core::replace(self, mechanism);
+    }
+
+    fn pass(&mut self, pass: &mut Pass) -> Passed {
+        Core::pass(self, pass)
     }
 
     /// Nothing is known of it while it goes; [`super::ErrorEstimate`] has it of a run.

@@ -23,6 +23,11 @@ impl Stretch {
         Self { begin: pieces.start, end: pieces.end.min(end), pieces, degree: pieces.degree() }
     }
 
+    /// The inputs along it.
+    pub(super) fn pieces(&self) -> Pieces {
+        self.pieces
+    }
+
     pub(super) fn length(&self) -> f64 {
         self.end - self.begin
     }

@@ -1,0 +1,177 @@
+//! `taut export`: a machine, or its controller, in files for other tools.
+
+mod fmu;
+
+use crate::args::{Export as Args, PartName, RealName, TargetName};
+use crate::command::{self, Finished};
+use crate::failure::{Failure, Outcome, Status};
+use crate::folder::{self, Folder};
+use crate::terminal;
+use clap::ValueEnum;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use taut::case::Opened;
+use taut::export::{self, Exported, Options, Part, Real, Target};
+use taut::files::{Batch, write_atomically};
+use taut::json;
+use taut::{Error, Result};
+
+impl TargetName {
+    /// The ending of its main file.
+    fn ending(self) -> &'static str {
+        match self {
+            TargetName::Fmu => "fmu",
+            TargetName::C => "c",
+            TargetName::St => "st",
+            TargetName::Matlab => "m",
+            TargetName::Python => "py",
+            TargetName::Json => "json",
+        }
+    }
+
+    /// Its word on the command line, and the sentence of the help.
+    fn words(self) -> (String, String) {
+        let value = self.to_possible_value();
+        let told = value.as_ref().and_then(|value| value.get_help()).map(ToString::to_string);
+        (value.map(|value| value.get_name().to_string()).unwrap_or_default(), told.unwrap_or_default())
+    }
+}
+
+/// Reads the case, exports, writes, tells.
+pub fn run(args: &Args) -> Outcome {
+    let (Some(target), Some(path)) = (args.target, &args.case) else {
+        terminal::show(&listing());
+        return Ok(Status::Done);
+    };
+    let common = &args.common;
+    check(args, target)?;
+    let case = common.open(path)?;
+    let place = Place::of(args, target, path);
+    let exported = make(args, target, &case, &place.stem).map_err(|error| error.in_file(path))?;
+    let title = case.title().to_string();
+    let inputs = folder::inputs(path, case.files());
+    let names = exported.files.iter().map(|(name, _)| name.clone());
+    let mut finished = finished(&title, target, &exported);
+    match &place.folder {
+        None => finished.finish(common, None),
+        Some(root) if place.is_file => {
+            names.clone().try_for_each(|name| inputs.check(&root.join(name)))?;
+            let batch = Batch::begin(root).map_err(Failure::work)?;
+            for (name, content) in &exported.files {
+                write_atomically(batch.path(name), content).map_err(Failure::work)?;
+            }
+            batch.place(&[]).map_err(Failure::work)?;
+            finished.written = names.map(|name| root.join(name).display().to_string()).collect();
+            finished.finish(common, None)
+        }
+        Some(root) => {
+            let folder = Folder::create(root, inputs, names)?;
+            // The model as data is the result as data.
+            for (name, content) in exported.files.iter().filter(|_| target != TargetName::Json) {
+                write_atomically(folder.path(name), content).map_err(Failure::work)?;
+            }
+            finished.finish(common, Some(folder))
+        }
+    }
+}
+
+/// The targets, one line each.
+fn listing() -> String {
+    let mut text = String::from("taut export NAME CASE --out PATH exports to one of\n");
+    for target in TargetName::value_variants() {
+        let (name, told) = target.words();
+        let _ = writeln!(text, "  {name:<7} {told}");
+    }
+    text
+}
+
+/// Refuses options that belong to another target.
+fn check(args: &Args, target: TargetName) -> Result<()> {
+    let not_of = |option: &str, of: &str| {
+        let (name, _) = target.words();
+        Error::new(format!("{option} means nothing to {name}")).in_file(option).allowed(format!("with {of}"))
+    };
+    if args.real.is_some() && target != TargetName::C {
+        return Err(not_of("--real", "c"));
+    }
+    if args.fmi.is_some() && target != TargetName::Fmu {
+        return Err(not_of("--fmi", "fmu"));
+    }
+    if args.step.is_some() && !matches!(target, TargetName::C | TargetName::Matlab | TargetName::Python) {
+        return Err(not_of("--step", "c, matlab and python"));
+    }
+    Ok(())
+}
+
+/// Where the files go, and what they are called.
+struct Place {
+    /// The folder; none for nowhere.
+    folder: Option<PathBuf>,
+    /// Whether a file was named and no folder.
+    is_file: bool,
+    /// The name that all files share.
+    stem: String,
+}
+
+impl Place {
+    fn of(args: &Args, target: TargetName, case: &Path) -> Self {
+        let stem = |path: &Path| path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        let own = if command::is_standard_input(case) { "axis".to_string() } else { stem(case) };
+        match &args.common.out {
+            None => Self { folder: None, is_file: false, stem: own },
+            Some(out) if out.extension().is_some_and(|e| e.eq_ignore_ascii_case(target.ending())) => {
+                let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
+                Self { folder: Some(folder.unwrap_or(Path::new(".")).into()), is_file: true, stem: stem(out) }
+            }
+            Some(out) => Self { folder: Some(out.clone()), is_file: false, stem: own },
+        }
+    }
+}
+
+/// The files of a target, called `stem`.
+fn make(args: &Args, target: TargetName, case: &Opened, stem: &str) -> Result<Exported> {
+    let part = args.part.map(|part| match part {
+        PartName::Plant => Part::Plant,
+        PartName::Controller => Part::Controller,
+        PartName::Both => Part::Both,
+    });
+    let real = match args.real {
+        Some(RealName::Float) => Real::Float,
+        Some(RealName::Double) | None => Real::Double,
+    };
+    let options = Options { part, real, step: args.step };
+    let of = |target| export::export(case, target, stem, &options);
+    match target {
+        TargetName::Fmu => fmu::make(args, case, stem),
+        TargetName::C => of(Target::C),
+        TargetName::St => of(Target::StructuredText),
+        TargetName::Matlab => of(Target::Matlab),
+        TargetName::Python => of(Target::Python),
+        TargetName::Json => {
+            let text = json::text(&json::export(case)?);
+            Ok(Exported { files: vec![(format!("{stem}.json"), text.into_bytes())], ..Exported::default() })
+        }
+    }
+}
+
+/// The result for people and as data.
+fn finished(title: &str, target: TargetName, exported: &Exported) -> Finished {
+    let (name, told) = target.words();
+    let mut text = format!("{}\n{told}\n\n", terminal::bold(title));
+    for (file, content) in &exported.files {
+        let _ = writeln!(text, "  {file:<42}{} bytes", content.len());
+    }
+    for (what, value) in &exported.facts {
+        let _ = writeln!(text, "  {what:<42}{value}");
+    }
+    text.push('\n');
+    for note in &exported.notes {
+        let _ = writeln!(text, "note: {note}");
+    }
+    let data = match target {
+        TargetName::Json => exported.files.first().map(|(_, text)| String::from_utf8_lossy(text).into_owned()),
+        _ => None,
+    };
+    let data = data.unwrap_or_else(|| json::text(&json::exported(title, &name, exported)));
+    Finished::new("export", ("export.json", data), text, "add --out PATH for the files")
+}

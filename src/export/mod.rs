@@ -1,0 +1,143 @@
+//! Machines and controllers for other tools: C, Structured Text, MATLAB, Python.
+//!
+//! What is exported is made of the mechanism's own equations ([`crate::mechanism::Mechanism::equations`]), written out as
+//! tables: [`Tables`]. The texts around them are in the folder of each target.
+
+pub mod fmu;
+mod tables;
+
+pub use tables::{Does, Element, ElementKind, Row, StateName, TableGuard, Tables, Then};
+
+use crate::case::{Case, Opened};
+use crate::error::{Error, Result};
+
+/// A target whose files are made here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// C99.
+    C,
+    /// IEC 61131-3 Structured Text.
+    StructuredText,
+    /// MATLAB and Octave.
+    Matlab,
+    /// Python.
+    Python,
+}
+
+/// A part of a case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// The machine.
+    Plant,
+    /// The controller.
+    Controller,
+    /// Both.
+    Both,
+}
+
+impl Part {
+    /// Whether the plant is in it.
+    pub fn has_plant(self) -> bool {
+        self != Part::Controller
+    }
+
+    /// Whether the controller is in it.
+    pub fn has_controller(self) -> bool {
+        self != Part::Plant
+    }
+}
+
+/// The numbers that exported C computes in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Real {
+    /// 32 bits.
+    Float,
+    /// 64 bits.
+    #[default]
+    Double,
+}
+
+/// What is asked for beside the target.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Options {
+    /// Which part; none for what the target has by itself.
+    pub part: Option<Part>,
+    /// The numbers of C.
+    pub real: Real,
+    /// Step of the plant, s; none for 1 ms.
+    pub step: Option<f64>,
+}
+
+/// The step of a plant where none is named, s.
+pub const STEP: f64 = 1e-3;
+
+/// The files of a target.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Exported {
+    /// Names and contents; the first is what the others belong to.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// Figures of it: what, and how much.
+    pub facts: Vec<(String, String)>,
+    /// What should be known besides.
+    pub notes: Vec<String>,
+}
+
+/// A name as C, Structured Text, MATLAB and Python take it: letters, digits and `_`, a letter first.
+pub fn identifier(name: &str) -> String {
+    let mut plain = String::new();
+    for c in name.chars() {
+        match c {
+            c if c.is_ascii_alphanumeric() => plain.push(c.to_ascii_lowercase()),
+            _ if plain.ends_with('_') || plain.is_empty() => {}
+            _ => plain.push('_'),
+        }
+    }
+    let plain = plain.trim_end_matches('_');
+    // 31 letters are what compilers tell apart, with room for what is put behind.
+    let plain = &plain[..plain.len().min(20)];
+    match plain.chars().next() {
+        Some(c) if c.is_ascii_alphabetic() => plain.to_string(),
+        _ => format!("axis_{plain}").trim_end_matches('_').to_string(),
+    }
+}
+
+/// The controller of a case, or what to do where there is none.
+pub fn controller(case: &Opened) -> Result<(&Case, &crate::design::Design)> {
+    match case {
+        Opened::Gantry(_) => Err(Error::new("a gantry has no controller that could be exported")
+            .next("leave --part out, or say --part plant")),
+        Opened::Axis(case) => match &case.controller {
+            Some(design) => Ok((case, design)),
+            None => Err(Error::new("this case has no controller that could be exported")
+                .next("add a [controller], as in docs/control.md, or say --part plant")),
+        },
+    }
+}
+
+/// The part that is asked for, or else what there is: a controller that is asked for must be there.
+pub fn part(case: &Opened, asked: Option<Part>) -> Result<Part> {
+    let part = asked.unwrap_or(match controller(case) {
+        Ok(_) => Part::Both,
+        Err(_) => Part::Plant,
+    });
+    if part.has_controller() {
+        controller(case)?;
+    }
+    Ok(part)
+}
+
+/// The files of a target, called `stem`. Errors: what the target cannot do, and what can be done instead.
+pub fn export(case: &Opened, target: Target, stem: &str, options: &Options) -> Result<Exported> {
+    let _ = (stem, options, part(case, options.part)?, STEP);
+    match target {
+        Target::C | Target::StructuredText | Target::Matlab | Target::Python => Err(Error::new("not yet")),
+    }
+}
+
+/// The mechanism of a case.
+pub fn mechanism(case: &Opened) -> crate::mechanism::Mechanism {
+    match case {
+        Opened::Axis(case) => case.stage.mechanism(),
+        Opened::Gantry(case) => case.gantry.mechanism(),
+    }
+}

@@ -1,0 +1,578 @@
+//! The equations of a mechanism as tables: what its parts can do, and for each quantity a row of weights on the state,
+//! the inputs and one, chosen by what those parts do that the quantity depends on.
+//!
+//! ```text
+//! z = (states, inputs, 1)      ż_i = row_i(mode)·z      a mode holds while guard(mode)·z ≥ 0
+//! ```
+//!
+//! A mode is what all parts do together; there may be thousands. But the acceleration of a body depends on its own
+//! motion and on the springs and the drive at it alone, so that the rows of a machine are a hundred, not thousands.
+
+use crate::error::{Error, Result};
+use crate::friction::Motion;
+use crate::mechanism::{
+    Cause, Contact, Equations, Form, Layout, Limit, Mechanism, Mode, Part, SpringLaw, State, Status, Switch, What,
+};
+
+/// A part that can do several things.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Element {
+    /// Which.
+    pub kind: ElementKind,
+    /// Its name, as columns have it.
+    pub key: &'static str,
+    /// What it can do, by its code in the tables.
+    pub states: Vec<Does>,
+}
+
+/// Which part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ElementKind {
+    /// A body with friction, or whose gear loses power.
+    Body(usize),
+    /// The torque through the gear of a drive, where it loses power.
+    GearTorque(usize),
+    /// The voltage limit of a drive.
+    Voltage(usize),
+    /// Its current limit.
+    Current(usize),
+    /// A spring that only pulls.
+    Span(usize),
+    /// A spring that only pushes.
+    Gap(usize),
+}
+
+/// What a part does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Does {
+    /// Of a body.
+    Moves(Motion),
+    /// Of a gear: whether its torque is positive.
+    Torque(bool),
+    /// Of a limit.
+    Limits(Limit),
+    /// Of a span: whether it is slack.
+    Slack(bool),
+    /// Of flanks and end stops.
+    Touches(Contact),
+}
+
+impl Does {
+    /// The word for it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Does::Moves(motion) => Status::Motion(motion).word(),
+            Does::Torque(true) => "positive",
+            Does::Torque(false) => "negative",
+            Does::Limits(limit) => Status::Limit(limit).word(),
+            Does::Slack(slack) => Status::Slack(slack).word(),
+            Does::Touches(Contact::LowLoose) => "negative side, loose",
+            Does::Touches(Contact::HighLoose) => "positive side, loose",
+            Does::Touches(contact) => Status::Contact(contact).word(),
+        }
+    }
+}
+
+/// Rows of weights on z, one for each combination of what some elements do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// The elements that choose, by their numbers; the last one changes fastest.
+    pub depends: Vec<usize>,
+    /// The rows.
+    pub weights: Vec<Vec<f64>>,
+    /// The same as forms.
+    pub(super) forms: Vec<Form>,
+}
+
+/// A condition of a mode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TableGuard {
+    /// The element that it is a condition on, and what that does where it is one; none for one that always is.
+    pub of: Option<(usize, usize)>,
+    /// What follows where it falls.
+    pub then: Then,
+    /// Which of several that have fallen at one instant is settled first.
+    pub rank: u8,
+    /// Which tolerance is its own; none for one that has none.
+    pub slot: Option<usize>,
+    /// Which note that it starts from zero is its own.
+    pub fresh: usize,
+    /// Its value.
+    pub row: Row,
+}
+
+/// What follows where a condition falls.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Then {
+    /// A body stops: what it does then its load decides.
+    Stop,
+    /// The element does this, by its code.
+    Become(usize),
+    /// The run ends: something left its travel.
+    Leave,
+}
+
+/// A machine as tables.
+#[derive(Debug, Clone)]
+pub struct Tables {
+    /// The machine, ways counted from zero.
+    pub mechanism: Mechanism,
+    pub(super) layout: Layout,
+    /// Parts that can do several things.
+    pub elements: Vec<Element>,
+    /// The rate of each state.
+    pub rates: Vec<Row>,
+    /// What each state is.
+    pub states: Vec<StateName>,
+    /// The conditions.
+    pub guards: Vec<TableGuard>,
+    /// Number of their tolerances.
+    pub slots: usize,
+    /// Currents of the drives, A.
+    pub currents: Vec<Row>,
+    /// Voltages at the motors, V.
+    pub voltages: Vec<Row>,
+    /// Forces of the springs, N or N m.
+    pub forces: Vec<Row>,
+    /// Torque of each gear with losses while bodies rest: its sign tells how it carries.
+    pub resting_torque: Vec<Option<Row>>,
+    /// A bound of how fast anything can change in any mode, 1/s.
+    pub fastest: f64,
+}
+
+/// A state.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StateName {
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: &'static str,
+}
+
+/// Rows that a model may have.
+const MOST_ROWS: usize = 20_000;
+
+/// How many modes are looked at to see what a row depends on.
+const LOOKS: u64 = 48;
+
+impl Tables {
+    /// Those of a mechanism. Errors: one that is not piecewise linear.
+    pub fn new(mechanism: &Mechanism) -> Result<Self> {
+        if !mechanism.is_piecewise_linear() {
+            return Err(curved(mechanism));
+        }
+        let layout = Layout::new(mechanism);
+        let elements = elements(mechanism);
+        let maker = Maker { mechanism, layout: &layout, elements: &elements };
+        let mut rates = Vec::new();
+        for place in 0..layout.states {
+            rates.push(maker.row(&|mode| maker.rate(place, mode))?);
+        }
+        let drives = 0..mechanism.drives.len();
+        let each = |form: &dyn Fn(usize, &Mode) -> Form, count: usize| -> Result<Vec<Row>> {
+            (0..count).map(|index| maker.row(&|mode| form(index, mode))).collect()
+        };
+        let currents = each(&|drive, mode| mechanism.current(drive, mode), drives.len())?;
+        let voltages = each(&|drive, mode| mechanism.voltage(drive, mode), drives.len())?;
+        let forces = each(&|spring, mode| mechanism.spring_force(spring, mode), mechanism.springs.len())?;
+        let resting_torque = drives
+            .map(|drive| {
+                let loses = mechanism.drives[drive].loses();
+                loses.then(|| maker.row(&|mode| mechanism.torque_at_rest(drive, mode))).transpose()
+            })
+            .collect::<Result<_>>()?;
+        let (guards, slots) = maker.guards()?;
+        let fastest = maker.fastest(&rates);
+        let states = states(mechanism, &layout);
+        let mechanism = mechanism.clone();
+        let all = [&rates, &currents, &voltages, &forces].into_iter().flatten().chain(guards.iter().map(|g| &g.row));
+        let rows: usize = all.map(|row| row.weights.len()).sum();
+        if rows > MOST_ROWS {
+            return Err(Error::new(format!("this machine has {rows} rows of equations"))
+                .allowed(format!("up to {MOST_ROWS}"))
+                .next("leave out what it can do without: limits, slack spans, end stops, or a gear that gives way"));
+        }
+        Ok(Self {
+            mechanism,
+            layout,
+            elements,
+            rates,
+            states,
+            guards,
+            slots,
+            currents,
+            voltages,
+            forces,
+            resting_torque,
+            fastest,
+        })
+    }
+
+    /// Number of places of z: states, inputs and a one.
+    pub fn size(&self) -> usize {
+        self.layout.states + self.layout.inputs + 1
+    }
+
+    /// The row of a table in a mode that is given by what each element does.
+    pub fn look<'t>(&self, row: &'t Row, does: &[usize]) -> &'t [f64] {
+        let index = row.depends.iter().fold(0, |index, &e| index * self.elements[e].states.len() + does[e]);
+        &row.weights[index]
+    }
+
+    /// What each element does at rest at the origin without an input.
+    pub fn at_rest(&self) -> Vec<usize> {
+        let mode = self.mechanism.first_mode(&State::default());
+        self.elements.iter().map(|element| element.code(element.kind.of(&mode))).collect()
+    }
+
+    /// Number of rows in all tables.
+    pub fn rows(&self) -> usize {
+        let all = [&self.rates, &self.currents, &self.voltages, &self.forces].into_iter().flatten();
+        all.chain(self.guards.iter().map(|guard| &guard.row)).map(|row| row.weights.len()).sum()
+    }
+
+    /// Number of modes: combinations of what all elements can do.
+    pub fn modes(&self) -> f64 {
+        self.elements.iter().map(|element| element.states.len() as f64).product()
+    }
+}
+
+/// Says which part is curved, and what to do instead.
+fn curved(mechanism: &Mechanism) -> Error {
+    let body = mechanism.bodies.iter().find(|body| !body.friction.is_piecewise_linear() || body.along.is_some());
+    let what = match (body, mechanism.springs.iter().find(|spring| spring.follows.is_some())) {
+        (Some(body), _) if body.along.is_some() => {
+            format!("the friction of the {} changes along its way", body.label.name)
+        }
+        (Some(body), _) => format!("the friction of the {} is a curve", body.label.name),
+        (None, Some(spring)) => format!("the stiffness of {} follows the cart", spring.label.name),
+        (None, None) => "this machine is not linear between its events".to_string(),
+    };
+    Error::new(format!("{what}, and what is exported here is linear between its events"))
+        .allowed("friction after law = \"coulomb\", and spans of constant stiffness")
+        .next("`taut export fmu` takes it as it is; or set the law to coulomb for this export with --set")
+}
+
+impl ElementKind {
+    /// What it does in a mode.
+    fn of(self, mode: &Mode) -> Does {
+        match self {
+            ElementKind::Body(body) => Does::Moves(mode.motion[body]),
+            ElementKind::GearTorque(drive) => Does::Torque(mode.drive[drive].torque_positive),
+            ElementKind::Voltage(drive) => Does::Limits(mode.drive[drive].voltage),
+            ElementKind::Current(drive) => Does::Limits(mode.drive[drive].current),
+            ElementKind::Span(spring) => Does::Slack(mode.slack[spring]),
+            ElementKind::Gap(spring) => Does::Touches(mode.contact[spring]),
+        }
+    }
+
+    /// Whether a condition with this cause is one on it.
+    fn owns(self, cause: Cause) -> bool {
+        match (self, cause) {
+            (ElementKind::Body(own), Cause::Stop(body) | Cause::BreakForward(body) | Cause::BreakBackward(body)) => {
+                own == body
+            }
+            (ElementKind::GearTorque(own), Cause::GearTorque(drive)) => own == drive,
+            (kind, Cause::Switch(switch)) => kind.what() == Some(switch.what()),
+            _ => false,
+        }
+    }
+
+    fn what(self) -> Option<What> {
+        match self {
+            ElementKind::Body(body) => Some(What::Body(body)),
+            ElementKind::GearTorque(_) => None,
+            ElementKind::Voltage(drive) => Some(What::Voltage(drive)),
+            ElementKind::Current(drive) => Some(What::Current(drive)),
+            ElementKind::Span(spring) => Some(What::Span(spring)),
+            ElementKind::Gap(spring) => Some(What::Gap(spring)),
+        }
+    }
+}
+
+impl Element {
+    /// The code of something that it can do.
+    fn code(&self, does: Does) -> usize {
+        self.states.iter().position(|own| *own == does).unwrap_or(0)
+    }
+
+    /// The code of what it does where this condition on it falls.
+    fn after(&self, state: usize, cause: Cause) -> Then {
+        let to = match cause {
+            Cause::Stop(_) => return Then::Stop,
+            Cause::Leave(_) => return Then::Leave,
+            Cause::BreakForward(_) => Does::Moves(Motion::Forward),
+            Cause::BreakBackward(_) => Does::Moves(Motion::Backward),
+            Cause::GearTorque(_) => return Then::Become(1 - state),
+            Cause::Switch(Switch::Span(_, slack)) => Does::Slack(slack),
+            Cause::Switch(Switch::Gap(_, contact)) => Does::Touches(contact),
+            Cause::Switch(Switch::Voltage(_, limit) | Switch::Current(_, limit)) => Does::Limits(limit),
+        };
+        Then::Become(self.code(to))
+    }
+}
+
+/// All parts of a mechanism that can do several things.
+fn elements(mechanism: &Mechanism) -> Vec<Element> {
+    let mut all = Vec::new();
+    let mut add = |kind: ElementKind, key: &'static str, states: &[Does]| {
+        all.push(Element { kind, key, states: states.to_vec() });
+    };
+    for body in mechanism.leaders().filter(|&body| mechanism.has_modes(body)) {
+        let motions = [Motion::Backward, Motion::Stuck, Motion::Forward].map(Does::Moves);
+        add(ElementKind::Body(body), mechanism.bodies[body].label.key, &motions);
+    }
+    let limits = [Limit::Low, Limit::Inside, Limit::High].map(Does::Limits);
+    for (index, drive) in mechanism.drives.iter().enumerate() {
+        if drive.loses() {
+            add(ElementKind::GearTorque(index), drive.label.key, &[true, false].map(Does::Torque));
+        }
+        if drive.amplifier.voltage_limit.is_some() {
+            add(ElementKind::Voltage(index), drive.voltage.key, &limits);
+        }
+        if drive.amplifier.current_limit.is_some() {
+            add(ElementKind::Current(index), drive.current.key, &limits);
+        }
+    }
+    for (index, spring) in mechanism.springs.iter().enumerate() {
+        match spring.law {
+            SpringLaw::Tension { .. } => {
+                add(ElementKind::Span(index), spring.label.key, &[false, true].map(Does::Slack));
+            }
+            SpringLaw::Gap { .. } if spring.damping > 0.0 => {
+                let sides = [Contact::Low, Contact::LowLoose, Contact::Apart, Contact::HighLoose, Contact::High];
+                add(ElementKind::Gap(index), spring.label.key, &sides.map(Does::Touches));
+            }
+            SpringLaw::Gap { .. } => {
+                let sides = [Contact::Low, Contact::Apart, Contact::High];
+                add(ElementKind::Gap(index), spring.label.key, &sides.map(Does::Touches));
+            }
+            SpringLaw::TwoSided | SpringLaw::Bounds { .. } | SpringLaw::None => {}
+        }
+    }
+    all
+}
+
+/// Names of the states.
+fn states(mechanism: &Mechanism, layout: &Layout) -> Vec<StateName> {
+    let mut all = vec![StateName { name: String::new(), unit: "" }; layout.states];
+    for (index, body) in mechanism.bodies.iter().enumerate() {
+        let [way, speed, _] = body.kind.units();
+        let key = body.label.key;
+        all[layout.coordinate[index]] = match layout.is_replaced(index) {
+            true => {
+                let turns = body.is_rotor;
+                StateName { name: format!("{key}_stretch"), unit: if turns { "rad" } else { "m" } }
+            }
+            false => StateName { name: format!("{key}_position"), unit: way },
+        };
+        all[layout.speed[index]] = StateName { name: format!("{key}_speed"), unit: speed };
+    }
+    for (drive, place) in mechanism.drives.iter().zip(layout.current) {
+        if let Some(place) = place {
+            all[place] = StateName { name: format!("{}_current", drive.label.key), unit: "A" };
+        }
+    }
+    all
+}
+
+/// Makes rows.
+struct Maker<'m> {
+    mechanism: &'m Mechanism,
+    layout: &'m Layout,
+    elements: &'m [Element],
+}
+
+impl Maker<'_> {
+    /// The mode in which the elements do this; all else is as at rest.
+    fn mode(&self, does: &[usize]) -> Mode {
+        let mut mode = self.mechanism.first_mode(&State::default());
+        for (element, &does) in self.elements.iter().zip(does) {
+            match (element.kind, element.states[does]) {
+                (ElementKind::Body(body), Does::Moves(motion)) => {
+                    for follower in self.mechanism.followers(body) {
+                        mode.motion[follower] = motion;
+                    }
+                }
+                (ElementKind::GearTorque(drive), Does::Torque(positive)) => {
+                    mode.drive[drive].torque_positive = positive;
+                }
+                (ElementKind::Voltage(drive), Does::Limits(limit)) => mode.drive[drive].voltage = limit,
+                (ElementKind::Current(drive), Does::Limits(limit)) => mode.drive[drive].current = limit,
+                (ElementKind::Span(spring), Does::Slack(slack)) => mode.slack[spring] = slack,
+                (ElementKind::Gap(spring), Does::Touches(contact)) => mode.contact[spring] = contact,
+                (kind, does) => unreachable!("{kind:?} cannot do {does:?}"),
+            }
+        }
+        mode
+    }
+
+    /// The rate of a state.
+    fn rate(&self, place: usize, mode: &Mode) -> Form {
+        let layout = self.layout;
+        let bodies = 0..layout.bodies();
+        if let Some(body) = bodies.clone().find(|&body| layout.coordinate[body] == place) {
+            return layout.rate(self.mechanism, body);
+        }
+        let equations = self.mechanism.equations(*mode);
+        if let Some(body) = bodies.clone().find(|&body| layout.speed[body] == place) {
+            return equations.acceleration[body];
+        }
+        let drive = layout.current.iter().position(|current| *current == Some(place));
+        drive.map_or(Form::ZERO, |drive| equations.current_rate[drive])
+    }
+
+    /// A form as weights on z.
+    fn weights(&self, form: &Form) -> Vec<f64> {
+        let layout = self.layout;
+        let mut row = vec![0.0; layout.states + layout.inputs + 1];
+        layout.put(form, &mut row);
+        for drive in 0..layout.inputs {
+            row[layout.states + drive] = form.input[drive];
+        }
+        row[layout.states + layout.inputs] = form.constant;
+        row
+    }
+
+    /// A random choice of what all elements do.
+    fn choose(&self, number: &mut u64) -> Vec<usize> {
+        let mut next = || {
+            *number = number.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (*number >> 33) as usize
+        };
+        self.elements.iter().map(|element| next() % element.states.len()).collect()
+    }
+
+    /// The table of a form that depends on the mode.
+    fn row(&self, form: &dyn Fn(&Mode) -> Form) -> Result<Row> {
+        self.row_with(None, form)
+    }
+
+    /// The same where an element does something given.
+    fn row_with(&self, fixed: Option<(usize, usize)>, form: &dyn Fn(&Mode) -> Form) -> Result<Row> {
+        let at = |does: &[usize]| form(&self.mode(does));
+        let mut depends: Vec<usize> = Vec::new();
+        let mut number = 1;
+        for _ in 0..LOOKS {
+            let mut does = self.choose(&mut number);
+            if let Some((element, state)) = fixed {
+                does[element] = state;
+            }
+            let here = at(&does);
+            for (index, element) in self.elements.iter().enumerate() {
+                if depends.contains(&index) || fixed.is_some_and(|(fixed, _)| fixed == index) {
+                    continue;
+                }
+                let own = does[index];
+                let differs = |state: usize| {
+                    let mut other = does.clone();
+                    other[index] = state;
+                    at(&other) != here
+                };
+                if (0..element.states.len()).filter(|&state| state != own).any(differs) {
+                    depends.push(index);
+                }
+            }
+        }
+        depends.sort_unstable();
+        let count: usize = depends.iter().map(|&e| self.elements[e].states.len()).product();
+        if count > MOST_ROWS {
+            return Err(Error::new(format!("one of the equations of this machine has {count} forms"))
+                .allowed(format!("up to {MOST_ROWS}"))
+                .next("leave out what it can do without: limits, slack spans, end stops"));
+        }
+        let mut forms = Vec::with_capacity(count);
+        for index in 0..count {
+            let mut does = vec![0; self.elements.len()];
+            if let Some((element, state)) = fixed {
+                does[element] = state;
+            }
+            let mut rest = index;
+            for &element in depends.iter().rev() {
+                let states = self.elements[element].states.len();
+                (does[element], rest) = (rest % states, rest / states);
+            }
+            forms.push(at(&does));
+        }
+        let weights = forms.iter().map(|form| self.weights(form)).collect();
+        Ok(Row { depends, weights, forms })
+    }
+
+    /// All conditions, and how many tolerances they have.
+    fn guards(&self) -> Result<(Vec<TableGuard>, usize)> {
+        let mut guards: Vec<(TableGuard, Cause)> = Vec::new();
+        for (index, element) in self.elements.iter().enumerate() {
+            for state in 0..element.states.len() {
+                let mut does = vec![0; self.elements.len()];
+                does[index] = state;
+                let own = |equations: &Equations| -> Vec<(Cause, Form)> {
+                    let own = equations.guards.iter().filter(|guard| element.kind.owns(guard.cause));
+                    own.map(|guard| (guard.cause, guard.form)).collect()
+                };
+                let causes = own(&self.mechanism.equations(self.mode(&does)));
+                for (k, (cause, _)) in causes.into_iter().enumerate() {
+                    let form = |mode: &Mode| own(&self.mechanism.equations(*mode))[k].1;
+                    let row = self.row_with(Some((index, state)), &form)?;
+                    let then = element.after(state, cause);
+                    let of = Some((index, state));
+                    guards.push((TableGuard { of, then, rank: cause.rank(), slot: None, fresh: 0, row }, cause));
+                }
+            }
+        }
+        let leaves = |equations: &Equations| -> Vec<(Cause, Form)> {
+            let leaves = equations.guards.iter().filter(|guard| matches!(guard.cause, Cause::Leave(_)));
+            leaves.map(|guard| (guard.cause, guard.form)).collect()
+        };
+        let bounds = leaves(&self.mechanism.equations(self.mode(&vec![0; self.elements.len()])));
+        for (k, (cause, _)) in bounds.into_iter().enumerate() {
+            let row = self.row(&|mode| leaves(&self.mechanism.equations(*mode))[k].1)?;
+            let guard = TableGuard { of: None, then: Then::Leave, rank: cause.rank(), slot: None, fresh: 0, row };
+            guards.push((guard, cause));
+        }
+        // Kinds that there are, counted.
+        let mut kinds: Vec<usize> = guards.iter().map(|(_, cause)| cause.kind()).collect();
+        kinds.sort_unstable();
+        kinds.dedup();
+        for (guard, cause) in &mut guards {
+            guard.fresh = kinds.iter().position(|kind| *kind == cause.kind()).unwrap_or(0);
+            guard.slot = (!matches!(cause, Cause::Stop(_))).then_some(guard.fresh);
+        }
+        Ok((guards.into_iter().map(|(guard, _)| guard).collect(), kinds.len()))
+    }
+
+    /// A bound of ‖A‖ over all modes: stiffness by its Frobenius norm, then all that damps by its trace, each the most
+    /// of its row.
+    fn fastest(&self, rates: &[Row]) -> f64 {
+        let (mechanism, layout) = (self.mechanism, self.layout);
+        let most = |place: usize, of: &dyn Fn(&Form) -> f64| rates[place].forms.iter().map(of).fold(0.0, f64::max);
+        let (mut swing, mut damp) = (0.0, 0.0);
+        for body in 0..layout.bodies() {
+            let stiff = |form: &Form| -> f64 {
+                let arms = |(stretch, spring): (&f64, &crate::mechanism::Spring)| -> f64 {
+                    let own = spring.arms.iter().filter(|(other, _)| *other == body);
+                    own.map(|(_, arm)| (stretch * arm).abs()).sum()
+                };
+                form.stretch.iter().zip(&mechanism.springs).map(arms).sum()
+            };
+            swing += most(layout.speed[body], &stiff);
+            damp += most(layout.speed[body], &|form| form.speed[body].abs());
+        }
+        for (drive, place) in layout.current.iter().enumerate() {
+            let Some(place) = *place else { continue };
+            let shaft = mechanism.drives[drive].shaft;
+            damp += most(place, &|form| form.current[drive].abs());
+            let back = most(place, &|form| form.speed[shaft].abs());
+            let push = most(layout.speed[shaft], &|form| form.current[drive].abs());
+            damp += (back * push).sqrt();
+        }
+        swing.sqrt() + damp
+    }
+}
+
+/// The name of a part for people.
+pub(super) fn part_name(mechanism: &Mechanism, kind: ElementKind) -> &'static str {
+    match kind.what() {
+        Some(what) => Part::of(mechanism, what).name(),
+        None => "gear",
+    }
+}
