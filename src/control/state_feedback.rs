@@ -45,7 +45,7 @@ pub struct StateFeedbackState {
 
 /// The parts that a linear view of it needs; names as in [`StateFeedbackState`].
 #[derive(Debug, Clone)]
-pub(super) struct Parts {
+pub(crate) struct Parts {
     pub every: f64,
     pub phi: DMatrix<f64>,
     pub now: DVector<f64>,
@@ -62,7 +62,7 @@ pub(super) struct Parts {
 
 impl StateFeedbackState {
     /// Its matrices.
-    pub(super) fn parts(&self) -> Parts {
+    pub(crate) fn parts(&self) -> Parts {
         Parts {
             every: self.every,
             phi: self.phi.clone(),

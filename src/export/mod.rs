@@ -3,6 +3,9 @@
 //! What is exported is made of the mechanism's own equations ([`crate::mechanism::Mechanism::equations`]), written out as
 //! tables: [`Tables`]. The texts around them are in the folder of each target.
 
+mod c;
+mod controller;
+mod program;
 mod tables;
 
 pub use tables::{Does, Element, ElementKind, Row, StateName, TableGuard, Tables, Then};
@@ -127,9 +130,10 @@ pub fn part(case: &Opened, asked: Option<Part>) -> Result<Part> {
 
 /// The files of a target, called `stem`. Errors: what the target cannot do, and what can be done instead.
 pub fn export(case: &Opened, target: Target, stem: &str, options: &Options) -> Result<Exported> {
-    let _ = (stem, options, part(case, options.part)?, STEP);
+    let part = part(case, options.part)?;
     match target {
-        Target::C | Target::StructuredText | Target::Matlab | Target::Python => Err(Error::new("not yet")),
+        Target::C => c::export(case, part, stem, options),
+        Target::StructuredText | Target::Matlab | Target::Python => Err(Error::new("this target is still to come")),
     }
 }
 
