@@ -5,6 +5,7 @@ mod commands;
 mod common_options;
 mod documents;
 mod endings;
+mod export;
 mod faults;
 mod fit;
 mod frf;

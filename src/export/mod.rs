@@ -6,6 +6,7 @@
 mod c;
 mod controller;
 mod program;
+mod st;
 mod tables;
 
 pub use tables::{Does, Element, ElementKind, Row, StateName, TableGuard, Tables, Then};
@@ -130,10 +131,10 @@ pub fn part(case: &Opened, asked: Option<Part>) -> Result<Part> {
 
 /// The files of a target, called `stem`. Errors: what the target cannot do, and what can be done instead.
 pub fn export(case: &Opened, target: Target, stem: &str, options: &Options) -> Result<Exported> {
-    let part = part(case, options.part)?;
     match target {
-        Target::C => c::export(case, part, stem, options),
-        Target::StructuredText | Target::Matlab | Target::Python => Err(Error::new("this target is still to come")),
+        Target::C => c::export(case, part(case, options.part)?, stem, options),
+        Target::StructuredText => st::export(case, options.part, stem),
+        Target::Matlab | Target::Python => Err(Error::new("this target is still to come")),
     }
 }
 

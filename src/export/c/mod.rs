@@ -1,5 +1,6 @@
 //! C99: a header and a source, with nothing below them.
 
+mod controller;
 mod plant;
 
 use super::{Exported, Options, Part, Real, STEP, Tables, identifier};
@@ -17,6 +18,13 @@ pub(super) fn export(case: &Opened, part: Part, stem: &str, options: &Options) -
         header += &plant.header(&writer, case.title());
         source += &plant.source(&writer);
         facts.extend(plant.facts());
+    }
+    if part.has_controller() {
+        let (case, design) = super::controller(case)?;
+        let controller = controller::Controller::new(design, &case.stage)?;
+        header += &controller.header(&writer);
+        source += &controller.source(&writer);
+        facts.extend(controller.facts());
     }
     let (header, source) = (writer.header(case.title(), &header), writer.source(stem, &source));
     let files = vec![(format!("{stem}.c"), source.into_bytes()), (format!("{stem}.h"), header.into_bytes())];

@@ -127,7 +127,7 @@ impl<'d> Core<'d> {
             }
             Core::Fuzzy(rules, _) => {
                 if rules.incremental {
-                    p.set("command", variable("command") + excess.clone());
+                    p.set("so_far", variable("so_far") + excess.clone());
                 }
             }
         }
@@ -437,9 +437,9 @@ fn fuzzy(p: &mut Program, rules: &Fuzzy, every: f64, target: &Target, position: 
     let high = p.local("high", &a * &((1.0 - &b) * hl + &b * &hh));
     let value = p.local("value", rules.command * (low + high));
     if rules.incremental {
-        p.state("command", 0.0, "the command so far");
-        p.set("command", variable("command") + every * value);
-        variable("command")
+        p.state("so_far", 0.0, "the command so far");
+        p.set("so_far", variable("so_far") + every * value);
+        variable("so_far")
     } else {
         value
     }
