@@ -10,5 +10,7 @@ mod machines;
 mod requests;
 #[path = "export/st.rs"]
 mod st;
+#[path = "export/together.rs"]
+mod together;
 #[path = "export/tools.rs"]
 mod tools;

@@ -5,7 +5,10 @@
 
 mod c;
 mod controller;
+mod matlab;
+mod packed;
 mod program;
+mod python;
 mod st;
 mod tables;
 
@@ -134,7 +137,8 @@ pub fn export(case: &Opened, target: Target, stem: &str, options: &Options) -> R
     match target {
         Target::C => c::export(case, part(case, options.part)?, stem, options),
         Target::StructuredText => st::export(case, options.part, stem),
-        Target::Matlab | Target::Python => Err(Error::new("this target is still to come")),
+        Target::Matlab => matlab::export(plant_of(case, options.part)?, stem, options),
+        Target::Python => python::export(plant_of(case, options.part)?, stem, options),
     }
 }
 
@@ -144,4 +148,15 @@ pub fn mechanism(case: &Opened) -> crate::mechanism::Mechanism {
         Opened::Axis(case) => case.stage.mechanism(),
         Opened::Gantry(case) => case.gantry.mechanism(),
     }
+}
+
+/// Refuses a controller where only the plant is exported.
+fn plant_of(case: &Opened, asked: Option<Part>) -> Result<&Opened> {
+    if asked.is_some_and(Part::has_controller) {
+        controller(case)?;
+        return Err(Error::new("only the machine is exported to this")
+            .in_file("--part")
+            .next("leave --part out; `taut export c` and `taut export st` have the controller"));
+    }
+    Ok(case)
 }

@@ -17,14 +17,19 @@ const ARM: [&str; 4] = ["-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfl
 const TABLE4: &str = "stages/sollmann-jouaneh/table4.toml";
 
 /// Machines with their commands' size: each kind of part that works piece by piece is in one of them.
-const MACHINES: [(&str, &[&str], f64); 9] = [
+const MACHINES: [(&str, &[&str], f64); 10] = [
     (TABLE4, &[], 8.0),
     ("stages/sollmann-jouaneh/table1.toml", &["cart.friction.coulomb=0.2 N"], 8.0),
     ("stages/sollmann-jouaneh/rig.toml", &[], 8.0),
     ("stages/two-mass/two-mass.toml", &[], 8.0),
     (TABLE4, &["motor.inductance=1 mH", "amplifier.current_limit=3 A", "amplifier.voltage_limit=7 V"], 12.0),
     (TABLE4, &["motor.gear_ratio=2", "motor.gear_efficiency=0.8", "motor.rotor_inertia=1e-5 kg m^2"], 12.0),
-    (TABLE4, &["belt.pretension=3 N", "drive_pulley.friction.breakaway=0.02 N m"], 24.0),
+    (TABLE4, &["belt.pretension=3 N", "drive_pulley.friction.static=0.02 N m"], 24.0),
+    (
+        TABLE4,
+        &["travel.min=-20 mm", "travel.max=20 mm", "travel.stop_stiffness=1e5 N/m", "travel.stop_damping=20 N s/m"],
+        8.0,
+    ),
     ("stages/h-frame/h-frame.toml", &[], 6.0),
     ("stages/core-xy/core-xy.toml", &[], 6.0),
 ];
@@ -51,7 +56,7 @@ fn controller(name: &str) -> String {
 }
 
 /// Exports a case as `model.c` and `model.h`, with the harnesses beside it.
-fn exported(case: &str, changes: &[&str], options: &[&str]) -> TempDir {
+pub fn exported(case: &str, changes: &[&str], options: &[&str]) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut words = vec!["export", "c", case, "--out", "model.c"];
     changes.iter().for_each(|change| words.extend(["--set", change]));
@@ -65,7 +70,7 @@ fn exported(case: &str, changes: &[&str], options: &[&str]) -> TempDir {
 }
 
 /// Compiles with a harness and more options, and runs it here.
-fn run_here(folder: &Path, harness: &str, options: &[&str]) -> String {
+pub fn run_here(folder: &Path, harness: &str, options: &[&str]) -> String {
     let mut words = STRICT.to_vec();
     words.extend(options);
     words.extend(["-c", "model.c", "-o", "model.o"]);
@@ -156,16 +161,16 @@ fn the_controller_replays_moves_bit_for_bit() {
 }
 
 /// What a Cortex-M4F makes of a model.
-struct OnArm {
-    code: usize,
-    data: usize,
-    stack: usize,
-    told: String,
-    symbols: String,
+pub struct OnArm {
+    pub code: usize,
+    pub data: usize,
+    pub stack: usize,
+    pub told: String,
+    pub symbols: String,
 }
 
 /// Compiles for a Cortex-M4F and runs under QEMU.
-fn run_on_arm(folder: &Path, harness: &str) -> OnArm {
+pub fn run_on_arm(folder: &Path, harness: &str) -> OnArm {
     let mut words = STRICT.to_vec();
     words.extend(ARM);
     words.extend(["-Wdouble-promotion", "-fstack-usage", "-c", "model.c", "-o", "model.o"]);
@@ -243,7 +248,7 @@ fn what_cannot_go_on_is_a_status() {
     if !are_there(&["gcc"]) {
         return;
     }
-    let folder = exported(&file(TABLE4), &["travel.length=100 mm", "travel.start=50 mm"], &[]);
+    let folder = exported(&file(TABLE4), &["travel.min=-50 mm", "travel.max=50 mm"], &[]);
     write_doubles(&folder.path().join("in.bin"), [f64::NAN]);
     let output = compiled(folder.path());
     assert_eq!(output, Some(3));

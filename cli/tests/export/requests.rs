@@ -24,12 +24,9 @@ fn wrong_requests_are_refused_with_what_can_be_done_instead() {
     let (table4, pid) =
         (file("stages/sollmann-jouaneh/table4.toml"), file("stages/sollmann-jouaneh/controllers/pid.toml"));
     let core = file("stages/core-xy/core-xy.toml");
-    let law = "cart.friction.law=stribeck";
-    let curved = [law, "cart.friction.breakaway=0.3 N", "cart.friction.stribeck_velocity=0.02 m/s"];
+    let curved = ["--set", "cart.friction.static=0.3 N", "--set", "cart.friction.stribeck.velocity=0.02 m/s"];
     let mut words = vec!["export", "c", &table4];
-    for change in &curved {
-        words.extend(["--set", change]);
-    }
+    words.extend(curved);
     let (code, _, error) = told(&words);
     assert_eq!(code, Some(2), "{error}");
     assert!(

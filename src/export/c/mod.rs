@@ -9,7 +9,12 @@ use crate::error::Result;
 
 /// The files `STEM.h` and `STEM.c`.
 pub(super) fn export(case: &Opened, part: Part, stem: &str, options: &Options) -> Result<Exported> {
-    let writer = Writer { name: identifier(stem), real: options.real };
+    named(case, part, (stem, &identifier(stem)), options)
+}
+
+/// The same with names that begin so.
+pub(super) fn named(case: &Opened, part: Part, (stem, name): (&str, &str), options: &Options) -> Result<Exported> {
+    let writer = Writer { name: name.to_string(), real: options.real };
     let (mut header, mut source) = (String::new(), String::new());
     let (mut facts, notes) = (Vec::new(), Vec::new());
     if part.has_plant() {
@@ -78,7 +83,7 @@ fn version() -> &'static str {
 }
 
 /// A text as a comment can hold it.
-pub(super) fn plain(text: &str) -> String {
+pub(in crate::export) fn plain(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>().replace("*/", "* /")
 }
 
