@@ -6,6 +6,7 @@ mod common_options;
 mod design;
 mod documents;
 mod endings;
+mod export;
 mod faults;
 mod fit;
 mod fmu;

@@ -209,7 +209,9 @@ fn four_threads_do_not_disturb_each_other() {
                         assert!(worst(&instance, &ends, &mut random, expected) <= SAME);
                     } else {
                         assert_eq!(instance.set("right_command", 6.0), OK);
-                        (0..20).for_each(|k| drop(instance.step(0.01 * f64::from(k), 0.01)));
+                        (0..20).for_each(|k| {
+                            instance.step(0.01 * f64::from(k), 0.01);
+                        });
                     }
                 }
             });
@@ -274,7 +276,9 @@ fn a_general_stage_is_solved_as_well() {
     instance.start();
     assert_eq!(instance.set("left_command", 6.0), OK);
     assert_eq!(instance.set("right_command", 6.0), OK);
-    (0..10).for_each(|k| drop(instance.step(0.01 * f64::from(k), 0.01)));
+    (0..10).for_each(|k| {
+        instance.step(0.01 * f64::from(k), 0.01);
+    });
     let [x, y] = ["bridge_position", "cart_position"].map(|name| instance.get(name));
     assert!(x.abs() + y.abs() > 1e-3 && x.is_finite() && y.is_finite(), "{x} {y}");
 }

@@ -30,6 +30,11 @@ impl Biquad {
         Self { b: over(n2, n1, n0).map(|b| b / a0), a: [a1 / a0, a2 / a0], state: [0.0; 2] }
     }
 
+    /// b and a of (b₀ + b₁ q + b₂ q²)/(1 + a₁ q + a₂ q²), q = 1/z.
+    pub(crate) fn coefficients(&self) -> ([f64; 3], [f64; 2]) {
+        (self.b, self.a)
+    }
+
     /// The next value.
     pub fn step(&mut self, input: f64) -> f64 {
         // Transposed direct form II.

@@ -36,6 +36,12 @@ impl DisturbanceState {
         gain.iter().all(|g| g.is_finite()).then_some(Self { a, b, gain, state: None })
     }
 
+    /// A, b and the gain L of s⁺ = A s + b u + L (y − s₁).
+    pub(crate) fn matrices(&self) -> ([[f64; 3]; 3], [f64; 3], [f64; 3]) {
+        let row = |i: usize| std::array::from_fn(|j| self.a[(i, j)]);
+        (std::array::from_fn(row), self.b.into(), self.gain.into())
+    }
+
     /// The disturbance, V or A, that acts along with the command.
     pub fn disturbance(&self) -> f64 {
         self.state.map_or(0.0, |state| state[2])

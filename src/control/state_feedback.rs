@@ -45,7 +45,7 @@ pub struct StateFeedbackState {
 
 /// The parts that a linear view of it needs; names as in [`StateFeedbackState`].
 #[derive(Debug, Clone)]
-pub(super) struct Parts {
+pub(crate) struct Parts {
     pub every: f64,
     /// Φ (I − L m), of the estimate from one sample to the next.
     pub estimate: DMatrix<f64>,
@@ -54,6 +54,10 @@ pub(super) struct Parts {
     /// Φ L, of the measured position to the estimate; and k L, straight to the command.
     pub corrected: DVector<f64>,
     pub direct: f64,
+    /// What both are made of: Φ, m and L.
+    pub phi: DMatrix<f64>,
+    pub measured: DVector<f64>,
+    pub kalman: DVector<f64>,
     pub now: DVector<f64>,
     pub before: DVector<f64>,
     pub gain: DVector<f64>,
@@ -66,7 +70,7 @@ pub(super) struct Parts {
 
 impl StateFeedbackState {
     /// Its matrices.
-    pub(super) fn parts(&self) -> Parts {
+    pub(crate) fn parts(&self) -> Parts {
         let n = self.phi.nrows();
         let correct = DMatrix::identity(n, n) - &self.kalman * self.measured.transpose();
         let own = self.gain.rows(0, n);
@@ -76,6 +80,9 @@ impl StateFeedbackState {
             row: correct.tr_mul(&own),
             corrected: &self.phi * &self.kalman,
             direct: own.dot(&self.kalman),
+            phi: self.phi.clone(),
+            measured: self.measured.clone(),
+            kalman: self.kalman.clone(),
             now: self.now.clone(),
             before: self.before.clone(),
             gain: self.gain.clone(),

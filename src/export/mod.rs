@@ -3,7 +3,14 @@
 //! What is exported is made of the mechanism's own equations ([`crate::mechanism::Mechanism::equations`]), written out as
 //! tables: [`Tables`]. The texts around them are in the folder of each target.
 
+mod c;
+mod controller;
 pub mod fmu;
+mod matlab;
+mod packed;
+mod program;
+mod python;
+mod st;
 mod tables;
 
 pub use tables::{Does, Element, ElementKind, Row, StateName, TableGuard, Tables, Then};
@@ -128,9 +135,11 @@ pub fn part(case: &Opened, asked: Option<Part>) -> Result<Part> {
 
 /// The files of a target, called `stem`. Errors: what the target cannot do, and what can be done instead.
 pub fn export(case: &Opened, target: Target, stem: &str, options: &Options) -> Result<Exported> {
-    let _ = (stem, options, part(case, options.part)?, STEP);
     match target {
-        Target::C | Target::StructuredText | Target::Matlab | Target::Python => Err(Error::new("not yet")),
+        Target::C => c::export(case, part(case, options.part)?, stem, options),
+        Target::StructuredText => st::export(case, options.part, stem),
+        Target::Matlab => matlab::export(plant_of(case, options.part)?, stem, options),
+        Target::Python => python::export(plant_of(case, options.part)?, stem, options),
     }
 }
 
@@ -140,4 +149,15 @@ pub fn mechanism(case: &Opened) -> crate::mechanism::Mechanism {
         Opened::Axis(case) => case.stage.mechanism(),
         Opened::Gantry(case) => case.gantry.mechanism(),
     }
+}
+
+/// Refuses a controller where only the plant is exported.
+fn plant_of(case: &Opened, asked: Option<Part>) -> Result<&Opened> {
+    if asked.is_some_and(Part::has_controller) {
+        controller(case)?;
+        return Err(Error::new("only the machine is exported to this")
+            .in_file("--part")
+            .next("leave --part out; `taut export c` and `taut export st` have the controller"));
+    }
+    Ok(case)
 }

@@ -11,7 +11,7 @@
 use crate::error::{Error, Result};
 use crate::friction::Motion;
 use crate::mechanism::{
-    Cause, Contact, Equations, Form, Layout, Limit, Mechanism, Mode, Part, SpringLaw, State, Status, Switch, What,
+    Cause, Contact, Equations, Form, Layout, Limit, Mechanism, Mode, SpringLaw, State, Status, Switch, What,
 };
 
 /// A part that can do several things.
@@ -529,6 +529,8 @@ impl Maker<'_> {
             let guard = TableGuard { of: None, then: Then::Leave, rank: cause.rank(), slot: None, fresh: 0, row };
             guards.push((guard, cause));
         }
+        // What has no end on one side has no condition there.
+        guards.retain(|(guard, _)| guard.row.weights.iter().flatten().all(|weight| weight.is_finite()));
         // Kinds that there are, counted.
         let mut kinds: Vec<usize> = guards.iter().map(|(_, cause)| cause.kind()).collect();
         kinds.sort_unstable();
@@ -566,13 +568,5 @@ impl Maker<'_> {
             damp += (back * push).sqrt();
         }
         swing.sqrt() + damp
-    }
-}
-
-/// The name of a part for people.
-pub(super) fn part_name(mechanism: &Mechanism, kind: ElementKind) -> &'static str {
-    match kind.what() {
-        Some(what) => Part::of(mechanism, what).name(),
-        None => "gear",
     }
 }

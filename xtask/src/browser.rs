@@ -133,7 +133,7 @@ fn is_installed() -> bool {
 }
 
 /// Installs packages where Debian's installer is there and may be used.
-fn install(packages: &[&str]) {
+pub fn install(packages: &[&str]) {
     if path_of("apt-get").is_none() || !is_root() {
         return;
     }
@@ -162,7 +162,7 @@ fn node_is_new_enough() -> bool {
 }
 
 /// Where a program is.
-fn path_of(program: &str) -> Option<PathBuf> {
+pub fn path_of(program: &str) -> Option<PathBuf> {
     let paths = std::env::var_os("PATH")?;
     std::env::split_paths(&paths).map(|folder| folder.join(program)).find(|path| path.is_file())
 }

@@ -1,5 +1,6 @@
 //! The project's own chores: `cargo xtask test` checks all that can be checked, `cargo xtask python` the Python package
-//! alone, `cargo xtask browser` the reports alone, `cargo xtask data` fetches other people's measurements,
+//! alone, `cargo xtask browser` the reports alone, `cargo xtask export` exported machines in their tools alone,
+//! `cargo xtask data` fetches other people's measurements,
 //! `cargo xtask hunt` looks for what is wrong with larger means, `cargo xtask coverage` and `cargo xtask faults` make
 //! the tables of docs/fit.md, `cargo xtask counts` counts the instructions of standard works, `cargo xtask fmu` calls the
 //! functions of FMI at random under address sanitizer.
@@ -7,6 +8,7 @@
 mod browser;
 mod counts;
 mod data;
+mod export;
 mod fmu;
 mod hunt;
 mod ignored;
@@ -32,10 +34,12 @@ enum Work {
     Python,
     /// Reports in a browser.
     Browser,
+    /// The tools of exported machines.
+    Export,
 }
 
 /// In this order, the quickest to fail first.
-const STEPS: [Step; 8] = [
+const STEPS: [Step; 9] = [
     step("formatting", &["fmt", "--all", "--check"]),
     step("lints", &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]),
     step(
@@ -46,12 +50,18 @@ const STEPS: [Step; 8] = [
         what: "documentation",
         work: Work::Cargo(&["doc", "--workspace", "--no-deps"], &[("RUSTDOCFLAGS", "-D warnings")]),
     },
+    TOOLS,
     // Unit tests, integration tests and the examples in the documentation.
     step("tests", &["test", "--workspace", "--no-fail-fast"]),
     step("examples", &["build", "--workspace", "--examples"]),
     BROWSER,
     PYTHON,
 ];
+
+const TOOLS: Step = Step { what: "tools of exported machines", work: Work::Export };
+
+const EXPORTS: Step =
+    step("exported machines in their tools", &["test", "--workspace", "--test", "all", "--", "export::"]);
 
 const PYTHON: Step = Step { what: "the Python package", work: Work::Python };
 
@@ -67,6 +77,7 @@ fn main() -> ExitCode {
         ["test"] => test(&STEPS),
         ["python"] => test(&[PYTHON]),
         ["browser"] => test(&[BROWSER]),
+        ["export"] => test(&[TOOLS, EXPORTS]),
         ["data", ref words @ ..] => data::run(words),
         ["counts", ref words @ ..] => counts::run(words),
         ["fmu", ref words @ ..] => fmu::run(words),
@@ -81,8 +92,8 @@ fn main() -> ExitCode {
         },
         _ => {
             eprintln!(
-                "usage: cargo xtask test | cargo xtask browser | cargo xtask python | cargo xtask coverage [...] | \
-                 cargo xtask faults [...] | {} | {} | {} | {}",
+                "usage: cargo xtask test | cargo xtask browser | cargo xtask export | cargo xtask python | \
+                 cargo xtask coverage [...] | cargo xtask faults [...] | {} | {} | {} | {}",
                 counts::USAGE,
                 data::USAGE,
                 fmu::USAGE,
@@ -145,6 +156,7 @@ impl Step {
             Work::Cargo(words, _) => words.join(" "),
             Work::Python => "xtask python".into(),
             Work::Browser => "xtask browser".into(),
+            Work::Export => "xtask export".into(),
         }
     }
 
@@ -158,6 +170,7 @@ impl Step {
             }
             Work::Python => python::test(counts),
             Work::Browser => browser::test(counts),
+            Work::Export => export::prepare(),
         }
     }
 }

@@ -87,7 +87,7 @@ fn interpreter() -> Result<&'static str, String> {
 }
 
 /// A program of the environment.
-fn program(environment: &Path, name: &str) -> PathBuf {
+pub fn program(environment: &Path, name: &str) -> PathBuf {
     let folder = if cfg!(windows) { "Scripts" } else { "bin" };
     environment.join(folder).join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
 }

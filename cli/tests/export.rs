@@ -1,0 +1,16 @@
+//! `taut export`: every target in its own tool.
+
+#[path = "export/c.rs"]
+mod c;
+#[path = "export/interpreter.rs"]
+mod interpreter;
+#[path = "export/machines.rs"]
+mod machines;
+#[path = "export/requests.rs"]
+mod requests;
+#[path = "export/st.rs"]
+mod st;
+#[path = "export/together.rs"]
+mod together;
+#[path = "export/tools.rs"]
+mod tools;

@@ -1,0 +1,262 @@
+//! C: compilers, analysers, and the same numbers as taut's, on this machine and on a Cortex-M4F.
+
+use super::machines::{Commands, commands, observed, pulse, ways};
+use super::tools::{are_there, doubles, file, run, taut, write_doubles};
+use std::fs;
+use std::path::Path;
+use taut::case::{Case, Opened};
+use tempfile::TempDir;
+
+/// What every compiler is asked for.
+const STRICT: [&str; 8] =
+    ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-Wconversion", "-ffp-contract=off", "-O2"];
+
+/// A processor with single precision in hardware.
+const ARM: [&str; 4] = ["-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"];
+
+const TABLE4: &str = "stages/sollmann-jouaneh/table4.toml";
+
+/// Machines with their commands' size: each kind of part that works piece by piece is in one of them.
+const MACHINES: [(&str, &[&str], f64); 10] = [
+    (TABLE4, &[], 8.0),
+    ("stages/sollmann-jouaneh/table1.toml", &["cart.friction.coulomb=0.2 N"], 8.0),
+    ("stages/sollmann-jouaneh/rig.toml", &[], 8.0),
+    ("stages/two-mass/two-mass.toml", &[], 8.0),
+    (TABLE4, &["motor.inductance=1 mH", "amplifier.current_limit=3 A", "amplifier.voltage_limit=7 V"], 12.0),
+    (TABLE4, &["motor.gear_ratio=2", "motor.gear_efficiency=0.8", "motor.rotor_inertia=1e-5 kg m^2"], 12.0),
+    (TABLE4, &["belt.pretension=3 N", "drive_pulley.friction.static=0.02 N m"], 24.0),
+    (
+        TABLE4,
+        &["travel.min=-20 mm", "travel.max=20 mm", "travel.stop_stiffness=1e5 N/m", "travel.stop_damping=20 N s/m"],
+        8.0,
+    ),
+    ("stages/h-frame/h-frame.toml", &[], 6.0),
+    ("stages/core-xy/core-xy.toml", &[], 6.0),
+];
+
+/// The bundled controllers: every structure, feed-forward, observer and filter.
+pub const CONTROLLERS: [&str; 13] = [
+    "cascade-current",
+    "cascade",
+    "fuzzy-pd",
+    "fuzzy-pi",
+    "lqg",
+    "lqi",
+    "pid-elastic",
+    "pid-observer",
+    "pid-rigid",
+    "pid-shaped",
+    "pid",
+    "sliding-cart",
+    "sliding",
+];
+
+fn controller(name: &str) -> String {
+    file(&format!("stages/sollmann-jouaneh/controllers/{name}.toml"))
+}
+
+/// Exports a case as `model.c` and `model.h`, with the harnesses beside it.
+pub fn exported(case: &str, changes: &[&str], options: &[&str]) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut words = vec!["export", "c", case, "--out", "model.c"];
+    changes.iter().for_each(|change| words.extend(["--set", change]));
+    words.extend(options);
+    let output = taut(folder.path(), &words);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    for name in ["plant.c", "control.c", "clock.h", "arm.c", "arm.ld"] {
+        fs::copy(file(&format!("cli/tests/export/{name}")), folder.path().join(name)).unwrap();
+    }
+    folder
+}
+
+/// Compiles with a harness and more options, and runs it here.
+pub fn run_here(folder: &Path, harness: &str, options: &[&str]) -> String {
+    let mut words = STRICT.to_vec();
+    words.extend(options);
+    words.extend(["-c", "model.c", "-o", "model.o"]);
+    run(folder, "gcc", &words);
+    let mut words = vec!["-O2", harness, "model.o", "-o", "here"];
+    words.extend(options);
+    run(folder, "gcc", &words);
+    run(folder, folder.join("here"), &[])
+}
+
+fn flat(commands: &Commands) -> impl Iterator<Item = f64> + '_ {
+    commands.iter().flatten().copied()
+}
+
+fn opened(case: &str, changes: &[&str]) -> Opened {
+    Opened::read_with(file(case), changes).unwrap()
+}
+
+#[test]
+fn compilers_and_analysers_find_nothing() {
+    if !are_there(&["gcc", "clang", "cppcheck"]) {
+        return;
+    }
+    let controllers: Vec<String> =
+        CONTROLLERS.iter().map(|name| format!("stages/sollmann-jouaneh/controllers/{name}.toml")).collect();
+    let plants = MACHINES.iter().map(|(case, changes, _)| (*case, *changes));
+    let all = plants.chain(controllers.iter().map(|case| (case.as_str(), &[][..])));
+    for (k, (case, changes)) in all.enumerate() {
+        for real in ["double", "float"] {
+            let folder = exported(&file(case), changes, &["--real", real]);
+            for compiler in ["gcc", "clang"] {
+                let mut words = STRICT.to_vec();
+                words.extend(["-Wdouble-promotion", "-Wshadow", "-c", "model.c", "-o", "model.o"]);
+                run(folder.path(), compiler, &words);
+            }
+            // An analyser takes longer than both.
+            if k % 4 == 0 {
+                let checks = ["--enable=warning,portability,performance", "--error-exitcode=1", "--quiet", "model.c"];
+                run(folder.path(), "cppcheck", &checks);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_plant_moves_as_taut_simulates() {
+    if !are_there(&["gcc"]) {
+        return;
+    }
+    for (case, changes, size) in MACHINES {
+        let opened = opened(case, changes);
+        let drives = taut::export::mechanism(&opened).drives.len();
+        let commands = commands(drives, size, 7);
+        let ways = ways(&opened, &commands);
+        for (real, most) in [("double", 1e-12), ("float", 1e-6)] {
+            let folder = exported(&file(case), changes, &["--real", real, "--part", "plant"]);
+            write_doubles(&folder.path().join("in.bin"), flat(&commands));
+            // What a sanitizer finds ends the program.
+            let options = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
+            let told = run_here(folder.path(), "plant.c", &options);
+            let off = ways.differ(&doubles(&folder.path().join("out.bin")));
+            println!("{case} {changes:?} {real}: {off:e} m, {}", told.trim());
+            assert!(off <= most, "{case} {changes:?} {real}: {off:e} m");
+        }
+    }
+}
+
+#[test]
+fn the_controller_replays_moves_bit_for_bit() {
+    if !are_there(&["gcc"]) {
+        return;
+    }
+    for name in CONTROLLERS {
+        let case = Case::read(controller(name)).unwrap();
+        let folder = exported(&controller(name), &[], &["--part", "controller"]);
+        for which in 0..case.moves.len() {
+            let seen = observed(&case, which);
+            write_doubles(&folder.path().join("in.bin"), seen.iter().flat_map(|(seen, _)| *seen));
+            run_here(folder.path(), "control.c", &[]);
+            let given = doubles(&folder.path().join("out.bin"));
+            assert_eq!(given.len(), seen.len());
+            let first = seen.iter().zip(&given).position(|((_, own), other)| own.to_bits() != other.to_bits());
+            if let Some(k) = first {
+                panic!("{name}, move {which}: sample {k} is {:e} and not {:e}", given[k], seen[k].1);
+            }
+        }
+    }
+}
+
+/// What a Cortex-M4F makes of a model.
+pub struct OnArm {
+    pub code: usize,
+    pub data: usize,
+    pub stack: usize,
+    pub told: String,
+    pub symbols: String,
+}
+
+/// Compiles for a Cortex-M4F and runs under QEMU.
+pub fn run_on_arm(folder: &Path, harness: &str) -> OnArm {
+    let mut words = STRICT.to_vec();
+    words.extend(ARM);
+    words.extend(["-Wdouble-promotion", "-fstack-usage", "-c", "model.c", "-o", "model.o"]);
+    run(folder, "arm-none-eabi-gcc", &words);
+    let sizes = run(folder, "arm-none-eabi-size", &["model.o"]);
+    let sizes: Vec<usize> =
+        sizes.lines().nth(1).unwrap().split_whitespace().take(3).map(|size| size.parse().unwrap()).collect();
+    let symbols = run(folder, "arm-none-eabi-nm", &["model.o"]);
+    // No chain of calls is deeper than all functions together.
+    let usage = fs::read_to_string(folder.join("model.su")).unwrap();
+    let stack = usage.lines().map(|line| line.split('\t').nth(1).unwrap().parse::<usize>().unwrap()).sum();
+    assert!(usage.lines().all(|line| line.ends_with("static")), "{usage}");
+    let mut words = vec!["-O2"];
+    words.extend(ARM);
+    words.extend(["-specs=rdimon.specs", "-T", "arm.ld", harness, "arm.c", "model.o", "-o", "arm.elf"]);
+    run(folder, "arm-none-eabi-gcc", &words);
+    let machine = ["-M", "mps2-an386", "-nographic", "-semihosting-config", "enable=on,target=native"];
+    let mut words = vec!["100", "qemu-system-arm"];
+    words.extend(machine);
+    words.extend(["-icount", "shift=0", "-kernel", "arm.elf"]);
+    let told = run(folder, "timeout", &words).trim().to_string();
+    OnArm { code: sizes[0] + sizes[1], data: sizes[1] + sizes[2], stack, told, symbols }
+}
+
+const ON_ARM: [&str; 4] = ["gcc", "arm-none-eabi-gcc", "qemu-system-arm", "timeout"];
+
+#[test]
+fn a_cortex_m4f_gives_the_same_numbers() {
+    if !are_there(&ON_ARM) {
+        return;
+    }
+    let commands = pulse(5.0, 250);
+    for real in ["double", "float"] {
+        let folder = exported(&file(TABLE4), &[], &["--real", real]);
+        write_doubles(&folder.path().join("in.bin"), flat(&commands));
+        run_here(folder.path(), "plant.c", &[]);
+        let here = doubles(&folder.path().join("out.bin"));
+        let arm = run_on_arm(folder.path(), "plant.c");
+        let there = doubles(&folder.path().join("out.bin"));
+        let OnArm { code, data, stack, told, symbols } = arm;
+        println!("plant, {real}: {code} bytes of flash, {data} of memory, {stack} of stack at most; {told}");
+        assert_eq!(here.len(), there.len());
+        assert!(here.iter().zip(&there).all(|(a, b)| a.to_bits() == b.to_bits()), "{real}");
+        check_symbols(&symbols, real);
+    }
+    for name in ["pid", "cascade-current", "lqi"] {
+        let case = Case::read(controller(name)).unwrap();
+        let seen = observed(&case, 0);
+        for real in ["double", "float"] {
+            let folder = exported(&controller(name), &[], &["--part", "controller", "--real", real]);
+            write_doubles(&folder.path().join("in.bin"), seen.iter().flat_map(|(seen, _)| *seen));
+            run_here(folder.path(), "control.c", &[]);
+            let here = doubles(&folder.path().join("out.bin"));
+            let OnArm { code, data, stack, told, symbols } = run_on_arm(folder.path(), "control.c");
+            let there = doubles(&folder.path().join("out.bin"));
+            println!("{name}, {real}: {code} bytes of flash, {data} of memory, {stack} of stack at most; {told}");
+            assert!(here.iter().zip(&there).all(|(a, b)| a.to_bits() == b.to_bits()), "{name} {real}");
+            check_symbols(&symbols, real);
+        }
+    }
+}
+
+/// Nothing of the C library but what a compiler puts in itself, and no double precision where floats are asked for.
+fn check_symbols(symbols: &str, real: &str) {
+    for line in symbols.lines().filter(|line| line.contains(" U ")) {
+        let name = line.split_whitespace().last().unwrap();
+        let of_compiler = matches!(name, "memset" | "memcpy") || (real == "double" && name.starts_with("__aeabi_"));
+        assert!(of_compiler, "{name}");
+    }
+}
+
+/// An end that is no `Complete`: told as a status, and nothing that is no number.
+#[test]
+fn what_cannot_go_on_is_a_status() {
+    if !are_there(&["gcc"]) {
+        return;
+    }
+    let folder = exported(&file(TABLE4), &["travel.min=-50 mm", "travel.max=50 mm"], &[]);
+    write_doubles(&folder.path().join("in.bin"), [f64::NAN]);
+    let output = compiled(folder.path());
+    assert_eq!(output, Some(3));
+    write_doubles(&folder.path().join("in.bin"), vec![24.0; 1000]);
+    assert_eq!(compiled(folder.path()), Some(2));
+}
+
+fn compiled(folder: &Path) -> Option<i32> {
+    run(folder, "gcc", &["-O2", "plant.c", "model.c", "-o", "here"]);
+    super::tools::try_to(folder, &folder.join("here"), &[]).status.code()
+}

@@ -1,0 +1,96 @@
+//! C99: a header and a source, with nothing below them.
+
+mod controller;
+mod plant;
+
+use super::{Exported, Options, Part, Real, STEP, Tables, identifier};
+use crate::case::Opened;
+use crate::error::Result;
+
+/// The files `STEM.h` and `STEM.c`.
+pub(super) fn export(case: &Opened, part: Part, stem: &str, options: &Options) -> Result<Exported> {
+    named(case, part, (stem, &identifier(stem)), options)
+}
+
+/// The same with names that begin so.
+pub(super) fn named(case: &Opened, part: Part, (stem, name): (&str, &str), options: &Options) -> Result<Exported> {
+    let writer = Writer { name: name.to_string(), real: options.real };
+    let (mut header, mut source) = (String::new(), String::new());
+    let (mut facts, notes) = (Vec::new(), Vec::new());
+    if part.has_plant() {
+        let tables = Tables::new(&super::mechanism(case))?;
+        let plant = plant::Plant::new(&tables, options.step.unwrap_or(STEP), options.real)?;
+        header += &plant.header(&writer, case.title());
+        source += &plant.source(&writer);
+        facts.extend(plant.facts());
+    }
+    if part.has_controller() {
+        let (case, design) = super::controller(case)?;
+        let controller = controller::Controller::new(design, &case.stage)?;
+        header += &controller.header(&writer);
+        source += &controller.source(&writer);
+        facts.extend(controller.facts());
+    }
+    let (header, source) = (writer.header(case.title(), &header), writer.source(stem, &source));
+    let files = vec![(format!("{stem}.c"), source.into_bytes()), (format!("{stem}.h"), header.into_bytes())];
+    Ok(Exported { files, facts, notes })
+}
+
+/// What all parts of the files have in common.
+pub(super) struct Writer {
+    /// What every name outside begins with.
+    pub name: String,
+    pub real: Real,
+}
+
+const HEADER: &str = include_str!("whole.h");
+const SOURCE: &str = include_str!("whole.c");
+
+impl Writer {
+    /// A template with its names.
+    pub(super) fn fill(&self, template: &str, parts: &[(&str, &str)]) -> String {
+        let mut text = template.replace("@name@", &self.name).replace("@NAME@", &self.name.to_uppercase());
+        for (place, part) in parts {
+            text = text.replace(place, part);
+        }
+        text
+    }
+
+    /// A number as C has it, in the numbers that are asked for.
+    pub(super) fn number(&self, value: f64) -> String {
+        number(self.real, value)
+    }
+
+    fn header(&self, title: &str, parts: &str) -> String {
+        let real = match self.real {
+            Real::Float => "float",
+            Real::Double => "double",
+        };
+        self.fill(HEADER, &[("@real@", real), ("@title@", &plain(title)), ("@version@", version()), ("@parts@", parts)])
+    }
+
+    fn source(&self, stem: &str, parts: &str) -> String {
+        let suffix = match self.real {
+            Real::Float => "x##F",
+            Real::Double => "x",
+        };
+        self.fill(SOURCE, &[("@header@", &format!("{stem}.h")), ("@suffix@", suffix), ("@parts@", parts)])
+    }
+}
+
+fn version() -> &'static str {
+    env!("CARGO_PKG_VERSION")
+}
+
+/// A text as a comment can hold it.
+pub(in crate::export) fn plain(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>().replace("*/", "* /")
+}
+
+/// A number as C has it.
+pub(super) fn number(real: Real, value: f64) -> String {
+    match real {
+        Real::Float => format!("{:?}F", value as f32),
+        Real::Double => format!("{value:?}"),
+    }
+}

@@ -1,0 +1,770 @@
+/* --- the plant ------------------------------------------------------------------------------------------------------ */
+/*
+ * z = (states, inputs, 1). In a mode, what all elements do together, every state's rate is a row of weights on z, and
+ * the mode holds while no guard, a row too, is below zero. A step is a chain of Taylor series of z; the first fall of a
+ * guard along a series is an event, located to the last bit, after which the rows of the next mode hold.
+ */
+
+@tables@
+
+#define STUCK 1U
+#define NONE 255U
+#define STOP 254U
+#define LEAVE 255U
+#define BODY 0U
+#define GEAR 1U
+#define LIMIT 2U
+#define CURRENT_STATE 3U
+#define SPRING 4U
+
+/* Mode changes allowed at one instant, and turns of a body after which it rests. */
+#define CHANGES_AT_ONCE 100U
+#define TURNS_AT_ONCE 20U
+/* Halvings of a series within which a guard's first fall is told. */
+#define HALVINGS 40U
+
+static struct {
+    @name@_real z[SIZE];
+    @name@_real carry[STATES]; /* what additions to z have lost */
+    @name@_real tolerance[ROOM_SLOTS];
+    @name@_real since_change;
+    const @name@_real *rate[STATES];
+    const @name@_real *row[ROOM_GUARDS];
+    uint32_t events;
+    uint32_t changes;
+    uint32_t active_count;
+    uint8_t active[ROOM_GUARDS];
+    uint8_t does[ROOM_ELEMENTS];
+    uint8_t fresh[ROOM_SLOTS];
+    uint8_t is_fresh;
+    uint8_t at_edge;
+    @name@_status status;
+} plant;
+
+/* The Taylor series under way, and the coefficients of a guard along it. */
+static @name@_real term[ORDER + 1][SIZE];
+static @name@_real coefficient[ORDER + 1];
+static @name@_real bernstein[ORDER + 1];
+static @name@_real guard_value[ROOM_GUARDS];
+
+static @name@_real size_of(@name@_real x) { return (x < R(0.0)) ? -x : x; }
+
+static int is_number(@name@_real x)
+{
+    const @name@_real zero = x - x;
+    return (zero <= R(0.0)) && (zero >= R(0.0));
+}
+
+/* The row of a table in a mode. */
+static const @name@_real *row_of(uint32_t table, const uint8_t does[])
+{
+    uint32_t index = 0U;
+    uint32_t k;
+    for (k = DEPENDS_FIRST[table]; k < DEPENDS_FIRST[table + 1U]; k++) {
+        index = (index * ELEMENT_STATES[DEPENDS[k]]) + does[DEPENDS[k]];
+    }
+    return WEIGHT[ENTRY[ENTRY_FIRST[table] + index]];
+}
+
+/* The value of a row. */
+static @name@_real value_of(const @name@_real row[])
+{
+    @name@_real sum = R(0.0);
+    uint32_t j;
+    for (j = 0U; j < SIZE; j++) {
+        sum += row[j] * plant.z[j];
+    }
+    return sum;
+}
+
+/* The rounding error of its value. */
+static @name@_real noise_of(const @name@_real row[])
+{
+    @name@_real sum = R(0.0);
+    uint32_t j;
+    for (j = 0U; j < SIZE; j++) {
+        sum += size_of(row[j] * plant.z[j]);
+    }
+    return ROUNDING * sum;
+}
+
+/* Takes the rows of the mode. */
+static void take_up_mode(void)
+{
+    uint32_t k;
+    plant.active_count = 0U;
+    for (k = 0U; k < STATES; k++) {
+        plant.rate[k] = row_of(k, plant.does);
+    }
+    for (k = 0U; k < GUARDS; k++) {
+        if ((GUARD[k].element == NONE) || (plant.does[GUARD[k].element] == GUARD[k].state)) {
+            plant.active[plant.active_count] = (uint8_t)k;
+            plant.row[plant.active_count] = row_of(GUARD[k].table, plant.does);
+            plant.active_count++;
+        }
+    }
+}
+
+/* A row of a guard where bodies rest: gears that lose power carry as they do at rest. */
+static const @name@_real *resting_row(uint32_t guard)
+{
+    static uint8_t does[ROOM_ELEMENTS];
+    uint32_t k;
+    for (k = 0U; k < ELEMENTS; k++) {
+        does[k] = plant.does[k];
+    }
+    for (k = 0U; k < ELEMENTS; k++) {
+        if (ELEMENT_KIND[k] == GEAR) {
+            does[k] = (uint8_t)((value_of(row_of(ELEMENT_DATA[k], plant.does)) >= R(0.0)) ? 0U : 1U);
+        }
+    }
+    return row_of(GUARD[guard].table, does);
+}
+
+static uint32_t fresh_order(uint32_t guard)
+{
+    return ((GUARD[guard].element != NONE) && (GUARD[guard].then != STOP) &&
+            (ELEMENT_KIND[GUARD[guard].element] == BODY))
+               ? 0U
+               : (uint32_t)plant.fresh[GUARD[guard].fresh];
+}
+
+static void refreshed(void)
+{
+    uint32_t k;
+    if (plant.is_fresh != 0U) {
+        for (k = 0U; k < SLOTS; k++) {
+            plant.fresh[k] = 0U;
+        }
+        plant.is_fresh = 0U;
+    }
+}
+
+/* --- Taylor series and their roots --- */
+
+/* z over a distance: term[k] is that of s^k for s from 0 to 1. */
+static void expand(@name@_real distance)
+{
+    uint32_t i;
+    uint32_t j;
+    uint32_t k;
+    for (j = 0U; j < SIZE; j++) {
+        term[0][j] = plant.z[j];
+    }
+    for (k = 1U; k <= ORDER; k++) {
+        const @name@_real factor = distance * RECIPROCAL[k];
+        const uint32_t places = (k == 1U) ? SIZE : STATES;
+        for (i = 0U; i < STATES; i++) {
+            const @name@_real *row = plant.rate[i];
+            @name@_real sum = R(0.0);
+            for (j = 0U; j < places; j++) {
+                sum += row[j] * term[k - 1U][j];
+            }
+            term[k][i] = sum * factor;
+        }
+        for (i = STATES; i < SIZE; i++) {
+            term[k][i] = R(0.0);
+        }
+    }
+}
+
+/* Moves z to the place s of the series. */
+static void add_series(@name@_real s)
+{
+    uint32_t i;
+    uint32_t k;
+    for (i = 0U; i < STATES; i++) {
+        @name@_real change = R(0.0);
+        @name@_real sum;
+        for (k = ORDER; k > 0U; k--) {
+            change = (change + term[k][i]) * s;
+        }
+        /* What the addition loses is kept for the next one. */
+        change -= plant.carry[i];
+        sum = plant.z[i] + change;
+        plant.carry[i] = (sum - plant.z[i]) - change;
+        plant.z[i] = sum;
+    }
+}
+
+/* The coefficients of a guard along the first part of the series. */
+static void along(const @name@_real row[], @name@_real part)
+{
+    @name@_real power = R(1.0);
+    uint32_t j;
+    uint32_t k;
+    for (k = 0U; k <= ORDER; k++) {
+        const uint32_t places = (k == 0U) ? SIZE : STATES;
+        @name@_real sum = R(0.0);
+        for (j = 0U; j < places; j++) {
+            sum += row[j] * term[k][j];
+        }
+        coefficient[k] = sum * power;
+        power *= part;
+    }
+}
+
+/* The first coefficient from `first` on that is more than rounding; those before it count as zero. */
+static uint32_t first_term(const @name@_real row[], @name@_real distance, uint32_t first)
+{
+    static @name@_real sizes[SIZE];
+    static @name@_real next[STATES];
+    uint32_t found = ORDER + 1U;
+    uint32_t i;
+    uint32_t j;
+    uint32_t k;
+    for (j = 0U; j < SIZE; j++) {
+        sizes[j] = size_of(plant.z[j]);
+    }
+    for (k = 0U; (k <= ORDER) && (found > ORDER); k++) {
+        if (k > 0U) {
+            for (i = 0U; i < STATES; i++) {
+                next[i] = R(0.0);
+                for (j = 0U; j < SIZE; j++) {
+                    next[i] += size_of(plant.rate[i][j]) * sizes[j];
+                }
+                next[i] *= distance * RECIPROCAL[k];
+            }
+            for (j = 0U; j < SIZE; j++) {
+                sizes[j] = (j < STATES) ? next[j] : R(0.0);
+            }
+        }
+        if (k >= first) {
+            @name@_real noise = R(0.0);
+            for (j = 0U; j < SIZE; j++) {
+                noise += size_of(row[j]) * sizes[j];
+            }
+            if (size_of(coefficient[k]) > (R(2.0) * ROUNDING * noise)) {
+                found = k;
+            }
+        }
+    }
+    return found;
+}
+
+/* Newton's method kept within [0, 1], at whose end the polynomial is below zero. */
+static @name@_real polish(const @name@_real c[], uint32_t count, @name@_real end)
+{
+    @name@_real low = R(0.0);
+    @name@_real high = R(1.0);
+    @name@_real s = c[0] / (c[0] - end);
+    uint32_t turn = 0U;
+    uint32_t k;
+    if (!((s > low) && (s < high))) {
+        s = R(0.5);
+    }
+    while (turn < 100U) {
+        @name@_real p = R(0.0);
+        @name@_real slope = R(0.0);
+        @name@_real newton;
+        for (k = count; k > 0U; k--) {
+            slope = (slope * s) + p;
+            p = (p * s) + c[k - 1U];
+        }
+        if (p < R(0.0)) {
+            high = s;
+        } else {
+            low = s;
+        }
+        newton = s - (p / slope);
+        turn++;
+        if (size_of(newton - s) <= (EPSILON * s)) {
+            s = newton;
+            turn = 100U;
+        } else {
+            s = ((newton > low) && (newton < high)) ? newton : (R(0.5) * (low + high));
+        }
+    }
+    return (s < R(0.0)) ? R(0.0) : ((s > R(1.0)) ? R(1.0) : s);
+}
+
+#define STAYS 0U
+#define FALLS 1U
+#define UNDECIDED 2U
+
+/* Whether a polynomial, not negative at 0, falls below zero within (0, 1], and where it does first. */
+static uint32_t first_fall(const @name@_real c[], uint32_t count, int is_last, @name@_real *s)
+{
+    @name@_real least;
+    @name@_real end;
+    @name@_real before;
+    uint32_t changes = 0U;
+    uint32_t result = STAYS;
+    uint32_t i;
+    uint32_t k;
+    int negative = 0;
+    if (count == 0U) {
+        return STAYS;
+    }
+    *s = R(0.0);
+    if (c[0] < R(0.0)) {
+        return FALLS;
+    }
+    least = c[0];
+    end = c[0];
+    for (k = 1U; k < count; k++) {
+        const int changed = (negative != 0) ? (c[k] > R(0.0)) : (c[k] < R(0.0));
+        least += (c[k] < R(0.0)) ? c[k] : R(0.0);
+        end += c[k];
+        if (changed) {
+            changes++;
+            negative = (negative == 0) ? 1 : 0;
+        }
+    }
+    if (least >= R(0.0)) {
+        return STAYS;
+    }
+    if ((c[0] > R(0.0)) && (changes == 1U)) {
+        /* One change of sign: one root above zero (Descartes). */
+        if (end < R(0.0)) {
+            *s = polish(c, count, end);
+            result = FALLS;
+        }
+        return result;
+    }
+    /* Bernstein coefficients b_i = sum of C(i,k)/C(n,k) c_k: the polynomial lies within their hull. */
+    before = R(1.0);
+    for (k = 0U; k < count; k++) {
+        /* 1/C(n,k), n = count - 1 */
+        bernstein[k] = c[k] * before;
+        before = before * (@name@_real)(k + 1U) * RECIPROCAL[(count - 1U > k) ? (count - 1U - k) : 1U];
+    }
+    for (k = 1U; k < count; k++) {
+        for (i = count - 1U; i >= k; i--) {
+            bernstein[i] += bernstein[i - 1U];
+        }
+    }
+    changes = 0U;
+    before = R(0.0);
+    for (i = 0U; i < count; i++) {
+        if ((before * bernstein[i]) < R(0.0)) {
+            changes++;
+        }
+        if (bernstein[i] > R(0.0)) {
+            before = R(1.0);
+        } else if (bernstein[i] < R(0.0)) {
+            before = R(-1.0);
+        } else {
+            /* as it was */
+        }
+    }
+    if ((changes > 1U) && (!is_last)) {
+        result = UNDECIDED;
+    } else if (bernstein[count - 1U] < R(0.0)) {
+        *s = polish(c, count, bernstein[count - 1U]);
+        result = FALLS;
+    } else {
+        result = STAYS;
+    }
+    return result;
+}
+
+/* --- modes --- */
+
+/* Guards, forgiven what rounding alone may have made negative. */
+static void look(void)
+{
+    uint32_t k;
+    for (k = 0U; k < plant.active_count; k++) {
+        @name@_real value = value_of(plant.row[k]);
+        if ((value < R(0.0)) && (size_of(value) <= (R(2.0) * noise_of(plant.row[k])))) {
+            value = R(0.0);
+        }
+        guard_value[k] = value + plant.tolerance[GUARD[plant.active[k]].slot];
+    }
+}
+
+/* Advances by a distance, or to the first guard that falls: its place among the active ones, or NONE. */
+static uint32_t advance(@name@_real distance, @name@_real *used)
+{
+    @name@_real part = R(1.0);
+    @name@_real earliest = R(1.0);
+    uint32_t fallen = NONE;
+    uint32_t halving;
+    uint32_t k;
+    int decided = 0;
+    look();
+    expand(distance);
+    for (halving = 0U; (halving <= HALVINGS) && (!decided); halving++) {
+        decided = 1;
+        fallen = NONE;
+        earliest = R(1.0);
+        for (k = 0U; (k < plant.active_count) && decided; k++) {
+            const uint32_t guard = plant.active[k];
+            uint32_t order = fresh_order(guard);
+            @name@_real s = R(1.0);
+            uint32_t told;
+            along(plant.row[k], part);
+            coefficient[0] = guard_value[k];
+            if ((order > 0U) || ((guard_value[k] <= R(0.0)) && (guard_value[k] >= R(0.0)))) {
+                order = first_term(plant.row[k], distance * part, (order > 1U) ? order : 1U);
+            }
+            told = first_fall(&coefficient[order], (ORDER + 1U) - order, halving == HALVINGS, &s);
+            if (told == UNDECIDED) {
+                decided = 0;
+            } else if ((told == FALLS) &&
+                       ((fallen == NONE) || (s < earliest) ||
+                        ((s <= earliest) && (GUARD[guard].rank < GUARD[plant.active[fallen]].rank)))) {
+                earliest = s;
+                fallen = k;
+            } else {
+                /* it stays, or falls later */
+            }
+        }
+        if (!decided) {
+            part *= R(0.5);
+        }
+    }
+    *used = part * earliest * distance;
+    add_series(part * earliest);
+    plant.since_change += *used;
+    if (*used > SOON) {
+        refreshed();
+    }
+    return fallen;
+}
+
+/* What has just become a condition on an element is zero where it is that but for rounding. */
+static void tolerate(uint32_t element)
+{
+    uint32_t k;
+    for (k = 0U; k < plant.active_count; k++) {
+        const uint32_t guard = plant.active[k];
+        if (GUARD[guard].element == element) {
+            const @name@_real now = value_of(plant.row[k]);
+            const @name@_real noise = noise_of(plant.row[k]);
+            const uint32_t slot = GUARD[guard].fresh;
+            plant.tolerance[slot] = R(0.0);
+            plant.fresh[slot] = 0U;
+            if (size_of(now) > (R(20.0) * noise)) {
+                if ((ELEMENT_KIND[element] == GEAR) && (plant.changes > TURNS_AT_ONCE)) {
+                    plant.tolerance[slot] = R(2.0) * size_of(now);
+                }
+            } else if (plant.changes <= TURNS_AT_ONCE) {
+                plant.tolerance[slot] = (now < R(0.0)) ? -now : R(0.0);
+                plant.fresh[slot] = 1U;
+            } else {
+                plant.tolerance[slot] = R(40.0) * noise;
+            }
+            plant.is_fresh = 1U;
+        }
+    }
+}
+
+/* What a body at zero speed does under its load. */
+static uint32_t decide(uint32_t element)
+{
+    const @name@_real *forward = resting_row(BODY_DATA[ELEMENT_DATA[element]].break_forward);
+    const @name@_real *backward = resting_row(BODY_DATA[ELEMENT_DATA[element]].break_backward);
+    uint32_t to = STUCK;
+    if (value_of(forward) < -noise_of(forward)) {
+        to = 2U;
+    } else if (value_of(backward) < -noise_of(backward)) {
+        to = 0U;
+    } else {
+        /* it stays */
+    }
+    return to;
+}
+
+static void change_body(uint32_t guard)
+{
+    const uint32_t element = GUARD[guard].element;
+    const uint32_t body = ELEMENT_DATA[element];
+    const uint32_t from = plant.does[element];
+    uint32_t to = GUARD[guard].then;
+    uint32_t side;
+    uint32_t k;
+    const @name@_real *row;
+    @name@_real noise;
+    @name@_real excess;
+    if (to == STOP) {
+        for (k = BODY_DATA[body].moves_first; k < BODY_DATA[body].moves_end; k++) {
+            plant.z[MOVES[k]] = R(0.0);
+            plant.carry[MOVES[k]] = R(0.0);
+        }
+        to = (plant.changes > TURNS_AT_ONCE) ? STUCK : decide(element);
+    }
+    /* Where it stops, the load is the one on the side it came from. */
+    side = (to == STUCK) ? from : to;
+    row = resting_row((side != 0U) ? BODY_DATA[body].break_forward : BODY_DATA[body].break_backward);
+    noise = noise_of(row);
+    excess = ((side != 0U) ? BODY_DATA[body].drop_forward : BODY_DATA[body].drop_backward) - value_of(row);
+    if (to == STUCK) {
+        plant.fresh[BODY_DATA[body].fresh] = 0U;
+    } else if ((GUARD[guard].then != STOP) && (size_of(excess) <= (R(2.0) * noise))) {
+        /* Where breakaway equals Coulomb friction the acceleration starts from zero, but for rounding. */
+        plant.fresh[BODY_DATA[body].fresh] = 2U;
+    } else {
+        plant.fresh[BODY_DATA[body].fresh] = 1U;
+    }
+    plant.is_fresh = 1U;
+    noise *= (plant.changes > TURNS_AT_ONCE) ? R(20.0) : R(2.0);
+    plant.tolerance[GUARD[BODY_DATA[body].break_forward].slot] = noise;
+    plant.tolerance[GUARD[BODY_DATA[body].break_backward].slot] = noise;
+    plant.does[element] = (uint8_t)to;
+    take_up_mode();
+}
+
+/* Goes into the mode that follows where a guard, the k-th active one, falls. */
+static void change(uint32_t k)
+{
+    const uint32_t guard = plant.active[k];
+    const uint32_t element = GUARD[guard].element;
+    const int gently = size_of(value_of(plant.row[k])) <= (R(20.0) * noise_of(plant.row[k]));
+    plant.changes = (plant.since_change <= MOMENT) ? (plant.changes + 1U) : 0U;
+    plant.since_change = R(0.0);
+    plant.events++;
+    if (plant.changes > CHANGES_AT_ONCE) {
+        plant.status = @NAME@_TOO_MANY_EVENTS;
+    }
+    if (GUARD[guard].then == LEAVE) {
+        plant.status = @NAME@_LEFT_TRAVEL;
+    } else if (ELEMENT_KIND[element] == BODY) {
+        change_body(guard);
+    } else {
+        const uint32_t before = plant.does[element];
+        plant.does[element] = GUARD[guard].then;
+        take_up_mode();
+        if ((ELEMENT_KIND[element] == CURRENT_STATE) && (plant.does[element] != 1U)) {
+            /* The current stands at its limit, to the last bit. */
+            const @name@_real limit = LIMIT_DATA[ELEMENT_DATA[element]].limit;
+            plant.z[LIMIT_DATA[ELEMENT_DATA[element]].place] = (plant.does[element] == 0U) ? -limit : limit;
+            plant.carry[LIMIT_DATA[ELEMENT_DATA[element]].place] = R(0.0);
+        }
+        tolerate(element);
+        if ((ELEMENT_KIND[element] == CURRENT_STATE) && (plant.does[element] == 1U) && gently) {
+            /* Let go by the motion, a current leaves its limit with no rate of its own. */
+            for (k = 0U; k < plant.active_count; k++) {
+                if ((GUARD[plant.active[k]].element == element) && (GUARD[plant.active[k]].then == before)) {
+                    plant.fresh[GUARD[plant.active[k]].fresh] = 2U;
+                    plant.is_fresh = 1U;
+                }
+            }
+        }
+    }
+}
+
+/* Whether a guard that is zero falls: the first term of its series that is more than rounding decides. */
+static int falls_from_zero(uint32_t k)
+{
+    uint32_t first;
+    expand(REACH);
+    along(plant.row[k], R(1.0));
+    first = first_term(plant.row[k], REACH, 1U);
+    return (first <= ORDER) && (coefficient[first] < R(0.0));
+}
+
+/* The guard that does not hold here; of several, that which is settled first. */
+static uint32_t fallen_guard(void)
+{
+    uint32_t fallen = NONE;
+    uint32_t k;
+    look();
+    for (k = 0U; k < plant.active_count; k++) {
+        const @name@_real value = guard_value[k];
+        const uint32_t guard = plant.active[k];
+        int falls = value < R(0.0);
+        if ((value <= R(0.0)) && (value >= R(0.0)) && (fresh_order(guard) == 0U)) {
+            falls = falls_from_zero(k);
+        }
+        if (falls && ((fallen == NONE) || (GUARD[guard].rank < GUARD[plant.active[fallen]].rank))) {
+            fallen = k;
+        }
+    }
+    return fallen;
+}
+
+/* Changes modes, without time passing, until every guard holds. */
+static void settle(void)
+{
+    uint32_t turn;
+    uint32_t k;
+    int settled = 0;
+    for (turn = 0U; (turn < CHANGES_AT_ONCE) && (!settled) && (plant.status == @NAME@_DONE); turn++) {
+        const uint32_t fallen = fallen_guard();
+        const int is_last = (fallen == NONE) || (GUARD[plant.active[fallen]].rank == 3U);
+        if ((plant.at_edge != 0U) && is_last) {
+            /* The loads on bodies are known now: one that passes a breakaway by rounding alone does not break it. */
+            plant.at_edge = 0U;
+            for (k = 0U; k < plant.active_count; k++) {
+                const uint32_t guard = plant.active[k];
+                if ((GUARD[guard].rank == 3U) && (GUARD[guard].then != STOP)) {
+                    const @name@_real noise = R(2.0) * noise_of(plant.row[k]);
+                    if (noise > plant.tolerance[GUARD[guard].slot]) {
+                        plant.tolerance[GUARD[guard].slot] = noise;
+                    }
+                }
+            }
+            settled = (fallen == NONE) ? 1 : 0;
+        } else if (fallen != NONE) {
+            change(fallen);
+        } else {
+            settled = 1;
+        }
+    }
+    if (settled) {
+        for (k = 0U; k < plant.active_count; k++) {
+            const uint32_t guard = plant.active[k];
+            if ((GUARD[guard].rank == 2U) &&
+                (size_of(value_of(plant.row[k])) <= (R(2.0) * noise_of(plant.row[k])))) {
+                plant.fresh[GUARD[guard].fresh] = 1U;
+                plant.is_fresh = 1U;
+            }
+        }
+    } else if (plant.status == @NAME@_DONE) {
+        plant.status = @NAME@_TOO_MANY_EVENTS;
+    } else {
+        /* told already */
+    }
+}
+
+void @name@_start(const @name@_real position[@NAME@_BODIES], const @name@_real speed[@NAME@_BODIES])
+{
+    uint32_t i;
+    uint32_t k;
+    for (i = 0U; i < SIZE; i++) {
+        plant.z[i] = R(0.0);
+    }
+    plant.z[SIZE - 1U] = R(1.0);
+    for (i = 0U; i < STATES; i++) {
+        plant.carry[i] = R(0.0);
+    }
+    for (i = 0U; i < @NAME@_BODIES; i++) {
+        plant.z[COORDINATE[i]] = position[i];
+        plant.z[SPEED[i]] = speed[i];
+    }
+    for (i = 0U; i < REPLACED; i++) {
+        /* A length of the belt stands in the place of a pulley's angle; what rounding makes of it is none. */
+        const uint32_t body = REPLACED_BODY[i];
+        @name@_real length = REPLACED_ARM[i] * position[body];
+        @name@_real size = size_of(length);
+        for (k = OTHERS_FIRST[i]; k < OTHERS_FIRST[i + 1U]; k++) {
+            const @name@_real part = OTHERS_ARM[k] * position[OTHERS[k]];
+            size = (size_of(part) > size) ? size_of(part) : size;
+            length += part;
+        }
+        plant.z[COORDINATE[body]] = (size_of(length) <= (R(4.0) * EPSILON * size)) ? R(0.0) : length;
+    }
+    for (i = 0U; i < ELEMENTS; i++) {
+        plant.does[i] = AT_REST[i];
+        if (ELEMENT_KIND[i] == BODY) {
+            const @name@_real now = plant.z[MOVES[BODY_DATA[ELEMENT_DATA[i]].moves_first]];
+            plant.does[i] = (uint8_t)((now > R(0.0)) ? 2U : ((now < R(0.0)) ? 0U : STUCK));
+        }
+    }
+    for (i = 0U; i <= SLOTS; i++) {
+        plant.tolerance[i] = R(0.0);
+        plant.fresh[i] = 0U;
+    }
+    plant.is_fresh = 0U;
+    plant.at_edge = 1U;
+    plant.since_change = R(1.0);
+    plant.changes = 0U;
+    plant.events = 0U;
+    plant.status = @NAME@_DONE;
+    take_up_mode();
+    settle();
+}
+
+void @name@_reset(void)
+{
+    static const @name@_real none[@NAME@_BODIES] = {R(0.0)};
+    @name@_start(none, none);
+}
+
+/* Takes up inputs; 0 where they are no numbers. */
+static int take_input(const @name@_real input[])
+{
+    uint32_t i;
+    int is_new = 0;
+    for (i = 0U; i < @NAME@_DRIVES; i++) {
+        if (!is_number(input[i])) {
+            return 0;
+        }
+        if ((input[i] < plant.z[STATES + i]) || (input[i] > plant.z[STATES + i])) {
+            is_new = 1;
+        }
+    }
+    if (is_new) {
+        for (i = 0U; i < @NAME@_DRIVES; i++) {
+            plant.z[STATES + i] = input[i];
+        }
+        refreshed();
+        plant.at_edge = 1U;
+        settle();
+    }
+    return 1;
+}
+
+@name@_status @name@_step(const @name@_real input[@NAME@_DRIVES])
+{
+    @name@_real left = @NAME@_STEP;
+    @name@_real sum = R(0.0);
+    const uint32_t begin = plant.events;
+    uint32_t series = 0U;
+    uint32_t i;
+    if (plant.status == @NAME@_LEFT_TRAVEL) {
+        return plant.status;
+    }
+    plant.status = @NAME@_DONE;
+    if (!take_input(input)) {
+        return @NAME@_NO_NUMBER;
+    }
+    while ((left > R(0.0)) && (plant.status == @NAME@_DONE)) {
+        @name@_real used = R(0.0);
+        /* What is left behind the last whole series of a step is of its own length. */
+        const uint32_t fallen = advance((left < (R(1.0000001) * REACH)) ? left : REACH, &used);
+        left -= used;
+        series++;
+        if (fallen != NONE) {
+            change(fallen);
+            if (plant.status == @NAME@_DONE) {
+                settle();
+            }
+        }
+        if ((left > R(0.0)) && (plant.status == @NAME@_DONE) &&
+            ((series >= @NAME@_SERIES) || ((plant.events - begin) >= @NAME@_EVENTS))) {
+            plant.status = @NAME@_TOO_MANY_EVENTS;
+        }
+    }
+    for (i = 0U; i < STATES; i++) {
+        sum += plant.z[i];
+    }
+    if (!is_number(sum)) {
+        plant.status = @NAME@_NO_NUMBER;
+    }
+    return plant.status;
+}
+
+void @name@_read(@name@_output *out)
+{
+    uint32_t i;
+    uint32_t k;
+    for (i = 0U; i < @NAME@_BODIES; i++) {
+        out->position[i] = plant.z[COORDINATE[i]];
+        out->speed[i] = plant.z[SPEED[i]];
+        out->motion[i] = 2;
+    }
+    for (i = 0U; i < REPLACED; i++) {
+        @name@_real length = plant.z[COORDINATE[REPLACED_BODY[i]]];
+        for (k = OTHERS_FIRST[i]; k < OTHERS_FIRST[i + 1U]; k++) {
+            length -= OTHERS_ARM[k] * out->position[OTHERS[k]];
+        }
+        out->position[REPLACED_BODY[i]] = length / REPLACED_ARM[i];
+    }
+    for (i = 0U; i < @NAME@_BODIES; i++) {
+        if (MOTION_OF[i] != NONE) {
+            out->motion[i] = (int8_t)((int32_t)plant.does[MOTION_OF[i]] - 1);
+        }
+    }
+    for (i = 0U; i < @NAME@_DRIVES; i++) {
+        out->current[i] = value_of(row_of(CURRENT_TABLE + i, plant.does));
+        out->voltage[i] = value_of(row_of(VOLTAGE_TABLE + i, plant.does));
+    }
+    for (i = 0U; i < @NAME@_SPRINGS; i++) {
+        out->force[i] = value_of(row_of(FORCE_TABLE + i, plant.does));
+    }
+}
+
+uint32_t @name@_events(void) { return plant.events; }

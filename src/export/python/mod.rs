@@ -1,0 +1,97 @@
+//! Python: a script on NumPy, SciPy and python-control.
+
+use super::packed::Packed;
+use super::{Exported, Options, STEP, Tables, mechanism};
+use crate::case::Opened;
+use crate::error::Result;
+use crate::linear::{Operation, StateSpace};
+use crate::stage::Stage;
+use std::fmt::{Debug, Write};
+
+const SCRIPT: &str = include_str!("model.py");
+
+/// The file `STEM.py`.
+pub(super) fn export(case: &Opened, stem: &str, options: &Options) -> Result<Exported> {
+    let tables = Tables::new(&mechanism(case))?;
+    let packed = Packed::new(&tables);
+    let linear = match case {
+        Opened::Axis(case) => linear(&case.stage)?,
+        Opened::Gantry(_) => "None".into(),
+    };
+    let mut text = SCRIPT.replace("@tables@", lists(&tables, &packed).trim_end()).replace("@linear@", &linear);
+    for (place, part) in [
+        ("@title@", plain(case.title())),
+        ("@version@", env!("CARGO_PKG_VERSION").into()),
+        ("@step@", format!("{:?}", options.step.unwrap_or(STEP))),
+        ("@stem@", plain(stem)),
+    ] {
+        text = text.replace(place, &part);
+    }
+    let facts = vec![
+        ("states".into(), tables.rates.len().to_string()),
+        ("modes".into(), tables.modes().to_string()),
+        ("needs".into(), "NumPy and SciPy; python-control for linear()".into()),
+    ];
+    Ok(Exported { files: vec![(format!("{stem}.py"), text.into_bytes())], facts, notes: Vec::new() })
+}
+
+/// A text as a string in three quotes can hold it.
+fn plain(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() || c == '"' || c == '\\' { ' ' } else { c }).collect()
+}
+
+fn lists(tables: &Tables, packed: &Packed) -> String {
+    let mut text = String::new();
+    let mut put = |name: &str, what: &str, values: &dyn Debug| {
+        let _ = writeln!(text, "# {what}\n{name} = {values:?}");
+    };
+    let mechanism = &tables.mechanism;
+    let keys: Vec<&str> = mechanism.bodies.iter().map(|body| body.label.key).collect();
+    put("BODIES", "the bodies", &keys);
+    let levers: Vec<f64> = mechanism.bodies.iter().map(|body| body.kind.lever()).collect();
+    put("LEVERS", "way at the belt per way of each body, m/rad or 1", &levers);
+    let drives: Vec<&str> = mechanism.drives.iter().map(|drive| drive.label.key).collect();
+    put("DRIVES", "the drives; the command of each is one of", &drives);
+    let units: Vec<&str> = mechanism.drives.iter().map(|drive| drive.amplifier.mode.unit()).collect();
+    put("COMMAND_UNITS", "these", &units);
+    let states: Vec<(&str, &str)> = tables.states.iter().map(|state| (state.name.as_str(), state.unit)).collect();
+    put("STATES", "the states", &states);
+    put("WEIGHTS", "rows of weights on z = (states, commands, 1), each once", &packed.weights);
+    put("ENTRY", "for all entries of all tables: which row", &packed.entry);
+    put("ENTRY_FIRST", "where the entries of a table begin", &packed.entry_first);
+    put("DEPENDS", "the elements that choose among them, the last one changing fastest", &packed.depends);
+    put("DEPENDS_FIRST", "where those of a table begin", &packed.depends_first);
+    put("GUARDS", "conditions: table, element, its state, what follows (-1 stop, -2 leave), rank", &packed.guards);
+    put("ELEMENTS", "elements: states, kind (0 body, 3 current at a limit), what it does at rest", &packed.elements);
+    put("MOVES", "speeds that stop with a body: element, place", &packed.moves);
+    put("HELD", "currents that a limit holds: element, place", &packed.held);
+    put("LIMITS", "the limits", &packed.limits);
+    put("PLACES", "of each body: places of coordinate and speed, element of its motion", &packed.bodies);
+    put("LENGTHS", "belt lengths in the places of angles: body, other body (-1 itself), arm", &packed.lengths);
+    put("OUTPUTS", "first tables of currents, voltages and forces", &packed.outputs);
+    text
+}
+
+fn linear(stage: &Stage) -> Result<String> {
+    let system = StateSpace::of(stage, Operation::default())?;
+    let rows = |m: &nalgebra::DMatrix<f64>| -> Vec<Vec<f64>> {
+        m.row_iter().map(|row| row.iter().copied().collect()).collect()
+    };
+    let names = |all: &[crate::linear::Variable]| -> Vec<&'static str> { all.iter().map(|v| v.name).collect() };
+    let units = |all: &[crate::linear::Variable]| -> Vec<&'static str> { all.iter().map(|v| v.unit).collect() };
+    let column = |v: &nalgebra::DVector<f64>| -> Vec<[f64; 1]> { v.iter().map(|v| [*v]).collect() };
+    let mut text = String::from("{\n");
+    for (key, values) in [
+        ("A", format!("{:?}", rows(&system.a))),
+        ("B", format!("{:?}", column(&system.b))),
+        ("C", format!("{:?}", rows(&system.c))),
+        ("D", format!("{:?}", column(&system.d))),
+        ("states", format!("{:?}", names(&system.states))),
+        ("outputs", format!("{:?}", names(&system.outputs))),
+        ("output_units", format!("{:?}", units(&system.outputs))),
+        ("inputs", format!("{:?}", [system.input.name])),
+    ] {
+        let _ = writeln!(text, "    \"{key}\": {values},");
+    }
+    Ok(text + "}")
+}

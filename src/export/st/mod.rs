@@ -1,0 +1,132 @@
+//! IEC 61131-3 Structured Text: the controller as a function block.
+
+use super::controller::program;
+use super::program::{Expr, Node, Program, Statement, Test};
+use super::{Exported, Part, controller, identifier};
+use crate::case::Opened;
+use crate::error::{Error, Result};
+use std::fmt::Write;
+
+const BLOCK: &str = include_str!("block.st");
+
+/// The file `STEM.st`.
+pub(super) fn export(case: &Opened, part: Option<Part>, stem: &str) -> Result<Exported> {
+    if part.is_some_and(Part::has_plant) {
+        return Err(Error::new("Structured Text is only a controller here")
+            .in_file("--part")
+            .next("leave --part out; `taut export c` has the plant"));
+    }
+    let (case, design) = controller(case)?;
+    let program = program(design, &case.stage)?;
+    let unit = case.stage.amplifier.mode.unit();
+    let lead = design.feed_forward.lead.unwrap_or(design.delay + 0.5 * design.every);
+    let read = program.read_inputs();
+    let inputs = program.inputs.iter().filter(|input| read.contains(&input.name));
+    let inputs: Vec<String> =
+        inputs.map(|input| format!("    {} : LREAL; (* {} *)", input.name, plain(&input.about))).collect();
+    let states = program
+        .states
+        .iter()
+        .map(|state| format!("    {} : LREAL := {}; (* {} *)", state.name, literal(state.start), plain(&state.about)));
+    let locals = program.locals.iter().map(|local| format!("    {local} : LREAL;"));
+    let kept: Vec<String> = states.chain(locals).collect();
+    let resets: Vec<String> =
+        program.states.iter().map(|state| format!("    {} := {};", state.name, literal(state.start))).collect();
+    let mut body = String::new();
+    block(&program, &program.body, 0, &mut body);
+    let name = format!("{}_controller", identifier(stem));
+    let mut text = BLOCK.to_string();
+    for (place, part) in [
+        ("@title@", plain(&case.title)),
+        ("@structure@", plain(design.structure.name())),
+        ("@version@", env!("CARGO_PKG_VERSION").into()),
+        ("@name@", name.clone()),
+        ("@every@", literal(design.every)),
+        ("@delay@", literal(design.delay)),
+        ("@lead@", literal(lead)),
+        ("@unit@", unit.into()),
+        ("@inputs@", inputs.join("\n")),
+        ("@kept@", kept.join("\n")),
+        ("@resets@", if resets.is_empty() { "    ;".into() } else { resets.join("\n") }),
+        ("@body@", body.trim_end().into()),
+        ("@result@", program.result.clone()),
+    ] {
+        text = text.replace(place, &part);
+    }
+    let facts = vec![
+        ("function block".into(), name),
+        ("controller".into(), design.structure.name().into()),
+        ("sample time".into(), format!("{:?} s", design.every)),
+        ("numbers that it keeps".into(), program.states.len().to_string()),
+    ];
+    let notes = vec!["untried on a real controller: its grammar is checked, and it is run by an interpreter".into()];
+    Ok(Exported { files: vec![(format!("{stem}.st"), text.into_bytes())], facts, notes })
+}
+
+/// A text as a comment can hold it.
+fn plain(text: &str) -> String {
+    text.chars()
+        .map(|c| if c.is_control() { ' ' } else { c })
+        .collect::<String>()
+        .replace("*)", "* )")
+        .replace("(*", "( *")
+}
+
+/// A number as a literal: with a point, and never negative.
+fn literal(value: f64) -> String {
+    let text = format!("{value:?}");
+    match text.split_once('e') {
+        Some((digits, exponent)) if !digits.contains('.') => format!("{digits}.0E{exponent}"),
+        Some((digits, exponent)) => format!("{digits}E{exponent}"),
+        None => text,
+    }
+}
+
+fn block(program: &Program, body: &[Statement], depth: usize, text: &mut String) {
+    let indent = "    ".repeat(depth);
+    for statement in body {
+        let _ = match statement {
+            Statement::Remark(remark) => writeln!(text, "{indent}(* {} *)", plain(remark)),
+            Statement::Set(name, value) => writeln!(text, "{indent}{name} := {};", whole(value)),
+            Statement::If(Test(relation, a, b), yes, no) => {
+                let test = format!("{} {} {}", term(a), relation.sign(), term(b));
+                match yes.is_empty() {
+                    true => {
+                        let _ = writeln!(text, "{indent}IF NOT ({test}) THEN");
+                        block(program, no, depth + 1, text);
+                    }
+                    false => {
+                        let _ = writeln!(text, "{indent}IF {test} THEN");
+                        block(program, yes, depth + 1, text);
+                        if !no.is_empty() {
+                            let _ = writeln!(text, "{indent}ELSE");
+                            block(program, no, depth + 1, text);
+                        }
+                    }
+                }
+                writeln!(text, "{indent}END_IF;")
+            }
+        };
+    }
+}
+
+/// An expression that stands by itself.
+fn whole(value: &Expr) -> String {
+    let text = term(value);
+    match value.node() {
+        Node::Two(..) => text[1..text.len() - 1].to_string(),
+        _ => text,
+    }
+}
+
+/// An expression as a part of another, every operation in parentheses.
+fn term(value: &Expr) -> String {
+    match value.node() {
+        Node::Number(value) if value.is_sign_negative() => format!("(-{})", literal(-value)),
+        Node::Number(value) => literal(*value),
+        Node::Variable(name) => name.clone(),
+        Node::Minus(a) => format!("(-{})", term(a)),
+        Node::Whole(a) => format!("DINT_TO_LREAL(TRUNC({}))", term(a)),
+        Node::Two(operator, a, b) => format!("({} {} {})", term(a), operator.sign(), term(b)),
+    }
+}
