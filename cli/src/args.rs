@@ -850,7 +850,7 @@ pub enum HoldName {
 pub enum SolverName {
     /// Exact to rounding: stick, slip and matrix exponentials
     Exact,
-    /// An adaptive formula of order 8 between located events: any friction law, spans that follow the cart
+    /// Collocation with steps by the error: any friction law, spans that follow the cart
     General,
     /// The friction function of the paper's Table 3 with a fixed step, to reproduce the paper
     Table3,

@@ -42,7 +42,7 @@ pub enum Solver {
     /// Modes and matrix exponentials: exact to rounding.
     #[default]
     Exact,
-    /// An adaptive formula between located events: any friction law, spans that follow the cart.
+    /// Collocation with steps by their error between located events: any friction law, spans that follow the cart.
     General {
         /// Error allowed in each step: relative, and absolute for what is smaller than 1 rad, rad/s or A, or r and r/s.
         tolerance: f64,

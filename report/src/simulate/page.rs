@@ -29,7 +29,7 @@ pub fn page(case: &Case, text: &str, solver: Solver, runs: &[Run], figures: &[Ve
 pub fn how(solver: Solver) -> &'static str {
     match solver {
         Solver::Exact => "Solved exactly: modes and matrix exponentials, events located to rounding.",
-        Solver::General { .. } => "Solved with an adaptive formula of order eight between located events.",
+        Solver::General { .. } => "Solved by collocation, with steps by their error, between located events.",
         Solver::Table3 { .. } => {
             "Solved with the friction function of the paper's Table 3 and a fixed step: a reproduction, not exact."
         }

@@ -53,6 +53,8 @@ pub(super) struct Linear {
     series: [OnceLock<Vec<[States; TERMS]>>; 2],
     /// (A/ν)ᵐ b_j.
     moved: OnceLock<Vec<[States; TERMS]>>,
+    /// r_m b_j/νᵐ of the arguments: `[argument][source]`.
+    moments: OnceLock<Vec<[f64; TERMS]>>,
 }
 
 /// A known force: powers of the share of the step.
@@ -67,8 +69,9 @@ impl Linear {
         }
         let norm = norm(size, &columns).max(f64::MIN_POSITIVE);
         let series = [const { OnceLock::new() }; 2];
-        let (source, outputs, arguments, moved) = (Vec::new(), Vec::new(), 0, OnceLock::new());
-        Self { size, columns, rows, constant, input, source, outputs, arguments, norm, series, moved }
+        let (source, outputs, arguments) = (Vec::new(), Vec::new(), 0);
+        let (moved, moments) = (OnceLock::new(), OnceLock::new());
+        Self { size, columns, rows, constant, input, source, outputs, arguments, norm, series, moved, moments }
     }
 
     /// c A/ν, then c (A/ν)², and so on, for each of `outputs`.
@@ -79,6 +82,12 @@ impl Linear {
 
     fn of_arguments(&self) -> &[[States; TERMS]] {
         self.series[0].get_or_init(|| self.rows_of(&self.outputs[..self.arguments]))
+    }
+
+    fn moments(&self) -> &[[f64; TERMS]] {
+        let of = |rows: &[States; TERMS], source: &States| rows.each_ref().map(|row| dot(self.size, row, source));
+        let all = || self.of_arguments().iter().flat_map(|rows| self.source.iter().map(move |source| of(rows, source)));
+        self.moments.get_or_init(|| all().collect())
     }
 
     fn of_guards(&self) -> &[[States; TERMS]] {
@@ -201,17 +210,17 @@ fn powers(size: usize, columns: &[States], x: &States, norm: f64) -> [States; TE
     list
 }
 
-/// ‖A⁸‖^⅛ in the norm of the largest row: even powers know lengths from speeds.
+/// ‖A⁶⁴‖^(1/64): so high a power does not know the units of what it couples.
 fn norm(size: usize, columns: &[States]) -> f64 {
     let most = |columns: &[States]| columns.iter().flatten().fold(0.0, |most: f64, entry| most.max(entry.abs()));
     let scale = most(columns);
     if scale == 0.0 || !scale.is_finite() {
         return scale;
     }
-    // Each power by its own scale, so that nothing overflows: A⁸ = (((A/a)²/b)²/c)² a⁸ b⁴ c²
+    // Each square by its own scale, so that nothing overflows: A⁴ = ((A/a)²/b)² a⁴ b²
     let mut power: Vec<States> = columns.iter().map(|column| column.map(|entry| entry / scale)).collect();
     let (mut logarithm, mut share) = (scale.ln(), 1.0);
-    for _ in 0..3 {
+    for _ in 0..6 {
         let square = |column: &States| {
             let mut sum = [0.0; STATES];
             for (other, factor) in power[..size].iter().zip(column).filter(|(_, factor)| **factor != 0.0) {
@@ -230,14 +239,16 @@ fn norm(size: usize, columns: &[States]) -> f64 {
         power = squared.iter().map(|column| column.map(|entry| entry / own)).collect();
     }
     // The largest row is as long as it has places, at most.
-    (logarithm + 0.125 * (size as f64).ln()).exp()
+    (logarithm + share * (size as f64).ln()).exp()
 }
 
 /// What a step of one length makes of a mode.
 pub(super) struct Set {
     pub(super) h: f64,
+    /// The highest power of the inputs.
+    pub(super) degree: usize,
     /// What the values of the forces at the points do to the arguments at the nodes: `[argument][source][point]`.
-    weights: Vec<Lane>,
+    weights: Vec<[Lane; POINTS]>,
     full: OnceLock<Full>,
 }
 
@@ -251,42 +262,35 @@ pub(super) struct Full {
 }
 
 impl Set {
-    /// That of a step of length `h`.
-    pub(super) fn new(linear: &Linear, h: f64) -> Self {
+    /// That of a step of length `h` under inputs of this degree.
+    pub(super) fn new(linear: &Linear, h: f64, degree: usize) -> Self {
         let order = radau::order(linear.norm * h);
-        let rows = linear.of_arguments();
-        let mut weights = Vec::with_capacity(rows.len() * linear.source.len() * POINTS);
-        for row in rows {
-            for source in &linear.source {
-                weights.extend(driven(linear, row, source, h, order));
-            }
-        }
-        Self { h, weights, full: OnceLock::new() }
+        let weights = linear.moments().iter().map(|moments| driven(moments, h, linear.norm * h, order)).collect();
+        Self { h, degree, weights, full: OnceLock::new() }
     }
 
     /// What the forces' values at the points do to an argument at the nodes.
     #[inline(always)]
     pub(super) fn weights(&self, argument: usize, source: usize, sources: usize) -> &[Lane; POINTS] {
-        let begin = (argument * sources + source) * POINTS;
-        self.weights[begin..begin + POINTS].as_chunks().0.first().expect("as many as there are points")
+        &self.weights[argument * sources + source]
     }
 
     /// The rest of it, where it is there already, or `wanted`.
-    pub(super) fn full(&self, linear: &Linear, degree: usize, wanted: bool) -> Option<&Full> {
+    pub(super) fn full(&self, linear: &Linear, wanted: bool) -> Option<&Full> {
         match wanted {
-            true => Some(self.full.get_or_init(|| Full::new(linear, self.h, degree))),
+            true => Some(self.full.get_or_init(|| Full::new(linear, self.h, self.degree))),
             false => self.full.get(),
         }
     }
 }
 
-/// The lanes of c y that the five values of a force add.
-fn driven(linear: &Linear, row: &[States; TERMS], source: &States, h: f64, order: usize) -> [Lane; POINTS] {
+/// The lanes of c y that the five values of a force add, by the moments r_m b/νᵐ.
+fn driven(moments: &[f64; TERMS], h: f64, reach: f64, order: usize) -> [Lane; POINTS] {
     let mut lanes = [[0.0; NODES]; POINTS];
-    let (mut factor, reach) = (h, linear.norm * h);
-    for (row, tables) in row.iter().zip(&DRIVEN).take(order) {
+    let mut factor = h;
+    for (moment, tables) in moments.iter().zip(&DRIVEN).take(order) {
         // hᵐ⁺¹ c Aᵐ b
-        let moment = factor * dot(linear.size, row, source);
+        let moment = factor * moment;
         for (lane, table) in lanes.iter_mut().zip(tables) {
             lane.iter_mut().zip(table).for_each(|(lane, value)| *lane += moment * value);
         }
@@ -336,7 +340,8 @@ impl Full {
             for ((lanes, column), at_once) in
                 forced[1 + inputs..].as_chunks_mut::<POINTS>().0.iter_mut().zip(&linear.source).zip(&output.source)
             {
-                *lanes = driven(linear, rows, column, h, order);
+                let moments = rows.each_ref().map(|row| dot(size, row, column));
+                *lanes = driven(&moments, h, reach, order);
                 for (node, lane) in lanes[1..].iter_mut().enumerate() {
                     lane[node] += at_once;
                 }
@@ -447,8 +452,8 @@ mod tests {
         }
         let mut series = Series::room();
         linear.series(&y, h, &forcing, &mut series);
-        let set = Set::new(&linear, h);
-        let full = set.full(&linear, 2, true).unwrap();
+        let set = Set::new(&linear, h, 2);
+        let full = set.full(&linear, true).unwrap();
         let mut x = vec![0.0; full.end.len()];
         (x[0], x[1], x[8]) = (y[0], y[1], 1.0);
         x[9..12].copy_from_slice(&u);

@@ -51,6 +51,23 @@ pub(super) struct Sliding {
 }
 
 impl Curved {
+    /// Which way a body goes whose law can hold it at rest.
+    #[inline(always)]
+    pub(super) fn direction(&self, motion: Motion) -> Option<bool> {
+        match (self.friction.law, motion) {
+            (Law::Coulomb | Law::Stribeck { .. }, Motion::Forward) => Some(true),
+            (Law::Coulomb | Law::Stribeck { .. }, Motion::Backward) => Some(false),
+            (Law::Coulomb | Law::Stribeck { .. } | Law::Smooth { .. } | Law::LuGre { .. }, _) => None,
+        }
+    }
+
+    /// The friction of such a law beyond b v ± F_c.
+    #[inline(always)]
+    pub(super) fn beyond_coulomb<const N: usize>(&self, forward: bool, v: [f64; N]) -> [f64; N] {
+        let (sign, coulomb) = (if forward { 1.0 } else { -1.0 }, self.friction.side(forward).coulomb);
+        self.friction.dry_at(forward, v.map(|v| sign * v)).map(|dry| sign * (dry - coulomb))
+    }
+
     /// The law at `v`, dry friction being multiplied by `factor`. The speed is counted in the direction of motion:
     /// where a trial step overshoots, the law goes on smoothly.
     #[inline(always)]

@@ -66,6 +66,9 @@ impl Source {
                     curved.sliding(motion, arguments[speed][i], factor, false)
                 };
                 let mut force = [0.0; NODES];
+                if let (None, Some(forward)) = (way, curved.direction(motion)) {
+                    return curved.beyond_coulomb(forward, arguments[speed]);
+                }
                 match (curved.friction.law, curved.bristle) {
                     (Law::LuGre { stiffness, damping, .. }, Some(place)) => {
                         let laws: [Sliding; NODES] = std::array::from_fn(law);

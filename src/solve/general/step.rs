@@ -62,6 +62,7 @@ pub(super) struct Room {
     base: Vec<Lane>,
     pub(super) bristles: Bristles,
     pub(super) series: Box<Series>,
+    forcing: Forcing,
     x: [f64; COLUMNS],
     newton: Newton,
     pub(super) evaluations: u64,
@@ -109,6 +110,7 @@ impl Room {
             base: Vec::new(),
             bristles: [[0.0; NODES]; BODIES],
             series: Box::new(Series::room()),
+            forcing: [[0.0; STATES]; POWERS],
             x: [0.0; COLUMNS],
             newton: Newton::default(),
             evaluations: 0,
@@ -142,8 +144,24 @@ impl Room {
     /// Solves a step from a guess of the forces, those at its beginning being known. Its error as a multiple of what is
     /// allowed, that of the cubic; nothing where it cannot be found.
     pub(super) fn solve(&mut self, field: &Field, number: u64, set: &Set, begin: &Begin, whole: bool) -> Option<f64> {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.solve_by_avx2(field, number, set, begin, whole) };
+        }
+        self.solve_by_any(field, number, set, begin, whole)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn solve_by_avx2(&mut self, field: &Field, number: u64, set: &Set, begin: &Begin, whole: bool) -> Option<f64> {
+        self.solve_by_any(field, number, set, begin, whole)
+    }
+
+    #[inline(always)]
+    fn solve_by_any(&mut self, field: &Field, number: u64, set: &Set, begin: &Begin, whole: bool) -> Option<f64> {
         let (linear, sources) = (&field.linear, field.sources.len());
-        let full = set.full(linear, begin.degree, whole);
+        let full = set.full(linear, whole);
         self.base.clear();
         match full {
             Some(full) => {
@@ -152,8 +170,8 @@ impl Room {
                 self.base.extend((0..linear.arguments).map(|argument| full.output(argument, &self.x[..known])));
             }
             None => {
-                let (h, forcing) = (set.h, self.forcing(field, begin, 0));
-                linear.series(&states(begin.y), h, &forcing, &mut self.series);
+                self.forcing(field, begin, 0);
+                linear.series(&states(begin.y), set.h, &self.forcing, &mut self.series);
                 for output in &linear.outputs[..linear.arguments] {
                     let mut coefficients = [0.0; super::radau::TERMS];
                     self.series.along(linear.size, &output.row, &mut coefficients);
@@ -186,6 +204,7 @@ impl Room {
         }
     }
 
+    #[inline(always)]
     fn iterate(&mut self, field: &Field, number: u64, set: &Set, begin: &Begin) -> Option<()> {
         let sources = field.sources.len();
         if self.newton.of != Some((number, set.h)) {
@@ -224,7 +243,8 @@ impl Room {
                     force[1..].iter_mut().zip(change).for_each(|(force, change)| *force += change);
                 }
             }
-            if most <= FOUND || (turn > 0 && most * contraction <= FOUND && contraction < 1.0) {
+            // One change alone tells nothing of the next.
+            if most <= FOUND || (before.is_finite() && most * contraction <= FOUND && contraction < 1.0) {
                 return Some(());
             }
             before = most;
@@ -242,6 +262,7 @@ impl Room {
     }
 
     /// What the arguments at the nodes would be off by if the forces were cubics, as a multiple of what is allowed.
+    #[inline(always)]
     fn error(&self, field: &Field, set: &Set, begin: &Begin) -> f64 {
         let sources = field.sources.len();
         let mut most: f64 = 0.0;
@@ -273,35 +294,37 @@ impl Room {
     }
 
     /// Known forces, and those of the first `sources` laws, by powers of the share of the step.
-    fn forcing(&self, field: &Field, begin: &Begin, sources: usize) -> Forcing {
-        let linear = &field.linear;
-        let mut forcing = [[0.0; STATES]; POWERS];
-        forcing[0] = linear.constant;
+    fn forcing(&mut self, field: &Field, begin: &Begin, sources: usize) {
+        let (linear, size) = (&field.linear, field.linear.size);
+        self.forcing.iter_mut().for_each(|power| power[..size].fill(0.0));
+        self.forcing[0][..size].copy_from_slice(&linear.constant[..size]);
+        let forcing = &mut self.forcing;
         let mut add = |power: usize, column: &States, factor: f64| {
             if factor != 0.0 {
-                forcing[power].iter_mut().zip(column).for_each(|(sum, value)| *sum += factor * value);
+                forcing[power][..size].iter_mut().zip(column).for_each(|(sum, value)| *sum += factor * value);
             }
         };
         for (column, powers) in linear.input.iter().zip(begin.input) {
             powers[..=begin.degree].iter().enumerate().for_each(|(power, value)| add(power, column, *value));
         }
         for (column, force) in linear.source[..sources].iter().zip(&self.forces) {
-            monomials(force).into_iter().enumerate().for_each(|(power, value)| add(power, column, value));
+            if *force != [0.0; POINTS] {
+                monomials(force).into_iter().enumerate().for_each(|(power, value)| add(power, column, value));
+            }
         }
-        forcing
     }
 
     /// The series of the states over the step that was solved.
     pub(super) fn expand(&mut self, field: &Field, h: f64, begin: &Begin) {
-        let forcing = self.forcing(field, begin, field.sources.len());
-        field.linear.series(&states(begin.y), h, &forcing, &mut self.series);
+        self.forcing(field, begin, field.sources.len());
+        field.linear.series(&states(begin.y), h, &self.forcing, &mut self.series);
     }
 
     /// The state at the end of the step that was solved; without its columns, from its series.
     pub(super) fn end(&mut self, field: &Field, set: &Set, begin: &Begin) -> Vector {
         let linear = &field.linear;
         let mut end = states(begin.y);
-        match set.full(linear, begin.degree, false) {
+        match set.full(linear, false) {
             Some(full) => {
                 let known = linear.size + 1 + DRIVES * (begin.degree + 1);
                 for (source, force) in self.forces[..field.sources.len()].iter().enumerate() {
@@ -349,7 +372,7 @@ impl Room {
         begin: &Begin,
         index: usize,
     ) -> Option<[f64; POINTS]> {
-        let full = set.full(&field.linear, begin.degree, false)?;
+        let full = set.full(&field.linear, false)?;
         let output = field.output[index];
         let lane = match output < field.linear.arguments {
             true => self.arguments[output],

@@ -14,7 +14,7 @@ use std::cell::RefCell;
 use std::sync::Arc;
 
 /// The error of the cubic that is allowed, as a multiple of what the quartic may be off by.
-const CUBIC: f64 = 10.0;
+const CUBIC: f64 = 1.0;
 
 /// Steps are so much shorter than their error asks for, and at most so much shorter or longer at once.
 const SAFETY: f64 = 0.85;
@@ -147,17 +147,18 @@ impl Core {
 
     /// What a step of this length makes of the mode, and whether it is worth its columns.
     fn set(&mut self, field: &Field, length: &Length) -> (Arc<Set>, bool) {
-        let known = &mut self.known[self.present].sets;
+        let (known, degree) = (&mut self.known[self.present].sets, self.stretch.degree);
         let near = 8.0 * f64::EPSILON * (self.stretch.begin + self.tau).max(length.h);
-        let fits = |set: &Set| match length.regular {
-            true => set.h == length.h,
-            false => (set.h - length.h).abs() <= near.min(1e-9 * length.h),
+        let is_near = |h: f64| match length.regular {
+            true => h == length.h,
+            false => (h - length.h).abs() <= near.min(1e-9 * length.h),
         };
+        let fits = |set: &Set| set.degree == degree && is_near(set.h);
         if let Some((set, times)) = known.iter_mut().find(|(set, _)| fits(set)) {
             *times += 1;
             return (Arc::clone(set), *times > 2);
         }
-        let set = Arc::new(Set::new(&field.linear, length.h));
+        let set = Arc::new(Set::new(&field.linear, length.h, degree));
         self.cost.propagators += 1;
         if known.len() == KEPT {
             known.remove(0);
@@ -181,7 +182,7 @@ impl Core {
         if self.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS) {
             self.trouble = self.pace.too_stiff(self.cost.steps, time, self.end);
         }
-        let is_expanded = set.full(&field.linear, start.degree, false).is_none();
+        let is_expanded = set.full(&field.linear, false).is_none();
         let mut dense = Dense { field, start, h: set.h, is_expanded };
         let fall = self.first_fall(room, &mut dense, set);
         let mut hit = fall.map(|fall| self.up_to(room, &mut dense, from, &fall));
@@ -274,7 +275,7 @@ impl Core {
                 break;
             }
             let before = room.clone();
-            let set = Set::new(&field.linear, h);
+            let set = Set::new(&field.linear, h, self.stretch.degree);
             let input = self.stretch.inputs(from, h);
             let start = Begin { input: &input, ..*dense.start };
             room.guess(field.sources.len(), Guess::Within(dense.h).of(h));
