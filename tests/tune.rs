@@ -435,3 +435,66 @@ fn a_brief_run_shows_what_a_whole_one_does() {
         }
     }
 }
+
+/// A tuning that was stopped went on with verdicts and limit cycles for many seconds: now what comes after is one
+/// verdict of what it has.
+#[test]
+fn a_tuning_that_is_stopped_ends_soon() {
+    let case = case("pid-elastic.toml", &[]);
+    let tuning = Tuning::default();
+    let before = evaluate(&case, &tuning).unwrap();
+    let left = std::cell::Cell::new(1500);
+    let stop = || {
+        left.set(left.get() - 1);
+        left.get() < 0
+    };
+    let begun = std::time::Instant::now();
+    let whole = tune(&case, &tuning, &|| false).unwrap();
+    let took = begun.elapsed();
+    let begun = std::time::Instant::now();
+    let tuned = tune(&case, &tuning, &stop).unwrap();
+    // Of each verdict all moves on all axes, three of them at most, and of the search what was begun.
+    assert!(left.get() < 0 && tuned.samples <= 4 * before.samples, "{} {}", tuned.samples, before.samples);
+    assert!(begun.elapsed() < took && tuned.samples < whole.samples / 2, "{:?} {took:?}", begun.elapsed());
+    assert!(tuned.after.hunt.is_none());
+}
+
+/// What a search may simulate is bounded: a few seconds of a processor on each bundled case, which took up to 23.
+#[test]
+fn a_search_keeps_to_its_samples() {
+    for name in ["pid-elastic.toml", "cascade.toml"] {
+        let tuned = tune(&case(name, &[]), &Tuning::default(), &|| false).unwrap();
+        assert!(tuned.samples < 12_000_000, "{name}: {}", tuned.samples);
+        assert_ne!(tuned.judgement, Judgement::Worse, "{name}");
+    }
+}
+
+/// The draws of a posterior are the family, with what they say of parameters together.
+#[test]
+fn draws_of_a_posterior_are_the_family() {
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("tune-posterior.csv");
+    let mut text = String::from("cart.mass_kg,cart.friction.viscous_N s m^-1\n");
+    let stage = case("pid.toml", &[]).stage;
+    let (mass, viscous) = (stage.cart.mass, stage.cart.friction.forward.viscous);
+    // A heavier cart has less friction.
+    for k in 0..80 {
+        let off = 0.1 * (f64::from(k) / 79.0 - 0.5);
+        text += &format!("{},{}\n", mass * (1.0 + off), viscous * (1.0 - off));
+    }
+    let unit = taut::parameter::Free::new(&stage, "cart.friction.viscous", &[], &[]).unwrap().unit;
+    let heading = taut::trajectory::Column::new("cart.friction.viscous", unit).heading();
+    std::fs::write(&file, text.replace("cart.friction.viscous_N s m^-1", &heading)).unwrap();
+    let free = ["cart.mass", "cart.friction.viscous"].map(String::from).to_vec();
+    let plan = Some(taut::case::Plan { free, ..taut::case::Plan::default() });
+    let drawn = Case { fit: plan, ..case("pid.toml", &[]) };
+    let tuning = Tuning { draws: Some(file.clone()), ..Tuning::default() };
+    let family = Family::of(&drawn, &tuning).unwrap();
+    assert_eq!((family.source, family.machines.len()), (taut::tune::Source::Posterior(80), 41));
+    for corner in &family.machines[1..] {
+        let machine = family.stage_at(corner);
+        let (m, d) = (machine.cart.mass / mass - 1.0, machine.cart.friction.forward.viscous / viscous - 1.0);
+        assert!((m + d).abs() < 1e-9 && m.abs() <= 0.05 + 1e-9, "{m} {d}");
+    }
+    let none = Family::of(&case("pid.toml", &[]), &tuning).unwrap_err().to_string();
+    assert!(none.contains("this case has no [fit]"), "{none}");
+}

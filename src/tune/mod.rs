@@ -46,7 +46,10 @@ const SOME: usize = 4;
 const POLISHED: usize = 2;
 
 /// Searches for what makes no figure worse, each with the machines on which one was.
-const KEPT: usize = 4;
+const KEPT: usize = 6;
+
+/// Of these, how many look nearby with the simplex before differential evolution does.
+const NEARBY: usize = 2;
 
 /// Designs of each balance that are looked at before none is taken.
 const TRIES: usize = 6;
@@ -290,9 +293,9 @@ impl Work<'_> {
         let figures = before.at_worst();
         let weighed = work::Weighed { cost, bars: Some(&figures) };
         let mut latest = after.clone();
-        // What makes no figure worse may cost as much as the best did.
-        self.most = self.spent.get() + self.most / 2;
-        for _ in 0..KEPT {
+        // What makes no figure worse may cost once more as much.
+        self.most += self.spent.get();
+        for round in 0..KEPT {
             if (self.stop)() || self.is_spent() {
                 break;
             }
@@ -304,10 +307,13 @@ impl Work<'_> {
             }
             for layout in self.nearest(archive, &weighed) {
                 self.again(archive, layout, &some, &weighed);
-                self.evolved(finalists, layout, &some, &weighed, archive)?;
+                match round < NEARBY {
+                    true => self.from_best(finalists, layout, &some, &weighed, archive)?,
+                    false => self.evolved(finalists, layout, &some, &weighed, archive)?,
+                }
             }
             let Some(design) = self.best_of(archive, cost, &BALANCES[1], Some(&figures), TRIES)? else { break };
-            if design == latest.design {
+            if design == latest.design && round >= NEARBY {
                 break;
             }
             latest = self.verdict(&design)?;

@@ -143,8 +143,17 @@ impl Work<'_> {
         Ok(Verdict { hunt, ..verdict })
     }
 
-    /// The verdict on a design.
+    /// The verdict on a design, given once.
     pub fn verdict(&self, design: &Design) -> Result<Verdict> {
+        if let Some(known) = self.known.borrow().iter().find(|known| known.design == *design) {
+            return Ok(known.clone());
+        }
+        let verdict = self.judged(design)?;
+        self.known.borrow_mut().push(verdict.clone());
+        Ok(verdict)
+    }
+
+    fn judged(&self, design: &Design) -> Result<Verdict> {
         let feedback = self.feedback(design)?;
         let corners = feedback.corners();
         let nominal = Margins::of(&self.family.plant(&self.family.nominal(), design, &corners)?, &feedback);

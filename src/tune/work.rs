@@ -16,7 +16,7 @@ use crate::design::Design;
 use crate::error::Result;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::f64::consts::PI;
 
 /// Share of the limits that a search on the grid keeps to: tops between its points and rounding are in the rest.
@@ -74,6 +74,8 @@ pub(super) struct Work<'a> {
     /// Samples of moves that were simulated, and most that a search may ask for.
     pub spent: Cell<u64>,
     pub most: u64,
+    /// Verdicts that were given.
+    pub known: RefCell<Vec<Verdict>>,
     pub stop: &'a dyn Fn() -> bool,
 }
 
@@ -140,6 +142,7 @@ impl<'a> Work<'a> {
             rounds: 0,
             spent: Cell::new(0),
             most: SAMPLES,
+            known: RefCell::default(),
             stop,
         })
     }
@@ -496,6 +499,24 @@ impl<'a> Work<'a> {
         let value = |tried: &Tried| self.valued(weighed.cost, &BALANCES[1], &tried.worst, weighed.bars);
         let best = archive.iter().min_by(|a, b| value(a).total_cmp(&value(b)));
         if let Some((layout, powers)) = best.map(|tried| (tried.layout, tried.powers.clone())) {
+            self.moved(finalists, layout, &powers, (some, FURTHER), weighed, archive)?;
+        }
+        Ok(())
+    }
+
+    /// With the simplex from the best design of a layout by what it is weighed with.
+    pub fn from_best(
+        &mut self,
+        finalists: &[Finalist],
+        layout: usize,
+        some: &[usize],
+        weighed: &Weighed,
+        archive: &mut Vec<Tried>,
+    ) -> Result<()> {
+        let value = |tried: &Tried| self.valued(weighed.cost, &BALANCES[1], &tried.worst, weighed.bars);
+        let own = archive.iter().filter(|tried| tried.layout == layout);
+        let best = own.min_by(|a, b| value(a).total_cmp(&value(b))).map(|tried| tried.powers.clone());
+        if let Some(powers) = best {
             self.moved(finalists, layout, &powers, (some, FURTHER), weighed, archive)?;
         }
         Ok(())
