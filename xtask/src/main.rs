@@ -1,7 +1,8 @@
 //! The project's own chores: `cargo xtask test` checks all that can be checked, `cargo xtask python` the Python package
 //! alone, `cargo xtask browser` the reports alone, `cargo xtask data` fetches other people's measurements,
 //! `cargo xtask hunt` looks for what is wrong with larger means, `cargo xtask coverage` and `cargo xtask faults` make
-//! the tables of docs/fit.md, `cargo xtask counts` counts the instructions of standard works.
+//! the tables of docs/fit.md, `cargo xtask counts` counts the instructions of standard works, `cargo xtask drag` and
+//! `cargo xtask load` measure the studio.
 
 mod browser;
 mod counts;
@@ -9,6 +10,7 @@ mod data;
 mod hunt;
 mod ignored;
 mod python;
+mod studio;
 
 use ignored::Ignored;
 use std::io::{BufRead, BufReader};
@@ -67,6 +69,8 @@ fn main() -> ExitCode {
         ["browser"] => test(&[BROWSER]),
         ["data", ref words @ ..] => data::run(words),
         ["counts", ref words @ ..] => counts::run(words),
+        ["drag", ref words @ ..] => studio::drag(words),
+        ["load", ref words @ ..] => studio::load(words),
         ["coverage", ref words @ ..] => example("coverage", words),
         ["faults", ref words @ ..] => example("faults", words),
         ["hunt", ref words @ ..] => match hunt::Hunt::new(words) {
@@ -79,8 +83,10 @@ fn main() -> ExitCode {
         _ => {
             eprintln!(
                 "usage: cargo xtask test | cargo xtask browser | cargo xtask python | cargo xtask coverage [...] | \
-                 cargo xtask faults [...] | {} | {} | {}",
+                 cargo xtask faults [...] | {} | {} | {} | {} | {}",
                 counts::USAGE,
+                studio::DRAG,
+                studio::LOAD,
                 data::USAGE,
                 hunt::USAGE
             );
