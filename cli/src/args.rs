@@ -24,6 +24,7 @@ const STATUS: &str = "\
 Start with:
   taut init axis.toml
   taut simulate axis.toml --out results
+  taut studio axis.toml
 
 Exit status: 0 done, 1 the work could not be done or its result is not to be relied on,
 2 the input was wrong, 130 ended by Ctrl-C.";

@@ -193,6 +193,8 @@ class Plot {
     if (axis !== undefined) linked.set(axis, this.siblings);
     this.siblings.push(this);
     figure.classList.add("live");
+    // A picture with switches in it is no picture any more.
+    this.svg.setAttribute("role", "group");
     this.listen();
     if (this.stage.clientWidth) this.draw();
     seen.observe(figure);

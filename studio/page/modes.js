@@ -4,7 +4,7 @@ import {element} from "./format.js";
 
 /** @typedef {import("./app.js").App} App */
 
-export const key = "modes", name = "Frequencies";
+export const key = "modes", name = "Frequencies, friction";
 
 /** @param {HTMLElement} root @param {App} app */
 export function mount(root, app) {
@@ -14,7 +14,9 @@ export function mount(root, app) {
   const show = () => {
     if (app.view !== key || !app.run || shown === app.text) return;
     const text = app.text;
-    app.wire.newest("modes", () => ({text: app.text}), (answer, error) => {
+    const speeds = app.run.columns.get("cart_speed") || new Float64Array(1);
+    const speed = speeds.reduce((most, value) => Math.max(most, Math.abs(value)), 0);
+    app.wire.newest("modes", () => ({text: app.text, speed}), (answer, error) => {
       told.hidden = Boolean(answer);
       if (!answer) { told.textContent = String(error && error.message); body.replaceChildren(); return; }
       shown = text;

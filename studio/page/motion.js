@@ -212,7 +212,7 @@ class Results {
       if (root.hidden && all.length > 100) return;
       const shown = all.slice(0, 200);
       events.replaceChildren(...shown.map(event => element("button", {type: "button", class: "event", onclick: () => { app.isPlaying = false; app.tell("play"); app.seek(event.time); }},
-        element("span", {}, `${number(event.time, 9)} s`), element("span", {}, event.part), element("span", {class: "quiet"}, `${event.from} → ${event.to}`))),
+        element("span", {}, timeText(event.time, 1e-9)), element("span", {}, event.part), element("span", {class: "quiet"}, `${event.from} → ${event.to}`))),
       ...(all.length + left > shown.length ? [element("p", {class: "quiet"}, `${all.length + left - shown.length} more`)] : all.length ? [] : [element("p", {class: "quiet"}, "None.")]));
     });
   }

@@ -6,7 +6,7 @@ import {svg, number} from "./format.js";
 /** @typedef {import("./app.js").App} App */
 
 const PITCH = 9; // of the teeth, in pixels of the drawing
-const WORDS = new Map([[0, "stuck"], [1, "slips forward"], [-1, "slips backward"], [2, "slides"]]);
+const WORDS = new Map([[0, "stuck"], [1, "forward"], [-1, "backward"], [2, "slides"]]);
 const COLOUR = new Map([[0, "grey"], [1, "blue"], [-1, "verm"], [2, "green"]]);
 
 /** The drawing of a kind of machine.
@@ -77,7 +77,7 @@ function pulley(root, x, y, r, name) {
     turn(angle, state, hasState = true) {
       wheel.setAttribute("transform", `translate(${x} ${y}) rotate(${((angle * 180) / Math.PI) % 360})`);
       hub.setAttribute("class", `f-${hasState ? COLOUR.get(state) || "grey" : "axis"}`);
-      label.textContent = hasState ? `${name} ${WORDS.get(state) || ""}` : name;
+      label.textContent = hasState ? `${name}: ${WORDS.get(state) || ""}` : name;
     },
   };
 }
@@ -86,7 +86,7 @@ function pulley(root, x, y, r, name) {
 
 /** @param {any} scene @returns {Drawing} */
 function axis(scene) {
-  const W = 1000, H = 224, Y = 108, LEFT = 90, RIGHT = 910, CART = 92;
+  const W = 1000, H = 196, Y = 108, LEFT = 90, RIGHT = 910, CART = 92;
   const root = svg("svg", {viewBox: `0 0 ${W} ${H}`, role: "img"});
   const ground = svg("g", {});
   root.append(ground);
@@ -105,7 +105,7 @@ function axis(scene) {
   const state = svg("text", {y: 5, "text-anchor": "middle", class: "small"});
   cart.append(box, svg("circle", {cx: -CART / 4, cy: 29, r: 5, class: "f-axis"}), svg("circle", {cx: CART / 4, cy: 29, r: 5, class: "f-axis"}), state);
   root.append(ghost, cart, error);
-  const way = svg("text", {"text-anchor": "middle", y: 186, class: "f-grey small"});
+  const way = svg("text", {"text-anchor": "middle", y: 139, class: "f-grey small"});
   root.append(way);
   let frame = "", scale = 1, middle = 0;
   return {
@@ -161,8 +161,8 @@ function axis(scene) {
         }
         if (scene.x) for (const end of scene.x)
           ground.append(svg("line", {x1: at(end) + (end > middle ? -1 : 1) * (CART / 2 + 3), x2: at(end) + (end > middle ? -1 : 1) * (CART / 2 + 3), y1: top - 18, y2: top + 35, class: "s-mark", "stroke-width": 4}));
-        way.setAttribute("x", String((LEFT + RIGHT) / 2));
-        way.textContent = "← x in mm";
+        way.setAttribute("x", "176");
+        way.textContent = "← x, mm";
       }
     },
   };
@@ -188,7 +188,7 @@ function gantry(scene) {
   const cart = svg("rect", {width: 96, height: 84, rx: 6, class: "f-paper s-ink", "stroke-width": 2});
   const cartState = svg("text", {"text-anchor": "middle", class: "small"}), told = svg("text", {"text-anchor": "middle", class: "f-verm small"});
   root.append(ghost, cart, cartState, told);
-  const drives = MOTORS.map(([x, y], side) => pulley(root, x, y, R - 3, isH ? ["left φ₁", "right φ₂"][side] : ["A", "B"][side]));
+  const drives = MOTORS.map(([x, y], side) => pulley(root, x, y, R - 3, isH ? ["left", "right"][side] : ["A", "B"][side]));
   const forces = scene.spans.map(() => svg("text", {class: "f-mark small"}));
   root.append(...forces);
   root.append(svg("text", {x: RAILS[1] + 40, y: 250, class: "f-grey small"}, "x ↑  y →"));
@@ -203,7 +203,7 @@ function gantry(scene) {
       const bridgeAt = x => 265 - (x - (xs[0] + xs[1]) / 2) * k, cartAt = y => 450 + (y - (ys[0] + ys[1]) / 2) * k;
       const x = value("bridge_position"), y = value("cart_position"), by = bridgeAt(x), cx = cartAt(y);
       bridge.setAttribute("transform", `translate(0 ${by})`);
-      bridgeState.textContent = `bridge ${WORDS.get(stateOf("bridge_state")) || ""}`;
+      bridgeState.textContent = `bridge: ${WORDS.get(stateOf("bridge_state")) || ""}`;
       place(cart, cx, by);
       cart.setAttribute("class", `f-paper s-${COLOUR.get(stateOf("cart_state")) || "ink"}`);
       place(ghost, cx - factor * value("y_error") * k, by + factor * value("x_error") * k);

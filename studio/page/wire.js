@@ -47,6 +47,9 @@ export class Wire {
     this.socket = this.connect();
   }
 
+  /** Whether an answer is to come. */
+  get isBusy() { return this.open.size > 0 || [...this.lanes.values()].some(lane => lane.busy); }
+
   /** @returns {Promise<WebSocket>} */
   connect() {
     return new Promise((done, failed) => {

@@ -23,7 +23,7 @@ use taut::{Error, Result};
 use taut_report::simulate::{Run, early_end, figures, hidden, named, page};
 
 /// How to keep the result.
-const ADVICE: &str = "add --out DIR for files and a report";
+const ADVICE: &str = "add --out DIR for files and a report; `taut studio CASE` shows it in motion";
 
 /// Reads the cases, simulates, measures, reports.
 pub fn run(args: &Simulate) -> Outcome {

@@ -3,6 +3,7 @@
 mod case;
 mod closed;
 mod curves;
+mod friction;
 mod gallery;
 mod logs;
 mod modes;

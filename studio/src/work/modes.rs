@@ -1,6 +1,6 @@
 //! How the machine swings: the page of `taut modes`.
 
-use super::Context;
+use super::{Context, friction};
 use super::case::opened;
 use crate::message::{Reply, Request};
 use serde_json::json;
@@ -9,9 +9,13 @@ use taut::error::Result;
 use taut::linear::{Analysis, GantryAnalysis, Question};
 use taut_report::modes;
 
-/// Poles, zeros, frequency responses, and how they change along the travel, as a part of a page and as data.
+/// Poles, zeros, frequency responses, and how they change along the travel, as a part of a page and as data; and friction
+/// over speed, up to `speed`, m/s.
 pub fn modes(request: &Request, context: &Context) -> Result<Reply> {
-    let (page, result) = match &opened(request, context)? {
+    let case = opened(request, context)?;
+    let speed = request.number("speed").filter(|speed| *speed > 0.0).unwrap_or(1.0);
+    let friction = friction::page(&case, speed);
+    let (page, result) = match &case {
         Opened::Axis(case) => {
             let analysis = Analysis::of(case, &Question::default())?;
             let figures = modes::figures(&analysis);
@@ -23,5 +27,5 @@ pub fn modes(request: &Request, context: &Context) -> Result<Reply> {
             (modes::gantry::page(&analysis, &figures), taut::json::gantry_modes(&analysis))
         }
     };
-    Ok(Reply::of(json!({ "html": page.body(), "result": result })))
+    Ok(Reply::of(json!({ "html": format!("{}{}", page.body(), friction.body()), "result": result })))
 }

@@ -23,16 +23,21 @@ pub fn section(request: &Request, context: &Context) -> Result<Reply> {
     let number = |key: &str| request.number(key).ok_or_else(|| Error::new(format!("a section needs a number `{key}`")));
     let (from, to) = (number("from")?.max(0.0), number("to")?);
     let points = request.number("points").unwrap_or(1001.0).clamp(2.0, POINTS) as usize;
-    let (mechanism, inputs, start, until) = match &case {
+    let (mechanism, inputs, start, (until, every)) = match &case {
         Opened::Axis(case) => {
             let experiment = &case.experiments[chosen(request, case.experiments.len())?];
             let mechanism = case.stage.mechanism();
             let start = experiment.initial.state(&mechanism);
-            (mechanism, vec![experiment.input.clone()], start, experiment.until)
+            (mechanism, vec![experiment.input.clone()], start, (experiment.until, experiment.every))
         }
         Opened::Gantry(case) => {
             let experiment = &case.experiments[chosen(request, case.experiments.len())?];
-            (case.gantry.mechanism(), experiment.inputs.to_vec(), experiment.initial, experiment.until)
+            (
+                case.gantry.mechanism(),
+                experiment.inputs.to_vec(),
+                experiment.initial,
+                (experiment.until, experiment.every),
+            )
         }
     };
     let to = to.min(until);
@@ -43,11 +48,14 @@ pub fn section(request: &Request, context: &Context) -> Result<Reply> {
     }
     let mut kept = Kept::new(&panels(&case, &mechanism.columns));
     let window = Window { from, to, points };
-    rows(&mechanism, (&inputs, &start), &window, &mut kept, context)?;
+    rows(&mechanism, (&inputs, &start), (&window, every), &mut kept, context)?;
     let mut reply = Reply::of(json!({ "from": from, "to": to, "columns": kept.told() }));
     reply.columns = kept.columns;
     Ok(reply)
 }
+
+/// Intervals between two looks whether anybody still waits.
+const BETWEEN_LOOKS: f64 = 4096.0;
 
 struct Window {
     from: f64,
@@ -56,6 +64,13 @@ struct Window {
 }
 
 impl Window {
+    /// The interval that steps are computed fastest for, s: that of the rows, doubled until it is about that of the run,
+    /// so that the way to the window takes no more steps than the run does.
+    fn interval(&self, every: f64) -> f64 {
+        let own = (self.to - self.from) / (self.points - 1) as f64;
+        own * (every / own).log2().ceil().max(0.0).exp2()
+    }
+
     fn time(&self, k: usize) -> f64 {
         let share = k as f64 / (self.points - 1) as f64;
         if k + 1 == self.points { self.to } else { self.from + share * (self.to - self.from) }
@@ -66,14 +81,14 @@ impl Window {
 fn rows(
     mechanism: &Mechanism,
     (inputs, start): (&[Signal], &State),
-    window: &Window,
+    (window, every): (&Window, f64),
     kept: &mut Kept,
     context: &Context,
 ) -> Result<()> {
-    let interval = (window.to - window.from) / (window.points - 1) as f64;
+    let interval = window.interval(every);
     let mut machine = Machine::of_mechanism(mechanism, start, Solver::of_mechanism(mechanism), interval)?;
     let headings = mechanism.columns.clone();
-    let (mut row, mut events, mut next) = (vec![0.0; headings.len()], Vec::new(), 0);
+    let (mut row, mut next) = (vec![0.0; headings.len()], 0);
     while context.flow() == Flow::Continue {
         let mut end = f64::INFINITY;
         for (drive, input) in inputs.iter().enumerate() {
@@ -83,7 +98,7 @@ fn rows(
         }
         while window.time(next) < end || next + 1 == window.points && window.time(next) <= end {
             // An early end leaves what there is.
-            if machine.advance(window.time(next), &mut events).is_err() || context.flow() == Flow::Stop {
+            if !advance(&mut machine, window.time(next), interval, context) {
                 return Ok(());
             }
             machine.outputs(&mut row);
@@ -93,10 +108,26 @@ fn rows(
                 return Ok(());
             }
         }
-        events.clear();
-        if machine.advance(end, &mut events).is_err() {
+        if !advance(&mut machine, end, interval, context) {
             return Ok(());
         }
     }
     Ok(())
+}
+
+/// Goes on to `until`, and looks from time to time whether anybody still waits; false where it ended before.
+fn advance(machine: &mut Machine, until: f64, interval: f64, context: &Context) -> bool {
+    let mut events = Vec::new();
+    while context.flow() == Flow::Continue {
+        let next = until.min(machine.time() + BETWEEN_LOOKS * interval);
+        if machine.advance(next, &mut events).is_err() {
+            return false;
+        }
+        // Far out, a step may be less than what doubles tell apart.
+        if next >= until || machine.time() >= until {
+            return true;
+        }
+        events.clear();
+    }
+    false
 }
