@@ -1,8 +1,8 @@
 //! The project's own chores: `cargo xtask test` checks all that can be checked, `cargo xtask python` the Python package
 //! alone, `cargo xtask browser` the reports alone, `cargo xtask data` fetches other people's measurements,
 //! `cargo xtask hunt` looks for what is wrong with larger means, `cargo xtask coverage` and `cargo xtask faults` make
-//! the tables of docs/fit.md, `cargo xtask counts` counts the instructions of standard works, `cargo xtask drag` and
-//! `cargo xtask load` measure the studio.
+//! the tables of docs/fit.md, `cargo xtask counts` counts the instructions of standard works, `cargo xtask drag`,
+//! `cargo xtask load` and `cargo xtask first-fit` measure the studio.
 
 mod browser;
 mod counts;
@@ -71,6 +71,7 @@ fn main() -> ExitCode {
         ["counts", ref words @ ..] => counts::run(words),
         ["drag", ref words @ ..] => studio::drag(words),
         ["load", ref words @ ..] => studio::load(words),
+        ["first-fit", ref words @ ..] => studio::first_fit(words),
         ["coverage", ref words @ ..] => example("coverage", words),
         ["faults", ref words @ ..] => example("faults", words),
         ["hunt", ref words @ ..] => match hunt::Hunt::new(words) {
@@ -83,8 +84,9 @@ fn main() -> ExitCode {
         _ => {
             eprintln!(
                 "usage: cargo xtask test | cargo xtask browser | cargo xtask python | cargo xtask coverage [...] | \
-                 cargo xtask faults [...] | {} | {} | {} | {} | {}",
+                 cargo xtask faults [...] | {} | {} | {} | {} | {} | {}",
                 counts::USAGE,
+                studio::FIRST_FIT,
                 studio::DRAG,
                 studio::LOAD,
                 data::USAGE,

@@ -1,5 +1,5 @@
-//! `cargo xtask drag` measures how quick the studio is, `cargo xtask load` what it bears: both with the program as it is
-//! released, by the scripts of `report/browser`.
+//! `cargo xtask drag` measures how quick the studio is, `cargo xtask load` what it bears, `cargo xtask first-fit` the way
+//! from an empty page to a fitted model: all with the program as it is released, by the scripts of `report/browser`.
 
 use crate::{browser, cargo, python};
 use std::path::Path;
@@ -7,12 +7,22 @@ use std::process::Command;
 
 pub const DRAG: &str = "cargo xtask drag [--seconds S] [--drags N]";
 
+pub const FIRST_FIT: &str = "cargo xtask first-fit [--shots DIR]";
+
 pub const LOAD: &str = "cargo xtask load [--clients N] [--seconds S] [--requests N]";
 
 /// Drags in headless Chromium, and prints the table of docs/studio.md; fails where a bound is not held.
 pub fn drag(words: &[&str]) -> Result<(), String> {
     let browser = browser::browser().map_err(|needs| format!("the drags need {needs}"))?;
     let mut node = script("drag.mjs");
+    node.arg(browser);
+    finish(node, words)
+}
+
+/// From an empty page to the fitted model of another's log, step by step with times.
+pub fn first_fit(words: &[&str]) -> Result<(), String> {
+    let browser = browser::browser().map_err(|needs| format!("this needs {needs}"))?;
+    let mut node = script("first-fit.mjs");
     node.arg(browser);
     finish(node, words)
 }

@@ -1,7 +1,7 @@
 //! How the machine swings: the page of `taut modes`.
 
-use super::{Context, friction};
 use super::case::opened;
+use super::{Context, friction};
 use crate::message::{Reply, Request};
 use serde_json::json;
 use taut::case::Opened;
