@@ -77,7 +77,7 @@ class Logs {
         const one = new LogFile(file, head, () => { this.files = this.files.filter(other => other !== one); one.element.remove(); });
         this.files.push(one);
         this.list.append(one.element);
-        this.app.say(`${file.name}: ${head.rows} rows of ${head.columns.length} columns`);
+        this.app.say(`${file.name}: ${head.rows} rows of ${head.found.length} columns`);
       } catch (error) { this.tell(error); }
     }
   }
@@ -278,7 +278,7 @@ class LogFile {
     this.split = this.columns("split", head.guess.split);
     this.preset = element("select", {"aria-label": `Recorder of ${file.name}`}, element("option", {value: ""}, "any"), ...head.presets.map(one => element("option", {value: one.name, selected: one.name === head.guess.preset}, one.title)));
     this.element = element("section", {class: "card log-file", "aria-label": file.name},
-      element("h4", {}, file.name, element("span", {class: "quiet"}, ` ${head.rows} rows, ${head.columns.length} columns `), element("button", {type: "button", onclick: remove, "aria-label": `Remove ${file.name}`}, "Remove")),
+      element("h4", {}, file.name, element("span", {class: "quiet"}, ` ${head.rows} rows, ${head.found.length} columns `), element("button", {type: "button", onclick: remove, "aria-label": `Remove ${file.name}`}, "Remove")),
       element("div", {class: "scroll"}, table(keys.filter(isShown))),
       element("div", {class: "fields"}, element("label", {}, `${WORDS.split}: `, this.split), element("label", {}, "Recorder: ", this.preset)),
       element("details", {class: "more"}, element("summary", {}, "More quantities"), element("div", {class: "scroll"}, table(others))),
@@ -289,7 +289,7 @@ class LogFile {
   columns(key, chosen) {
     const words = id => (typeof id === "number" ? `column ${id}` : id);
     return element("select", {"aria-label": `${WORDS[key] || key.replace(/_/g, " ")}: column`, onchange: () => this.look()}, element("option", {value: ""}, "–"),
-      ...this.head.columns.map((column, k) => element("option", {value: k, selected: k === chosen}, words(column.id))));
+      ...this.head.found.map((column, k) => element("option", {value: k, selected: k === chosen}, words(column.id))));
   }
 
   row(key, wanted, guess) {
@@ -298,7 +298,7 @@ class LogFile {
     const first = element("td", {class: "quiet first-values"});
     this.roles.set(key, {column, unit});
     const show = () => {
-      const one = this.head.columns[column.value];
+      const one = this.head.found[column.value];
       unit.placeholder = (one && one.unit) || wanted;
       first.textContent = column.value === "" ? "" : one.first.slice(0, 5).map(value => (value === null ? "–" : number(value, 6))).join(", ") + "…";
     };
@@ -311,7 +311,7 @@ class LogFile {
     const series = [];
     for (const [key, {column}] of this.roles) {
       if (column.value === "" || key === "time") continue;
-      const points = this.head.columns[column.value].points.map(value => (value === null ? NaN : value)), good = points.filter(isFinite);
+      const points = this.head.found[column.value].points.map(value => (value === null ? NaN : value)), good = points.filter(isFinite);
       const low = Math.min(...good), high = Math.max(...good), span = high - low || 1, thin = this.head.rows / Math.max(1, points.length);
       series.push({name: WORDS[key] || key.replace(/_/g, " "), x: points.map((_, k) => k * thin), y: points.map(value => (value - low) / span)});
     }
@@ -320,7 +320,7 @@ class LogFile {
 
   /** The table of the log, as a case has it. */
   table() {
-    const id = place => this.head.columns[place].id;
+    const id = place => this.head.found[place].id;
     const table = {file: this.file.path, preset: this.preset.value || null}, units = {};
     for (const [key, {column, unit}] of this.roles) {
       if (column.value === "") continue;
