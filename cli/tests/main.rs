@@ -18,6 +18,7 @@ mod schemas;
 mod shape;
 mod show;
 mod studio;
+mod studio_work;
 mod sweep;
 
 /// A file that is no module here would not be run, and nobody would notice.

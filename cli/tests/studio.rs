@@ -9,7 +9,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// A server that runs, and ends with the test.
-struct Studio {
+pub(crate) struct Studio {
     child: Child,
     port: u16,
     token: String,
@@ -23,7 +23,7 @@ impl Drop for Studio {
 }
 
 impl Studio {
-    fn start(words: &[&str]) -> Self {
+    pub(crate) fn start(words: &[&str]) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_taut"));
         command.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
         let mut child = command.arg("studio").args(words).arg("--no-open").stdout(Stdio::piped()).spawn().unwrap();
@@ -34,7 +34,7 @@ impl Studio {
         Self { child, port: port.parse().unwrap(), token: token.to_string() }
     }
 
-    fn connect(&self) -> TcpStream {
+    pub(crate) fn connect(&self) -> TcpStream {
         let stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
         // Each request goes at once: a head comes in pieces.
         stream.set_nodelay(true).unwrap();
@@ -42,11 +42,11 @@ impl Studio {
         stream
     }
 
-    fn host(&self) -> String {
+    pub(crate) fn host(&self) -> String {
         format!("Host: 127.0.0.1:{}", self.port)
     }
 
-    fn origin(&self) -> String {
+    pub(crate) fn origin(&self) -> String {
         format!("Origin: http://127.0.0.1:{}", self.port)
     }
 
@@ -60,13 +60,13 @@ impl Studio {
     }
 
     /// The cookie that the token is exchanged for.
-    fn cookie(&self) -> String {
+    pub(crate) fn cookie(&self) -> String {
         let answer = self.ask(&format!("GET /?token={}", self.token), &[&self.host()]);
         let cookie = answer.lines().find_map(|line| line.strip_prefix("set-cookie: ")).unwrap();
         format!("Cookie: {}", cookie.split(';').next().unwrap())
     }
 
-    fn page(&self) -> Page {
+    pub(crate) fn page(&self) -> Page {
         let mut stream = self.connect();
         let status = handshake(&mut stream, &[&self.host(), &self.origin(), &self.cookie()]);
         assert_eq!(status, 101);
@@ -92,7 +92,7 @@ fn handshake(stream: &mut TcpStream, lines: &[&str]) -> u16 {
 }
 
 /// A page's socket.
-struct Page {
+pub(crate) struct Page {
     stream: TcpStream,
     last: u64,
 }
@@ -116,7 +116,7 @@ impl Page {
     }
 
     /// Asks for something; returns the number of the request.
-    fn ask(&mut self, act: &str, mut body: Value) -> u64 {
+    pub(crate) fn ask(&mut self, act: &str, mut body: Value) -> u64 {
         self.last += 1;
         body["id"] = json!(self.last);
         body["do"] = json!(act);
@@ -125,7 +125,7 @@ impl Page {
     }
 
     /// The next answer: its head, and its columns.
-    fn answer(&mut self) -> Option<(Value, Vec<Vec<f64>>)> {
+    pub(crate) fn answer(&mut self) -> Option<(Value, Vec<Vec<f64>>)> {
         let (kind, frame) = self.frame()?;
         if kind != 2 {
             return None;
@@ -167,7 +167,7 @@ impl Page {
         Some((head[0] & 0x0f, content))
     }
 
-    fn result(&mut self, act: &str, body: Value) -> Value {
+    pub(crate) fn result(&mut self, act: &str, body: Value) -> Value {
         let id = self.ask(act, body);
         let (head, _) = self.answer().unwrap();
         assert_eq!(head["id"], json!(id));
@@ -177,7 +177,7 @@ impl Page {
 
 const TABLE4: &str = "stages/sollmann-jouaneh/table4.toml";
 
-fn text(path: &str) -> String {
+pub(crate) fn text(path: &str) -> String {
     fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../").to_string() + path).unwrap()
 }
 

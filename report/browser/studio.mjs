@@ -267,7 +267,7 @@ await test("gallery, tour and frequencies lead where they say", async open => {
   await page.click("#go-gallery");
   await page.waitForSelector(".gallery li");
   const count = await page.locator(".gallery li").count();
-  expect(count === 10, `${count} machines`);
+  expect(count === 12, `${count} machines`);
   await page.screenshot({path: join(shots, "studio-gallery.png")});
   await page.locator(".gallery button", {hasText: "core-xy/core-xy.toml"}).click();
   await quiet(page);

@@ -6,11 +6,15 @@ import {fragment, stateOf} from "./link.js";
 import {Mistake} from "./wire.js";
 import * as motion from "./motion.js";
 import * as modes from "./modes.js";
+import * as logs from "./logs.js";
+import * as tune from "./tune.js";
+import * as shape from "./shape.js";
+import * as sweep from "./sweep.js";
 import * as gallery from "./gallery.js";
 import * as tour from "./tour.js";
 
 /** Each view has a key, a name, and a function that makes it once; it listens to the app for the rest. */
-const VIEWS = [motion, modes, gallery, tour];
+const VIEWS = [motion, modes, logs, tune, shape, sweep, gallery, tour];
 
 const app = new App();
 /** For tests, and for the curious. */

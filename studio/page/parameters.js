@@ -76,13 +76,13 @@ export class Parameters {
   }
 }
 
-class Row {
-  /** @param {any} parameter @param {App} app */
-  constructor(parameter, app) {
+export class Row {
+  /** @param {any} parameter @param {App} app @param {string} [prefix] of its id */
+  constructor(parameter, app, prefix = "p-") {
     this.parameter = parameter;
     this.app = app;
     const {key, symbol, unit, sentence, allowed} = parameter;
-    const name = nameOf(key), id = "p-" + key.replace(/[^\w]/g, "-");
+    const name = nameOf(key), id = prefix + key.replace(/[^\w]/g, "-");
     this.text = [key, name, symbol, sentence].join(" ").toLowerCase();
     this.home = parameter.value;
     this.field = element("input", {type: "text", id, inputmode: "decimal", autocomplete: "off", spellcheck: "false", "aria-describedby": id + "-told",

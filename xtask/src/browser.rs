@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The script that opens them, and what npm installs for it.
-const FOLDER: &str = "report/browser";
+pub const FOLDER: &str = "report/browser";
 
 /// The name of these tests where they cannot be done.
 const NAME: &str = "reports in a browser";
@@ -86,7 +86,10 @@ fn studio(taut: &Path, browser: &Path, shots: &Path, counts: &mut Counts) -> Res
     types.arg(Path::new(FOLDER).join("node_modules/typescript/bin/tsc")).args(["-p", "studio/page/tsconfig.json"]);
     let mut used = Command::new("node");
     used.arg(Path::new(FOLDER).join("studio.mjs")).arg(browser).arg(taut).arg(shots);
-    Ok(crate::run(types, counts)? && crate::run(used, counts)?)
+    let mut worked = Command::new("node");
+    worked.arg(Path::new(FOLDER).join("studio-work.mjs")).arg(browser).arg(taut).arg(shots);
+    let (types, used, worked) = (crate::run(types, counts)?, crate::run(used, counts)?, crate::run(worked, counts)?);
+    Ok(types && used && worked)
 }
 
 /// A spectrum with a peak there, and a smaller one above it, as Klipper writes them.
@@ -102,7 +105,7 @@ fn spectrum(peak: f64) -> String {
 }
 
 /// The browser, with node and what drives it installed; or the line that says what is missing.
-fn browser() -> Result<PathBuf, String> {
+pub fn browser() -> Result<PathBuf, String> {
     if !answers("node") || !answers("npm") {
         install(&["nodejs", "npm"]);
     }

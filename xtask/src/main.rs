@@ -3,7 +3,8 @@
 //! `cargo xtask data` fetches other people's measurements,
 //! `cargo xtask hunt` looks for what is wrong with larger means, `cargo xtask coverage` and `cargo xtask faults` make
 //! the tables of docs/fit.md, `cargo xtask counts` counts the instructions of standard works, `cargo xtask fmu` calls the
-//! functions of FMI at random under address sanitizer.
+//! functions of FMI at random under address sanitizer, `cargo xtask drag`, `cargo xtask load` and `cargo xtask first-fit`
+//! measure the studio.
 
 mod browser;
 mod counts;
@@ -13,6 +14,7 @@ mod fmu;
 mod hunt;
 mod ignored;
 mod python;
+mod studio;
 
 use ignored::Ignored;
 use std::io::{BufRead, BufReader};
@@ -81,6 +83,9 @@ fn main() -> ExitCode {
         ["data", ref words @ ..] => data::run(words),
         ["counts", ref words @ ..] => counts::run(words),
         ["fmu", ref words @ ..] => fmu::run(words),
+        ["drag", ref words @ ..] => studio::drag(words),
+        ["load", ref words @ ..] => studio::load(words),
+        ["first-fit", ref words @ ..] => studio::first_fit(words),
         ["coverage", ref words @ ..] => example("coverage", words),
         ["faults", ref words @ ..] => example("faults", words),
         ["hunt", ref words @ ..] => match hunt::Hunt::new(words) {
@@ -93,8 +98,11 @@ fn main() -> ExitCode {
         _ => {
             eprintln!(
                 "usage: cargo xtask test | cargo xtask browser | cargo xtask export | cargo xtask python | \
-                 cargo xtask coverage [...] | cargo xtask faults [...] | {} | {} | {} | {}",
+                 cargo xtask coverage [...] | cargo xtask faults [...] | {} | {} | {} | {} | {} | {} | {}",
                 counts::USAGE,
+                studio::FIRST_FIT,
+                studio::DRAG,
+                studio::LOAD,
                 data::USAGE,
                 fmu::USAGE,
                 hunt::USAGE

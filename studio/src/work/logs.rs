@@ -49,7 +49,7 @@ pub fn columns(request: &Request, context: &Context) -> Result<Reply> {
         |(key, column, unit): &(&str, usize, Option<String>)| json!({ "key": key, "column": column, "unit": unit });
     let quantity = |quantity: Quantity| json!({ "key": quantity.name(), "unit": quantity.unit() });
     Ok(Reply::of(json!({
-        "columns": columns.iter().map(one).collect::<Vec<_>>(),
+        "found": columns.iter().map(one).collect::<Vec<_>>(),
         "rows": rows,
         "guess": { "preset": guess.preset, "columns": guess.columns.iter().map(keys).collect::<Vec<_>>(), "split": guess.split },
         "quantities": Quantity::ALL.map(quantity),

@@ -1,0 +1,71 @@
+// What scripts that use the studio in a browser have in common: servers, pages whose console is watched, tests.
+import {spawn} from "node:child_process";
+import {chromium} from "playwright-core";
+
+/** Servers, a browser and tests of a program. */
+export class Harness {
+  constructor(program, taut) {
+    this.program = program;
+    this.taut = taut;
+    this.servers = [];
+    this.passed = this.failed = 0;
+  }
+
+  async start() {
+    const asRoot = process.getuid && process.getuid() === 0;
+    this.browser = await chromium.launch({executablePath: this.program, args: ["--disable-background-networking", ...(asRoot ? ["--no-sandbox"] : [])]});
+  }
+
+  /** A server with these words behind `studio`. */
+  async serve(words) {
+    const child = spawn(this.taut, ["studio", ...words, "--no-open"], {stdio: ["ignore", "pipe", "inherit"]});
+    this.servers.push(child);
+    const address = await new Promise(done => child.stdout.once("data", data => done(String(data).split("\n")[0])));
+    return {child, address};
+  }
+
+  /** A page of it; what its console says, and what it asks of others, is trouble. */
+  async open(address, options = {}) {
+    const context = await this.browser.newContext({viewport: {width: 1400, height: 950}, colorScheme: "light", ...options});
+    const page = await context.newPage(), trouble = [];
+    page.on("console", message => { if (["error", "warning"].includes(message.type())) trouble.push("console: " + message.text()); });
+    page.on("pageerror", error => trouble.push("error: " + error.message));
+    const local = url => /^(http|ws):\/\/127\.0\.0\.1:/.test(url) || /^(data|blob):/.test(url);
+    page.on("request", request => { if (!local(request.url())) trouble.push("asked for " + request.url()); });
+    await page.goto(address);
+    await page.waitForFunction(() => window.studio && window.studio.run && document.querySelector(".live-plot"), null, {timeout: 20_000});
+    await settled(page);
+    return {page, trouble, context};
+  }
+
+  async test(name, work) {
+    const pages = [];
+    try {
+      await work(async (...given) => { const page = await this.open(...given); pages.push(page); return page; });
+      for (const {trouble} of pages) expect(!trouble.length, trouble.join("; "));
+      this.passed++;
+    } catch (error) {
+      this.failed++;
+      console.log(`studio: ${name} ... FAILED\n  ${String(error.stack || error).split("\n").slice(0, 6).join("\n  ")}`);
+    }
+    for (const {context} of pages) await context.close();
+  }
+
+  async end(what, left = []) {
+    await this.browser.close();
+    for (const child of this.servers) child.kill("SIGTERM");
+    for (const one of left) console.log(`ignored: ${one}`);
+    console.log(`test result: ${this.failed ? "FAILED" : "ok"}. ${this.passed} passed; ${this.failed} failed; ${what}`);
+    process.exit(this.failed ? 1 : 0);
+  }
+}
+
+export function expect(holds, told) {
+  if (!holds) throw new Error(told);
+}
+
+/** Two pictures later. */
+export const settled = page => page.evaluate(() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done))));
+
+/** When the page shows what was asked for last. */
+export const quiet = page => page.waitForFunction(() => !window.studio.wire.open.size, null, {timeout: 30_000}).then(() => settled(page));
