@@ -31,6 +31,7 @@ pub mod spectrum;
 mod spread;
 mod standard;
 pub mod state_feedback;
+mod stepped;
 mod welch;
 
 pub use outcome::{Deviation, Figures, MoveRun, Rows, Setup, close, closed_loop, stream};
@@ -40,4 +41,5 @@ pub(crate) use sampled::Added;
 pub use sampled::{Controller, Loop, Observation, Sample, measures_cart};
 pub use spread::{Worst, spread, worst};
 pub use standard::Standard;
+pub use stepped::Stepped;
 pub use welch::power_spectral_density;

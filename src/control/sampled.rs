@@ -146,15 +146,7 @@ impl<'a> Sampled<'a> {
         profile: &'a Profile,
         keep: bool,
     ) -> Self {
-        let ratio = timing.delay / timing.every;
-        // A delay of whole samples is one, whatever rounding says.
-        let near = ratio.round();
-        let whole = if (ratio - near).abs() < 1e-9 * near.max(1.0) { near } else { ratio.floor() };
-        let rest = if whole == near && (ratio - near).abs() < 1e-9 * near.max(1.0) {
-            0.0
-        } else {
-            timing.delay - whole * timing.every
-        };
+        let (whole, rest) = timing.samples_late();
         Self {
             controller,
             profile,
@@ -164,7 +156,7 @@ impl<'a> Sampled<'a> {
             k: 0,
             halfway: false,
             rest,
-            waiting: std::iter::repeat_n(0.0, whole as usize).collect(),
+            waiting: std::iter::repeat_n(0.0, whole).collect(),
             acting: 0.0,
             limited: 0,
             held_back: 0.0,
@@ -354,6 +346,18 @@ impl Loop {
             return wrong(format!("a controller cannot look {lead:?} s ahead"), "from zero on");
         }
         Ok(())
+    }
+
+    /// The delay in whole samples, and what is left of it, s.
+    pub(super) fn samples_late(&self) -> (usize, f64) {
+        let ratio = self.delay / self.every;
+        // A delay of whole samples is one, whatever rounding says.
+        let near = ratio.round();
+        if (ratio - near).abs() < 1e-9 * near.max(1.0) {
+            (near as usize, 0.0)
+        } else {
+            (ratio.floor() as usize, self.delay - ratio.floor() * self.every)
+        }
     }
 
     /// That of a design.

@@ -31,6 +31,19 @@ impl Mechanism {
         }))
     }
 
+    /// Takes a machine over from another of the same parts but other numbers: a body that did not have modes and now does,
+    /// or the other way round, moves as its speed says; a part that is no more is in order.
+    pub(crate) fn take_over(&self, from: &Mechanism, mode: &mut Mode, speed: impl Fn(usize) -> f64) {
+        let mut state = State::default();
+        for (body, own) in state.speed.iter_mut().enumerate().take(self.bodies.len()) {
+            *own = speed(body);
+        }
+        let fresh = self.first_mode(&state);
+        for body in (0..self.bodies.len()).filter(|body| self.has_modes(*body) != from.has_modes(*body)) {
+            mode.motion[body] = fresh.motion[body];
+        }
+    }
+
     /// The part of the torque that a gear passes on: η if the motor drives, 1/η if it is driven.
     ///
     /// Whatever side drives loses the share 1 − η of its power, so that the gear never adds any.

@@ -199,6 +199,18 @@ pub fn values(machine: &dyn Numbers) -> Vec<(String, f64)> {
     all().filter_map(of).flatten().collect()
 }
 
+/// The numbers of a machine by their keys, with their rows: each in one form, and without those that go along with
+/// another as long as they have its value.
+pub fn own(machine: &dyn Numbers) -> Vec<(String, &'static Parameter)> {
+    let of = |row: &'static Parameter| {
+        let is_one = matches!(machine.sits(row), Sits::Machine(..));
+        let numbers = present(machine, row).filter(|(number, _)| !follows_any(machine, *number));
+        let numbers: Vec<Number> = numbers.map(|(number, _)| number).filter(|_| is_one).collect();
+        numbers.into_iter().map(move |number| (number.key(machine), row))
+    };
+    all().flat_map(of).collect()
+}
+
 /// The keys of everything of a machine that may be off and is not zero. Directions and breakaways that have the same
 /// value, and drives that are alike, count once.
 pub fn every(machine: &dyn Numbers) -> Vec<String> {

@@ -23,7 +23,7 @@ const FASTEST: f64 = 1e13;
 const MOST_ROWS: f64 = 1e12;
 
 /// Refuses what is no machine.
-pub(super) fn stage(stage: &Stage) -> Result<()> {
+pub(crate) fn stage(stage: &Stage) -> Result<()> {
     let motor = &stage.motor;
     let r = stage.pulley_radius;
     let bodies = [stage.drive_pulley.inertia, stage.cart.mass, stage.idler_pulley.inertia];

@@ -4,6 +4,7 @@
 //! q_b = q_b0 + (c_b − c_b0 − Σ a_j (q_j − q_j0))/a_b        c_b = Σ a_j q_j, the length that stands in the place of q_b
 //! ```
 
+use super::saved::{Pass, Passed};
 use crate::friction::Motion;
 use crate::mechanism::{BODIES, Layout, Mode, Replaced, State};
 
@@ -50,6 +51,19 @@ impl Coordinates {
     /// The same where angles are as in `state`, whatever lengths say.
     pub(crate) fn at(&self, state: &State) -> Self {
         Self { held: state.position.map(Some), ..self.clone() }
+    }
+
+    /// As plain numbers.
+    pub(super) fn pass(&mut self, pass: &mut Pass) -> Passed {
+        pass.state(&mut self.start)?;
+        pass.numbers(&mut self.origin)?;
+        pass.numbers(&mut self.strain)?;
+        self.held.iter_mut().try_for_each(|held| pass.optional(held))
+    }
+
+    /// The state in which it begins.
+    pub(super) fn start(&self) -> &State {
+        &self.start
     }
 
     /// Where ways are counted from.

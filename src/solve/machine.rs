@@ -3,10 +3,11 @@
 use super::exact::{self, Make};
 use super::inputs::Pieces;
 use super::record::Extra;
+use super::saved::{Pass, Passed};
 use super::{Ending, Event, PositionError, Solver, check, general};
 use crate::error::{Error, Result};
 use crate::mechanism::{DRIVES, Form, Heading, Layout, Mechanism, Mode, Shown, SpringLaw, State, What};
-use crate::signal::Piece;
+use crate::signal::{DEGREE, Piece};
 use crate::stage::Stage;
 use std::sync::Arc;
 
@@ -88,6 +89,12 @@ pub(super) trait Engine: Send + Sync {
 
     /// The values of a row beyond the linear equations.
     fn extra(&self) -> Extra;
+
+    /// Goes on with other numbers of the same mechanism.
+    fn replace(&mut self, mechanism: &Mechanism);
+
+    /// All that it needs to go on, as plain numbers; nothing of one that has ended early.
+    fn pass(&mut self, pass: &mut Pass) -> Passed;
 
     /// By how much positions may be off, where that is known.
     fn error(&self) -> Option<PositionError>;
@@ -215,64 +222,105 @@ impl Machine {
 
     /// The value of each of [`Machine::columns`] now, in SI units; `into` has a place for each.
     pub fn outputs(&self, into: &mut [f64]) {
-        let (mechanism, mode) = (self.mechanism(), self.mode());
-        let state = self.state();
-        let value = |form: &Form| self.engine.value(form);
-        let within = |value: f64, limit: Option<f64>| limit.map_or(value, |limit| value.clamp(-limit, limit));
-        let input = self.engine.input();
-        for (into, heading) in into.iter_mut().zip(&mechanism.columns) {
-            *into = match heading.shown {
-                Shown::Time => self.time(),
-                Shown::Input(drive) => input[drive],
-                Shown::Voltage(drive) => {
-                    within(value(&mechanism.voltage(drive, mode)), mechanism.drives[drive].amplifier.voltage_limit)
-                }
-                Shown::Current(drive) => {
-                    within(value(&mechanism.current(drive, mode)), mechanism.drives[drive].amplifier.current_limit)
-                }
-                Shown::Position(body, factor) => state.position[body] * factor,
-                Shown::Speed(body, factor) => state.speed[body] * factor,
-                Shown::Stretch(spring) => value(&Form::stretch(spring)),
-                Shown::Force(spring, factor) => {
-                    let extra = self.engine.extra().force[spring];
-                    (value(&mechanism.spring_force(spring, mode)) + extra) * factor
-                }
-                Shown::Friction(body) => self.friction(body, mechanism, mode, &state, &value),
-                Shown::Motion(body) => f64::from(mode.motion[body].code()),
-                Shown::Bristle(body) => self.engine.extra().bristle[body],
-                Shown::Contact(spring) => {
-                    let what = match mechanism.springs[spring].law {
-                        SpringLaw::Tension { .. } => What::Span(spring),
-                        _ => What::Gap(spring),
-                    };
-                    f64::from(mode.status(what).code())
-                }
-                Shown::Counts(body, counts) => (state.position[body] * counts).round(),
-            } + 0.0;
-        }
+        shown(&*self.engine, into);
     }
 
-    /// Friction on a body now.
-    fn friction(
-        &self,
-        body: usize,
-        mechanism: &Mechanism,
-        mode: &Mode,
-        state: &State,
-        value: &dyn Fn(&Form) -> f64,
-    ) -> f64 {
-        let extra = self.engine.extra();
-        // What holds a body at rest is what acts on it, least and most by the way that a gear with losses counts.
-        let load = |positive: bool, forward: bool| value(&mechanism.load(body, forward, &mode.with_torque(positive)));
-        let all = [load(true, true), load(true, false), load(false, true), load(false, false)];
-        let least = all.iter().fold(f64::INFINITY, |a: f64, b| a.min(*b));
-        let most = all.iter().fold(f64::NEG_INFINITY, |a: f64, b| a.max(*b));
-        let beyond: f64 = (mechanism.springs.iter().zip(extra.force))
-            .flat_map(|(spring, force)| spring.arms.iter().map(move |arm| (arm, force)))
-            .filter(|((other, _), _)| mechanism.leader(*other) == body)
-            .map(|((other, arm), force)| -mechanism.ratio(*other) * arm * force)
-            .sum();
-        mechanism.friction_value(body, mode.motion[body], state.speed[body], (least + beyond, most + beyond))
-            + extra.friction[body]
+    /// Goes on with other numbers of the same mechanism: masses, friction, stiffness, constants of a motor, forces. Its
+    /// geometry, which tells ways from lengths, and what its states are, stay.
+    pub fn replace(&mut self, mechanism: &Mechanism) {
+        self.engine.replace(mechanism);
+        self.is_set = true;
     }
+
+    /// All that it needs to go on, as plain numbers; none of one that has ended early.
+    pub fn save(&self) -> Option<Vec<u64>> {
+        let mut copy = self.clone();
+        let mut list = vec![self.engine.degree() as u64];
+        copy.pass(&mut Pass::Out(&mut list))?;
+        Some(list)
+    }
+
+    /// Goes on from what [`Machine::save`] gave, bit for bit, of a machine of the same numbers that began in the same
+    /// state. None, and nothing has changed, where `saved` is not of such a machine.
+    pub fn restore(&mut self, saved: &[u64]) -> Option<()> {
+        let (degree, rest) = saved.split_first()?;
+        let mut copy = self.clone();
+        if *degree > copy.engine.degree() as u64 && *degree <= DEGREE as u64 {
+            copy.engine = copy.engine.raised(*degree as usize);
+        }
+        if *degree != copy.engine.degree() as u64 {
+            return None;
+        }
+        let mut pass = Pass::In(rest.iter());
+        copy.pass(&mut pass)?;
+        let Pass::In(mut left) = pass else { return None };
+        if left.next().is_some() {
+            return None;
+        }
+        *self = copy;
+        Some(())
+    }
+
+    fn pass(&mut self, pass: &mut Pass) -> Passed {
+        pass.pieces(&mut self.inputs)?;
+        pass.flag(&mut self.is_set)?;
+        self.engine.pass(pass)
+    }
+}
+
+/// The value of each column of an engine's mechanism now.
+pub(super) fn shown(engine: &dyn Engine, into: &mut [f64]) {
+    let (mechanism, mode) = (engine.mechanism(), engine.mode());
+    let state = engine.state();
+    let value = |form: &Form| engine.value(form);
+    let within = |value: f64, limit: Option<f64>| limit.map_or(value, |limit| value.clamp(-limit, limit));
+    let input = engine.input();
+    for (into, heading) in into.iter_mut().zip(&mechanism.columns) {
+        *into = match heading.shown {
+            Shown::Time => engine.time(),
+            Shown::Input(drive) => input[drive],
+            Shown::Voltage(drive) => {
+                within(value(&mechanism.voltage(drive, mode)), mechanism.drives[drive].amplifier.voltage_limit)
+            }
+            Shown::Current(drive) => {
+                within(value(&mechanism.current(drive, mode)), mechanism.drives[drive].amplifier.current_limit)
+            }
+            Shown::Position(body, factor) => state.position[body] * factor,
+            Shown::Speed(body, factor) => state.speed[body] * factor,
+            Shown::Stretch(spring) => value(&Form::stretch(spring)),
+            Shown::Force(spring, factor) => {
+                let extra = engine.extra().force[spring];
+                (value(&mechanism.spring_force(spring, mode)) + extra) * factor
+            }
+            Shown::Friction(body) => friction(engine, body, &state),
+            Shown::Motion(body) => f64::from(mode.motion[body].code()),
+            Shown::Bristle(body) => engine.extra().bristle[body],
+            Shown::Contact(spring) => {
+                let what = match mechanism.springs[spring].law {
+                    SpringLaw::Tension { .. } => What::Span(spring),
+                    _ => What::Gap(spring),
+                };
+                f64::from(mode.status(what).code())
+            }
+            Shown::Counts(body, counts) => (state.position[body] * counts).round(),
+        } + 0.0;
+    }
+}
+
+/// Friction on a body now.
+fn friction(engine: &dyn Engine, body: usize, state: &State) -> f64 {
+    let (mechanism, mode, extra) = (engine.mechanism(), engine.mode(), engine.extra());
+    // What holds a body at rest is what acts on it, least and most by the way that a gear with losses counts.
+    let load =
+        |positive: bool, forward: bool| engine.value(&mechanism.load(body, forward, &mode.with_torque(positive)));
+    let all = [load(true, true), load(true, false), load(false, true), load(false, false)];
+    let least = all.iter().fold(f64::INFINITY, |a: f64, b| a.min(*b));
+    let most = all.iter().fold(f64::NEG_INFINITY, |a: f64, b| a.max(*b));
+    let beyond: f64 = (mechanism.springs.iter().zip(extra.force))
+        .flat_map(|(spring, force)| spring.arms.iter().map(move |arm| (arm, force)))
+        .filter(|((other, _), _)| mechanism.leader(*other) == body)
+        .map(|((other, arm), force)| -mechanism.ratio(*other) * arm * force)
+        .sum();
+    mechanism.friction_value(body, mode.motion[body], state.speed[body], (least + beyond, most + beyond))
+        + extra.friction[body]
 }

@@ -15,15 +15,19 @@ mod record;
 mod roots;
 mod rounding;
 mod run;
+mod saved;
 mod table3;
 
 pub use crate::trajectory::Grid;
 pub use choice::{Choice, Kind};
 pub use estimate::ErrorEstimate;
+pub use general::{Dynamics, Quantity};
 pub use machine::Machine;
 use observe::Output;
 pub use observe::{Curve, Gap, Observe, Polynomial, QUANTITIES, Reading, TERMS, reading};
 pub use run::{Course, Run};
+
+pub(crate) use check::stage as check_stage;
 
 use crate::case::Experiment;
 use crate::error::{Error, Result};

@@ -13,6 +13,7 @@
 //! uncertain the model's own answer is as uncertain, for parameters that differ in their last bit.
 
 use super::PositionError;
+use super::saved::{Pass, Passed};
 use crate::mechanism::{Body, Layout, Mechanism};
 
 /// c: units in the last place of one step. The largest that independent solutions of random stages have shown is below
@@ -56,6 +57,11 @@ impl Rounding {
     /// Largest speed that a body can have had in a row so far, m/s or rad/s.
     pub(super) fn largest_speed(&self, body: &Body) -> f64 {
         self.speed / body.kind.lever()
+    }
+
+    /// As plain numbers.
+    pub(super) fn pass(&mut self, pass: &mut Pass) -> Passed {
+        [&mut self.phase, &mut self.since, &mut self.speed, &mut self.way].into_iter().try_for_each(|n| pass.number(n))
     }
 
     /// The fastest swing has been this fast, rad/s, until `time`.

@@ -197,7 +197,7 @@ impl<const N: usize> Core<N> {
     }
 
     /// Takes up the equations of the present mode.
-    fn take_up_mode(&mut self) {
+    pub(super) fn take_up_mode(&mut self) {
         self.common.rounding.swing(self.matrices.swing, self.time());
         let (mechanism, space) = (&self.common.mechanism, &self.common.space);
         let (matrices, is_new) = ModeMatrices::of(&mut self.known, mechanism, space, &self.common.mode, self.common.h);

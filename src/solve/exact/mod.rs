@@ -14,6 +14,7 @@ mod change;
 mod kernel;
 mod matrices;
 mod run;
+mod saved;
 mod shown;
 
 use super::coordinates::Coordinates;
@@ -23,6 +24,7 @@ use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
 use super::record::Extra;
 use super::roots;
 use super::rounding::Rounding;
+use super::saved::{Pass, Passed};
 use super::{Cost, Ending, Event, PositionError};
 use crate::mechanism::{Cause, DRIVES, Form, Mechanism, Mode, State};
 use kernel::Modes;
@@ -636,6 +638,14 @@ impl<const N: usize> Engine for Core<N> {
 
     fn extra(&self) -> Extra {
         Extra::default()
+    }
+
+    fn replace(&mut self, mechanism: &Mechanism) {
+        Core::replace(self, mechanism);
+    }
+
+    fn pass(&mut self, pass: &mut Pass) -> Passed {
+        Core::pass(self, pass)
     }
 
     fn error(&self) -> Option<PositionError> {

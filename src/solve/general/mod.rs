@@ -6,9 +6,11 @@
 //! as the exact solver does, so that two crossings within a step are seen; the step is then taken again up to the
 //! event.
 
+mod dynamics;
 mod fall;
 mod model;
 mod run;
+mod saved;
 mod shown;
 mod stretch;
 
@@ -17,6 +19,7 @@ use super::inputs::Pieces;
 use super::machine::Engine;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
 use super::record::Extra;
+use super::saved::{Pass, Passed};
 use super::{Cost, Ending, Event, PositionError};
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
@@ -25,6 +28,7 @@ use crate::mechanism::{
 };
 use crate::mechanism::{Form, What};
 use crate::signal::DEGREE;
+pub use dynamics::{Dynamics, Quantity};
 use fall::NODES;
 use ivp::dense::StepInterpolant;
 use ivp::methods::{DOP853, Tolerance};
@@ -503,6 +507,14 @@ impl Engine for Core {
 
     fn extra(&self) -> Extra {
         self.model.extra(&self.mode, &self.y)
+    }
+
+    fn replace(&mut self, mechanism: &Mechanism) {
+        Core::replace(self, mechanism);
+    }
+
+    fn pass(&mut self, pass: &mut Pass) -> Passed {
+        Core::pass(self, pass)
     }
 
     /// Nothing is known of it while it goes; [`super::ErrorEstimate`] has it of a run.

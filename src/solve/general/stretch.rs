@@ -44,6 +44,11 @@ impl Stretch {
         Self { begin: pieces.start, end: pieces.end.min(end), parts: vec![(0.0, pieces)], degree }
     }
 
+    /// The first piece.
+    pub(super) fn first(&self) -> Pieces {
+        self.parts[0].1
+    }
+
     pub(super) fn pieces(&self) -> usize {
         self.parts.len()
     }

@@ -1,0 +1,56 @@
+//! The exact solver's machine as plain numbers, and with other numbers of its mechanism.
+
+use super::{Core, ModeMatrices};
+use crate::mechanism::{Cause, Mechanism};
+use crate::solve::saved::{Pass, Passed};
+use std::sync::Arc;
+
+impl<const N: usize> Core<N> {
+    /// As plain numbers. Whoever puts them into another machine sees to it that this one has the same equations.
+    pub(super) fn pass(&mut self, pass: &mut Pass) -> Passed {
+        let common = &mut self.common;
+        if common.trouble.is_some() {
+            return None;
+        }
+        let start = *common.coordinates.start();
+        pass.numbers(&mut self.z)?;
+        pass.numbers(&mut self.largest)?;
+        pass.coordinates(&mut common.coordinates)?;
+        pass.mode(&mut common.mode)?;
+        for fresh in &mut common.fresh {
+            let mut order = usize::from(*fresh);
+            pass.count(&mut order)?;
+            *fresh = u8::try_from(order).ok()?;
+        }
+        pass.flag(&mut common.is_fresh)?;
+        pass.numbers(&mut common.tolerance)?;
+        pass.flag(&mut common.at_edge)?;
+        pass.numbers(&mut common.input_rate)?;
+        pass.numbers(&mut common.input_curvature)?;
+        let times = [&mut common.base, &mut common.offset, &mut common.since_change, &mut common.end];
+        times.into_iter().try_for_each(|time| pass.number(time))?;
+        pass.count(&mut common.handed_on)?;
+        pass.count(&mut common.changes)?;
+        pass.bits(&mut common.taken)?;
+        pass.bits(&mut common.cost.steps)?;
+        pass.bits(&mut common.cost.series)?;
+        common.rounding.pass(pass)?;
+        if *common.coordinates.start() != start || common.tolerance[Cause::KINDS] != 0.0 {
+            return None;
+        }
+        let (mechanism, space) = (&common.mechanism, &common.space);
+        self.matrices = ModeMatrices::of(&mut self.known, mechanism, space, &common.mode, common.h).0;
+        Some(())
+    }
+
+    /// Goes on with other numbers of the same mechanism.
+    pub(super) fn replace(&mut self, mechanism: &Mechanism) {
+        let common = &mut self.common;
+        let seen = mechanism.seen_from(&common.space.layout, common.coordinates.start());
+        seen.take_over(&common.mechanism, &mut common.mode, |body| self.z[common.space.layout.speed[body]]);
+        common.mechanism = Arc::new(seen);
+        self.known = Vec::new();
+        self.refreshed();
+        self.take_up_mode();
+    }
+}

@@ -1,0 +1,271 @@
+//! A machine that another program integrates: rates, conditions that must not become negative, changes of mode.
+
+use super::model::{Field, MOST};
+use super::{Core, Event};
+use crate::error::Result;
+use crate::friction::Motion;
+use crate::mechanism::{BODIES, Cause, DRIVES, Layout, Mechanism, Mode, SpringLaw, State};
+use crate::solve::machine::{Engine, shown};
+use crate::solve::saved::{Pass, Passed};
+use crate::solve::{Ending, check};
+use ivp::prelude::FirstOrderSystem;
+use std::sync::Arc;
+
+/// What rounding and a stranger's integrator may be off by, as a share of what a quantity is.
+const TOLERANCE: f64 = 1e-9;
+
+/// Changes of mode at one instant.
+const CHANGES: usize = 100;
+
+/// A quantity that is integrated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// The way of a body, rad or m.
+    Position(usize),
+    /// Its speed.
+    Speed(usize),
+    /// The current of a drive, A.
+    Current(usize),
+    /// The deflection of the bristles of a body, rad or m.
+    Bristle(usize),
+}
+
+/// The equations of a machine for an integrator from elsewhere, with its mode. In a mode the rates are smooth; where a
+/// condition falls below zero, [`Dynamics::settle`] takes up the mode that follows.
+#[derive(Clone)]
+pub struct Dynamics {
+    core: Core,
+    quantities: Vec<Quantity>,
+    kinds: Vec<usize>,
+}
+
+impl Dynamics {
+    /// A machine in `start` at time zero, its inputs zero. Errors: a state that is none.
+    pub fn new(mechanism: &Mechanism, start: &State) -> Result<Self> {
+        check::state(start)?;
+        let reach = (TOLERANCE, check::fastest_rate(mechanism), f64::INFINITY);
+        let core = Core::new(mechanism, Layout::new(mechanism), start, reach);
+        let (quantities, kinds) = (quantities(mechanism), kinds(mechanism));
+        Ok(Self { core, quantities, kinds })
+    }
+
+    /// The quantities to integrate: those of bodies that move by themselves, currents that are states, bristles.
+    pub fn quantities(&self) -> &[Quantity] {
+        &self.quantities
+    }
+
+    /// How many conditions there are, in whichever mode.
+    pub fn conditions(&self) -> usize {
+        self.kinds.len()
+    }
+
+    /// The mechanism, its ways counted from where it began.
+    pub fn mechanism(&self) -> &Mechanism {
+        &self.core.model.mechanism
+    }
+
+    /// The states of its parts.
+    pub fn mode(&self) -> &Mode {
+        &self.core.mode
+    }
+
+    /// Puts time, s, the quantities and the inputs in place.
+    pub fn put(&mut self, time: f64, values: &[f64], inputs: &[f64; DRIVES]) {
+        let model = Arc::clone(&self.core.model);
+        let mechanism = &*model.mechanism;
+        let start = *self.core.coordinates.start();
+        let mut state = start;
+        let mut bristles = [0.0; BODIES];
+        for (quantity, &value) in self.quantities.iter().zip(values) {
+            match *quantity {
+                Quantity::Position(leader) => {
+                    for body in mechanism.followers(leader) {
+                        let way = value - start.position[leader];
+                        state.position[body] = start.position[body] + mechanism.ratio(body) * way;
+                    }
+                    state.position[leader] = value;
+                }
+                Quantity::Speed(leader) => {
+                    mechanism.followers(leader).for_each(|body| state.speed[body] = mechanism.ratio(body) * value);
+                }
+                Quantity::Current(drive) => state.current[drive] = value,
+                Quantity::Bristle(body) => bristles[body] = value,
+            }
+        }
+        let mut inner = state;
+        for (position, origin) in inner.position.iter_mut().zip(self.core.coordinates.origin()) {
+            *position -= origin;
+        }
+        for replaced in &model.layout.replaced {
+            // The length that stands in the place of a way.
+            let others: f64 = replaced.others.iter().map(|&(other, arm)| arm * state.position[other]).sum();
+            inner.position[replaced.body] = replaced.own.mul_add(state.position[replaced.body], others);
+        }
+        self.core.y = model.vector(&inner);
+        for (place, value) in model.bristle.iter().zip(bristles) {
+            if let Some(place) = place {
+                self.core.y[*place] = value;
+            }
+        }
+        self.core.coordinates = self.core.coordinates.at(&state);
+        self.core.hold_inputs(inputs, time);
+    }
+
+    /// The quantities as they are, in the order of [`Dynamics::quantities`].
+    pub fn values(&self, into: &mut [f64]) {
+        let (state, model) = (Engine::state(&self.core), &self.core.model);
+        for (into, quantity) in into.iter_mut().zip(&self.quantities) {
+            *into = match *quantity {
+                Quantity::Position(body) => state.position[body],
+                Quantity::Speed(body) => state.speed[body],
+                Quantity::Current(drive) => state.current[drive],
+                Quantity::Bristle(body) => model.bristle[body].map_or(0.0, |place| self.core.y[place]),
+            };
+        }
+    }
+
+    /// Their rates.
+    pub fn rates(&self, into: &mut [f64]) {
+        let (core, model) = (&self.core, &self.core.model);
+        let mut rate = [0.0; MOST];
+        Field::new(model, &core.mode, &core.stretch).derivative(core.tau, &core.y, &mut rate[..model.size]);
+        for (into, quantity) in into.iter_mut().zip(&self.quantities) {
+            *into = match *quantity {
+                Quantity::Position(body) if core.mode.motion[body] == Motion::Stuck => 0.0,
+                Quantity::Position(body) => core.y[model.speed(body)],
+                Quantity::Speed(body) => rate[model.speed(body)],
+                Quantity::Current(drive) => model.current[drive].map_or(0.0, |place| rate[place]),
+                Quantity::Bristle(body) => model.bristle[body].map_or(0.0, |place| rate[place]),
+            } + 0.0;
+        }
+    }
+
+    /// The conditions as residuals: of a body that slides its speed in the direction of motion, of one at rest what is
+    /// left to its breakaway on either side, of any other part what is left to its limit. One that the mode does not
+    /// watch is 1.
+    pub fn residuals(&self, into: &mut [f64]) {
+        into.fill(1.0);
+        let mut seen = [false; Cause::KINDS];
+        for (cause, value) in self.watched() {
+            let Some(place) = self.kinds.iter().position(|kind| *kind == cause.kind()) else { continue };
+            let before = seen[cause.kind()].then_some(into[place]);
+            into[place] = before.map_or(value, |before| before.min(value));
+            seen[cause.kind()] = true;
+        }
+    }
+
+    /// The conditions of the mode, and by how much each holds: what rounding may do is forgiven.
+    fn watched(&self) -> impl Iterator<Item = (Cause, f64)> + '_ {
+        let core = &self.core;
+        let field = Field::new(&core.model, &core.mode, &core.stretch);
+        let values = field.guards(core.tau, &core.y);
+        field.watches().into_iter().zip(values).map(|(cause, value)| {
+            let slack = match cause {
+                Cause::Stop(_) => 0.0,
+                Cause::GearTorque(drive) => core.torque_slack[drive],
+                cause => core.slack[cause.kind()],
+            };
+            // A torque that nothing tells from zero is watched by nobody.
+            (cause, if slack.is_finite() { value + slack } else { 1.0 })
+        })
+    }
+
+    /// Whether a condition has fallen.
+    pub fn is_over(&self) -> bool {
+        self.watched().any(|(_, value)| value < 0.0)
+    }
+
+    /// Changes modes, without time passing, until every condition holds, and adds the events to `events`. Says whether
+    /// it put quantities elsewhere: a body that stops has no speed.
+    pub fn settle(&mut self, events: &mut Vec<Event>) -> std::result::Result<bool, Ending> {
+        let before = self.core.y;
+        for _ in 0..CHANGES {
+            let stopped = self.watched().find(|(cause, value)| matches!(cause, Cause::Stop(_)) && *value < 0.0);
+            let Some((cause, _)) = stopped else { break };
+            self.core.change(cause);
+        }
+        self.core.resolve();
+        events.append(&mut self.core.events);
+        self.core.trouble.map_or(Ok(self.core.y != before), Err)
+    }
+
+    /// The value of each column of the mechanism now, in SI units; `into` has a place for each.
+    pub fn outputs(&self, into: &mut [f64]) {
+        shown(&self.core, into);
+    }
+
+    /// Goes on with other numbers of the same mechanism; [`crate::solve::Machine::replace`] says which.
+    pub fn replace(&mut self, mechanism: &Mechanism) {
+        self.core.replace(mechanism);
+    }
+
+    /// All that it needs to go on, as plain numbers; none of one that has ended early.
+    pub fn save(&self) -> Option<Vec<u64>> {
+        let mut list = Vec::new();
+        self.clone().pass(&mut Pass::Out(&mut list))?;
+        Some(list)
+    }
+
+    /// Goes on from what [`Dynamics::save`] gave. None, and nothing has changed, where `saved` is not of such a machine.
+    pub fn restore(&mut self, saved: &[u64]) -> Option<()> {
+        let mut copy = self.clone();
+        let mut pass = Pass::In(saved.iter());
+        copy.pass(&mut pass)?;
+        let Pass::In(mut left) = pass else { return None };
+        if left.next().is_some() {
+            return None;
+        }
+        *self = copy;
+        Some(())
+    }
+
+    fn pass(&mut self, pass: &mut Pass) -> Passed {
+        self.core.pass(pass)
+    }
+}
+
+/// What there is to integrate.
+fn quantities(mechanism: &Mechanism) -> Vec<Quantity> {
+    let mut list: Vec<Quantity> =
+        mechanism.leaders().flat_map(|body| [Quantity::Position(body), Quantity::Speed(body)]).collect();
+    let currents = mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.has_current_state());
+    list.extend(currents.map(|(drive, _)| Quantity::Current(drive)));
+    let has_bristles =
+        |body: &usize| matches!(mechanism.bodies[*body].friction.law, crate::friction::Law::LuGre { .. });
+    list.extend((0..mechanism.bodies.len()).filter(has_bristles).map(Quantity::Bristle));
+    list
+}
+
+/// The kinds of conditions that a mechanism can watch in any of its modes.
+fn kinds(mechanism: &Mechanism) -> Vec<usize> {
+    use crate::mechanism::{Contact, Limit, Switch};
+    let mut causes = Vec::new();
+    for body in mechanism.leaders().filter(|body| mechanism.has_modes(*body)) {
+        causes.extend([Cause::BreakForward(body), Cause::BreakBackward(body)]);
+    }
+    for (index, drive) in mechanism.drives.iter().enumerate() {
+        if drive.loses() {
+            causes.push(Cause::GearTorque(index));
+        }
+        for to in [Limit::Inside, Limit::High, Limit::Low] {
+            if drive.amplifier.voltage_limit.is_some() {
+                causes.push(Cause::Switch(Switch::Voltage(index, to)));
+            }
+            if drive.amplifier.current_limit.is_some() {
+                causes.push(Cause::Switch(Switch::Current(index, to)));
+            }
+        }
+    }
+    for (index, spring) in mechanism.springs.iter().enumerate() {
+        match spring.law {
+            SpringLaw::Tension { .. } => causes.push(Cause::Switch(Switch::Span(index, true))),
+            SpringLaw::Gap { .. } => {
+                let sides = [Contact::Apart, Contact::High, Contact::Low];
+                causes.extend(sides.map(|to| Cause::Switch(Switch::Gap(index, to))));
+            }
+            SpringLaw::Bounds { .. } => causes.push(Cause::Leave(index)),
+            SpringLaw::TwoSided | SpringLaw::None => {}
+        }
+    }
+    causes.into_iter().map(Cause::kind).collect()
+}

@@ -1,0 +1,56 @@
+//! The general solver's machine as plain numbers, and with other numbers of its mechanism.
+
+use super::{Core, Model, Stretch};
+use crate::mechanism::Mechanism;
+use crate::solve::check;
+use crate::solve::inputs::Pieces;
+use crate::solve::saved::{Pass, Passed};
+use std::sync::Arc;
+
+impl Core {
+    /// As plain numbers. Whoever puts them into another machine sees to it that this one has the same equations.
+    pub(super) fn pass(&mut self, pass: &mut Pass) -> Passed {
+        if self.trouble.is_some() || self.stretch.pieces() != 1 {
+            return None;
+        }
+        let start = *self.coordinates.start();
+        pass.numbers(&mut self.y)?;
+        pass.coordinates(&mut self.coordinates)?;
+        pass.mode(&mut self.mode)?;
+        let mut pieces = self.stretch.first();
+        pass.pieces(&mut pieces)?;
+        let mut end = self.stretch.end;
+        pass.number(&mut end)?;
+        self.stretch = Stretch::of(pieces, f64::INFINITY);
+        self.stretch.end = end;
+        pass.number(&mut self.tau)?;
+        pass.numbers(&mut self.slack)?;
+        pass.numbers(&mut self.torque_slack)?;
+        pass.numbers(&mut self.torque)?;
+        pass.number(&mut self.changed_at)?;
+        pass.number(&mut self.end)?;
+        pass.count(&mut self.changes)?;
+        pass.count(&mut self.handed_on)?;
+        pass.bits(&mut self.taken)?;
+        pass.optional(&mut self.solver.first_step)?;
+        self.modes = vec![self.mode];
+        (*self.coordinates.start() == start).then_some(())
+    }
+
+    /// Goes on with other numbers of the same mechanism.
+    pub(super) fn replace(&mut self, mechanism: &Mechanism) {
+        let model = Arc::clone(&self.model);
+        let seen = mechanism.seen_from(&model.layout, self.coordinates.start());
+        seen.take_over(&model.mechanism, &mut self.mode, |body| self.y[model.speed(body)]);
+        let fastest = check::fastest_rate(&seen);
+        self.first_step = super::FIRST / fastest;
+        self.solver.first_step = Some(self.first_step);
+        self.model = Arc::new(Model::new(Arc::new(seen), model.layout.clone()));
+        self.enter();
+    }
+
+    /// Its inputs held from `time` on.
+    pub(super) fn hold_inputs(&mut self, inputs: &[f64], time: f64) {
+        (self.stretch, self.tau) = (Stretch::of(Pieces::held(inputs, time, f64::INFINITY), f64::INFINITY), 0.0);
+    }
+}
