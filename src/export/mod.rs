@@ -3,6 +3,7 @@
 //! What is exported is made of the mechanism's own equations ([`crate::mechanism::Mechanism::equations`]), written out as
 //! tables: [`Tables`]. The texts around them are in the folder of each target.
 
+pub mod fmu;
 mod tables;
 
 pub use tables::{Does, Element, ElementKind, Row, StateName, TableGuard, Tables, Then};

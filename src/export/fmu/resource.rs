@@ -1,0 +1,75 @@
+//! The machine of a case alone, as a case file: what the shared object reads.
+
+use crate::case::Opened;
+use crate::error::{Error, Result};
+use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, value};
+
+/// Tables that say nothing of the machine, or of how its controller works.
+const OTHERS: [&str; 8] = ["experiment", "move", "fit", "tune", "uncertainty", "sweep", "measurement", "campaign"];
+
+/// The text of a case without its experiments, logs, fits and sweeps: one experiment is left, which says where the machine
+/// starts from and how long it runs, its inputs zero. It names no other file.
+pub fn resource(case: &Opened) -> Result<String> {
+    let text = case.text();
+    let mut document: DocumentMut =
+        text.parse().map_err(|_| Error::new("the text of this case cannot be taken apart"))?;
+    let first = first_experiment(&document);
+    OTHERS.iter().for_each(|table| {
+        document.remove(table);
+    });
+    let [until, every] = times(case);
+    let mut experiment = Table::new();
+    experiment.insert("name", value("as exported"));
+    experiment.insert("input", at_rest(case));
+    experiment.insert("until", value(until));
+    experiment.insert("every", value(every));
+    if let Some(initial) = first.and_then(|table| table.get("initial").cloned()) {
+        experiment.insert("initial", initial);
+    }
+    let mut list = ArrayOfTables::new();
+    list.push(experiment);
+    document.insert("experiment", Item::ArrayOfTables(list));
+    if document.get("title").is_none() {
+        document.insert("title", value(case.title()));
+        document.key_mut("title").iter_mut().for_each(|key| key.leaf_decor_mut().clear());
+    }
+    let text = document.to_string();
+    // What is written here is read there.
+    Opened::from_text_with("machine.toml", &text, &[])?;
+    Ok(text)
+}
+
+/// End and interval of the first experiment, or of a second in milliseconds.
+pub(super) fn times(case: &Opened) -> [f64; 2] {
+    let first = match case {
+        Opened::Axis(case) => case.experiments.first().map(|first| [first.until, first.every]),
+        Opened::Gantry(case) => case.experiments.first().map(|first| [first.until, first.every]),
+    };
+    first.unwrap_or([1.0, 1e-3])
+}
+
+fn first_experiment(document: &DocumentMut) -> Option<Table> {
+    match document.get("experiment")? {
+        Item::ArrayOfTables(tables) => tables.get(0).cloned(),
+        other => other.as_array()?.get(0)?.as_inline_table().map(|table| table.clone().into_table()),
+    }
+}
+
+/// No input.
+fn at_rest(case: &Opened) -> Item {
+    let step = |unit: &str| {
+        let mut table = toml_edit::InlineTable::new();
+        table.insert("step", format!("0 {unit}").into());
+        table
+    };
+    match case {
+        Opened::Axis(case) => value(step(case.stage.amplifier.mode.unit())),
+        Opened::Gantry(case) => {
+            let mut table = toml_edit::InlineTable::new();
+            for (side, amplifier) in ["left", "right"].into_iter().zip(&case.gantry.amplifiers) {
+                table.insert(side, step(amplifier.mode.unit()).into());
+            }
+            value(table)
+        }
+    }
+}
