@@ -1,11 +1,13 @@
 //! The project's own chores: `cargo xtask test` checks all that can be checked, `cargo xtask python` the Python package
 //! alone, `cargo xtask browser` the reports alone, `cargo xtask data` fetches other people's measurements,
 //! `cargo xtask hunt` looks for what is wrong with larger means, `cargo xtask coverage` and `cargo xtask faults` make
-//! the tables of docs/fit.md, `cargo xtask counts` counts the instructions of standard works.
+//! the tables of docs/fit.md, `cargo xtask counts` counts the instructions of standard works, `cargo xtask fmu` calls the
+//! functions of FMI at random under address sanitizer.
 
 mod browser;
 mod counts;
 mod data;
+mod fmu;
 mod hunt;
 mod ignored;
 mod python;
@@ -67,6 +69,7 @@ fn main() -> ExitCode {
         ["browser"] => test(&[BROWSER]),
         ["data", ref words @ ..] => data::run(words),
         ["counts", ref words @ ..] => counts::run(words),
+        ["fmu", ref words @ ..] => fmu::run(words),
         ["coverage", ref words @ ..] => example("coverage", words),
         ["faults", ref words @ ..] => example("faults", words),
         ["hunt", ref words @ ..] => match hunt::Hunt::new(words) {
@@ -79,9 +82,10 @@ fn main() -> ExitCode {
         _ => {
             eprintln!(
                 "usage: cargo xtask test | cargo xtask browser | cargo xtask python | cargo xtask coverage [...] | \
-                 cargo xtask faults [...] | {} | {} | {}",
+                 cargo xtask faults [...] | {} | {} | {} | {}",
                 counts::USAGE,
                 data::USAGE,
+                fmu::USAGE,
                 hunt::USAGE
             );
             return ExitCode::from(2);

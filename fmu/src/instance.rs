@@ -1,0 +1,439 @@
+//! A machine under way as the standard sees it: which function is allowed when, and what it does.
+
+use std::sync::Arc;
+use taut::control::Stepped;
+use taut::export::fmu::{Model, Role};
+use taut::mechanism::{DRIVES, Mechanism};
+use taut::signal::{DEGREE, Piece};
+use taut::solve::{Dynamics, Machine, Solver};
+
+/// How a function ended, as the standard counts it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(i32)]
+pub enum Status {
+    /// All is well.
+    Ok = 0,
+    /// It did less than was asked.
+    Discard = 2,
+    /// It did nothing.
+    Error = 3,
+    /// The instance cannot be used any more.
+    Fatal = 4,
+}
+
+/// Why a function did not do what was asked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Refusal {
+    /// The answer of the function.
+    pub status: Status,
+    /// What is wrong, and what is allowed.
+    pub message: String,
+}
+
+impl Refusal {
+    /// An error.
+    pub fn error(message: impl Into<String>) -> Self {
+        Self { status: Status::Error, message: message.into() }
+    }
+}
+
+impl From<taut::Error> for Refusal {
+    fn from(error: taut::Error) -> Self {
+        Self::error(error.to_string())
+    }
+}
+
+/// The answer of a function.
+pub type Told<T> = Result<T, Refusal>;
+
+/// What an instance is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Use {
+    /// The importer integrates.
+    ModelExchange,
+    /// The machine does.
+    CoSimulation {
+        /// Whether the importer handles events.
+        events: bool,
+        /// Whether a step may end before its end.
+        early: bool,
+    },
+}
+
+/// Where an instance stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// It was made.
+    Instantiated,
+    /// Its start is being found.
+    Initialization,
+    /// Time stands, and parts may begin to do something else.
+    Event,
+    /// Model exchange between events.
+    Continuous,
+    /// Co-simulation between steps.
+    Step,
+    /// It is over.
+    Terminated,
+    /// It cannot go on.
+    Broken,
+}
+
+impl Phase {
+    /// Its name.
+    fn word(self) -> &'static str {
+        match self {
+            Phase::Instantiated => "instantiated",
+            Phase::Initialization => "initialization mode",
+            Phase::Event => "event mode",
+            Phase::Continuous => "continuous-time mode",
+            Phase::Step => "step mode",
+            Phase::Terminated => "terminated",
+            Phase::Broken => "broken",
+        }
+    }
+}
+
+/// An input over time: a polynomial since it was set.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Input {
+    pub(crate) since: f64,
+    pub(crate) coefficients: [f64; DEGREE + 1],
+}
+
+impl Input {
+    pub(crate) fn at(&self, time: f64) -> f64 {
+        let tau = time - self.since;
+        self.coefficients.iter().rev().fold(0.0, |sum, c| sum * tau + c)
+    }
+}
+
+/// The machine behind an instance.
+#[derive(Clone)]
+pub(crate) enum Plant {
+    /// None yet, or not with the present numbers.
+    None,
+    /// It moves by itself.
+    Machine(Box<Machine>),
+    /// It is moved.
+    Dynamics(Box<Dynamics>),
+}
+
+/// An instance: all of it is its state, which a clone keeps.
+#[derive(Clone)]
+pub struct Instance {
+    pub(crate) model: Arc<Model>,
+    pub(crate) purpose: Use,
+    pub(crate) phase: Phase,
+    pub(crate) time: f64,
+    /// Where it began, and where it must end, s.
+    pub(crate) begin: f64,
+    pub(crate) stop: Option<f64>,
+    pub(crate) parameters: Vec<f64>,
+    /// Integrated quantities: where they are to start, and of model exchange now.
+    pub(crate) quantities: Vec<f64>,
+    /// Where the machine started.
+    pub(crate) start: Vec<f64>,
+    pub(crate) inputs: Vec<Input>,
+    /// Forces on bodies that the mechanism has as numbers.
+    pub(crate) forces: Vec<f64>,
+    pub(crate) plant: Plant,
+    pub(crate) control: Option<Stepped>,
+    /// Whether inputs were set that the plant does not know yet; and whether the columns are those of now.
+    pub(crate) is_set: bool,
+    pub(crate) columns: Option<Vec<f64>>,
+    /// Whether the machine has ended the run.
+    pub(crate) is_over: bool,
+}
+
+impl Instance {
+    /// A new one.
+    pub fn new(model: Arc<Model>, purpose: Use) -> Self {
+        let mut instance = Self {
+            purpose,
+            phase: Phase::Instantiated,
+            time: 0.0,
+            begin: 0.0,
+            stop: None,
+            parameters: Vec::new(),
+            quantities: Vec::new(),
+            start: Vec::new(),
+            inputs: Vec::new(),
+            forces: Vec::new(),
+            plant: Plant::None,
+            control: None,
+            is_set: true,
+            columns: None,
+            is_over: false,
+            model,
+        };
+        instance.renew();
+        instance
+    }
+
+    /// The machine and its variables.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Where it stands.
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// Time now, s.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Whether the machine has ended the run: its cart left its travel.
+    pub fn is_over(&self) -> bool {
+        self.is_over
+    }
+
+    /// As it was made.
+    fn renew(&mut self) {
+        let model = Arc::clone(&self.model);
+        let count = model.variables.iter().filter(|variable| place(&model, variable.role).is_some()).count();
+        *self = Self {
+            purpose: self.purpose,
+            phase: Phase::Instantiated,
+            time: 0.0,
+            begin: 0.0,
+            stop: None,
+            parameters: model.defaults(),
+            quantities: model.quantities.iter().map(|(_, start)| *start).collect(),
+            start: vec![0.0; model.quantities.len()],
+            inputs: vec![Input { since: 0.0, coefficients: [0.0; DEGREE + 1] }; count],
+            forces: vec![0.0; model.loads.len()],
+            plant: Plant::None,
+            control: None,
+            is_set: true,
+            columns: None,
+            is_over: false,
+            model,
+        };
+    }
+
+    /// Refuses a function outside of its phases.
+    pub fn allow(&self, function: &str, phases: &[Phase]) -> Told<()> {
+        match phases.contains(&self.phase) {
+            true => Ok(()),
+            false => {
+                let allowed: Vec<&str> = phases.iter().map(|phase| phase.word()).collect();
+                Err(Refusal::error(format!(
+                    "{function} cannot be called here: the instance is {}; allowed: {}",
+                    self.phase.word(),
+                    allowed.join(", ")
+                )))
+            }
+        }
+    }
+
+    /// Refuses a function of the other kind.
+    pub fn only(&self, function: &str, wanted: bool) -> Told<()> {
+        match wanted {
+            true => Ok(()),
+            false => Err(Refusal::error(format!("{function} is not of this kind of instance"))),
+        }
+    }
+
+    /// Whether it is for model exchange.
+    pub fn exchanges(&self) -> bool {
+        self.purpose == Use::ModelExchange
+    }
+
+    // --- from one phase to the next ---------------------------------------------------------------------------------
+
+    /// Where it begins and where it must end.
+    pub fn set_up(&mut self, start: f64, stop: Option<f64>) -> Told<()> {
+        if !start.is_finite() || stop.is_some_and(|stop| stop.is_nan() || stop < start) {
+            return Err(Refusal::error(format!(
+                "a run from {start} s to {stop:?} s cannot be; allowed: an end behind the start"
+            )));
+        }
+        (self.begin, self.time, self.stop) = (start, start, stop);
+        self.inputs.iter_mut().for_each(|input| input.since = start);
+        Ok(())
+    }
+
+    /// Its start is found from here on.
+    pub fn enter_initialization(&mut self) -> Told<()> {
+        self.phase = Phase::Initialization;
+        self.columns = None;
+        Ok(())
+    }
+
+    /// Its start is found.
+    pub fn exit_initialization(&mut self) -> Told<()> {
+        self.prepare()?;
+        self.phase = match self.purpose {
+            Use::ModelExchange | Use::CoSimulation { events: true, .. } => Phase::Event,
+            Use::CoSimulation { events: false, .. } => Phase::Step,
+        };
+        self.columns = None;
+        Ok(())
+    }
+
+    /// To another phase, from one of these.
+    pub fn go_into(&mut self, function: &str, from: &[Phase], to: Phase) -> Told<()> {
+        self.allow(function, from)?;
+        (self.phase, self.columns) = (to, None);
+        Ok(())
+    }
+
+    /// As it was made.
+    pub fn reset(&mut self) -> Told<()> {
+        self.renew();
+        Ok(())
+    }
+
+    /// It cannot be used any more.
+    pub fn break_down(&mut self) {
+        self.phase = Phase::Broken;
+    }
+
+    // --- the plant --------------------------------------------------------------------------------------------------
+
+    /// The mechanism with the present parameters and forces.
+    pub(crate) fn mechanism(&self) -> Told<Mechanism> {
+        let mut mechanism = self.model.mechanism(&self.parameters)?;
+        for ((index, body), force) in self.model.loads.iter().enumerate().zip(&self.forces) {
+            if self.model.force_input(index).is_none() {
+                mechanism.bodies[*body].force += force;
+            }
+        }
+        Ok(mechanism)
+    }
+
+    /// Makes the machine, where there is none with the present numbers.
+    pub(crate) fn prepare(&mut self) -> Told<()> {
+        if !matches!(self.plant, Plant::None) {
+            return Ok(());
+        }
+        self.start.clone_from(&self.quantities);
+        self.make()?;
+        self.is_set = true;
+        self.refresh()
+    }
+
+    /// Makes the machine in its start.
+    pub(crate) fn make(&mut self) -> Told<()> {
+        let mechanism = self.mechanism()?;
+        let state = self.model.state(&mechanism, &self.start);
+        self.control = match (&self.model.design, self.model.stage(&self.parameters)) {
+            (Some(design), Some(stage)) => Some(Stepped::new(design, &stage)?),
+            _ => None,
+        };
+        self.plant = match self.purpose {
+            Use::ModelExchange => Plant::Dynamics(Box::new(Dynamics::new(&mechanism, &state)?)),
+            Use::CoSimulation { .. } => {
+                let solver = Solver::of_mechanism(&mechanism);
+                Plant::Machine(Box::new(Machine::of_mechanism(&mechanism, &state, solver, self.model.every)?))
+            }
+        };
+        Ok(())
+    }
+
+    /// The inputs of the mechanism now, and their polynomials since when.
+    pub(crate) fn pieces(&self) -> [Piece; DRIVES] {
+        let held = |value: f64| {
+            let mut coefficients = [0.0; DEGREE + 1];
+            coefficients[0] = value;
+            Piece { start: self.time - self.begin, end: f64::INFINITY, coefficients }
+        };
+        let mut pieces = [held(0.0); DRIVES];
+        for variable in &self.model.variables {
+            let Some(index) = place(&self.model, variable.role) else { continue };
+            let input = &self.inputs[index];
+            let drive = match variable.role {
+                Role::Input(drive) => Some(drive),
+                Role::Force(load) => self.model.force_input(load),
+                _ => None,
+            };
+            if let Some(drive) = drive {
+                let Input { since, coefficients } = *input;
+                pieces[drive] = Piece { start: since - self.begin, end: f64::INFINITY, coefficients };
+            }
+        }
+        if let Some(control) = &self.control {
+            pieces[0] = held(control.command());
+        }
+        pieces
+    }
+
+    /// The forces that the mechanism has as numbers, now.
+    fn forces_now(&self) -> Vec<f64> {
+        let mut forces = self.forces.clone();
+        for variable in &self.model.variables {
+            if let (Role::Force(load), Some(index)) = (variable.role, place(&self.model, variable.role))
+                && self.model.force_input(load).is_none()
+            {
+                forces[load] = self.inputs[index].at(self.time);
+            }
+        }
+        forces
+    }
+
+    /// Tells the plant its inputs.
+    pub(crate) fn refresh(&mut self) -> Told<()> {
+        if !self.is_set {
+            return Ok(());
+        }
+        let forces = self.forces_now();
+        if forces != self.forces {
+            self.forces = forces;
+            self.replace()?;
+        }
+        let pieces = self.pieces();
+        let drives = self.model.drives() + usize::from(self.model.force_input(0).is_some());
+        let (time, now) = (self.time - self.begin, self.time);
+        match &mut self.plant {
+            Plant::None => {}
+            Plant::Machine(machine) => {
+                for (drive, piece) in pieces.iter().enumerate().take(drives) {
+                    // The machine's clock may be a last bit behind.
+                    let start = piece.start.min(machine.time());
+                    machine.set_input(drive, &Piece { start, ..*piece })?;
+                }
+            }
+            Plant::Dynamics(dynamics) => {
+                let values = pieces.map(|piece| piece.value(time));
+                dynamics.put(now, &self.quantities, &values);
+            }
+        }
+        self.is_set = false;
+        Ok(())
+    }
+
+    /// Goes on with the present numbers of the machine.
+    pub(crate) fn replace(&mut self) -> Told<()> {
+        let mechanism = self.mechanism()?;
+        match &mut self.plant {
+            Plant::None => {}
+            Plant::Machine(machine) => machine.replace(&mechanism),
+            Plant::Dynamics(dynamics) => dynamics.replace(&mechanism),
+        }
+        self.is_set = true;
+        self.columns = None;
+        Ok(())
+    }
+}
+
+/// The place of an input among all.
+pub(crate) fn place(model: &Model, role: Role) -> Option<usize> {
+    let first = if model.design.is_some() { 3 } else { model.drives() };
+    match role {
+        Role::Input(drive) => Some(drive),
+        Role::Reference(k) => Some(k),
+        Role::Force(load) => Some(first + load),
+        Role::Time
+        | Role::Parameter(..)
+        | Role::Output(_)
+        | Role::Error
+        | Role::Command
+        | Role::Quantity(_)
+        | Role::Rate(_)
+        | Role::Condition(_) => None,
+    }
+}

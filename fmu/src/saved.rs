@@ -1,0 +1,113 @@
+//! The state of an instance as bytes, and back.
+
+use crate::instance::{Input, Instance, Phase, Plant, Refusal, Told};
+
+/// What such bytes begin with.
+const MARK: u64 = u64::from_le_bytes(*b"tautfmu1");
+
+const PHASES: [Phase; 7] = [
+    Phase::Instantiated,
+    Phase::Initialization,
+    Phase::Event,
+    Phase::Continuous,
+    Phase::Step,
+    Phase::Terminated,
+    Phase::Broken,
+];
+
+impl Instance {
+    /// All of its state. Errors: with a controller inside, whose memory is no plain numbers.
+    pub fn bytes(&self) -> Told<Vec<u8>> {
+        let refuse = |why: &str| Err(Refusal::error(format!("this state cannot be turned into bytes: {why}")));
+        if self.model.design.is_some() {
+            return refuse("there is a controller inside; allowed: get and set states without bytes");
+        }
+        let mut list = vec![MARK, taut::chance::hash(self.model.token.bytes()), u64::from(self.exchanges())];
+        list.push(PHASES.iter().position(|phase| *phase == self.phase).unwrap_or_default() as u64);
+        list.extend([self.is_set, self.is_over, self.stop.is_some()].map(u64::from));
+        let numbers = [self.time, self.begin, self.stop.unwrap_or(0.0)];
+        let inputs = self.inputs.iter().flat_map(|input| std::iter::once(&input.since).chain(&input.coefficients));
+        let all = numbers
+            .iter()
+            .chain(&self.parameters)
+            .chain(&self.quantities)
+            .chain(&self.start)
+            .chain(&self.forces)
+            .chain(inputs);
+        list.extend(all.map(|number| number.to_bits()));
+        let plant = match &self.plant {
+            Plant::None => Some(Vec::new()),
+            Plant::Machine(machine) => machine.save(),
+            Plant::Dynamics(dynamics) => dynamics.save(),
+        };
+        let Some(plant) = plant else { return refuse("the machine has ended the run") };
+        list.push(u64::from(!matches!(self.plant, Plant::None)));
+        list.extend(plant);
+        Ok(list.into_iter().flat_map(u64::to_le_bytes).collect())
+    }
+
+    /// The state that these bytes are of, as an instance beside this one. Errors: bytes of something else.
+    pub fn of_bytes(&self, bytes: &[u8]) -> Told<Self> {
+        let wrong = || Refusal::error("these bytes are no state of this machine; allowed: what SerializeFMUState gave");
+        let words = bytes.chunks_exact(8);
+        if !words.remainder().is_empty() {
+            return Err(wrong());
+        }
+        let mut list = words.map(|word| u64::from_le_bytes(std::array::from_fn(|k| word[k])));
+        let mut next = || list.next().ok_or_else(wrong);
+        let mut other = Self::new(self.model.clone(), self.purpose);
+        let head = [MARK, taut::chance::hash(self.model.token.bytes()), u64::from(self.exchanges())];
+        for wanted in head {
+            if next()? != wanted {
+                return Err(wrong());
+            }
+        }
+        let phase = usize::try_from(next()?).ok().and_then(|phase| PHASES.get(phase));
+        other.phase = *phase.ok_or_else(wrong)?;
+        let mut flags = [false; 3];
+        for flag in &mut flags {
+            *flag = match next()? {
+                0 => false,
+                1 => true,
+                _ => return Err(wrong()),
+            };
+        }
+        let mut numbers = |into: &mut [f64]| -> Told<()> {
+            for number in into {
+                *number = f64::from_bits(next()?);
+                if !number.is_finite() {
+                    return Err(wrong());
+                }
+            }
+            Ok(())
+        };
+        let mut times = [0.0; 3];
+        numbers(&mut times)?;
+        numbers(&mut other.parameters)?;
+        numbers(&mut other.quantities)?;
+        numbers(&mut other.start)?;
+        numbers(&mut other.forces)?;
+        for Input { since, coefficients } in &mut other.inputs {
+            numbers(std::slice::from_mut(since))?;
+            numbers(coefficients)?;
+        }
+        let is_there = next()?;
+        let rest: Vec<u64> = list.collect();
+        if is_there == 1 {
+            // The machine in its start, from where its saved state goes on.
+            other.make()?;
+            let restored = match &mut other.plant {
+                Plant::None => None,
+                Plant::Machine(machine) => machine.restore(&rest),
+                Plant::Dynamics(dynamics) => dynamics.restore(&rest),
+            };
+            restored.ok_or_else(wrong)?;
+        } else if !rest.is_empty() {
+            return Err(wrong());
+        }
+        [other.is_set, other.is_over] = [flags[0], flags[1]];
+        [other.time, other.begin] = [times[0], times[1]];
+        other.stop = flags[2].then_some(times[2]);
+        Ok(other)
+    }
+}

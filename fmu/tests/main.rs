@@ -1,0 +1,8 @@
+//! The functions of the standard, called as an importer calls them.
+
+mod derivatives;
+mod exchange;
+mod sequences;
+mod statuses;
+mod steps;
+mod unit;
