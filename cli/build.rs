@@ -1,8 +1,12 @@
-//! Source of the build: the commit, where there is one, and the profile.
+//! Source of the build: the commit, where there is one, and the profile; and the shared object for FMUs.
+
+#[path = "carry.rs"]
+mod carry;
 
 use std::process::Command;
 
 fn main() {
+    carry::carry();
     let git = |arguments: &[&str]| -> Option<String> {
         let done = Command::new("git").args(arguments).output().ok().filter(|done| done.status.success())?;
         Some(String::from_utf8(done.stdout).ok()?.trim().to_string()).filter(|text| !text.is_empty())

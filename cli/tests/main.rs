@@ -7,6 +7,7 @@ mod documents;
 mod endings;
 mod faults;
 mod fit;
+mod fmu;
 mod frf;
 mod gantry;
 mod outputs;

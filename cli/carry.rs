@@ -1,0 +1,124 @@
+//! The shared object for FMUs, built on the way: its bytes go into the program. A part of build.rs.
+
+use std::env;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Writes `carried.rs`: the shared object, or none, and the licences of what is in it.
+///
+/// It is built where the program is built to be used: in release profiles, with the feature `fmu`, from the whole
+/// repository. A program that is being worked on takes the one that lies beside it, so that it is not compiled twice.
+/// Cargo holds its lock on the folder of this build while this runs, so the object has a folder of its own.
+pub fn carry() {
+    let out = PathBuf::from(env::var_os("OUT_DIR").unwrap_or_default());
+    let source = Path::new("../fmu/Cargo.toml");
+    let wanted = env::var_os("CARGO_FEATURE_FMU").is_some() && env::var("PROFILE").is_ok_and(|name| name == "release");
+    let mut text = String::new();
+    if wanted && source.is_file() {
+        for path in ["../src", "../fmu/src", "../fmu/Cargo.toml", "../Cargo.toml", "../Cargo.lock", "carry.rs"] {
+            println!("cargo::rerun-if-changed={path}");
+        }
+        let object = build(source, &out.join("fmu"));
+        let _ = writeln!(text, "pub const CARRIED: Option<&[u8]> = Some(include_bytes!({object:?}));");
+        let notices = out.join("notices.txt");
+        std::fs::write(&notices, self::notices(source)).expect("the folder of the build can be written to");
+        let _ = writeln!(text, "pub const NOTICES: &str = include_str!({notices:?});");
+    } else {
+        if wanted {
+            println!("cargo::warning=this is not the whole repository: the program will carry no object for FMUs");
+        }
+        text.push_str("pub const CARRIED: Option<&[u8]> = None;\npub const NOTICES: &str = \"\";\n");
+    }
+    std::fs::write(out.join("carried.rs"), text).expect("the folder of the build can be written to");
+}
+
+/// Builds the shared object into a folder of its own; its path.
+fn build(source: &Path, folder: &Path) -> PathBuf {
+    let target = env::var("TARGET").unwrap_or_default();
+    let mut command = cargo("build");
+    command.args(["--lib", "--profile", "fmu", "--target", &target]).arg("--manifest-path").arg(source);
+    command.arg("--target-dir").arg(folder);
+    let done = command.output().expect("cargo can be started");
+    if !done.status.success() {
+        panic!("the shared object for FMUs cannot be built:\n{}", String::from_utf8_lossy(&done.stderr));
+    }
+    let (prefix, suffix) = match env::var("CARGO_CFG_TARGET_OS").as_deref() {
+        Ok("windows") => ("", ".dll"),
+        Ok("macos") => ("lib", ".dylib"),
+        _ => ("lib", ".so"),
+    };
+    let object = folder.join(&target).join("fmu").join(format!("{prefix}taut_fmu{suffix}"));
+    assert!(object.is_file(), "cargo left no {}: this target has no shared objects", object.display());
+    object
+}
+
+/// Cargo as it runs this, but for what is meant for this build alone: lints, wrappers, the folder.
+fn cargo(command: &str) -> Command {
+    let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.args([command, "--locked"]);
+    for name in ["RUSTC_WORKSPACE_WRAPPER", "CLIPPY_ARGS", "CLIPPY_CONF_DIR", "CARGO_BUILD_TARGET", "RUSTFLAGS"] {
+        cargo.env_remove(name);
+    }
+    // What cargo tells a build script of its own package is not of that one.
+    for (name, _) in env::vars_os() {
+        let name_text = name.to_string_lossy();
+        if ["CARGO_FEATURE_", "CARGO_CFG_", "CARGO_PKG_", "DEP_"].iter().any(|begin| name_text.starts_with(begin)) {
+            cargo.env_remove(&name);
+        }
+    }
+    cargo
+}
+
+/// The packages in the shared object with their licences, and the texts of these as far as they can be found.
+fn notices(source: &Path) -> String {
+    let mut command = cargo("tree");
+    command.args(["--offline", "--edges", "normal", "--prefix", "none", "--format", "{p}|{l}"]);
+    command.arg("--manifest-path").arg(source);
+    let listed = command.output().ok().filter(|done| done.status.success()).map(|done| done.stdout);
+    let listed = String::from_utf8(listed.unwrap_or_default()).unwrap_or_default();
+    // "name v1.2.3 (proc-macro)|MIT": those of this repository have a path instead.
+    let mut packages: Vec<(String, String, String)> = Vec::new();
+    for line in listed.lines() {
+        let (package, licence) = line.split_once('|').unwrap_or((line, ""));
+        let mut words = package.split(' ');
+        let (Some(name), Some(version)) = (words.next(), words.next()) else { continue };
+        if name == "taut" || name == "taut-fmu" {
+            continue;
+        }
+        let licence = licence.trim_end_matches(" (*)").to_string();
+        packages.push((name.to_string(), version.trim_start_matches('v').to_string(), licence));
+    }
+    packages.sort();
+    packages.dedup();
+    let mut text = String::from("The shared object contains these packages of others, under these licences.\n");
+    for (name, version, licence) in &packages {
+        let _ = write!(text, "\n{}\n{name} {version}: {licence}\n", "=".repeat(72));
+        for file in licence_files(name, version) {
+            if let Ok(content) = std::fs::read_to_string(&file) {
+                let _ = write!(text, "\n{}\n\n{}\n", file.file_name().unwrap_or_default().to_string_lossy(), content);
+            }
+        }
+    }
+    text
+}
+
+/// Texts of the licence of a package, in cargo's own folder.
+fn licence_files(name: &str, version: &str) -> Vec<PathBuf> {
+    let home = env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| Some(PathBuf::from(env::var_os("HOME")?).join(".cargo")));
+    let entries = |path: PathBuf| std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut files: Vec<PathBuf> = home
+        .into_iter()
+        .flat_map(|home| entries(home.join("registry/src")))
+        .flat_map(|registry| entries(registry.join(format!("{name}-{version}"))))
+        .filter(|path| {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().to_uppercase();
+            // Apache's text is beside this one already.
+            let is_licence = name.starts_with("LICEN") || name.starts_with("COPYING") || name.starts_with("NOTICE");
+            path.is_file() && is_licence && !name.contains("APACHE")
+        })
+        .collect();
+    files.sort();
+    files
+}
