@@ -1,0 +1,264 @@
+"""FMUs of ``taut export fmu`` in two importers: FMPy with its own integrator, and ecos."""
+
+from __future__ import annotations
+
+import csv
+import os
+import random
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+fmpy = pytest.importorskip("fmpy")
+from fmpy import extract, read_model_description, simulate_fmu  # noqa: E402
+from fmpy.fmi2 import FMU2Slave  # noqa: E402
+from fmpy.fmi3 import FMU3Slave  # noqa: E402
+from fmpy.validation import validate_fmu  # noqa: E402
+
+PROGRAM = os.environ.get("TAUT_PROGRAM")
+pytestmark = pytest.mark.skipif(PROGRAM is None, reason="TAUT_PROGRAM does not name the program")
+
+PAPER = "stages/sollmann-jouaneh/table4.toml"
+PULSE = {"step": 1e-3, "until": 1.0}
+
+#: Co-simulation is exact but for rounding; a stranger's integrator is as good as its tolerance. Metres.
+SAME, NEAR = 1e-12, 1e-6
+
+
+def taut(*words: str) -> None:
+    """Runs the program, which has to succeed."""
+    assert PROGRAM is not None
+    done = subprocess.run([PROGRAM, *words], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def export(case: Path, out: Path, version: int, *more: str) -> str:
+    """An FMU of a case."""
+    taut("export", "fmu", str(case), "--out", str(out), "--fmi", str(version), *more)
+    return str(out)
+
+
+def rows(case: Path, folder: Path, name: str, *changes: str) -> dict[str, np.ndarray[Any, Any]]:
+    """What ``taut simulate`` makes of an experiment."""
+    sets = [word for change in changes for word in ("--set", change)]
+    taut("simulate", str(case), "--out", str(folder), "--no-report", *sets)
+    with (folder / name).open() as file:
+        table = list(csv.DictReader(file))
+    return {key: np.array([float(row[key]) for row in table]) for key in table[0]}
+
+
+def signal(points: list[tuple[float, float]], name: str = "command") -> np.ndarray[Any, Any]:
+    """An input of straight lines; two points at one time are a jump."""
+    return np.array(points, dtype=[("time", np.float64), (name, np.float64)])
+
+
+def slave(unit: str, version: int) -> tuple[Any, dict[str, int], str]:
+    """An instance of FMPy's that is ready for its first step, its value references, and where it was unpacked."""
+    description = read_model_description(unit)
+    place = extract(unit)
+    kind = FMU2Slave if version == 2 else FMU3Slave
+    one = kind(guid=description.guid, unzipDirectory=place, modelIdentifier=description.coSimulation.modelIdentifier)
+    one.instantiate()
+    if version == 2:
+        one.setupExperiment(startTime=0.0)
+    one.enterInitializationMode()
+    one.exitInitializationMode()
+    return one, {variable.name: variable.valueReference for variable in description.modelVariables}, place
+
+
+#: 10 V for a quarter of a second.
+JUMPS = [(0.0, 10.0), (0.25, 10.0), (0.25, 0.0), (1.0, 0.0)]
+
+
+@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize(
+    ("case", "more"),
+    [
+        (PAPER, ()),
+        ("stages/core-xy/core-xy.toml", ()),
+        ("stages/core-xy/follows.toml", ()),
+        ("stages/h-frame/h-frame.toml", ()),
+        ("stages/emps/emps.toml", ()),
+        ("stages/two-mass/two-mass.toml", ()),
+        ("stages/laser-gantry/laser-gantry.toml", ()),
+        ("stages/sollmann-jouaneh/controllers/pid.toml", ("--part", "both")),
+    ],
+)
+def test_descriptions_are_valid(root: Path, tmp_path: Path, version: int, case: str, more: tuple[str, ...]) -> None:
+    """The schema of the standard, and what FMPy checks beyond it."""
+    unit = export(root / case, tmp_path / "unit.fmu", version, *more)
+    assert validate_fmu(unit) == []
+    with zipfile.ZipFile(unit) as archive:
+        assert archive.testzip() is None
+        names = archive.namelist()
+    assert "resources/case.toml" in names and "documentation/licenses/license.txt" in names
+    assert ("model.png" if version == 2 else "terminalsAndIcons/icon.png") in names
+
+
+@pytest.mark.parametrize(("version", "events"), [(2, False), (3, False), (3, True)])
+def test_co_simulation_is_exact(root: Path, tmp_path: Path, version: int, events: bool) -> None:
+    """The pulse in steps of a millisecond and of a quarter of a second, with importers' defaults and with event mode."""
+    wanted = rows(root / PAPER, tmp_path / "rows", "10-v-pulse.csv")
+    unit = export(root / PAPER, tmp_path / "unit.fmu", version)
+    for step in (1e-3, 0.25):
+        result = simulate_fmu(
+            unit,
+            fmi_type="CoSimulation",
+            stop_time=1.0,
+            output_interval=step,
+            input=signal(JUMPS),
+            output=["cart_position", "drive_angle", "cart_state"],
+            use_event_mode=events,
+            early_return_allowed=events,
+        )
+        x = dict(zip(np.round(wanted["time_s"], 9), wanted["cart_position_m"], strict=True))
+        whole = [k for k, t in enumerate(result["time"]) if round(t, 9) in x and abs(t - round(t, 9)) < 1e-15]
+        off = max(abs(result["cart_position"][k] - x[round(result["time"][k], 9)]) for k in whole)
+        assert len(whole) >= 1 / step and off <= SAME, off
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_stranger_integrates_through_stick_and_slip(root: Path, tmp_path: Path, version: int) -> None:
+    """Model exchange with CVODE: a triangle wave, through every rest and turn."""
+    wanted = rows(
+        root / PAPER, tmp_path / "rows", "5-v-pulse.csv", 'experiment.0.input={ triangle = "3 V", frequency = "2 Hz" }'
+    )
+    unit = export(root / PAPER, tmp_path / "unit.fmu", version)
+    corners = [(0.0, 0.0)] + [(0.125 + 0.25 * k, 3.0 * (-1) ** k) for k in range(4)] + [(1.0, 0.0)]
+    result = simulate_fmu(
+        unit,
+        fmi_type="ModelExchange",
+        solver="CVode",
+        stop_time=0.5,
+        relative_tolerance=1e-9,
+        # The belt swings at 300 Hz with nothing to damp it: at this tolerance CVODE takes 2 us, and no more than 500
+        # steps from one output to the next.
+        output_interval=0.25e-3,
+        input=signal(corners),
+        output=["cart_position", "cart_state"],
+        record_events=False,
+    )
+    off = np.max(np.abs(result["cart_position"][::4] - wanted["cart_position_m"][:501]))
+    assert off <= NEAR, off
+    assert set(result["cart_state"]) == {-1, 0, 1}, "it slides both ways, and sticks"
+
+
+def test_ramps_are_exact_by_input_derivatives(root: Path, tmp_path: Path) -> None:
+    """FMI 2.0: a triangle wave in steps of an eighth of a second, told by value and slope."""
+    wanted = rows(
+        root / PAPER, tmp_path / "rows", "5-v-pulse.csv", 'experiment.0.input={ triangle = "3 V", frequency = "2 Hz" }'
+    )
+    unit = export(root / PAPER, tmp_path / "unit.fmu", 2)
+    one, references, place = slave(unit, 2)
+    command, cart = [references["command"]], [references["cart_position"]]
+    for k in range(8):
+        # From 0 up to 3 V, down to -3 V and back, an eighth of a second for each 3 V.
+        value, slope = [0.0, 3.0, 0.0, -3.0][k % 4], [24.0, -24.0, -24.0, 24.0][k % 4]
+        one.setReal(command, [value])
+        one.setRealInputDerivatives(command, [1], [slope])
+        one.doStep(k / 8, 1 / 8)
+        off = abs(one.getReal(cart)[0] - wanted["cart_position_m"][125 * (k + 1)])
+        assert off <= SAME, (k, off)
+    one.terminate()
+    one.freeInstance()
+    shutil.rmtree(place)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_steps_are_taken_back_by_the_importer(root: Path, tmp_path: Path, version: int) -> None:
+    """States got, set and sent as bytes, by FMPy's own calls, in steps that nobody has planned."""
+    wanted = rows(root / PAPER, tmp_path / "rows", "10-v-pulse.csv")["cart_position_m"]
+    unit = export(root / PAPER, tmp_path / "unit.fmu", version)
+    one, references, place = slave(unit, version)
+    command, cart = [references["command"]], [references["cart_position"]]
+    reads = one.getReal if version == 2 else one.getFloat64
+    sets = one.setReal if version == 2 else one.setFloat64
+    choose = random.Random(5)
+    time, milliseconds = 0.0, 0
+    sets(command, [10.0])
+    while milliseconds < 1000:
+        state = one.getFMUState()
+        back = choose.random() < 0.3
+        steps = choose.choice([1, 3, 7, 50])
+        steps = min(steps, (250 if milliseconds < 250 else 1000) - milliseconds)
+        end = (milliseconds + steps) / 1000
+        one.doStep(time, end - time)
+        if back:
+            # As bytes and from them, and once more.
+            data = one.serializeFMUState(state)
+            again = one.deserializeFMUState(data)
+            one.setFMUState(again)
+            one.freeFMUState(again)
+        else:
+            time, milliseconds = end, milliseconds + steps
+            assert abs(reads(cart)[0] - wanted[milliseconds]) <= SAME
+        one.freeFMUState(state)
+        if milliseconds >= 250:
+            sets(command, [0.0])
+    one.terminate()
+    one.freeInstance()
+    shutil.rmtree(place)
+
+
+def test_a_controller_inside_follows_as_taut_move_does(root: Path, tmp_path: Path) -> None:
+    """The reference goes in, the error comes out; PID of the paper's axis with a reference that is known at its samples."""
+    case = root / "stages/sollmann-jouaneh/controllers/pid.toml"
+    unit = export(case, tmp_path / "unit.fmu", 3, "--part", "both")
+    result = simulate_fmu(
+        unit,
+        fmi_type="CoSimulation",
+        stop_time=0.5,
+        output_interval=1e-3,
+        start_values={"reference": 0.01},
+        output=["cart_position", "error", "command"],
+    )
+    assert abs(result["error"][-1]) < 2e-4, "it gets there, as far as friction lets it"
+    assert result["error"][0] == -0.01
+    off = result["cart_position"] - 0.01 - result["error"]
+    assert np.max(np.abs(off)) < 1e-15
+    exchanged = simulate_fmu(
+        unit,
+        fmi_type="ModelExchange",
+        solver="CVode",
+        stop_time=0.05,
+        relative_tolerance=1e-9,
+        output_interval=0.25e-3,
+        start_values={"reference": 0.01},
+        output=["cart_position"],
+        record_events=False,
+    )
+    off = np.max(np.abs(exchanged["cart_position"][::4] - result["cart_position"][:51]))
+    assert off <= NEAR, off
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_second_importer_runs_it(root: Path, tmp_path: Path, version: int) -> None:
+    """Ecos, in a process of its own: a held input for half a second, in its steps."""
+    # Its library looks for that of the package tbb, which lies in the environment.
+    libraries = {**os.environ, "LD_LIBRARY_PATH": str(Path(sys.prefix) / "lib")}
+    wanted = rows(root / PAPER, tmp_path / "rows", "5-v-pulse.csv", 'experiment.0.input={ step = "5 V" }')
+    unit = export(root / PAPER, tmp_path / "unit.fmu", version)
+    script = (
+        "import sys\n"
+        "from ecospy import EcosSimulation, EcosSimulationStructure\n"
+        "structure = EcosSimulationStructure()\n"
+        "structure.add_model('one', sys.argv[1])\n"
+        "structure.add_parameter_set('start', {'one::command': 5.0})\n"
+        "simulation = EcosSimulation(structure=structure, step_size=0.01)\n"
+        "simulation.init(parameter_set='start')\n"
+        "simulation.step(50)\n"
+        "print(repr(simulation.get_real('one::cart_position')))\n"
+        "simulation.terminate()\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, unit], capture_output=True, text=True, check=False, env=libraries
+    )
+    assert done.returncode == 0, done.stderr + done.stdout
+    x = float(done.stdout.strip().splitlines()[-1])
+    assert abs(x - wanted["cart_position_m"][500]) <= SAME, x
