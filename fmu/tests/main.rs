@@ -1,5 +1,6 @@
 //! The functions of the standard, called as an importer calls them.
 
+mod controller;
 mod derivatives;
 mod exchange;
 mod sequences;
