@@ -133,6 +133,26 @@ fn another_token_or_no_resources_make_no_instance() {
 }
 
 #[test]
+fn friction_that_was_none_gave_more_conditions_than_there_was_room_for() {
+    // A body without friction has no modes; with friction set before the start it has, and was watched by conditions that
+    // the description did not count: a panic of a thousandth of all random sequences.
+    let unit = Unit::with("sollmann-jouaneh/table4.toml", &["cart.friction.coulomb=0 N"], false);
+    let one = unit.exchange();
+    assert_eq!(one.set("cart.friction.coulomb", 3.0), OK);
+    one.start();
+    let (mut count, mut values) = (0, vec![0.0; 64]);
+    unsafe {
+        assert_eq!(fmi3::fmi3GetNumberOfEventIndicators(one.pointer, &mut count), OK);
+        assert_eq!(fmi3::fmi3GetEventIndicators(one.pointer, values.as_mut_ptr(), count), OK);
+    }
+    assert_eq!(values.iter().filter(|value| (**value - 3.0).abs() < 1e-9).count(), 2, "{values:?}");
+    // Which quantities there are to integrate is fixed: an inductance that was none cannot come.
+    let other = unit.exchange();
+    assert_eq!(other.set("motor.inductance", 1e-3), ERROR);
+    assert_eq!(other.get_parameter("motor.inductance"), 0.0);
+}
+
+#[test]
 fn a_cart_that_leaves_its_travel_ends_the_run() {
     let changes = ["travel={ min = \"-0.01 m\", max = \"0.01 m\" }"];
     let unit = Unit::with("sollmann-jouaneh/table4.toml", &changes, false);

@@ -147,6 +147,12 @@ impl Three<'_> {
         value
     }
 
+    /// The value of a parameter of an instance that has not begun, by beginning.
+    pub fn get_parameter(&self, name: &str) -> f64 {
+        self.start();
+        self.get(name)
+    }
+
     pub fn whole(&self, name: &str) -> i32 {
         let (reference, mut value) = (self.unit.reference(name), i32::MIN);
         assert_eq!(unsafe { fmi3::fmi3GetInt32(self.pointer, &reference, 1, &mut value, 1) }, OK, "{name}");

@@ -246,16 +246,27 @@ impl Model {
                     .allowed(row.range.describe(unit_for(row.unit, self.input_unit()))));
             }
         }
-        match self.set(parameters) {
+        let mechanism = match self.set(parameters) {
             Machine::Axis(stage) => {
                 check_stage(&stage)?;
                 let mut mechanism = stage.mechanism();
                 mechanism.drives.push(push(axis::CART));
-                Ok(mechanism)
+                mechanism
             }
             Machine::Gantry(gantry) => {
                 gantry.check()?;
-                Ok(gantry.mechanism())
+                gantry.mechanism()
+            }
+        };
+        let has = |drive: usize| self.quantities.iter().any(|(quantity, _)| *quantity == Quantity::Current(drive));
+        let own = mechanism.drives.iter().enumerate();
+        let changed = own.filter(|(drive, own)| own.has_current_state() != has(*drive)).map(|(_, own)| own).next();
+        match changed.filter(|_| !self.quantities.is_empty()) {
+            None => Ok(mechanism),
+            Some(drive) => {
+                Err(Error::new(format!("the inductance of the {} decides which states there are", drive.label.name))
+                    .allowed("zero where it is zero in the case, above zero where it is")
+                    .next("change it in the case, and export that"))
             }
         }
     }

@@ -236,15 +236,16 @@ fn quantities(mechanism: &Mechanism) -> Vec<Quantity> {
     list
 }
 
-/// The kinds of conditions that a mechanism can watch in any of its modes.
+/// The kinds of conditions that a mechanism can watch in any of its modes, whatever its numbers are: friction that is none
+/// may be set, and so may a loss of the gear.
 fn kinds(mechanism: &Mechanism) -> Vec<usize> {
     use crate::mechanism::{Contact, Limit, Switch};
     let mut causes = Vec::new();
-    for body in mechanism.leaders().filter(|body| mechanism.has_modes(*body)) {
+    for body in mechanism.leaders() {
         causes.extend([Cause::BreakForward(body), Cause::BreakBackward(body)]);
     }
     for (index, drive) in mechanism.drives.iter().enumerate() {
-        if drive.loses() {
+        if !drive.motor.is_simple {
             causes.push(Cause::GearTorque(index));
         }
         for to in [Limit::Inside, Limit::High, Limit::Low] {
