@@ -218,6 +218,7 @@ fn what_the_documents_name_is_there() {
         "docs/case-file.md",
         "docs/commands.md",
         "docs/control.md",
+        "docs/export.md",
         "docs/first-axis.md",
         "docs/fit.md",
         "docs/gantry.md",

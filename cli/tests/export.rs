@@ -1,7 +1,10 @@
 //! `taut export`: every target in its own tool.
+#![cfg(unix)]
 
 #[path = "export/c.rs"]
 mod c;
+#[path = "export/how_to.rs"]
+mod how_to;
 #[path = "export/interpreter.rs"]
 mod interpreter;
 #[path = "export/machines.rs"]

@@ -148,6 +148,11 @@ fn results_follow_their_schemas() {
         ("check", &["check", "stages/sollmann-jouaneh/identification/separate.toml"]),
         ("shape", &["shape", "stages/printer-axis/printer-axis.toml"]),
         ("show", &["show", TABLE4]),
+        ("export", &["export", "json", TABLE4, "--json"]),
+        ("export", &["export", "json", "stages/core-xy/follows.toml", "--json"]),
+        ("export", &["export", "json", TABLE4, "--json", "--set", "travel.max=1 m", "--set", "belt.pretension=20 N"]),
+        ("exported", &["export", "c", TABLE4, "--json"]),
+        ("exported", &["export", "st", PID, "--json"]),
         ("show", &["show", "stages/core-xy/follows.toml"]),
         ("tune", &["tune", PID, "--evaluate"]),
         (

@@ -11,6 +11,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use taut::Error;
 use taut::case::{GantryCase, InputFile, Opened, Plan, TEMPLATE};
+use taut::export::{Exported, Options, Part, Place, Real, Target, export};
 use taut::files::{Inputs, write_atomically};
 use taut::fit::compare::{FrictionLaw, Setting, compare};
 use taut::fit::experiment_design::{Criterion, Kind, Request, design, verify};
@@ -48,6 +49,28 @@ impl From<Opened> for Inner {
             Opened::Axis(case) => Inner::Axis(Arc::from(case)),
             Opened::Gantry(case) => Inner::Gantry(Arc::from(case)),
         }
+    }
+}
+
+/// The part of a case that a word names.
+fn exported_part(word: Option<&str>) -> PyResult<Option<Part>> {
+    match word {
+        None => Ok(None),
+        Some("plant") => Ok(Some(Part::Plant)),
+        Some("controller") => Ok(Some(Part::Controller)),
+        Some("both") => Ok(Some(Part::Both)),
+        Some(other) => {
+            Err(PyValueError::new_err(format!("part: plant, controller or both is wanted, and no {other:?}")))
+        }
+    }
+}
+
+/// The numbers of C that a word names.
+fn exported_real(word: &str) -> PyResult<Real> {
+    match word {
+        "float" => Ok(Real::Float),
+        "double" => Ok(Real::Double),
+        other => Err(PyValueError::new_err(format!("real: float or double is wanted, and no {other:?}"))),
     }
 }
 
@@ -379,6 +402,49 @@ impl Case {
         };
         let overview = unlocked(py, || Overview::of(&opened))?.told(py)?;
         value::json(py, &guarded(|| json::show(&overview))?)
+    }
+
+    /// Writes the files of a target, as `taut export` does, and says where they are and what should be known besides.
+    fn export(
+        &self,
+        py: Python<'_>,
+        target: &str,
+        out: PathBuf,
+        part: Option<&str>,
+        real: &str,
+        step: Option<f64>,
+    ) -> PyResult<(Vec<PathBuf>, Vec<String>)> {
+        let opened = match &self.inner {
+            Inner::Axis(case) => Opened::Axis(Box::new(case.as_ref().clone())),
+            Inner::Gantry(case) => Opened::Gantry(Box::new(case.as_ref().clone())),
+        };
+        let options = Options { part: exported_part(part)?, real: exported_real(real)?, step };
+        let own = self.path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        let made = unlocked(py, || {
+            let inputs = inputs(opened.files());
+            let text = |target: Target| {
+                let place = Place::of(&out, target.ending(), &own);
+                let exported = export(&opened, target, &place.stem, &options)?;
+                Ok((place.write(&exported, &inputs)?, exported.notes))
+            };
+            match target {
+                "c" => text(Target::C),
+                "st" => text(Target::StructuredText),
+                "matlab" => text(Target::Matlab),
+                "python" => text(Target::Python),
+                "json" => {
+                    let place = Place::of(&out, "json", &own);
+                    let content = json::text(&json::export(&opened)?).into_bytes();
+                    let files = vec![(format!("{}.json", place.stem), content)];
+                    let exported = Exported { files, ..Exported::default() };
+                    Ok((place.write(&exported, &inputs)?, Vec::new()))
+                }
+                other => Err(taut::Error::new(format!("there is no target \"{other}\" here"))
+                    .allowed("c, st, matlab, python or json")
+                    .next("the program `taut export` lists what else there is")),
+            }
+        });
+        made?.told(py)
     }
 
     /// Modes of a gantry, as `taut modes --json` has them.

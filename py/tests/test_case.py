@@ -106,3 +106,17 @@ def test_cases_are_read_and_saved(case, tmp_path):
 def test_it_shows_itself(case):
     assert repr(case).startswith("<taut.Case 'My axis': 5 V pulse")
     assert "<td>cart.mass</td><td>0.362</td>" in case._repr_html_()
+
+
+def test_a_case_is_exported_as_the_program_does(case, tmp_path):
+    files = taut.export(case, "c", tmp_path / "axis.c", real="float")
+    assert [file.name for file in files] == ["axis.c", "axis.h"]
+    assert "typedef float axis_real;" in files[1].read_text(encoding="utf-8")
+    files = taut.export(case, "matlab", tmp_path / "matlab")
+    assert all(file.is_file() for file in files) and len(files) == 5
+    with pytest.raises(taut.Error, match="there is no target"):
+        taut.export(case, "fortran", tmp_path)
+    with pytest.raises(taut.Error, match="no controller"):
+        taut.export(case, "st", tmp_path)
+    with pytest.raises(ValueError, match="real: float or double"):
+        taut.export(case, "c", tmp_path, real="half")

@@ -8,11 +8,13 @@ mod controller;
 pub mod fmu;
 mod matlab;
 mod packed;
+mod place;
 mod program;
 mod python;
 mod st;
 mod tables;
 
+pub use place::Place;
 pub use tables::{Does, Element, ElementKind, Row, StateName, TableGuard, Tables, Then};
 
 use crate::case::{Case, Opened};
@@ -29,6 +31,18 @@ pub enum Target {
     Matlab,
     /// Python.
     Python,
+}
+
+impl Target {
+    /// The ending of its main file.
+    pub fn ending(self) -> &'static str {
+        match self {
+            Target::C => "c",
+            Target::StructuredText => "st",
+            Target::Matlab => "m",
+            Target::Python => "py",
+        }
+    }
 }
 
 /// A part of a case.

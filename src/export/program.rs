@@ -291,7 +291,9 @@ impl Program {
     /// A local within a limit on both sides.
     pub(super) fn within(&mut self, name: &str, value: Expr, low: f64, high: f64) -> Expr {
         let local = self.declare(name);
-        self.set(name, value);
+        if !matches!(value.node(), Node::Variable(own) if own == name) {
+            self.set(name, value);
+        }
         self.when(
             Test(Relation::Less, local.clone(), number(low)),
             |p| p.set(name, number(low)),

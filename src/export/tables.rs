@@ -249,8 +249,8 @@ fn curved(mechanism: &Mechanism) -> Error {
         (None, None) => "this machine is not linear between its events".to_string(),
     };
     Error::new(format!("{what}, and what is exported here is linear between its events"))
-        .allowed("friction after law = \"coulomb\", and spans of constant stiffness")
-        .next("`taut export fmu` takes it as it is; or set the law to coulomb for this export with --set")
+        .allowed("Coulomb friction with or without a breakaway (`coulomb`, `static`), and spans of constant stiffness")
+        .next("`taut export fmu` takes it as it is; --part controller leaves the machine out; or export a case without it")
 }
 
 impl ElementKind {

@@ -9,10 +9,9 @@ use crate::folder::{self, Folder};
 use crate::terminal;
 use clap::ValueEnum;
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
 use taut::case::Opened;
-use taut::export::{self, Exported, Options, Part, Real, Target};
-use taut::files::{Batch, write_atomically};
+use taut::export::{self, Exported, Options, Part, Place, Real, Target};
+use taut::files::write_atomically;
 use taut::json;
 use taut::{Error, Result};
 
@@ -21,10 +20,10 @@ impl TargetName {
     fn ending(self) -> &'static str {
         match self {
             TargetName::Fmu => "fmu",
-            TargetName::C => "c",
-            TargetName::St => "st",
-            TargetName::Matlab => "m",
-            TargetName::Python => "py",
+            TargetName::C => Target::C.ending(),
+            TargetName::St => Target::StructuredText.ending(),
+            TargetName::Matlab => Target::Matlab.ending(),
+            TargetName::Python => Target::Python.ending(),
             TargetName::Json => "json",
         }
     }
@@ -46,26 +45,26 @@ pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
     check(args, target)?;
     let case = common.open(path)?;
-    let place = Place::of(args, target, path);
-    let exported = make(args, target, &case, &place.stem).map_err(|error| error.in_file(path))?;
-    let title = case.title().to_string();
+    let own = match command::is_standard_input(path) {
+        true => "axis".to_string(),
+        false => path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
+    };
+    let place = common.out.as_deref().map(|out| Place::of(out, target.ending(), &own));
+    let stem = place.as_ref().map_or(&own, |place| &place.stem);
+    let exported = make(args, target, &case, stem).map_err(|error| error.in_file(path))?;
     let inputs = folder::inputs(path, case.files());
-    let names = exported.files.iter().map(|(name, _)| name.clone());
-    let mut finished = finished(&title, target, &exported);
-    match &place.folder {
+    let mut finished = finished(case.title(), target, &exported);
+    match &place {
         None => finished.finish(common, None),
-        Some(root) if place.is_file => {
-            names.clone().try_for_each(|name| inputs.check(&root.join(name)))?;
-            let batch = Batch::begin(root).map_err(Failure::work)?;
-            for (name, content) in &exported.files {
-                write_atomically(batch.path(name), content).map_err(Failure::work)?;
-            }
-            batch.place(&[]).map_err(Failure::work)?;
-            finished.written = names.map(|name| root.join(name).display().to_string()).collect();
+        Some(place) if place.is_file => {
+            let names = exported.files.iter().map(|(name, _)| place.folder.join(name));
+            names.into_iter().try_for_each(|name| inputs.check(&name))?;
+            let written = place.write(&exported, &inputs).map_err(Failure::work)?;
+            finished.written = written.iter().map(|path| path.display().to_string()).collect();
             finished.finish(common, None)
         }
-        Some(root) => {
-            let folder = Folder::create(root, inputs, names)?;
+        Some(place) => {
+            let folder = Folder::create(&place.folder, inputs, exported.files.iter().map(|(name, _)| name))?;
             // The model as data is the result as data.
             for (name, content) in exported.files.iter().filter(|_| target != TargetName::Json) {
                 write_atomically(folder.path(name), content).map_err(Failure::work)?;
@@ -101,31 +100,6 @@ fn check(args: &Args, target: TargetName) -> Result<()> {
         return Err(not_of("--step", "c, matlab and python"));
     }
     Ok(())
-}
-
-/// Where the files go, and what they are called.
-struct Place {
-    /// The folder; none for nowhere.
-    folder: Option<PathBuf>,
-    /// Whether a file was named and no folder.
-    is_file: bool,
-    /// The name that all files share.
-    stem: String,
-}
-
-impl Place {
-    fn of(args: &Args, target: TargetName, case: &Path) -> Self {
-        let stem = |path: &Path| path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-        let own = if command::is_standard_input(case) { "axis".to_string() } else { stem(case) };
-        match &args.common.out {
-            None => Self { folder: None, is_file: false, stem: own },
-            Some(out) if out.extension().is_some_and(|e| e.eq_ignore_ascii_case(target.ending())) => {
-                let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
-                Self { folder: Some(folder.unwrap_or(Path::new(".")).into()), is_file: true, stem: stem(out) }
-            }
-            Some(out) => Self { folder: Some(out.clone()), is_file: false, stem: own },
-        }
-    }
 }
 
 /// The files of a target, called `stem`.

@@ -110,8 +110,21 @@ fn compilers_and_analysers_find_nothing() {
             if k % 4 == 0 {
                 let checks = ["--enable=warning,portability,performance", "--error-exitcode=1", "--quiet", "model.c"];
                 run(folder.path(), "cppcheck", &checks);
+                misra(folder.path());
             }
         }
+    }
+}
+
+/// The rules of MISRA C that the analyser's addon finds broken are those that the source names.
+fn misra(folder: &Path) {
+    let words = ["--addon=misra", "--quiet", "--std=c99", "model.c"];
+    let output = super::tools::try_to(folder, Path::new("cppcheck"), &words);
+    let source = fs::read_to_string(folder.join("model.c")).unwrap();
+    let named = source.split_once("*/").unwrap().0;
+    let told = String::from_utf8_lossy(&output.stderr);
+    for rule in told.split("[misra-c2012-").skip(1).filter_map(|rest| rest.split(']').next()) {
+        assert!(named.split([' ', ',']).any(|word| word == rule), "{rule}: {told}");
     }
 }
 
@@ -203,6 +216,7 @@ fn a_cortex_m4f_gives_the_same_numbers() {
         return;
     }
     let commands = pulse(5.0, 250);
+    let mut rows = Vec::new();
     for real in ["double", "float"] {
         let folder = exported(&file(TABLE4), &[], &["--real", real]);
         write_doubles(&folder.path().join("in.bin"), flat(&commands));
@@ -210,8 +224,8 @@ fn a_cortex_m4f_gives_the_same_numbers() {
         let here = doubles(&folder.path().join("out.bin"));
         let arm = run_on_arm(folder.path(), "plant.c");
         let there = doubles(&folder.path().join("out.bin"));
-        let OnArm { code, data, stack, told, symbols } = arm;
-        println!("plant, {real}: {code} bytes of flash, {data} of memory, {stack} of stack at most; {told}");
+        rows.push(arm.row(&format!("plant, {real}")));
+        let symbols = arm.symbols;
         assert_eq!(here.len(), there.len());
         assert!(here.iter().zip(&there).all(|(a, b)| a.to_bits() == b.to_bits()), "{real}");
         check_symbols(&symbols, real);
@@ -224,12 +238,51 @@ fn a_cortex_m4f_gives_the_same_numbers() {
             write_doubles(&folder.path().join("in.bin"), seen.iter().flat_map(|(seen, _)| *seen));
             run_here(folder.path(), "control.c", &[]);
             let here = doubles(&folder.path().join("out.bin"));
-            let OnArm { code, data, stack, told, symbols } = run_on_arm(folder.path(), "control.c");
+            let arm = run_on_arm(folder.path(), "control.c");
+            rows.push(arm.row(&format!("{name}, {real}")));
+            let symbols = arm.symbols;
             let there = doubles(&folder.path().join("out.bin"));
-            println!("{name}, {real}: {code} bytes of flash, {data} of memory, {stack} of stack at most; {told}");
             assert!(here.iter().zip(&there).all(|(a, b)| a.to_bits() == b.to_bits()), "{name} {real}");
             check_symbols(&symbols, real);
         }
+    }
+    documented(&rows);
+}
+
+impl OnArm {
+    /// Bytes of flash, memory and stack, and instructions on average and at most.
+    fn row(&self, what: &str) -> (String, Vec<usize>) {
+        let words: Vec<&str> = self.told.split_whitespace().collect();
+        let after = |word: &str| words[words.iter().position(|w| *w == word).unwrap() + 1].parse().unwrap();
+        let most = words.last().unwrap().parse().unwrap();
+        (what.to_string(), vec![self.code, self.data, self.stack, after("instructions"), most])
+    }
+}
+
+/// The table of docs/export.md: what another version of the compiler makes of it may differ by a quarter.
+fn documented(rows: &[(String, Vec<usize>)]) {
+    let path = file("docs/export.md");
+    let page = fs::read_to_string(&path).unwrap();
+    let (before, rest) = page.split_once("<!-- cortex -->\n").unwrap();
+    let (there, after) = rest.split_once("<!-- end -->").unwrap();
+    let mut table = String::from("| | flash, bytes | memory, bytes | stack, bytes | instructions | at most |\n");
+    table += "|---|---|---|---|---|---|\n";
+    for (what, numbers) in rows {
+        let numbers: Vec<String> = numbers.iter().map(ToString::to_string).collect();
+        table += &format!("| {what} | {} |\n", numbers.join(" | "));
+    }
+    println!("{table}");
+    if std::env::var_os("UPDATE_EXPECT").is_some() {
+        fs::write(&path, format!("{before}<!-- cortex -->\n{table}<!-- end -->{after}")).unwrap();
+        return;
+    }
+    for (what, numbers) in rows {
+        let line = there.lines().find(|line| line.starts_with(&format!("| {what} |")));
+        let line = line.unwrap_or_else(|| panic!("docs/export.md has no row {what}; UPDATE_EXPECT=1 writes it"));
+        let shown: Vec<f64> = line.split('|').filter_map(|cell| cell.trim().parse().ok()).collect();
+        assert_eq!(shown.len(), numbers.len(), "{line}");
+        let near = shown.iter().zip(numbers).all(|(a, b)| (a - *b as f64).abs() <= 0.25 * a + 64.0);
+        assert!(near, "docs/export.md: {line} and now {numbers:?}; UPDATE_EXPECT=1 writes the table");
     }
 }
 

@@ -24,7 +24,8 @@ fn wrong_requests_are_refused_with_what_can_be_done_instead() {
     let (table4, pid) =
         (file("stages/sollmann-jouaneh/table4.toml"), file("stages/sollmann-jouaneh/controllers/pid.toml"));
     let core = file("stages/core-xy/core-xy.toml");
-    let curved = ["--set", "cart.friction.static=0.3 N", "--set", "cart.friction.stribeck.velocity=0.02 m/s"];
+    let curved =
+        ["--set", "cart.friction={ coulomb = \"0.2 N\", stribeck = { force = \"0.1 N\", velocity = \"0.02 m/s\" } }"];
     let mut words = vec!["export", "c", &table4];
     words.extend(curved);
     let (code, _, error) = told(&words);
@@ -32,7 +33,7 @@ fn wrong_requests_are_refused_with_what_can_be_done_instead() {
     assert!(
         error.contains("the friction of the cart is a curve")
             && error.contains("taut export fmu")
-            && error.contains("--set"),
+            && error.contains("--part controller"),
         "{error}"
     );
     let cases: [(&[&str], &[&str]); 8] = [

@@ -32,6 +32,7 @@ fn exported(name: &str) -> String {
 /// The commands of a block that is called with what a controller saw.
 pub fn replayed(text: &str, seen: &[([f64; 12], f64)]) -> Vec<f64> {
     let mut block = Block::new(text);
+    assert!(block.name.ends_with("_CONTROLLER"), "{}", block.name);
     let step = |(seen, _): &([f64; 12], f64)| {
         for (name, value) in SEEN.iter().zip(seen).filter(|(name, _)| block.has(name)).collect::<Vec<_>>() {
             block.set(name, *value);

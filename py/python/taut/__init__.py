@@ -11,7 +11,7 @@ Mistakes are :class:`taut.Error`, a ``ValueError`` with the text that the comman
 """
 
 from ._native import Bug, Error, Observation, __version__
-from .case import Case, GantryCase, read, show, template
+from .case import Case, GantryCase, export, read, show, template
 from .results import Check, Comparison, Designed, Drift, Estimate, Fit, FitLog, FrequencyResponses, GantryModes, LinearModel, Modes, Shown, Tuned
 from .runs import Run, Runs
 from .shapers import Shape, shape
@@ -42,6 +42,7 @@ __all__ = [
     "Table",
     "Tuned",
     "__version__",
+    "export",
     "read",
     "shape",
     "show",

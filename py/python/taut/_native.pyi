@@ -1,6 +1,7 @@
 """What is written in Rust."""
 
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -154,6 +155,9 @@ class Case:
         highest: float | None,
         /,
     ) -> dict[str, Any]: ...
+    def export(
+        self, target: str, out: str, part: str | None, real: str, step: float | None, /
+    ) -> tuple[list[Path], list[str]]: ...
     def gantry_modes(self) -> dict[str, Any]: ...
     def show(self) -> dict[str, Any]: ...
 

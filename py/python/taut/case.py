@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, overload
 
 from . import _checks, _html, _native
@@ -468,6 +469,27 @@ def read(path: str | PathLike[str]) -> Case:
 def show(case: Case | str | PathLike[str]) -> Shown:
     """What follows from the numbers of a case, or of a case file."""
     return (case if isinstance(case, Case) else read(case)).show()
+
+
+def export(
+    case: Case | str | PathLike[str],
+    target: str,
+    out: str | PathLike[str],
+    *,
+    part: str | None = None,
+    real: str = "double",
+    step: float | None = None,
+) -> list[Path]:
+    """Writes a case, or a case file, for another tool, as ``taut export`` does, and returns the files.
+
+    ``target`` is ``c``, ``st``, ``matlab``, ``python`` or ``json``. ``out`` names the file where it ends as the target's
+    files do, else a folder. ``part`` is ``plant``, ``controller`` or ``both``, ``real`` the numbers of C (``float`` or
+    ``double``), ``step`` the step of the plant, s.
+    """
+    found = case if isinstance(case, Case) else read(case)
+    words = _checks.text("target", target), _checks.path(out), _checks.word("part", part), _checks.text("real", real)
+    files, _ = found._native.export(*words, _checks.number("step", step))
+    return [Path(file) for file in files]
 
 
 def template() -> str:

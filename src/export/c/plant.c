@@ -174,15 +174,15 @@ static void add_series(@name@_real s)
     uint32_t i;
     uint32_t k;
     for (i = 0U; i < STATES; i++) {
-        @name@_real change = R(0.0);
+        @name@_real moved = R(0.0);
         @name@_real sum;
         for (k = ORDER; k > 0U; k--) {
-            change = (change + term[k][i]) * s;
+            moved = (moved + term[k][i]) * s;
         }
         /* What the addition loses is kept for the next one. */
-        change -= plant.carry[i];
-        sum = plant.z[i] + change;
-        plant.carry[i] = (sum - plant.z[i]) - change;
+        moved -= plant.carry[i];
+        sum = plant.z[i] + moved;
+        plant.carry[i] = (sum - plant.z[i]) - moved;
         plant.z[i] = sum;
     }
 }

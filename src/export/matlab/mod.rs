@@ -37,7 +37,7 @@ pub(super) fn export(case: &Opened, stem: &str, options: &Options) -> Result<Exp
     let facts = vec![
         ("states".into(), tables.rates.len().to_string()),
         ("modes".into(), tables.modes().to_string()),
-        ("function".into(), format!("{name}(commands, until, every)")),
+        ("function".into(), format!("{name}(commands, t_end, every)")),
     ];
     let mut notes = Vec::new();
     if format!("{name}.m") != format!("{stem}.m") {

@@ -1,8 +1,8 @@
-function out = @name@(commands, until, every)
+function out = @name@(commands, t_end, every)
 % @title@
 %
-% out = @name@(commands, until, every) simulates from rest at the origin. Each row of commands is a time (s) and the
-% commands of the drives from then on; until (s) is the end, every (s) the interval of the rows. out.time, out.position
+% out = @name@(commands, t_end, every) simulates from rest at the origin. Each row of commands is a time (s) and the
+% commands of the drives from then on; t_end (s) is the end, every (s) the interval of the rows. out.time, out.position
 % (rad or m, a column for each of out.bodies), out.speed, out.current (A), out.events (time, element, what follows).
 %
 %   out = @name@([0 5; 0.25 0], 1, 1e-3);      % 5 V for 0.25 s
@@ -33,7 +33,7 @@ s.events = zeros(0, 3);
 s.cache = {};
 s = take_up(m, s);
 
-rows = round(until / every) + 1;
+rows = round(t_end / every) + 1;
 bodies = size(m.bodies, 1);
 out.bodies = m.bodies;
 out.time = (0:rows - 1)' * every;
@@ -104,7 +104,7 @@ sizes = abs(value);
 answer = false;
 for k = 1:24
   now = row * value;
-  if abs(now) > 1e-14 * (abs(row) * sizes)
+  if abs(now) > 1e-13 * (abs(row) * sizes)
     answer = now < 0;
     return
   end
@@ -157,9 +157,9 @@ error('too many events at %g s', s.time);
 end
 
 % Goes on to a time.
-function s = advance(m, s, until)
-while until - s.time > 1e-15 * max(1, until)
-  h = min(s.mode.h, until - s.time);
+function s = advance(m, s, goal)
+while goal - s.time > 1e-15 * max(1, goal)
+  h = min(s.mode.h, goal - s.time);
   if h == s.mode.h
     after = s.mode.p * s.z;
   else

@@ -20,7 +20,8 @@ from scipy.integrate import solve_ivp
 LINEAR = @linear@
 
 STEP = @step@
-ROUNDING = 5e-15
+# What an integrator with event location makes of a zero, as a share of the parts of a sum.
+ROUNDING = 1e-11
 N = len(STATES)
 SIZE = N + len(DRIVES) + 1
 WEIGHTS = np.array(WEIGHTS)
@@ -62,11 +63,11 @@ class Machine:
         self.rows = [self._row(guard[0]) for guard in self.active]
 
     def _falls(self, row):
-        """Whether a condition falls below zero here: the first of its derivatives that is more than rounding decides."""
+        """Whether a condition falls below zero here: the first of its derivatives that is more than that decides."""
         value, size, absolute = self.z, np.abs(self.z), np.abs(self.a)
         for _ in range(24):
             now = row @ value
-            if abs(now) > 2 * ROUNDING * (np.abs(row) @ size):
+            if abs(now) > ROUNDING * (np.abs(row) @ size):
                 return now < 0
             value, size = self.a @ value, absolute @ size
         return False
@@ -106,7 +107,10 @@ class Machine:
         while until - self.time > 1e-15 * max(1.0, until):
             events = []
             for row in self.rows:
-                event = lambda t, x, row=row: row[:N] @ x + row[N:] @ self.z[N:]
+                # What is zero here and rises is below zero only by the integrator's own error.
+                slack = 1e-13 * (np.abs(row) @ np.abs(self.z) + 1.0)
+                slack = slack if abs(row @ self.z) <= slack else 0.0
+                event = lambda t, x, row=row, slack=slack: row[:N] @ x + row[N:] @ self.z[N:] + slack
                 event.terminal, event.direction = True, -1
                 events.append(event)
             a, b = self.a[:N, :N], self.a[:N, N:] @ self.z[N:]
