@@ -169,22 +169,26 @@ impl Friction {
     pub(crate) fn dry_at<const N: usize>(&self, forward: bool, v: [f64; N]) -> [f64; N] {
         let side = self.side(forward);
         let (coulomb, above) = (side.coulomb, side.breakaway - side.coulomb);
+        // Written into place: several of them are one operation where the processor has such.
+        let mut dry = [coulomb; N];
         match self.law {
-            Law::Coulomb => [coulomb; N],
+            Law::Coulomb => {}
             // F_c + F_s e^{−F_τ v²}                                              (14)
-            Law::Stribeck { velocity, shape: Shape::Gaussian } => {
-                v.map(|v| coulomb + above * Shape::Gaussian.share(v / velocity))
+            Law::Stribeck { velocity, shape: Shape::Gaussian } | Law::LuGre { velocity, .. } => {
+                // Of bristles: what they carry in steady sliding, g(v).
+                dry.iter_mut().zip(v).for_each(|(dry, v)| *dry += above * Shape::Gaussian.share(v / velocity));
             }
             Law::Stribeck { velocity, shape: Shape::Exponential } => {
-                v.map(|v| coulomb + above * Shape::Exponential.share(v / velocity))
+                dry.iter_mut().zip(v).for_each(|(dry, v)| *dry += above * Shape::Exponential.share(v / velocity));
             }
-            Law::Smooth { breakaway_velocity } => v.map(|v| {
-                let (q, c) = (v / (SQRT_2 * breakaway_velocity), v / (breakaway_velocity / 10.0));
-                (2.0 * E).sqrt() * above * exp(-q * q) * q + coulomb * c.tanh()
-            }),
-            // In steady sliding the bristles carry g(v).
-            Law::LuGre { velocity, .. } => v.map(|v| coulomb + above * Shape::Gaussian.share(v / velocity)),
+            Law::Smooth { breakaway_velocity } => {
+                for (dry, v) in dry.iter_mut().zip(v) {
+                    let (q, c) = (v / (SQRT_2 * breakaway_velocity), v / (breakaway_velocity / 10.0));
+                    *dry = (2.0 * E).sqrt() * above * exp(-q * q) * q + coulomb * c.tanh();
+                }
+            }
         }
+        dry
     }
 
     /// How [`Friction::sliding`] changes with the velocity: negative where stick-slip begins by itself.

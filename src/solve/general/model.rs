@@ -65,7 +65,11 @@ impl Curved {
     #[inline(always)]
     pub(super) fn beyond_coulomb<const N: usize>(&self, forward: bool, v: [f64; N]) -> [f64; N] {
         let (sign, coulomb) = (if forward { 1.0 } else { -1.0 }, self.friction.side(forward).coulomb);
-        self.friction.dry_at(forward, v.map(|v| sign * v)).map(|dry| sign * (dry - coulomb))
+        let mut along = v;
+        along.iter_mut().for_each(|v| *v *= sign);
+        let mut beyond = self.friction.dry_at(forward, along);
+        beyond.iter_mut().for_each(|dry| *dry = sign * (*dry - coulomb));
+        beyond
     }
 
     /// The law at `v`, dry friction being multiplied by `factor`. The speed is counted in the direction of motion:

@@ -423,7 +423,13 @@ fn at_nodes(c: &[f64; super::radau::TERMS], order: usize) -> Lane {
 /// The powers of the quartic through five values.
 #[inline(always)]
 pub(super) fn monomials(values: &[f64; POINTS]) -> [f64; POINTS] {
-    MONOMIALS.map(|row| row.iter().zip(values).fold(0.0, |sum, (weight, value)| sum + weight * value))
+    let mut powers = [0.0; POINTS];
+    for (power, row) in powers.iter_mut().zip(&MONOMIALS) {
+        for (weight, value) in row.iter().zip(values) {
+            *power += weight * value;
+        }
+    }
+    powers
 }
 
 /// Coordinates, speeds and currents of a whole state; what stands behind them does not count.
