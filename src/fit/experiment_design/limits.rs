@@ -112,10 +112,21 @@ impl Limits {
     }
 }
 
+/// A machine that the cart does not leave: how far it goes is looked at afterwards. Spans that follow the cart need
+/// their travel.
+pub(super) fn unbounded(stage: &Stage) -> Stage {
+    let mut stage = stage.clone();
+    if !stage.belt.follows_cart {
+        stage.travel = None;
+    }
+    stage
+}
+
 /// How far the case's own experiments go; those that do not get to their end are left out.
 fn seen(case: &Case) -> Vec<Reached> {
+    let stage = unbounded(&case.stage);
     let one = |experiment: &Experiment| {
-        reach(&case.stage, &experiment.input, experiment.initial, experiment.every, experiment.until)
+        reach(&stage, &experiment.input, experiment.initial, experiment.every, experiment.until)
     };
     case.experiments.iter().filter_map(one).collect()
 }

@@ -269,6 +269,10 @@ impl Task<'_> {
     /// An input that keeps the limits on all of these machines, too, and what it surely tells.
     fn finally(&self, shape: Shape, doubtful: &[Stage]) -> Option<Judged> {
         let (shape, initial, reached) = self.fitted(shape, doubtful)?;
+        // What does not break away tells nothing.
+        if reached.speed == 0.0 {
+            return None;
+        }
         let information = self.surely(self.information(&shape.signal(), initial, &Differences::Central)?)?;
         let score = information.score(self.criterion);
         Some(Judged { shape, initial, reached, information, score })

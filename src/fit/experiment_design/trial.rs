@@ -3,7 +3,7 @@
 use super::Task;
 use super::candidates::Shape;
 use super::criterion::Information;
-use super::limits::{Reached, reach};
+use super::limits::{Reached, reach, unbounded};
 use crate::case::{Experiment, Initial};
 use crate::chance::{hash, normal};
 use crate::fit::least_squares::{Differences, Residuals};
@@ -22,20 +22,10 @@ use std::sync::Arc;
 const SMALLER: usize = 8;
 
 impl Task<'_> {
-    /// A machine that the cart does not leave: how far it goes is looked at afterwards. Spans that follow the cart need
-    /// their travel.
-    fn unbounded(&self, stage: &Stage) -> Stage {
-        let mut stage = stage.clone();
-        if !stage.belt.follows_cart {
-            stage.travel = None;
-        }
-        stage
-    }
-
     /// Where an input begins so that its way is in the middle of the travel, and how far it goes; none where the run
     /// does not get to its end.
     pub(super) fn placed(&self, stage: &Stage, input: &Signal) -> Option<(Initial, Reached)> {
-        let stage = self.unbounded(stage);
+        let stage = unbounded(stage);
         let at = |x: f64| {
             let angle = x / stage.pulley_radius;
             Initial { cart_position: x, drive_angle: angle, idler_angle: angle, ..Initial::default() }
@@ -58,7 +48,7 @@ impl Task<'_> {
             let (initial, reached) = self.placed(&self.case.stage, &signal)?;
             let mut used = self.limits.used(&reached);
             for stage in stages {
-                let reached = reach(&self.unbounded(stage), &signal, initial, self.every, self.duration)?;
+                let reached = reach(&unbounded(stage), &signal, initial, self.every, self.duration)?;
                 used = used.max(self.limits.used(&reached));
             }
             // Four digits.
