@@ -281,6 +281,16 @@ impl Instance {
             return Ok(Settled::default());
         }
         self.refresh()?;
+        // Samples that an importer passes over are none that could be made up for.
+        if let (Some(control), Some(design)) = (&self.control, &self.model.design)
+            && self.begin + control.next() + design.every < self.time
+        {
+            return Err(Refusal::error(format!(
+                "the controller was to decide at {} s, and it is {} s; allowed: no time behind the next event time",
+                self.begin + control.next(),
+                self.time
+            )));
+        }
         let mut settled = self.change()?;
         let mut decided = false;
         while self.control.as_ref().is_some_and(|control| self.begin + control.next() <= self.time + self.near()) {
