@@ -195,7 +195,9 @@ impl Opened {
             let has_default = matches!(row.default, Fallback::Value(_)) && value.is_finite();
             let whole = |number: &Number| key.starts_with(&format!("{}.", number.key)) || number.key == key;
             let sits = matches!(machine.sits(row), parameter::Sits::Machine(..));
-            let is_new = sits && has_default && !numbers.iter().any(whole);
+            // An element of a list that is not there cannot be set by itself.
+            let is_element = key.split('.').any(|part| part.bytes().all(|byte| byte.is_ascii_digit()));
+            let is_new = sits && has_default && !is_element && !numbers.iter().any(whole);
             is_new.then_some(Number { row, unit: row.unit, value, written: None, key })
         });
         let unwritten: Vec<Number> = unwritten.collect();
