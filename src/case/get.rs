@@ -252,7 +252,7 @@ impl Number {
     ///
     /// ```
     /// use taut::case::{Opened, TEMPLATE};
-    /// let case = Opened::from_text_with("axis.toml", &TEMPLATE.replace("0.0194 m", "19.4 mm"), &[])?;
+    /// let case = Opened::from_text_with("axis.toml", TEMPLATE, &[])?; // with radius = "19.4 mm"
     /// let radius = case.numbers()?.into_iter().find(|number| number.key == "drive_pulley.radius").unwrap();
     /// assert_eq!(radius.change(0.02), "drive_pulley.radius=20 mm");
     /// # Ok::<(), taut::Error>(())
