@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::LazyLock;
-use taut::case::{Case, Given};
+use taut::case::{Case, Given, Opened};
 use taut::fit::Problem;
 use taut::parameter::{self, Field, Free, Off, Parameter, all, every, free_markdown, kinds, named, values};
 use taut::stage::Stage;
@@ -446,5 +446,36 @@ fn a_point_is_set_by_the_name_of_its_part() {
     ] {
         let error = Case::from_text_with(&name, &text, &[change]).unwrap_err().to_string();
         assert!(error.contains(part), "{error}");
+    }
+}
+
+/// A slider that gives a number the value that it has must change nothing but its digits, whatever the text's unit.
+#[test]
+fn each_number_of_each_bundled_machine_takes_its_own_value_back() {
+    let cases = [
+        "sollmann-jouaneh/table4.toml",
+        "sollmann-jouaneh/controllers/pid.toml",
+        "printer-axis/printer-axis.toml",
+        "laser-gantry/laser-gantry.toml",
+        "two-mass/two-mass.toml",
+        "h-frame/follows.toml",
+        "core-xy/core-xy.toml",
+    ];
+    for path in cases {
+        let path = format!("stages/{path}");
+        let case = Opened::read_with(&path, &[]).unwrap();
+        let numbers = case.numbers().unwrap();
+        assert!(numbers.len() > 20, "{path} has {} numbers", numbers.len());
+        for number in &numbers {
+            let change = number.change(number.value);
+            let changed = Opened::from_text_with(&path, case.text(), &[&change]);
+            let changed = changed.unwrap_or_else(|e| panic!("{path}: {change}: {e}"));
+            let again = changed.numbers().unwrap();
+            let again =
+                again.iter().find(|other| other.key == number.key).unwrap_or_else(|| panic!("{path}: {change}"));
+            let off = (again.value - number.value).abs();
+            assert!(off <= 1e-5 * number.value.abs(), "{path}: {change}: {} was {}", again.value, number.value);
+            assert!(again.written.is_some(), "{path}: {change}");
+        }
     }
 }

@@ -543,6 +543,18 @@ fn the_case_is_saved_whole_and_never_over_what_somebody_else_wrote() {
     assert_eq!(error["what"], "no case was named on the command line, and the page writes no other file");
 }
 
+/// With `--no-open` a link's state was lost: the address that was printed did not hold it.
+#[test]
+fn a_link_is_opened_under_the_address_that_is_printed() {
+    for link in ["#state=ab_c-d", "http://127.0.0.1:4711/#state=ab_c-d"] {
+        let studio = Studio::start(&[link]);
+        let (token, fragment) = studio.token.split_once('#').unwrap();
+        assert_eq!((token.len(), fragment), (64, "state=ab_c-d"));
+    }
+    // An address without a state is none, and no file either.
+    assert_eq!(Studio::start(&["http://127.0.0.1:4711/"]).token.len(), 64);
+}
+
 #[test]
 fn what_cannot_be_served_is_told() {
     let run = |words: &[&str]| {

@@ -195,7 +195,9 @@ impl Opened {
             let has_default = matches!(row.default, Fallback::Value(_)) && value.is_finite();
             let whole = |number: &Number| key.starts_with(&format!("{}.", number.key)) || number.key == key;
             let sits = matches!(machine.sits(row), parameter::Sits::Machine(..));
-            let is_new = sits && has_default && !numbers.iter().any(whole);
+            // An element of a list that is not there cannot be set by itself.
+            let is_element = key.split('.').any(|part| part.bytes().all(|byte| byte.is_ascii_digit()));
+            let is_new = sits && has_default && !is_element && !numbers.iter().any(whole);
             is_new.then_some(Number { row, unit: row.unit, value, written: None, key })
         });
         let unwritten: Vec<Number> = unwritten.collect();
@@ -250,7 +252,7 @@ impl Number {
     ///
     /// ```
     /// use taut::case::{Opened, TEMPLATE};
-    /// let case = Opened::from_text_with("axis.toml", &TEMPLATE.replace("0.0194 m", "19.4 mm"), &[])?;
+    /// let case = Opened::from_text_with("axis.toml", TEMPLATE, &[])?; // with radius = "19.4 mm"
     /// let radius = case.numbers()?.into_iter().find(|number| number.key == "drive_pulley.radius").unwrap();
     /// assert_eq!(radius.change(0.02), "drive_pulley.radius=20 mm");
     /// # Ok::<(), taut::Error>(())

@@ -67,11 +67,9 @@ function bar(app) {
     ...RATES.map(value => element("option", {value}, value === 1 ? "as it is" : `${number(1 / value)} × slower`)));
   const factor = element("input", {type: "range", id: "factor", min: 0, max: 40, step: 1, "aria-label": "Magnification of stretch and error", oninput: () => {
     app.factor = Number((10 ** (Number(factor.value) / 10)).toPrecision(2));
-    factorTold.textContent = `× ${number(app.factor)}`;
     app.tell("cursor");
   }});
-  const factorTold = element("output", {}, `× ${app.factor}`);
-  factor.value = String(10 * Math.log10(app.factor));
+  const factorTold = element("output", {});
   const experiment = element("select", {id: "experiment", "aria-label": "Experiment", onchange: () => app.choose(Number(experiment.value))});
   const before = element("button", {type: "button", "aria-pressed": "true", id: "before", onclick: () => {
     app.showsBefore = !app.showsBefore;
@@ -86,6 +84,9 @@ function bar(app) {
     scrub.value = String(Math.round((10000 * (app.cursor - from())) / span()));
     clock.textContent = timeText(app.cursor, Math.min(span() / 1000, app.isPlaying ? app.rate / 60 : 1));
     scrub.setAttribute("aria-valuetext", clock.textContent);
+    factorTold.textContent = `× ${number(app.factor)}`;
+    factor.value = String(Math.round(10 * Math.log10(app.factor)));
+    factor.setAttribute("aria-valuetext", factorTold.textContent);
   };
   app.on("cursor", show);
   app.on("window", () => { all.hidden = !app.window; show(); });

@@ -57,10 +57,12 @@ async fn run(options: Options) -> Result<()> {
     })?;
     let port = listener.local_addr().map_err(|e| cannot("listen", &e))?.port();
     let state = Arc::new(State::new(options.case, port)?);
-    let address = format!("http://127.0.0.1:{port}/?token={}", state.keys.token);
+    // Browsers keep the fragment to themselves, and take it along when the token is exchanged.
+    let address =
+        format!("http://127.0.0.1:{port}/?token={}{}", state.keys.token, options.fragment.unwrap_or_default());
     tell(&address, &state);
     if options.open {
-        address::open(&format!("{address}{}", options.fragment.unwrap_or_default()));
+        address::open(&address);
     }
     let ended = ended();
     tokio::pin!(ended);

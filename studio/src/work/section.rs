@@ -41,8 +41,7 @@ pub fn section(request: &Request, context: &Context) -> Result<Reply> {
         }
     };
     let to = to.min(until);
-    // Not a number, too.
-    if !(to - from > SHORTEST * to) {
+    if to - from <= SHORTEST * to {
         let error = Error::new(format!("a section from {from} s to {to} s holds nothing"));
         return Err(error.allowed(format!("within 0 s and {until} s, the end above the start")));
     }
