@@ -96,7 +96,7 @@ class Logs {
   refresh() {
     const {app} = this;
     this.own.hidden = !/^\s*log\s*=/m.test(app.text);
-    const machine = app.parameters.filter(one => MACHINE.test(one.key));
+    const machine = app.parameters.filter(one => MACHINE.test(one.key) && one.free !== false);
     const shape = machine.map(one => one.key).join(" ");
     if (shape === this.shape) return;
     this.shape = shape;
