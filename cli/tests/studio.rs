@@ -36,6 +36,8 @@ impl Studio {
 
     pub(crate) fn connect(&self) -> TcpStream {
         let stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
+        // Each request goes at once: a head comes in pieces.
+        stream.set_nodelay(true).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(45))).unwrap();
         stream
     }
@@ -342,7 +344,7 @@ fn malformed_frames_end_one_socket_and_nothing_else() {
         &[0x81, 0x05, b'h', b'e', b'l', b'l', b'o'], // without a mask
         &[0x8f, 0x80, 0, 0, 0, 0],                   // of no known kind
         &[0xf1, 0x80, 0, 0, 0, 0],                   // with reserved bits
-        &[0x81, 0xff, 0x7f, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0], // of 2^63 bytes
+        &[0x81, 0xff, 0x7f, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0, 0, 0, 0], // of 2^63 bytes
         &[0x82, 0x81, 0, 0, 0, 0, 7],                // binary
         &[0x81, 0x82, 0, 0, 0, 0, 0xff, 0xfe],       // not UTF-8
     ];
@@ -560,4 +562,70 @@ fn what_cannot_be_served_is_told() {
     assert_eq!(status, Some(2));
     assert!(told.starts_with(&format!("error: --port: port {} cannot be taken: ", other.port)), "{told}");
     assert!(told.ends_with("next: leave --port away for a free one, or name another\n"), "{told}");
+}
+
+/// Bytes of memory that a process has, where the system tells.
+fn memory(id: u32) -> Option<u64> {
+    let status = fs::read_to_string(format!("/proc/{id}/status")).ok()?;
+    let kilobytes = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?.trim().strip_suffix(" kB")?;
+    Some(1024 * kilobytes.parse::<u64>().ok()?)
+}
+
+/// Fifty pages drag at once while ten thousand requests come in; `TAUT_STUDIO_MINUTES=60` goes on for an hour, and prints
+/// what memory it needs.
+#[test]
+fn fifty_pages_drag_at_once_and_memory_stays() {
+    let studio = Studio::start(&[TABLE4]);
+    let minutes = std::env::var("TAUT_STUDIO_MINUTES").ok().and_then(|minutes| minutes.parse::<f64>().ok());
+    let until = minutes.map(|minutes| Instant::now() + Duration::from_secs_f64(60.0 * minutes));
+    let case = text(TABLE4);
+    let drag = |page: &mut Page, k: u32| {
+        let mass = 0.1 + 0.001 * f64::from(k % 1000);
+        let head = page.result("run", json!({ "text": case, "set": [["cart.mass", mass]] }));
+        let rows = head["columns"][0]["rows"].as_u64();
+        assert_eq!((rows, &head["error"]), (Some(1001), &Value::Null), "drag {k}");
+    };
+    let requests = |count: u32| {
+        let (host, cookie) = (studio.host(), studio.cookie());
+        let mut stream = studio.connect();
+        for k in 0..count {
+            stream.write_all(format!("GET /icon.svg HTTP/1.1\r\n{host}\r\n{cookie}\r\n\r\n").as_bytes()).unwrap();
+            let mut answer = [0; 4096];
+            let mut length = 0;
+            while !answer[..length].ends_with(b"</svg>\n") {
+                let more = stream.read(&mut answer[length..]).unwrap();
+                assert!(more > 0, "request {k} has half an answer");
+                length += more;
+            }
+            assert!(answer.starts_with(b"HTTP/1.1 200"));
+        }
+    };
+    // Once, so that what stays for good is there.
+    drag(&mut studio.page(), 0);
+    let mut first = None;
+    let mut rounds = 0;
+    loop {
+        std::thread::scope(|scope| {
+            for _ in 0..50 {
+                scope.spawn(|| {
+                    let mut page = studio.page();
+                    (0..if minutes.is_some() { 400 } else { 6 }).for_each(|k| drag(&mut page, k));
+                });
+            }
+            (0..4).for_each(|_| drop(scope.spawn(|| requests(1250))));
+        });
+        rounds += 1;
+        let now = memory(studio.child.id());
+        if let (Some(now), Some(_)) = (now, until) {
+            println!("round {rounds}: {:.1} MB", now as f64 / 1e6);
+        }
+        let first = *first.get_or_insert(now);
+        // What allocators keep is no leak: a tenth of it in a round would be.
+        if let (Some(first), Some(now)) = (first, now) {
+            assert!(now < first + (50 << 20), "memory grew from {first} to {now} bytes");
+        }
+        if until.is_none_or(|until| Instant::now() >= until) && rounds >= 2 {
+            break;
+        }
+    }
 }

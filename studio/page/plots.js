@@ -239,7 +239,9 @@ class Plot {
     const [from, to] = this.plots.seen, {scale} = this.panel, {low, high} = /** @type {any} */ (this.range);
     const kx = (this.width - LEFT - RIGHT) / (to - from), ky = (this.height - TOP - BOTTOM) / (high - low);
     const first = Math.max(0, lowerBound(x, from) - 1), last = Math.min(x.length, lowerBound(x, to) + 1);
-    const together = Math.max(1, Math.floor((last - first) / (2 * (this.width - LEFT - RIGHT))));
+    const together = Math.max(1, Math.floor((last - first) / (this.width - LEFT - RIGHT)));
+    // Dashes of what is dense show nothing, and cost most of a picture.
+    if (together > 2) pen.setLineDash([]);
     pen.beginPath();
     for (let i = first; i < last; i += together) {
       let least = i, greatest = i;
