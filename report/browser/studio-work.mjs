@@ -68,9 +68,9 @@ if (LOG) await test("a PendulePi log is dropped, mapped, checked, fitted and kep
   await quiet(page);
   const {text, mistake} = await page.evaluate(() => ({text: window.studio.text, mistake: window.studio.mistake}));
   expect(!mistake && text !== before && text.includes("[uncertainty]") && !text.includes("february"), `${JSON.stringify(mistake)} ${text.slice(-600)}`);
-  // What others found on the same two voltages: 12 V of 255 counts, 0.030621 N a count.
-  const gain = await page.evaluate(() => window.studio.parameters.find(one => one.key === "amplifier.gain").value);
-  expect(Math.abs(gain / (12 / 255) - 1) < 0.15, `the gain is ${gain}`);
+  // The authors' own supply and counts, 12 V of 255, are within what the fit knows.
+  const [, low, high] = /"amplifier.gain" = \{[^}]*low = ([\d.e-]+), high = ([\d.e-]+)/.exec(text) || [];
+  expect(Number(low) < 12 / 255 && 12 / 255 < Number(high), `the gain's interval is ${low} to ${high}`);
   await page.keyboard.press("Control+z");
   await quiet(page);
   expect((await page.evaluate(() => window.studio.text)) === before, "Ctrl-Z does not take the estimates back");
@@ -89,7 +89,7 @@ if (LOG) await test("a fit is stopped, and keeps the best", async open => {
   await page.click("#fit-stop");
   await page.waitForSelector("#fit-keep", {timeout: 30_000});
   const told = await page.locator("#fit-status").innerText();
-  expect(/interrupted|stopped/i.test(told), told);
+  expect(/interrupted|stopped|best so far/i.test(told), told);
   expect(Date.now() - begun < 20_000, `stopping took ${Date.now() - begun} ms`);
   expect((await page.locator("#fit-done tbody tr").count()) >= 5, "no estimates");
 });

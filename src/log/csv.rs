@@ -119,7 +119,11 @@ pub(super) fn names(file: &Path) -> Result<Vec<ColumnId>> {
             }
             continue;
         }
-        let remark = Layout::candidate(&lines, &lines.remark, &request, &[])?.names;
+        // As some programs write it, the names stand in a remark above the numbers.
+        let remark = match lines.remark.is_empty() {
+            true => Vec::new(),
+            false => Layout::candidate(&lines, &lines.remark, &request, &[]).map_or(Vec::new(), |found| found.names),
+        };
         let named = |those: &[String]| those.len() == names.len() && those.iter().all(|name| !numeric(name));
         let there = if named(&above) { above } else { remark };
         let place = |k: usize| there.get(k).filter(|name| named(&there) && !name.is_empty());

@@ -174,13 +174,10 @@ fn unit(column: &Seen, wanted: &str) -> Option<String> {
 
 /// The unit of a clock without a name for it, by the step between its rows: recorders take a sample every 10 µs to 0.1 s.
 fn by_step(column: &Seen) -> Option<String> {
-    let mut steps: Vec<f64> =
-        column.values.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
-    if steps.is_empty() || column.unit.is_some() {
+    if column.unit.is_some() {
         return None;
     }
-    let middle = steps.len() / 2;
-    match *steps.select_nth_unstable_by(middle, f64::total_cmp).1 {
+    match usual_step(&column.values)? {
         step if step > 500.0 => Some("us".into()),
         step if step >= 0.5 => Some("ms".into()),
         _ => None,
@@ -207,15 +204,27 @@ fn rises(values: &[f64]) -> bool {
     values.len() > 2 && up as f64 >= 0.97 * (values.len() - 1) as f64
 }
 
-/// The column that changes where the clock goes back, and nowhere else.
+/// Steps of a clock of so many usual ones part two runs.
+const PAUSE: f64 = 10.0;
+
+/// The column that changes where the clock goes back or pauses, and nowhere else.
 fn split(time: &[f64], clock: usize, columns: &[Seen]) -> Option<usize> {
-    let back: Vec<usize> = (1..time.len()).filter(|&k| time[k] <= time[k - 1]).collect();
+    let pause = PAUSE * usual_step(time)?;
+    let parts = |k: usize| time[k] <= time[k - 1] || time[k] - time[k - 1] > pause;
+    let seams: Vec<usize> = (1..time.len()).filter(|&k| parts(k)).collect();
     let tells = |column: &Seen| {
         let values = &column.values;
         let changes = (1..values.len()).filter(|&k| values[k].to_bits() != values[k - 1].to_bits());
-        values.len() == time.len() && changes.eq(back.iter().copied())
+        values.len() == time.len() && changes.eq(seams.iter().copied())
     };
-    (0..columns.len()).find(|&place| place != clock && !back.is_empty() && tells(&columns[place]))
+    (0..columns.len()).find(|&place| place != clock && !seams.is_empty() && tells(&columns[place]))
+}
+
+/// The median of the steps forward.
+fn usual_step(time: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
+    let middle = steps.len() / 2;
+    (!steps.is_empty()).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 #[cfg(test)]
@@ -232,15 +241,22 @@ mod tests {
 
     #[test]
     fn runs_of_one_file_are_told_apart_by_the_column_that_changes_with_them() {
-        let mut text = "pwm,time_us,position\n".to_string();
-        for pwm in [50, -50, 60] {
-            (0..40).for_each(|k| text += &format!("{pwm},{},{}\n", 5000 * k, 0.01 * f64::from(k)));
+        // The clock begins anew with each run, or goes on after a pause.
+        for pause in [0, 1_000_000] {
+            let mut text = "pwm, time_us, position\n".to_string();
+            for (run, pwm) in [50, -50, 60].into_iter().enumerate() {
+                let begin = pause * run;
+                (0..40).for_each(|k| text += &format!("{pwm}, {}, {}\n", begin + 5000 * k, 0.01 * k as f64));
+            }
+            let found = looked("runs.csv", &text);
+            let guess = &found.guess;
+            assert_eq!(found.columns[2].values.len(), 120);
+            assert_eq!(guess.columns[0], ("time", 1, Some("us".into())));
+            assert_eq!(
+                (guess.column("input"), guess.column("cart_position"), guess.split),
+                (Some(0), Some(2), Some(0))
+            );
         }
-        let found = looked("runs.csv", &text);
-        let guess = &found.guess;
-        assert_eq!(found.columns[2].values.len(), 120);
-        assert_eq!(guess.columns[0], ("time", 1, Some("us".into())));
-        assert_eq!((guess.column("input"), guess.column("cart_position"), guess.split), (Some(0), Some(2), Some(0)));
     }
 
     #[test]

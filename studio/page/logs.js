@@ -59,7 +59,7 @@ class Logs {
     this.cost = new Picture("Cost", {x: "Step", y: "log₁₀ of the cost", height: 150, words: "Falls as the model comes nearer to the logs."});
     this.moving = element("table", {class: "moving"});
     this.overlays = element("div", {class: "plots"});
-    this.live.append(element("div", {class: "live-head"}, this.cost.figure, element("div", {class: "scroll"}, this.moving)), this.overlays);
+    this.live.append(element("div", {class: "live-head"}, element("div", {}, this.cost.figure, element("p", {class: "quiet small-note"}, "It jumps where the weights of the residuals are estimated anew.")), element("div", {class: "scroll"}, this.moving)), this.overlays);
   }
 
   tell(error) {
@@ -96,7 +96,7 @@ class Logs {
   refresh() {
     const {app} = this;
     this.own.hidden = !/^\s*log\s*=/m.test(app.text);
-    const machine = app.parameters.filter(one => MACHINE.test(one.key));
+    const machine = app.parameters.filter(one => MACHINE.test(one.key) && one.free !== false);
     const shape = machine.map(one => one.key).join(" ");
     if (shape === this.shape) return;
     this.shape = shape;
@@ -219,7 +219,7 @@ class Logs {
   show(head) {
     this.result = head;
     const {result} = head;
-    const rows = head.rows.map((row, k) => element("tr", {}, element("th", {scope: "row"}, row.name), element("td", {}, row.value), element("td", {}, row.error), element("td", {}, row.interval), element("td", {class: "quiet"}, row.start),
+    const rows = head.rows.map((row, k) => element("tr", {}, element("th", {scope: "row"}, row.name), element("td", {}, row.value), element("td", {}, row.error), element("td", {}, row.interval.replace(/^95 %: /, "")), element("td", {class: "quiet"}, row.start),
       element("td", {}, result.parameters[k].determined ? "" : result.parameters[k].at_bound ? "at its bound" : "not determined")));
     const table = element("div", {class: "scroll card"}, element("table", {}, element("caption", {}, "Estimates and 95 % intervals"),
       element("thead", {}, element("tr", {}, ...["Parameter", "Estimate", "Standard error", "95 % interval", "Start", ""].map(text => element("th", {scope: "col"}, text)))), element("tbody", {}, ...rows)));

@@ -44,7 +44,8 @@ export class Picture {
       "aria-label": `${title}. ${axes.words || ""} ${help}`, onkeydown: event => this.key(event)}, this.canvas);
     this.table = element("details", {class: "data", ontoggle: () => this.fill()}, element("summary", {"aria-label": `Values of ${title}`}, "Values"), element("div", {class: "scroll", tabindex: "0", role: "group", "aria-label": `Values of ${title}`}));
     this.head = element("h3", {}, title);
-    this.figure = element("figure", {class: "picture", "data-picture": title}, element("figcaption", {}, this.head, this.legend), this.area, this.said, this.table);
+    this.unit = element("span", {class: "quiet"});
+    this.figure = element("figure", {class: "picture", "data-picture": title}, element("figcaption", {}, element("span", {class: "picture-head"}, this.head, this.unit), this.legend), this.area, this.said, this.table);
     new ResizeObserver(() => this.later()).observe(this.area);
     this.listen();
     all.add(this);
@@ -55,6 +56,7 @@ export class Picture {
     const names = JSON.stringify(series.filter(one => !one.quiet).map(one => [one.name, one.colour]));
     this.series = series;
     Object.assign(this.axes, axes);
+    this.unit.textContent = this.axes.yUnit || "";
     if (names !== this.names) {
       this.names = names;
       this.legend.replaceChildren(...series.filter(one => !one.quiet && one.name).map(one =>
@@ -123,7 +125,7 @@ export class Picture {
     // The grid, and numbers at it.
     pen.font = "12px system-ui, sans-serif";
     pen.lineWidth = 1;
-    const by = step(y1 - y0, Math.max(2, high / 55)), bx = axes.logX ? 1 : step(x1 - x0, Math.max(2, wide / 110));
+    const by = step(y1 - y0, Math.max(2, high / 34)), bx = axes.logX ? 1 : step(x1 - x0, Math.max(2, wide / 62));
     pen.textAlign = "right";
     pen.textBaseline = "middle";
     for (let i = Math.ceil(y0 / by - 1e-9); i * by <= y1 + 1e-9 * by; i++) this.line(pen, colour, LEFT, up(i * by), width - RIGHT, up(i * by), number(i * by, 5), LEFT - 7, up(i * by));

@@ -60,7 +60,7 @@ class Sweep {
   }
 
   refresh() {
-    const machine = this.app.parameters.filter(one => MACHINE.test(one.key) && one.value !== 0 && !/\.travel/.test(one.key));
+    const machine = this.app.parameters.filter(one => MACHINE.test(one.key) && one.value !== 0 && one.free !== false);
     const shape = machine.map(one => one.key).join(" ");
     if (shape === this.shape) return;
     this.shape = shape;
@@ -110,6 +110,8 @@ class Sweep {
       const {head, columns} = await asked;
       if (!this.headings.length) this.begin(head.headings);
       this.experiments = head.experiments;
+      // Moves have no trajectories here.
+      this.paths.figure.hidden = this.curve.parentElement.hidden = !this.experiments.length;
       const all = [...columns.values()];
       this.rows = Array.from({length: head.done}, (_, k) => all.map(column => column[k]));
       this.status.textContent = `${head.done} runs${head.stopped ? ` of ${head.runs}, stopped,` : ""} in ${number((performance.now() - begun) / 1000, 3)} s.`;

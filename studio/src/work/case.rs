@@ -5,7 +5,7 @@ use crate::message::Request;
 use serde_json::{Value, json};
 use taut::case::{Number, Opened};
 use taut::error::{Error, Result};
-use taut::parameter::Fallback;
+use taut::parameter::{Fallback, Free, Numbers};
 
 /// The case: `text`, changed by `set`, a list of keys and SI values, and by `changes`, a list of `KEY=VALUE`.
 pub fn opened(request: &Request, context: &Context) -> Result<Opened> {
@@ -33,7 +33,11 @@ fn change(numbers: &[Number], pair: &Value) -> Result<String> {
 }
 
 /// The numbers of a case with what the table of parameters says of them.
-pub fn parameters(numbers: &[Number]) -> Value {
+pub fn parameters(case: &Opened, numbers: &[Number]) -> Value {
+    let machine: &dyn Numbers = match case {
+        Opened::Axis(case) => &case.stage,
+        Opened::Gantry(case) => &case.gantry,
+    };
     let one = |number: &Number| {
         let Number { key, row, unit, value, written } = number;
         let default = match row.default {
@@ -52,6 +56,8 @@ pub fn parameters(numbers: &[Number]) -> Value {
             "low": limit(row.range.low),
             "high": limit(row.range.high),
             "whole": row.range.whole,
+            // Whether a fit or a sweep can set it by itself.
+            "free": !row.range.whole && Free::new(machine, key, &[key.as_str()], &[]).is_ok(),
             "allowed": row.range.describe(unit),
             "sentence": row.sentence,
             "example": taut::quantity::read(row.example, unit).ok(),

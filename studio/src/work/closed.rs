@@ -103,7 +103,7 @@ pub fn closed(request: &Request, context: &Context) -> Result<Reply> {
         "ending": taut_report::simulate::early_end(&done.run.outcome.ending),
         "trouble": done.trouble.as_ref().map(|trouble| &trouble.words),
         "result": told,
-        "parameters": parameters(&opened.numbers()?),
+        "parameters": parameters(&opened, &opened.numbers()?),
     }));
     match nyquist(&case, design) {
         Ok((margins, limit, curves)) => {

@@ -56,7 +56,7 @@ pub fn run(request: &Request, context: &Context) -> Result<Reply> {
         "took_s": took.as_secs_f64(),
     }));
     if request.flag("describe") {
-        reply.head.insert("parameters".into(), parameters(&numbers));
+        reply.head.insert("parameters".into(), parameters(&case, &numbers));
     }
     reply.head.insert("overview".into(), overview(&case));
     reply.columns = kept.columns;
