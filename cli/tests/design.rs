@@ -75,8 +75,7 @@ fn what_it_cannot_do_it_says() {
 #[test]
 fn what_is_not_determined_ends_with_status_one() {
     // Of a belt that does not stretch the friction of both pulleys acts as one.
-    let names =
-        ["--set", "belt.model=rigid", "--for", "drive_pulley.friction.viscous,idler_pulley.friction.viscous"];
+    let names = ["--set", "belt.model=rigid", "--for", "drive_pulley.friction.viscous,idler_pulley.friction.viscous"];
     let told = taut(&[&["design", TABLE4, "--json"][..], &names, &QUICK, &ANGLE].concat());
     let value: Value = serde_json::from_slice(&told.stdout).unwrap();
     assert_eq!((told.status.code(), &value["complete"]), (Some(1), &Value::Bool(false)), "{value}");
