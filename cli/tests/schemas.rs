@@ -150,7 +150,7 @@ fn results_follow_their_schemas() {
         ("show", &["show", TABLE4]),
         ("export", &["export", "json", TABLE4]),
         ("export", &["export", "json", "stages/core-xy/follows.toml"]),
-        ("export", &["export", "json", TABLE4, "--set", "travel.max=1 m", "--set", "belt.pretension=20 N"]),
+        ("export", &["export", "json", TABLE4, "--set", "belt.pretension=20 N"]),
         ("exported", &["export", "c", TABLE4]),
         ("exported", &["export", "st", PID]),
         ("show", &["show", "stages/core-xy/follows.toml"]),
