@@ -1,7 +1,7 @@
 //! How long a second of the paper's axis takes in steps of a millisecond, by the functions of FMI 3.0, and beside it a
 //! ball by the loop that the Reference FMUs have: one Euler step a millisecond, with bounces seen at its end alone.
 //!
-//! `cargo run --release --package taut-fmu --example speed`
+//! `cargo run --release --package taut-fmu --example steps`
 
 use std::ffi::CString;
 use std::hint::black_box;
