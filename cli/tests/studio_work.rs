@@ -145,7 +145,7 @@ fn a_sweep_sends_its_rows_and_the_trajectories_of_chosen_runs() {
     let head = page.result("sweep", json!({ "text": text(TABLE4), "plan": plan }));
     assert_eq!(
         head["error"]["text"],
-        "20001 runs are too many for a page; allowed: up to 20000; use `taut sweep` for more"
+        "20001 runs are too many for a page\n  allowed: up to 20000\n  next: use `taut sweep` for more"
     );
 }
 
