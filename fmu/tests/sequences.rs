@@ -62,7 +62,7 @@ impl Session<'_> {
                 13 => self.keep(random),
                 14 => fmi3::fmi3SetFMUState(c, self.any_state(random)),
                 15 => self.free_one(random),
-                16 => self.to_bytes(random),
+                16 => self.bytes_and_back(random),
                 17 => self.of_bytes(random),
                 18 => {
                     let known = self.reference(random);
@@ -126,7 +126,7 @@ impl Session<'_> {
         unsafe { fmi3::fmi3FreeFMUState(self.pointer, &mut state) }
     }
 
-    unsafe fn to_bytes(&mut self, random: &mut Random) -> c_int {
+    unsafe fn bytes_and_back(&mut self, random: &mut Random) -> c_int {
         let (state, mut size) = (self.any_state(random), 0);
         let status = unsafe { fmi3::fmi3SerializedFMUStateSize(self.pointer, state, &mut size) };
         if status != 0 {

@@ -170,11 +170,20 @@ impl Candidate {
                 if amplitude > 0.0 { "greater" } else { "less" }
             ),
             Kind::Drift => format!(
-                "friction of the {whose} that {} by {:.0} % from the begin of each log to its end",
+                "friction of the {whose} that {} by {} % from the begin of each log to its end",
                 if amplitude > 0.0 { "rises" } else { "falls" },
-                200.0 * amplitude.abs()
+                percent(200.0 * amplitude.abs())
             ),
         }
+    }
+}
+
+/// Per cent in two digits.
+fn percent(value: f64) -> String {
+    if value >= 0.1 {
+        format!("{:.*}", if value < 1.0 { 2 } else { usize::from(value < 10.0) }, value)
+    } else {
+        format!("{value:.1e}")
     }
 }
 

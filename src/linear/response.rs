@@ -204,7 +204,8 @@ pub fn solve_shifted(a: &DMatrix<f64>, s: Complex<f64>, transposed: bool, x: &mu
         rows.swap(k, pivot);
         x.swap(k, pivot);
         let lead = rows[k][k];
-        if !(lead.norm_sqr() > 0.0) {
+        // Nor is what is no number a pivot.
+        if lead.norm_sqr().partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
             return false;
         }
         let inverse = lead.inv();
@@ -215,7 +216,8 @@ pub fn solve_shifted(a: &DMatrix<f64>, s: Complex<f64>, transposed: bool, x: &mu
                 for j in k + 1..n {
                     row[j] -= factor * above[k][j];
                 }
-                x[i] = x[i] - factor * x[k];
+                let own = factor * x[k];
+                x[i] -= own;
             }
         }
     }

@@ -168,7 +168,7 @@ fn by_name(columns: &[Seen]) -> Guess {
 
 /// The unit that a column's name ends in, where the file states none.
 fn unit(column: &Seen, wanted: &str) -> Option<String> {
-    let Some(name) = column.id.name().filter(|_| column.unit.is_none()) else { return None };
+    let name = column.id.name().filter(|_| column.unit.is_none())?;
     suspected(name, wanted).map(str::to_string)
 }
 

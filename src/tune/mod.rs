@@ -308,7 +308,7 @@ impl Work<'_> {
             for layout in self.nearest(archive, &weighed) {
                 self.again(archive, layout, &some, &weighed);
                 match round < NEARBY {
-                    true => self.from_best(finalists, layout, &some, &weighed, archive)?,
+                    true => self.onward_from_best(finalists, layout, &some, &weighed, archive)?,
                     false => self.evolved(finalists, layout, &some, &weighed, archive)?,
                 }
             }

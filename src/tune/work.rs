@@ -505,7 +505,7 @@ impl<'a> Work<'a> {
     }
 
     /// With the simplex from the best design of a layout by what it is weighed with.
-    pub fn from_best(
+    pub fn onward_from_best(
         &mut self,
         finalists: &[Finalist],
         layout: usize,

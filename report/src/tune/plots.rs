@@ -129,9 +129,12 @@ fn bode(work: &Work) -> Result<Figure> {
     Ok(figure)
 }
 
-/// The loops before and after on the axis as it is taken for, those alone that are stable: frequencies, rad/s, and the
-/// way from the reference to the cart without feed-forward.
-fn ways(work: &Work) -> Result<Vec<(&'static str, Colour, Vec<f64>, Vec<Complex<f64>>)>> {
+/// A closed loop with its name and colour: frequencies, rad/s, and the way from the reference to the cart without
+/// feed-forward.
+type Way = (&'static str, Colour, Vec<f64>, Vec<Complex<f64>>);
+
+/// The loops before and after on the axis as it is taken for, those alone that are stable.
+fn ways(work: &Work) -> Result<Vec<Way>> {
     let nominal = work.tuned.family.nominal();
     let both = [("before", &work.tuned.before, Colour::Amber), ("after", &work.tuned.after, Colour::Blue)];
     let mut all = Vec::new();

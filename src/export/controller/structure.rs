@@ -307,8 +307,8 @@ fn state_feedback(
     );
     let measured: Vec<f64> = parts.measured.iter().copied().collect();
     let surprise = p.local("innovation", position.clone() - dot(&measured, |i| estimate[i].clone()));
-    for i in 0..n {
-        p.set(&format!("estimate{i}"), surprise.clone() * parts.kalman[i] + estimate[i].clone());
+    for (i, estimate) in estimate.iter().enumerate().take(n) {
+        p.set(&format!("estimate{i}"), surprise.clone() * parts.kalman[i] + estimate.clone());
     }
     let mut command = number(0.0);
     for i in 0..n {

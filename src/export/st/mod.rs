@@ -1,7 +1,7 @@
 //! IEC 61131-3 Structured Text: the controller as a function block.
 
 use super::controller::program;
-use super::program::{Expr, Node, Program, Statement, Test};
+use super::program::{Expr, Node, Statement, Test};
 use super::{Exported, Part, controller, identifier};
 use crate::case::Opened;
 use crate::error::{Error, Result};
@@ -33,7 +33,7 @@ pub(super) fn export(case: &Opened, part: Option<Part>, stem: &str) -> Result<Ex
     let resets: Vec<String> =
         program.states.iter().map(|state| format!("    {} := {};", state.name, literal(state.start))).collect();
     let mut body = String::new();
-    block(&program, &program.body, 0, &mut body);
+    block(&program.body, 0, &mut body);
     let name = format!("{}_controller", identifier(stem));
     let mut text = BLOCK.to_string();
     for (place, part) in [
@@ -82,7 +82,7 @@ fn literal(value: f64) -> String {
     }
 }
 
-fn block(program: &Program, body: &[Statement], depth: usize, text: &mut String) {
+fn block(body: &[Statement], depth: usize, text: &mut String) {
     let indent = "    ".repeat(depth);
     for statement in body {
         let _ = match statement {
@@ -93,14 +93,14 @@ fn block(program: &Program, body: &[Statement], depth: usize, text: &mut String)
                 match yes.is_empty() {
                     true => {
                         let _ = writeln!(text, "{indent}IF NOT ({test}) THEN");
-                        block(program, no, depth + 1, text);
+                        block(no, depth + 1, text);
                     }
                     false => {
                         let _ = writeln!(text, "{indent}IF {test} THEN");
-                        block(program, yes, depth + 1, text);
+                        block(yes, depth + 1, text);
                         if !no.is_empty() {
                             let _ = writeln!(text, "{indent}ELSE");
-                            block(program, no, depth + 1, text);
+                            block(no, depth + 1, text);
                         }
                     }
                 }

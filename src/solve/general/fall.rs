@@ -34,7 +34,13 @@ pub(super) fn first_fall(c: &[f64; TERMS], order: usize) -> Option<f64> {
             second[k] += second[k + 1];
         }
     }
-    second[0] = second[0].max(0.0);
+    if second[0] <= 0.0 {
+        // Zero between the halves: what begins there is told by the first power that is there.
+        second[0] = 0.0;
+        if second[1..].iter().find(|c| **c != 0.0).is_some_and(|c| *c < 0.0) {
+            return Some(0.5);
+        }
+    }
     roots::first_fall(&second[..SERIES_TERMS]).map(|s| 0.5 + 0.5 * s)
 }
 

@@ -447,8 +447,8 @@ mod tests {
         let monomial = |k: usize| (0..POINTS).fold(0.0, |sum, p| sum + radau::MONOMIALS[k][p] * f[p]);
         let mut forcing = [[0.0; STATES]; POWERS];
         forcing[0][1] = 0.3;
-        for k in 0..POINTS {
-            forcing[k][1] += 2.0 * u.get(k).unwrap_or(&0.0) - 1.5 * monomial(k);
+        for (k, forcing) in forcing.iter_mut().enumerate().take(POINTS) {
+            forcing[1] += 2.0 * u.get(k).unwrap_or(&0.0) - 1.5 * monomial(k);
         }
         let mut series = Series::room();
         linear.series(&y, h, &forcing, &mut series);

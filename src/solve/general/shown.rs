@@ -11,6 +11,9 @@ use crate::solve::observe::{Curve, Gap, QUANTITIES, Reading, Readout, TERMS};
 /// Places within a step at which it is shown, its ends among them: as many as a curve has terms.
 const PLACES: usize = TERMS;
 
+/// Most parts of a step that are shown one by one: steps are as long as four radians.
+const MOST_PARTS: f64 = 4.0;
+
 /// From values at k/7 to the coefficients of the polynomial through them.
 const COEFFICIENTS: [[f64; PLACES]; PLACES] = {
     let mut places = [0.0; PLACES];
@@ -51,25 +54,30 @@ impl Rows<'_> {
         }
         let (model, mode) = (&*core.model, &core.mode);
         let readout = Shown::of(&mut self.shown, &model.mechanism, mode);
-        let (from, until) = (way.from, way.until);
-        let mut nodes = [[0.0; QUANTITIES]; PLACES];
-        for (node, values) in nodes.iter_mut().enumerate() {
-            let tau = from + (until - from) * node as f64 / (PLACES - 1) as f64;
-            let y = if node == 0 { *way.begin } else { (way.dense)(tau) };
-            *values = read(readout, model, mode, &y, &way.stretch.input(tau));
-        }
-        let (begin, length) = (way.stretch.begin + from, until - from);
-        let bow = [f64::INFINITY; QUANTITIES];
-        let gap = Gap { begin, length, from: &nodes[0], to: &nodes[PLACES - 1], bow: &bow, mode };
-        let Some(observer) = &mut self.recorder.observer else { return };
-        if observer.pass(&gap) && length > 0.0 {
-            let mut terms = [[0.0; QUANTITIES]; PLACES];
-            for q in 0..QUANTITIES {
-                for (term, value) in terms.iter_mut().zip(through(&nodes.map(|node| node[q]))) {
-                    term[q] = value;
-                }
+        // A polynomial of degree seven follows what swings by a radian to 1e-9 of itself.
+        let parts = ((way.until - way.from) / core.moment).ceil().clamp(1.0, MOST_PARTS);
+        let place = |part: f64| way.from + (way.until - way.from) * (part / parts);
+        for part in 0..parts as usize {
+            let (from, until) = (place(part as f64), place((part + 1) as f64));
+            let mut nodes = [[0.0; QUANTITIES]; PLACES];
+            for (node, values) in nodes.iter_mut().enumerate() {
+                let tau = from + (until - from) * node as f64 / (PLACES - 1) as f64;
+                let y = if part == 0 && node == 0 { *way.begin } else { (way.dense)(tau) };
+                *values = read(readout, model, mode, &y, &way.stretch.input(tau));
             }
-            observer.see(&Curve { begin, length, terms });
+            let (begin, length) = (way.stretch.begin + from, until - from);
+            let bow = [f64::INFINITY; QUANTITIES];
+            let gap = Gap { begin, length, from: &nodes[0], to: &nodes[PLACES - 1], bow: &bow, mode };
+            let Some(observer) = &mut self.recorder.observer else { return };
+            if observer.pass(&gap) && length > 0.0 {
+                let mut terms = [[0.0; QUANTITIES]; PLACES];
+                for q in 0..QUANTITIES {
+                    for (term, value) in terms.iter_mut().zip(through(&nodes.map(|node| node[q]))) {
+                        term[q] = value;
+                    }
+                }
+                observer.see(&Curve { begin, length, terms });
+            }
         }
     }
 

@@ -230,11 +230,12 @@ fn decompose(matrix: &mut Slopes) -> [usize; NODES] {
         let best = (k..NODES).fold(k, |best, i| if matrix[i][k].abs() > matrix[best][k].abs() { i } else { best });
         matrix.swap(k, best);
         order.swap(k, best);
-        for i in k + 1..NODES {
-            let factor = matrix[i][k] / matrix[k][k];
-            matrix[i][k] = factor;
-            for j in k + 1..NODES {
-                matrix[i][j] -= factor * matrix[k][j];
+        let lead = matrix[k];
+        for row in &mut matrix[k + 1..] {
+            let factor = row[k] / lead[k];
+            row[k] = factor;
+            for (own, lead) in row[k + 1..].iter_mut().zip(&lead[k + 1..]) {
+                *own -= factor * lead;
             }
         }
     }

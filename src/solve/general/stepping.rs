@@ -136,7 +136,7 @@ impl Core {
         if h < 0.25 * regular && h + regular <= most {
             (to, h) = (to + regular, h + regular);
         }
-        if !(h < left - near) {
+        if h >= left - near {
             let is_whole = (left - regular).abs() <= near.min(1e-12 * regular + 8.0 * f64::EPSILON * time);
             return Length { h: if is_whole { regular } else { left }, to: stretch.length(), regular: is_whole };
         }
