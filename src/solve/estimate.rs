@@ -11,15 +11,16 @@ use crate::trajectory::Trajectory;
 const MOST_ROWS: u64 = 1000;
 
 /// The tolerance of the second run, as a multiple of the first one's.
-const FACTOR: f64 = 10.0;
+const FACTOR: f64 = 100.0;
 
 /// Where rows go.
 type Sink<'a> = dyn FnMut(&Trajectory) -> Flow + 'a;
 
 /// Keeps some of a run's rows, and compares them with those of a second run.
 ///
-/// The error of a step is about in proportion to the tolerance, so the second run, with ten times the tolerance, is off
-/// by about ten times as much as the first: twice their difference is an estimate on the safe side. Where the motion is
+/// The error of a step is about in proportion to the tolerance, so the second run, with a hundred times the tolerance, is
+/// off by far more than the first: twice their difference is an estimate on the safe side. Steps are halves and doubles
+/// of one length, so that with ten times the tolerance many were the same. Where the motion is
 /// sensitive to its last digits (flanks that rattle, loads just at a breakaway) both differ by what that makes of them.
 ///
 /// ```
