@@ -64,7 +64,7 @@ impl Criterion {
 /// The experiment that is wanted; what is not said follows from the case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
-    /// The parameters that count; the free ones of [fit] where none is named.
+    /// The parameters that count; the free ones of `[fit]` where none is named.
     pub names: Vec<String>,
     /// The inputs to choose among; all where none is named.
     pub kinds: Vec<Kind>,
