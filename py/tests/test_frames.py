@@ -84,6 +84,8 @@ def test_every_result_goes_to_pandas(case, root, moving):
 
 
 def test_a_design_is_that_of_the_program(case, root, tmp_path):
+    from test_results import program
+
     case.save(tmp_path / "axis.toml")
     told = program(root, "design", str(tmp_path / "axis.toml"), "--for", "cart.mass", "--input", "trapezoid", "--duration", "0.5")
     designed = taut.read(tmp_path / "axis.toml").design(["cart.mass"], inputs=["trapezoid"], duration=0.5)

@@ -635,5 +635,5 @@ def test_everything_public_is_called_here():
         assert sorted(public) == methods
         assert all(f".{method}(" in source for method in methods)
     assert {name for name in taut.__all__ if callable(getattr(taut, name)) and not isinstance(getattr(taut, name), type)} == {
-        "read", "shape", "show", "sweep", "sweep_tables", "template",
+        "export", "read", "shape", "show", "sweep", "sweep_tables", "template",
     }  # fmt: skip
