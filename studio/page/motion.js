@@ -176,15 +176,26 @@ class Stage {
   }
 }
 
-/** What follows from the numbers of the machine. */
+/** New texts for the cells that are there: the page lays out only what changed.
+ * @param {HTMLElement} root @param {string} cells @param {string[]} texts */
+function retext(root, cells, texts) {
+  root.querySelectorAll(cells).forEach((cell, k) => { if (cell.textContent !== texts[k]) cell.textContent = texts[k]; });
+}
+
+/** Quantities that follow from the numbers of the machine. */
 class Glance {
   /** @param {HTMLElement} root @param {App} app */
   constructor(root, app) {
     this.body = element("div", {class: "cards"});
     root.append(this.body);
+    let shape = "";
     app.on("run", () => {
       const overview = app.run && app.run.head.overview;
-      if (!overview) { this.body.replaceChildren(); return; }
+      if (!overview) { shape = ""; this.body.replaceChildren(); return; }
+      const {groups, notes: told} = overview, [titles, ...lines] = overview.places;
+      const now = JSON.stringify([groups.map(({name, rows}) => [name, rows.map(row => [row.name, row.how])]), titles, lines.length, told]);
+      if (now === shape) { retext(this.body, "dd, tbody td", [...groups.flatMap(({rows}) => rows.map(row => row.value)), ...lines.flat()]); return; }
+      shape = now;
       const card = ({name, rows}) => element("div", {class: "card"}, element("h3", {}, name), element("dl", {},
         ...rows.flatMap(row => [element("dt", {title: row.how || null}, row.name), element("dd", {}, row.value)])));
       const [head, ...places] = overview.places;
@@ -204,12 +215,16 @@ class Results {
     const figures = element("dl", {class: "figures"}), events = element("div", {class: "events"});
     const ending = element("p", {class: "mistake", hidden: true});
     root.append(ending, element("h2", {}, "Key figures"), figures, element("h2", {}, "Events"), events);
+    let shape = "";
     app.on("run", () => {
       if (!app.run) return;
       const {rows, ending: told, events: all, events_left_out: left} = app.run.head;
       ending.hidden = !told;
       ending.textContent = told ? `This run ${told}.` : "";
-      figures.replaceChildren(...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
+      const now = JSON.stringify(rows.map(([name]) => name));
+      if (now === shape) retext(figures, "dd", rows.map(([, value]) => value));
+      else figures.replaceChildren(...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
+      shape = now;
       if (root.hidden && all.length > 100) return;
       const shown = all.slice(0, 200);
       events.replaceChildren(...shown.map(event => element("button", {type: "button", class: "event", onclick: () => { app.isPlaying = false; app.tell("play"); app.seek(event.time); }},

@@ -85,6 +85,8 @@ export class Row {
     const name = nameOf(key), id = prefix + key.replace(/[^\w]/g, "-");
     this.text = [key, name, symbol, sentence].join(" ").toLowerCase();
     this.home = parameter.value;
+    /** The value that field and slider show, none while they are used. */
+    this.shown = NaN;
     this.field = element("input", {type: "text", id, inputmode: "decimal", autocomplete: "off", spellcheck: "false", "aria-describedby": id + "-told",
       onchange: () => this.typed(), onkeydown: event => { if (event.key === "Escape") this.show(); }});
     this.slider = element("input", {type: "range", min: 0, max: STEPS, step: 1, "aria-label": `${name}, slider`,
@@ -120,6 +122,7 @@ export class Row {
     const value = Number(this.field.value.trim().replace(",", ".").replace("\u2212", "-"));
     if (!isFinite(value) || this.field.value.trim() === "") {
       this.field.setAttribute("aria-invalid", "true");
+      this.shown = NaN;
       return;
     }
     this.app.drag(this.parameter.key, value);
@@ -131,7 +134,9 @@ export class Row {
     const isWrong = Boolean(mistake && pending.has(key));
     this.field.toggleAttribute("aria-invalid", isWrong);
     if (isWrong) this.field.setAttribute("aria-invalid", "true");
-    if (pending.has(key)) return;
+    if (pending.has(key)) { this.shown = NaN; return; }
+    if (value === this.shown) return;
+    this.shown = document.activeElement === this.field || document.activeElement === this.slider ? NaN : value;
     if (document.activeElement !== this.field) this.field.value = String(Number(value.toPrecision(6)));
     if (document.activeElement !== this.slider) {
       if (value < this.low || value > this.high) this.span();

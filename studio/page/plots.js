@@ -41,7 +41,15 @@ export class Plots {
     for (const what of /** @type {const} */ (["window", "compare", "cursor"])) app.on(what, () => this.later(what === "cursor"));
     app.on("theme", () => { this.readColours(); this.later(); });
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { this.readColours(); this.later(); });
-    new ResizeObserver(() => this.later()).observe(root);
+    new ResizeObserver(() => { for (const plot of this.plots) plot.measure(); this.later(); }).observe(root);
+    // A plot that is scrolled out of sight is drawn when it comes in: pictures of a drag are of what is looked at.
+    this.sight = new IntersectionObserver(entries => {
+      for (const {target, isIntersecting} of entries) {
+        const plot = this.plots.find(({area}) => area === target);
+        if (plot) { plot.isSeen = isIntersecting; plot.catchUp(); }
+      }
+    }, {rootMargin: "150px"});
+    addEventListener("beforeprint", () => this.plots.forEach(plot => { plot.isSeen = true; plot.catchUp(); }));
     this.readColours();
     this.frame = 0;
     this.onlyCursor = true;
@@ -63,6 +71,8 @@ export class Plots {
     this.shape = shape;
     this.plots = panels.map(panel => new Plot(panel, this));
     this.root.replaceChildren(...this.plots.map(plot => plot.figure));
+    this.sight.disconnect();
+    for (const plot of this.plots) this.sight.observe(plot.area);
   }
 
   /** Draws with the next picture. @param {boolean} [onlyCursor] */
@@ -74,7 +84,7 @@ export class Plots {
       const all = !this.onlyCursor;
       this.onlyCursor = true;
       if (!this.root.clientWidth) return;
-      for (const plot of this.plots) { if (all) plot.draw(); plot.drawCursor(); }
+      for (const plot of this.plots) { if (all) plot.isStale = true; plot.catchUp(); }
       this.app.drawn = this.app.run;
     });
   }
@@ -91,6 +101,14 @@ class Plot {
     /** @type {Set<string>} */
     this.hidden = new Set();
     this.isStates = panel.key === "state";
+    /** Whether it is in sight, or may be. */
+    this.isSeen = true;
+    /** Whether its curves are of an earlier run or another part of time. */
+    this.isStale = true;
+    /** Width of the area, which is asked of the page once a change: each asking has it laid out. */
+    this.wide = 0;
+    /** What the canvas of the cursor shows. */
+    this.pointed = "";
     /** @type {{low: number, high: number} | null} */
     this.range = null;
     /** @type {{x: number, to?: number, window: [number, number], pans: boolean} | null} */
@@ -136,7 +154,8 @@ class Plot {
 
   // ---- Drawing
 
-  get width() { return Math.max(200, this.area.clientWidth); }
+  get width() { return Math.max(200, this.wide || this.measure()); }
+  measure() { return this.wide = this.area.clientWidth; }
   get height() { return this.isStates ? 26 + 22 * this.panel.curves.length + BOTTOM : HEIGHT + BOTTOM; }
   across(time) { const [a, b] = this.plots.seen; return LEFT + (this.width - LEFT - RIGHT) * (time - a) / (b - a); }
   timeAt(x) { const [a, b] = this.plots.seen; return a + (b - a) * (x - LEFT) / (this.width - LEFT - RIGHT); }
@@ -176,7 +195,15 @@ class Plot {
     return {x: answer.columns.get("time"), y: answer.columns.get(key)};
   }
 
+  /** Draws what is to be drawn, where it is in sight. */
+  catchUp() {
+    if (!this.isSeen && !this.table.open) return;
+    if (this.isStale) this.draw();
+    this.drawCursor();
+  }
+
   draw() {
+    this.isStale = false;
     const pen = this.pen(this.canvas);
     if (this.isStates) this.drawStates(pen); else this.drawCurves(pen);
     if (this.table.open) this.fill(this.table);
@@ -356,29 +383,39 @@ class Plot {
   }
 
   drawCursor() {
-    const {app, colours} = this.plots, pen = this.pen(this.over), x = this.across(app.cursor);
-    const box = this.press;
-    if (box && !box.pans && box.to !== undefined) {
-      pen.fillStyle = colours.blue;
-      pen.globalAlpha = 0.12;
-      pen.fillRect(Math.min(box.x, box.to), TOP, Math.abs(box.to - box.x), this.height - TOP - BOTTOM);
-      pen.globalAlpha = 1;
-    }
-    if (x >= LEFT - 0.5 && x <= this.width - RIGHT + 0.5) {
-      pen.strokeStyle = colours.ink;
-      pen.globalAlpha = 0.55;
-      line(pen, x, TOP, x, this.height - BOTTOM);
-      pen.globalAlpha = 1;
-    }
+    const {app, colours} = this.plots, {width, height, press} = this, x = this.across(app.cursor);
+    const isInside = x >= LEFT && x <= width - RIGHT;
+    /** @type {[string, number][]} */
+    const dots = [];
     this.panel.curves.forEach(({key}, k) => {
       const text = this.words(key, k);
       if (this.values[k].textContent !== text) this.values[k].textContent = text;
-      if (this.isStates || this.hidden.has(key) || x < LEFT || x > this.width - RIGHT) return;
-      pen.fillStyle = colours[COLOURS[k % COLOURS.length]];
-      pen.beginPath();
-      pen.arc(x, this.up(app.value(key, app.cursor) * this.panel.scale), 3, 0, 7);
-      pen.fill();
+      if (this.isStates || this.hidden.has(key) || !isInside) return;
+      dots.push([colours[COLOURS[k % COLOURS.length]], this.up(app.value(key, app.cursor) * this.panel.scale)]);
     });
+    const box = press && !press.pans && press.to !== undefined ? [press.x, press.to] : null;
+    const pointed = JSON.stringify([x, width, height, box, dots, colours.ink]);
+    if (pointed === this.pointed) return;
+    this.pointed = pointed;
+    const pen = this.pen(this.over);
+    if (box) {
+      pen.fillStyle = colours.blue;
+      pen.globalAlpha = 0.12;
+      pen.fillRect(Math.min(...box), TOP, Math.abs(box[1] - box[0]), height - TOP - BOTTOM);
+      pen.globalAlpha = 1;
+    }
+    if (x >= LEFT - 0.5 && x <= width - RIGHT + 0.5) {
+      pen.strokeStyle = colours.ink;
+      pen.globalAlpha = 0.55;
+      line(pen, x, TOP, x, height - BOTTOM);
+      pen.globalAlpha = 1;
+    }
+    for (const [colour, y] of dots) {
+      pen.fillStyle = colour;
+      pen.beginPath();
+      pen.arc(x, y, 3, 0, 7);
+      pen.fill();
+    }
   }
 
   /** The value of a curve at the cursor. */
@@ -500,6 +537,7 @@ class Plot {
   }
 
   png() {
+    if (this.isStale) this.draw();
     const canvas = document.createElement("canvas"), {colours} = this.plots;
     canvas.width = this.canvas.width;
     canvas.height = this.canvas.height;

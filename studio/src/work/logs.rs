@@ -24,7 +24,7 @@ const SHOWN: usize = 4;
 const THINNED: usize = 240;
 
 /// Time between two pictures of a fit.
-const PICTURES: Duration = Duration::from_millis(120);
+const PICTURES: Duration = Duration::from_millis(40);
 
 /// The columns of a file that was sent, their first rows, and what they seem to be.
 pub fn columns(request: &Request, context: &Context) -> Result<Reply> {
