@@ -14,7 +14,7 @@ use taut::case::Case;
 use taut::chance::uniform;
 use taut::tune::{Tuned, Verdict, evolved, tune};
 
-/// What is drawn, and as factors of what.
+/// The quantities that are drawn, as factors of the case's own.
 const DRAWN: [&str; 7] = [
     "cart.mass",
     "cart.friction.viscous",
@@ -85,7 +85,7 @@ fn one(name: &str, case: taut::Result<Case>, generations: usize) {
     }
 }
 
-/// What the evolution found, and by how much the tuning is worse (better, below zero).
+/// Cost that the evolution found, and by how much the tuning is worse (better, below zero).
 fn beside(tuned: &Tuned, other: Option<Option<Verdict>>) -> String {
     match other {
         None => String::new(),

@@ -58,7 +58,7 @@ const INDEPENDENT: f64 = 0.947;
 /// of the power of Hann's window, 1/3 of a line squared.
 const SMEARED: f64 = 1.0 / 6.0;
 
-/// What that makes of the variance: neighbouring lines are alike by 4/9, the next by 1/36, so that
+/// Effect on the variance: neighbouring lines are alike by 4/9, the next by 1/36, so that
 /// (1 + 2/6)² + 2/36 − 4 (4/3) (1/6) (4/9) + 2/36² = 1.44.
 const NOISIER: f64 = 1.44;
 

@@ -56,7 +56,7 @@ fn promises_for_an_encoder_alone_are_kept() {
     }
 }
 
-/// What is designed tells more than the experiments that the case has, in no more time.
+/// A designed input tells more than the experiments that the case has, in no more time.
 #[test]
 fn a_design_tells_more_than_a_pulse() {
     let case = template();

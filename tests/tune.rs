@@ -459,7 +459,7 @@ fn a_tuning_that_is_stopped_ends_soon() {
     assert!(tuned.after.hunt.is_none());
 }
 
-/// What a search may simulate is bounded: a few seconds of a processor on each bundled case, which took up to 23.
+/// The simulations of a search are bounded: a few seconds of a processor on each bundled case, which took up to 23.
 #[test]
 fn a_search_keeps_to_its_samples() {
     for name in ["pid-elastic.toml", "cascade.toml"] {

@@ -541,7 +541,7 @@ pub struct Design {
     /// The inputs to choose among, separated by commas [default: all of them]
     #[arg(long = "input", value_enum, value_name = "INPUT", value_delimiter = ',')]
     pub kinds: Vec<InputName>,
-    /// What is made small: the volume of the confidence ellipsoid, or the mean square of the errors
+    /// The measure that is made small: the volume of the confidence ellipsoid, or the mean square of the errors
     #[arg(long, value_enum, default_value = "d")]
     pub criterion: CriterionName,
     /// Length of the experiment
@@ -589,7 +589,7 @@ pub struct Design {
     "The file to write, or the folder for it and for those that belong to it"
 )), mut_arg("no_report", |arg| arg.hide(true)), mut_arg("png", |arg| arg.hide(true)))]
 pub struct Export {
-    /// What to export to; without a name they are listed
+    /// Target of the export; without one, all are listed
     #[arg(value_enum)]
     pub target: Option<TargetName>,
     /// The case file; - is standard input
@@ -642,7 +642,7 @@ impl InputName {
     }
 }
 
-/// What a design makes small.
+/// Measures that a design makes small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum CriterionName {
     /// The volume of the confidence ellipsoid
@@ -677,7 +677,7 @@ Examples:
   taut export st stages/sollmann-jouaneh/controllers/pid.toml --out pid.st
   taut export json axis.toml --json | jq .linear";
 
-/// What a case is exported to.
+/// Targets of an export.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum TargetName {
     /// A functional mock-up unit: one file for any tool that imports FMI

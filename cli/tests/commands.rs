@@ -211,6 +211,42 @@ fn a_run_as_measured() {
     }
 }
 
+/// Simulated against its log, a machine shows by how much it misses it: by the encoder's rounding where it is the
+/// machine that was logged, by much more where its friction is another.
+#[test]
+fn a_run_beside_its_log() {
+    let folder = TempDir::new().unwrap();
+    let here = folder.path();
+    taut(here).args(["init", "axis.toml"]).assert().success();
+    let measured =
+        ["simulate", "axis.toml", "--experiment", "5 V pulse", "--as-measured", "--no-report", "--out", "made"];
+    taut(here).args(measured).assert().success();
+    let log = "experiment.0.log={ file = \"made/5-v-pulse.measured.csv\", time = \"time_s\", input = \"voltage_V\", \
+               drive_angle = \"drive_angle_rad\" }";
+    let beside = |more: &[&str]| {
+        let mut args = vec!["simulate", "axis.toml", "--experiment", "5 V pulse"];
+        args.extend(["--set", "experiment.0.input=none", "--set", log]);
+        args.extend(more);
+        let text = taut(here).args(&args).assert().success().get_output().stdout.clone();
+        let text = String::from_utf8(text).unwrap();
+        let told = taut(here).args(&args).arg("--json").assert().success().get_output().stdout.clone();
+        let told: serde_json::Value = serde_json::from_slice(&told).unwrap();
+        let log = &told["experiments"][0]["log"];
+        assert_eq!(log["complete"], true);
+        assert_eq!(log["outputs"][0]["quantity"], "drive_angle");
+        assert_eq!(log["outputs"][0]["score"]["count"], 1001);
+        assert!(text.contains("against its log") && text.contains("drive_angle: RMSE"), "{text}");
+        log["outputs"][0]["score"]["rmse"].as_f64().unwrap()
+    };
+    // A count is 2π/2048.
+    let count = std::f64::consts::TAU / 2048.0;
+    assert!(beside(&[]) < 0.6 * count);
+    assert!(beside(&["--set", "cart.friction.coulomb=12"]) > 10.0 * count);
+    // Without a log there is nothing to be told.
+    let plain = taut(here).args(["simulate", "axis.toml", "--json"]).assert().success().get_output().stdout.clone();
+    assert!(serde_json::from_slice::<serde_json::Value>(&plain).unwrap()["experiments"][0]["log"].is_null());
+}
+
 #[test]
 fn json_on_the_terminal_is_the_summary_in_the_folder() {
     let folder = TempDir::new().unwrap();

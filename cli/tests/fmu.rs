@@ -15,7 +15,7 @@ fn taut(args: &[&str]) -> Command {
     command
 }
 
-/// What is told of a request that is refused, and its exit status.
+/// The message of a request that is refused, and its exit status.
 fn refused(args: &[&str]) -> (i32, String) {
     let output = taut(args).output().unwrap();
     assert!(output.stdout.is_empty(), "{}", String::from_utf8_lossy(&output.stdout));

@@ -120,7 +120,7 @@ fn spans_that_follow_are_solved_in_general_with_an_error_that_is_estimated() {
         let (usual, fine) = (told(&[]), told(&["--solver", "general", "--tolerance", "1e-12"]));
         assert_eq!(usual["solver"]["name"], "general");
         assert_eq!((&usual["solver"]["tolerance"], &fine["solver"]["tolerance"]), (&1e-9.into(), &1e-12.into()));
-        assert_eq!(usual["experiments"][0]["position_error_basis"], "a second run with ten times the tolerance");
+        assert_eq!(usual["experiments"][0]["position_error_basis"], "a second run with a hundred times the tolerance");
         let at = |told: &Value, key: &str| told["experiments"][0]["metrics"][key].as_f64().unwrap();
         let error = usual["experiments"][0]["position_error_m"].as_f64().unwrap();
         for key in ["final_bridge_position_m", "final_cart_position_m"] {

@@ -389,15 +389,24 @@ impl Drop for Inside {
 /// The JSON that `taut simulate --json` prints of these runs.
 #[pyfunction]
 pub fn simulation<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound<'py, PyAny>> {
+    let beside: Vec<_> = runs
+        .iter()
+        .map(|run| match &run.what {
+            What::Experiment { case, index, .. } => taut::fit::beside_log(&case.stage, &case.experiments[*index]),
+            What::Gantry { .. } | What::Move { .. } => None,
+        })
+        .collect();
     let axis: Vec<Simulated> = runs
         .iter()
-        .filter_map(|run| match &run.what {
+        .zip(&beside)
+        .filter_map(|(run, log)| match &run.what {
             What::Experiment { case, index, outcome, metrics, reduction, .. } => Some(Simulated {
                 experiment: &case.experiments[*index],
                 outcome,
                 metrics,
                 reduction: *reduction,
                 band: None,
+                log: log.as_ref(),
                 files: &[],
             }),
             What::Gantry { .. } | What::Move { .. } => None,

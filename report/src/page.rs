@@ -337,7 +337,7 @@ impl Page {
         self.push(words(markup));
     }
 
-    /// What stands between header and footer, for a page of one's own that has [`style`] and [`script`].
+    /// The part between header and footer, for a page of one's own that has [`style`] and [`script`].
     pub fn body(&self) -> &str {
         &self.body
     }

@@ -54,7 +54,7 @@ pub(crate) struct Parts {
     /// Φ L, of the measured position to the estimate; and k L, straight to the command.
     pub corrected: DVector<f64>,
     pub direct: f64,
-    /// What both are made of: Φ, m and L.
+    /// The parts of both: Φ, m and L.
     pub phi: DMatrix<f64>,
     pub measured: DVector<f64>,
     pub kalman: DVector<f64>,

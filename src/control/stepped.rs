@@ -21,7 +21,7 @@ pub struct Stepped {
     /// Next sample, and the place in it: at the sample, or where a delayed command takes over.
     k: u64,
     halfway: bool,
-    /// What is left of the delay beyond whole samples, s.
+    /// Rest of the delay beyond whole samples, s.
     rest: f64,
     waiting: VecDeque<f64>,
     acting: f64,

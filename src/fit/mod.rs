@@ -51,7 +51,7 @@ pub use proposals::Proposal;
 pub use regression::{Balance, regression};
 pub use residual_force::{ResidualForce, residual_force};
 pub use run::{Extra, MeasuredOutput, Nuisance, Run};
-pub use scores::{LogFit, OutputFit, Score, Together, together};
+pub use scores::{LogFit, OutputFit, Score, Together, beside_log, together};
 use search::{HUBER, Searched, search};
 pub use sub_records::Disagreement;
 use uncertainty::Judged;

@@ -195,7 +195,7 @@ struct Tried {
     column: DVector<f64>,
     /// A Jᵀ j
     along: DVector<f64>,
-    /// What it takes off Σ r².
+    /// Amount that it takes off Σ r².
     gain: f64,
 }
 

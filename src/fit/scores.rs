@@ -1,7 +1,8 @@
 //! Model and log side by side.
 
-use super::run::{Nuisance, Run};
+use super::run::{Nuisance, Run, Setting};
 use super::uncertainty;
+use crate::case::Experiment;
 use crate::log::Quantity;
 use crate::solve::Bench;
 use crate::stage::Stage;
@@ -57,6 +58,14 @@ pub struct Score {
     pub percent: f64,
     /// Correlation of neighbouring residuals.
     pub memory: f64,
+}
+
+/// A run beside the log of its experiment, with nothing fitted: it starts where the experiment does, and sensors have no
+/// offset. None where the experiment has no log.
+pub fn beside_log(stage: &Stage, experiment: &Experiment) -> Option<LogFit> {
+    let log = experiment.log.as_ref()?;
+    let run = Run::all(experiment, log, &Setting::default()).pop()?;
+    Some(compared(&run, stage, &[], Vec::new()))
 }
 
 /// Model and log side by side.

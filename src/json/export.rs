@@ -38,7 +38,7 @@ pub fn export(case: &Opened) -> Result<Value> {
     }))
 }
 
-/// What was written for a target.
+/// Files that were written for a target.
 pub fn exported(title: &str, target: &str, exported: &Exported) -> Value {
     let file = |(name, content): &(String, Vec<u8>)| json!({ "name": name, "bytes": content.len() });
     let facts = exported.facts.iter().map(|(name, value)| json!({ "name": name, "value": value }));

@@ -5,7 +5,7 @@ use crate::case::Case;
 use crate::fit::{Combination, Estimate, Finding, Fit, Group, Profile, Score};
 use serde_json::{Value, json};
 
-fn score(score: Option<Score>) -> Value {
+pub(super) fn score(score: Option<Score>) -> Value {
     score.map_or(Value::Null, |score| {
         json!({
             "count": score.count,

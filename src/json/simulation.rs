@@ -1,12 +1,15 @@
 //! A simulation: `taut simulate --json`, `summary.json`.
 
+use super::fit::score;
 use crate::case::{Case, Experiment};
+use crate::fit::LogFit;
 use crate::mechanism::Mechanism;
 use crate::metrics::{self, Peak, SteadySpeed};
 use crate::reduction::Reduction;
 use crate::solve::{self, Method, Outcome, Solver};
 use crate::stage::{AmplifierMode, Stage, axis};
 use serde::Serialize;
+use serde_json::{Value, json};
 
 /// Events listed; the rest is in the events' own file.
 pub(super) const MOST_EVENTS: usize = 10_000;
@@ -24,6 +27,8 @@ pub struct Simulated<'a> {
     pub reduction: Option<Reduction>,
     /// The band of the machines of a posterior.
     pub band: Option<Band>,
+    /// The run beside the log of its experiment, where it has one.
+    pub log: Option<&'a LogFit>,
     /// Its files.
     pub files: &'a [String],
 }
@@ -75,6 +80,9 @@ struct ExperimentFigures {
     /// With --draws.
     #[serde(skip_serializing_if = "Option::is_none")]
     band: Option<Band>,
+    /// Where the experiment has a log.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    log: Option<Value>,
     /// By how much r φ₁, x and r φ₃ may be off.
     position_error_m: Option<f64>,
     position_error_basis: Option<&'static str>,
@@ -261,6 +269,7 @@ impl ExperimentFigures {
                 stretch: reduction.stretch.into(),
             }),
             band: run.band,
+            log: run.log.map(beside),
             position_error_m: run.outcome.error.map(|error| error.value),
             position_error_basis: error_basis(outcome, solver),
             events: outcome.events.iter().take(MOST_EVENTS).map(Event::of).collect(),
@@ -283,7 +292,7 @@ pub(super) fn error_basis(outcome: &Outcome, solver: Solver) -> Option<&'static 
     match (solver, outcome.error) {
         (_, None) => None,
         (Solver::Exact, _) => Some("bound of rounding"),
-        _ => Some("a second run with ten times the tolerance"),
+        _ => Some("a second run with a hundred times the tolerance"),
     }
 }
 
@@ -382,4 +391,12 @@ impl Event {
 /// The unit of an event's load: a force at the cart, a torque at a pulley.
 pub fn load_unit(body: usize) -> &'static str {
     if body == axis::CART { "N" } else { "N m" }
+}
+
+/// The run beside the log of its experiment.
+fn beside(log: &LogFit) -> Value {
+    let outputs = log.outputs.iter().map(
+        |output| json!({ "quantity": output.quantity.name(), "unit": output.quantity.unit(), "score": score(output.fitted) }),
+    );
+    json!({ "complete": log.complete, "outputs": outputs.collect::<Vec<_>>() })
 }

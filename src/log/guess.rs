@@ -12,12 +12,12 @@ use std::path::Path;
 /// Columns that are looked at.
 const MOST: usize = 64;
 
-/// What a file has.
+/// The columns of a file, and their likely meaning.
 #[derive(Debug, Clone)]
 pub struct Looked {
     /// Its columns, in the file's order.
     pub columns: Vec<Seen>,
-    /// What they seem to be.
+    /// Their likely meaning.
     pub guess: Guess,
 }
 
@@ -32,7 +32,7 @@ pub struct Seen {
     pub values: Vec<f64>,
 }
 
-/// What columns seem to be.
+/// Likely meaning of columns.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Guess {
     /// The recorder that made the file, where its columns are called as those of one.
@@ -125,7 +125,7 @@ fn guess(file: &Path, columns: &[Seen]) -> Guess {
     guess
 }
 
-/// What a preset says, where the file has its clock and something that it measures.
+/// The mapping of a preset, where the file has its clock and something that it measures.
 fn of_preset(preset: &'static Preset, file: &Path, columns: &[Seen]) -> Option<Guess> {
     let place = |id: &ColumnId| columns.iter().position(|column| column.id == *id);
     let mut known = Vec::new();

@@ -1,7 +1,7 @@
 //! Data sheets: timing belts by their type, motors by their rating, a drive by its force.
 //!
 //! Every number of the table of belts stands in a catalogue, a data sheet or a published measurement, named beside it.
-//! What none of these says is left out.
+//! Facts that none of these gives are left out.
 
 use super::Motor;
 

@@ -11,7 +11,7 @@ pub struct Found {
 }
 
 /// From a point, with a simplex of edge `step`, until it is smaller than `accuracy` or `most` values were asked for.
-/// What is no number is as bad as can be.
+/// NaN is as bad as can be.
 pub fn minimise(
     start: &[f64],
     step: f64,

@@ -63,7 +63,7 @@ fn status(found: &Designed, interrupt: &Interrupt) -> Status {
     }
 }
 
-/// What the command line asks for.
+/// The request, from the command line.
 fn request(args: &Args, case: &Case) -> Result<Request> {
     let input = args.amplitude.as_deref().map(|text| {
         let unit = case.stage.amplifier.mode.unit();

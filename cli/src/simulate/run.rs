@@ -10,6 +10,7 @@ use crate::progress::Progress;
 use std::time::Instant;
 use taut::Error;
 use taut::case::{Case, Experiment};
+use taut::fit::beside_log;
 use taut::measure;
 use taut::metrics::Meter;
 use taut::reduction::Reduction;
@@ -88,7 +89,9 @@ impl<'a> Setting<'a> {
         let metrics = meter.finish(&outcome.events);
         let took = begin.elapsed();
         let reduction = Reduction::of(stage, experiment, self.solver)?;
-        Ok(Run { experiment, outcome, metrics, curves, samples, band, model: stage.belt.model, reduction, files, took })
+        let log = if self.interrupt.signal().is_some() { None } else { beside_log(stage, experiment) };
+        let model = stage.belt.model;
+        Ok(Run { experiment, outcome, metrics, curves, samples, band, log, model, reduction, files, took })
     }
 
     /// Runs it once more, as its recorder sees it, and writes the log.

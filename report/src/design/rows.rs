@@ -32,7 +32,7 @@ pub fn promises(found: &Designed) -> Vec<[String; 4]> {
     wanted.chain(found.promises.iter().filter(|promise| !promise.wanted)).map(row).collect()
 }
 
-/// What the best of each kind of input comes to.
+/// The best of each kind of input.
 pub fn inputs(found: &Designed) -> Vec<[String; 3]> {
     let all = found.alternatives.iter();
     all.map(|one| {
@@ -42,7 +42,7 @@ pub fn inputs(found: &Designed) -> Vec<[String; 3]> {
     .collect()
 }
 
-/// What the case's own experiments come to, measured in the same way.
+/// The case's own experiments, measured in the same way.
 pub fn own(found: &Designed) -> Vec<[String; 3]> {
     let count = found.promises.iter().filter(|promise| promise.wanted).count();
     let all = found.own.iter();
@@ -69,7 +69,7 @@ pub fn limits(found: &Designed) -> Vec<[String; 4]> {
     rows
 }
 
-/// What is measured, and how well.
+/// Outputs that are measured, and how well.
 pub fn measured(found: &Designed) -> String {
     let one = |channel: &taut::stage::Channel| {
         let unit = channel.quantity.unit();
@@ -82,7 +82,7 @@ pub fn measured(found: &Designed) -> String {
     format!("measured every {}: {}", value(found.every, "s", 3), all.join("; "))
 }
 
-/// What fits of simulated logs found.
+/// Findings of fits of simulated logs.
 pub fn verified(all: &[Verified]) -> Vec<[String; 4]> {
     let row = |one: &Verified| {
         [

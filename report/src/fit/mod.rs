@@ -8,7 +8,7 @@ pub mod posterior;
 mod rows;
 
 pub use page::{page, page_with};
-pub use rows::{crooked, ending, findings, past_kinks, plain, scores, value, words};
+pub use rows::{crooked, ending, findings, outputs, past_kinks, plain, scores, value, words};
 
 use taut::fit::{Fit, Posterior, Profile};
 

@@ -164,18 +164,7 @@ pub fn scores(fit: &Fit) -> Vec<(String, String)> {
         false => fit.logs.iter().collect(),
     };
     for log in &logs {
-        let mut parts = Vec::new();
-        for output in &log.outputs {
-            let quantity = output.quantity;
-            for (score, held) in [(output.fitted, false), (output.held_out, true)] {
-                let Some(score) = score else { continue };
-                parts.push(told(quantity.name(), quantity.unit(), &score, held));
-            }
-        }
-        if !log.complete {
-            parts.push("the model does not reach its end".into());
-        }
-        lines.push((name(log), parts.join("; ")));
+        lines.push((name(log), outputs(log)));
     }
     if logs.len() < fit.logs.len() {
         lines.push((
@@ -195,6 +184,22 @@ pub fn scores(fit: &Fit) -> Vec<(String, String)> {
         lines.extend(together(&fit.logs, |_| String::new()).iter().map(|one| ("all together".into(), word(one))));
     }
     lines
+}
+
+/// How each output of a log is met.
+pub fn outputs(log: &LogFit) -> String {
+    let mut parts = Vec::new();
+    for output in &log.outputs {
+        let quantity = output.quantity;
+        for (score, held) in [(output.fitted, false), (output.held_out, true)] {
+            let Some(score) = score else { continue };
+            parts.push(told(quantity.name(), quantity.unit(), &score, held));
+        }
+    }
+    if !log.complete {
+        parts.push("the model does not reach its end".into());
+    }
+    parts.join("; ")
 }
 
 fn told(quantity: &str, unit: &str, score: &Score, held: bool) -> String {

@@ -17,6 +17,7 @@ pub use rows::{accuracy, cost, early_end, events, hidden, lines, plain, solver_w
 
 use std::time::Duration;
 use taut::case::Experiment;
+use taut::fit::LogFit;
 use taut::json::{self, Simulated};
 use taut::metrics::Metrics;
 use taut::reduction::Reduction;
@@ -37,6 +38,8 @@ pub struct Run<'a> {
     pub samples: Option<Samples>,
     /// The band of the machines of --draws.
     pub band: Option<Band>,
+    /// The run beside the log of its experiment, where it has one.
+    pub log: Option<LogFit>,
     /// Its model of the belt.
     pub model: BeltModel,
     /// How far its model is from the elastic one, where it is a reduced one.
@@ -62,6 +65,7 @@ impl Run<'_> {
                 final_cart_position_m: band.end(1),
                 final_drive_travel_minus_cart_m: band.end(2),
             }),
+            log: self.log.as_ref(),
             files: &self.files,
         }
     }

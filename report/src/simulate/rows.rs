@@ -2,6 +2,7 @@
 
 use super::Run;
 use super::band::Band;
+use crate::fit::outputs;
 use taut::mechanism::Part;
 use taut::metrics::{Balance, Metrics, largest};
 use taut::number;
@@ -103,6 +104,9 @@ pub fn lines(run: &Run, solver: Solver) -> Vec<(&'static str, String)> {
         // Nothing stretches in it.
         lines.retain(|(name, _)| !["peak stretch", "peak force", "r φ₁ - x"].contains(name));
     }
+    if let Some(log) = &run.log {
+        lines.insert(lines.len() - 1, ("against its log", outputs(log)));
+    }
     if let Some(band) = &run.band {
         lines.insert(lines.len() - 1, ("band", band_words(band)));
     }
@@ -118,7 +122,7 @@ pub fn accuracy(error: Option<PositionError>, solver: Solver) -> String {
     let rounded = number::engineering_typed(error.value, "m", 2);
     match solver {
         Solver::Exact => format!("positions within {rounded}, by a bound of rounding"),
-        _ => format!("positions within some {rounded}, by a second run with ten times the tolerance"),
+        _ => format!("positions within some {rounded}, by a second run with a hundred times the tolerance"),
     }
 }
 

@@ -1,4 +1,4 @@
-//! What a fit would know, as one number.
+//! The knowledge that a fit would have, as one number.
 
 use super::Criterion;
 use crate::fit::identify::{Directions, Identifiability};

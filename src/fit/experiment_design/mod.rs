@@ -41,7 +41,7 @@ const EVERY: f64 = 1e-3;
 /// Most rows of an experiment.
 const MOST_ROWS: f64 = 200_000.0;
 
-/// What is made small.
+/// The measure that is made small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Criterion {
     /// The volume of the confidence ellipsoid: the geometric mean of the errors along its axes.
@@ -68,7 +68,7 @@ pub struct Request {
     pub names: Vec<String>,
     /// The inputs to choose among; all where none is named.
     pub kinds: Vec<Kind>,
-    /// What is made small.
+    /// The measure that is made small.
     pub criterion: Criterion,
     /// Length, s.
     pub duration: f64,
@@ -84,7 +84,7 @@ pub struct Request {
     pub current: Option<f64>,
     /// Length of the travel, m.
     pub travel: Option<f64>,
-    /// What is measured; the case's encoder and recorder where nothing is named.
+    /// Outputs that are measured; the case's encoder and recorder where nothing is named.
     pub measured: Vec<Channel>,
     /// Which search, and which noise.
     pub seed: u64,
@@ -250,7 +250,7 @@ fn usual_interval(case: &Case) -> f64 {
     recorder.or(shortest).unwrap_or(EVERY)
 }
 
-/// What is measured, and how well: as asked for; else the encoder and the recorder of the case; else the outputs of its
+/// Outputs that are measured, and how well: as asked for; else the encoder and the recorder of the case; else the outputs of its
 /// logs, with the noise that they show.
 fn measured(case: &Case, request: &Request) -> Result<Vec<Channel>> {
     if !request.measured.is_empty() {

@@ -33,7 +33,7 @@ const PERIODS: f64 = 400.0;
 /// Most experiments of the case that the design is compared with.
 const COMPARED: usize = 8;
 
-/// What an experiment promises of a parameter.
+/// Promise of an experiment for a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Promise {
     /// Its name.
@@ -102,11 +102,11 @@ pub struct Designed {
     pub limits: Limits,
     /// By what share each free parameter may be off and the limits hold.
     pub doubt: f64,
-    /// What is measured, and how well.
+    /// Outputs that are measured, and how well.
     pub measured: Vec<Channel>,
-    /// What it promises of every free parameter.
+    /// Its promise for every free parameter.
     pub promises: Vec<Promise>,
-    /// What was made small, and the mean relative error by it.
+    /// The measure that was made small, and the mean relative error by it.
     pub criterion: Criterion,
     /// The same.
     pub score: f64,
@@ -193,7 +193,7 @@ fn room(task: &Task) -> Room {
     Room { input: task.limits.input.0, duration: task.duration, frequencies: [low, high] }
 }
 
-/// What an input at a point of the unit cube comes to.
+/// Value of an input at a point of the unit cube.
 fn look(task: &Task, kind: Kind, point: &[f64], tried: &mut usize) -> Option<(Shape, f64)> {
     *tried += 1;
     let (shape, initial, _) = task.fitted(Shape::at(kind, point, &room(task)), &[])?;
@@ -320,7 +320,7 @@ impl Task<'_> {
         }
     }
 
-    /// What an experiment of the case tells, measured as the design is.
+    /// Information of an experiment of the case, measured as the design is.
     fn own(&self, experiment: &Experiment) -> Option<Own> {
         if (self.stop)() || experiment.until / self.every > super::MOST_ROWS || experiment.until < 10.0 * self.every {
             return None;

@@ -119,7 +119,7 @@ impl Task<'_> {
         Some(problem)
     }
 
-    /// What a fit of a log of this input would know, by such derivatives.
+    /// Knowledge of a fit of a log of this input, by such derivatives.
     pub(super) fn information(&self, input: &Signal, initial: Initial, how: &Differences) -> Option<Information> {
         let mut problem = self.problem(self.experiment("designed", input, initial, self.seed)?)?;
         let x = problem.start();

@@ -15,7 +15,7 @@ use rand_pcg::rand_core::SeedableRng;
 /// By what share the starts of the fits are off, to either side.
 const OFF: f64 = 0.1;
 
-/// What the fits of simulated logs found of a parameter.
+/// Findings of the fits of simulated logs for a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verified {
     /// Its name.

@@ -167,6 +167,7 @@ pub fn simulate_axis<'a>(
         curves,
         samples: None,
         band: None,
+        log: None,
         model,
         reduction,
         files: Vec::new(),
