@@ -88,7 +88,7 @@ export class Row {
     /** The value that field and slider show, none while they are used. */
     this.shown = NaN;
     this.field = element("input", {type: "text", id, inputmode: "decimal", autocomplete: "off", spellcheck: "false", "aria-describedby": id + "-told",
-      onchange: () => this.typed(), onkeydown: event => { if (event.key === "Escape") this.show(); }});
+      onchange: () => this.typed(), onkeydown: event => { if (event.key === "Escape") this.back(); }});
     this.slider = element("input", {type: "range", min: 0, max: STEPS, step: 1, "aria-label": `${name}, slider`,
       oninput: () => this.moved(), onchange: () => app.drop(), onpointerdown: () => this.span()});
     this.told = element("p", {class: "told", id: id + "-told"}, `${sentence} `, element("span", {class: "quiet"}, `${key}; ${allowed}`));
@@ -127,6 +127,12 @@ export class Row {
     }
     this.app.drag(this.parameter.key, value);
     this.app.drop();
+  }
+
+  /** The value as it was before it was typed over. */
+  back() {
+    this.field.removeAttribute("aria-invalid");
+    this.field.value = String(Number(this.parameter.value.toPrecision(6)));
   }
 
   show() {
