@@ -221,11 +221,11 @@ fn a_run_beside_its_log() {
     let measured =
         ["simulate", "axis.toml", "--experiment", "5 V pulse", "--as-measured", "--no-report", "--out", "made"];
     taut(here).args(measured).assert().success();
-    let log = "experiment.0.log={ file = \"made/5-v-pulse.measured.csv\", time = \"time_s\", input = \"voltage_V\", \
+    let log = "experiment.0.log={ file = \"made/5-v-pulse.measured.csv\", time = \"time_s\", \
                drive_angle = \"drive_angle_rad\" }";
     let beside = |more: &[&str]| {
         let mut args = vec!["simulate", "axis.toml", "--experiment", "5 V pulse"];
-        args.extend(["--set", "experiment.0.input=none", "--set", log]);
+        args.extend(["--set", log]);
         args.extend(more);
         let text = taut(here).args(&args).assert().success().get_output().stdout.clone();
         let text = String::from_utf8(text).unwrap();
