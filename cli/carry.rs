@@ -1,4 +1,5 @@
-//! The shared object for FMUs, built on the way: its bytes go into the program. A part of build.rs.
+//! The shared object for FMUs, built on the way: its bytes go into the program, and into the Python package. A part of
+//! build.rs.
 
 use std::env;
 use std::fmt::Write;
@@ -16,7 +17,7 @@ pub fn carry() {
     let wanted = env::var_os("CARGO_FEATURE_FMU").is_some() && env::var("PROFILE").is_ok_and(|name| name == "release");
     let mut text = String::new();
     if wanted && source.is_file() {
-        for path in ["../src", "../fmu/src", "../fmu/Cargo.toml", "../Cargo.toml", "../Cargo.lock", "carry.rs"] {
+        for path in ["../src", "../fmu/src", "../fmu/Cargo.toml", "../Cargo.toml", "../Cargo.lock", "../cli/carry.rs"] {
             println!("cargo::rerun-if-changed={path}");
         }
         let object = build(source, &out.join("fmu"));
@@ -60,7 +61,7 @@ fn cargo(command: &str) -> Command {
     for name in ["RUSTC_WORKSPACE_WRAPPER", "CLIPPY_ARGS", "CLIPPY_CONF_DIR", "CARGO_BUILD_TARGET", "RUSTFLAGS"] {
         cargo.env_remove(name);
     }
-    // What cargo tells a build script of its own package is not of that one.
+    // Variables that cargo sets for this package's build script are not those of that one.
     for (name, _) in env::vars_os() {
         let name_text = name.to_string_lossy();
         if ["CARGO_FEATURE_", "CARGO_CFG_", "CARGO_PKG_", "DEP_"].iter().any(|begin| name_text.starts_with(begin)) {

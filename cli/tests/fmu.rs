@@ -15,7 +15,7 @@ fn taut(args: &[&str]) -> Command {
     command
 }
 
-/// The message of a request that is refused, and its exit status.
+/// Exit status and message of a request that is refused.
 fn refused(args: &[&str]) -> (i32, String) {
     let output = taut(args).output().unwrap();
     assert!(output.stdout.is_empty(), "{}", String::from_utf8_lossy(&output.stdout));
@@ -77,10 +77,40 @@ fn the_archive_has_all_that_an_importer_looks_for() {
         {
             assert!(description.contains(wanted), "{wanted} in\n{description}");
         }
+        assert!(description.contains("maxOutputDerivativeOrder=\"7\""), "{description}");
+        let compiled = if fmi == "3" { "fmi3.c" } else { "fmi2.c" };
+        for name in [compiled, "instance.c", "machine.c", "machine.h"] {
+            assert!(file(&format!("sources/{name}")).is_some(), "{name}");
+        }
+        let told = if fmi == "3" { file("sources/buildDescription.xml").unwrap() } else { description.as_bytes() };
+        assert!(String::from_utf8_lossy(told).contains(compiled));
         // One case is one file, to the bit.
         let again = folder.path().join("again.fmu");
         taut(&[TABLE4, "--fmi", fmi, "--out", again.to_str().unwrap()]).assert().success();
         assert_eq!(fs::read(&out).unwrap(), fs::read(again).unwrap());
+    }
+}
+
+/// Machines that `export c` does not cover have no sources, and say why.
+#[test]
+fn what_c_does_not_cover_has_no_sources() {
+    let folder = TempDir::new().unwrap();
+    for (case, more, why) in [
+        ("stages/core-xy/follows.toml", &[][..], "the stiffness of "),
+        (
+            "stages/sollmann-jouaneh/controllers/pid.toml",
+            &["--part", "both"][..],
+            "the controller inside is not written in C beside its machine",
+        ),
+    ] {
+        let out = folder.path().join("one.fmu");
+        let output = taut(&[case, "--out", out.to_str().unwrap(), "--json"]).args(more).output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let note = told["notes"][0].as_str().unwrap();
+        assert!(note.contains("there are no sources in it") && note.contains(why), "{note}");
+        let files = unpacked(&fs::read(&out).unwrap());
+        assert!(files.iter().all(|(name, _)| !name.starts_with("sources/")));
     }
 }
 

@@ -13,7 +13,7 @@ use std::ffi::{c_char, c_int, c_uint, c_void};
 type Component = *mut c_void;
 type References = *const c_uint;
 
-/// What an importer brings along.
+/// Functions of the importer.
 #[repr(C)]
 pub struct Callbacks {
     logger: Option<Logger2>,
@@ -23,7 +23,7 @@ pub struct Callbacks {
     environment: *mut c_void,
 }
 
-/// What an event has brought about.
+/// Changes that an event has brought about.
 #[repr(C)]
 pub struct EventInfo {
     needed: c_int,
@@ -196,7 +196,6 @@ none_of! {
     fmi2SetInteger(*const c_int);
     fmi2SetBoolean(*const c_int);
     fmi2SetString(*const *const c_char);
-    fmi2GetRealOutputDerivatives(*const c_int, *mut f64);
 }
 
 fn none(instance: &Instance, function: &str, count: usize) -> Told<()> {
@@ -394,6 +393,23 @@ pub unsafe extern "C" fn fmi2SetRealInputDerivatives(
             handle.instance.only("fmi2SetRealInputDerivatives", !handle.instance.exchanges())?;
             handle.instance.allow("fmi2SetRealInputDerivatives", &[Instantiated, Initialization, Step])?;
             handle.instance.set_input_derivatives(slice(vr, n)?, slice(orders, n)?, slice(values, n)?)
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetRealOutputDerivatives(
+    c: Component,
+    vr: References,
+    n: usize,
+    orders: *const c_int,
+    values: *mut f64,
+) -> c_int {
+    unsafe {
+        with(c, |handle| {
+            handle.instance.only("fmi2GetRealOutputDerivatives", !handle.instance.exchanges())?;
+            handle.instance.allow("fmi2GetRealOutputDerivatives", &[Step, Terminated])?;
+            handle.instance.output_derivatives(slice(vr, n)?, slice(orders, n)?, room(values, n)?)
         })
     }
 }

@@ -295,7 +295,6 @@ none_of! {
     fmi3SetIntervalFraction(*const u64, *const u64);
     fmi3SetShiftDecimal(*const f64);
     fmi3SetShiftFraction(*const u64, *const u64);
-    fmi3GetOutputDerivatives(*const i32, *mut f64, usize);
 }
 
 fn none(handle: &mut Handle, function: &str, count: usize) -> Told<()> {
@@ -533,12 +532,31 @@ pub unsafe extern "C" fn fmi3GetNumberOfContinuousStates(c: Component, n: *mut u
 
 // --- co-simulation --------------------------------------------------------------------------------------------------
 
-/// What a step has come to so far.
+/// The state of a step under way.
 struct Stepped {
     end: f64,
     event: bool,
     early: bool,
     over: bool,
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3GetOutputDerivatives(
+    c: Component,
+    vr: References,
+    n: usize,
+    orders: *const i32,
+    values: *mut f64,
+    count: usize,
+) -> c_int {
+    unsafe {
+        with(c, |handle| {
+            handle.instance.only("fmi3GetOutputDerivatives", !handle.instance.exchanges())?;
+            handle.instance.allow("fmi3GetOutputDerivatives", &[Step, Terminated])?;
+            alike(n, count)?;
+            handle.instance.output_derivatives(slice(vr, n)?, slice(orders, n)?, room(values, n)?)
+        })
+    }
 }
 
 #[unsafe(no_mangle)]

@@ -26,7 +26,7 @@ pub enum Status {
 pub struct Refusal {
     /// The answer of the function.
     pub status: Status,
-    /// What is wrong, and what is allowed.
+    /// The mistake, and what is allowed.
     pub message: String,
 }
 
@@ -46,7 +46,7 @@ impl From<taut::Error> for Refusal {
 /// The answer of a function.
 pub type Told<T> = Result<T, Refusal>;
 
-/// What an instance is for.
+/// The purpose of an instance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Use {
     /// The importer integrates.
@@ -105,6 +105,14 @@ impl Input {
     pub(crate) fn at(&self, time: f64) -> f64 {
         let tau = time - self.since;
         self.coefficients.iter().rev().fold(0.0, |sum, c| sum * tau + c)
+    }
+
+    /// Its derivative of this order with respect to time.
+    pub(crate) fn derivative(&self, time: f64, order: usize) -> f64 {
+        let tau = time - self.since;
+        // k!/(k − n)!
+        let falling = |k: usize| (k - order + 1..=k).map(|factor| factor as f64).product::<f64>();
+        (order..=DEGREE).rev().fold(0.0, |sum, k| sum * tau + falling(k) * self.coefficients[k])
     }
 }
 

@@ -1,9 +1,10 @@
 //! The state of an instance as bytes, and back.
 
 use crate::instance::{Input, Instance, Phase, Plant, Refusal, Told};
+use taut::control::Stepped;
 
-/// What such bytes begin with.
-const MARK: u64 = u64::from_le_bytes(*b"tautfmu1");
+/// The first eight of such bytes.
+const MARK: u64 = u64::from_le_bytes(*b"tautfmu2");
 
 const PHASES: [Phase; 7] = [
     Phase::Instantiated,
@@ -16,12 +17,8 @@ const PHASES: [Phase; 7] = [
 ];
 
 impl Instance {
-    /// All of its state. Errors: with a controller inside, whose memory is no plain numbers.
+    /// All of its state. Errors: one whose machine has ended the run.
     pub fn bytes(&self) -> Told<Vec<u8>> {
-        let refuse = |why: &str| Err(Refusal::error(format!("this state cannot be turned into bytes: {why}")));
-        if self.model.design.is_some() {
-            return refuse("there is a controller inside; allowed: get and set states without bytes");
-        }
         let mut list = vec![MARK, taut::chance::hash(self.model.token.bytes()), u64::from(self.exchanges())];
         list.push(PHASES.iter().position(|phase| *phase == self.phase).unwrap_or_default() as u64);
         list.extend([self.is_set, self.is_over, self.stop.is_some()].map(u64::from));
@@ -40,9 +37,15 @@ impl Instance {
             Plant::Machine(machine) => machine.save(),
             Plant::Dynamics(dynamics) => dynamics.save(),
         };
-        let Some(plant) = plant else { return refuse("the machine has ended the run") };
+        let Some(plant) = plant else {
+            let message =
+                "this state cannot be turned into bytes: the machine has ended the run; allowed: get and set it";
+            return Err(Refusal::error(message));
+        };
         list.push(u64::from(!matches!(self.plant, Plant::None)));
-        list.extend(plant);
+        let control = self.control.as_ref().map(Stepped::save).unwrap_or_default();
+        list.push(control.len() as u64);
+        list.extend(control.into_iter().chain(plant));
         Ok(list.into_iter().flat_map(u64::to_le_bytes).collect())
     }
 
@@ -92,16 +95,23 @@ impl Instance {
             numbers(coefficients)?;
         }
         let is_there = next()?;
+        let remembered = usize::try_from(next()?).map_err(|_| wrong())?;
         let rest: Vec<u64> = list.collect();
+        let (control, plant) = rest.split_at_checked(remembered).ok_or_else(wrong)?;
         if is_there == 1 {
             // The machine in its start, from where its saved state goes on.
             other.make()?;
             let restored = match &mut other.plant {
                 Plant::None => None,
-                Plant::Machine(machine) => machine.restore(&rest),
-                Plant::Dynamics(dynamics) => dynamics.restore(&rest),
+                Plant::Machine(machine) => machine.restore(plant),
+                Plant::Dynamics(dynamics) => dynamics.restore(plant),
             };
             restored.ok_or_else(wrong)?;
+            match &mut other.control {
+                Some(own) => own.restore(control).ok_or_else(wrong)?,
+                None if control.is_empty() => {}
+                None => return Err(wrong()),
+            }
         } else if !rest.is_empty() {
             return Err(wrong());
         }

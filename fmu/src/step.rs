@@ -22,7 +22,7 @@ pub enum Halt {
     Over,
 }
 
-/// What an event has changed.
+/// Changes that an event has brought about.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Settled {
     /// Whether integrated quantities were put elsewhere.
@@ -149,7 +149,7 @@ impl Instance {
         let mut events: Vec<Event> = Vec::new();
         let (from, before) = (machine.time(), stops.then(|| machine.clone()));
         let mut ended = machine.advance(until, &mut events);
-        // What inputs bring about where the step begins is known to whoever set them, and no reason to stop there.
+        // Events that inputs bring about where the step begins are known to whoever set them: no reason to stop there.
         events.retain(|event| event.time > from);
         let first = events.first().map(|event| event.time).filter(|time| *time < until);
         if let (Some(before), Some(first)) = (before, first) {
@@ -226,7 +226,7 @@ impl Instance {
         Ok(())
     }
 
-    /// What a unit size of each is.
+    /// A unit size of each.
     pub fn nominals(&self, into: &mut [f64]) -> Told<()> {
         let nominals = self.model.nominals(&self.mechanism()?);
         into.copy_from_slice(self.matching(&nominals, into.len())?);

@@ -1,10 +1,10 @@
 //! Variables read and set.
 
 use crate::instance::{Instance, Phase, Plant, Refusal, Told, place};
-use taut::export::fmu::{Kind, Role, Variable};
-use taut::mechanism::DRIVES;
+use taut::export::fmu::{Causality, Kind, Role, Variability, Variable};
+use taut::mechanism::{DRIVES, Shown};
 use taut::signal::DEGREE;
-use taut::solve::{Dynamics, Quantity};
+use taut::solve::{Dynamics, Machine, Quantity};
 
 /// Phases in which values can be read.
 pub(crate) const READ: [Phase; 5] =
@@ -103,16 +103,10 @@ impl Instance {
             let mut values = Vec::new();
             let count = |mechanism: &taut::mechanism::Mechanism| mechanism.columns.len();
             if self.is_set && matches!(self.plant, Plant::Machine(_)) {
-                // What the inputs bring about at once: on a copy, as others may yet be set at this time.
-                let mut copy = self.clone();
-                copy.refresh()?;
-                if let Plant::Machine(machine) = &mut copy.plant {
-                    let now = machine.time();
-                    // An early end is told by the step.
-                    let _ = machine.advance(now, &mut Vec::new());
-                    values.resize(count(machine.mechanism()), 0.0);
-                    machine.outputs(&mut values);
-                }
+                // On a copy, as other inputs may yet be set at this time.
+                let machine = self.as_set()?;
+                values.resize(count(machine.mechanism()), 0.0);
+                machine.outputs(&mut values);
             } else {
                 self.refresh()?;
                 match &self.plant {
@@ -277,6 +271,58 @@ impl Instance {
         }
         (self.is_set, self.columns) = (true, None);
         Ok(())
+    }
+
+    /// Derivatives of outputs with respect to time, of orders 1 to [`DEGREE`]: exact, those of the present mode. Errors:
+    /// what is no output that changes all the time, or a machine whose equations are curved.
+    pub fn output_derivatives(&mut self, references: &[u32], orders: &[i32], into: &mut [f64]) -> Told<()> {
+        let mut values: Vec<f64> = Vec::new();
+        let machine = self.as_set()?;
+        for ((into, reference), order) in into.iter_mut().zip(references).zip(orders) {
+            let variable = self.variable(*reference, Kind::Real)?;
+            let order = usize::try_from(*order).ok().filter(|order| (1..=DEGREE).contains(order));
+            let (Some(order), Causality::Output, Variability::Continuous) =
+                (order, variable.causality(), variable.variability())
+            else {
+                return Err(Refusal::error(format!(
+                    "there is no such derivative of {}; allowed: orders 1 to {DEGREE} of outputs that are continuous",
+                    variable.name
+                )));
+            };
+            values.resize(machine.columns().len(), 0.0);
+            if machine.derivatives(order, &mut values).is_none() {
+                return Err(Refusal::error(
+                    "there are no derivatives of outputs: friction or stiffness of this machine is a curve",
+                ));
+            }
+            let load = Shown::Position(self.model.loads[0], 1.0);
+            let of = |shown: Shown| machine.columns().iter().position(|heading| heading.shown == shown);
+            *into = match variable.role {
+                Role::Output(column) => values[column],
+                Role::Error => {
+                    of(load).map_or(0.0, |column| values[column]) - self.inputs[0].derivative(self.time, order)
+                }
+                // The controller's command is held, and is no continuous output; nothing else is an output.
+                _ => 0.0,
+            };
+        }
+        Ok(())
+    }
+
+    /// A copy of the machine that has taken the inputs as they are set now.
+    fn as_set(&self) -> Told<Machine> {
+        let mut copy = self.clone();
+        copy.prepare()?;
+        copy.refresh()?;
+        match copy.plant {
+            Plant::Machine(mut machine) => {
+                let now = machine.time();
+                // An early end is told by the step.
+                let _ = machine.advance(now, &mut Vec::new());
+                Ok(*machine)
+            }
+            Plant::None | Plant::Dynamics(_) => Err(Refusal::error("there is no machine that moves by itself")),
+        }
     }
 
     /// The change of `unknowns` when `knowns`, inputs or integrated quantities, change as `seed` says, in the present

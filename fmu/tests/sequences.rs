@@ -42,7 +42,7 @@ impl Session<'_> {
 
     /// One call of FMI 3.0.
     unsafe fn three(&mut self, random: &mut Random) {
-        let (c, what) = (self.pointer, random.below(30));
+        let (c, what) = (self.pointer, random.below(31));
         let (mut flags, mut last) = ([0u8; 5], 0.0);
         let [a, b, d, e, f] = &mut flags;
         let (reference, value, mut real, mut whole) = (self.reference(random), number(random), 0.0, 0);
@@ -75,6 +75,10 @@ impl Session<'_> {
                 23 => fmi3::fmi3GetContinuousStateDerivatives(c, many.as_mut_ptr(), self.unit.model.quantities.len()),
                 24 => fmi3::fmi3GetEventIndicators(c, many.as_mut_ptr(), self.unit.model.conditions),
                 25 => fmi3::fmi3GetFloat64(c, std::ptr::null(), 3, &mut real, 3),
+                26 => {
+                    let order = random.below(10) as i32 - 1;
+                    fmi3::fmi3GetOutputDerivatives(c, &reference, 1, &order, &mut real, 1)
+                }
                 _ => {
                     let (time, size) = match random.below(4) {
                         0 => (value, 1e-3),
@@ -189,7 +193,7 @@ unsafe fn two(unit: &Unit, random: &mut Random) {
     let mut info = std::mem::MaybeUninit::<[u64; 8]>::uninit();
     let mut time = 0.0;
     for _ in 0..20 {
-        let (what, value) = (random.below(14), number(random));
+        let (what, value) = (random.below(16), number(random));
         let reference = unit.model.variables[random.below(unit.model.variables.len() as u64) as usize].reference;
         let (mut real, mut whole, mut many) = (0.0, 0, [0.0; 64]);
         let status = unsafe {
@@ -206,6 +210,7 @@ unsafe fn two(unit: &Unit, random: &mut Random) {
                 9 => fmi2::fmi2SetRealInputDerivatives(c, &reference, 1, &(random.below(9) as c_int), &value),
                 10 => fmi2::fmi2GetRealStatus(c, random.below(4) as c_int, &mut real),
                 11 => fmi2::fmi2SetBoolean(c, &reference, 1, &whole),
+                12 => fmi2::fmi2GetRealOutputDerivatives(c, &reference, 1, &(random.below(9) as c_int), &mut real),
                 _ => {
                     let status = fmi2::fmi2DoStep(c, time, 1e-3, 0);
                     if status == 0 {

@@ -192,6 +192,39 @@ fn a_state_as_bytes_goes_on_bit_for_bit_in_another_instance() {
     }
 }
 
+/// A state was refused as bytes where a controller was inside: its memory was no plain numbers.
+#[test]
+fn a_state_as_bytes_takes_the_controller_along() {
+    for case in ["pid", "cascade-current", "lqi", "lqg", "fuzzy-pi", "sliding", "pid-observer", "pid-shaped"] {
+        let unit = Unit::of(&format!("sollmann-jouaneh/controllers/{case}.toml"), true);
+        let (one, two) = (unit.three(false, false), unit.three(false, false));
+        one.start();
+        two.start();
+        assert_eq!(one.set("reference", 0.01), OK);
+        // Between two samples, and with commands under way.
+        one.step(0.0, 0.00373);
+        let state = one.keep();
+        let (mut size, mut bytes, mut other) = (0, Vec::new(), std::ptr::null_mut());
+        unsafe {
+            assert_eq!(fmi3::fmi3SerializedFMUStateSize(one.pointer, state, &mut size), OK);
+            bytes.resize(size, 0);
+            assert_eq!(fmi3::fmi3SerializeFMUState(one.pointer, state, bytes.as_mut_ptr(), size), OK);
+            assert_eq!(fmi3::fmi3DeserializeFMUState(two.pointer, bytes.as_ptr(), size, &mut other), OK);
+        }
+        two.bring_back(other);
+        for instance in [&one, &two] {
+            assert_eq!(instance.set("reference", 0.012), OK);
+            instance.step(0.00373, 0.05);
+        }
+        let [a, b] = [&one, &two].map(|instance| ["cart_position", "command", "error"].map(|name| instance.get(name)));
+        assert_eq!(a, b, "{case}");
+        assert!(a[0] > 1e-3, "{case}: the cart has moved, to {} m", a[0]);
+        // With a number of the controller's missing it is none.
+        let status = unsafe { fmi3::fmi3DeserializeFMUState(two.pointer, bytes.as_ptr(), size - 8, &mut other) };
+        assert_eq!(status, crate::unit::ERROR);
+    }
+}
+
 #[test]
 fn four_threads_do_not_disturb_each_other() {
     let expected = expected();

@@ -118,7 +118,7 @@ impl Drop for Three<'_> {
     }
 }
 
-/// What a step says.
+/// Answers of a step.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub struct Step {
     pub event: u8,

@@ -3,7 +3,7 @@
 use crate::columns::Columns;
 use crate::error::{Told, guarded, unlocked};
 use crate::interrupt::Interrupt;
-use crate::{logs, modes, runs, value};
+use crate::{fmu, logs, modes, runs, value};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -413,6 +413,7 @@ impl Case {
         part: Option<&str>,
         real: &str,
         step: Option<f64>,
+        fmi: u32,
     ) -> PyResult<(Vec<PathBuf>, Vec<String>)> {
         let opened = match &self.inner {
             Inner::Axis(case) => Opened::Axis(Box::new(case.as_ref().clone())),
@@ -432,6 +433,11 @@ impl Case {
                 "st" => text(Target::StructuredText),
                 "matlab" => text(Target::Matlab),
                 "python" => text(Target::Python),
+                "fmu" => {
+                    let place = Place::of(&out, "fmu", &own);
+                    let exported = fmu::export(&opened, options.part, fmi, &place.stem)?;
+                    Ok((place.write(&exported, &inputs)?, exported.notes))
+                }
                 "json" => {
                     let place = Place::of(&out, "json", &own);
                     let content = json::text(&json::export(&opened)?).into_bytes();
@@ -440,8 +446,7 @@ impl Case {
                     Ok((place.write(&exported, &inputs)?, Vec::new()))
                 }
                 other => Err(taut::Error::new(format!("there is no target \"{other}\" here"))
-                    .allowed("c, st, matlab, python or json")
-                    .next("the program `taut export` lists what else there is")),
+                    .allowed("fmu, c, st, matlab, python or json")),
             }
         });
         made?.told(py)

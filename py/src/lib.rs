@@ -7,6 +7,7 @@ mod case;
 mod columns;
 mod controller;
 mod error;
+mod fmu;
 mod interrupt;
 mod logs;
 mod modes;

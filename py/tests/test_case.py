@@ -1,6 +1,7 @@
 """Cases: read, edited, saved, and mistakes told."""
 
 import pickle
+import zipfile
 
 import numpy as np
 import pytest
@@ -114,6 +115,14 @@ def test_a_case_is_exported_as_the_program_does(case, tmp_path):
     assert "typedef float axis_real;" in files[1].read_text(encoding="utf-8")
     files = taut.export(case, "matlab", tmp_path / "matlab")
     assert all(file.is_file() for file in files) and len(files) == 5
+    files = taut.export(case, "fmu", tmp_path / "axis.fmu", fmi=2)
+    with zipfile.ZipFile(files[0]) as archive:
+        assert {"modelDescription.xml", "resources/machine.toml", "sources/fmi2.c"} <= set(archive.namelist())
+        assert b'fmiVersion="2.0"' in archive.read("modelDescription.xml")
+    with pytest.raises(ValueError, match="fmi: 1 cannot be; allowed: 2 to 3"):
+        taut.export(case, "fmu", tmp_path / "axis.fmu", fmi=1)
+    with pytest.raises(taut.Error, match="no controller that could be put inside"):
+        taut.export(case, "fmu", tmp_path / "axis.fmu", part="both")
     with pytest.raises(taut.Error, match="there is no target"):
         taut.export(case, "fortran", tmp_path)
     with pytest.raises(taut.Error, match="no controller"):

@@ -17,6 +17,7 @@ import pytest
 
 fmpy = pytest.importorskip("fmpy")
 from fmpy import extract, read_model_description, simulate_fmu  # noqa: E402
+from fmpy.build import build_platform_binary  # noqa: E402
 from fmpy.fmi2 import FMU2Slave  # noqa: E402
 from fmpy.fmi3 import FMU3Slave  # noqa: E402
 from fmpy.validation import validate_fmu  # noqa: E402
@@ -45,7 +46,7 @@ def export(case: Path, out: Path, version: int, *more: str) -> str:
 
 
 def rows(case: Path, folder: Path, name: str, *changes: str) -> dict[str, np.ndarray[Any, Any]]:
-    """What ``taut simulate`` makes of an experiment."""
+    """Rows of ``taut simulate`` of an experiment."""
     sets = [word for change in changes for word in ("--set", change)]
     taut("simulate", str(case), "--out", str(folder), "--no-report", *sets)
     with (folder / name).open() as file:
@@ -58,10 +59,20 @@ def signal(points: list[tuple[float, float]], name: str = "command") -> np.ndarr
     return np.array(points, dtype=[("time", np.float64), (name, np.float64)])
 
 
-def slave(unit: str, version: int) -> tuple[Any, dict[str, int], str]:
+def sources_of(unit: str, version: int) -> tuple[Any, str]:
+    """An instance of the sources in a unit, compiled by FMPy's own means in the place of its binary."""
+    place = extract(unit)
+    for binary in Path(place).glob("binaries/*/*"):
+        binary.unlink()
+    build_platform_binary(place, all_warnings=True)
+    assert any(Path(place).glob("binaries/*/taut_fmu.*")), "it is compiled"
+    return slave(unit, version, place)[0], place
+
+
+def slave(unit: str, version: int, place: str | None = None) -> tuple[Any, dict[str, int], str]:
     """An instance of FMPy's that is ready for its first step, its value references, and where it was unpacked."""
     description = read_model_description(unit)
-    place = extract(unit)
+    place = place or extract(unit)
     kind = FMU2Slave if version == 2 else FMU3Slave
     one = kind(guid=description.guid, unzipDirectory=place, modelIdentifier=description.coSimulation.modelIdentifier)
     one.instantiate()
@@ -262,3 +273,99 @@ def test_a_second_importer_runs_it(root: Path, tmp_path: Path, version: int) -> 
     assert done.returncode == 0, done.stderr + done.stdout
     x = float(done.stdout.strip().splitlines()[-1])
     assert abs(x - wanted["cart_position_m"][500]) <= SAME, x
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_what_the_sources_make_is_the_same_machine(root: Path, tmp_path: Path, version: int) -> None:
+    """The sources in the FMU, compiled by FMPy's own means in the place of the binary: the pulse, and a jump in slope."""
+    wanted = rows(root / PAPER, tmp_path / "rows", "10-v-pulse.csv")
+    unit = export(root / PAPER, tmp_path / "unit.fmu", version)
+    one, place = sources_of(unit, version)
+    one.terminate()
+    one.freeInstance()
+    for step in (1e-3, 0.25):
+        names = ["cart_position", "drive_angle", "motor_current", "span1_force", "cart_friction", "cart_state"]
+        result = simulate_fmu(
+            place, fmi_type="CoSimulation", stop_time=1.0, output_interval=step, input=signal(JUMPS), output=names
+        )
+        x = dict(zip(np.round(wanted["time_s"], 9), wanted["cart_position_m"], strict=True))
+        whole = [k for k, t in enumerate(result["time"]) if round(t, 9) in x and abs(t - round(t, 9)) < 1e-15]
+        off = max(abs(result["cart_position"][k] - x[round(result["time"][k], 9)]) for k in whole)
+        assert len(whole) >= 1 / step and off <= SAME, off
+    shutil.rmtree(place)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("case", [PAPER, "stages/h-frame/h-frame.toml", "stages/printer-axis/printer-axis.toml"])
+def test_sources_and_binary_agree_in_all_outputs(root: Path, tmp_path: Path, version: int, case: str) -> None:
+    """Random inputs, ramps among them, in random steps, some taken back by bytes: every output, and its derivatives."""
+    unit = export(root / case, tmp_path / "unit.fmu", version)
+    one, references, place = slave(unit, version)
+    other, compiled = sources_of(unit, version)
+    variables = read_model_description(unit).modelVariables
+    inputs = [v.valueReference for v in variables if v.causality == "input" and v.name.endswith("command")]
+    outputs = [v for v in variables if v.causality == "output" and v.type in ("Real", "Float64")]
+    states = [v.valueReference for v in variables if v.causality == "output" and v.type in ("Integer", "Int32")]
+    smooth = [v.valueReference for v in outputs if v.variability == "continuous"]
+    choose, time = random.Random(3), 0.0
+    for k in range(60):
+        values = [choose.choice([0.0, choose.uniform(-12, 12)]) for _ in inputs]
+        slopes, size = [choose.uniform(-50, 50) for _ in inputs], choose.choice([1e-4, 1e-3, 7.3e-3, 0.05])
+        for unit_ in (one, other):
+            (unit_.setReal if version == 2 else unit_.setFloat64)(inputs, values)
+            if version == 2 and k % 3 == 0:
+                unit_.setRealInputDerivatives(inputs, [1] * len(inputs), slopes)
+            if k % 7 == 0:
+                data = unit_.serializeFMUState(unit_.getFMUState())
+                unit_.doStep(time, size)
+                unit_.setFMUState(unit_.deserializeFMUState(data))
+            unit_.doStep(time, size)
+        time += size
+        read = [v.valueReference for v in outputs]
+        rows_ = [(u.getReal if version == 2 else u.getFloat64)(read) for u in (one, other)]
+        for variable, is_, was in zip(outputs, *rows_, strict=True):
+            allowed = SAME if variable.name.endswith("position") else 1e-9 * max(1.0, abs(is_))
+            assert abs(is_ - was) <= allowed, (k, variable.name, is_, was)
+        found = [list((u.getInteger if version == 2 else u.getInt32)(states)) for u in (one, other)]
+        assert found[0] == found[1], k
+        if version == 2:
+            orders = [1 + k % 3] * len(smooth)
+            pairs = zip(*(u.getRealOutputDerivatives(smooth, orders) for u in (one, other)), strict=True)
+            assert all(abs(is_ - was) <= 1e-7 * max(1.0, abs(is_)) for is_, was in pairs), k
+    for unit_, folder in ((one, place), (other, compiled)):
+        unit_.terminate()
+        unit_.freeInstance()
+        shutil.rmtree(folder)
+
+
+def test_what_the_sources_cannot_do_is_refused(root: Path, tmp_path: Path) -> None:
+    """Their numbers are fixed: one that is set to another value is an error, and the instance lives on."""
+    unit = export(root / PAPER, tmp_path / "unit.fmu", 3)
+    one, place = sources_of(unit, 3)
+    references = {v.name: v.valueReference for v in read_model_description(unit).modelVariables}
+    for name, value in [("cart.mass", 1.0), ("command", float("nan"))]:
+        with pytest.raises(fmpy.fmi1.FMICallException):
+            one.setFloat64([references[name]], [value])
+    one.setFloat64([references["cart.mass"]], [0.362])
+    for size in (0.0, -1.0, float("nan")):
+        with pytest.raises(fmpy.fmi1.FMICallException):
+            one.doStep(0.0, size)
+    one.doStep(0.0, 0.1)
+    one.terminate()
+    one.freeInstance()
+    with pytest.raises(Exception, match="nstantiat"):
+        simulate_fmu(place, fmi_type="ModelExchange", stop_time=0.1)
+    shutil.rmtree(place)
+
+
+def test_the_package_exports_the_units_of_the_program(root: Path, tmp_path: Path) -> None:
+    """``taut.export`` writes what ``taut export fmu`` does, but for the icon, and it runs."""
+    import taut as package
+
+    unit = export(root / PAPER, tmp_path / "unit.fmu", 3)
+    (own,) = package.export(root / PAPER, "fmu", tmp_path / "own.fmu")
+    with zipfile.ZipFile(unit) as one, zipfile.ZipFile(own) as other:
+        assert set(one.namelist()) - set(other.namelist()) == {"terminalsAndIcons/icon.png"}
+        assert one.read("modelDescription.xml") == other.read("modelDescription.xml")
+    result = simulate_fmu(str(own), stop_time=0.5, input=signal(JUMPS), output=["cart_position"])
+    assert result["cart_position"][-1] > 0.05

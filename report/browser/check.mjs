@@ -76,7 +76,7 @@ async function looks(name, width, colorScheme) {
 
 // ---- What a reader does with a plot
 
-// What plot number i shows: texts of ticks, and the range of x.
+// Content of plot number i: texts of ticks, and the range of x.
 const state = (page, i) => page.evaluate(i => {
   const {plot} = document.querySelectorAll("figure.plot")[i];
   return {ticks: plot.shown.xTicks.map(tick => tick[1]).join(" "), range: plot.view.x.join(" "), picture: plot.svg.innerHTML};

@@ -1,4 +1,4 @@
-// What scripts that use the studio in a browser have in common: servers, pages whose console is watched, tests.
+// Parts that scripts which use the studio in a browser have in common: servers, pages whose console is watched, tests.
 import {spawn} from "node:child_process";
 import {chromium} from "playwright-core";
 
@@ -32,6 +32,7 @@ export class Harness {
     page.on("pageerror", error => trouble.push("error: " + error.message));
     const local = url => /^(http|ws):\/\/127\.0\.0\.1:/.test(url) || /^(data|blob):/.test(url);
     page.on("request", request => { if (!local(request.url())) trouble.push("asked for " + request.url()); });
+    page.on("websocket", socket => { if (!local(socket.url())) trouble.push("asked for " + socket.url()); });
     await page.goto(address);
     await page.waitForFunction(() => window.studio && window.studio.run && document.querySelector(".live-plot"), null, {timeout: 20_000});
     await settled(page);
@@ -68,4 +69,4 @@ export function expect(holds, told) {
 export const settled = page => page.evaluate(() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done))));
 
 /** When the page shows what was asked for last. */
-export const quiet = page => page.waitForFunction(() => !window.studio.wire.open.size, null, {timeout: 30_000}).then(() => settled(page));
+export const quiet = page => page.waitForFunction(() => !window.studio.wire.isBusy, null, {timeout: 30_000}).then(() => settled(page));

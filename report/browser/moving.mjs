@@ -114,7 +114,7 @@ let before = null;
 pictures.forEach((data, number) => {
   const now = new Uint8Array(WIDE * HIGH);
   for (let i = 0; i < now.length; i++) now[i] = nearest.get(coarse(data, 3 * i));
-  // What changed, in its box.
+  // The box of all that changed.
   let [left, top, right, bottom] = [WIDE, HIGH, -1, -1];
   for (let y = 0; y < HIGH; y++) for (let x = 0; x < WIDE; x++) if (!before || now[y * WIDE + x] !== before[y * WIDE + x]) {
     left = Math.min(left, x); right = Math.max(right, x); top = Math.min(top, y); bottom = Math.max(bottom, y);

@@ -4,6 +4,7 @@
 //
 // TAUT is the program; it is run in the folder of the project. Pictures go to SHOTS. A log of another's machine is in
 // data/, or in the folder that TAUT_DATA names; where it is not, one that the program simulated takes its place.
+import {execFileSync} from "node:child_process";
 import {existsSync, mkdirSync, readFileSync, writeFileSync, mkdtempSync} from "node:fs";
 import {createRequire} from "node:module";
 import {tmpdir} from "node:os";
@@ -113,6 +114,48 @@ if (LOG) await test("a page that is closed ends its fit", async open => {
     last = now;
   }
   expect(quietFor >= 5, "the server still computes 20 s after its page has gone");
+});
+
+/** A MATLAB file (level 5) of columns of numbers. */
+function matlab(columns) {
+  const padded = bytes => Buffer.concat([bytes, Buffer.alloc((8 - (bytes.length % 8)) % 8)]);
+  const element = (kind, bytes) => { const head = Buffer.alloc(8); head.writeUInt32LE(kind, 0); head.writeUInt32LE(bytes.length, 4); return padded(Buffer.concat([head, bytes])); };
+  const whole = (...numbers) => { const bytes = Buffer.alloc(4 * numbers.length); numbers.forEach((number, k) => bytes.writeInt32LE(number, 4 * k)); return bytes; };
+  const head = Buffer.alloc(128, " ");
+  head.write("MATLAB 5.0 MAT-file");
+  head.fill(0, 116);
+  head.writeUInt16LE(0x0100, 124);
+  head.write("IM", 126);
+  const matrices = Object.entries(columns).map(([name, values]) => element(14, Buffer.concat([
+    element(6, whole(6, 0)), element(5, whole(values.length, 1)), element(1, Buffer.from(name)), element(9, Buffer.from(new Float64Array(values).buffer))])));
+  return Buffer.concat([head, ...matrices]);
+}
+
+await test("Parquet and MATLAB logs are dropped, mapped, checked and fitted as CSV is", async open => {
+  const {address} = await harness.serve([TABLE4]), folder = mkdtempSync(join(tmpdir(), "taut-studio-test-"));
+  execFileSync(taut, ["simulate", TABLE4, "--out", folder, "--format", "parquet", "--no-report", "--quiet"]);
+  execFileSync(taut, ["simulate", TABLE4, "--out", folder, "--no-report", "--quiet"]);
+  const [head, ...rows] = readFileSync(join(folder, "5-v-pulse.csv"), "utf8").trim().split("\n").map(line => line.split(","));
+  const names = ["time_s", "voltage_V", "drive_angle_rad", "cart_position_m"];
+  writeFileSync(join(folder, "pulse.mat"), matlab(Object.fromEntries(names.map(name => [name, rows.map(row => Number(row[head.indexOf(name)]))]))));
+  const fitted = [];
+  for (const file of ["5-v-pulse.parquet", "pulse.mat"]) {
+    const {page} = await open(address);
+    await go(page, "fit");
+    await page.setInputFiles("#log-file", join(folder, file));
+    await page.waitForSelector(".log-file");
+    const mapped = await page.evaluate(() => [...document.querySelectorAll(".log-file select")].map(select => [select.getAttribute("aria-label"), select.options[select.selectedIndex].text].join()));
+    for (const one of ["Time: column,time_s", "drive angle: column,drive_angle_rad", "cart position: column,cart_position_m"]) expect(mapped.includes(one), `${file}: ${one}: ${mapped}`);
+    expect(mapped.some(one => /^Input of the amplifier: column,(input_V|voltage_V)$/.test(one)), `${file}: ${mapped}`);
+    await page.click("#check");
+    await page.waitForSelector("#view-fit .report[data-of=check] h2", {timeout: 120_000});
+    await page.click("#fit");
+    await page.waitForSelector("#fit-keep", {timeout: 120_000});
+    fitted.push(await page.locator("#fit-done table").first().innerText());
+    await shot(page, `fit-${file.split(".").pop()}`);
+  }
+  // The case's own numbers come out, as the logs are of its own simulation.
+  for (const table of fitted) expect(/cart.friction.viscous\s+19\.0/.test(table), table);
 });
 
 await test("a file that is no log is told where it is wrong", async open => {

@@ -1,5 +1,6 @@
 //! Filters on the command.
 
+use super::memory::{Memory, all};
 use crate::design::Filter;
 use nalgebra::Complex;
 use std::f64::consts::PI;
@@ -61,6 +62,11 @@ impl Biquad {
     /// Forgets.
     pub fn reset(&mut self) {
         self.state = [0.0; 2];
+    }
+
+    /// What it remembers.
+    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
+        all(&mut self.state, memory)
     }
 }
 

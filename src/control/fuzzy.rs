@@ -1,6 +1,7 @@
 //! A fuzzy controller with its table of rules (A. Kulkarni, M. A. El-Sharkawi, "Intelligent precision position control
 //! of elastic drive systems", IEEE Transactions on Energy Conversion 16, 2001).
 
+use super::memory::Memory;
 use super::sampled::Speed;
 use crate::design::Fuzzy;
 use crate::signal::profile::Reference;
@@ -41,6 +42,12 @@ impl FuzzyState {
     pub fn reset(&mut self) {
         self.speed.reset();
         self.command = 0.0;
+    }
+
+    /// What it remembers.
+    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
+        self.speed.memory(memory)?;
+        memory(&mut self.command)
     }
 }
 

@@ -15,6 +15,7 @@ pub mod feedback;
 pub mod filter;
 pub mod fuzzy;
 mod insensitive;
+mod memory;
 pub mod model;
 pub mod observer;
 mod outcome;

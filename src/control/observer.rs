@@ -1,6 +1,7 @@
 //! An observer of the disturbance at the command.
 
 use super::compensation::Rigid;
+use super::memory::{Memory, optional};
 use nalgebra::{Complex, Matrix3, RowVector3, Vector3};
 
 /// Estimates position, speed and a constant disturbance of an axis of one mass from its measured position.
@@ -71,5 +72,13 @@ impl DisturbanceState {
     /// Forgets.
     pub fn reset(&mut self) {
         self.state = None;
+    }
+
+    /// What it remembers.
+    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
+        let mut state = self.state.map(|state| [state[0], state[1], state[2]]);
+        optional(&mut state, memory)?;
+        self.state = state.map(Vector3::from);
+        Some(())
     }
 }

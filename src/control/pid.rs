@@ -2,6 +2,7 @@
 //!
 //! With the weight c of the reference's speed: c = 1 differentiates the error, c = 0 the measurement alone.
 
+use super::memory::{Memory, all, last};
 use super::sampled::Speed;
 use crate::design::{Cascade, Pid};
 use crate::signal::profile::Reference;
@@ -47,6 +48,12 @@ impl PidState {
     /// Forgets.
     pub fn reset(&mut self) {
         *self = Self::new(&self.gains, self.every);
+    }
+
+    /// What it remembers.
+    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
+        all([&mut self.integral, &mut self.slope], memory)?;
+        last(&mut self.last, memory)
     }
 }
 
@@ -116,5 +123,11 @@ impl CascadeState {
     /// Forgets.
     pub fn reset(&mut self) {
         *self = Self::new(&self.gains, self.every);
+    }
+
+    /// What it remembers.
+    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
+        self.speed.memory(memory)?;
+        all([&mut self.speed_integral, &mut self.current_integral], memory)
     }
 }

@@ -1,5 +1,6 @@
 //! The loop closed: samples, counts, delay and limit between a controller and the axis.
 
+use super::memory::{Memory, last};
 use super::rest::Rest;
 use crate::error::{Error, Result};
 use crate::mechanism::State;
@@ -391,5 +392,11 @@ impl Speed {
 
     pub(super) fn reset(&mut self) {
         (self.last, self.value) = (None, 0.0);
+    }
+
+    /// What it remembers.
+    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
+        last(&mut self.last, memory)?;
+        memory(&mut self.value)
     }
 }

@@ -1,6 +1,7 @@
 //! Sliding mode with a boundary layer, and the condition under which it reaches its surface.
 
 use super::compensation::Rigid;
+use super::memory::Memory;
 use super::sampled::Speed;
 use crate::design::SlidingMode;
 use crate::signal::profile::Reference;
@@ -49,6 +50,12 @@ impl SlidingState {
     /// Forgets.
     pub fn reset(&mut self) {
         *self = Self::new(&self.gains, &self.rigid, self.every);
+    }
+
+    /// What it remembers.
+    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
+        self.speed.memory(memory)?;
+        memory(&mut self.integral)
     }
 }
 

@@ -3,6 +3,7 @@
 use super::compensation::Compensation;
 use super::filter::Biquad;
 use super::fuzzy::FuzzyState;
+use super::memory::{Memory, all};
 use super::observer::DisturbanceState;
 use super::pid::{CascadeState, PidState};
 use super::sampled::{Controller, Observation};
@@ -102,6 +103,24 @@ fn check(design: &Design, model: &Stage) -> Result<()> {
         return Err(Error::new("the command moves nothing: torque constant or gain is zero").allowed("above zero"));
     }
     Ok(())
+}
+
+impl Standard {
+    /// What it remembers from sample to sample.
+    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
+        match &mut self.core {
+            Core::Pid(core) => core.memory(memory)?,
+            Core::Cascade(core) => core.memory(memory)?,
+            Core::StateFeedback(core) => core.memory(memory)?,
+            Core::SlidingMode(core) => core.memory(memory)?,
+            Core::Fuzzy(core) => core.memory(memory)?,
+        }
+        self.filters.iter_mut().try_for_each(|filter| filter.memory(memory))?;
+        if let Some(observer) = &mut self.observer {
+            observer.memory(memory)?;
+        }
+        all([&mut self.asked, &mut self.position, &mut self.dry], memory)
+    }
 }
 
 impl Controller for Standard {

@@ -1,6 +1,7 @@
 //! State feedback with a Kalman filter: LQG, and with an integral LQI.
 
 use super::compensation::{Compensation, Rigid};
+use super::memory::{Memory, all, flag};
 use super::model::Linear;
 use super::model::Quantity;
 use super::riccati;
@@ -272,5 +273,12 @@ impl StateFeedbackState {
         self.own.fill(0.0);
         self.given.fill(0.0);
         (self.integral, self.integrated, self.last_own) = (0.0, 0.0, 0.0);
+    }
+
+    /// What it remembers.
+    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
+        flag(&mut self.started, memory)?;
+        all(self.estimate.iter_mut().chain(&mut self.own).chain(&mut self.given), memory)?;
+        all([&mut self.integral, &mut self.integrated, &mut self.last_own], memory)
     }
 }

@@ -1,5 +1,6 @@
 //! A controller stepped from outside: whoever asks gives it the reference, and the machine at its samples.
 
+use super::memory::{Memory, all, flag};
 use super::sampled::{Controller, Loop, Observation, Sensor};
 use super::standard::Standard;
 use crate::design::Design;
@@ -85,6 +86,47 @@ impl Stepped {
             self.acting = self.waiting.pop_front().unwrap_or(0.0);
         }
         self.acting
+    }
+}
+
+impl Stepped {
+    /// All that it needs to go on, as plain numbers.
+    pub fn save(&self) -> Vec<u64> {
+        let mut list = Vec::new();
+        let mut out = |number: &mut f64| {
+            list.push(number.to_bits());
+            Some(())
+        };
+        // Every number is shown to a function that takes all of them.
+        let _ = self.clone().memory(&mut out);
+        list.push(self.k);
+        list
+    }
+
+    /// Goes on from what [`Stepped::save`] gave, bit for bit, of a controller of the same design. None, and nothing has
+    /// changed, where `saved` is not of such a one.
+    pub fn restore(&mut self, saved: &[u64]) -> Option<()> {
+        let (k, numbers) = saved.split_last()?;
+        let mut numbers = numbers.iter();
+        let mut copy = self.clone();
+        copy.memory(&mut |number| {
+            *number = f64::from_bits(*numbers.next()?);
+            Some(())
+        })?;
+        if numbers.next().is_some() {
+            return None;
+        }
+        *self = Self { k: *k, ..copy };
+        Some(())
+    }
+
+    fn memory(&mut self, memory: &mut Memory) -> Option<()> {
+        flag(&mut self.halfway, memory)?;
+        // Between a sample and where its command takes over, that command waits with the others.
+        let (whole, _) = self.timing.samples_late();
+        self.waiting.resize(whole + usize::from(self.halfway), 0.0);
+        all(self.waiting.iter_mut().chain([&mut self.acting]), memory)?;
+        self.controller.memory(memory)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Machines and controllers for other tools: C, Structured Text, MATLAB, Python.
 //!
-//! What is exported is made of the mechanism's own equations ([`crate::mechanism::Mechanism::equations`]), written out as
+//! Exports are made of the mechanism's own equations ([`crate::mechanism::Mechanism::equations`]), written out as
 //! tables: [`Tables`]. The texts around them are in the folder of each target.
 
 mod c;
@@ -78,7 +78,7 @@ pub enum Real {
     Double,
 }
 
-/// What is asked for beside the target.
+/// Wishes beside the target.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Options {
     /// Which part; none for what the target has by itself.
@@ -99,7 +99,7 @@ pub struct Exported {
     pub files: Vec<(String, Vec<u8>)>,
     /// Figures of it: what, and how much.
     pub facts: Vec<(String, String)>,
-    /// What should be known besides.
+    /// Notes that a user should read.
     pub notes: Vec<String>,
 }
 

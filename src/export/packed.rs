@@ -4,7 +4,7 @@ use super::tables::{ElementKind, Row, Tables, Then};
 use crate::mechanism::AmplifierMode;
 use std::collections::HashMap;
 
-/// What a condition that ends a body's motion, or the run, is followed by.
+/// The codes that follow a condition which ends a body's motion, or the run.
 pub(super) const STOP: i64 = -1;
 pub(super) const LEAVE: i64 = -2;
 

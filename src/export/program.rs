@@ -9,7 +9,7 @@ use std::rc::Rc;
 #[derive(Debug, Clone)]
 pub(super) struct Expr(Rc<Node>);
 
-/// What it is made of.
+/// Its node.
 #[derive(Debug)]
 pub(super) enum Node {
     Number(f64),
@@ -20,7 +20,7 @@ pub(super) enum Node {
     Whole(Expr),
 }
 
-/// What joins two numbers.
+/// An operation on two numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Operator {
     Plus,
@@ -79,7 +79,7 @@ impl Expr {
 
     fn two(operator: Operator, a: Expr, b: Expr) -> Expr {
         match (operator, a.known(), b.known()) {
-            // What both sides know is computed now, as it would be later.
+            // Two numbers are joined now, as they would be later.
             (_, Some(a), Some(b)) => number(operator.of(a, b)),
             (Operator::Times, Some(1.0), None) => b,
             (Operator::Times | Operator::Over, None, Some(1.0)) => a,
@@ -205,14 +205,14 @@ pub(super) struct Variable {
     pub about: String,
 }
 
-/// What is done once a sample.
+/// The work of a sample.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Program {
-    /// What it is given.
+    /// Its inputs.
     pub inputs: Vec<Variable>,
-    /// What it keeps from sample to sample.
+    /// Its memory from sample to sample.
     pub states: Vec<Variable>,
-    /// What it makes on the way.
+    /// Its local variables.
     pub locals: Vec<String>,
     pub body: Vec<Statement>,
     /// The variable that holds the result.

@@ -21,7 +21,7 @@ pub struct Element {
     pub kind: ElementKind,
     /// Its name, as columns have it.
     pub key: &'static str,
-    /// What it can do, by its code in the tables.
+    /// The things it can do, by their codes in the tables.
     pub states: Vec<Does>,
 }
 
@@ -42,7 +42,7 @@ pub enum ElementKind {
     Gap(usize),
 }
 
-/// What a part does.
+/// A thing that a part does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Does {
     /// Of a body.
@@ -89,7 +89,7 @@ pub struct Row {
 pub struct TableGuard {
     /// The element that it is a condition on, and what that does where it is one; none for one that always is.
     pub of: Option<(usize, usize)>,
-    /// What follows where it falls.
+    /// The change that follows where it falls.
     pub then: Then,
     /// Which of several that have fallen at one instant is settled first.
     pub rank: u8,
@@ -101,7 +101,7 @@ pub struct TableGuard {
     pub row: Row,
 }
 
-/// What follows where a condition falls.
+/// The change that follows where a condition falls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Then {
     /// A body stops: what it does then its load decides.
@@ -122,7 +122,7 @@ pub struct Tables {
     pub elements: Vec<Element>,
     /// The rate of each state.
     pub rates: Vec<Row>,
-    /// What each state is.
+    /// Names of the states.
     pub states: Vec<StateName>,
     /// The conditions.
     pub guards: Vec<TableGuard>,
@@ -136,6 +136,8 @@ pub struct Tables {
     pub forces: Vec<Row>,
     /// Torque of each gear with losses while bodies rest: its sign tells how it carries.
     pub resting_torque: Vec<Option<Row>>,
+    /// Rows that [`Tables::ask`] added.
+    pub(super) others: Vec<Row>,
     /// A bound of how fast anything can change in any mode, 1/s.
     pub fastest: f64,
 }
@@ -204,6 +206,7 @@ impl Tables {
             voltages,
             forces,
             resting_torque,
+            others: Vec::new(),
             fastest,
         })
     }
@@ -213,13 +216,62 @@ impl Tables {
         self.layout.states + self.layout.inputs + 1
     }
 
+    /// Adds the rows of one more quantity, and says where among the [others](Self::others) they stand.
+    pub(super) fn ask(&mut self, form: &dyn Fn(&Mechanism, &Mode) -> Form) -> Result<usize> {
+        let maker = Maker { mechanism: &self.mechanism, layout: &self.layout, elements: &self.elements };
+        let row = maker.row(&|mode| form(&self.mechanism, mode))?;
+        self.others.push(row);
+        Ok(self.others.len() - 1)
+    }
+
+    /// The same machine with each input as a state that rises at a rate, and that rate as one: ramps are no stairs then.
+    /// Behind the states stand as many inputs as before, which nothing depends on.
+    ///
+    /// ```text
+    /// z = (states, u, u̇, 0, 1)      rate of u: u̇      rate of u̇: 0
+    /// ```
+    pub(super) fn with_ramps(mut self) -> Self {
+        let (first, inputs) = (self.layout.states, self.layout.inputs);
+        let widen = |row: &mut Row| {
+            for weights in &mut row.weights {
+                let place = weights.len() - 1;
+                weights.splice(place..place, std::iter::repeat_n(0.0, 2 * inputs));
+            }
+        };
+        let guards = self.guards.iter_mut().map(|guard| &mut guard.row);
+        let all = [&mut self.rates, &mut self.currents, &mut self.voltages, &mut self.forces, &mut self.others];
+        all.into_iter().flatten().chain(guards).chain(self.resting_torque.iter_mut().flatten()).for_each(widen);
+        let size = self.size() + 2 * inputs;
+        for drive in 0..2 * inputs {
+            let mut weights = vec![0.0; size];
+            if drive < inputs {
+                weights[first + inputs + drive] = 1.0;
+            }
+            self.rates.push(Row { depends: Vec::new(), weights: vec![weights], forms: Vec::new() });
+            self.states.push(StateName { name: format!("input_{drive}"), unit: "" });
+        }
+        self.layout.states += 2 * inputs;
+        self
+    }
+
+    /// The code that a column shows of what an element does.
+    pub(super) fn shown_code(does: Does) -> i8 {
+        match does {
+            Does::Moves(motion) => Status::Motion(motion).code(),
+            Does::Torque(positive) => i8::from(positive),
+            Does::Limits(limit) => Status::Limit(limit).code(),
+            Does::Slack(slack) => Status::Slack(slack).code(),
+            Does::Touches(contact) => Status::Contact(contact).code(),
+        }
+    }
+
     /// The row of a table in a mode that is given by what each element does.
     pub fn look<'t>(&self, row: &'t Row, does: &[usize]) -> &'t [f64] {
         let index = row.depends.iter().fold(0, |index, &e| index * self.elements[e].states.len() + does[e]);
         &row.weights[index]
     }
 
-    /// What each element does at rest at the origin without an input.
+    /// Codes of the elements at rest at the origin without an input.
     pub fn at_rest(&self) -> Vec<usize> {
         let mode = self.mechanism.first_mode(&State::default());
         self.elements.iter().map(|element| element.code(element.kind.of(&mode))).collect()
@@ -254,7 +306,7 @@ fn curved(mechanism: &Mechanism) -> Error {
 }
 
 impl ElementKind {
-    /// What it does in a mode.
+    /// The thing it does in a mode.
     fn of(self, mode: &Mode) -> Does {
         match self {
             ElementKind::Body(body) => Does::Moves(mode.motion[body]),
@@ -529,7 +581,7 @@ impl Maker<'_> {
             let guard = TableGuard { of: None, then: Then::Leave, rank: cause.rank(), slot: None, fresh: 0, row };
             guards.push((guard, cause));
         }
-        // What has no end on one side has no condition there.
+        // A travel without an end on one side has no condition there.
         guards.retain(|(guard, _)| guard.row.weights.iter().flatten().all(|weight| weight.is_finite()));
         // Kinds that there are, counted.
         let mut kinds: Vec<usize> = guards.iter().map(|(_, cause)| cause.kind()).collect();

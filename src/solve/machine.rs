@@ -210,6 +210,16 @@ impl Machine {
         self.engine.mode()
     }
 
+    /// Its solver.
+    pub(super) fn engine(&self) -> &dyn Engine {
+        &*self.engine
+    }
+
+    /// The polynomials of its inputs, powers counted from now.
+    pub(super) fn input_coefficients(&self) -> [[f64; DEGREE + 1]; DRIVES] {
+        self.inputs.since(self.time()).coefficients
+    }
+
     /// By how much positions may be off, m; of the general solver nothing is known.
     pub fn error(&self) -> Option<PositionError> {
         self.engine.error()

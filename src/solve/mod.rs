@@ -3,6 +3,7 @@
 mod check;
 mod choice;
 mod coordinates;
+mod derivatives;
 mod estimate;
 mod exact;
 mod general;

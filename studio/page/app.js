@@ -162,11 +162,15 @@ export class App {
   /** Asks for the run of the case as it is now. @param {() => void} [then] */
   ask(then) {
     this.sent++;
-    let asked = this.sent;
+    let asked = this.sent, describes = false;
     this.wire.newest("run", () => {
       asked = this.sent;
-      return {...this.body(), describe: this.needsDescription};
+      // A text that comes while this one is under way asks for a description of its own.
+      describes = this.needsDescription;
+      this.needsDescription = false;
+      return {...this.body(), describe: describes};
     }, (answer, error) => {
+      if (!answer && describes) this.needsDescription = true;
       // Something newer is on its way.
       if (asked === this.sent || answer) this.take(answer, error, asked === this.sent);
       if (then) then();
@@ -183,8 +187,9 @@ export class App {
     }
     this.mistake = null;
     this.run = answer;
-    this.experiment = answer.head.experiment;
-    if (answer.head.parameters) { this.parameters = answer.head.parameters; this.needsDescription = false; }
+    // Of an answer that is overtaken already, neither experiment nor text are those that were chosen since.
+    if (isLast) this.experiment = answer.head.experiment;
+    if (answer.head.parameters) this.parameters = answer.head.parameters;
     else {
       const values = new Map(answer.head.values);
       for (const parameter of this.parameters) {

@@ -39,7 +39,7 @@ export function dropPlace({id, words, accept, many, take, failed}) {
   return place;
 }
 
-/** What went wrong, in one line. @param {any} error */
+/** A mistake in one line. @param {any} error */
 export function wordsOf(error) {
   const mistake = error && error.mistake;
   if (!mistake) return String((error && error.message) || error);

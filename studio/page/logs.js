@@ -118,7 +118,7 @@ class Logs {
       element("details", {class: "more"}, element("summary", {}, "More that is fitted along with each log"), this.along)].filter(Boolean));
   }
 
-  /** What check and fit are asked with. */
+  /** The request of check and fit. */
   body() {
     const chosen = place => [...place.querySelectorAll("input:checked")].map(input => input.value);
     const logs = this.files.map(file => ({name: file.title, log: file.table()}));

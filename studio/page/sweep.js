@@ -30,7 +30,7 @@ class Sweep {
     this.headings = [];
     /** Rows of all columns, in the order in which they came. @type {number[][]} */
     this.rows = [];
-    /** What was brushed, by figure. @type {Map<string, any>} */
+    /** The ranges that were brushed, by figure. @type {Map<string, any>} */
     this.brushes = new Map();
     this.vary = element("div", {class: "choices", role: "group", "aria-label": "What varies"});
     this.share = element("input", {type: "number", id: "share", min: 0.1, max: 90, step: 1, value: 20});

@@ -8,29 +8,74 @@ export const key = "tour", name = "Tour";
 
 const RIG = "sollmann-jouaneh/";
 
-/** A stop: what the paper says there, the case that shows it, and what can be played with.
- * @typedef {{figure: string, title: string, words: string, stage: string, experiment?: number, panels: string[], tries: {words: string, key: string, value: number}[], at?: number, factor?: number}} Stop */
+/** Something to try at a stop: other values, or another experiment.
+ * @typedef {{words: string, set?: [string, number][], experiment?: number}} Try */
+
+/** A stop: figures of the paper, the sentence that they support, the case that shows it (with a change of its text, where
+ * there is one), where to look, and what can be played with.
+ * @typedef {Object} Stop
+ * @property {string} figure
+ * @property {string} title
+ * @property {string} words
+ * @property {string} stage
+ * @property {[string, string]} [change]
+ * @property {string} [view]
+ * @property {string} panel
+ * @property {Try[]} tries
+ * @property {number} [at]
+ * @property {number} [factor]
+ * @property {[number, number]} [window] */
+
+/** All three spans times a factor, of Table 1. @param {number} factor @returns {[string, number][]} */
+const stiffness = factor => [265520, 265520, 117770].map((k, span) => [`belt.stiffness.${span}`, factor * k]);
+
+/** Both pulleys. @param {number} factor @returns {[string, number][]} */
+const inertia = factor => [["drive_pulley.inertia", factor * 7e-5], ["idler_pulley.inertia", factor * 7e-5]];
+
+/** Friction everywhere. @param {number} factor @returns {[string, number][]} */
+const friction = factor => [["drive_pulley.friction.viscous", factor * 0.0042], ["idler_pulley.friction.viscous", factor * 0.0042], ["cart.friction.viscous", factor * 40.6518]];
+
+/** The cart's friction with an excess at the start. @type {[string, string]} */
+const STRIBECK = ['coulomb = "0.2000 N"', 'coulomb = "0.2000 N", stribeck = { force = "0.1 N", velocity = "20 mm/s" }'];
 
 /** @type {Stop[]} */
 const STOPS = [
-  {figure: "Figures 1 and 2", title: "The stage and its model", stage: "table4.toml", panels: ["position"], factor: 1000, at: 0.05,
-    words: "A motor turns the drive pulley; three spans of a toothed belt carry the motion to the cart and around the idler pulley. The model is two pulleys and a cart, joined by springs.",
-    tries: [{words: "a belt twenty times softer in span 1", key: "belt.stiffness.0", value: 6638}]},
-  {figure: "Figures 4 to 7", title: "The linear model answers a pulse", stage: "table1.toml", panels: ["position", "speed"], at: 0.25,
-    words: "With viscous friction alone, the cart follows a 5 V pulse of a quarter of a second and comes to rest slowly: nothing but damping holds it.",
-    tries: [{words: "half the cart's friction", key: "cart.friction.viscous", value: 9.5}, {words: "a cart of one kilogram", key: "cart.mass", value: 1}]},
-  {figure: "Figures 8 and 9", title: "Coulomb friction ends the motion", stage: "table4.toml", panels: ["position", "state"], at: 0.4,
-    words: "With dry friction the bodies stop for good: they stick one after another, at instants that the strip below shows, and no speed creeps on.",
-    tries: [{words: "no dry friction at the cart", key: "cart.friction.coulomb", value: 0}, {words: "ten times as much", key: "cart.friction.coulomb", value: 2}]},
-  {figure: "Figures 10 to 13", title: "Where motor and cart part", stage: "table4.toml", panels: ["error", "force"], factor: 2000, at: 0.01,
-    words: "While the stage accelerates, its belt stretches: the cart is micrometres behind the motor's encoder, most of all in the first milliseconds.",
-    tries: [{words: "twice the cart's mass", key: "cart.mass", value: 0.724}, {words: "twice as stiff a span 2", key: "belt.stiffness.1", value: 265520}]},
-  {figure: "Figures 14 to 17", title: "Twice the voltage", stage: "table4.toml", experiment: 1, panels: ["speed", "current"], at: 0.25,
-    words: "At 10 V the stage runs more than twice as fast as at 5 V: of the first volts, dry friction takes its share.",
-    tries: [{words: "no dry friction at the drive pulley", key: "drive_pulley.friction.coulomb", value: 0}]},
-  {figure: "Figures 20 and 21", title: "The stiffness of the belt", stage: "table2.toml", panels: ["error", "force"], factor: 2000, at: 0.01,
-    words: "Stiffness and length of a span decide how far the cart is from where the encoder says; the resonance lies far above what the motion excites. The view Frequencies has it along the travel.",
-    tries: [{words: "a tenth of the stiffness of span 3", key: "belt.stiffness.2", value: 5888.5}]},
+  {figure: "Figures 1 and 2", title: "The stage and its model", stage: "table4.toml", panel: "position", factor: 1000, at: 0.05,
+    words: "A geared DC motor turns one of two pulleys, and a toothed belt pulls the cart along its guide. The model has three inertias, the pulleys and the cart, and between them the three spans of the belt as springs: equations (1) to (3).",
+    tries: [{words: "a belt twenty times softer in span 1", set: [["belt.stiffness.0", 6638]]}]},
+  {figure: "Figure 3", title: "The belt as a spring", stage: "table1.toml", panel: "force", factor: 2000, at: 0.01, window: [0, 0.05],
+    words: "Where the belt has teeth it is much stiffer than between them. The two are springs in series, so the thin section decides: k = AE/l, equations (11) to (13). The longest span is the softest.",
+    tries: [{words: "half the modulus, as in Table 2", set: stiffness(0.5)}]},
+  {figure: "Figures 4 and 5", title: "A pulse, with the first guess", stage: "table1.toml", panel: "position", at: 0.25,
+    words: "5 V, and then 10 V, for a quarter of a second, with the values of Table 1. The simulated motor answers in the shape of the real one, and ends short of it. What was measured was not published as data: these are the simulated curves.",
+    tries: [{words: "10 V", experiment: 1}, {words: "friction of a half", set: friction(0.5)}]},
+  {figure: "Figures 6 and 7", title: "Stiffness and position", stage: "table1.toml", panel: "position", at: 0.25,
+    words: "One parameter at a time is doubled and halved. Twice and half the stiffness do not change the position by anything that could be seen: the dotted line, the run before, lies under the new one.",
+    tries: [{words: "twice the stiffness", set: stiffness(2)}, {words: "half the stiffness", set: stiffness(0.5)}]},
+  {figure: "Figures 8 and 9", title: "Stiffness and speed", stage: "table1.toml", panel: "speed", at: 0.005, window: [0, 0.03],
+    words: "In the speed, the swing of the belt on top of the motion changes, and hardly more than that: a stiffer belt swings faster and less.",
+    tries: [{words: "twice the stiffness", set: stiffness(2)}, {words: "half the stiffness", set: stiffness(0.5)}]},
+  {figure: "Figures 10 and 11", title: "Inertia", stage: "table1.toml", panel: "speed", at: 0.01,
+    words: "More inertia makes the answer slower, and the run-out after the pulse longer by as much, so that the end is the same. That holds while friction is viscous alone.",
+    tries: [{words: "pulleys twice as heavy", set: inertia(2)}, {words: "pulleys half as heavy", set: inertia(0.5)}, {words: "all twice as heavy", set: [...inertia(2), ["cart.mass", 0.724]]}]},
+  {figure: "Figures 12 and 13", title: "Friction", stage: "table1.toml", panel: "position", at: 0.25,
+    words: "Friction has by far the largest influence: twice as much of it nearly halves the way, half as much nearly doubles it.",
+    tries: [{words: "twice the friction", set: friction(2)}, {words: "half the friction", set: friction(0.5)}]},
+  {figure: "Figures 14 and 15", title: "Matched at 5 V", stage: "table2.toml", panel: "position", at: 0.25,
+    words: "Table 2 was matched to the pulse of 5 V. A linear model goes exactly twice as far at 10 V, whatever its numbers are, and the real stage does not: one set of linear parameters does not serve both.",
+    tries: [{words: "10 V", experiment: 1}]},
+  {figure: "Figure 16", title: "Three parts of friction", stage: "table4.toml", change: STRIBECK, view: "modes", panel: "friction",
+    words: "Friction against speed, equation (14): a part that grows with speed, a part that only knows the direction (Coulomb), and an excess at the start of a motion that is soon gone (Stribeck). The view shows the curve of each body; the cart's has the excess.",
+    tries: []},
+  {figure: "Figure 17", title: "Two of them are kept", stage: "table4.toml", view: "modes", panel: "friction",
+    words: "The Stribeck part is called minor and left out: what remains, equation (15), jumps at zero speed and rises from there.",
+    tries: [{words: "no dry friction at the cart", set: [["cart.friction.coulomb", 0]]}, {words: "ten times as much", set: [["cart.friction.coulomb", 2]]}]},
+  {figure: "Figures 18 and 19", title: "Friction must not push", stage: "table4.toml", panel: "state", at: 0.4,
+    words: "Block diagrams of equations (16) to (18). Friction may hold a body and never turn it round: Table 3 sees to that by a band of speeds about zero. Here a body that comes to rest sticks until its load breaks it loose; the strip shows when.",
+    tries: [{words: "no dry friction at the cart", set: [["cart.friction.coulomb", 0]]}]},
+  {figure: "Figures 20 and 21", title: "One set for both voltages", stage: "table4.toml", panel: "position", at: 0.4,
+    words: "With the Coulomb friction of Table 4 one set of numbers serves 5 V and 10 V. Dry friction takes its share of the first volts: twice the voltage moves the cart 2.3 times as far.",
+    tries: [{words: "10 V", experiment: 1}, {words: "no dry friction at the drive pulley", set: [["drive_pulley.friction.coulomb", 0]]}]},
 ];
 
 /** @param {HTMLElement} root @param {App} app */
@@ -64,17 +109,20 @@ export function mount(root, app) {
     title.focus({preventScroll: true});
   }
 
-  function open(stop, one) {
-    app.open(stages.get(RIG + stop.stage) || "", {name: stop.stage, experiment: stop.experiment || 0});
+  /** @param {Stop} stop @param {Try} [one] */
+  function open(stop, one = {words: ""}) {
+    const text = stages.get(RIG + stop.stage) || "";
+    app.open(stop.change ? text.replace(...stop.change) : text, {name: stop.stage, experiment: one.experiment || 0});
     app.factor = stop.factor || 100;
-    app.show("motion");
-    const seek = () => {
+    app.show(stop.view || "motion");
+    waitFor(app, () => {
+      for (const [key, value] of one.set || []) app.drag(key, value);
+      app.drop();
+      if (stop.window) app.look(stop.window);
       if (stop.at !== undefined && app.cursor === 0) app.seek(stop.at);
-      const panel = document.querySelector(`[data-panel="${stop.panels[0]}"]`);
-      if (panel) panel.scrollIntoView({block: "center", behavior: "smooth"});
-    };
-    const isOpen = () => { if (one) { app.drag(one.key, one.value); app.drop(); } seek(); };
-    waitFor(app, isOpen);
+      const panel = document.querySelector(`[data-panel="${stop.panel}"]`);
+      if (panel && !stop.view) panel.scrollIntoView({block: "center", behavior: "smooth"});
+    });
   }
 
   app.on("view", () => { if (app.view === key && !stages.size) go(at); });

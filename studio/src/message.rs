@@ -1,14 +1,14 @@
-//! What goes over a socket: requests as JSON, answers as frames of a JSON head and columns of numbers.
+//! Messages of a socket: requests as JSON, answers as frames of a JSON head and columns of numbers.
 
 use serde_json::{Map, Value, json};
 use taut::error::{Error, Result};
 
-/// What a page asks for.
+/// A request of a page.
 #[derive(Debug, Clone)]
 pub struct Request {
     /// The page's number for it, given back with the answer.
     pub id: u64,
-    /// What is to be done: a row of `work::ACTS`.
+    /// The act: a row of `work::ACTS`.
     pub act: String,
     /// All of it.
     pub body: Map<String, Value>,
@@ -68,7 +68,7 @@ impl Reply {
         }
     }
 
-    /// What is wrong, with its place.
+    /// A mistake, with its place.
     pub fn error(error: &Error) -> Self {
         let place = error.place.as_ref();
         let span = place.and_then(|place| place.span.as_ref());

@@ -26,7 +26,7 @@ const HEAD: Duration = Duration::from_secs(10);
 /// How long open connections have when it ends.
 const GRACE: Duration = Duration::from_millis(400);
 
-/// What the command line says.
+/// Options of the command line.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
     /// The case that is opened, and the only file that the page may save to.
@@ -101,7 +101,7 @@ async fn connection(stream: TcpStream, service: TowerToHyperService<Router>) {
     let _ = stream.set_nodelay(true);
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new()).header_read_timeout(HEAD).max_headers(64).max_buf_size(64 * 1024);
-    // What a client does wrong ends its connection, and nothing else.
+    // A mistake of a client ends its connection, and nothing else.
     let _ = http.serve_connection(TokioIo::new(stream), service).with_upgrades().await;
 }
 

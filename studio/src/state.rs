@@ -1,4 +1,4 @@
-//! What all connections of a server share.
+//! The state that all connections of a server share.
 
 use crate::guard::Keys;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ const SOCKETS: usize = 128;
 
 /// The state of a server.
 pub struct State {
-    /// What opens it.
+    /// The token that opens it.
     pub keys: Keys,
     /// The case of the command line.
     pub case: Option<CaseFile>,
@@ -111,14 +111,14 @@ impl Drop for Place {
     }
 }
 
-/// What a panic of another thread left is as whole as before: each lock guards one value.
+/// A value is as whole after a panic of another thread as before: each lock guards one.
 pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl CaseFile {
     fn read(path: PathBuf) -> Result<Self> {
-        // What is wrong in it is shown at its line on the page; a file that is no text at all is told now.
+        // Mistakes in it are shown at their line on the page; a file that is no text at all is told now.
         match Opened::read_with(&path, &[]) {
             Err(error) if error.place.as_ref().is_none_or(|place| place.span.is_none()) => return Err(error),
             _ => {}

@@ -116,7 +116,7 @@ fn make(args: &Args, target: TargetName, case: &Opened, stem: &str) -> Result<Ex
     let options = Options { part, real, step: args.step };
     let of = |target| export::export(case, target, stem, &options);
     match target {
-        TargetName::Fmu => fmu::make(args, case, stem),
+        TargetName::Fmu => fmu::make(args, part, case, stem),
         TargetName::C => of(Target::C),
         TargetName::St => of(Target::StructuredText),
         TargetName::Matlab => of(Target::Matlab),

@@ -1,4 +1,4 @@
-/* What a Cortex-M4F begins with: its vector table, and the floating-point unit switched on before newlib starts. */
+/* The beginning of a Cortex-M4F: its vector table, and the floating-point unit switched on before newlib starts. */
 #include <stdint.h>
 
 extern void _start(void);

@@ -7,7 +7,7 @@ use std::path::Path;
 use taut::case::{Case, Opened};
 use tempfile::TempDir;
 
-/// What every compiler is asked for.
+/// Warnings that every compiler is asked for.
 const STRICT: [&str; 8] =
     ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-Wconversion", "-ffp-contract=off", "-O2"];
 
@@ -141,7 +141,7 @@ fn the_plant_moves_as_taut_simulates() {
         for (real, most) in [("double", 1e-12), ("float", 1e-6)] {
             let folder = exported(&file(case), changes, &["--real", real, "--part", "plant"]);
             write_doubles(&folder.path().join("in.bin"), flat(&commands));
-            // What a sanitizer finds ends the program.
+            // A finding of a sanitizer ends the program.
             let options = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
             let told = run_here(folder.path(), "plant.c", &options);
             let off = ways.differ(&doubles(&folder.path().join("out.bin")));
@@ -173,7 +173,7 @@ fn the_controller_replays_moves_bit_for_bit() {
     }
 }
 
-/// What a Cortex-M4F makes of a model.
+/// A model on a Cortex-M4F: its numbers and its cost.
 pub struct OnArm {
     pub code: usize,
     pub data: usize,

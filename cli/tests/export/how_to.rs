@@ -54,7 +54,7 @@ fn every_page_of_use_works_as_it_stands() {
             "c" => &["gcc"],
             "matlab" => &["octave-cli", "mkoctfile"],
             "st" | "python" | "json" => &[],
-            // What another program exports is tested beside that.
+            // Exports of another program are tested beside that.
             _ => continue,
         };
         if !are_there(tools) {

@@ -1,4 +1,4 @@
-//! What exported machines and controllers are compared with.
+//! Trajectories and commands that exported machines and controllers are compared with.
 
 use taut::case::{Case, Opened};
 use taut::control::{Controller, Loop, Observation, Standard, close};
@@ -102,7 +102,7 @@ impl Controller for Watched {
     }
 }
 
-/// What the controller of a case sees in one of its moves, and the commands that follow: twelve numbers and one.
+/// Inputs of the controller of a case in one of its moves, and the commands that follow: twelve numbers and one.
 pub fn observed(case: &Case, which: usize) -> Vec<([f64; 12], f64)> {
     let design = case.controller.as_ref().unwrap();
     let one = &case.moves[which];

@@ -1,4 +1,4 @@
-//! What can be asked for, and what is refused with what can be done instead.
+//! Requests that are met, and those that are refused with what can be done instead.
 
 use super::tools::{file, taut};
 use std::path::Path;

@@ -6,7 +6,7 @@ use super::tools::{file, python, run, taut};
 use std::fs;
 use taut::case::Case;
 
-/// What a block is given, in the order of what a controller sees.
+/// Inputs of a block, in the order of what a controller sees.
 pub const SEEN: [&str; 12] = [
     "now_position",
     "now_speed",
@@ -74,7 +74,7 @@ def faults(text):
 for name in sys.argv[1:]:
     text = open(name, 'rb').read()
     assert not faults(text), (name, faults(text)[:5])
-    # What is wrong is found.
+    # A mistake is found.
     assert faults(text.replace(b'END_IF;', b'END;', 1)), name
 ";
 

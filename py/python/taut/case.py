@@ -479,16 +479,17 @@ def export(
     part: str | None = None,
     real: str = "double",
     step: float | None = None,
+    fmi: int = 3,
 ) -> list[Path]:
     """Writes a case, or a case file, for another tool, as ``taut export`` does, and returns the files.
 
-    ``target`` is ``c``, ``st``, ``matlab``, ``python`` or ``json``. ``out`` names the file where it ends as the target's
-    files do, else a folder. ``part`` is ``plant``, ``controller`` or ``both``, ``real`` the numbers of C (``float`` or
-    ``double``), ``step`` the step of the plant, s.
+    ``target`` is ``fmu``, ``c``, ``st``, ``matlab``, ``python`` or ``json``. ``out`` names the file where it ends as the
+    target's files do, else a folder. ``part`` is ``plant``, ``controller`` or ``both``, ``real`` the numbers of C (``float`` or
+    ``double``), ``step`` the step of the plant, s, ``fmi`` the version of an FMU: 2 or 3.
     """
     found = case if isinstance(case, Case) else read(case)
     words = _checks.text("target", target), _checks.path(out), _checks.word("part", part), _checks.text("real", real)
-    files, _ = found._native.export(*words, _checks.number("step", step))
+    files, _ = found._native.export(*words, _checks.number("step", step), _checks.whole("fmi", fmi, 2, 3))
     return [Path(file) for file in files]
 
 

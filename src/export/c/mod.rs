@@ -14,7 +14,7 @@ pub(super) fn export(case: &Opened, part: Part, stem: &str, options: &Options) -
 
 /// The same with names that begin so.
 pub(super) fn named(case: &Opened, part: Part, (stem, name): (&str, &str), options: &Options) -> Result<Exported> {
-    let writer = Writer { name: name.to_string(), real: options.real };
+    let writer = Writer { name: name.to_string(), real: options.real, local: "" };
     let (mut header, mut source) = (String::new(), String::new());
     let (mut facts, notes) = (Vec::new(), Vec::new());
     if part.has_plant() {
@@ -36,11 +36,31 @@ pub(super) fn named(case: &Opened, part: Part, (stem, name): (&str, &str), optio
     Ok(Exported { files, facts, notes })
 }
 
-/// What all parts of the files have in common.
+/// Header and source of a plant that others are written around: `local` is what its static variables are declared with.
+pub(super) fn plant(
+    tables: &Tables,
+    (title, name): (&str, &str),
+    step: f64,
+    local: &'static str,
+) -> Result<[String; 2]> {
+    let writer = Writer { name: name.to_string(), real: Real::Double, local };
+    let plant = plant::Plant::new(tables, step, writer.real)?;
+    let header = writer.header(title, &plant.header(&writer, title));
+    Ok([header, writer.source(name, &plant.source(&writer))])
+}
+
+/// The longest step that a plant can have, s.
+pub(super) fn longest_step(tables: &Tables) -> f64 {
+    plant::Plant::longest_step(tables)
+}
+
+/// Names and numbers that all parts of the files have in common.
 pub(super) struct Writer {
-    /// What every name outside begins with.
+    /// The beginning of every name outside.
     pub name: String,
     pub real: Real,
+    /// The word before the types of static variables: that of threads, or nothing.
+    pub local: &'static str,
 }
 
 const HEADER: &str = include_str!("whole.h");
@@ -49,7 +69,8 @@ const SOURCE: &str = include_str!("whole.c");
 impl Writer {
     /// A template with its names.
     pub(super) fn fill(&self, template: &str, parts: &[(&str, &str)]) -> String {
-        let mut text = template.replace("@name@", &self.name).replace("@NAME@", &self.name.to_uppercase());
+        let text = template.replace("@local@", self.local).replace("@NAME@", &self.name.to_uppercase());
+        let mut text = text.replace("@name@", &self.name);
         for (place, part) in parts {
             text = text.replace(place, part);
         }

@@ -23,7 +23,7 @@
 /* Halvings of a series within which a guard's first fall is told. */
 #define HALVINGS 40U
 
-static struct {
+static @local@struct {
     @name@_real z[SIZE];
     @name@_real carry[STATES]; /* what additions to z have lost */
     @name@_real tolerance[ROOM_SLOTS];
@@ -42,10 +42,10 @@ static struct {
 } plant;
 
 /* The Taylor series under way, and the coefficients of a guard along it. */
-static @name@_real term[ORDER + 1][SIZE];
-static @name@_real coefficient[ORDER + 1];
-static @name@_real bernstein[ORDER + 1];
-static @name@_real guard_value[ROOM_GUARDS];
+static @local@@name@_real term[ORDER + 1][SIZE];
+static @local@@name@_real coefficient[ORDER + 1];
+static @local@@name@_real bernstein[ORDER + 1];
+static @local@@name@_real guard_value[ROOM_GUARDS];
 
 static @name@_real size_of(@name@_real x) { return (x < R(0.0)) ? -x : x; }
 
@@ -108,7 +108,7 @@ static void take_up_mode(void)
 /* A row of a guard where bodies rest: gears that lose power carry as they do at rest. */
 static const @name@_real *resting_row(uint32_t guard)
 {
-    static uint8_t does[ROOM_ELEMENTS];
+    static @local@uint8_t does[ROOM_ELEMENTS];
     uint32_t k;
     for (k = 0U; k < ELEMENTS; k++) {
         does[k] = plant.does[k];
@@ -179,7 +179,7 @@ static void add_series(@name@_real s)
         for (k = ORDER; k > 0U; k--) {
             moved = (moved + term[k][i]) * s;
         }
-        /* What the addition loses is kept for the next one. */
+        /* The rounding of the addition is kept for the next one. */
         moved -= plant.carry[i];
         sum = plant.z[i] + moved;
         plant.carry[i] = (sum - plant.z[i]) - moved;
@@ -207,8 +207,8 @@ static void along(const @name@_real row[], @name@_real part)
 /* The first coefficient from `first` on that is more than rounding; those before it count as zero. */
 static uint32_t first_term(const @name@_real row[], @name@_real distance, uint32_t first)
 {
-    static @name@_real sizes[SIZE];
-    static @name@_real next[STATES];
+    static @local@@name@_real sizes[SIZE];
+    static @local@@name@_real next[STATES];
     uint32_t found = ORDER + 1U;
     uint32_t i;
     uint32_t j;
@@ -424,7 +424,7 @@ static uint32_t advance(@name@_real distance, @name@_real *used)
     return fallen;
 }
 
-/* What has just become a condition on an element is zero where it is that but for rounding. */
+/* A condition on an element that has just become one is zero where it is that but for rounding. */
 static void tolerate(uint32_t element)
 {
     uint32_t k;
@@ -451,7 +451,7 @@ static void tolerate(uint32_t element)
     }
 }
 
-/* What a body at zero speed does under its load. */
+/* The motion of a body at zero speed under its load. */
 static uint32_t decide(uint32_t element)
 {
     const @name@_real *forward = resting_row(BODY_DATA[ELEMENT_DATA[element]].break_forward);
@@ -697,25 +697,17 @@ static int take_input(const @name@_real input[])
     return 1;
 }
 
-@name@_status @name@_step(const @name@_real input[@NAME@_DRIVES])
+/* Goes on by what is left, s, until there have been too many events since `begin` of them; says what is left then. */
+static @name@_status go_on(@name@_real *left, uint32_t begin)
 {
-    @name@_real left = @NAME@_STEP;
     @name@_real sum = R(0.0);
-    const uint32_t begin = plant.events;
     uint32_t series = 0U;
     uint32_t i;
-    if (plant.status == @NAME@_LEFT_TRAVEL) {
-        return plant.status;
-    }
-    plant.status = @NAME@_DONE;
-    if (!take_input(input)) {
-        return @NAME@_NO_NUMBER;
-    }
-    while ((left > R(0.0)) && (plant.status == @NAME@_DONE)) {
+    while ((*left > R(0.0)) && (plant.status == @NAME@_DONE)) {
         @name@_real used = R(0.0);
-        /* What is left behind the last whole series of a step is of its own length. */
-        const uint32_t fallen = advance((left < (R(1.0000001) * REACH)) ? left : REACH, &used);
-        left -= used;
+        /* The rest behind the last whole series of a step is of its own length. */
+        const uint32_t fallen = advance((*left < (R(1.0000001) * REACH)) ? *left : REACH, &used);
+        *left -= used;
         series++;
         if (fallen != NONE) {
             change(fallen);
@@ -723,7 +715,7 @@ static int take_input(const @name@_real input[])
                 settle();
             }
         }
-        if ((left > R(0.0)) && (plant.status == @NAME@_DONE) &&
+        if ((*left > R(0.0)) && (plant.status == @NAME@_DONE) &&
             ((series >= @NAME@_SERIES) || ((plant.events - begin) >= @NAME@_EVENTS))) {
             plant.status = @NAME@_TOO_MANY_EVENTS;
         }
@@ -735,6 +727,20 @@ static int take_input(const @name@_real input[])
         plant.status = @NAME@_NO_NUMBER;
     }
     return plant.status;
+}
+
+@name@_status @name@_step(const @name@_real input[@NAME@_DRIVES])
+{
+    @name@_real left = @NAME@_STEP;
+    const uint32_t begin = plant.events;
+    if (plant.status == @NAME@_LEFT_TRAVEL) {
+        return plant.status;
+    }
+    plant.status = @NAME@_DONE;
+    if (!take_input(input)) {
+        return @NAME@_NO_NUMBER;
+    }
+    return go_on(&left, begin);
 }
 
 void @name@_read(@name@_output *out)

@@ -3,7 +3,7 @@
 /* Bodies, drives and springs, by the numbers that the functions take. */
 @numbers@
 
-/* What is read of the plant, in SI units. */
+/* Outputs of the plant, in SI units. */
 typedef struct {
     @name@_real position[@NAME@_BODIES]; /* rad or m */
     @name@_real speed[@NAME@_BODIES];    /* rad/s or m/s */
@@ -36,7 +36,7 @@ void @name@_start(const @name@_real position[@NAME@_BODIES], const @name@_real s
 /* One step with the commands of the drives held. */
 @name@_status @name@_step(const @name@_real input[@NAME@_DRIVES]);
 
-/* What it is like now. */
+/* Its outputs now. */
 void @name@_read(@name@_output *out);
 
 /* Events (a body that starts to slide, stops or turns; a limit, a span or a stop that changes) since the start. */

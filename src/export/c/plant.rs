@@ -73,7 +73,7 @@ impl<'t> Plant<'t> {
         };
         let parts = (tables.fastest * step / 2.0).ceil().max(1.0);
         if parts > MOST_SERIES || !(step > 0.0 && step.is_finite()) {
-            let fits = crate::quantity::rounded(MOST_SERIES * 2.0 / tables.fastest);
+            let fits = crate::quantity::rounded(Self::longest_step(tables));
             return Err(Error::new(format!("a step of {step:?} s takes {parts} series of this machine"))
                 .in_file("--step")
                 .allowed(format!("steps of up to {fits} s"))
@@ -82,6 +82,11 @@ impl<'t> Plant<'t> {
         let reach = tables.fastest * step / parts;
         let order = orders.iter().find(|(most, _)| reach <= *most).map_or(orders[3].1, |(_, order)| *order);
         Ok(Self { tables, step, real, parts: parts as usize, order })
+    }
+
+    /// The longest step that it can have, s.
+    pub(super) fn longest_step(tables: &Tables) -> f64 {
+        MOST_SERIES * 2.0 / tables.fastest
     }
 
     fn number(&self, value: f64) -> String {
@@ -179,6 +184,10 @@ impl<'t> Plant<'t> {
         }
         let resting: Vec<usize> =
             tables.resting_torque.iter().map(|row| row.as_ref().map_or(0, |row| pool.add(row))).collect();
+        let others = pool.first.len();
+        tables.others.iter().for_each(|row| {
+            pool.add(row);
+        });
 
         let mut text = String::new();
         let mut define = |word: &str, value: String| {
@@ -193,6 +202,9 @@ impl<'t> Plant<'t> {
         define("CURRENT_TABLE", format!("{currents}U"));
         define("VOLTAGE_TABLE", format!("{voltages}U"));
         define("FORCE_TABLE", format!("{forces}U"));
+        if !tables.others.is_empty() {
+            define("OTHER_TABLE", format!("{others}U"));
+        }
         let (epsilon, rounding) = match self.real {
             Real::Float => (f64::from(f32::EPSILON), 2.7e-6),
             Real::Double => (f64::EPSILON, crate::mechanism::ROUNDING),

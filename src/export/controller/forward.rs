@@ -15,7 +15,7 @@ pub(super) struct Forward<'s> {
     before_gear: bool,
 }
 
-/// What the reference needs of pulleys and motor.
+/// Accelerations and forces that the reference needs of pulleys and motor.
 pub(super) struct Needed {
     pub drive: Target,
     pub idler: [Expr; 2],

@@ -39,7 +39,7 @@ impl Target {
 
 /// The program of a design for a model of the axis. Errors: what no controller can be.
 pub(super) fn program(design: &Design, model: &Stage) -> Result<Program> {
-    // What `taut move` refuses is refused here.
+    // Designs that `taut move` refuses are refused here.
     Standard::new(design, model)?;
     let mut p = Program::default();
     let now = Target::input(&mut p, "now", "where the cart should be at this sample");

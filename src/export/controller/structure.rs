@@ -90,7 +90,7 @@ impl<'d> Core<'d> {
         }
     }
 
-    /// What the limit left of the command.
+    /// The command that the limit left.
     pub(super) fn limited(&mut self, p: &mut Program, excess: &Expr, effective: &Expr) {
         match self {
             Core::Pid(gains, every) => {
@@ -313,7 +313,7 @@ fn state_feedback(
     let mut command = number(0.0);
     for i in 0..n {
         let term = parts.gain[i] * (estimate[i].clone() - wanted[i].clone());
-        // What begins with nothing is the negative of its first term.
+        // A sum that begins with nothing is the negative of its first term.
         command = if i == 0 { -term } else { command - term };
     }
     for i in 0..parts.pending {
@@ -336,7 +336,7 @@ fn state_feedback(
 fn state_feedback_limited(p: &mut Program, parts: &Parts, excess: &Expr, effective: &Expr) {
     let n = parts.phi.nrows();
     if parts.integral.is_some() {
-        // What has no effect is not gathered.
+        // A command that has no effect is not gathered.
         let back = |p: &mut Program| p.set("integral", variable("integral") - variable("integrated"));
         p.when(Test(Relation::More, excess.clone(), number(0.0)), back, |p| {
             p.when(Test(Relation::Less, excess.clone(), number(0.0)), back, |_| {})

@@ -1,9 +1,10 @@
 //! `modelDescription.xml`, of FMI 2.0 and 3.0.
 
-use super::BINARY;
 use super::model::{Causality, Kind, Model, Role, Variability, Variable};
+use super::{BINARY, sources};
 use crate::error::Result;
 use crate::quantity::{self, Dimension};
+use crate::signal::DEGREE;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -30,8 +31,8 @@ impl Version {
 /// The tolerance that importers give their integrators, if nobody says another.
 const TOLERANCE: f64 = 1e-8;
 
-/// The description of a machine.
-pub fn description(model: &Model, version: Version) -> Result<String> {
+/// The description of a machine, with [sources](super::sources) or without.
+pub fn description(model: &Model, version: Version, has_sources: bool) -> Result<String> {
     let mut xml = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
     let token = match version {
         Version::Two => "guid",
@@ -52,7 +53,7 @@ pub fn description(model: &Model, version: Version) -> Result<String> {
             Version::Three => String::new(),
         }
     );
-    kinds(&mut xml, model, version);
+    kinds(&mut xml, model, version, has_sources);
     units(&mut xml, model)?;
     let _ = writeln!(
         xml,
@@ -76,27 +77,35 @@ fn is_shown(variable: &Variable, version: Version) -> bool {
 }
 
 /// Model exchange and co-simulation: what they can do.
-fn kinds(xml: &mut String, model: &Model, version: Version) {
-    // A controller's memory is no plain numbers.
-    let serialises = model.design.is_none();
+fn kinds(xml: &mut String, model: &Model, version: Version, has_sources: bool) {
     let both = |state: &str, derivative: &str| {
         format!(
-            "modelIdentifier=\"{BINARY}\" canGetAndSet{state}=\"true\" canSerialize{state}=\"{serialises}\" \
+            "modelIdentifier=\"{BINARY}\" canGetAndSet{state}=\"true\" canSerialize{state}=\"true\" \
              {derivative}=\"true\""
         )
     };
+    // In 3.0 they have a description of their own.
+    let end = match has_sources {
+        true => format!(
+            ">\n    <SourceFiles><File name=\"{}\"/></SourceFiles>\n  </CoSimulation>",
+            sources::compiled(version)
+        ),
+        false => "/>".to_string(),
+    };
+    let orders = if model.is_piecewise_linear() { DEGREE } else { 0 };
     let _ = match version {
         Version::Two => writeln!(
             xml,
             "  <ModelExchange {both}/>\n  <CoSimulation {both} canHandleVariableCommunicationStepSize=\"true\" \
-             canInterpolateInputs=\"true\"/>",
+             canInterpolateInputs=\"true\" maxOutputDerivativeOrder=\"{orders}\"{end}",
             both = both("FMUstate", "providesDirectionalDerivative")
         ),
         Version::Three => writeln!(
             xml,
             "  <ModelExchange {both} needsCompletedIntegratorStep=\"true\"/>\n  <CoSimulation {both} \
              canHandleVariableCommunicationStepSize=\"true\" hasEventMode=\"true\" mightReturnEarlyFromDoStep=\"true\" \
-             providesIntermediateUpdate=\"true\" canReturnEarlyAfterIntermediateUpdate=\"true\"/>",
+             providesIntermediateUpdate=\"true\" canReturnEarlyAfterIntermediateUpdate=\"true\" \
+             maxOutputDerivativeOrder=\"{orders}\"/>",
             both = both("FMUState", "providesDirectionalDerivatives")
         ),
     };
@@ -202,7 +211,7 @@ fn nominals(model: &Model) -> Option<Vec<f64>> {
     Some(model.nominals(&mechanism))
 }
 
-/// What depends on what is not told: all on all, as it may be in some mode.
+/// Dependencies are not told one by one: all depends on all, as it may be in some mode.
 fn structure(xml: &mut String, shown: &[&Variable], version: Version) {
     let is_unknown = |variable: &Variable| {
         let calculated = variable.start.is_none();

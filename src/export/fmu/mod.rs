@@ -6,12 +6,16 @@
 mod archive;
 mod description;
 mod model;
+mod pack;
 mod resource;
+mod sources;
 
 pub use archive::Archive;
 pub use description::{Version, description};
 pub use model::{Causality, Kind, Model, Role, Variability, Variable};
+pub use pack::{Carried, object_in, pack};
 pub use resource::resource;
+pub use sources::sources;
 
 /// Where the machine stands in the archive.
 pub const MACHINE: &str = "resources/machine.toml";

@@ -32,7 +32,7 @@ pub struct Variable {
     pub unit: &'static str,
     /// The unit that it is shown in, if another.
     pub shown: String,
-    /// What it is to the machine.
+    /// Its part in the machine.
     pub role: Role,
     /// Real numbers, or whole ones.
     pub kind: Kind,
@@ -53,7 +53,7 @@ pub enum Kind {
     Whole,
 }
 
-/// What a variable is to the machine.
+/// The part of a variable in the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// Time.
@@ -151,7 +151,7 @@ pub struct Model {
     pub title: String,
     /// The machine as a case file.
     pub resource: String,
-    /// What tells this machine, and this list of variables, from others.
+    /// The mark of this machine and of this list of variables.
     pub token: String,
     /// All variables, references growing.
     pub variables: Vec<Variable>,
@@ -271,6 +271,11 @@ impl Model {
         }
     }
 
+    /// Whether it is linear between its events.
+    pub fn is_piecewise_linear(&self) -> bool {
+        self.mechanism(&self.defaults()).is_ok_and(|mechanism| mechanism.is_piecewise_linear())
+    }
+
     /// Whether a force is an input of the mechanism beside those of the drives, and its place there; else it is a number
     /// of a body.
     pub fn force_input(&self, load: usize) -> Option<usize> {
@@ -311,12 +316,17 @@ impl Model {
         state
     }
 
+    /// The state in which the case has the machine begin.
+    pub(super) fn start(&self) -> &State {
+        &self.start
+    }
+
     /// The variable with this reference.
     pub fn variable(&self, reference: u32) -> Option<&Variable> {
         self.variables.binary_search_by_key(&reference, |variable| variable.reference).ok().map(|k| &self.variables[k])
     }
 
-    /// What a unit size of each integrated quantity is, for the tolerances of integrators.
+    /// A unit size of each integrated quantity, for the tolerances of integrators.
     pub fn nominals(&self, mechanism: &Mechanism) -> Vec<f64> {
         let lever = |body: usize| mechanism.bodies[body].kind.lever();
         let of = |quantity: &Quantity| match *quantity {
@@ -428,7 +438,7 @@ impl Model {
         list
     }
 
-    /// What stands for integrated quantities that no column shows, their rates, and the conditions.
+    /// Variables of integrated quantities that no column shows, of their rates, and of the conditions.
     fn inner(&self, mechanism: &Mechanism, before: &[Variable]) -> Vec<Variable> {
         let mut list = Vec::new();
         for (index, (quantity, start)) in self.quantities.iter().enumerate() {
@@ -595,7 +605,7 @@ fn typical(unit: &str) -> &'static str {
     }
 }
 
-/// What a column is.
+/// The description of a column.
 fn words(heading: &Heading, mechanism: &Mechanism) -> String {
     let body = |body: usize| mechanism.bodies[body].label.name;
     let drive = |drive: usize| mechanism.drives[drive].label.name;

@@ -34,7 +34,7 @@ pub fn resource(case: &Opened) -> Result<String> {
         document.key_mut("title").iter_mut().for_each(|key| key.leaf_decor_mut().clear());
     }
     let text = document.to_string();
-    // What is written here is read there.
+    // The shared object must be able to read it.
     Opened::from_text_with("machine.toml", &text, &[])?;
     Ok(text)
 }

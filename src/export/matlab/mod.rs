@@ -46,7 +46,7 @@ pub(super) fn export(case: &Opened, stem: &str, options: &Options) -> Result<Exp
     Ok(Exported { files: all, facts, notes })
 }
 
-/// What the MAT-file holds.
+/// The content of the MAT-file.
 fn variables(case: &Opened, tables: &Tables, step: f64) -> Result<Vec<(&'static str, Variable)>> {
     let packed = Packed::new(tables);
     let mechanism = &tables.mechanism;

@@ -20,7 +20,7 @@ from scipy.integrate import solve_ivp
 LINEAR = @linear@
 
 STEP = @step@
-# What an integrator with event location makes of a zero, as a share of the parts of a sum.
+# The error of an integrator with event location where a sum is zero, as a share of its parts.
 ROUNDING = 1e-11
 N = len(STATES)
 SIZE = N + len(DRIVES) + 1
@@ -107,7 +107,7 @@ class Machine:
         while until - self.time > 1e-15 * max(1.0, until):
             events = []
             for row in self.rows:
-                # What is zero here and rises is below zero only by the integrator's own error.
+                # A guard that is zero here and rises is below zero only by the integrator's own error.
                 slack = 1e-13 * (np.abs(row) @ np.abs(self.z) + 1.0)
                 slack = slack if abs(row @ self.z) <= slack else 0.0
                 event = lambda t, x, row=row, slack=slack: row[:N] @ x + row[N:] @ self.z[N:] + slack

@@ -24,7 +24,7 @@ pub struct Curve {
 pub struct Panel {
     key: &'static str,
     title: &'static str,
-    /// What it shows, for those who do not see it.
+    /// A description, for those who do not see it.
     words: &'static str,
     /// The unit that is shown, and how many of it make one SI unit.
     unit: &'static str,

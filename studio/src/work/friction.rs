@@ -1,4 +1,4 @@
-//! What friction resists with, over speed: a figure for each body.
+//! Friction over speed: a figure for each body.
 
 use taut::case::Opened;
 use taut::friction::Friction;

@@ -91,7 +91,7 @@ fn planned(request: &Request, context: &Context) -> Result<(Case, Plan)> {
     }
 }
 
-/// What the logs show, and what they determine: the page of `taut check`.
+/// The survey of the logs, and what they determine: the page of `taut check`.
 pub fn check(request: &Request, context: &Context) -> Result<Reply> {
     let (case, plan) = planned(request, context)?;
     let stop = || context.is_stopped();

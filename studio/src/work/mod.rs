@@ -1,4 +1,4 @@
-//! What a page can ask for: each act is a row of [`ACTS`] and a function from a request to a reply.
+//! Acts that a page can ask for: each is a row of [`ACTS`] and a function from a request to a reply.
 
 mod case;
 mod closed;
@@ -62,9 +62,9 @@ const ACTS: &[Act] = &[
 /// A quick work is stopped after this time: a picture that takes longer is none to drag.
 const DEADLINE: Duration = Duration::from_secs(10);
 
-/// What a work knows beside its request.
+/// Surroundings of a work beside its request.
 pub struct Context<'a> {
-    /// What all pages share.
+    /// The state that all pages share.
     pub state: &'a State,
     /// Set when nobody wants the answer any more.
     stop: &'a AtomicBool,

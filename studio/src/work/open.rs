@@ -1,4 +1,4 @@
-//! What a page needs first: the case of the command line, or a case to start from.
+//! The first request of a page: the case of the command line, or a case to start from.
 
 use super::Context;
 use crate::message::{Reply, Request};

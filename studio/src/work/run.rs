@@ -249,7 +249,7 @@ fn event(event: &solve::Event) -> Value {
     })
 }
 
-/// What follows from the numbers at a glance: groups of names and values.
+/// Consequences of the numbers at a glance: groups of names and values.
 fn overview(case: &Opened) -> Value {
     let Ok(overview) = Overview::of(case) else { return Value::Null };
     let row = |row: &taut::overview::Row| json!({ "key": row.key, "name": row.name, "value": taut_report::show::value(row), "how": row.how });

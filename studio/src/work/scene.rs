@@ -1,4 +1,4 @@
-//! What the drawing of a machine needs beside its motion: lengths that do not change.
+//! The drawing of a machine beside its motion: lengths that do not change.
 
 use serde_json::{Value, json};
 use taut::case::Opened;

@@ -108,7 +108,7 @@ fn rows(sweep: &Sweep, context: &Context) -> Trajectory {
         for piece in pieces {
             all.push(piece);
             if last.elapsed() > STEPS {
-                // What the page was too busy for comes with the next step.
+                // Rows that the page was too busy for come with the next step.
                 let fresh: Vec<Vec<f64>> = all[told..].iter().flat_map(|(_, piece)| lines(piece)).collect();
                 if (context.progress)(json!({ "runs": sweep.runs(), "rows": fresh })) {
                     told = all.len();
