@@ -10,6 +10,10 @@ use taut::solve::{Dynamics, Machine, Quantity};
 pub(crate) const READ: [Phase; 5] =
     [Phase::Initialization, Phase::Event, Phase::Continuous, Phase::Step, Phase::Terminated];
 
+/// Phases in which states can be kept: all but that of an instance that cannot be used any more.
+pub(crate) const ALIVE: [Phase; 6] =
+    [Phase::Instantiated, Phase::Initialization, Phase::Event, Phase::Continuous, Phase::Step, Phase::Terminated];
+
 /// Phases in which values can be set.
 pub(crate) const SET: [Phase; 5] =
     [Phase::Instantiated, Phase::Initialization, Phase::Event, Phase::Continuous, Phase::Step];
