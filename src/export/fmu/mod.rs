@@ -9,13 +9,15 @@ mod model;
 mod pack;
 mod resource;
 mod sources;
+mod variable;
 
 pub use archive::Archive;
 pub use description::{Version, description};
-pub use model::{Causality, Kind, Model, Role, Variability, Variable};
+pub use model::Model;
 pub use pack::{Carried, object_in, pack};
 pub use resource::resource;
 pub use sources::sources;
+pub use variable::{Causality, Kind, Role, Variability, Variable};
 
 /// Where the machine stands in the archive.
 pub const MACHINE: &str = "resources/machine.toml";
