@@ -277,8 +277,8 @@ impl Instance {
         Ok(())
     }
 
-    /// Derivatives of outputs with respect to time, of orders 1 to [`DEGREE`]: exact, those of the present mode. Errors:
-    /// what is no output that changes all the time, or a machine whose equations are curved.
+    /// Derivatives of outputs with respect to time, of orders 1 to [`DEGREE`]: exact, those of the present mode.
+    /// Errors: what is no output that changes all the time, or a machine whose equations are curved.
     pub fn output_derivatives(&mut self, references: &[u32], orders: &[i32], into: &mut [f64]) -> Told<()> {
         let mut values: Vec<f64> = Vec::new();
         let machine = self.as_set()?;

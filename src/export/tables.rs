@@ -222,8 +222,8 @@ impl Tables {
         Ok(self.others.len() - 1)
     }
 
-    /// The same machine with each input as a state that rises at a rate, and that rate as one: ramps are no stairs then.
-    /// Behind the states stand as many inputs as before, which nothing depends on.
+    /// The same machine with each input as a state that rises at a rate, and that rate as one: ramps are no stairs
+    /// then. Behind the states stand as many inputs as before, which nothing depends on.
     ///
     /// ```text
     /// z = (states, u, u̇, 0, 1)      rate of u: u̇      rate of u̇: 0

@@ -25,8 +25,8 @@ pub const MACHINE: &str = "resources/machine.toml";
 /// How the shared object is called in the archive, without its ending.
 pub const BINARY: &str = "taut_fmu";
 
-/// The folder of binaries for the platform of this build and its ending: of FMI 3.0 and 2.0. None where the standard has
-/// no name for it.
+/// The folder of binaries for the platform of this build and its ending: of FMI 3.0 and 2.0. None where the standard
+/// has no name for it.
 pub fn platform(version: Version) -> Option<(&'static str, &'static str)> {
     let (system, ending, word) = match std::env::consts::OS {
         "linux" => ("linux", "so", "linux"),

@@ -56,7 +56,8 @@ pub struct Model {
 }
 
 impl Model {
-    /// The machine of a case, with the controller inside if it is asked for. Errors: a controller that the case has not.
+    /// The machine of a case, with the controller inside if it is asked for. Errors: a controller that the case has
+    /// not.
     pub fn new(case: &Opened, with_controller: bool) -> Result<Self> {
         let resource = resource::resource(case)?;
         Self::of_resource(&resource, with_controller)
@@ -159,8 +160,8 @@ impl Model {
         self.mechanism(&self.defaults()).is_ok_and(|mechanism| mechanism.is_piecewise_linear())
     }
 
-    /// Whether a force is an input of the mechanism beside those of the drives, and its place there; else it is a number
-    /// of a body.
+    /// Whether a force is an input of the mechanism beside those of the drives, and its place there; else it is a
+    /// number of a body.
     pub fn force_input(&self, load: usize) -> Option<usize> {
         match self.machine {
             Machine::Axis(_) => Some(1 + load),
