@@ -5,6 +5,8 @@
 mod c;
 #[path = "export/how_to.rs"]
 mod how_to;
+#[path = "../../tests/common/ignored.rs"]
+mod ignored;
 #[path = "export/interpreter.rs"]
 mod interpreter;
 #[path = "export/machines.rs"]

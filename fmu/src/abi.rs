@@ -1,6 +1,7 @@
 //! Pointers into slices, texts out of pointers, panics into statuses.
 
-use crate::instance::{Instance, Phase, Refusal, Status, Told, Use};
+use crate::instance::{Instance, Refusal, Status, Told, Use};
+use crate::values::ALIVE;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -270,10 +271,6 @@ pub(crate) unsafe fn instantiate(
 }
 
 // --- states that are handed out -------------------------------------------------------------------------------------
-
-/// All phases in which states can be kept.
-const ALIVE: [Phase; 6] =
-    [Phase::Instantiated, Phase::Initialization, Phase::Event, Phase::Continuous, Phase::Step, Phase::Terminated];
 
 /// Keeps a state; one that was handed out before is written over.
 pub(crate) unsafe fn keep(handle: &mut Handle, function: &str, state: *mut *mut c_void) -> Told<()> {

@@ -1,13 +1,16 @@
 //! The functions of FMI 2.0, as the standard names them.
 #![allow(non_snake_case, missing_docs, clippy::missing_safety_doc, clippy::too_many_arguments)]
 
-use crate::abi::{
-    Log, Logger2, bring_back, free, instantiate, keep, let_go, put, read_in, room, slice, with, write_out,
+use crate::abi::{Log, Logger2, free, instantiate, put, room, slice, with};
+pub use crate::both::{
+    fmi2DeSerializeFMUstate, fmi2ExitInitializationMode, fmi2FreeFMUstate, fmi2GetContinuousStates, fmi2GetDerivatives,
+    fmi2GetEventIndicators, fmi2GetFMUstate, fmi2GetNominalsOfContinuousStates, fmi2Reset, fmi2SerializeFMUstate,
+    fmi2SerializedFMUstateSize, fmi2SetContinuousStates, fmi2SetFMUstate, fmi2SetTime, fmi2Terminate,
 };
 use crate::instance::Phase::{Continuous, Event, Initialization, Instantiated, Step, Terminated};
-use crate::instance::{Instance, Phase, Refusal, Status, Told, Use};
+use crate::instance::{Instance, Refusal, Status, Told, Use};
 use crate::step::Halt;
-use crate::values::{READ, SET};
+use crate::values::{ALIVE, READ, SET};
 use std::ffi::{c_char, c_int, c_uint, c_void};
 
 type Component = *mut c_void;
@@ -36,9 +39,6 @@ pub struct EventInfo {
 
 const EXCHANGE: c_int = 0;
 const CO_SIMULATION: c_int = 1;
-
-/// All phases in which states can be kept.
-const ALIVE: [Phase; 6] = [Instantiated, Initialization, Event, Continuous, Step, Terminated];
 
 #[unsafe(no_mangle)]
 pub extern "C" fn fmi2GetTypesPlatform() -> *const c_char {
@@ -123,31 +123,6 @@ pub unsafe extern "C" fn fmi2EnterInitializationMode(c: Component) -> c_int {
     }
 }
 
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2ExitInitializationMode(c: Component) -> c_int {
-    unsafe {
-        with(c, |handle| {
-            handle.instance.allow("fmi2ExitInitializationMode", &[Initialization])?;
-            handle.instance.exit_initialization()
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2Terminate(c: Component) -> c_int {
-    unsafe { with(c, |handle| handle.instance.go_into("fmi2Terminate", &[Event, Continuous, Step], Terminated)) }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2Reset(c: Component) -> c_int {
-    unsafe {
-        with(c, |handle| {
-            handle.instance.allow("fmi2Reset", &ALIVE)?;
-            handle.instance.reset()
-        })
-    }
-}
-
 // --- values ---------------------------------------------------------------------------------------------------------
 
 #[unsafe(no_mangle)]
@@ -208,42 +183,7 @@ fn none(instance: &Instance, function: &str, count: usize) -> Told<()> {
     }
 }
 
-// --- states ---------------------------------------------------------------------------------------------------------
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetFMUstate(c: Component, state: *mut *mut c_void) -> c_int {
-    unsafe { with(c, |handle| keep(handle, "fmi2GetFMUstate", state)) }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetFMUstate(c: Component, state: *mut c_void) -> c_int {
-    unsafe { with(c, |handle| bring_back(handle, "fmi2SetFMUstate", state)) }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2FreeFMUstate(c: Component, state: *mut *mut c_void) -> c_int {
-    unsafe { with(c, |handle| let_go(handle, state)) }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SerializedFMUstateSize(c: Component, state: *mut c_void, size: *mut usize) -> c_int {
-    unsafe { with(c, |handle| put(size, handle.state(state)?.bytes()?.len())) }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SerializeFMUstate(c: Component, state: *mut c_void, bytes: *mut u8, size: usize) -> c_int {
-    unsafe { with(c, |handle| write_out(handle, state, room(bytes, size)?)) }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2DeSerializeFMUstate(
-    c: Component,
-    bytes: *const u8,
-    size: usize,
-    state: *mut *mut c_void,
-) -> c_int {
-    unsafe { with(c, |handle| read_in(handle, slice(bytes, size)?, state)) }
-}
+// --- derivatives ----------------------------------------------------------------------------------------------------
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2GetDirectionalDerivative(
@@ -309,71 +249,6 @@ pub unsafe extern "C" fn fmi2CompletedIntegratorStep(
             handle.instance.allow("fmi2CompletedIntegratorStep", &[Continuous])?;
             put(event, c_int::from(handle.instance.has_fallen()?))?;
             put(terminate, 0)
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetTime(c: Component, time: f64) -> c_int {
-    unsafe {
-        with(c, |handle| {
-            handle.instance.only("fmi2SetTime", handle.instance.exchanges())?;
-            handle.instance.allow("fmi2SetTime", &[Event, Continuous])?;
-            handle.instance.set_time(time)
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetContinuousStates(c: Component, x: *const f64, n: usize) -> c_int {
-    unsafe {
-        with(c, |handle| {
-            handle.instance.allow("fmi2SetContinuousStates", &[Continuous])?;
-            handle.instance.set_states(slice(x, n)?)
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetDerivatives(c: Component, rates: *mut f64, n: usize) -> c_int {
-    unsafe {
-        with(c, |handle| {
-            handle.instance.only("fmi2GetDerivatives", handle.instance.exchanges())?;
-            handle.instance.allow("fmi2GetDerivatives", &READ)?;
-            handle.instance.rates(room(rates, n)?)
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetEventIndicators(c: Component, values: *mut f64, n: usize) -> c_int {
-    unsafe {
-        with(c, |handle| {
-            handle.instance.only("fmi2GetEventIndicators", handle.instance.exchanges())?;
-            handle.instance.allow("fmi2GetEventIndicators", &READ)?;
-            handle.instance.residuals(room(values, n)?)
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetContinuousStates(c: Component, x: *mut f64, n: usize) -> c_int {
-    unsafe {
-        with(c, |handle| {
-            handle.instance.only("fmi2GetContinuousStates", handle.instance.exchanges())?;
-            handle.instance.allow("fmi2GetContinuousStates", &READ)?;
-            handle.instance.states(room(x, n)?)
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetNominalsOfContinuousStates(c: Component, x: *mut f64, n: usize) -> c_int {
-    unsafe {
-        with(c, |handle| {
-            handle.instance.only("fmi2GetNominalsOfContinuousStates", handle.instance.exchanges())?;
-            handle.instance.allow("fmi2GetNominalsOfContinuousStates", &ALIVE)?;
-            handle.instance.nominals(room(x, n)?)
         })
     }
 }

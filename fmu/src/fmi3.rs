@@ -1,13 +1,17 @@
 //! The functions of FMI 3.0, as the standard names them. Its booleans come in as bytes: what is not zero is true.
 #![allow(non_snake_case, missing_docs, clippy::missing_safety_doc, clippy::too_many_arguments)]
 
-use crate::abi::{
-    Handle, Log, Logger3, bring_back, free, instantiate, keep, let_go, put, read_in, room, slice, with, write_out,
+use crate::abi::{Handle, Log, Logger3, free, instantiate, put, room, slice, with};
+pub use crate::both::{
+    fmi3DeserializeFMUState, fmi3ExitInitializationMode, fmi3FreeFMUState, fmi3GetContinuousStateDerivatives,
+    fmi3GetContinuousStates, fmi3GetEventIndicators, fmi3GetFMUState, fmi3GetNominalsOfContinuousStates, fmi3Reset,
+    fmi3SerializeFMUState, fmi3SerializedFMUStateSize, fmi3SetContinuousStates, fmi3SetFMUState, fmi3SetTime,
+    fmi3Terminate,
 };
-use crate::instance::Phase::{Continuous, Event, Initialization, Instantiated, Step, Terminated};
-use crate::instance::{Phase, Refusal, Status, Told, Use};
+use crate::instance::Phase::{Continuous, Event, Instantiated, Step, Terminated};
+use crate::instance::{Refusal, Status, Told, Use};
 use crate::step::Halt;
-use crate::values::{READ, SET};
+use crate::values::{ALIVE, READ, SET};
 use std::ffi::{c_char, c_int, c_void};
 
 type Component = *mut c_void;
@@ -16,8 +20,6 @@ type References = *const u32;
 /// Is called within a step: environment, time, whether values can be set and read, whether the step is done, whether it
 /// can return early, whether it shall, and when.
 pub type IntermediateUpdate = unsafe extern "C" fn(*mut c_void, f64, bool, bool, bool, bool, *mut u8, *mut f64);
-
-const ALIVE: [Phase; 6] = [Instantiated, Initialization, Event, Continuous, Step, Terminated];
 
 #[unsafe(no_mangle)]
 pub extern "C" fn fmi3GetVersion() -> *const c_char {
@@ -124,16 +126,6 @@ pub unsafe extern "C" fn fmi3EnterInitializationMode(
 }
 
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3ExitInitializationMode(c: Component) -> c_int {
-    unsafe {
-        with(c, |handle| {
-            handle.instance.allow("fmi3ExitInitializationMode", &[Initialization])?;
-            handle.instance.exit_initialization()
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3EnterEventMode(c: Component) -> c_int {
     unsafe {
         with(c, |handle| {
@@ -165,21 +157,6 @@ pub unsafe extern "C" fn fmi3EnterStepMode(c: Component) -> c_int {
         with(c, |handle| {
             handle.instance.only("fmi3EnterStepMode", !handle.instance.exchanges())?;
             handle.instance.go_into("fmi3EnterStepMode", &[Event], Step)
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3Terminate(c: Component) -> c_int {
-    unsafe { with(c, |handle| handle.instance.go_into("fmi3Terminate", &[Event, Continuous, Step], Terminated)) }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3Reset(c: Component) -> c_int {
-    unsafe {
-        with(c, |handle| {
-            handle.instance.allow("fmi3Reset", &ALIVE)?;
-            handle.instance.reset()
         })
     }
 }
@@ -329,42 +306,7 @@ fn no_dependencies(function: &str) -> Refusal {
     Refusal::error(format!("{function}: dependencies are those of modelDescription.xml, and no others"))
 }
 
-// --- states ---------------------------------------------------------------------------------------------------------
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetFMUState(c: Component, state: *mut *mut c_void) -> c_int {
-    unsafe { with(c, |handle| keep(handle, "fmi3GetFMUState", state)) }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetFMUState(c: Component, state: *mut c_void) -> c_int {
-    unsafe { with(c, |handle| bring_back(handle, "fmi3SetFMUState", state)) }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3FreeFMUState(c: Component, state: *mut *mut c_void) -> c_int {
-    unsafe { with(c, |handle| let_go(handle, state)) }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SerializedFMUStateSize(c: Component, state: *mut c_void, size: *mut usize) -> c_int {
-    unsafe { with(c, |handle| put(size, handle.state(state)?.bytes()?.len())) }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SerializeFMUState(c: Component, state: *mut c_void, bytes: *mut u8, size: usize) -> c_int {
-    unsafe { with(c, |handle| write_out(handle, state, room(bytes, size)?)) }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3DeserializeFMUState(
-    c: Component,
-    bytes: *const u8,
-    size: usize,
-    state: *mut *mut c_void,
-) -> c_int {
-    unsafe { with(c, |handle| read_in(handle, slice(bytes, size)?, state)) }
-}
+// --- derivatives ----------------------------------------------------------------------------------------------------
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3GetDirectionalDerivative(
@@ -451,71 +393,6 @@ pub unsafe extern "C" fn fmi3CompletedIntegratorStep(
             handle.instance.allow("fmi3CompletedIntegratorStep", &[Continuous])?;
             put(event, u8::from(handle.instance.has_fallen()?))?;
             put(terminate, 0)
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetTime(c: Component, time: f64) -> c_int {
-    unsafe {
-        with(c, |handle| {
-            handle.instance.only("fmi3SetTime", handle.instance.exchanges())?;
-            handle.instance.allow("fmi3SetTime", &[Event, Continuous])?;
-            handle.instance.set_time(time)
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetContinuousStates(c: Component, x: *const f64, n: usize) -> c_int {
-    unsafe {
-        with(c, |handle| {
-            handle.instance.allow("fmi3SetContinuousStates", &[Continuous])?;
-            handle.instance.set_states(slice(x, n)?)
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetContinuousStateDerivatives(c: Component, rates: *mut f64, n: usize) -> c_int {
-    unsafe {
-        with(c, |handle| {
-            handle.instance.only("fmi3GetContinuousStateDerivatives", handle.instance.exchanges())?;
-            handle.instance.allow("fmi3GetContinuousStateDerivatives", &READ)?;
-            handle.instance.rates(room(rates, n)?)
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetEventIndicators(c: Component, values: *mut f64, n: usize) -> c_int {
-    unsafe {
-        with(c, |handle| {
-            handle.instance.only("fmi3GetEventIndicators", handle.instance.exchanges())?;
-            handle.instance.allow("fmi3GetEventIndicators", &READ)?;
-            handle.instance.residuals(room(values, n)?)
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetContinuousStates(c: Component, x: *mut f64, n: usize) -> c_int {
-    unsafe {
-        with(c, |handle| {
-            handle.instance.only("fmi3GetContinuousStates", handle.instance.exchanges())?;
-            handle.instance.allow("fmi3GetContinuousStates", &READ)?;
-            handle.instance.states(room(x, n)?)
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetNominalsOfContinuousStates(c: Component, x: *mut f64, n: usize) -> c_int {
-    unsafe {
-        with(c, |handle| {
-            handle.instance.only("fmi3GetNominalsOfContinuousStates", handle.instance.exchanges())?;
-            handle.instance.allow("fmi3GetNominalsOfContinuousStates", &ALIVE)?;
-            handle.instance.nominals(room(x, n)?)
         })
     }
 }

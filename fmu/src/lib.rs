@@ -1,12 +1,13 @@
-//! The shared object inside the FMUs that `taut export fmu` writes: the functions of FMI 2.0 and 3.0, for model exchange
-//! and co-simulation, over [`taut::solve::Machine`] and [`taut::solve::Dynamics`].
+//! The shared object inside the FMUs that `taut export fmu` writes: the functions of FMI 2.0 and 3.0, for model
+//! exchange and co-simulation, over [`taut::solve::Machine`] and [`taut::solve::Dynamics`].
 //!
 //! [`instance`] is a machine under way as the standard sees it, in safe Rust: its phases, its variables, its steps.
-//! `fmi2` and `fmi3` are the functions that importers call: they turn pointers into slices and back, and say no to
-//! what is null. Whatever panics inside a call ends there: the instance answers with the standard's "fatal" then, and
-//! the importer lives on.
+//! `fmi2` and `fmi3` are the functions that importers call, `both` those that are alike in the two: they turn pointers
+//! into slices and back, and say no to what is null. Whatever panics inside a call ends there: the instance answers
+//! with the standard's "fatal" then, and the importer lives on.
 
 mod abi;
+mod both;
 pub mod fmi2;
 pub mod fmi3;
 pub mod instance;

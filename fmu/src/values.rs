@@ -10,6 +10,10 @@ use taut::solve::{Dynamics, Machine, Quantity};
 pub(crate) const READ: [Phase; 5] =
     [Phase::Initialization, Phase::Event, Phase::Continuous, Phase::Step, Phase::Terminated];
 
+/// Phases in which states can be kept: all but that of an instance that cannot be used any more.
+pub(crate) const ALIVE: [Phase; 6] =
+    [Phase::Instantiated, Phase::Initialization, Phase::Event, Phase::Continuous, Phase::Step, Phase::Terminated];
+
 /// Phases in which values can be set.
 pub(crate) const SET: [Phase; 5] =
     [Phase::Instantiated, Phase::Initialization, Phase::Event, Phase::Continuous, Phase::Step];
@@ -273,8 +277,8 @@ impl Instance {
         Ok(())
     }
 
-    /// Derivatives of outputs with respect to time, of orders 1 to [`DEGREE`]: exact, those of the present mode. Errors:
-    /// what is no output that changes all the time, or a machine whose equations are curved.
+    /// Derivatives of outputs with respect to time, of orders 1 to [`DEGREE`]: exact, those of the present mode.
+    /// Errors: what is no output that changes all the time, or a machine whose equations are curved.
     pub fn output_derivatives(&mut self, references: &[u32], orders: &[i32], into: &mut [f64]) -> Told<()> {
         let mut values: Vec<f64> = Vec::new();
         let machine = self.as_set()?;

@@ -62,7 +62,8 @@ fn is_continuous_output(variable: &&Variable) -> bool {
 /// Outputs a moment later are those now and Taylor's series of their derivatives, of all seven orders.
 #[test]
 fn outputs_go_on_as_their_derivatives_say() {
-    // Sliding; a cart that friction holds while its belt pulls; two drives; with the controller inside, between samples.
+    // Sliding; a cart that friction holds while its belt pulls; two drives; with the controller inside, between
+    // samples.
     for (case, input, value, inside, now) in [
         ("sollmann-jouaneh/table4.toml", "command", 5.0, false, 0.05),
         ("sollmann-jouaneh/table4.toml", "command", 5.0, false, 2e-4),

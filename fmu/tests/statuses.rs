@@ -134,8 +134,8 @@ fn another_token_or_no_resources_make_no_instance() {
 
 #[test]
 fn friction_that_was_none_gave_more_conditions_than_there_was_room_for() {
-    // A body without friction has no modes; with friction set before the start it has, and was watched by conditions that
-    // the description did not count: a panic of a thousandth of all random sequences.
+    // A body without friction has no modes; with friction set before the start it has, and was watched by conditions
+    // that the description did not count: a panic of a thousandth of all random sequences.
     let unit = Unit::with("sollmann-jouaneh/table4.toml", &["cart.friction.coulomb=0 N"], false);
     let one = unit.exchange();
     assert_eq!(one.set("cart.friction.coulomb", 3.0), OK);

@@ -404,22 +404,21 @@ impl Case {
         value::json(py, &guarded(|| json::show(&overview))?)
     }
 
-    /// Writes the files of a target, as `taut export` does, and says where they are and what should be known besides.
+    /// Writes the files of a target, as `taut export` does, and says where they are and what should be known besides. `how`
+    /// is the part, the numbers of C, the step, s, and the version of FMI.
     fn export(
         &self,
         py: Python<'_>,
         target: &str,
         out: PathBuf,
-        part: Option<&str>,
-        real: &str,
-        step: Option<f64>,
-        fmi: u32,
+        how: (Option<String>, String, Option<f64>, u32),
     ) -> PyResult<(Vec<PathBuf>, Vec<String>)> {
+        let (part, real, step, fmi) = how;
         let opened = match &self.inner {
             Inner::Axis(case) => Opened::Axis(Box::new(case.as_ref().clone())),
             Inner::Gantry(case) => Opened::Gantry(Box::new(case.as_ref().clone())),
         };
-        let options = Options { part: exported_part(part)?, real: exported_real(real)?, step };
+        let options = Options { part: exported_part(part.as_deref())?, real: exported_real(&real)?, step };
         let own = self.path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let made = unlocked(py, || {
             let inputs = inputs(opened.files());

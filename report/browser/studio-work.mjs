@@ -133,13 +133,13 @@ function matlab(columns) {
 
 await test("Parquet and MATLAB logs are dropped, mapped, checked and fitted as CSV is", async open => {
   const {address} = await harness.serve([TABLE4]), folder = mkdtempSync(join(tmpdir(), "taut-studio-test-"));
-  execFileSync(taut, ["simulate", TABLE4, "--out", folder, "--format", "parquet", "--no-report", "--quiet"]);
+  execFileSync(taut, ["simulate", TABLE4, "--out", join(folder, "parquet"), "--format", "parquet", "--no-report", "--quiet"]);
   execFileSync(taut, ["simulate", TABLE4, "--out", folder, "--no-report", "--quiet"]);
   const [head, ...rows] = readFileSync(join(folder, "5-v-pulse.csv"), "utf8").trim().split("\n").map(line => line.split(","));
   const names = ["time_s", "voltage_V", "drive_angle_rad", "cart_position_m"];
   writeFileSync(join(folder, "pulse.mat"), matlab(Object.fromEntries(names.map(name => [name, rows.map(row => Number(row[head.indexOf(name)]))]))));
   const fitted = [];
-  for (const file of ["5-v-pulse.parquet", "pulse.mat"]) {
+  for (const file of ["parquet/5-v-pulse.parquet", "pulse.mat"]) {
     const {page} = await open(address);
     await go(page, "fit");
     await page.setInputFiles("#log-file", join(folder, file));

@@ -88,8 +88,8 @@ await test("random drags end with the run of the last value", async open => {
   expect(lost === 0, `${lost} of 60 last values are lost`);
 });
 
-// An answer under way took the description, or the experiment, that was asked for after it: typed quickly, a text kept the
-// sliders of the one before; another case opened in its first experiment.
+// An answer under way took the description, or the experiment, that was asked for after it: typed quickly, a text kept
+// the sliders of the one before; another case opened in its first experiment.
 await test("an answer that is overtaken takes nothing of what was chosen since", async open => {
   const {page} = await open();
   const has = key => page.evaluate(key => window.studio.parameters.some(one => one.key === key), key);

@@ -20,8 +20,8 @@ pub(super) struct Packed {
     pub depends_first: Vec<i64>,
     /// For each condition: its table, the element (−1 for none) and the state in which it is one, what follows, rank.
     pub guards: Vec<[i64; 5]>,
-    /// For each element: states, kind (0 body, 1 gear, 2 limit, 3 limit of a current that is a state, 4 spring), what it
-    /// does at rest.
+    /// For each element: states, kind (0 body, 1 gear, 2 limit, 3 limit of a current that is a state, 4 spring), what
+    /// it does at rest.
     pub elements: Vec<[i64; 3]>,
     /// Speeds that end with a body's: (element, place).
     pub moves: Vec<[i64; 2]>,

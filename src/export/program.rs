@@ -1,5 +1,5 @@
-//! A small language for what is computed once a sample: assignments and conditions, no loops. It is written out as C and
-//! as Structured Text, in the same order of operations, so that both give the same bits.
+//! A small language for what is computed once a sample: assignments and conditions, no loops. It is written out as C
+//! and as Structured Text, in the same order of operations, so that both give the same bits.
 
 use std::collections::HashSet;
 use std::ops::{Add, Div, Mul, Neg, Sub};

@@ -7,6 +7,7 @@ use super::presets::{In, PRESETS, Preset};
 use super::sheet::{ColumnId, Request, Sheet};
 use super::{Quantity, csv, lines, matlab};
 use crate::error::{Error, Result};
+use crate::quantity::conversion;
 use std::path::Path;
 
 /// Columns that are looked at.
@@ -149,21 +150,28 @@ fn by_name(columns: &[Seen]) -> Guess {
         guess.columns.push(("time", place, unit(&columns[place], "s").or_else(|| by_step(&columns[place]))));
     }
     for (key, names) in NAMES {
+        let wanted = match *key {
+            "input" => "V",
+            "reference" => "m",
+            key => Quantity::ALL.iter().find(|quantity| quantity.name() == key).map_or("", |one| one.unit()),
+        };
         let free = |place: &usize| !guess.columns.iter().any(|(_, taken, _)| taken == place);
         let ranked = (0..columns.len()).filter(free).filter_map(|place| {
             let column = &columns[place];
-            Some((rank(&words(column), names)?, place)).filter(|_| !column.values.is_empty())
+            let can_be = !column.values.is_empty() && (*key == "input" || is_of(column, wanted));
+            Some((rank(&words(column), names)?, place)).filter(|_| can_be)
         });
         if let Some((_, place)) = ranked.min() {
-            let wanted = match *key {
-                "input" => "V",
-                "reference" => "m",
-                key => Quantity::ALL.iter().find(|quantity| quantity.name() == key).map_or("", |one| one.unit()),
-            };
             guess.columns.push((key, place, unit(&columns[place], wanted)));
         }
     }
     guess
+}
+
+/// Whether a column can be of a quantity with this unit: the unit that its file states, if one, has the same dimension.
+fn is_of(column: &Seen, wanted: &str) -> bool {
+    let dimension = |unit: &str| conversion(unit).map(|(dimension, _)| dimension.without_angle()).ok();
+    column.unit.as_deref().and_then(dimension).is_none_or(|own| Some(own) == dimension(wanted))
 }
 
 /// The unit that a column's name ends in, where the file states none.
@@ -193,9 +201,13 @@ fn words(column: &Seen) -> Vec<String> {
     words
 }
 
-/// The first of these that is a word of a name: the less, the more telling.
+/// The first of these that is a word of a name, or several in a row: the less, the more telling.
 fn rank(words: &[String], known: &[&str]) -> Option<usize> {
-    known.iter().position(|known| words.iter().any(|word| word == known))
+    let has = |known: &&str| {
+        let parts: Vec<&str> = known.split('_').collect();
+        words.iter().any(|word| word == known) || words.windows(parts.len()).any(|some| some == parts)
+    };
+    known.iter().position(has)
 }
 
 /// Whether nearly all rows are above the one before: a clock may begin anew with each run.
@@ -270,6 +282,20 @@ mod tests {
         assert_eq!(guess.column("input"), Some(2));
         assert!(guess.columns.contains(&("drive_angle", 3, Some("deg".into()))));
         assert_eq!(guess.split, None);
+    }
+
+    /// The speed of the drive was taken for that of the cart, as the first column that speaks of a speed, and the log was
+    /// refused for its unit.
+    #[test]
+    fn columns_of_our_own_results_are_what_they_are_called() {
+        let text = "time_s,voltage_V,drive_angle_rad,drive_speed_rad_s,cart_position_m,cart_speed_m_s,motor_current_A\n\
+                    0,5,0,0,0,0,7\n0.001,5,1e-3,2,1e-5,0.02,6.9\n0.002,5,5e-3,4,6e-5,0.05,6.8\n";
+        let guess = looked("own.csv", text).guess;
+        let keys = ["time", "input", "drive_angle", "drive_speed", "cart_position", "cart_speed", "motor_current"];
+        assert_eq!(keys.map(|key| guess.column(key)), [0, 1, 2, 3, 4, 5, 6].map(Some));
+        // A speed in rad/s is none of a cart, whichever its name.
+        let guess = looked("speed.csv", "t [s], u [V], speed [rad/s]\n0,1,0\n0.1,1,1\n0.2,1,2\n").guess;
+        assert_eq!(guess.column("cart_speed"), None);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::exact::{self, Make};
 use super::inputs::Pieces;
 use super::record::Extra;
-use super::saved::{Pass, Passed};
+use super::saved::{Pass, Passed, restored};
 use super::{Ending, Event, PositionError, Solver, check, general};
 use crate::error::{Error, Result};
 use crate::mechanism::{DRIVES, Form, Heading, Layout, Mechanism, Mode, Shown, SpringLaw, State, What};
@@ -261,13 +261,7 @@ impl Machine {
         if *degree != copy.engine.degree() as u64 {
             return None;
         }
-        let mut pass = Pass::In(rest.iter());
-        copy.pass(&mut pass)?;
-        let Pass::In(mut left) = pass else { return None };
-        if left.next().is_some() {
-            return None;
-        }
-        *self = copy;
+        *self = restored(&copy, rest, Self::pass)?;
         Some(())
     }
 

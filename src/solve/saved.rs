@@ -99,6 +99,18 @@ impl Pass<'_> {
     }
 }
 
+/// A copy that goes on from numbers that were handed out, all of which it has to take; none where they are of something
+/// else.
+pub(super) fn restored<T: Clone>(own: &T, saved: &[u64], pass: impl FnOnce(&mut T, &mut Pass) -> Passed) -> Option<T> {
+    let mut copy = own.clone();
+    let mut numbers = Pass::In(saved.iter());
+    pass(&mut copy, &mut numbers)?;
+    match numbers {
+        Pass::In(mut left) => left.next().is_none().then_some(copy),
+        Pass::Out(_) => None,
+    }
+}
+
 fn one_of<T: Copy, const N: usize>(all: [T; N], place: u64) -> Option<T> {
     all.get(usize::try_from(place).ok()?).copied()
 }

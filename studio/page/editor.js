@@ -1,5 +1,6 @@
 // @ts-check
-// The case text beside its picture: a field for text with line numbers, and the line of a mistake marked as it is typed.
+// The case text beside its picture: a field for text with line numbers, and the line of a mistake marked as it is
+// typed.
 import {element} from "./format.js";
 
 /** @typedef {import("./app.js").App} App */

@@ -54,6 +54,8 @@ app.show = key => {
     find(`view-${view.key}`).hidden = view.key !== app.view;
     const button = find(`go-${view.key}`);
     if (view.key === app.view) button.setAttribute("aria-current", "page"); else button.removeAttribute("aria-current");
+    // On a narrow screen the list of views is longer than its place.
+    if (view.key === app.view) button.scrollIntoView({block: "nearest", inline: "nearest"});
   }
   app.tell("view");
 };

@@ -20,7 +20,7 @@ const RIG = "sollmann-jouaneh/";
  * @property {string} stage
  * @property {[string, string]} [change]
  * @property {string} [view]
- * @property {string} panel
+ * @property {string} panel to be seen; of another view the heading
  * @property {Try[]} tries
  * @property {number} [at]
  * @property {number} [factor]
@@ -36,7 +36,7 @@ const inertia = factor => [["drive_pulley.inertia", factor * 7e-5], ["idler_pull
 const friction = factor => [["drive_pulley.friction.viscous", factor * 0.0042], ["idler_pulley.friction.viscous", factor * 0.0042], ["cart.friction.viscous", factor * 40.6518]];
 
 /** The cart's friction with an excess at the start. @type {[string, string]} */
-const STRIBECK = ['coulomb = "0.2000 N"', 'coulomb = "0.2000 N", stribeck = { force = "0.1 N", velocity = "20 mm/s" }'];
+const STRIBECK = ['coulomb = "0.2000 N"', 'coulomb = "0.2000 N", stribeck = { force = "1 N", velocity = "20 mm/s" }'];
 
 /** @type {Stop[]} */
 const STOPS = [
@@ -64,10 +64,10 @@ const STOPS = [
   {figure: "Figures 14 and 15", title: "Matched at 5 V", stage: "table2.toml", panel: "position", at: 0.25,
     words: "Table 2 was matched to the pulse of 5 V. A linear model goes exactly twice as far at 10 V, whatever its numbers are, and the real stage does not: one set of linear parameters does not serve both.",
     tries: [{words: "10 V", experiment: 1}]},
-  {figure: "Figure 16", title: "Three parts of friction", stage: "table4.toml", change: STRIBECK, view: "modes", panel: "friction",
-    words: "Friction against speed, equation (14): a part that grows with speed, a part that only knows the direction (Coulomb), and an excess at the start of a motion that is soon gone (Stribeck). The view shows the curve of each body; the cart's has the excess.",
+  {figure: "Figure 16", title: "Three parts of friction", stage: "table4.toml", change: STRIBECK, view: "modes", panel: "Friction over speed",
+    words: "Friction against speed, equation (14): a part that grows with speed, a part that only knows the direction (Coulomb), and an excess at the start of a motion that is soon gone (Stribeck). The view shows the curve of each body; here the cart has such an excess, drawn large.",
     tries: []},
-  {figure: "Figure 17", title: "Two of them are kept", stage: "table4.toml", view: "modes", panel: "friction",
+  {figure: "Figure 17", title: "Two of them are kept", stage: "table4.toml", view: "modes", panel: "Friction over speed",
     words: "The Stribeck part is called minor and left out: what remains, equation (15), jumps at zero speed and rises from there.",
     tries: [{words: "no dry friction at the cart", set: [["cart.friction.coulomb", 0]]}, {words: "ten times as much", set: [["cart.friction.coulomb", 2]]}]},
   {figure: "Figures 18 and 19", title: "Friction must not push", stage: "table4.toml", panel: "state", at: 0.4,
@@ -87,7 +87,7 @@ export function mount(root, app) {
   const next = element("button", {type: "button", id: "tour-next", class: "strong", onclick: () => go(at + 1)}, "Next");
   const list = element("ol", {class: "stops"}, ...STOPS.map((stop, k) => element("li", {}, element("button", {type: "button", onclick: () => go(k)}, `${stop.figure}: ${stop.title}`))));
   root.append(element("div", {class: "tour"}, element("p", {class: "quiet"}, "K. Sollmann and M. Jouaneh, Dynamic modelling of a single-axis belt-drive system, 2011: the paper that this program recomputes, figure by figure. ",
-    "taut paper checks every number."), list, place, title, words, tries, element("p", {class: "turns"}, back, next)));
+    "taut paper checks every number."), place, title, words, tries, element("p", {class: "turns"}, back, next), element("h3", {}, "All stops"), list));
   /** @type {Map<string, string>} */
   let stages = new Map();
 
@@ -120,12 +120,20 @@ export function mount(root, app) {
       app.drop();
       if (stop.window) app.look(stop.window);
       if (stop.at !== undefined && app.cursor === 0) app.seek(stop.at);
+      if (stop.view) { heading(stop.panel, 100); return; }
       const panel = document.querySelector(`[data-panel="${stop.panel}"]`);
-      if (panel && !stop.view) panel.scrollIntoView({block: "center", behavior: "smooth"});
+      if (panel) panel.scrollIntoView({block: "center", behavior: "smooth"});
     });
   }
 
   app.on("view", () => { if (app.view === key && !stages.size) go(at); });
+}
+
+/** Scrolls to a heading, once the page that has it is made. @param {string} text @param {number} turns to wait at most */
+function heading(text, turns) {
+  const found = [...document.querySelectorAll(".view:not([hidden]) h2")].find(one => one.textContent === text);
+  if (found) found.scrollIntoView({block: "start", behavior: "smooth"});
+  else if (turns > 0) setTimeout(() => heading(text, turns - 1), 100);
 }
 
 /** Calls once, when the case that is being opened has run. @param {App} app @param {() => void} then */

@@ -35,6 +35,7 @@ class Tune {
     this.trouble = element("p", {class: "mistake", role: "alert", hidden: true});
     this.choice = element("select", {id: "controller", onchange: () => this.take()}, element("option", {value: ""}, "as in the case"));
     this.moves = element("select", {id: "move", onchange: () => { this.move = Number(this.moves.value); this.sent = ""; this.ask(); }});
+    this.moveLabel = element("label", {for: "move", hidden: true}, "Move: ", this.moves);
     this.gains = element("div", {class: "groups gains"});
     this.margins = element("dl", {class: "figures", id: "margins"});
     this.figures = element("dl", {class: "figures", id: "move-figures"});
@@ -51,7 +52,7 @@ class Tune {
     this.report = element("div", {class: "report page"});
     this.live = element("div", {class: "loop", hidden: true}, element("div", {class: "loop-side"}, element("h3", {}, "Gains"), this.gains, element("h3", {}, "Margins"), this.margins, element("h3", {}, "The move"), this.figures),
       element("div", {class: "plots"}, this.error.figure, this.nyquist.figure, this.sensitivity.figure, this.position.figure, this.command.figure));
-    root.append(element("h2", {}, "Move and tune"), element("p", {class: "fields"}, element("label", {for: "controller"}, "Controller: ", this.choice), element("label", {for: "move"}, "Move: ", this.moves), this.told),
+    root.append(element("h2", {}, "Move and tune"), element("p", {class: "fields"}, element("label", {for: "controller"}, "Controller: ", this.choice), this.moveLabel, this.told),
       this.trouble, this.live, element("h3", {}, "Tuning"), element("p", {class: "quiet"}, "Searches for gains that are good on every machine that can be: settling, error and current at worst, while the sensitivity keeps within its limit."),
       element("p", {class: "buttons"}, this.tuneButton, this.stopButton, element("label", {for: "spread"}, "Parameters may be off by ", this.spread, " %")), this.status, this.result, this.report);
     this.shape = "";
@@ -82,7 +83,8 @@ class Tune {
 
   tell(error) {
     this.trouble.hidden = !error;
-    this.trouble.textContent = error ? wordsOf(error) : "";
+    const hasController = /^\s*\[?controller\b/m.test(this.app.text);
+    this.trouble.textContent = error ? (hasController ? "" : "Choose a controller above, or write one. As the case stands, ") + wordsOf(error) : "";
   }
 
   // ---- The loop
@@ -95,7 +97,7 @@ class Tune {
     if (state === this.sent) return;
     this.sent = state;
     app.wire.newest("loop", () => ({...app.body(), move: this.move}), (answer, error) => {
-      if (!answer) { this.live.hidden = true; this.tell(error); return; }
+      if (!answer) { this.live.hidden = this.moveLabel.hidden = true; this.told.textContent = ""; this.tell(error); return; }
       if (answer.head.replaced) return;
       this.tell(null);
       this.show(answer);
@@ -104,7 +106,7 @@ class Tune {
 
   show({head, columns}) {
     this.shown = head;
-    this.live.hidden = false;
+    this.live.hidden = this.moveLabel.hidden = false;
     this.told.textContent = `${head.controller}. ${number(1000 * head.took_s, 3)} ms.`;
     const names = JSON.stringify(head.moves);
     if (names !== this.moves.dataset.names) {

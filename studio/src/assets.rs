@@ -63,8 +63,8 @@ pub async fn serve(uri: Uri) -> Response {
     response
 }
 
-/// The same file from the folder that `TAUT_STUDIO_PAGE` names, so that whoever writes the page need not build: in builds
-/// for debugging alone, and only under the names of [`ASSETS`].
+/// The same file from the folder that `TAUT_STUDIO_PAGE` names, so that whoever writes the page need not build: in
+/// builds for debugging alone, and only under the names of [`ASSETS`].
 fn from_folder(path: &str) -> Option<String> {
     let folder = std::env::var_os("TAUT_STUDIO_PAGE").filter(|_| cfg!(debug_assertions))?;
     std::fs::read_to_string(std::path::Path::new(&folder).join(path.trim_start_matches('/'))).ok()

@@ -1,9 +1,7 @@
 //! Files that are not part of the project. A test that lacks one does nothing, and is counted as ignored by
-//! `cargo xtask test`: its name is appended to the file that `TAUT_IGNORED` names. With `TAUT_REQUIRE=all` it fails
-//! instead.
+//! `cargo xtask test`.
 
-use std::fs::OpenOptions;
-use std::io::Write;
+use super::ignored::ignored;
 use std::path::{Path, PathBuf};
 
 /// Measurements of others in `data/`, each of these files; none where one is absent.
@@ -36,15 +34,4 @@ pub fn reference() -> Option<PathBuf> {
         return None;
     }
     Some(folder)
-}
-
-fn ignored(needs: &str) {
-    let thread = std::thread::current();
-    let name = thread.name().unwrap_or("a test");
-    assert!(std::env::var_os("TAUT_REQUIRE").is_none_or(|all| all != "all"), "{name} needs {needs}");
-    println!("ignored: {name}: needs {needs}");
-    if let Some(list) = std::env::var_os("TAUT_IGNORED") {
-        let mut list = OpenOptions::new().append(true).create(true).open(list).unwrap();
-        list.write_all(format!("{name}: needs {needs}\n").as_bytes()).unwrap();
-    }
 }

@@ -4,6 +4,7 @@
 pub mod chance;
 pub mod data;
 pub mod document;
+pub mod ignored;
 pub mod logged;
 pub mod random;
 pub mod wrong;

@@ -1,8 +1,7 @@
 //! Tools that are not part of the project: a test that lacks one does nothing, and is counted as ignored by
 //! `cargo xtask test`, which installs them where it may; with `TAUT_REQUIRE=all` it fails instead.
 
-use std::fs::OpenOptions;
-use std::io::Write;
+use super::ignored::ignored;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -29,17 +28,6 @@ pub fn python() -> Option<PathBuf> {
     }
     ignored("the Python environment that `cargo xtask export` makes");
     None
-}
-
-fn ignored(needs: &str) {
-    let thread = std::thread::current();
-    let name = thread.name().unwrap_or("a test");
-    assert!(std::env::var_os("TAUT_REQUIRE").is_none_or(|all| all != "all"), "{name} needs {needs}");
-    println!("ignored: {name}: needs {needs}");
-    if let Some(list) = std::env::var_os("TAUT_IGNORED") {
-        let mut list = OpenOptions::new().append(true).create(true).open(list).unwrap();
-        list.write_all(format!("{name}: needs {needs}\n").as_bytes()).unwrap();
-    }
 }
 
 /// Runs a command in a folder; it must succeed.

@@ -488,8 +488,8 @@ def export(
     ``double``), ``step`` the step of the plant, s, ``fmi`` the version of an FMU: 2 or 3.
     """
     found = case if isinstance(case, Case) else read(case)
-    words = _checks.text("target", target), _checks.path(out), _checks.word("part", part), _checks.text("real", real)
-    files, _ = found._native.export(*words, _checks.number("step", step), _checks.whole("fmi", fmi, 2, 3))
+    how = (_checks.word("part", part), _checks.text("real", real), _checks.number("step", step), _checks.whole("fmi", fmi, 2, 3))
+    files, _ = found._native.export(_checks.text("target", target), _checks.path(out), how)
     return [Path(file) for file in files]
 
 

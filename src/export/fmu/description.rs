@@ -1,7 +1,7 @@
 //! `modelDescription.xml`, of FMI 2.0 and 3.0.
 
-use super::model::{Causality, Kind, Model, Role, Variability, Variable};
 use super::{BINARY, sources};
+use super::{Causality, Kind, Model, Role, Variability, Variable};
 use crate::error::Result;
 use crate::quantity::{self, Dimension};
 use crate::signal::DEGREE;

@@ -9,13 +9,15 @@ mod model;
 mod pack;
 mod resource;
 mod sources;
+mod variable;
 
 pub use archive::Archive;
 pub use description::{Version, description};
-pub use model::{Causality, Kind, Model, Role, Variability, Variable};
+pub use model::Model;
 pub use pack::{Carried, object_in, pack};
 pub use resource::resource;
 pub use sources::sources;
+pub use variable::{Causality, Kind, Role, Variability, Variable};
 
 /// Where the machine stands in the archive.
 pub const MACHINE: &str = "resources/machine.toml";
@@ -23,8 +25,8 @@ pub const MACHINE: &str = "resources/machine.toml";
 /// How the shared object is called in the archive, without its ending.
 pub const BINARY: &str = "taut_fmu";
 
-/// The folder of binaries for the platform of this build and its ending: of FMI 3.0 and 2.0. None where the standard has
-/// no name for it.
+/// The folder of binaries for the platform of this build and its ending: of FMI 3.0 and 2.0. None where the standard
+/// has no name for it.
 pub fn platform(version: Version) -> Option<(&'static str, &'static str)> {
     let (system, ending, word) = match std::env::consts::OS {
         "linux" => ("linux", "so", "linux"),

@@ -1,6 +1,7 @@
 //! The variables of a machine: the one list that its description is written from and its shared object works by.
 
 use super::resource;
+use super::variable::{Kind, Role, Variable, named, plain, rate_unit, typed, typical, words};
 use crate::case::Opened;
 use crate::chance::hash;
 use crate::design::Design;
@@ -18,124 +19,6 @@ const OUTPUTS: u32 = 2000;
 const STATES: u32 = 3000;
 const RATES: u32 = 4000;
 const CONDITIONS: u32 = 5000;
-
-/// A variable of a machine.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Variable {
-    /// Its number for importers.
-    pub reference: u32,
-    /// Its name: a column's, or a key of the case file.
-    pub name: String,
-    /// Its meaning.
-    pub description: String,
-    /// SI unit; empty for a pure number.
-    pub unit: &'static str,
-    /// The unit that it is shown in, if another.
-    pub shown: String,
-    /// Its part in the machine.
-    pub role: Role,
-    /// Real numbers, or whole ones.
-    pub kind: Kind,
-    /// The value it has unless another is set; of what follows from others, none.
-    pub start: Option<f64>,
-    /// Least and greatest value, where there are.
-    pub range: Option<[f64; 2]>,
-    /// Which of the integrated quantities it is, if one.
-    pub quantity: Option<usize>,
-}
-
-/// Real numbers, or whole ones.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// Double precision.
-    Real,
-    /// 32 bits.
-    Whole,
-}
-
-/// The part of a variable in the machine.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Role {
-    /// Time.
-    Time,
-    /// The input of a drive.
-    Input(usize),
-    /// A force on a body that the machine is there to move, by its place among these.
-    Force(usize),
-    /// Where the controller's cart should be: position, speed, acceleration.
-    Reference(usize),
-    /// A number of the machine, by its place among these, and whether it may change under way.
-    Parameter(usize, bool),
-    /// A column of a run.
-    Output(usize),
-    /// The cart from its reference.
-    Error,
-    /// The controller's command.
-    Command,
-    /// An integrated quantity that is no column.
-    Quantity(usize),
-    /// The rate of an integrated quantity.
-    Rate(usize),
-    /// A condition of the mode.
-    Condition(usize),
-}
-
-/// As the standard has it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Causality {
-    /// Time.
-    Independent,
-    /// Set from outside.
-    Input,
-    /// Set before it begins, or at an event.
-    Parameter,
-    /// For others.
-    Output,
-    /// For those who look inside.
-    Local,
-}
-
-/// As the standard has it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Variability {
-    /// It stays.
-    Fixed,
-    /// It may be set at an event.
-    Tunable,
-    /// It changes at events alone.
-    Discrete,
-    /// It changes all the time.
-    Continuous,
-}
-
-impl Variable {
-    /// As the standard has it.
-    pub fn causality(&self) -> Causality {
-        match self.role {
-            Role::Time => Causality::Independent,
-            Role::Input(_) | Role::Force(_) | Role::Reference(_) => Causality::Input,
-            Role::Parameter(..) => Causality::Parameter,
-            Role::Output(_) | Role::Error | Role::Command => Causality::Output,
-            Role::Quantity(_) | Role::Rate(_) | Role::Condition(_) => Causality::Local,
-        }
-    }
-
-    /// As the standard has it.
-    pub fn variability(&self) -> Variability {
-        match (self.role, self.kind) {
-            (Role::Parameter(_, true), _) => Variability::Tunable,
-            (Role::Parameter(_, false), _) => Variability::Fixed,
-            (Role::Command, _) | (_, Kind::Whole) => Variability::Discrete,
-            _ if self.is_count() => Variability::Discrete,
-            _ => Variability::Continuous,
-        }
-    }
-
-    /// Whether it counts: it jumps, though it may be too large for a whole number of 32 bits.
-    fn is_count(&self) -> bool {
-        matches!(self.role, Role::Output(_)) && self.name.ends_with("_count")
-    }
-}
 
 /// The machine itself.
 #[derive(Debug, Clone)]
@@ -173,7 +56,8 @@ pub struct Model {
 }
 
 impl Model {
-    /// The machine of a case, with the controller inside if it is asked for. Errors: a controller that the case has not.
+    /// The machine of a case, with the controller inside if it is asked for. Errors: a controller that the case has
+    /// not.
     pub fn new(case: &Opened, with_controller: bool) -> Result<Self> {
         let resource = resource::resource(case)?;
         Self::of_resource(&resource, with_controller)
@@ -276,8 +160,8 @@ impl Model {
         self.mechanism(&self.defaults()).is_ok_and(|mechanism| mechanism.is_piecewise_linear())
     }
 
-    /// Whether a force is an input of the mechanism beside those of the drives, and its place there; else it is a number
-    /// of a body.
+    /// Whether a force is an input of the mechanism beside those of the drives, and its place there; else it is a
+    /// number of a body.
     pub fn force_input(&self, load: usize) -> Option<usize> {
         match self.machine {
             Machine::Axis(_) => Some(1 + load),
@@ -540,21 +424,6 @@ fn push(body: usize) -> Drive {
     Drive { label, voltage: label, current: label, pulley: body, shaft: body, motor, amplifier }
 }
 
-fn plain(reference: u32, name: &str, description: &str, unit: &'static str, role: Role) -> Variable {
-    Variable {
-        reference,
-        name: name.to_string(),
-        description: description.to_string(),
-        unit,
-        shown: String::new(),
-        role,
-        kind: Kind::Real,
-        start: None,
-        range: None,
-        quantity: None,
-    }
-}
-
 /// Whether a column is an integrated quantity as it stands.
 fn shows(heading: &Heading, quantity: Quantity) -> bool {
     heading.shown
@@ -564,66 +433,4 @@ fn shows(heading: &Heading, quantity: Quantity) -> bool {
             Quantity::Current(drive) => Shown::Current(drive),
             Quantity::Bristle(body) => Shown::Bristle(body),
         }
-}
-
-/// The name of an integrated quantity that is no column, and its unit.
-fn named(quantity: Quantity, mechanism: &Mechanism) -> (String, &'static str) {
-    let body = |body: usize| (mechanism.bodies[body].label.key, mechanism.bodies[body].kind.units());
-    match quantity {
-        Quantity::Position(b) => (format!("{}_way", body(b).0), body(b).1[0]),
-        Quantity::Speed(b) => (format!("{}_rate", body(b).0), body(b).1[1]),
-        Quantity::Current(drive) => (format!("{}_armature_current", mechanism.drives[drive].label.key), "A"),
-        Quantity::Bristle(b) => (format!("{}_bristle", body(b).0), body(b).1[0]),
-    }
-}
-
-/// The unit of the rate of something in this unit.
-fn rate_unit(unit: &str) -> &'static str {
-    match unit {
-        "rad" => "rad/s",
-        "m" => "m/s",
-        "rad/s" => "rad/s^2",
-        "m/s" => "m/s^2",
-        _ => "A/s",
-    }
-}
-
-/// The unit of a typical value: `mm` of `19.4 mm`.
-fn typed(example: &str) -> String {
-    example.split_once(' ').map(|(_, unit)| unit.to_string()).unwrap_or_default()
-}
-
-/// The unit in which people look at it.
-fn typical(unit: &str) -> &'static str {
-    match unit {
-        "m" => "mm",
-        "m/s" => "mm/s",
-        "rad" => "deg",
-        "rad/s" => "rpm",
-        "N m" => "mN m",
-        _ => "",
-    }
-}
-
-/// The description of a column.
-fn words(heading: &Heading, mechanism: &Mechanism) -> String {
-    let body = |body: usize| mechanism.bodies[body].label.name;
-    let drive = |drive: usize| mechanism.drives[drive].label.name;
-    let spring = |spring: usize| mechanism.springs[spring].label.name;
-    let seen = |factor: f64| if factor == 1.0 { String::new() } else { format!(", times {factor}") };
-    match heading.shown {
-        Shown::Time => "Time.".into(),
-        Shown::Input(d) => format!("Input of the amplifier of the {}, as it takes it.", drive(d)),
-        Shown::Voltage(d) => format!("Voltage at the terminals of the {}.", drive(d)),
-        Shown::Current(d) => format!("Current of the {}.", drive(d)),
-        Shown::Position(b, factor) => format!("Way of the {}{}.", body(b), seen(factor)),
-        Shown::Speed(b, factor) => format!("Speed of the {}{}.", body(b), seen(factor)),
-        Shown::Stretch(s) => format!("Length of the {}.", spring(s)),
-        Shown::Force(s, factor) => format!("Force of the {}{}.", spring(s), seen(factor)),
-        Shown::Friction(b) => format!("Friction on the {}.", body(b)),
-        Shown::Motion(b) => format!("What the {} does: -1 backward, 0 stuck, 1 forward, 2 free.", body(b)),
-        Shown::Bristle(b) => format!("Deflection of the bristles of the {}.", body(b)),
-        Shown::Contact(s) => format!("The side of the {} that carries, or 0; of a span 1 if it is slack.", spring(s)),
-        Shown::Counts(b, _) => format!("Counts of the encoder at the {}.", body(b)),
-    }
 }

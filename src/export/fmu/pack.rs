@@ -22,8 +22,8 @@ pub struct Carried<'c> {
     pub icon: Option<&'c [u8]>,
 }
 
-/// The shared object that building the workspace left in one of these folders: of several the youngest. Errors: there is
-/// none.
+/// The shared object that building the workspace left in one of these folders: of several the youngest. Errors: there
+/// is none.
 pub fn object_in(folders: &[PathBuf]) -> Result<Vec<u8>> {
     let name = format!("{}{BINARY}{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     let paths = folders.iter().flat_map(|folder| [folder.join(&name), folder.join("deps").join(&name)]);

@@ -7,8 +7,8 @@ use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, value};
 /// Tables that say nothing of the machine, or of how its controller works.
 const OTHERS: [&str; 8] = ["experiment", "move", "fit", "tune", "uncertainty", "sweep", "measurement", "campaign"];
 
-/// The text of a case without its experiments, logs, fits and sweeps: one experiment is left, which says where the machine
-/// starts from and how long it runs, its inputs zero. It names no other file.
+/// The text of a case without its experiments, logs, fits and sweeps: one experiment is left, which says where the
+/// machine starts from and how long it runs, its inputs zero. It names no other file.
 pub fn resource(case: &Opened) -> Result<String> {
     let text = case.text();
     let mut document: DocumentMut =

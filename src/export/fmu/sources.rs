@@ -1,5 +1,6 @@
 //! The machine of an FMU as sources in C, for platforms that the shared object is not for: the plant of `export c` with
-//! inputs that rise at a rate, its variables as a table, and the functions of the standard around both, for co-simulation.
+//! inputs that rise at a rate, its variables as a table, and the functions of the standard around both, for
+//! co-simulation.
 
 use super::{BINARY, Causality, Kind, Model, Role, Variability, Variable, Version};
 use crate::error::{Error, Result};
@@ -22,8 +23,8 @@ pub(super) fn compiled(version: Version) -> &'static str {
     }
 }
 
-/// The files of the folder `sources`: names and texts. Errors: a machine that `export c` does not cover, or one with its
-/// controller inside.
+/// The files of the folder `sources`: names and texts. Errors: a machine that `export c` does not cover, or one with
+/// its controller inside.
 pub fn sources(model: &Model, version: Version) -> Result<Vec<(String, String)>> {
     if model.design.is_some() {
         return Err(Error::new("the controller inside is not written in C beside its machine"));

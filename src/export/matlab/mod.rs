@@ -1,5 +1,5 @@
-//! MATLAB and Octave: a function that simulates, a MAT-file with the linear model and the tables, and a MEX function over
-//! the C.
+//! MATLAB and Octave: a function that simulates, a MAT-file with the linear model and the tables, and a MEX function
+//! over the C.
 
 mod mat;
 

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::friction::Motion;
 use crate::mechanism::{BODIES, Cause, DRIVES, Layout, Mechanism, Mode, SpringLaw, State};
 use crate::solve::machine::{Engine, shown};
-use crate::solve::saved::{Pass, Passed};
+use crate::solve::saved::{Pass, Passed, restored};
 use crate::solve::{Ending, check};
 use std::sync::Arc;
 
@@ -206,14 +206,7 @@ impl Dynamics {
 
     /// Goes on from what [`Dynamics::save`] gave. None, and nothing has changed, where `saved` is not of such a machine.
     pub fn restore(&mut self, saved: &[u64]) -> Option<()> {
-        let mut copy = self.clone();
-        let mut pass = Pass::In(saved.iter());
-        copy.pass(&mut pass)?;
-        let Pass::In(mut left) = pass else { return None };
-        if left.next().is_some() {
-            return None;
-        }
-        *self = copy;
+        *self = restored(self, saved, Self::pass)?;
         Some(())
     }
 

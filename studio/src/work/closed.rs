@@ -41,7 +41,8 @@ const CONTROLLERS: &[(&str, &str)] = controllers![
     "fuzzy-pi.toml",
 ];
 
-/// The controllers to begin with: name, and the table `[controller]` on one line, in SI units; and the moves of their case.
+/// The controllers to begin with: name, and the table `[controller]` on one line, in SI units; and the moves of their
+/// case.
 pub fn controllers(_: &Request, _: &Context) -> Result<Reply> {
     let one = |(path, text): &(&str, &str)| {
         let case = Case::from_text(path, text)?;

@@ -9,8 +9,8 @@ use taut::error::Result;
 use taut::linear::{Analysis, GantryAnalysis, Question};
 use taut_report::modes;
 
-/// Poles, zeros, frequency responses, and how they change along the travel, as a part of a page and as data; and friction
-/// over speed, up to `speed`, m/s.
+/// Poles, zeros, frequency responses, and how they change along the travel, as a part of a page and as data; and
+/// friction over speed, up to `speed`, m/s.
 pub fn modes(request: &Request, context: &Context) -> Result<Reply> {
     let case = opened(request, context)?;
     let speed = request.number("speed").filter(|speed| *speed > 0.0).unwrap_or(1.0);

@@ -63,8 +63,8 @@ struct Window {
 }
 
 impl Window {
-    /// The interval that steps are computed fastest for, s: that of the rows, doubled until it is about that of the run,
-    /// so that the way to the window takes no more steps than the run does.
+    /// The interval that steps are computed fastest for, s: that of the rows, doubled until it is about that of the
+    /// run, so that the way to the window takes no more steps than the run does.
     fn interval(&self, every: f64) -> f64 {
         let own = (self.to - self.from) / (self.points - 1) as f64;
         own * (every / own).log2().ceil().max(0.0).exp2()
