@@ -18,6 +18,7 @@ mod insensitive;
 pub mod model;
 pub mod observer;
 mod outcome;
+pub mod pairs;
 pub mod pid;
 pub mod recommendation;
 pub mod resonance;
