@@ -213,21 +213,22 @@ enum Device {
         /// Counts per radian of the drive pulley, or per metre.
         counts: f64,
     },
+    /// Counts of a scale beside the encoder, per metre.
+    Scale { counts: f64 },
     /// An analogue-to-digital converter.
     Converter { channel: Channel, noise: Pcg64 },
 }
 
 impl Device {
     fn all(stage: &Stage, measurement: &Measurement, experiment: &Experiment) -> Vec<Self> {
-        let encoder = stage.encoder.map(|encoder: Encoder| Device::Encoder {
-            at: encoder.at,
-            counts: encoder.counts_per_unit(stage.motor.gear_ratio),
-        });
+        let counts = |encoder: Encoder| encoder.counts_per_unit(stage.motor.gear_ratio);
+        let encoder = stage.encoder.map(|encoder| Device::Encoder { at: encoder.at, counts: counts(encoder) });
+        let scale = stage.scale.map(|scale| Device::Scale { counts: counts(scale) });
         let converter = |&channel: &Channel| {
             let noise = random(measurement.seed, &experiment.name, channel.quantity.name());
             Device::Converter { channel, noise }
         };
-        encoder.into_iter().chain(measurement.channels.iter().map(converter)).collect()
+        encoder.into_iter().chain(scale).chain(measurement.channels.iter().map(converter)).collect()
     }
 
     /// The column of a run that it sees.
@@ -238,7 +239,7 @@ impl Device {
                 rows.get("rotor_angle").or_else(|| rows.get("drive_angle"))
             }
             Device::Encoder { at: EncoderPlace::DrivePulley, .. } => rows.get("drive_angle"),
-            Device::Encoder { at: EncoderPlace::Cart, .. } => rows.get("cart_position"),
+            Device::Encoder { at: EncoderPlace::Cart, .. } | Device::Scale { .. } => rows.get("cart_position"),
             // Where the terminals' voltage has no column of its own, it is the one the amplifier gives.
             Device::Converter { channel: Channel { quantity: Quantity::MotorVoltage, .. }, .. } => {
                 rows.get("motor_voltage").or_else(|| rows.get("voltage"))
@@ -252,6 +253,7 @@ impl Device {
             Device::Encoder { at: EncoderPlace::Cart, .. } => {
                 vec![Column::new("encoder_count", ""), Column::new("cart_position", "m")]
             }
+            Device::Scale { .. } => vec![Column::new("scale_count", ""), Column::new("cart_position", "m")],
             Device::Encoder { .. } => vec![Column::new("encoder_count", ""), Column::new("drive_angle", "rad")],
             Device::Converter { channel, .. } => vec![Column::new(channel.quantity.name(), channel.quantity.unit())],
         }
@@ -259,7 +261,7 @@ impl Device {
 
     fn read(&mut self, value: f64, put: &mut dyn FnMut(f64)) {
         match self {
-            Device::Encoder { counts, .. } => {
+            Device::Encoder { counts, .. } | Device::Scale { counts } => {
                 // The nearest count; + 0.0 turns −0 into 0.
                 let count = (value * *counts).round() + 0.0;
                 put(count);

@@ -32,6 +32,8 @@ pub struct Stage {
     pub travel: Option<Travel>,
     /// How the motion is measured, if it is.
     pub encoder: Option<Encoder>,
+    /// A second encoder at the cart, beside one at motor or drive pulley.
+    pub scale: Option<Encoder>,
 }
 
 impl Stage {

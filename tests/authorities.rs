@@ -55,6 +55,7 @@ fn stage(value: &Value) -> Stage {
         belt: Belt::given(["k1", "k2", "k3"].map(get), ["c1", "c2", "c3"].map(get)),
         travel: None,
         encoder: None,
+        scale: None,
     }
 }
 

@@ -495,7 +495,7 @@ fn a_limit_leaves_nothing_behind_where_there_is_no_integral() {
         controller.reset();
         let mut step = |error: f64| {
             let reference = Reference::at(error);
-            let seen = Observation { time: 0.0, reference, ahead: reference, position: 0.0, current: 0.0 };
+            let seen = Observation { time: 0.0, reference, ahead: reference, position: 0.0, scale: None, current: 0.0 };
             let asked = controller.step(&seen);
             controller.limited(asked.clamp(-0.1, 0.1));
             asked

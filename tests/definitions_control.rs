@@ -54,7 +54,7 @@ fn compare(controller: &str, mut made: Made, around: impl Fn(&Case, &Reference) 
         };
         let (now, ahead) = (reference(), reference());
         let (position, current) = (draw(0.01), draw(5.0));
-        let seen = Observation { time: f64::from(k) * T, reference: now, ahead, position, current };
+        let seen = Observation { time: f64::from(k) * T, reference: now, ahead, position, scale: None, current };
         let [forward, inner] = around(&case, &ahead);
         let wanted = if target { elastic(&case, &now).0 } else { now };
         let asked = (made.step)(&wanted, position, current, inner) + forward;

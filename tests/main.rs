@@ -53,6 +53,7 @@ mod survey;
 mod sweep;
 mod table3;
 mod tune;
+mod two_sensors;
 mod verdict;
 
 /// A file that is no module here would not be run, and nobody would notice.

@@ -10,7 +10,7 @@ use taut::case::Case;
 use taut::control::compare::compare;
 use taut::control::damping::fitted;
 use taut::control::power_spectral_density;
-use taut::control::resonance::{Drive, resonances};
+use taut::control::resonance::{Drive, Resonance, reaches, resonances};
 use taut::control::shaper::{Corner, Firmware, Form, Kind, Pattern, Shaper, TOLERANCE, residual_vibration};
 use taut::control::shaping::{ALLOWED_SMOOTHING, Criterion, Target, choose};
 use taut::control::spectrum::{Axis, Spectrum};
@@ -666,6 +666,117 @@ fn a_stage_without_a_measurement() {
     }
     let rigid = Case::read("stages/emps/emps.toml").unwrap().stage;
     assert!(resonances(&rigid, Drive::Held).unwrap_err().what.contains("rigid"));
+}
+
+/// Two modes far apart: one shaper that covers both would be long.
+fn two_modes() -> Vec<Resonance> {
+    let mode = |frequency: f64, share: f64| Resonance { position: 0.0, frequency, damping: 0.02, share };
+    vec![mode(30.0, 1.0), mode(83.0, 0.8)]
+}
+
+/// A pair leaves of every mode the product of what its parts leave, and its figures are those of its impulses.
+#[test]
+fn a_pair_is_one_shaper_behind_another() {
+    let modes = two_modes();
+    let criterion = Criterion { pairs: true, ..Criterion::default().with_damping(0.02).unwrap() };
+    let choice = choose(Target::Modes { modes: &modes, uncertainty: 0.05 }, &criterion).unwrap();
+    assert!(choice.pairs.len() == 3 && choice.pairs.windows(2).all(|pair| pair[0].score <= pair[1].score));
+    for pair in &choice.pairs {
+        let impulses = pair.impulses();
+        let sum: f64 = impulses.iter().map(|(_, a)| a).sum();
+        assert!((sum - 1.0).abs() < 1e-12 && impulses.windows(2).all(|pair| pair[0].0 < pair[1].0), "{pair:?}");
+        let [a, b] = &pair.parts;
+        assert!(a.frequency <= b.frequency);
+        for (f, zeta) in [(10.0, 0.02), (31.0, 0.1), (77.0, 0.0)] {
+            let product = a.residual_vibration(f, zeta) * b.residual_vibration(f, zeta);
+            assert!((residual_vibration(&impulses, f, zeta) - product).abs() < 1e-12);
+        }
+        assert!((taut::control::shaper::smoothing(&impulses, &criterion.corner) - pair.smoothing).abs() < 1e-15);
+    }
+}
+
+/// A second mode at 2.8 times the first was left to shapers for one mode: they had to be as long as a three-hump EI or
+/// left a tenth of it.
+#[test]
+fn two_modes_have_a_shaper_each() {
+    let modes = two_modes();
+    let criterion = Criterion { pairs: true, ..Criterion::default().with_damping(0.02).unwrap() };
+    let target = Target::Modes { modes: &modes, uncertainty: 0.05 };
+    let choice = choose(target, &criterion).unwrap();
+    let (best, pair) = (choice.best(), &choice.pairs[0]);
+    assert!(choice.is_pair_better && 1.2 * pair.score < best.score, "{pair:?} {best:?}");
+    assert!(pair.vibration < 0.05, "{pair:?}");
+    // Nothing on a grid of its own is better by more than a hundredth.
+    for one in &criterion.candidates {
+        for other in &criterion.candidates {
+            for f in (0..60).map(|k| 20.0 + 0.5 * f64::from(k)) {
+                for g in (0..60).map(|k| 70.0 + f64::from(k)) {
+                    let parts = [(one, f), (other, g)]
+                        .map(|(form, f)| Shaper::formed(*form, Firmware::Klipper, f, 0.02).unwrap());
+                    let v = |f: f64| parts.iter().map(|part| part.residual_vibration(f, 0.02)).product::<f64>();
+                    let left = modes
+                        .iter()
+                        .flat_map(|mode| [0.95, 0.975, 1.0, 1.025, 1.05].map(|u| v(u * mode.frequency) * mode.share));
+                    let left = left.fold(0.0, f64::max);
+                    // Both shapers smooth at least as much as either does.
+                    let least = parts.iter().map(|part| part.smoothing(&criterion.corner)).fold(0.0, f64::max);
+                    if 1e3 * least * (left.powf(1.5) + 0.2 * left + 0.01) < 0.99 * pair.score {
+                        let impulses = convolved(&parts);
+                        let smoothing = taut::control::shaper::smoothing(&impulses, &criterion.corner);
+                        let score = 1e3 * smoothing * (left.powf(1.5) + 0.2 * left + 0.01);
+                        assert!(score > 0.99 * pair.score, "{score} of {parts:?} against {pair:?}");
+                    }
+                }
+            }
+        }
+    }
+    // The line for a case file is read as what it is.
+    let case = "stages/sollmann-jouaneh/controllers/pid-shaped.toml";
+    let change = format!("controller.{}", pair.line().replacen(" = ", "=", 1));
+    let read = Case::read_with(case, &[&change]).unwrap().controller.unwrap().shaper;
+    assert_eq!(read.len(), pair.impulses().len());
+    for ([t, a], (time, amplitude)) in read.iter().zip(pair.impulses()) {
+        assert!((t - time).abs() < 1e-9 && (a - amplitude).abs() < 1e-8, "{read:?} {pair:?}");
+    }
+    // With less smoothing allowed than any has there is none, which is said and no error.
+    let little = Criterion { max_smoothing: Some(0.9 * pair.smoothing), ..criterion.clone() };
+    if let Ok(choice) = choose(target, &little) {
+        assert!(choice.pairs.iter().all(|pair| pair.smoothing <= little.max_smoothing.unwrap()));
+    }
+}
+
+fn convolved(parts: &[Shaper; 2]) -> Vec<(f64, f64)> {
+    let [one, other] = parts;
+    let mut all = Vec::new();
+    for (t, a) in one.impulses() {
+        all.extend(other.impulses().iter().map(|(s, b)| (t + s, a * b)));
+    }
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    all
+}
+
+/// A mode whose frequency falls to a half along the travel was covered by the widest shaper alone.
+#[test]
+fn a_mode_that_moves_far_is_told_with_its_range() {
+    let mode = |k: u32| Resonance {
+        position: 0.05 * f64::from(k),
+        frequency: 60.0 - 1.5 * f64::from(k),
+        damping: 0.03 + 1e-4 * f64::from(k),
+        share: 1.0,
+    };
+    let second = |k: u32| Resonance { frequency: 150.0 + 3.0 * f64::from(k), share: 0.1, ..mode(k) };
+    let modes: Vec<Resonance> = (0..=20).flat_map(|k| [mode(k), second(k)]).collect();
+    let all = reaches(&modes);
+    assert_eq!(all.iter().map(|reach| reach.frequency).collect::<Vec<_>>(), [[30.0, 60.0], [150.0, 210.0]]);
+    assert_eq!((all[0].damping, all[0].share, all[1].share), ([0.03, 0.032], 1.0, 0.1));
+    let criterion = Criterion { pairs: true, ..Criterion::default().with_damping(0.03).unwrap() };
+    let choice = choose(Target::Modes { modes: &modes, uncertainty: 0.05 }, &criterion).unwrap();
+    let pair = &choice.pairs[0];
+    // What the pair leaves anywhere is what it says it leaves at worst.
+    let impulses = pair.impulses();
+    let worst = modes.iter().map(|mode| mode.share * residual_vibration(&impulses, mode.frequency, mode.damping));
+    assert!(worst.fold(0.0, f64::max) <= pair.vibration + 1e-12);
+    assert!(pair.vibration < 0.05 && pair.score < choice.best().score, "{pair:?} {:?}", choice.best());
 }
 
 #[test]

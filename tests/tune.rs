@@ -57,7 +57,8 @@ fn the_linear_controller_is_what_the_controller_does() {
                 let phase = omega * t * k as f64;
                 let position = 1e-5 * phase.cos();
                 let at = Reference::default();
-                let seen = Observation { time: t * k as f64, reference: at, ahead: at, position, current: 0.0 };
+                let seen =
+                    Observation { time: t * k as f64, reference: at, ahead: at, position, scale: None, current: 0.0 };
                 let command = controller.step(&seen);
                 controller.limited(command);
                 if k >= from {

@@ -485,6 +485,9 @@ pub struct Shape {
     /// [default: all but zvd]
     #[arg(long, value_name = "NAMES", value_parser = shapers)]
     pub shapers: Option<Shapers>,
+    /// Look at pairs of shapers, too, one behind the other: for two modes, or for a mode that moves far along the travel
+    #[arg(long)]
+    pub pairs: bool,
     /// Of a case file: by which part its frequencies may be wrong [default: 0.1]
     #[arg(long, value_name = "PART", value_parser = uncertainty)]
     pub uncertainty: Option<f64>,

@@ -65,6 +65,31 @@ fn a_model_and_its_options() {
     assert_eq!(only["recommended"]["damping"], 0.05);
 }
 
+/// Pairs are looked at where they are asked for, with what they leave of each mode.
+#[test]
+fn pairs_of_shapers() {
+    let case = "stages/sollmann-jouaneh/table4.toml";
+    assert!(json(&[case])["pairs"].as_array().unwrap().is_empty());
+    let found = json(&[case, "--pairs"]);
+    let pairs = found["pairs"].as_array().unwrap();
+    assert_eq!(pairs.len(), 3);
+    let along = found["model"]["along_travel"].as_array().unwrap();
+    let shapers = found["shapers"].as_array().unwrap().len();
+    for mode in along {
+        assert_eq!(mode["shapers"].as_array().unwrap().len(), shapers);
+        assert_eq!(mode["pairs"].as_array().unwrap().len(), 3);
+    }
+    // What is left of the strongest at worst is what is left of all.
+    let worst = |kind: &str, k: usize| {
+        let of = |mode: &Value| mode[kind][k].as_f64().unwrap() * mode["share"].as_f64().unwrap();
+        along.iter().map(of).fold(0.0, f64::max)
+    };
+    assert!((worst("pairs", 0) - pairs[0]["vibration"].as_f64().unwrap()).abs() < 1e-9);
+    let told = taut().args(["shape", case, "--pairs"]).output().unwrap();
+    let told = String::from_utf8(told.stdout).unwrap();
+    assert!(told.contains("\nPairs\n") && told.contains("mode along the travel"), "{told}");
+}
+
 #[test]
 fn mistakes_end_with_status_2() {
     let case = "stages/printer-axis/printer-axis.toml";

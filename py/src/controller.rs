@@ -14,6 +14,8 @@ pub struct Observation {
     time: f64,
     /// Measured position, m along the belt: whole counts of the encoder.
     position: f64,
+    /// The cart's position on a scale beside that encoder, m: whole counts; None without a scale.
+    scale: Option<f64>,
     /// Measured motor current, A.
     current: f64,
     /// Where the cart should be now, m.
@@ -42,6 +44,7 @@ impl From<&control::Observation> for Observation {
         Self {
             time: seen.time,
             position: seen.position,
+            scale: seen.scale,
             current: seen.current,
             reference: seen.reference.position,
             reference_speed: seen.reference.speed,

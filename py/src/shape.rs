@@ -27,6 +27,7 @@ pub struct Options {
     uncertainty: Option<f64>,
     motor: Option<String>,
     changes: Vec<String>,
+    pairs: bool,
 }
 
 /// The JSON that `taut shape --json` prints of these files.
@@ -60,6 +61,7 @@ pub fn shape<'py>(py: Python<'py>, files: Vec<PathBuf>, options: Options) -> PyR
         forms: Some(forms).filter(|forms| !forms.is_empty()),
         uncertainty: within("uncertainty", options.uncertainty, 0.0, 0.5)?,
         drive: drive.map(|place| [Drive::Held, Drive::Free][place]),
+        pairs: options.pairs,
     };
     let found = unlocked(py, || recommend(&question, &files))?.told(py)?;
     value::json(py, &guarded(|| json::shape(&found))?)

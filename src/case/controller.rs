@@ -190,6 +190,13 @@ fn feed_forward(table: &Table, structure: &Structure, stage: &Stage) -> Result<F
             .fail("an encoder at the cart sees no stretch of the belt")
             .next("leave it out: it is for an encoder at motor or drive pulley"));
     }
+    if let (true, Some(field), Structure::Cascade(_), Some(_)) =
+        (compensate_stretch, table.optional("compensate_stretch"), structure, stage.scale)
+    {
+        return Err(field
+            .fail("with a scale the cascade closes its position loop at the cart, where no stretch is seen")
+            .next("leave it out, or leave [scale] out"));
+    }
     Ok(FeedForward {
         model,
         inertia: table.number("inertia")?,

@@ -207,6 +207,7 @@ impl Case {
             "belt",
             "travel",
             "encoder",
+            "scale",
             "measurement",
             "experiment",
             "controller",

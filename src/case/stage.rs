@@ -23,6 +23,7 @@ pub(super) fn stage(root: &Table) -> Result<Stage> {
     let belt = table("belt", "stiffness")?;
     let travel = root.optional("travel").map(|field| field.table()).transpose()?;
     let encoder = root.optional("encoder").map(|field| field.table()).transpose()?;
+    let scale = root.optional("scale");
 
     drive.check_keys(&[], &[])?;
     idler.check_keys(&[], &[])?;
@@ -48,7 +49,9 @@ pub(super) fn stage(root: &Table) -> Result<Stage> {
         belt: self::belt(&belt, travel.as_ref())?,
         travel: travel.as_ref().map(self::travel).transpose()?,
         encoder: encoder.map(|table| self::encoder(&table)).transpose()?,
+        scale: None,
     };
+    stage.scale = scale.map(|field| self::scale(&field, stage.encoder)).transpose()?;
     if let Some(proportion) = sheet::proportion(&belt, &stage.mechanism())? {
         stage.belt.damping = stage.belt.stiffness.map(|stiffness| proportion * stiffness);
     }
@@ -322,6 +325,22 @@ pub(super) fn section(field: &Field) -> Result<f64> {
     let table = field.table()?;
     table.check_keys(&[], &[])?;
     Ok(toothed_section(table.number("plain")?, table.number("toothed")?, table.number("toothed_share")?))
+}
+
+/// A scale at the cart beside an encoder that is elsewhere.
+fn scale(field: &Field, encoder: Option<Encoder>) -> Result<Encoder> {
+    let table = field.table()?;
+    table.check_keys(&[], &[])?;
+    let scale = Encoder { at: EncoderPlace::Cart, lines: sheet::lines(&table)? };
+    match encoder.map(|encoder| encoder.at) {
+        Some(EncoderPlace::Motor | EncoderPlace::DrivePulley) => Ok(scale),
+        Some(EncoderPlace::Cart) => {
+            Err(field.fail("the encoder of this case sits at the cart already").next("leave the one or the other out"))
+        }
+        None => Err(field
+            .fail("a scale is a second sensor, and this case has no first one")
+            .next("add [encoder] at the motor or the drive pulley, or write [encoder] with at = \"cart\" instead")),
+    }
 }
 
 fn encoder(table: &Table) -> Result<Encoder> {

@@ -9,6 +9,8 @@ use crate::stage::{AmplifierMode, BeltModel, EncoderPlace, Stage};
 pub struct Rigid {
     /// M + (J₁ + n² J_r + J₂)/r², kg.
     pub mass: f64,
+    /// Of that (J₁ + n² J_r)/r², what moves before the belt, kg.
+    pub driving: f64,
     /// b + (B₁ + B₂)/r², N s/m, forward and backward.
     pub viscous: [f64; 2],
     /// F_c + (τ_c1 + τ_c2)/r, N, forward and backward.
@@ -35,6 +37,7 @@ impl Rigid {
         let [drive, cart, idler] = [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction];
         Self {
             mass: stage.cart.mass + pulleys / (r * r),
+            driving: (stage.drive_pulley.inertia + n * n * motor.rotor_inertia) / (r * r),
             viscous: [true, false].map(|forward| {
                 cart.side(forward).viscous + (drive.side(forward).viscous + idler.side(forward).viscous) / (r * r)
             }),

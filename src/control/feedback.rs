@@ -4,40 +4,77 @@
 use super::compensation::Rigid;
 use super::filter::Biquad;
 use super::observer::DisturbanceState;
-use super::state_feedback::{Parts, StateFeedbackState};
+use super::standard::observed;
+use super::state_feedback::{Law, StateFeedbackState};
 use crate::design::{Cascade, Design, Pid, Structure};
 use crate::error::{Error, Result};
 use crate::linear::{SMALL, solve_shifted};
 use crate::stage::Stage;
-use nalgebra::{Complex, DVector};
+use nalgebra::{Complex, DMatrix, DVector, Hessenberg};
 use std::f64::consts::PI;
 
-/// The controller of a design as D u = −(N_y y + N_i i), with y the measured position and i the measured current at a
-/// sample.
+/// The controller of a design as D u = −(N_y y + N_x x + N_i i), with y the measured position, x the cart on a scale
+/// beside that and i the measured current at a sample.
 #[derive(Debug, Clone)]
 pub struct Feedback {
     every: f64,
     core: Core,
     filters: Vec<Biquad>,
     observer: Option<DisturbanceState>,
+    /// Whether there is a scale, and what the observer sees of encoder and scale.
+    has_scale: bool,
+    weights: [f64; 2],
 }
 
 #[derive(Debug, Clone)]
 enum Core {
     Pid(Pid),
     Cascade(Cascade),
-    StateFeedback(Box<Parts>),
+    StateFeedback(Box<Observed>),
 }
 
-/// N_y, N_i and D at one frequency. D has no poles but stable ones: unstable controllers show as zeros of it.
+/// N_y, N_x, N_i and D at one frequency. D has no poles but stable ones: unstable controllers show as zeros of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Terms {
     /// N_y, V/m or A/m.
     pub position: Complex<f64>,
+    /// N_x, V/m or A/m; zero without a scale.
+    pub scale: Complex<f64>,
     /// N_i, V/A; zero without a current loop.
     pub current: Complex<f64>,
     /// D.
     pub own: Complex<f64>,
+}
+
+impl Terms {
+    /// Whether the loop is the same wherever it is broken.
+    pub fn has_one_loop(&self) -> bool {
+        self.current == Complex::ZERO && self.scale == Complex::ZERO
+    }
+}
+
+/// A frequency as a sampled loop sees it.
+#[derive(Debug, Clone, Copy)]
+pub struct Turn {
+    /// z = e^{jωT}.
+    z: Complex<f64>,
+    /// z − 1, without the loss of a difference.
+    change: Complex<f64>,
+}
+
+impl Turn {
+    /// That of ω (rad/s) at a sample time T (s).
+    pub fn of(omega: f64, t: f64) -> Self {
+        let half = Complex::new(0.0, 0.5 * omega * t).exp();
+        let change = Complex::new(0.0, 2.0 * half.im) * half;
+        Self { z: Complex::new(0.0, omega * t).exp(), change }
+    }
+
+    /// (1 − 1/z)/|1 − 1/z| = j e^{−jωT/2}, for the angle of 1 − 1/z.
+    pub(crate) fn lag(&self) -> Complex<f64> {
+        let whole = self.change / self.z;
+        whole / whole.norm()
+    }
 }
 
 impl Feedback {
@@ -47,7 +84,8 @@ impl Feedback {
             Structure::Pid(gains) => Core::Pid(*gains),
             Structure::Cascade(gains) => Core::Cascade(*gains),
             Structure::StateFeedback(weights) => {
-                Core::StateFeedback(Box::new(StateFeedbackState::new(weights, model, design)?.parts()))
+                let state = StateFeedbackState::new(weights, model, design)?;
+                Core::StateFeedback(Box::new(Observed::of(state.law())))
             }
             other => {
                 return Err(Error::new(format!("{} is no linear controller: it has no margins", other.name()))
@@ -59,33 +97,42 @@ impl Feedback {
             Some(observer) => DisturbanceState::new(observer.bandwidth, &Rigid::of(model), design.every),
         };
         let filters = design.filters.iter().map(|filter| Biquad::new(filter, design.every)).collect();
-        Ok(Self { every: design.every, core, filters, observer })
+        let weights = observed(model, &Rigid::of(model));
+        Ok(Self { every: design.every, core, filters, observer, has_scale: model.scale.is_some(), weights })
     }
 
     /// At z = e^{jωT}; ω in rad/s, above zero.
     pub fn at(&self, omega: f64) -> Terms {
+        self.at_turn(&Turn::of(omega, self.every))
+    }
+
+    /// The same where what belongs to the frequency is known already.
+    pub fn at_turn(&self, &Turn { z, change }: &Turn) -> Terms {
         let t = self.every;
-        let z = Complex::new(0.0, omega * t).exp();
         let one = Complex::new(1.0, 0.0);
-        // z − 1 without the loss of a difference
-        let change = Complex::new(0.0, 2.0 * (0.5 * omega * t).sin()) * Complex::new(0.0, 0.5 * omega * t).exp();
         let filter = self.filters.iter().fold(one, |product, filter| product * filter.at(z));
-        let (position, current, own) = match &self.core {
-            Core::Pid(gains) => (pid(gains, t, z, change), Complex::ZERO, (one, Complex::ZERO)),
+        let zero = Complex::ZERO;
+        let (position, scale, current, own) = match &self.core {
+            Core::Pid(gains) => (pid(gains, t, z, change), zero, zero, (one, zero)),
             Core::Cascade(gains) => {
-                let (position, current) = cascade(gains, t, z, change);
-                (position, current, (one, Complex::ZERO))
+                let ([speed, position], current) = cascade(gains, t, z, change);
+                match self.has_scale {
+                    true => (speed, position, current, (one, zero)),
+                    false => (speed + position, zero, current, (one, zero)),
+                }
             }
-            Core::StateFeedback(parts) => {
-                let (position, delayed, input) = parts.at(z, change);
-                (position, Complex::ZERO, (delayed, input))
+            Core::StateFeedback(observed) => {
+                let ([position, scale], delayed, input) = observed.at(z, change);
+                (position, scale, zero, (delayed, input))
             }
         };
-        // w = W_u u + W_y y, and u = H v − w with v D₀ = −(N y + N_i i + N_u u)
-        let [on_command, on_position] = self.observer.as_ref().map_or([Complex::ZERO; 2], |observer| observer.at(z));
+        // w = W_u u + W_y (a y + b x), and u = H v − w with v D₀ = −(N_y y + N_x x + N_i i + N_u u)
+        let [on_command, on_position] = self.observer.as_ref().map_or([zero; 2], |observer| observer.at(z));
         let (delayed, input) = own;
+        let [encoder, cart] = self.weights.map(|weight| delayed * on_position * weight);
         Terms {
-            position: filter * position + delayed * on_position,
+            position: filter * position + encoder,
+            scale: filter * scale + cart,
             current: filter * current,
             own: delayed * (one + on_command) + filter * input,
         }
@@ -105,8 +152,9 @@ fn pid(gains: &Pid, t: f64, z: Complex<f64>, change: Complex<f64>) -> Complex<f6
     slope * gains.derivative + integral + gains.proportional
 }
 
-/// (K_s + K_si T z/(z − 1)) (K_v + V(z)), V the filtered difference; with a current loop that times its own controller.
-fn cascade(gains: &Cascade, t: f64, z: Complex<f64>, change: Complex<f64>) -> (Complex<f64>, Complex<f64>) {
+/// (K_s + K_si T z/(z − 1)) times V(z), the filtered difference, and times K_v; with a current loop that times its own
+/// controller.
+fn cascade(gains: &Cascade, t: f64, z: Complex<f64>, change: Complex<f64>) -> ([Complex<f64>; 2], Complex<f64>) {
     let summed = |proportional: f64, integral: f64| match integral {
         0.0 => Complex::new(proportional, 0.0),
         _ => z * (integral * t) / change + proportional,
@@ -114,45 +162,89 @@ fn cascade(gains: &Cascade, t: f64, z: Complex<f64>, change: Complex<f64>) -> (C
     let keep = (-2.0 * PI * gains.filter * t).exp();
     // v = (1 − a) z/(z − a) · (1 − 1/z)/T y
     let speed = change * ((1.0 - keep) / t) / (z - keep);
-    let outer = summed(gains.speed, gains.speed_integral) * (speed + gains.position);
+    let outer = summed(gains.speed, gains.speed_integral);
+    let outer = [outer * speed, outer * gains.position];
     match gains.current {
         None => (outer, Complex::ZERO),
         Some(inner) => {
             let inner = summed(inner.proportional, inner.integral);
-            (outer * inner, inner)
+            (outer.map(|outer| outer * inner), inner)
         }
     }
 }
 
-impl Parts {
-    /// N_y, D₀ and N_u of the command before filters: v D₀ = −(N_y y + N_u u).
-    fn at(&self, z: Complex<f64>, change: Complex<f64>) -> (Complex<f64>, Complex<f64>, Complex<f64>) {
-        let n = self.estimate.nrows();
-        let inverse = z.inv();
-        // x̂⁺ = (I − L m) x̂ + L y,  z x̂ = Φ x̂⁺ + Γ₀ z^{−d} u + Γ₁ z^{−d−1} u
-        let lag = inverse.powi(self.lag as i32);
-        // kᵀ (I − L m) (z I − Φ (I − L m))⁻¹, a row for both that it is asked of
-        let row = self.resolved(z);
-        let seen = |from: &dyn Fn(usize) -> Complex<f64>| (0..n).map(|i| row[i] * from(i)).sum::<Complex<f64>>();
-        let mut position = seen(&|i| Complex::new(self.corrected[i], 0.0)) + self.direct;
-        if let Some(integral) = self.integral {
-            position += Complex::new(integral * self.every, 0.0) / change;
+/// The Kalman filter and the regulator as a filter of what is measured, from [`Law`], in coordinates in which the
+/// resolvent of the estimate costs least: (Φ C)ᵀ = Q H Qᵀ, H upper Hessenberg.
+#[derive(Debug, Clone)]
+struct Observed {
+    law: Law,
+    /// H; of the estimate from one sample to the next, C = Π (I − L_i m_i).
+    estimate: DMatrix<f64>,
+    /// Qᵀ Cᵀ k, of the estimate before a sample to the command.
+    row: DVector<f64>,
+    /// Of encoder and scale: Qᵀ Φ G, of the measured position to the estimate, and k G, straight to the command; G_i =
+    /// Π_{j>i} (I − L_j m_j) L_i.
+    sensors: Vec<(DVector<f64>, f64)>,
+    /// Qᵀ Γ₀ and Qᵀ Γ₁, of commands.
+    now: DVector<f64>,
+    before: DVector<f64>,
+}
+
+impl Observed {
+    fn of(law: &Law) -> Self {
+        let n = law.phi.nrows();
+        let own = law.gain.rows(0, n);
+        let mut corrected = DMatrix::identity(n, n);
+        let mut gains: Vec<DVector<f64>> = Vec::new();
+        for sensor in &law.sensors {
+            let correct = DMatrix::identity(n, n) - &sensor.kalman * sensor.measured.transpose();
+            gains.iter_mut().for_each(|gain| *gain = &correct * &*gain);
+            gains.push(sensor.kalman.clone());
+            corrected = correct * corrected;
         }
-        let mut delayed = Complex::new(1.0, 0.0);
-        for i in 0..self.pending {
-            delayed += inverse.powi(i as i32 + 1) * self.gain[n + i];
+        let (q, estimate) = Hessenberg::new((&law.phi * &corrected).transpose()).unpack();
+        Self {
+            estimate,
+            row: q.tr_mul(&corrected.tr_mul(&own)),
+            sensors: gains.iter().map(|gain| (q.tr_mul(&(&law.phi * gain)), own.dot(gain))).collect(),
+            now: q.tr_mul(&law.now),
+            before: q.tr_mul(&law.before),
+            law: law.clone(),
         }
-        (position, delayed, seen(&|i| lag * self.now[i] + lag * inverse * self.before[i]))
     }
 
-    /// The row kᵀ (I − L m) times the resolvent of the estimate; no numbers on a pole.
+    /// N_y and N_x, D₀ and N_u of the command before filters: v D₀ = −(N_y y + N_x x + N_u u).
+    fn at(&self, z: Complex<f64>, change: Complex<f64>) -> ([Complex<f64>; 2], Complex<f64>, Complex<f64>) {
+        let law = &self.law;
+        let n = self.estimate.nrows();
+        let inverse = z.inv();
+        // x̂⁺ = C x̂ + G y,  z x̂ = Φ x̂⁺ + Γ₀ z^{−d} u + Γ₁ z^{−d−1} u
+        let lag = inverse.powi(law.lag() as i32);
+        // kᵀ C (z I − Φ C)⁻¹, a row for all that it is asked of
+        let row = self.resolved(z);
+        let seen = |from: &dyn Fn(usize) -> Complex<f64>| (0..n).map(|i| row[i] * from(i)).sum::<Complex<f64>>();
+        let mut positions = [Complex::ZERO; 2];
+        for (position, (corrected, direct)) in positions.iter_mut().zip(&self.sensors) {
+            *position = seen(&|i| Complex::new(corrected[i], 0.0)) + *direct;
+        }
+        if let Some(integral) = law.integral() {
+            positions[self.sensors.len().min(2) - 1] += Complex::new(integral * law.every, 0.0) / change;
+        }
+        let mut delayed = Complex::new(1.0, 0.0);
+        for i in 0..law.pending {
+            delayed += inverse.powi(i as i32 + 1) * law.gain[n + i];
+        }
+        (positions, delayed, seen(&|i| lag * self.now[i] + lag * inverse * self.before[i]))
+    }
+
+    /// The row kᵀ C times the resolvent of the estimate; no numbers on a pole.
     fn resolved(&self, z: Complex<f64>) -> Vec<Complex<f64>> {
         let n = self.estimate.nrows();
         let mut row: Vec<Complex<f64>> = self.row.iter().map(|v| Complex::new(*v, 0.0)).collect();
         let solved = match n <= SMALL {
-            true => solve_shifted(&self.estimate, z, true, &mut row),
+            true => solve_shifted(&self.estimate, z, false, &mut row),
             false => {
-                let mut shifted = self.estimate.transpose().map(|v| Complex::new(-v, 0.0));
+                let mut shifted = self.estimate.map(|v| Complex::new(-v, 0.0));
                 (0..n).for_each(|i| shifted[(i, i)] += z);
                 let found = shifted.lu().solve(&DVector::from_column_slice(&row));
                 row = found.iter().flat_map(|found| found.iter().copied()).collect();

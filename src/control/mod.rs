@@ -19,6 +19,7 @@ mod memory;
 pub mod model;
 pub mod observer;
 mod outcome;
+pub mod pairs;
 pub mod pid;
 pub mod recommendation;
 pub mod resonance;
@@ -39,7 +40,7 @@ pub use outcome::{Deviation, Figures, MoveRun, Rows, Setup, close, closed_loop, 
 pub(crate) use outcome::{closed_loop_briefly, follow};
 pub use rest::Swing;
 pub(crate) use sampled::Added;
-pub use sampled::{Controller, Loop, Observation, Sample, measures_cart};
+pub use sampled::{Controller, Loop, Observation, Sample, measures_cart, reads_scale};
 pub use spread::{Worst, spread, worst};
 pub use standard::Standard;
 pub use stepped::Stepped;

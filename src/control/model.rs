@@ -18,6 +18,8 @@ pub struct Linear {
     pub e: DVector<f64>,
     /// Measured position, m along the belt.
     pub measured: RowDVector<f64>,
+    /// The cart on a scale beside that, m.
+    pub scale: Option<RowDVector<f64>>,
     /// Position of the cart, m.
     pub cart: RowDVector<f64>,
     /// Its speed, m/s.
@@ -97,7 +99,8 @@ impl Linear {
             _ => at(mechanism.drives[0].shaft) * r,
         };
         let cart_speed = of_form(&Form::speed(CART));
-        Self { a, b, e, measured, cart: at(CART), cart_speed, states }
+        let scale = stage.scale.map(|_| at(CART));
+        Self { a, b, e, measured, scale, cart: at(CART), cart_speed, states }
     }
 
     /// The transition over `time` (s) with inputs held: e^{A t} and ∫ e^{A s} ds [B E].

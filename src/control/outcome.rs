@@ -100,20 +100,24 @@ pub fn closed_loop(setup: &Setup) -> Result<MoveRun> {
     close(setup.stage, &mut controller, &timing, &profile, setup.until, setup.window, setup.solver)
 }
 
-/// The same of a search that runs it a thousand times: of the figures the cart's error, settling and the root mean
-/// square of the current, equal to those of [`closed_loop`] (root mean squares to rounding, the others to the last bit), and
-/// how it ended.
-pub(crate) fn closed_loop_briefly(setup: &Setup) -> Result<(Figures, solve::Ending)> {
-    let mut controller = Standard::new(setup.design, setup.model)?;
-    let profile = setup.profile.clone().shaped(&setup.design.shaper);
-    let timing = Loop::of(setup.design);
-    timing.check(setup.until)?;
-    let experiment = at_rest(setup.stage, &profile, setup.until, timing.every.min(setup.until));
+/// The same of a search that runs it a thousand times, with a controller and a shaped profile that are made once: of the
+/// figures the cart's error, settling and the root mean square of the current, equal to those of [`closed_loop`] (root
+/// mean squares to rounding, the others to the last bit), and how it ended.
+pub(crate) fn closed_loop_briefly(
+    stage: &Stage,
+    controller: &mut Standard,
+    timing: &Loop,
+    profile: &Profile,
+    (until, window): (f64, f64),
+    solver: Solver,
+) -> Result<(Figures, solve::Ending)> {
+    timing.check(until)?;
+    let experiment = at_rest(stage, profile, until, timing.every.min(until));
     controller.reset();
-    let mut sampled = Sampled::new(setup.stage, &mut controller, timing, &profile, false).until(setup.until);
-    let mut gauge = Gauge { is_brief: true, ..Gauge::new(setup.stage, &experiment, &profile, setup.window) };
+    let mut sampled = Sampled::new(stage, controller, *timing, profile, false).until(until);
+    let mut gauge = Gauge { is_brief: true, ..Gauge::new(stage, &experiment, profile, window) };
     let sink = &mut |_: &Trajectory| Flow::Continue;
-    let mut run = solve::Run::new(setup.stage, &experiment, setup.solver, Detail::None, Some(&mut gauge), sink)?;
+    let mut run = solve::Run::new(stage, &experiment, solver, Detail::None, Some(&mut gauge), sink)?;
     sampled.drive(&mut run, experiment.until);
     let outcome = run.finish();
     Ok((gauge.finish(&outcome.events).0, outcome.ending))

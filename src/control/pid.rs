@@ -74,12 +74,14 @@ impl CascadeState {
         Self { gains: *gains, every, speed, speed_integral: 0.0, current_integral: 0.0 }
     }
 
-    /// The next command. `forward` is what feed-forward adds to the speed loop's output where that is a current.
-    pub fn step(&mut self, target: &Reference, position: f64, current: f64, forward: f64) -> f64 {
+    /// The next command, told the position that its speed is of and the one that is to follow the target: with two
+    /// sensors that of the motor and that of the cart. `forward` is what feed-forward adds to the speed loop's output
+    /// where that is a current.
+    pub fn step(&mut self, target: &Reference, [motor, load]: [f64; 2], current: f64, forward: f64) -> f64 {
         let gains = &self.gains;
-        let speed = self.speed.step(position);
+        let speed = self.speed.step(motor);
         // v* = K_v (y* − y) + c ẏ*
-        let wanted = gains.position * (target.position - position) + gains.reference_speed * target.speed;
+        let wanted = gains.position * (target.position - load) + gains.reference_speed * target.speed;
         let error = wanted - speed;
         self.speed_integral += gains.speed_integral * self.every * error;
         let output = gains.speed * error + self.speed_integral;

@@ -3,8 +3,8 @@
 
 use super::compare::{Comparison, compare};
 use super::damping::{FittedMode, fitted};
-use super::resonance::{Drive, Resonance, resonances};
-use super::shaper::{Firmware, Form};
+use super::resonance::{Drive, Reach, Resonance, reaches, resonances};
+use super::shaper::{Firmware, Form, residual_vibration};
 use super::shaping::{Choice, Criterion, Target, choose};
 use super::spectrum::{Axis, Spectrum};
 use crate::case::Case;
@@ -40,6 +40,8 @@ pub struct Found {
     pub file: PathBuf,
     /// Further files that are read with it.
     pub also: Vec<PathBuf>,
+    /// Share by which a model's frequencies may be off.
+    pub uncertainty: f64,
     /// Its vibration.
     pub source: Source,
     /// The criterion of the choice.
@@ -84,6 +86,8 @@ pub struct Question {
     pub uncertainty: Option<f64>,
     /// The motor while the cart vibrates.
     pub drive: Option<Drive>,
+    /// Whether pairs of shapers, convolved, are looked at, too.
+    pub pairs: bool,
 }
 
 /// A damping ratio that is given, or fitted to the highest peak.
@@ -157,6 +161,7 @@ fn chosen(args: &Question, file: &Path, source: Source, also: Vec<PathBuf>) -> R
         max_smoothing: args.max_smoothing,
         max_vibrations: args.max_vibrations,
         firmware: args.firmware,
+        pairs: args.pairs,
         ..Criterion::default()
     };
     if let Some(forms) = &args.forms {
@@ -191,16 +196,17 @@ fn chosen(args: &Question, file: &Path, source: Source, also: Vec<PathBuf>) -> R
         criterion = criterion.with_damping(damping).map_err(option)?;
     }
     let spectra: Vec<Spectrum>;
+    let uncertainty = args.uncertainty.unwrap_or(UNCERTAINTY);
     let target = match &source {
         Source::Spectrum(spectrum) => Target::Spectrum(spectrum),
         Source::Spectra(all) => {
             spectra = all.iter().map(|(_, spectrum)| spectrum.clone()).collect();
             Target::Spectra(&spectra)
         }
-        Source::Model { modes, .. } => Target::Modes { modes, uncertainty: args.uncertainty.unwrap_or(UNCERTAINTY) },
+        Source::Model { modes, .. } => Target::Modes { modes, uncertainty },
     };
     let choice = choose(target, &criterion).map_err(|e| e.in_file(file))?;
-    Ok(Found { file: file.to_path_buf(), also, source, criterion, choice, mode })
+    Ok(Found { file: file.to_path_buf(), also, uncertainty, source, criterion, choice, mode })
 }
 
 /// The mean damping ratio of the modes that move the cart most, over the travel.
@@ -242,7 +248,55 @@ fn measured(args: &Question, files: &[PathBuf], file: &Path) -> Result<Source> {
     Ok(Source::Spectrum(spectrum))
 }
 
+/// A mode of a model along the travel, and what is left of it at worst.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Left {
+    /// Its frequencies, without uncertainty.
+    pub reach: Reach,
+    /// Behind each shaper, in the order of the choice, of what the mode does without one.
+    pub shapers: Vec<f64>,
+    /// Behind each pair.
+    pub pairs: Vec<f64>,
+}
+
 impl Found {
+    /// Each mode of a model along the travel, the strongest first; none of a measured spectrum.
+    pub fn left(&self) -> Vec<Left> {
+        let Source::Model { modes, .. } = &self.source else { return Vec::new() };
+        let one = |reach: Reach| {
+            let own: Vec<Resonance> = modes.iter().filter(|mode| reach.has(mode)).copied().collect();
+            let target = Target::Modes { modes: &own, uncertainty: self.uncertainty };
+            let pair =
+                |impulses: Vec<(f64, f64)>| target.weighed(&[], &mut |f, zeta| residual_vibration(&impulses, f, zeta));
+            Left {
+                reach,
+                shapers: self.choice.fitted.iter().map(|fitted| target.remaining(&fitted.shaper, &[])).collect(),
+                pairs: self.choice.pairs.iter().map(|one| pair(one.impulses())).collect(),
+            }
+        };
+        reaches(modes).into_iter().map(one).collect()
+    }
+
+    /// The verdict on pairs, in a sentence; none where they were not asked for.
+    pub fn pair_told(&self) -> Option<String> {
+        let Some(pair) = self.choice.pairs.first() else {
+            return self.criterion.pairs.then(|| "no pair of shapers smooths as little as is allowed".into());
+        };
+        let best = self.choice.best();
+        let told = format!(
+            "{} leaves {:.1} % of the vibration and smooths by {:.3} mm, its score is {:.2} of that of {} alone",
+            pair.name(),
+            100.0 * pair.vibration,
+            1e3 * pair.smoothing,
+            pair.score / best.score,
+            best.shaper.form.name()
+        );
+        Some(match self.choice.is_pair_better {
+            true => format!("better, one behind the other: {told}; Klipper has no pairs, [controller] of a case has"),
+            false => format!("no pair is clearly better: {told}"),
+        })
+    }
+
     /// The damping of the highest peak, in a sentence.
     pub fn damping_told(&self) -> Option<String> {
         let mode = self.mode?;

@@ -33,6 +33,55 @@ pub struct Resonance {
     pub share: f64,
 }
 
+/// A mode along the travel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reach {
+    /// Its lowest and highest frequency, Hz.
+    pub frequency: [f64; 2],
+    /// Its least and most damping ratio.
+    pub damping: [f64; 2],
+    /// The most of its shares.
+    pub share: f64,
+    /// Its frequency at the last place, Hz.
+    last: f64,
+}
+
+/// Step of a mode's frequency from one place to the next up to which it is the same mode, as part of it.
+const SAME: f64 = 0.2;
+
+/// Each mode over all places, the strongest first: from place to place a mode is the one of the nearest frequency.
+pub fn reaches(modes: &[Resonance]) -> Vec<Reach> {
+    let mut all: Vec<Reach> = Vec::new();
+    for mode in modes {
+        let off = |reach: &Reach| (mode.frequency / reach.last).ln().abs();
+        let near = all.iter_mut().filter(|reach| off(reach) < SAME).min_by(|a, b| off(a).total_cmp(&off(b)));
+        match near {
+            Some(reach) => {
+                let [low, high] = reach.frequency;
+                reach.frequency = [low.min(mode.frequency), high.max(mode.frequency)];
+                let [low, high] = reach.damping;
+                reach.damping = [low.min(mode.damping), high.max(mode.damping)];
+                (reach.share, reach.last) = (reach.share.max(mode.share), mode.frequency);
+            }
+            None => all.push(Reach {
+                frequency: [mode.frequency; 2],
+                damping: [mode.damping; 2],
+                share: mode.share,
+                last: mode.frequency,
+            }),
+        }
+    }
+    all.sort_by(|a, b| b.share.total_cmp(&a.share));
+    all
+}
+
+impl Reach {
+    /// Whether a mode at some place is this one.
+    pub fn has(&self, mode: &Resonance) -> bool {
+        (self.frequency[0]..=self.frequency[1]).contains(&mode.frequency)
+    }
+}
+
 /// The modes of a stage that move its cart: at every place along the travel if the spans follow the cart, else at one.
 ///
 /// The masses, springs and dampers are those of the sliding stage: M q̈ + C q̇ + K q = 0 with the viscous friction, the

@@ -2,6 +2,8 @@
 
 use super::memory::{Memory, last};
 use super::rest::Rest;
+use super::stepped::{Clocked, Decision};
+use crate::design::{Design, Structure};
 use crate::error::{Error, Result};
 use crate::mechanism::State;
 use crate::quantity::rounded;
@@ -9,8 +11,6 @@ use crate::signal::profile::{Profile, Reference};
 use crate::solve::Run;
 use crate::stage::axis::{CART, DRIVE};
 use crate::stage::{Encoder, EncoderPlace, Stage};
-use crate::trajectory::Interval;
-use std::collections::VecDeque;
 
 /// Measurements and references that a controller has at a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,6 +23,8 @@ pub struct Observation {
     pub ahead: Reference,
     /// Measured position, m along the belt: whole counts.
     pub position: f64,
+    /// The cart's position on a scale beside that encoder, m: whole counts; none without a scale.
+    pub scale: Option<f64>,
     /// Measured motor current, A.
     pub current: f64,
 }
@@ -94,17 +96,7 @@ pub struct Sample {
 pub(super) struct Sampled<'a> {
     controller: &'a mut dyn Controller,
     profile: &'a Profile,
-    timing: Loop,
-    /// Its samples.
-    clock: Interval,
-    sensor: Sensor,
-    /// Next sample, and the place in it: at the sample, or where a delayed command takes over.
-    k: u64,
-    halfway: bool,
-    /// Whole samples of delay, and what is left of it, s.
-    rest: f64,
-    waiting: VecDeque<f64>,
-    acting: f64,
+    clocked: Clocked,
     /// Samples at the limit, and for how long their commands were held, s.
     pub(super) limited: u64,
     pub(super) held_back: f64,
@@ -147,18 +139,10 @@ impl<'a> Sampled<'a> {
         profile: &'a Profile,
         keep: bool,
     ) -> Self {
-        let (whole, rest) = timing.samples_late();
         Self {
             controller,
             profile,
-            timing,
-            clock: Interval::of(timing.every),
-            sensor: Sensor::new(stage),
-            k: 0,
-            halfway: false,
-            rest,
-            waiting: std::iter::repeat_n(0.0, whole).collect(),
-            acting: 0.0,
+            clocked: Clocked::new(stage, timing),
             limited: 0,
             held_back: 0.0,
             turns: 0,
@@ -186,20 +170,9 @@ impl<'a> Sampled<'a> {
         self
     }
 
-    /// Has the next command act from `time` on.
-    fn act(&mut self, time: f64) {
-        let next = self.waiting.pop_front().unwrap_or(0.0);
-        let change = next - self.acting;
-        if time < self.until {
-            self.turns += u64::from(change * self.way < 0.0);
-            self.way = if change == 0.0 { self.way } else { change };
-        }
-        self.acting = next;
-    }
-
     /// With positions read exactly and not in counts.
     pub(super) fn exactly(mut self) -> Self {
-        self.sensor.counts = None;
+        self.clocked = self.clocked.exactly();
         self
     }
 }
@@ -221,7 +194,7 @@ impl Sampled<'_> {
         let Some(added) = self.added else { return run.hold(&[command], end) };
         loop {
             // A hundredth of a sample is what clocks of logs are off by.
-            let near = 1e-2 * self.timing.every;
+            let near = 1e-2 * self.clocked.timing.every;
             let (value, next) = added.at(run.time() + near);
             let next = if next < end - near { next } else { end };
             if !run.hold(&[command + value], next) {
@@ -235,44 +208,64 @@ impl Sampled<'_> {
 
     /// The input from now on and until when it is held, s, told the state and the motor's current, A, just before.
     fn decide(&mut self, state: &State, current: f64) -> (f64, f64) {
-        let Loop { every, lead, limit, .. } = self.timing;
-        let time = self.clock.times(self.k);
-        if self.halfway {
-            self.halfway = false;
-            self.k += 1;
-            self.act(time + self.rest);
-            return (self.acting, self.clock.times(self.k));
-        }
-        let reference = self.profile.at(time);
-        let seen = Observation {
-            time,
-            reference,
-            ahead: if lead == 0.0 { reference } else { self.profile.at(time + lead) },
-            position: self.sensor.read(state),
-            current,
+        let Loop { every, lead, .. } = self.clocked.timing;
+        let (time, before) = (self.clocked.next(), self.clocked.acting());
+        // A command that was delayed needs no reference.
+        let [reference, ahead] = match self.clocked.is_at_sample() {
+            false => [Reference::default(); 2],
+            true => {
+                let reference = self.profile.at(time);
+                [reference, if lead == 0.0 { reference } else { self.profile.at(time + lead) }]
+            }
         };
-        let asked = self.controller.step(&seen);
-        // What is no number asks for nothing.
-        let asked = if asked.is_finite() { asked } else { 0.0 };
-        let given = limit.map_or(asked, |limit| asked.clamp(-limit, limit));
-        self.controller.limited(given);
-        self.samples += 1;
-        self.at_rest.see(time, given);
-        if given != asked {
-            self.limited += 1;
-            self.held_back += every.min(self.until - time).max(0.0);
+        if let Some(Decision { seen, asked, given }) =
+            self.clocked.decide(self.controller, (state, current), &reference, &ahead)
+        {
+            self.samples += 1;
+            self.at_rest.see(time, given);
+            if given != asked {
+                self.limited += 1;
+                self.held_back += every.min(self.until - time).max(0.0);
+            }
+            if let Some(kept) = &mut self.kept {
+                kept.push(Sample { time, reference: seen.reference.position, measured: seen.position, asked, given });
+            }
         }
-        if let Some(kept) = &mut self.kept {
-            kept.push(Sample { time, reference: seen.reference.position, measured: seen.position, asked, given });
+        let acting = self.clocked.acting();
+        let change = acting - before;
+        if time < self.until {
+            self.turns += u64::from(change * self.way < 0.0);
+            self.way = if change == 0.0 { self.way } else { change };
         }
-        self.waiting.push_back(given);
-        if self.rest > 0.0 {
-            self.halfway = true;
-            return (self.acting, time + self.rest);
-        }
-        self.k += 1;
-        self.act(time);
-        (self.acting, self.clock.times(self.k))
+        (acting, self.clocked.next())
+    }
+}
+
+/// All that a controller reads of an axis.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sensors {
+    encoder: Sensor,
+    scale: Option<Sensor>,
+}
+
+impl Sensors {
+    pub(super) fn new(stage: &Stage) -> Self {
+        Self { encoder: Sensor::new(stage), scale: Sensor::of_scale(stage) }
+    }
+
+    pub(super) fn exactly(self) -> Self {
+        let exact = |sensor: Sensor| Sensor { counts: None, ..sensor };
+        Self { encoder: exact(self.encoder), scale: self.scale.map(exact) }
+    }
+
+    /// The measured position, m along the belt.
+    pub(super) fn position(&self, state: &State) -> f64 {
+        self.encoder.read(state)
+    }
+
+    /// The cart on the scale, m.
+    pub(super) fn scale(&self, state: &State) -> Option<f64> {
+        self.scale.map(|scale| scale.read(state))
     }
 }
 
@@ -298,6 +291,12 @@ impl Sensor {
         Self { body, length, counts }
     }
 
+    /// That of the scale beside the encoder, if there is one.
+    pub(super) fn of_scale(stage: &Stage) -> Option<Self> {
+        let counts = stage.scale?.counts_per_unit(stage.motor.gear_ratio);
+        Some(Self { body: CART, length: 1.0, counts: Some(counts) })
+    }
+
     pub(super) fn read(&self, state: &State) -> f64 {
         let value = state.position[self.body];
         self.length * self.counts.map_or(value, |counts| (value * counts).round() / counts)
@@ -312,6 +311,16 @@ impl Sensor {
 /// Whether the encoder of this stage sits at the cart.
 pub fn measures_cart(stage: &Stage) -> bool {
     stage.encoder.is_some_and(|encoder| encoder.at == EncoderPlace::Cart)
+}
+
+/// Whether a controller on this stage reads the scale beside the encoder: a cascade, state feedback and a disturbance
+/// observer do.
+pub fn reads_scale(design: &Design, stage: &Stage) -> bool {
+    let structure = match &design.structure {
+        Structure::Cascade(_) | Structure::StateFeedback(_) => true,
+        Structure::Pid(_) | Structure::SlidingMode(_) | Structure::Fuzzy(_) => false,
+    };
+    stage.scale.is_some() && (structure || design.disturbance_observer.is_some())
 }
 
 /// Most samples that a command may wait for.

@@ -372,8 +372,7 @@ impl Shaper {
 
     /// The amplitude-weighted middle of its impulses, s: by how much it delays a slow command.
     pub fn delay(&self) -> f64 {
-        // Σ A_i t_i
-        self.impulses.iter().map(|(t, a)| a * t).sum()
+        middle(&self.impulses)
     }
 
     /// Vibration that is left of a mode of that undamped natural `frequency` (Hz) and `damping` ratio, as part of what
@@ -384,32 +383,13 @@ impl Shaper {
 
     /// How far a shaped path leaves a corner, m: see [`Corner`].
     pub fn smoothing(&self, corner: &Corner) -> f64 {
-        let (quarter, half) = self.corner_moments();
-        // 90°: the way √2 Σ A_i (v u_i + a u_i²/2) over impulses later than the middle.  180°: Σ A_i a u_i²/2 over all
-        let right = SQRT_2 * (corner.speed * quarter.0 + 0.5 * corner.acceleration * quarter.1);
-        right.max(0.5 * corner.acceleration * half)
+        smoothing(&self.impulses, corner)
     }
 
     /// The greatest acceleration, m/s², at which [`Shaper::smoothing`] stays within `limit` (m) at a corner speed in
     /// m/s; 0 if there is none.
     pub fn max_acceleration(&self, limit: f64, corner_speed: f64) -> f64 {
-        let (quarter, half) = self.corner_moments();
-        let right = 2.0 * (limit / SQRT_2 - corner_speed * quarter.0) / quarter.1;
-        right.min(2.0 * limit / half).max(0.0)
-    }
-
-    /// Σ A u and Σ A u² over impulses later than the middle, and Σ A u² over all; u is the time from the middle.
-    fn corner_moments(&self) -> ((f64, f64), f64) {
-        let middle = self.delay();
-        let (mut later, mut all) = ((0.0, 0.0), 0.0);
-        for (t, a) in &self.impulses {
-            let u = t - middle;
-            all += a * u * u;
-            if u > 0.0 {
-                later = (later.0 + a * u, later.1 + a * u * u);
-            }
-        }
-        (later, all)
+        max_acceleration(&self.impulses, limit, corner_speed)
     }
 
     /// The frequencies about the shaper's own at which no mode with one of these damping ratios keeps more than `level`
@@ -456,6 +436,42 @@ impl Default for Corner {
     fn default() -> Self {
         Self { acceleration: 5.0, speed: 5e-3 }
     }
+}
+
+/// The amplitude-weighted middle of impulses, s.
+fn middle(impulses: &[(f64, f64)]) -> f64 {
+    // Σ A_i t_i
+    impulses.iter().map(|(t, a)| a * t).sum()
+}
+
+/// How far a path behind these impulses leaves a corner, m: see [`Corner`].
+pub fn smoothing(impulses: &[(f64, f64)], corner: &Corner) -> f64 {
+    let (quarter, half) = corner_moments(impulses);
+    // 90°: the way √2 Σ A_i (v u_i + a u_i²/2) over impulses later than the middle.  180°: Σ A_i a u_i²/2 over all
+    let right = SQRT_2 * (corner.speed * quarter.0 + 0.5 * corner.acceleration * quarter.1);
+    right.max(0.5 * corner.acceleration * half)
+}
+
+/// The greatest acceleration, m/s², at which [`smoothing`] stays within `limit` (m) at a corner speed in m/s; 0 if there
+/// is none.
+pub fn max_acceleration(impulses: &[(f64, f64)], limit: f64, corner_speed: f64) -> f64 {
+    let (quarter, half) = corner_moments(impulses);
+    let right = 2.0 * (limit / SQRT_2 - corner_speed * quarter.0) / quarter.1;
+    right.min(2.0 * limit / half).max(0.0)
+}
+
+/// Σ A u and Σ A u² over impulses later than the middle, and Σ A u² over all; u is the time from the middle.
+fn corner_moments(impulses: &[(f64, f64)]) -> ((f64, f64), f64) {
+    let middle = middle(impulses);
+    let (mut later, mut all) = ((0.0, 0.0), 0.0);
+    for (t, a) in impulses {
+        let u = t - middle;
+        all += a * u * u;
+        if u > 0.0 {
+            later = (later.0 + a * u, later.1 + a * u * u);
+        }
+    }
+    (later, all)
 }
 
 /// Vibration of a mode after a sequence of impulses (time in s, amplitude), as part of that after one impulse of their

@@ -5,6 +5,7 @@
 //! taken that leaves the least vibration or hardly more, with the best score; and of all kinds the one with the clearly
 //! best score.
 
+use super::pairs::{Pair, pairs};
 use super::resonance::Resonance;
 use super::shaper::{Corner, Firmware, Form, Kind, Pattern, Shaper, TOLERANCE, USUAL_DAMPING, check_damping};
 use super::spectrum::Spectrum;
@@ -56,6 +57,8 @@ pub struct Criterion {
     pub forms: Vec<Form>,
     /// Those of them that may be recommended.
     pub candidates: Vec<Form>,
+    /// Whether pairs of them, convolved, are looked at, too.
+    pub pairs: bool,
 }
 
 impl Default for Criterion {
@@ -73,6 +76,7 @@ impl Default for Criterion {
             firmware: Firmware::default(),
             forms,
             candidates,
+            pairs: false,
         };
         criterion.assume(USUAL_DAMPING);
         criterion
@@ -130,6 +134,10 @@ pub struct Choice {
     pub recommended: usize,
     /// Why that one.
     pub reason: String,
+    /// Pairs of shapers, convolved, the best first; empty unless they were asked for.
+    pub pairs: Vec<Pair>,
+    /// Whether the first of them is clearly better than the recommended shaper.
+    pub is_pair_better: bool,
 }
 
 impl Choice {
@@ -143,20 +151,25 @@ impl Target<'_> {
     /// Vibration that a shaper leaves, of that without one: 0 to 1; of a spectrum what is above a twentieth of the
     /// highest peak.
     pub fn remaining(&self, shaper: &Shaper, dampings: &[f64]) -> f64 {
+        self.weighed(dampings, &mut |f, zeta| shaper.residual_vibration(f, zeta))
+    }
+
+    /// The same of anything that leaves V(f, ζ), which is asked for always in the same order.
+    pub(super) fn weighed(&self, dampings: &[f64], left: &mut dyn FnMut(f64, f64) -> f64) -> f64 {
         match self {
-            Target::Spectrum(spectrum) => of_spectrum(spectrum, shaper, dampings),
+            Target::Spectrum(spectrum) => of_spectrum(spectrum, left, dampings),
             Target::Spectra(spectra) => {
-                spectra.iter().map(|spectrum| of_spectrum(spectrum, shaper, dampings)).fold(0.0, f64::max)
+                spectra.iter().map(|spectrum| of_spectrum(spectrum, left, dampings)).fold(0.0, f64::max)
             }
             // max V w / w_max over modes and over f (1 − u) to f (1 + u); nothing is taken off, as a model has no noise
             Target::Modes { modes, uncertainty } => {
                 let most = modes.iter().map(|mode| mode.share).fold(0.0, f64::max);
-                let at = |mode: &Resonance, part: f64| {
+                let mut at = |mode: &Resonance, part: f64| {
                     let f = mode.frequency * (1.0 + part * uncertainty);
-                    shaper.residual_vibration(f, mode.damping) * mode.share / most
+                    left(f, mode.damping) * mode.share / most
                 };
-                let worst = |mode: &Resonance| PARTS.iter().map(|part| at(mode, *part)).fold(0.0, f64::max);
-                modes.iter().map(worst).fold(0.0, f64::max)
+                let mut worst = |mode: &Resonance| PARTS.iter().map(|part| at(mode, *part)).fold(0.0, f64::max);
+                modes.iter().map(&mut worst).fold(0.0, f64::max)
             }
         }
     }
@@ -168,7 +181,7 @@ impl Target<'_> {
     }
 
     /// Frequencies that are tried for a kind, ascending.
-    fn grid(&self, kind: Kind) -> Vec<f64> {
+    pub(super) fn grid(&self, kind: Kind) -> Vec<f64> {
         match self {
             Target::Spectrum(_) | Target::Spectra(_) => {
                 let first = lowest(kind) * STEPS;
@@ -187,12 +200,12 @@ impl Target<'_> {
 }
 
 /// Σ max(V P − P_max/20, 0) / Σ max(P − P_max/20, 0), at the worst of the damping ratios.
-fn of_spectrum(spectrum: &Spectrum, shaper: &Shaper, dampings: &[f64]) -> f64 {
+fn of_spectrum(spectrum: &Spectrum, v: &mut dyn FnMut(f64, f64) -> f64, dampings: &[f64]) -> f64 {
     let floor = TOLERANCE * spectrum.greatest();
     let above = |p: f64| (p - floor).max(0.0);
     let lines = || spectrum.frequency.iter().zip(&spectrum.density).filter(|(_, p)| **p > floor);
     let whole: f64 = lines().map(|(_, p)| above(*p)).sum();
-    let left = |zeta: &f64| -> f64 { lines().map(|(f, p)| above(shaper.residual_vibration(*f, *zeta) * p)).sum() };
+    let left = |zeta: &f64| -> f64 { lines().map(|(f, p)| above(v(*f, *zeta) * p)).sum() };
     dampings.iter().map(left).fold(0.0, f64::max) / whole
 }
 
@@ -229,19 +242,25 @@ pub fn choose(target: Target<'_>, criterion: &Criterion) -> Result<Choice> {
         let error = Error::new(format!("no shaper has so little smoothing as {limit} mm"));
         return Err(error.next("allow more smoothing, or more kinds of shapers"));
     };
-    let recommended =
-        match criterion.firmware {
-            Firmware::Klipper202508 => candidates.iter().copied().skip(1).fold(first, |best, i| {
-                if is_clearly_better(fitted[i].taken(), fitted[best].taken()) { i } else { best }
-            }),
-            Firmware::Klipper => {
-                let is_measured = !matches!(target, Target::Modes { .. });
-                recommended(&mut fitted, &candidates, criterion.max_vibrations, is_measured)
-            }
-        };
+    let recommended = match criterion.firmware {
+        Firmware::Klipper202508 => candidates.iter().copied().skip(1).fold(first, |best, i| {
+            if is_clearly_better(fitted[i].taken().rank(), fitted[best].taken().rank()) { i } else { best }
+        }),
+        Firmware::Klipper => {
+            let is_measured = !matches!(target, Target::Modes { .. });
+            recommended(&mut fitted, &candidates, criterion.max_vibrations, is_measured)
+        }
+    };
     let fitted: Vec<Fitted> = fitted.iter().map(|one| one.fitted(criterion)).collect();
     let reason = reason(&fitted, recommended);
-    Ok(Choice { fitted, recommended, reason })
+    let pairs = if criterion.pairs { pairs(target, criterion) } else { Vec::new() };
+    let best = &fitted[recommended];
+    let is_pair_better = pairs.first().is_some_and(|pair| {
+        let quieter = criterion.max_vibrations.is_some_and(|most| best.vibration > most);
+        is_clearly_better((pair.score, pair.smoothing), (best.score, best.smoothing))
+            || quieter && pair.vibration < best.vibration
+    });
+    Ok(Choice { fitted, recommended, reason, pairs, is_pair_better })
 }
 
 /// A shaper at one frequency.
@@ -253,6 +272,18 @@ struct Point {
     score: f64,
 }
 
+impl Point {
+    /// Score and smoothing.
+    fn rank(&self) -> (f64, f64) {
+        (self.score, self.smoothing)
+    }
+}
+
+/// Smoothing in mm times (v^1.5 + 0.2 v + 0.01): with little vibration v left it is smoothing that counts.
+pub(super) fn score(smoothing: f64, v: f64) -> f64 {
+    smoothing * 1e3 * (v.powf(1.5) + 0.2 * v + 0.01)
+}
+
 /// A form at all frequencies, ascending, and the one that is taken.
 struct Tried {
     pattern: Pattern,
@@ -261,9 +292,10 @@ struct Tried {
     lowest: Option<f64>,
 }
 
-/// A longer shaper must be clearly better: by a fifth, or by a twentieth with a tenth less smoothing.
-fn is_clearly_better(one: &Point, other: &Point) -> bool {
-    1.2 * one.score < other.score || 1.05 * one.score < other.score && 1.1 * one.smoothing < other.smoothing
+/// By score and smoothing; a longer shaper must be clearly better: by a fifth, or by a twentieth with a tenth less
+/// smoothing.
+fn is_clearly_better(one: (f64, f64), other: (f64, f64)) -> bool {
+    1.2 * one.0 < other.0 || 1.05 * one.0 < other.0 && 1.1 * one.1 < other.1
 }
 
 /// The rule since 2025-10: as before from shorter to longer; a longer one, too, where the best so far leaves more than
@@ -275,7 +307,7 @@ fn recommended(fitted: &mut [Tried], candidates: &[usize], wanted: Option<f64>, 
     for &i in candidates {
         let (one, other) = (fitted[i].taken().clone(), fitted[best].taken().clone());
         let quieter = wanted.is_some_and(|most| other.vibration > most) && one.vibration < other.vibration;
-        if i != best && (is_clearly_better(&one, &other) || quieter) {
+        if i != best && (is_clearly_better(one.rank(), other.rank()) || quieter) {
             best = i;
         }
         let mut least = (fitted[best].taken().vibration, fitted[best].taken().smoothing);
@@ -309,8 +341,7 @@ impl Tried {
                 return None;
             }
             let v = target.remaining(&shaper, &criterion.tested);
-            // Smoothing in mm times (v^1.5 + 0.2 v + 0.01): with little vibration left it is smoothing that counts.
-            let score = smoothing * 1e3 * (v.powf(1.5) + 0.2 * v + 0.01);
+            let score = score(smoothing, v);
             Some(Point { shaper, vibration: v, smoothing, score })
         };
         let points: Vec<Point> = grid.iter().copied().filter_map(point).collect();

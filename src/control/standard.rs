@@ -1,6 +1,6 @@
 //! A controller from its design: structure, feed-forward, observer and filters put together.
 
-use super::compensation::Compensation;
+use super::compensation::{Compensation, Rigid};
 use super::filter::Biquad;
 use super::fuzzy::FuzzyState;
 use super::memory::{Memory, all};
@@ -21,7 +21,9 @@ pub struct Standard {
     compensation: Compensation,
     observer: Option<DisturbanceState>,
     filters: Vec<Biquad>,
-    /// The last command asked for, and the measured position and dry friction there.
+    /// Weights of encoder and scale in the position that the observer is given.
+    weights: [f64; 2],
+    /// The last command asked for, and the position for the observer and dry friction there.
     asked: f64,
     position: f64,
     dry: f64,
@@ -64,10 +66,20 @@ impl Standard {
             compensation,
             observer,
             filters: design.filters.iter().map(|filter| Biquad::new(filter, every)).collect(),
+            weights: observed(model, &rigid),
             asked: 0.0,
             position: 0.0,
             dry: 0.0,
         })
+    }
+}
+
+/// Weights of encoder and scale in the position that a disturbance observer is given: the share of the mass that moves
+/// with each, so that it sees the common motion, in which the belt does not swing. All of the encoder without a scale.
+pub(super) fn observed(model: &Stage, rigid: &Rigid) -> [f64; 2] {
+    match model.scale {
+        None => [1.0, 0.0],
+        Some(_) => [rigid.driving / rigid.mass, 1.0 - rigid.driving / rigid.mass],
     }
 }
 
@@ -126,6 +138,8 @@ impl Standard {
 impl Controller for Standard {
     fn step(&mut self, seen: &Observation) -> f64 {
         let target = self.compensation.target(&seen.reference);
+        // A scale that the model has and the axis has not is none.
+        let scale = seen.scale.unwrap_or(seen.position);
         let mut forward = self.compensation.command(&seen.ahead);
         let own = match &mut self.core {
             Core::Pid(core) => core.step(&target, seen.position),
@@ -136,15 +150,21 @@ impl Controller for Standard {
                     inner = forward_current(&self.compensation, &seen.ahead, forward);
                     forward = back_emf(&self.compensation, &seen.ahead, forward);
                 }
-                core.step(&target, seen.position, seen.current, inner)
+                // With a scale the position loop is closed at the cart, which is to be where the reference is.
+                match seen.scale {
+                    None => core.step(&target, [seen.position; 2], seen.current, inner),
+                    Some(scale) => core.step(&seen.reference, [seen.position, scale], seen.current, inner),
+                }
             }
-            Core::StateFeedback(core) => core.step(&seen.reference, &self.compensation, seen.position),
+            Core::StateFeedback(core) => core.step(&seen.reference, &self.compensation, [seen.position, scale]),
             Core::SlidingMode(core) => core.step(&target, seen.position),
             Core::Fuzzy(core) => core.step(&target, seen.position),
         };
         let own = self.filters.iter_mut().fold(own, |value, filter| filter.step(value));
         let disturbance = self.observer.as_ref().map_or(0.0, DisturbanceState::disturbance);
-        (self.position, self.dry) = (seen.position, self.compensation.dry(&seen.ahead));
+        let [encoder, cart] = self.weights;
+        self.position = if cart == 0.0 { seen.position } else { encoder * seen.position + cart * scale };
+        self.dry = self.compensation.dry(&seen.ahead);
         self.asked = own + forward - disturbance;
         self.asked
     }

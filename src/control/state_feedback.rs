@@ -16,20 +16,9 @@ use nalgebra::{DMatrix, DVector};
 /// A linear-quadratic regulator on the states that a Kalman filter estimates, both for the sampled axis with its delay.
 #[derive(Debug, Clone)]
 pub struct StateFeedbackState {
-    every: f64,
+    law: Law,
     radius: f64,
     states: Vec<Quantity>,
-    phi: DMatrix<f64>,
-    /// Effect over a sample of the command that takes over within it, and of the one before.
-    now: DVector<f64>,
-    before: DVector<f64>,
-    measured: DVector<f64>,
-    kalman: DVector<f64>,
-    /// u = −K (x − x*), then of commands under way, then of the integral.
-    gain: DVector<f64>,
-    pending: usize,
-    has_integral: bool,
-    /// Weight of the disturbance as a command: what dry friction amounts to.
     estimate: DVector<f64>,
     scratch: DVector<f64>,
     wanted: DVector<f64>,
@@ -44,57 +33,48 @@ pub struct StateFeedbackState {
     pub residuals: [f64; 2],
 }
 
-/// The parts that a linear view of it needs; names as in [`StateFeedbackState`].
+/// The part of it that does not change in time.
 #[derive(Debug, Clone)]
-pub(crate) struct Parts {
+pub(crate) struct Law {
     pub every: f64,
-    /// Φ (I − L m), of the estimate from one sample to the next.
-    pub estimate: DMatrix<f64>,
-    /// (I − L m)ᵀ k, of the estimate before a sample to the command.
-    pub row: DVector<f64>,
-    /// Φ L, of the measured position to the estimate; and k L, straight to the command.
-    pub corrected: DVector<f64>,
-    pub direct: f64,
-    /// The parts of both: Φ, m and L.
+    /// Φ.
     pub phi: DMatrix<f64>,
-    pub measured: DVector<f64>,
-    pub kalman: DVector<f64>,
+    /// Effect over a sample of the command that takes over within it, and of the one before.
     pub now: DVector<f64>,
     pub before: DVector<f64>,
+    /// The encoder; behind it the scale, if there is one. Each corrects the estimate that the one before has left.
+    pub sensors: Vec<Corrected>,
+    /// u = −K (x − x*), then of commands under way, then of the integral.
     pub gain: DVector<f64>,
     pub pending: usize,
+    pub has_integral: bool,
+}
+
+/// A sensor of the Kalman filter: x̂ ← x̂ + L (y − m x̂).
+#[derive(Debug, Clone)]
+pub(crate) struct Corrected {
+    /// m.
+    pub measured: DVector<f64>,
+    /// L.
+    pub kalman: DVector<f64>,
+}
+
+impl Law {
     /// Samples from a command to the one that takes over within a sample.
-    pub lag: usize,
+    pub fn lag(&self) -> usize {
+        if self.before.iter().any(|v| *v != 0.0) { self.pending - 1 } else { self.pending }
+    }
+
     /// Gain of the integral, if there is one.
-    pub integral: Option<f64>,
+    pub fn integral(&self) -> Option<f64> {
+        self.has_integral.then(|| self.gain[self.phi.nrows() + self.pending])
+    }
 }
 
 impl StateFeedbackState {
-    /// Its matrices.
-    pub(crate) fn parts(&self) -> Parts {
-        let n = self.phi.nrows();
-        let correct = DMatrix::identity(n, n) - &self.kalman * self.measured.transpose();
-        let own = self.gain.rows(0, n);
-        Parts {
-            every: self.every,
-            estimate: &self.phi * &correct,
-            row: correct.tr_mul(&own),
-            corrected: &self.phi * &self.kalman,
-            direct: own.dot(&self.kalman),
-            phi: self.phi.clone(),
-            measured: self.measured.clone(),
-            kalman: self.kalman.clone(),
-            now: self.now.clone(),
-            before: self.before.clone(),
-            gain: self.gain.clone(),
-            pending: self.pending,
-            lag: self.lag(),
-            integral: self.has_integral.then(|| self.gain[self.phi.nrows() + self.pending]),
-        }
-    }
-
-    fn lag(&self) -> usize {
-        if self.before.iter().any(|v| *v != 0.0) { self.pending - 1 } else { self.pending }
+    /// What of it does not change in time.
+    pub(crate) fn law(&self) -> &Law {
+        &self.law
     }
 
     /// For a model of the axis.
@@ -148,8 +128,10 @@ impl StateFeedbackState {
         if let Some(scale) = weights.integral {
             let last = size - 1;
             a[(last, last)] = 1.0;
+            // Of the scale, if there is one: it is the cart that is to come to rest where it should.
+            let measured = linear.scale.as_ref().unwrap_or(&linear.measured);
             for j in 0..n {
-                a[(last, j)] = every * linear.measured[j];
+                a[(last, j)] = every * measured[j];
             }
             q[(last, last)] = 1.0 / (scale * scale);
         }
@@ -164,29 +146,13 @@ impl StateFeedbackState {
             let effect = both.column(column) * scale;
             noise += &effect * effect.transpose();
         }
-        let spread = weights.noise.max(0.3 * Sensor::new(stage).step());
-        let measured = linear.measured.transpose();
-        let filter = riccati::discrete(
-            &phi.transpose(),
-            &DMatrix::from_column_slice(n, 1, measured.as_slice()),
-            &noise,
-            &DMatrix::from_element(1, 1, spread * spread),
-        )?;
-        // L = P cᵀ/(c P cᵀ + V), before the prediction
-        let p = &filter.x * &measured;
-        let kalman = &p / (measured.dot(&p) + spread * spread);
+        let (sensors, residual) = filter(&linear, &phi, &noise, weights, stage)?;
+        let gain = regulator.gain.row(0).transpose();
+        let law = Law { every, phi, now, before, sensors, gain, pending, has_integral: integral };
         Ok(Self {
-            every,
+            law,
             radius: stage.pulley_radius,
             states: linear.states,
-            phi,
-            now,
-            before,
-            measured,
-            kalman,
-            gain: regulator.gain.row(0).transpose(),
-            pending,
-            has_integral: integral,
             estimate: DVector::zeros(n),
             scratch: DVector::zeros(n),
             wanted: DVector::zeros(n),
@@ -196,12 +162,14 @@ impl StateFeedbackState {
             integral: 0.0,
             integrated: 0.0,
             last_own: 0.0,
-            residuals: [regulator.residual, filter.residual],
+            residuals: [regulator.residual, residual],
         })
     }
 
-    /// The next command beside feed-forward.
-    pub fn step(&mut self, reference: &Reference, compensation: &Compensation, position: f64) -> f64 {
+    /// The next command beside feed-forward, told the position at the encoder and that at the scale, of which there may
+    /// be none.
+    pub fn step(&mut self, reference: &Reference, compensation: &Compensation, positions: [f64; 2]) -> f64 {
+        let [position, _] = positions;
         // What the states should be, were the cart where it should be.
         let needed = compensation.needed(reference);
         let r = self.radius;
@@ -229,19 +197,22 @@ impl StateFeedbackState {
                 };
             }
         }
-        let surprise = position - self.measured.dot(&self.estimate);
-        self.estimate.axpy(surprise, &self.kalman, 1.0);
+        for (sensor, position) in self.law.sensors.iter().zip(positions) {
+            let surprise = position - sensor.measured.dot(&self.estimate);
+            self.estimate.axpy(surprise, &sensor.kalman, 1.0);
+        }
+        let law = &self.law;
         let mut command = 0.0;
         let n = self.estimate.len();
         for i in 0..n {
-            command -= self.gain[i] * (self.estimate[i] - self.wanted[i]);
+            command -= law.gain[i] * (self.estimate[i] - self.wanted[i]);
         }
         for (i, own) in self.own.iter().enumerate() {
-            command -= self.gain[n + i] * own;
+            command -= law.gain[n + i] * own;
         }
-        if self.has_integral {
-            command -= self.gain[n + self.pending] * self.integral;
-            self.integrated = self.every * (position - self.measured.dot(&self.wanted));
+        if let (Some(gain), Some((sensor, position))) = (law.integral(), law.sensors.iter().zip(positions).last()) {
+            command -= gain * self.integral;
+            self.integrated = law.every * (position - sensor.measured.dot(&self.wanted));
             self.integral += self.integrated;
         }
         self.last_own = command;
@@ -250,19 +221,20 @@ impl StateFeedbackState {
 
     /// Is told what the limit took (`excess`), and what the axis gets beside what dry friction takes of it.
     pub fn limited(&mut self, excess: f64, effective: f64) {
-        if excess != 0.0 && self.has_integral {
+        if excess != 0.0 && self.law.has_integral {
             // What has no effect is not gathered.
             self.integral -= self.integrated;
         }
+        let law = &self.law;
         self.own.insert(0, self.last_own + excess);
-        self.own.truncate(self.pending);
+        self.own.truncate(law.pending);
         self.given.insert(0, effective);
-        self.given.truncate(self.pending + 1);
-        let lag = self.lag();
-        self.scratch.gemv(1.0, &self.phi, &self.estimate, 0.0);
-        self.scratch.axpy(self.given[lag], &self.now, 1.0);
+        self.given.truncate(law.pending + 1);
+        let lag = law.lag();
+        self.scratch.gemv(1.0, &law.phi, &self.estimate, 0.0);
+        self.scratch.axpy(self.given[lag], &law.now, 1.0);
         if let Some(&previous) = self.given.get(lag + 1) {
-            self.scratch.axpy(previous, &self.before, 1.0);
+            self.scratch.axpy(previous, &law.before, 1.0);
         }
         std::mem::swap(&mut self.scratch, &mut self.estimate);
     }
@@ -281,4 +253,35 @@ impl StateFeedbackState {
         all(self.estimate.iter_mut().chain(&mut self.own).chain(&mut self.given), memory)?;
         all([&mut self.integral, &mut self.integrated, &mut self.last_own], memory)
     }
+}
+
+/// The sensors of the Kalman filter with their gains, and what is left of its Riccati equation. Their noise is
+/// independent, so that they may correct one after another: L = P mᵀ/(m P mᵀ + V), P ← P − L m P, before the
+/// prediction.
+fn filter(
+    linear: &Linear,
+    phi: &DMatrix<f64>,
+    noise: &DMatrix<f64>,
+    weights: &StateFeedback,
+    stage: &Stage,
+) -> Result<(Vec<Corrected>, f64)> {
+    let n = phi.nrows();
+    let spread = |sensor: Sensor| weights.noise.max(0.3 * sensor.step());
+    let mut all = vec![(linear.measured.transpose(), spread(Sensor::new(stage)))];
+    if let (Some(row), Some(sensor)) = (&linear.scale, Sensor::of_scale(stage)) {
+        all.push((row.transpose(), spread(sensor)));
+    }
+    let mut rows = DMatrix::zeros(n, all.len());
+    all.iter().enumerate().for_each(|(k, (measured, _))| rows.set_column(k, measured));
+    let variances = DMatrix::from_diagonal(&DVector::from_iterator(all.len(), all.iter().map(|(_, v)| v * v)));
+    let filter = riccati::discrete(&phi.transpose(), &rows, noise, &variances)?;
+    let mut x = filter.x;
+    let mut sensors = Vec::new();
+    for (measured, spread) in all {
+        let p = &x * &measured;
+        let kalman = &p / (measured.dot(&p) + spread * spread);
+        x -= &kalman * p.transpose();
+        sensors.push(Corrected { measured, kalman });
+    }
+    Ok((sensors, filter.residual))
 }

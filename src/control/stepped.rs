@@ -1,7 +1,7 @@
 //! A controller stepped from outside: whoever asks gives it the reference, and the machine at its samples.
 
 use super::memory::{Memory, all, flag};
-use super::sampled::{Controller, Loop, Observation, Sensor};
+use super::sampled::{Controller, Loop, Observation, Sensors};
 use super::standard::Standard;
 use crate::design::Design;
 use crate::error::Result;
@@ -11,14 +11,12 @@ use crate::stage::Stage;
 use crate::trajectory::Interval;
 use std::collections::VecDeque;
 
-/// A controller with its clock, its delay and its limit, between two of its decisions. A clone of it goes on in the
-/// same way.
+/// A controller's clock, delay and limit, between two of its decisions.
 #[derive(Debug, Clone)]
-pub struct Stepped {
-    controller: Standard,
-    timing: Loop,
+pub(super) struct Clocked {
+    pub timing: Loop,
     clock: Interval,
-    sensor: Sensor,
+    sensors: Sensors,
     /// Next sample, and the place in it: at the sample, or where a delayed command takes over.
     k: u64,
     halfway: bool,
@@ -28,23 +26,36 @@ pub struct Stepped {
     acting: f64,
 }
 
-impl Stepped {
-    /// The controller of `design` on `stage`, its first sample at time zero.
-    pub fn new(design: &Design, stage: &Stage) -> Result<Self> {
-        let timing = Loop::of(design);
-        timing.check(timing.every)?;
+/// A command at a sample.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Decision {
+    /// What was seen.
+    pub seen: Observation,
+    /// The command before the limit and after it, V or A.
+    pub asked: f64,
+    /// After it.
+    pub given: f64,
+}
+
+impl Clocked {
+    pub fn new(stage: &Stage, timing: Loop) -> Self {
         let (whole, rest) = timing.samples_late();
-        Ok(Self {
-            controller: Standard::new(design, stage)?,
+        Self {
             timing,
             clock: Interval::of(timing.every),
-            sensor: Sensor::new(stage),
+            sensors: Sensors::new(stage),
             k: 0,
             halfway: false,
             rest,
             waiting: std::iter::repeat_n(0.0, whole).collect(),
             acting: 0.0,
-        })
+        }
+    }
+
+    /// With positions read exactly and not in counts.
+    pub fn exactly(mut self) -> Self {
+        self.sensors = self.sensors.exactly();
+        self
     }
 
     /// When it decides next, s.
@@ -52,40 +63,100 @@ impl Stepped {
         self.clock.times(self.k) + if self.halfway { self.rest } else { 0.0 }
     }
 
+    /// Whether it is at a sample, and not where a delayed command takes over.
+    pub fn is_at_sample(&self) -> bool {
+        !self.halfway
+    }
+
+    /// The command that acts now, V or A.
+    pub fn acting(&self) -> f64 {
+        self.acting
+    }
+
+    /// The next command takes over.
+    fn take_over(&mut self) {
+        self.k += 1;
+        self.acting = self.waiting.pop_front().unwrap_or(0.0);
+    }
+
+    /// Decides at [`Clocked::next`]; what was decided if that is a sample. A delayed command needs nothing else.
+    pub fn decide(
+        &mut self,
+        controller: &mut dyn Controller,
+        (state, current): (&State, f64),
+        reference: &Reference,
+        ahead: &Reference,
+    ) -> Option<Decision> {
+        if self.halfway {
+            self.halfway = false;
+            self.take_over();
+            return None;
+        }
+        let seen = Observation {
+            time: self.clock.times(self.k),
+            reference: *reference,
+            ahead: *ahead,
+            position: self.sensors.position(state),
+            scale: self.sensors.scale(state),
+            current,
+        };
+        let asked = controller.step(&seen);
+        // What is no number asks for nothing.
+        let asked = if asked.is_finite() { asked } else { 0.0 };
+        let given = self.timing.limit.map_or(asked, |limit| asked.clamp(-limit, limit));
+        controller.limited(given);
+        self.waiting.push_back(given);
+        match self.rest > 0.0 {
+            true => self.halfway = true,
+            false => self.take_over(),
+        }
+        Some(Decision { seen, asked, given })
+    }
+}
+
+impl Clocked {
+    /// The numbers that it remembers, but for its place in time.
+    fn memory(&mut self, memory: &mut Memory) -> Option<()> {
+        flag(&mut self.halfway, memory)?;
+        // Between a sample and where its command takes over, that command waits with the others.
+        let (whole, _) = self.timing.samples_late();
+        self.waiting.resize(whole + usize::from(self.halfway), 0.0);
+        all(self.waiting.iter_mut().chain([&mut self.acting]), memory)
+    }
+}
+
+/// A controller with its clock, its delay and its limit, between two of its decisions. A clone of it goes on in the
+/// same way.
+#[derive(Debug, Clone)]
+pub struct Stepped {
+    controller: Standard,
+    clocked: Clocked,
+}
+
+impl Stepped {
+    /// The controller of `design` on `stage`, its first sample at time zero.
+    pub fn new(design: &Design, stage: &Stage) -> Result<Self> {
+        let timing = Loop::of(design);
+        timing.check(timing.every)?;
+        Ok(Self { controller: Standard::new(design, stage)?, clocked: Clocked::new(stage, timing) })
+    }
+
+    /// When it decides next, s.
+    pub fn next(&self) -> f64 {
+        self.clocked.next()
+    }
+
     /// The command that acts now, V or A.
     pub fn command(&self) -> f64 {
-        self.acting
+        self.clocked.acting()
     }
 
     /// Decides at [`Stepped::next`], told the state, the motor's current, A, and the reference there, from which it
     /// looks ahead as if its acceleration stayed. The command acts until the next decision.
     pub fn decide(&mut self, state: &State, current: f64, reference: &Reference) -> f64 {
-        if self.halfway {
-            self.halfway = false;
-            self.k += 1;
-            self.acting = self.waiting.pop_front().unwrap_or(0.0);
-            return self.acting;
-        }
-        let seen = Observation {
-            time: self.clock.times(self.k),
-            reference: *reference,
-            ahead: after(reference, self.timing.lead),
-            position: self.sensor.read(state),
-            current,
-        };
-        let asked = self.controller.step(&seen);
-        // What is no number asks for nothing.
-        let asked = if asked.is_finite() { asked } else { 0.0 };
-        let given = self.timing.limit.map_or(asked, |limit| asked.clamp(-limit, limit));
-        self.controller.limited(given);
-        self.waiting.push_back(given);
-        if self.rest > 0.0 {
-            self.halfway = true;
-        } else {
-            self.k += 1;
-            self.acting = self.waiting.pop_front().unwrap_or(0.0);
-        }
-        self.acting
+        let ahead = after(reference, self.clocked.timing.lead);
+        self.clocked.decide(&mut self.controller, (state, current), reference, &ahead);
+        self.clocked.acting()
     }
 }
 
@@ -99,7 +170,7 @@ impl Stepped {
         };
         // Every number is shown to a function that takes all of them.
         let _ = self.clone().memory(&mut out);
-        list.push(self.k);
+        list.push(self.clocked.k);
         list
     }
 
@@ -116,16 +187,13 @@ impl Stepped {
         if numbers.next().is_some() {
             return None;
         }
-        *self = Self { k: *k, ..copy };
+        copy.clocked.k = *k;
+        *self = copy;
         Some(())
     }
 
     fn memory(&mut self, memory: &mut Memory) -> Option<()> {
-        flag(&mut self.halfway, memory)?;
-        // Between a sample and where its command takes over, that command waits with the others.
-        let (whole, _) = self.timing.samples_late();
-        self.waiting.resize(whole + usize::from(self.halfway), 0.0);
-        all(self.waiting.iter_mut().chain([&mut self.acting]), memory)?;
+        self.clocked.memory(memory)?;
         self.controller.memory(memory)
     }
 }

@@ -12,6 +12,10 @@ use crate::stage::{EncoderPlace, Stage};
 pub(super) fn reproduced(case: &Case, log: &Log) -> Option<f64> {
     let (design, reference) = (case.controller.as_ref()?, log.reference.as_ref()?);
     let position = position(&case.stage, log)?;
+    let scale = match case.stage.scale {
+        Some(_) => Some(filled(log, Quantity::CartPosition, 1.0)?),
+        None => None,
+    };
     let mut controller = Standard::new(design, &case.stage).ok()?;
     let profile = Profile::sampled(&log.time, reference).shaped(&design.shaper);
     let timing = Loop::of(design);
@@ -37,6 +41,7 @@ pub(super) fn reproduced(case: &Case, log: &Log) -> Option<f64> {
             reference: profile.at(time),
             ahead: profile.at(time + timing.lead),
             position: at(&position, time),
+            scale: scale.as_ref().map(|scale| at(scale, time)),
             current: current.map_or(0.0, |output| at(&output.values, time)),
         };
         let asked = controller.step(&seen);
@@ -58,18 +63,21 @@ pub(super) fn reproduced(case: &Case, log: &Log) -> Option<f64> {
 
 /// The reading of the controller's encoder along a log, m along the belt, gaps filled.
 fn position(stage: &Stage, log: &Log) -> Option<Vec<f64>> {
-    let of = |quantity: Quantity, arm: f64| {
-        let output = log.output(quantity).filter(|output| !output.absolute)?;
-        let mut last = output.values.iter().copied().find(|value| value.is_finite())?;
-        let filled = output.values.iter().map(|value| {
-            last = if value.is_finite() { *value } else { last };
-            arm * last
-        });
-        Some(filled.collect::<Vec<_>>())
-    };
-    let (cart, angle) = (of(Quantity::CartPosition, 1.0), of(Quantity::DriveAngle, stage.pulley_radius));
+    let cart = filled(log, Quantity::CartPosition, 1.0);
+    let angle = filled(log, Quantity::DriveAngle, stage.pulley_radius);
     match stage.encoder.map(|encoder| encoder.at) {
         Some(EncoderPlace::Cart) => cart.or(angle),
         Some(EncoderPlace::DrivePulley | EncoderPlace::Motor) | None => angle.or(cart),
     }
+}
+
+/// A quantity of a log times `arm`, gaps filled.
+fn filled(log: &Log, quantity: Quantity, arm: f64) -> Option<Vec<f64>> {
+    let output = log.output(quantity).filter(|output| !output.absolute)?;
+    let mut last = output.values.iter().copied().find(|value| value.is_finite())?;
+    let filled = output.values.iter().map(|value| {
+        last = if value.is_finite() { *value } else { last };
+        arm * last
+    });
+    Some(filled.collect())
 }

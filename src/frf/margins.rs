@@ -51,6 +51,10 @@ pub fn measured(frf: &Frf, design: &Design, stage: &Stage, length: f64) -> Resul
             return Err(Error::new("a current loop needs the response of the current, too")
                 .next("leave its margins to taut tune"));
         }
+        if terms.scale != Complex::ZERO {
+            return Err(Error::new("a controller with two sensors needs the responses of both")
+                .next("leave its margins to taut tune"));
+        }
         let factor = terms.position / terms.own * length;
         let l = factor * point.value;
         let far = (l + 1.0).norm();

@@ -120,6 +120,7 @@ fn root() -> Properties {
         ("belt", belt()),
         ("travel", table("travel", &[])),
         ("encoder", table("encoder", &[("at", words(["motor", "drive_pulley", "cart"]))])),
+        ("scale", table("scale", &[])),
         ("measurement", table("measurement", &[])),
         ("experiment", list(experiment())),
         ("controller", controller()),

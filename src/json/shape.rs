@@ -1,8 +1,10 @@
 //! Input shapers: `taut shape --json`, `shape.json`.
 
 use crate::control::compare::{Comparison, Pair};
-use crate::control::recommendation::{Findings, Found, Source};
+use crate::control::pairs;
+use crate::control::recommendation::{Findings, Found, Left, Source};
 use crate::control::resonance::{Drive, Resonance};
+use crate::control::shaper::Shaper;
 use crate::control::shaping::Fitted;
 use crate::control::spectrum::Spectrum;
 use serde_json::{Value, json};
@@ -36,6 +38,10 @@ fn one(found: &Found) -> Value {
             "frequency": mode.frequency, "damping": mode.damping, "interval": mode.interval, "error": mode.error,
         })),
         "shapers": found.choice.fitted.iter().map(fitted).collect::<Vec<_>>(),
+        "pairs": found.choice.pairs.iter().map(pair).collect::<Vec<_>>(),
+        "recommended_pair": found.choice.pairs.first().filter(|_| found.choice.is_pair_better).map(|pair| json!({
+            "told": found.pair_told(), "line": pair.line(),
+        })),
         "criterion": {
             "design_damping": criterion.damping,
             "tested_dampings": criterion.tested,
@@ -66,8 +72,13 @@ fn one(found: &Found) -> Value {
         Source::Model { title, drive, modes } => {
             let mode = |mode: &Resonance| json!({ "position": mode.position, "frequency": mode.frequency, "damping": mode.damping, "share": mode.share });
             let drive = if *drive == Drive::Held { "held" } else { "free" };
-            value["model"] =
-                json!({ "title": title, "motor": drive, "modes": modes.iter().map(mode).collect::<Vec<_>>() });
+            value["model"] = json!({
+                "title": title,
+                "motor": drive,
+                "modes": modes.iter().map(mode).collect::<Vec<_>>(),
+                "uncertainty": found.uncertainty,
+                "along_travel": found.left().iter().map(left).collect::<Vec<_>>(),
+            });
         }
     }
     value
@@ -85,6 +96,29 @@ fn fitted(fitted: &Fitted) -> Value {
         "candidate": fitted.is_candidate,
         "lowest_tried": fitted.is_lowest,
         "impulses": impulses,
+    })
+}
+
+fn pair(pair: &pairs::Pair) -> Value {
+    let part = |shaper: &Shaper| json!({ "shaper": shaper.form.name(), "frequency": shaper.frequency });
+    let impulses: Vec<[f64; 2]> = pair.impulses().iter().map(|(t, a)| [*t, *a]).collect();
+    json!({
+        "parts": pair.parts.iter().map(part).collect::<Vec<_>>(),
+        "vibration": pair.vibration,
+        "smoothing": pair.smoothing,
+        "max_acceleration": pair.max_acceleration,
+        "score": pair.score,
+        "impulses": impulses,
+    })
+}
+
+fn left(left: &Left) -> Value {
+    json!({
+        "frequency": left.reach.frequency,
+        "damping": left.reach.damping,
+        "share": left.reach.share,
+        "shapers": left.shapers,
+        "pairs": left.pairs,
     })
 }
 

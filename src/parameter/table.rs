@@ -483,6 +483,14 @@ const ENCODER: &[Parameter] = &[
 ];
 
 #[rustfmt::skip]
+const SCALE: &[Parameter] = &[
+    row("scale.lines", "", "", Words("from `counts`"), POSITIVE, "50000", "Lines per metre of a scale at the cart, beside an encoder at motor or drive pulley; in quadrature each gives four counts.")
+        .at(part!(|s| s.scale, &mut s.scale => lines)),
+    row("scale.counts", "", "", Words("from `lines`"), POSITIVE, "200000", "Counts per metre, every edge counted; instead of `lines`.")
+        .at(Place::part_of("scale.lines")),
+];
+
+#[rustfmt::skip]
 const MEASUREMENT: &[Parameter] = &[
     row("measurement.every", "", "s", Words("the experiment's `every`"), DURATION, "1 ms", "Interval between samples."),
     row("measurement.delay", "", "s", Value(0.0), TIME, "2 ms", "The row of time t shows what was at t minus this."),
@@ -804,6 +812,7 @@ pub(super) const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     ("belt", &[BELT]),
     ("travel", &[TRAVEL]),
     ("encoder", &[ENCODER]),
+    ("scale", &[SCALE]),
     (
         "measurement",
         &[

@@ -247,6 +247,9 @@ impl Stage {
             let counts = encoder.counts_per_unit(self.motor.gear_ratio);
             add("encoder_count", "", Shown::Counts(body, counts), false);
         }
+        if let Some(scale) = self.scale {
+            add("scale_count", "", Shown::Counts(CART, scale.counts_per_unit(self.motor.gear_ratio)), false);
+        }
         for (body, name) in ["drive_bristle", "cart_bristle", "idler_bristle"].into_iter().enumerate() {
             if matches!(mechanism.bodies[body].friction.law, Law::LuGre { .. }) {
                 add(name, mechanism.bodies[body].kind.units()[0], Shown::Bristle(body), false);

@@ -64,8 +64,9 @@ pub fn hunting(stage: &Stage, design: &Design) -> Result<Option<Hunt>> {
         other.motor.gear_play = None;
         without("play in the gear", &other, design)?;
     }
-    if let Some(encoder) = stage.encoder {
-        let finer = Stage { encoder: Some(Encoder { lines: 1e6 * encoder.lines, ..encoder }), ..stage.clone() };
+    if stage.encoder.is_some() {
+        let finer = |encoder: Option<Encoder>| encoder.map(|one| Encoder { lines: 1e6 * one.lines, ..one });
+        let finer = Stage { encoder: finer(stage.encoder), scale: finer(stage.scale), ..stage.clone() };
         without("encoder counts", &finer, design)?;
     }
     Ok(Some(Hunt { amplitude, period, irregular, needs, watched }))
@@ -140,8 +141,12 @@ fn swing(stage: &Stage, design: &Design, model: &Stage, watched: f64) -> Result<
         cart.extend(late.map(|(t, x)| (*t, *x)));
         Flow::Continue
     })?;
-    let middle = cart.len() / 2;
-    let (early, late) = cart.split_at(middle);
+    Ok(swung(&cart))
+}
+
+/// The swing of a cart of which place (m) over time (s) is known from a time on at which it should rest.
+fn swung(cart: &[(f64, f64)]) -> Option<Swing> {
+    let (early, late) = cart.split_at(cart.len() / 2);
     let ends = |part: &[(f64, f64)]| {
         part.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, x)| (low.min(*x), high.max(*x)))
     };
@@ -149,13 +154,13 @@ fn swing(stage: &Stage, design: &Design, model: &Stage, watched: f64) -> Result<
     let (size, before) = (high - low, early_high - early_low);
     // What trembles in the last digits rests, and what halves dies out.
     if !(size > 1e-9 && size > 0.5 * before) {
-        return Ok(None);
+        return None;
     }
     // Crossings of the middle upward, with a band of a quarter each way.
     let (mean, band) = (0.5 * (low + high), 0.25 * size);
     let mut below = false;
     let mut upward = Vec::new();
-    for (time, x) in &cart {
+    for (time, x) in cart {
         if *x < mean - band {
             below = true;
         } else if *x > mean + band && below {
@@ -168,8 +173,47 @@ fn swing(stage: &Stage, design: &Design, model: &Stage, watched: f64) -> Result<
             let period = (last - first) / (upward.len() - 1) as f64;
             let off = upward.windows(2).map(|pair| (pair[1] - pair[0] - period).powi(2)).sum::<f64>();
             let irregular = (off / (upward.len() - 1) as f64).sqrt() > IRREGULAR * period;
-            Ok(Some(Swing { amplitude: 0.5 * size, period, irregular }))
+            Some(Swing { amplitude: 0.5 * size, period, irregular })
         }
-        _ => Ok(None),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    /// A cart that swings by `size(t)` to either side, a period after `lasts(k)` s.
+    fn cart(lasts: impl Fn(usize) -> f64, size: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
+        let (mut all, mut begin) = (Vec::new(), 0.0);
+        for k in 0..40 {
+            let period = lasts(k);
+            let steps = (period / 1e-3) as usize;
+            all.extend((0..steps).map(|i| {
+                let share = i as f64 / steps as f64;
+                let time = begin + share * period;
+                (time, 0.01 + size(time) * (2.0 * PI * share).sin())
+            }));
+            begin += period;
+        }
+        all
+    }
+
+    /// An axis that jumps now after half a second, now after three was told to swing every 1.7 s.
+    #[test]
+    fn swings_of_unequal_length_are_irregular() {
+        let regular = swung(&cart(|k| 0.5 + 0.02 * (k % 3) as f64, |_| 1e-5)).unwrap();
+        assert!(!regular.irregular && (regular.period / 0.52 - 1.0).abs() < 0.01, "{}", regular.period);
+        assert!((regular.amplitude / 1e-5 - 1.0).abs() < 1e-3, "{}", regular.amplitude);
+        let unequal = swung(&cart(|k| if k % 3 == 0 { 3.0 } else { 0.5 }, |_| 1e-5)).unwrap();
+        assert!(unequal.irregular, "{}", unequal.period);
+    }
+
+    #[test]
+    fn what_dies_out_or_trembles_in_its_last_digits_rests() {
+        assert!(swung(&cart(|_| 0.5, |t| 1e-5 * (-0.2 * t).exp())).is_none());
+        assert!(swung(&cart(|_| 0.5, |_| 4e-10)).is_none());
+        assert!(swung(&[]).is_none());
     }
 }

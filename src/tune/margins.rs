@@ -1,14 +1,14 @@
 //! Margins of a sampled loop: what its sensitivity is over all frequencies, and whether it is stable.
 //!
-//! The loop is broken at the measured position, a current loop being closed; with a current loop the loop broken at the
-//! command counts as well. Held commands, delay and filters are in it exactly.
+//! The loop is broken at the measured position, a current loop being closed, and with a scale beside the encoder at the
+//! scale; with either the loop broken at the command counts as well. Held commands, delay and filters are in it exactly.
 //!
 //! The peaks of |S| and |T| stand at poles of the closed loop, which no grid knows beforehand. So a grid that is dense
 //! about the poles of the axis is first divided wherever L or 1 + L turns by much from one point to the next, which it
 //! does about every lightly damped pole of the closed loop; then every local maximum is followed to its top, and every
 //! crossing to where it is.
 
-use crate::control::feedback::Feedback;
+use crate::control::feedback::{Feedback, Terms, Turn};
 use crate::control::measures_cart;
 use crate::design::Design;
 use crate::error::Result;
@@ -58,6 +58,8 @@ pub struct Plant {
     pub frequency: Vec<f64>,
     /// The answers to a command there.
     pub answers: Vec<Answer>,
+    /// The same frequencies as a sampled loop sees them.
+    turns: Vec<Turn>,
     model: Discrete,
     /// Outputs of the model: what is measured, the cart, the current; and metres per unit of the first.
     outputs: [usize; 3],
@@ -84,7 +86,8 @@ impl Plant {
         let of = |name: &str| system.output(name).unwrap_or_default();
         let outputs = [measured, of("cart_position"), of("motor_current")];
         let unstable = model.poles().iter().filter(|z| z.norm() > 1.0 + 1e-9).count();
-        let mut plant = Self { frequency, answers: Vec::new(), model, outputs, length, every: t, unstable };
+        let turns = frequency.iter().map(|&omega| Turn::of(omega, t)).collect();
+        let mut plant = Self { frequency, answers: Vec::new(), turns, model, outputs, length, every: t, unstable };
         plant.answers = plant.frequency.iter().map(|&omega| plant.at(omega)).collect();
         Ok(plant)
     }
@@ -161,16 +164,7 @@ impl Margins {
     pub fn of(plant: &Plant, feedback: &Feedback) -> Self {
         let mut curve = Curve::on_grid(plant, feedback);
         curve.divide();
-        let mut margins = curve.margins(true);
-        if !margins.stable {
-            margins.spoil();
-        }
-        margins
-    }
-
-    /// The same on the grid alone: peaks may be higher by some per cent.
-    pub fn roughly(plant: &Plant, feedback: &Feedback) -> Self {
-        let mut margins = Curve::on_grid(plant, feedback).margins(false);
+        let mut margins = curve.margins();
         if !margins.stable {
             margins.spoil();
         }
@@ -187,17 +181,108 @@ impl Margins {
 
     /// How far it is beyond its limits: above 1 it passes one. What is no number passes them by far.
     pub fn excess(&self, sensitivity: f64, complementary: f64) -> f64 {
-        let excess = (self.sensitivity / sensitivity).max(self.complementary / complementary);
-        if excess.is_nan() { f64::INFINITY } else { excess }
+        beyond([self.sensitivity, self.complementary], [sensitivity, complementary])
+    }
+}
+
+/// The larger of two peaks, each as part of its limit.
+fn beyond(peaks: [f64; 2], limits: [f64; 2]) -> f64 {
+    let excess = (peaks[0] / limits[0]).max(peaks[1] / limits[1]);
+    if excess.is_nan() { f64::INFINITY } else { excess }
+}
+
+/// M_s and M_t of a loop, both infinite if it is not stable: all of [`Margins`] that limits are asked of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Peaks {
+    /// M_s and M_t.
+    pub peaks: [f64; 2],
+}
+
+impl Peaks {
+    /// Of a controller on an axis, the same as those of [`Margins::of`].
+    pub fn of(plant: &Plant, feedback: &Feedback) -> Self {
+        let mut curve = Curve::on_grid(plant, feedback);
+        curve.divide();
+        let peaks = [curve.highest(&Open::sensitivity).0, curve.highest(&Open::complementary).0];
+        let is_stable = curve.is_stable() && peaks[0].is_finite();
+        Self { peaks: if is_stable { peaks } else { [f64::INFINITY; 2] } }
+    }
+
+    /// Whether the loop is stable.
+    pub fn is_stable(&self) -> bool {
+        self.peaks[0].is_finite()
+    }
+
+    /// How far they are beyond their limits: above 1 one passes.
+    pub fn excess(&self, sensitivity: f64, complementary: f64) -> f64 {
+        beyond(self.peaks, [sensitivity, complementary])
+    }
+}
+
+/// A loop on the grid alone, in one pass: its peaks may be higher by some per cent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rough {
+    /// M_s and M_t; infinite if it is not stable.
+    pub peaks: Peaks,
+    /// As of [`Margins`].
+    pub disturbance: f64,
+    /// As of [`Margins`].
+    pub following: f64,
+}
+
+impl Rough {
+    /// Of a controller on an axis.
+    pub fn of(plant: &Plant, feedback: &Feedback) -> Self {
+        let mut most = [0.0_f64; 2];
+        let mut sums = [0.0; 2];
+        let mut winding = Winding::new(plant);
+        let mut before: Option<(f64, [f64; 2])> = None;
+        for ((&omega, answer), turn) in plant.frequency.iter().zip(&plant.answers).zip(&plant.turns) {
+            let terms = feedback.at_turn(turn);
+            let (inner, outer) = parted(&terms, answer);
+            let difference = inner + outer;
+            winding.go_on(omega, difference, turn);
+            // |S|², |T|² and |x/v|², in which 1 + L = difference/inner
+            let least = difference.norm_sqr().recip();
+            let followed = inner.norm_sqr() * least;
+            let own = terms.own.norm_sqr() * least;
+            let both = if terms.has_one_loop() { followed } else { followed.max(own) };
+            most = [most[0].max(both), most[1].max(outer.norm_sqr() * least)];
+            let parts = [answer.cart.norm_sqr() * own / omega, followed / omega];
+            if let Some((last, was)) = before.filter(|(last, _)| *last >= 2.0 * PI * SLOWEST) {
+                let way = 0.5 * (omega / last).ln();
+                for (sum, (a, b)) in sums.iter_mut().zip(was.iter().zip(parts)) {
+                    *sum += way * (a + b);
+                }
+            }
+            before = Some((omega, parts));
+        }
+        if !winding.is_stable() || !most[0].is_finite() {
+            let peaks = Peaks { peaks: [f64::INFINITY; 2] };
+            return Self { peaks, disturbance: f64::INFINITY, following: f64::INFINITY };
+        }
+        let [disturbance, following] = sums.map(|sum| (sum / PI).sqrt());
+        Self { peaks: Peaks { peaks: most.map(f64::sqrt) }, disturbance, following }
+    }
+}
+
+/// D and what is closed inside the loop that is looked at, and that loop: D u = −(N_y y + N_x x + N_i i) is broken at
+/// the measured position, L = N_y G_y/(D + N_i G_i), and with a scale there: L = N_x G_x/(D + N_y G_y + N_i G_i).
+fn parted(terms: &Terms, answer: &Answer) -> (Complex<f64>, Complex<f64>) {
+    let inner = terms.own + terms.current * answer.current;
+    let outer = terms.position * answer.position;
+    match terms.scale == Complex::ZERO {
+        true => (inner, outer),
+        false => (inner + outer, terms.scale * answer.cart),
     }
 }
 
 /// The loops at one frequency.
 #[derive(Debug, Clone, Copy)]
 pub struct Open {
-    /// L broken at the measured position.
+    /// L broken at the measured position; with a scale there.
     pub position: Complex<f64>,
-    /// |S| of the loop broken at the command; 0 without a current loop, where it is the same.
+    /// |S| of the loop broken at the command; 0 where it is the same.
     command: f64,
     /// 1 + L, times what has stable poles.
     difference: Complex<f64>,
@@ -207,16 +292,16 @@ pub struct Open {
 }
 
 impl Open {
-    fn of(answer: &Answer, feedback: &Feedback, omega: f64) -> Self {
-        let terms = feedback.at(omega);
-        let &Answer { position: y, current: i, cart } = answer;
-        // D u = −(N_y y + N_i i):  L_y = N_y G_y/(D + N_i G_i)
-        let inner = terms.own + terms.current * i;
-        let difference = inner + terms.position * y;
-        let command = if terms.current == Complex::ZERO { 0.0 } else { (terms.own / difference).norm() };
-        // x = G_x D/(D + N_y G_y + N_i G_i) v for a step v beside the command
-        let pushed = cart * terms.own / difference;
-        Self { position: terms.position * y / inner, command, difference, cart: cart / y, pushed }
+    fn of(answer: &Answer, feedback: &Feedback, turn: &Turn) -> Self {
+        let terms = feedback.at_turn(turn);
+        let (inner, outer) = parted(&terms, answer);
+        let difference = inner + outer;
+        let command = if terms.has_one_loop() { 0.0 } else { (terms.own / difference).norm() };
+        // x = G_x D/(D + N_y G_y + N_x G_x + N_i G_i) v for a step v beside the command
+        let pushed = answer.cart * terms.own / difference;
+        // What follows the reference is the cart itself where it is measured.
+        let follows = if terms.scale == Complex::ZERO { answer.position } else { answer.cart };
+        Self { position: outer / inner, command, difference, cart: answer.cart / follows, pushed }
     }
 
     /// |S|, of the worse of both loops.
@@ -242,8 +327,8 @@ impl Open {
 
 /// The loops at all frequencies of the axis.
 pub fn loops(plant: &Plant, feedback: &Feedback) -> Vec<Open> {
-    let one = |(&omega, answer): (&f64, &Answer)| Open::of(answer, feedback, omega);
-    plant.frequency.iter().zip(&plant.answers).map(one).collect()
+    let one = |(turn, answer): (&Turn, &Answer)| Open::of(answer, feedback, turn);
+    plant.turns.iter().zip(&plant.answers).map(one).collect()
 }
 
 /// The loops along the frequencies.
@@ -260,7 +345,7 @@ impl<'a> Curve<'a> {
     }
 
     fn at(&self, omega: f64) -> Open {
-        Open::of(&self.plant.at(omega), self.feedback, omega)
+        Open::of(&self.plant.at(omega), self.feedback, &Turn::of(omega, self.plant.every))
     }
 
     /// Puts points between those from one of which to the next L or 1 + L turns by more than [`TURN`].
@@ -285,11 +370,20 @@ impl<'a> Curve<'a> {
         self.points = done;
     }
 
-    /// The margins of the curve; `finely` with every top and crossing followed to where it is.
-    fn margins(&self, finely: bool) -> Margins {
-        let stable = stable(self.plant, &self.points);
-        let (sensitivity, at) = self.highest(&Open::sensitivity, finely);
-        let (complementary, complementary_at) = self.highest(&Open::complementary, finely);
+    /// Whether the closed loop is stable.
+    fn is_stable(&self) -> bool {
+        let mut winding = Winding::new(self.plant);
+        for (omega, open) in &self.points {
+            winding.go_on(*omega, open.difference, &Turn::of(*omega, self.plant.every));
+        }
+        winding.is_stable()
+    }
+
+    /// The margins of the curve, with every top and crossing followed to where it is.
+    fn margins(&self) -> Margins {
+        let stable = self.is_stable();
+        let (sensitivity, at) = self.highest(&Open::sensitivity);
+        let (complementary, complementary_at) = self.highest(&Open::complementary);
         let mut margins = Margins {
             stable: stable && sensitivity.is_finite(),
             sensitivity,
@@ -308,7 +402,7 @@ impl<'a> Curve<'a> {
             let [(_, was), (_, is)] = [pair[0], pair[1]];
             let (a, b) = (was.position, is.position);
             if (a.norm() - 1.0) * (b.norm() - 1.0) <= 0.0 && a.norm() != 1.0 {
-                let (omega, open) = self.crossing(pair, &|open| open.position.norm().ln(), finely);
+                let (omega, open) = self.crossing(pair, &|open| open.position.norm().ln());
                 // The angle from the negative axis; the nearest of all crossings counts.
                 margins.phase = margins.phase.min((-open.position).arg().abs());
                 if margins.crossover.is_nan() && a.norm() > 1.0 {
@@ -316,16 +410,16 @@ impl<'a> Curve<'a> {
                 }
             }
             if a.im * b.im < 0.0 && a.re < 0.0 && b.re < 0.0 {
-                margins.cross(-self.crossing(pair, &|open| open.position.im, finely).1.position.re);
+                margins.cross(-self.crossing(pair, &|open| open.position.im).1.position.re);
             }
             let level = |value: f64| value.ln() - FRAC_1_SQRT_2.ln();
             let of_s = |open: &Open| level((open.position + 1.0).inv().norm());
             if margins.bandwidth.is_nan() && of_s(&was) < 0.0 && of_s(&is) >= 0.0 {
-                margins.bandwidth = self.crossing(pair, &of_s, finely).0;
+                margins.bandwidth = self.crossing(pair, &of_s).0;
             }
             let of_t = |open: &Open| level(open.tracking());
             if margins.tracking.is_nan() && of_t(&was) >= 0.0 && of_t(&is) < 0.0 {
-                margins.tracking = self.crossing(pair, &of_t, finely).0;
+                margins.tracking = self.crossing(pair, &of_t).0;
             }
         }
         // At half the sampling rate L is real.
@@ -338,7 +432,7 @@ impl<'a> Curve<'a> {
     }
 
     /// The highest value over all frequencies, and where.
-    fn highest(&self, value: &dyn Fn(&Open) -> f64, finely: bool) -> (f64, f64) {
+    fn highest(&self, value: &dyn Fn(&Open) -> f64) -> (f64, f64) {
         let values: Vec<f64> = self.points.iter().map(|(_, open)| value(open)).collect();
         let mut best = (0.0, 0.0);
         for (&v, &(omega, _)) in values.iter().zip(&self.points) {
@@ -347,7 +441,7 @@ impl<'a> Curve<'a> {
             }
         }
         let level = HIGH * best.0;
-        for k in (1..values.len().saturating_sub(1)).filter(|_| finely && level.is_finite()) {
+        for k in (1..values.len().saturating_sub(1)).filter(|_| level.is_finite()) {
             if values[k] >= level && values[k] >= values[k - 1] && values[k] >= values[k + 1] {
                 let (top, omega) = self.top(self.points[k - 1].0, self.points[k + 1].0, value);
                 if top > best.0 {
@@ -379,19 +473,16 @@ impl<'a> Curve<'a> {
     }
 
     /// Where a quantity passes zero between two points.
-    fn crossing(&self, pair: &[(f64, Open)], of: &dyn Fn(&Open) -> f64, finely: bool) -> (f64, Open) {
+    fn crossing(&self, pair: &[(f64, Open)], of: &dyn Fn(&Open) -> f64) -> (f64, Open) {
         let (mut low, mut high) = ((pair[0], of(&pair[0].1)), (pair[1], of(&pair[1].1)));
-        for step in 0..if finely { STEPS } else { 1 } {
+        for step in 0..STEPS {
             // The straight line, and every other time the middle.
             let line = (low.1 / (low.1 - high.1)).clamp(0.0, 1.0);
             let share = if step % 2 == 1 || !line.is_finite() { 0.5 } else { line };
             let omega = low.0.0 + share * (high.0.0 - low.0.0);
-            let open = match finely {
-                true => self.at(omega),
-                false => between(&low.0.1, &high.0.1, share),
-            };
+            let open = self.at(omega);
             let value = of(&open);
-            if value == 0.0 || !finely || high.0.0 - low.0.0 <= 1e-12 * omega {
+            if value == 0.0 || high.0.0 - low.0.0 <= 1e-12 * omega {
                 return (omega, open);
             }
             if (value > 0.0) == (low.1 > 0.0) { low = ((omega, open), value) } else { high = ((omega, open), value) }
@@ -422,42 +513,59 @@ impl Margins {
     }
 }
 
-/// Part of the way from one point to the next.
-fn between(a: &Open, b: &Open, share: f64) -> Open {
-    let mix = |a: Complex<f64>, b: Complex<f64>| a + (b - a) * share;
-    Open {
-        position: mix(a.position, b.position),
-        command: a.command + share * (b.command - a.command),
-        difference: mix(a.difference, b.difference),
-        cart: mix(a.cart, b.cart),
-        pushed: mix(a.pushed, b.pushed),
-    }
-}
-
 /// Nyquist's criterion: F(z) = (1 + L)(1 − 1/z)^m, with m poles at z = 1, turns by π (P − Z) from θ = 0 to π, P poles
 /// of the axis and Z of the closed loop being outside.
-fn stable(plant: &Plant, points: &[(f64, Open)]) -> bool {
-    let [(w0, first), (w1, second), ..] = points else { return false };
-    let is_number = |v: Complex<f64>| v.re.is_finite() && v.im.is_finite() && v != Complex::ZERO;
-    if !points.iter().all(|(_, open)| is_number(open.difference)) {
-        return false;
+struct Winding {
+    unstable: f64,
+    /// The first two of ω and 1 + L, of which m is known.
+    first: Option<(f64, Complex<f64>, Turn)>,
+    poles: i32,
+    /// F where it begins and where it is, whole turns between, and whether all were numbers.
+    start: Complex<f64>,
+    now: Complex<f64>,
+    turns: f64,
+    is_number: bool,
+}
+
+impl Winding {
+    fn new(plant: &Plant) -> Self {
+        let zero = Complex::ZERO;
+        let unstable = plant.unstable as f64;
+        Self { unstable, first: None, poles: 0, start: zero, now: zero, turns: 0.0, is_number: true }
     }
-    // |F| ~ ω^−m
-    let m = -((second.difference.norm() / first.difference.norm()).ln() / (w1 / w0).ln()).round();
-    let turned = |(omega, open): &(f64, Open)| {
-        // 1 − e^{−jθ} = 2 j sin(θ/2) e^{−jθ/2}: its angle is π/2 − θ/2
-        let angle = m * (0.5 * PI - 0.5 * omega * plant.every);
-        open.difference * Complex::new(0.0, angle).exp()
-    };
-    let mut before = turned(&points[0]);
-    // It begins on the real axis.
-    let start = if before.re < 0.0 { -before } else { before }.arg();
-    let mut sum = start;
-    for point in &points[1..] {
-        let now = turned(point);
-        sum += (now / before).arg();
-        before = now;
+
+    /// On to the next frequency.
+    fn go_on(&mut self, omega: f64, difference: Complex<f64>, turn: &Turn) {
+        self.is_number &= difference.re.is_finite() && difference.im.is_finite() && difference != Complex::ZERO;
+        let Some((w0, begin, at)) = self.first else {
+            self.first = Some((omega, difference, *turn));
+            return;
+        };
+        if self.start == Complex::ZERO {
+            // |F| ~ ω^−m
+            self.poles = -((difference.norm() / begin.norm()).ln() / (omega / w0).ln()).round() as i32;
+            self.start = begin * at.lag().powi(self.poles);
+            self.now = self.start;
+        }
+        let (was, is) = (self.now, difference * turn.lag().powi(self.poles));
+        // The way from one to the next crosses the negative real axis where both are on other sides of the axis and
+        // their cross product tells that zero is to the right.
+        let cross = was.re * is.im - is.re * was.im;
+        match (was.im < 0.0, is.im < 0.0) {
+            (false, true) if cross > 0.0 => self.turns += 1.0,
+            (true, false) if cross < 0.0 => self.turns -= 1.0,
+            _ => {}
+        }
+        self.now = is;
     }
-    let outside = plant.unstable as f64 - (sum / PI).round();
-    start.abs() < 0.5 && outside == 0.0
+
+    /// Whether no pole of the closed loop is outside.
+    fn is_stable(&self) -> bool {
+        let arg = |v: Complex<f64>| (v.im + 0.0).atan2(v.re);
+        // It begins on the real axis.
+        let start = arg(if self.start.re < 0.0 { -self.start } else { self.start });
+        let sum = start + arg(self.now) - arg(self.start) + 2.0 * PI * self.turns;
+        let outside = self.unstable - (sum / PI).round();
+        self.is_number && self.first.is_some() && start.abs() < 0.5 && outside == 0.0
+    }
 }

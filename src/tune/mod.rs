@@ -23,7 +23,7 @@ pub use evolution::evolve;
 pub use family::{Corner, Family, MACHINES, SPREAD, Source, Unknown};
 pub use gains::{Gain, gains};
 pub use hunting::{Hunt, hunting};
-pub use margins::{Answer, Margins, Open, Plant, loops};
+pub use margins::{Answer, Margins, Open, Peaks, Plant, Rough, loops};
 pub use objective::{AtWorst, BALANCES, Balance, MoveFigures, look, objective};
 pub use placement::{first, place};
 pub use reference::evolved;
@@ -37,7 +37,7 @@ use crate::error::{Error, Result};
 use crate::stage::BeltModel;
 use std::path::Path;
 use verdict::{compare, forced};
-use work::Work;
+use work::{Bars, Work};
 
 /// Machines that moves are run on while searching, the axis of the file with them.
 const SOME: usize = 4;
@@ -50,6 +50,12 @@ const KEPT: usize = 6;
 
 /// Of these, how many look nearby with the simplex before differential evolution does.
 const NEARBY: usize = 2;
+
+/// How steeply ln J grows with the logarithm of what an error is worse than before, and with what settling is later, as a
+/// share of the move: some times as steeply as J falls with either, so that a search does not end where one is worse,
+/// and where nothing may be.
+const SOFT: f64 = 3.0;
+const HARD: f64 = 30.0;
 
 /// Designs of each balance that are looked at before none is taken.
 const TRIES: usize = 6;
@@ -148,8 +154,11 @@ pub fn tune(case: &Case, tuning: &Tuning, stop: &dyn Fn() -> bool) -> Result<Tun
         Cost::Moves | Cost::Squares | Cost::Peak => {
             let leading = work.verdict(&best.design)?;
             let mut some = some_of(&leading);
-            let mut archive = work.by_moves(&finalists, &some, cost)?;
-            let leading = work.polished(&finalists, &mut archive, &mut some, cost, leading)?;
+            let figures = before.at_worst();
+            let bars = Some(Bars { figures: &figures, steep: SOFT });
+            let weighed = work::Weighed { cost, bars };
+            let mut archive = work.by_moves(&finalists, &some, &weighed)?;
+            let leading = work.polished(&finalists, &mut archive, &mut some, &weighed, leading)?;
             let (after, choices) = work.chosen(&archive, cost, &before, leading)?;
             match compare(&before, &after) {
                 Judgement::Worse => work.kept(&finalists, &mut archive, some, cost, &before, after)?,
@@ -198,11 +207,12 @@ impl Work<'_> {
             return Ok((leading, Vec::new()));
         }
         let figures = before.at_worst();
+        let bars = Some(Bars { figures: &figures, steep: HARD });
         let rank = |verdict: &Verdict| (compare(before, verdict) == Judgement::Worse, verdict.objective);
         let is_better = |one: &Verdict, other: &Verdict| rank(one) < rank(other);
         let mut after = leading;
         let mut choices: Vec<Choice> = Vec::new();
-        for (place, bars) in [(1, Some(&figures[..])), (1, None), (0, None), (2, None)] {
+        for (place, bars) in [(1, bars), (1, None), (0, None), (2, None)] {
             let balance = &BALANCES[place];
             let Some(design) = self.best_of(archive, cost, balance, bars, TRIES)? else { continue };
             let known = choices.iter().find(|choice| choice.design == design).map(|c| (c.objective, c.worst.clone()));
@@ -252,15 +262,14 @@ impl Work<'_> {
         finalists: &[work::Finalist],
         archive: &mut Vec<work::Tried>,
         some: &mut Vec<usize>,
-        cost: Cost,
+        weighed: &work::Weighed,
         mut leading: Verdict,
     ) -> Result<Verdict> {
-        let weighed = work::Weighed { cost, bars: None };
         for _ in 0..POLISHED {
             if (self.stop)() || self.is_spent() {
                 break;
             }
-            let Some(design) = self.best_of(archive, cost, &BALANCES[1], None, TRIES)? else { break };
+            let Some(design) = self.best_of(archive, weighed.cost, &BALANCES[1], weighed.bars, TRIES)? else { break };
             let verdict = self.verdict(&design)?;
             let known = some.len();
             for place in some_of(&verdict) {
@@ -274,7 +283,7 @@ impl Work<'_> {
             if some.len() == known {
                 break;
             }
-            self.further(finalists, archive, some, &weighed)?;
+            self.further(finalists, archive, some, weighed)?;
         }
         Ok(leading)
     }
@@ -291,7 +300,8 @@ impl Work<'_> {
         mut after: Verdict,
     ) -> Result<(Verdict, Vec<Choice>)> {
         let figures = before.at_worst();
-        let weighed = work::Weighed { cost, bars: Some(&figures) };
+        let bars = Some(Bars { figures: &figures, steep: HARD });
+        let weighed = work::Weighed { cost, bars };
         let mut latest = after.clone();
         // What makes no figure worse may cost once more as much.
         self.most += self.spent.get();
@@ -306,13 +316,13 @@ impl Work<'_> {
                 }
             }
             for layout in self.nearest(archive, &weighed) {
-                self.again(archive, layout, &some, &weighed);
+                self.again(archive, (layout, work::MEMBERS / 2), &some, &weighed);
                 match round < NEARBY {
-                    true => self.onward_from_best(finalists, layout, &some, &weighed, archive)?,
+                    true => self.onward(finalists, Some(layout), &some, &weighed, archive)?,
                     false => self.evolved(finalists, layout, &some, &weighed, archive)?,
                 }
             }
-            let Some(design) = self.best_of(archive, cost, &BALANCES[1], Some(&figures), TRIES)? else { break };
+            let Some(design) = self.best_of(archive, cost, &BALANCES[1], bars, TRIES)? else { break };
             if design == latest.design && round >= NEARBY {
                 break;
             }

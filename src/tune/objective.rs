@@ -12,11 +12,11 @@
 //! An axis on which the cart is not within its window at the end of the run, t_end, but away by e, has S = (t_end −
 //! D)(1 + ln(1 + e/w)).
 
-use super::family::{Corner, Family};
 use crate::case::{Cost, Move};
-use crate::control::{Setup, closed_loop_briefly};
+use crate::control::{Figures, Loop, Standard, closed_loop_briefly};
 use crate::design::Design;
 use crate::error::Result;
+use crate::signal::profile::Profile;
 use crate::solve::{Ending, Solver};
 use crate::stage::Stage;
 
@@ -57,27 +57,49 @@ pub struct MoveFigures {
 
 /// A move on one axis.
 pub fn look(stage: &Stage, model: &Stage, design: &Design, motion: &Move) -> Result<MoveFigures> {
-    let (until, window, solver) = (motion.until, motion.window, Solver::of(stage));
-    let setup = Setup { stage, model, design, profile: &motion.profile, until, window, solver };
-    let (figures, ending) = closed_loop_briefly(&setup)?;
+    Runner::new(model, design)?.look(stage, motion, &motion.profile.clone().shaped(&design.shaper))
+}
+
+/// A controller that is made once and run through many moves.
+pub(super) struct Runner {
+    controller: Standard,
+    timing: Loop,
+}
+
+impl Runner {
+    /// That of a design for a model of the axis.
+    pub fn new(model: &Stage, design: &Design) -> Result<Self> {
+        Ok(Self { controller: Standard::new(design, model)?, timing: Loop::of(design) })
+    }
+
+    /// A move on one axis, its profile being shaped already.
+    pub fn look(&mut self, stage: &Stage, motion: &Move, shaped: &Profile) -> Result<MoveFigures> {
+        let seen = (motion.until, motion.window);
+        let (figures, ending) =
+            closed_loop_briefly(stage, &mut self.controller, &self.timing, shaped, seen, Solver::of(stage))?;
+        Ok(figures_of(&figures, ending, motion))
+    }
+}
+
+fn figures_of(figures: &Figures, ending: Ending, motion: &Move) -> MoveFigures {
     if ending != Ending::Complete {
-        return Ok(MoveFigures {
+        return MoveFigures {
             error: f64::INFINITY,
             rms: f64::INFINITY,
             settling: None,
             settles: f64::INFINITY,
             current: f64::INFINITY,
-        });
+        };
     }
-    let left = (until - motion.profile.end()).max(motion.profile.end() * 1e-3);
-    let away = left * (1.0 + (figures.final_cart_error.abs() / window).ln_1p());
-    Ok(MoveFigures {
+    let left = (motion.until - motion.profile.end()).max(motion.profile.end() * 1e-3);
+    let away = left * (1.0 + (figures.final_cart_error.abs() / motion.window).ln_1p());
+    MoveFigures {
         error: figures.cart.peak.value.abs(),
         rms: figures.cart.rms,
         settling: figures.settling,
         settles: figures.settling.unwrap_or(away),
         current: figures.current.1,
-    })
+    }
 }
 
 /// A move on several axes at worst.
@@ -136,17 +158,4 @@ pub fn objective(cost: Cost, balance: &Balance, moves: &[Move], asked: &[f64], w
     };
     let sum: f64 = moves.iter().zip(asked).zip(worst).map(of).sum();
     sure(sum / moves.len().max(1) as f64)
-}
-
-/// Every move on each of these axes, by move and axis.
-pub fn look_at_all(
-    family: &Family,
-    corners: &[Corner],
-    model: &Stage,
-    design: &Design,
-    moves: &[Move],
-) -> Result<Vec<Vec<MoveFigures>>> {
-    let stages: Vec<Stage> = corners.iter().map(|corner| family.stage_at(corner)).collect();
-    let of = |motion: &Move| stages.iter().map(|stage| look(stage, model, design, motion)).collect();
-    moves.iter().map(of).collect()
 }

@@ -4,8 +4,8 @@
 use super::evolution::evolve;
 use super::search::Found;
 use super::verdict::{Judgement, Verdict, compare};
-use super::work::{Finalist, Weighed, Work};
-use super::{Tuned, some_of};
+use super::work::{Bars, Finalist, Weighed, Work};
+use super::{HARD, Tuned, some_of};
 use crate::case::{Case, Cost, Tuning};
 use crate::chance::uniform;
 use crate::error::Result;
@@ -34,7 +34,8 @@ pub fn evolved(
     work.most = u64::MAX;
     let cost = tuning.cost.unwrap_or(Cost::Moves);
     let figures = tuned.before.at_worst();
-    let bars = (compare(&tuned.before, &tuned.after) != Judgement::Worse).then_some(&figures[..]);
+    let is_worse = compare(&tuned.before, &tuned.after) == Judgement::Worse;
+    let bars = (!is_worse).then_some(Bars { figures: &figures, steep: HARD });
     let weighed = Weighed { cost, bars };
     let finalist = Finalist::at(&tuned.after.design, given.filters.len());
     let mut some = some_of(&tuned.before);

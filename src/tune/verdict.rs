@@ -3,7 +3,7 @@
 use super::family::{Corner, Family, modes_along};
 use super::hunting::{Hunt, hunting};
 use super::margins::Margins;
-use super::objective::{AtWorst, BALANCES, MoveFigures, look_at_all, objective};
+use super::objective::{AtWorst, BALANCES, MoveFigures, Runner, objective};
 use super::work::{Work, mode_at};
 use crate::case::{Cost, Tuning};
 use crate::control::{Deviation, Setup, closed_loop};
@@ -116,6 +116,27 @@ impl Verdict {
         self.moves.iter().map(|one| one.at_worst).collect()
     }
 
+    /// Its machines, those first that are worst in some figure.
+    pub(super) fn badness(&self) -> Vec<usize> {
+        let mut ranked: Vec<(usize, usize)> = Vec::new();
+        for one in &self.moves {
+            let figures: [fn(&MoveFigures) -> f64; 3] = [|seen| seen.error, |seen| seen.settles, |seen| seen.current];
+            for figure in figures {
+                let mut order: Vec<usize> = (0..one.seen.len()).collect();
+                order.sort_by(|&a, &b| figure(&one.seen[b]).total_cmp(&figure(&one.seen[a])));
+                ranked.extend(order.into_iter().enumerate());
+            }
+        }
+        ranked.sort();
+        let mut all = Vec::new();
+        for (_, place) in ranked {
+            if !all.contains(&place) {
+                all.push(place);
+            }
+        }
+        all
+    }
+
     /// Machines on which a figure is worse than it was at worst, of each move the two that are worst.
     pub(super) fn worse_on(&self, before: &Verdict) -> Vec<usize> {
         let mut all = Vec::new();
@@ -148,12 +169,25 @@ impl Work<'_> {
         if let Some(known) = self.known.borrow().iter().find(|known| known.design == *design) {
             return Ok(known.clone());
         }
-        let verdict = self.judged(design)?;
+        let all: Vec<usize> = (0..=self.family.machines.len()).collect();
+        let verdict = self.judged(design, (f64::INFINITY, &all))?;
+        let verdict = verdict.expect("without a bar there is a verdict");
         self.known.borrow_mut().push(verdict.clone());
         Ok(verdict)
     }
 
-    fn judged(&self, design: &Design) -> Result<Verdict> {
+    /// The verdict on a design whose ln J is at most `bar`; none for another, which is told as soon as the machines that
+    /// were run until then, in this order, say so.
+    pub fn verdict_below(&self, design: &Design, bar: f64, order: &[usize]) -> Result<Option<Verdict>> {
+        if let Some(known) = self.known.borrow().iter().find(|known| known.design == *design) {
+            return Ok(Some(known.clone()).filter(|known| known.objective <= bar));
+        }
+        let verdict = self.judged(design, (bar, order))?;
+        self.known.borrow_mut().extend(verdict.clone());
+        Ok(verdict)
+    }
+
+    fn judged(&self, design: &Design, (bar, order): (f64, &[usize])) -> Result<Option<Verdict>> {
         let feedback = self.feedback(design)?;
         let corners = feedback.corners();
         let nominal = Margins::of(&self.family.plant(&self.family.nominal(), design, &corners)?, &feedback);
@@ -167,11 +201,8 @@ impl Work<'_> {
             }
             machines.push(found);
         }
-        for motion in self.moves {
-            (0..machines.len()).for_each(|_| self.spend(design, motion));
-        }
-        let all = look_at_all(self.family, &machines, &self.case.stage, design, self.moves)?;
         let left_out = self.family.left_out(machines.len());
+        let Some(all) = self.seen(design, &machines, (bar, order, left_out))? else { return Ok(None) };
         let mut moves = Vec::new();
         for (motion, seen) in self.moves.iter().zip(all) {
             let (stage, until, window) = (&self.case.stage, motion.until, motion.window);
@@ -196,7 +227,45 @@ impl Work<'_> {
         let cost = self.tuning.cost.unwrap_or(Cost::Moves);
         let value = objective(cost, &BALANCES[1], self.moves, &self.asked, &figures);
         let unstable = (unstable, self.family.machines.len());
-        Ok(Verdict { design: design.clone(), nominal, corner, worst, unstable, objective: value, moves, hunt: None })
+        let design = design.clone();
+        Ok(Some(Verdict { design, nominal, corner, worst, unstable, objective: value, moves, hunt: None }))
+    }
+
+    /// The figures of each move on all machines; none as soon as ln J is above the bar: another machine makes no figure
+    /// at worst smaller.
+    fn seen(
+        &self,
+        design: &Design,
+        machines: &[Corner],
+        (bar, order, left_out): (f64, &[usize], usize),
+    ) -> Result<Option<Vec<Vec<MoveFigures>>>> {
+        let cost = self.tuning.cost.unwrap_or(Cost::Moves);
+        let mut runner = Runner::new(&self.case.stage, design)?;
+        let mut found: Vec<(usize, Vec<MoveFigures>)> = Vec::with_capacity(machines.len());
+        let of = |found: &[(usize, Vec<MoveFigures>)], k: usize| -> Vec<MoveFigures> {
+            found.iter().map(|(_, figures)| figures[k]).collect()
+        };
+        for place in order.iter().copied().filter(|place| *place < machines.len()) {
+            // A corner that is none of the machines has no axis made ready.
+            let corner;
+            let stage = match self.stages.get(place) {
+                Some(stage) => stage,
+                None => {
+                    corner = self.family.stage_at(&machines[place]);
+                    &corner
+                }
+            };
+            found.push((place, self.looked(&mut runner, design, stage)?));
+            if bar.is_finite() && found.len() > left_out {
+                let worst: Vec<AtWorst> =
+                    (0..self.moves.len()).map(|k| AtWorst::of(&of(&found, k), left_out)).collect();
+                if objective(cost, &BALANCES[1], self.moves, &self.asked, &worst) > bar {
+                    return Ok(None);
+                }
+            }
+        }
+        found.sort_by_key(|(place, _)| *place);
+        Ok(Some((0..self.moves.len()).map(|k| of(&found, k)).collect()))
     }
 }
 

@@ -4,8 +4,8 @@
 use super::evolution::evolve;
 use super::family::{Family, modes_along};
 use super::gains::{self, rounded, searched, shaped};
-use super::margins::{Margins, Plant};
-use super::objective::{AtWorst, BALANCES, Balance, MoveFigures, look, objective};
+use super::margins::{Margins, Peaks, Plant, Rough};
+use super::objective::{AtWorst, BALANCES, Balance, MoveFigures, Runner, objective};
 use super::rules::{layouts, starts};
 use super::search::{Found, minimise, minimise_below};
 use super::verdict::Verdict;
@@ -14,6 +14,8 @@ use crate::chance::uniform;
 use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::Result;
+use crate::signal::profile::Profile;
+use crate::stage::Stage;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 use std::cell::{Cell, RefCell};
@@ -36,7 +38,7 @@ const FURTHER: f64 = 0.12;
 
 /// Members and generations of differential evolution, how far members are scattered about the best (natural logarithm
 /// of gains), and how often it is done again with an axis more.
-const MEMBERS: usize = 12;
+pub(super) const MEMBERS: usize = 12;
 const GENERATIONS: usize = 8;
 const SCATTER: f64 = 0.4;
 const EVOLVED: usize = 2;
@@ -52,7 +54,7 @@ const SAMPLES: u64 = 6_000_000;
 /// Share by which filters that are added have to make the cost smaller.
 const PAYS: f64 = 0.02;
 
-/// Weight of what is beyond a limit, and of what a figure is worse than before, in ln J.
+/// Weight of what is beyond a limit, in ln J.
 const STEEP: f64 = 30.0;
 
 /// A tuning on its way.
@@ -63,7 +65,10 @@ pub(super) struct Work<'a> {
     pub moves: &'a [Move],
     /// I₀ of each move, A.
     pub asked: Vec<f64>,
-    /// Of all machines of the family.
+    /// The moves as the shaper of the controller makes them, which no search changes.
+    pub shaped: Vec<Profile>,
+    /// The axes of all machines of the family, and what a controller sees of them over frequency.
+    pub stages: Vec<Stage>,
     pub plants: Vec<Plant>,
     /// Machines on which the limits have to hold while searching.
     set: Vec<usize>,
@@ -113,7 +118,14 @@ pub(super) struct Tried {
 pub(super) struct Weighed<'a> {
     pub cost: Cost,
     /// Figures that none may be worse than.
-    pub bars: Option<&'a [AtWorst]>,
+    pub bars: Option<Bars<'a>>,
+}
+
+/// Figures before, and how steeply ln J grows with what a figure is worse.
+#[derive(Clone, Copy)]
+pub(super) struct Bars<'a> {
+    pub figures: &'a [AtWorst],
+    pub steep: f64,
 }
 
 impl<'a> Work<'a> {
@@ -135,6 +147,8 @@ impl<'a> Work<'a> {
             tuning,
             moves,
             asked,
+            shaped: moves.iter().map(|motion| motion.profile.clone().shaped(&design.shaper)).collect(),
+            stages: family.machines.iter().map(|machine| family.stage_at(machine)).collect(),
             plants,
             set: vec![0],
             more: Vec::new(),
@@ -155,29 +169,37 @@ impl<'a> Work<'a> {
         margins.excess(self.tuning.sensitivity, self.tuning.complementary)
     }
 
+    /// The machine on which a design is worst, once the bad end is left out, how far it is beyond its limits there, and
+    /// how many machines are not stable.
+    fn worst(&self, feedback: &Feedback) -> (usize, f64, usize) {
+        let (ms, mt) = (self.tuning.sensitivity, self.tuning.complementary);
+        let peaks = self.plants.iter().map(|plant| Peaks::of(plant, feedback));
+        let mut all: Vec<(usize, f64)> = peaks.map(|peaks| peaks.excess(ms, mt)).enumerate().collect();
+        let unstable = all.iter().filter(|(_, excess)| excess.is_infinite()).count();
+        all.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let (place, excess) = all[self.family.left_out(all.len())];
+        (place, excess, unstable)
+    }
+
     /// The machine on which a design is worst, once the bad end is left out, and its margins; and how many are not
     /// stable.
     pub fn limits(&self, design: &Design) -> Result<(usize, Margins, usize)> {
         let feedback = self.feedback(design)?;
-        let mut all: Vec<(usize, Margins)> =
-            self.plants.iter().map(|plant| Margins::of(plant, &feedback)).enumerate().collect();
-        let unstable = all.iter().filter(|(_, margins)| !margins.stable).count();
-        all.sort_by(|a, b| self.excess(&b.1).total_cmp(&self.excess(&a.1)));
-        let (place, margins) = all[self.family.left_out(all.len())];
-        Ok((place, margins, unstable))
+        let (place, _, unstable) = self.worst(&feedback);
+        Ok((place, Margins::of(&self.plants[place], &feedback), unstable))
     }
 
     /// Where a design passes a limit, if it does; what is worst joins the set.
     fn passes(&mut self, design: &Design) -> Result<bool> {
-        let (place, margins, _) = self.limits(design)?;
-        if self.excess(&margins) > 1.0 {
+        let feedback = self.feedback(design)?;
+        let (place, excess, _) = self.worst(&feedback);
+        if excess > 1.0 {
             if !self.set.contains(&place) {
                 self.set.push(place);
             }
             return Ok(true);
         }
         if self.family.corners {
-            let feedback = self.feedback(design)?;
             let (corner, margins) = self.family.worst(design, &feedback, &|margins| self.excess(margins))?;
             if self.excess(&margins) > 1.0 {
                 self.more.push(self.family.plant(&corner, design, &feedback.corners())?);
@@ -193,11 +215,11 @@ impl<'a> Work<'a> {
         let Ok(feedback) = self.feedback(design) else { return (f64::INFINITY, f64::INFINITY) };
         let (mut most, mut slow) = (0.0_f64, 0.0_f64);
         for plant in self.set.iter().map(|&place| &self.plants[place]).chain(&self.more) {
-            let margins = Margins::roughly(plant, &feedback);
-            most = most.max(self.excess(&margins));
+            let rough = Rough::of(plant, &feedback);
+            most = most.max(rough.peaks.excess(self.tuning.sensitivity, self.tuning.complementary));
             // What a step at the command does, and a step of the reference: the one alone would do without a position
             // gain.
-            slow = slow.max(margins.disturbance * margins.following);
+            slow = slow.max(rough.disturbance * rough.following);
         }
         ((most / WITHIN - 1.0).max(0.0), slow)
     }
@@ -331,16 +353,13 @@ impl<'a> Work<'a> {
     fn run(&self, design: &Design, some: &[usize], weighed: &Weighed, bar: f64) -> (Vec<AtWorst>, f64) {
         let mut seen: Vec<Vec<MoveFigures>> = vec![Vec::new(); self.moves.len()];
         let mut found = (Vec::new(), f64::INFINITY);
+        let Ok(mut runner) = Runner::new(&self.case.stage, design) else { return found };
         // The axis of the file is seldom the worst.
         for &place in some.iter().rev() {
-            let stage = self.family.stage_at(&self.family.machines[place]);
-            for (all, motion) in seen.iter_mut().zip(self.moves) {
-                self.spend(design, motion);
-                let Ok(one) = look(&stage, &self.case.stage, design, motion) else {
-                    return (Vec::new(), f64::INFINITY);
-                };
-                all.push(one);
-            }
+            let Ok(one) = self.looked(&mut runner, design, &self.stages[place]) else {
+                return (Vec::new(), f64::INFINITY);
+            };
+            seen.iter_mut().zip(one).for_each(|(all, one)| all.push(one));
             let worst: Vec<AtWorst> = seen.iter().map(|seen| AtWorst::of(seen, 0)).collect();
             let value = self.valued(weighed.cost, &BALANCES[1], &worst, weighed.bars);
             found = (worst, value);
@@ -351,15 +370,24 @@ impl<'a> Work<'a> {
         found
     }
 
+    /// The figures of all moves on one axis.
+    pub fn looked(&self, runner: &mut Runner, design: &Design, stage: &Stage) -> Result<Vec<MoveFigures>> {
+        let one = |(motion, shaped): (&Move, &Profile)| {
+            self.spend(design, motion);
+            runner.look(stage, motion, shaped)
+        };
+        self.moves.iter().zip(&self.shaped).map(one).collect()
+    }
+
     /// Searches by moves on the machines `some`: with the simplex from each of the best finalists, then with
     /// differential evolution about the best. All that was run and keeps the limits on the set.
-    pub fn by_moves(&mut self, finalists: &[Finalist], some: &[usize], cost: Cost) -> Result<Vec<Tried>> {
-        let weighed = Weighed { cost, bars: None };
+    pub fn by_moves(&mut self, finalists: &[Finalist], some: &[usize], weighed: &Weighed) -> Result<Vec<Tried>> {
         let mut archive: Vec<Tried> = Vec::new();
         let mut ranked: Vec<(f64, usize)> = Vec::new();
         for (layout, finalist) in finalists.iter().enumerate() {
-            let (worst, value) = self.run(&finalist.design, some, &weighed, f64::INFINITY);
-            ranked.push((value, layout));
+            let (worst, _) = self.run(&finalist.design, some, weighed, f64::INFINITY);
+            // Where a search begins need not be good in every figure.
+            ranked.push((self.valued(weighed.cost, &BALANCES[1], &worst, None), layout));
             archive.push(Tried { design: finalist.design.clone(), worst, layout, powers: finalist.powers.clone() });
         }
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -368,13 +396,13 @@ impl<'a> Work<'a> {
         ranked.retain(|(value, _)| *value <= least + NEAR);
         for (_, layout) in ranked.into_iter().take(FINALISTS) {
             let from = finalists[layout].powers.clone();
-            let (value, _) = self.moved(finalists, layout, &from, (some, FIRST), &weighed, &mut archive)?;
+            let (value, _) = self.moved(finalists, layout, &from, (some, FIRST), weighed, &mut archive)?;
             if best.is_none_or(|(least, _)| value < least) {
                 best = Some((value, layout));
             }
         }
         if let Some((_, layout)) = best {
-            self.evolved(finalists, layout, some, &weighed, &mut archive)?;
+            self.evolved(finalists, layout, some, weighed, &mut archive)?;
         }
         Ok(archive)
     }
@@ -459,7 +487,7 @@ impl<'a> Work<'a> {
             }
             let mut known: Vec<Found> = Vec::new();
             for tried in archive.iter().filter(|tried| tried.layout == layout) {
-                let value = self.valued(weighed.cost, &BALANCES[1], &tried.worst, weighed.bars);
+                let value = self.worth(tried, weighed);
                 known.push(Found { x: tried.powers.clone(), value });
             }
             known.sort_by(|a, b| a.value.total_cmp(&b.value));
@@ -485,6 +513,11 @@ impl<'a> Work<'a> {
         Ok(())
     }
 
+    /// ln J of a design that was run, by what a search weighs.
+    fn worth(&self, tried: &Tried, weighed: &Weighed) -> f64 {
+        self.valued(weighed.cost, &BALANCES[1], &tried.worst, weighed.bars)
+    }
+
     /// On with the simplex from the best design of all on machines that are more now.
     pub fn further(
         &mut self,
@@ -494,29 +527,23 @@ impl<'a> Work<'a> {
         weighed: &Weighed,
     ) -> Result<()> {
         for layout in self.nearest(archive, weighed) {
-            self.again(archive, layout, some, weighed);
+            self.again(archive, (layout, FINALISTS), some, weighed);
         }
-        let value = |tried: &Tried| self.valued(weighed.cost, &BALANCES[1], &tried.worst, weighed.bars);
-        let best = archive.iter().min_by(|a, b| value(a).total_cmp(&value(b)));
-        if let Some((layout, powers)) = best.map(|tried| (tried.layout, tried.powers.clone())) {
-            self.moved(finalists, layout, &powers, (some, FURTHER), weighed, archive)?;
-        }
-        Ok(())
+        self.onward(finalists, None, some, weighed, archive)
     }
 
-    /// With the simplex from the best design of a layout by what it is weighed with.
-    pub fn onward_from_best(
+    /// With the simplex from the best design that was run, of a layout if one is named.
+    pub fn onward(
         &mut self,
         finalists: &[Finalist],
-        layout: usize,
+        layout: Option<usize>,
         some: &[usize],
         weighed: &Weighed,
         archive: &mut Vec<Tried>,
     ) -> Result<()> {
-        let value = |tried: &Tried| self.valued(weighed.cost, &BALANCES[1], &tried.worst, weighed.bars);
-        let own = archive.iter().filter(|tried| tried.layout == layout);
-        let best = own.min_by(|a, b| value(a).total_cmp(&value(b))).map(|tried| tried.powers.clone());
-        if let Some(powers) = best {
+        let own = archive.iter().filter(|tried| layout.is_none_or(|layout| tried.layout == layout));
+        let best = own.min_by(|a, b| self.worth(a, weighed).total_cmp(&self.worth(b, weighed)));
+        if let Some((layout, powers)) = best.map(|tried| (tried.layout, tried.powers.clone())) {
             self.moved(finalists, layout, &powers, (some, FURTHER), weighed, archive)?;
         }
         Ok(())
@@ -524,8 +551,8 @@ impl<'a> Work<'a> {
 
     /// The two layouts with a design that is best where none of the figures may be worse.
     pub fn nearest(&self, archive: &[Tried], weighed: &Weighed) -> Vec<usize> {
-        let value = |tried: &Tried| self.valued(weighed.cost, &BALANCES[1], &tried.worst, weighed.bars);
-        let mut ranked: Vec<(f64, usize)> = archive.iter().map(|tried| (value(tried), tried.layout)).collect();
+        let mut ranked: Vec<(f64, usize)> =
+            archive.iter().map(|tried| (self.worth(tried, weighed), tried.layout)).collect();
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut layouts: Vec<usize> = Vec::new();
         for (_, layout) in ranked {
@@ -536,12 +563,11 @@ impl<'a> Work<'a> {
         layouts
     }
 
-    /// Runs the best designs of a layout again, on other machines, and forgets the rest of it.
-    pub fn again(&self, archive: &mut Vec<Tried>, layout: usize, some: &[usize], weighed: &Weighed) {
-        let value = |tried: &Tried| self.valued(weighed.cost, &BALANCES[1], &tried.worst, weighed.bars);
+    /// Runs the best designs of a layout, at most so many, again, on other machines, and forgets the rest of it.
+    pub fn again(&self, archive: &mut Vec<Tried>, (layout, most): (usize, usize), some: &[usize], weighed: &Weighed) {
         let (mut own, other): (Vec<Tried>, Vec<Tried>) = archive.drain(..).partition(|tried| tried.layout == layout);
-        own.sort_by(|a, b| value(a).total_cmp(&value(b)));
-        own.truncate(MEMBERS / 2);
+        own.sort_by(|a, b| self.worth(a, weighed).total_cmp(&self.worth(b, weighed)));
+        own.truncate(most);
         for tried in &mut own {
             tried.worst = self.run(&tried.design, some, weighed, f64::INFINITY).0;
         }
@@ -566,8 +592,8 @@ impl<'a> Work<'a> {
             if self.passes(&design)? {
                 continue;
             }
-            let other = self.verdict(&design)?;
-            if other.objective <= verdict.objective + PAYS && is_as_good(&verdict, &other) {
+            let other = self.verdict_below(&design, verdict.objective + PAYS, &verdict.badness())?;
+            if let Some(other) = other.filter(|other| is_as_good(&verdict, other)) {
                 verdict = other;
             }
         }
@@ -575,14 +601,17 @@ impl<'a> Work<'a> {
     }
 
     /// ln J, and what figures are worse than before.
-    pub fn valued(&self, cost: Cost, balance: &Balance, worst: &[AtWorst], before: Option<&[AtWorst]>) -> f64 {
+    pub fn valued(&self, cost: Cost, balance: &Balance, worst: &[AtWorst], bars: Option<Bars>) -> f64 {
         if worst.len() != self.moves.len() {
             return f64::INFINITY;
         }
         let mut value = objective(cost, balance, self.moves, &self.asked, worst);
-        for (is, was) in worst.iter().zip(before.unwrap_or_default()) {
-            value += STEEP * (is.error.0 / was.error.0).ln().max(0.0);
-            value += (is.settles.0 - was.settles.0).max(0.0) * STEEP / was.settles.0.max(0.05);
+        let (figures, steep) = bars.map_or((&[][..], 0.0), |bars| (bars.figures, bars.steep));
+        for ((is, was), motion) in worst.iter().zip(figures).zip(self.moves) {
+            value += steep * (is.error.0 / was.error.0).ln().max(0.0);
+            // As a share of the profile's duration, as J counts it.
+            let duration = motion.profile.end().max(f64::MIN_POSITIVE);
+            value += steep * (is.settles.0 - was.settles.0).max(0.0) / duration;
         }
         if value.is_nan() { f64::INFINITY } else { value }
     }
@@ -593,11 +622,11 @@ impl<'a> Work<'a> {
         archive: &[Tried],
         cost: Cost,
         balance: &Balance,
-        before: Option<&[AtWorst]>,
+        bars: Option<Bars>,
         tries: usize,
     ) -> Result<Option<Design>> {
         let mut ranked: Vec<(f64, &Tried)> =
-            archive.iter().map(|tried| (self.valued(cost, balance, &tried.worst, before), tried)).collect();
+            archive.iter().map(|tried| (self.valued(cost, balance, &tried.worst, bars), tried)).collect();
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (value, tried) in ranked.into_iter().take(tries) {
             if value.is_finite() && !self.passes(&tried.design)? {
@@ -610,7 +639,7 @@ impl<'a> Work<'a> {
 
 /// A design with a slower loop: of a PID or a cascade as if time went by more slowly, of state feedback with less
 /// weight on errors.
-fn slower(design: &Design, own: usize, stage: &crate::stage::Stage, factor: f64) -> Design {
+fn slower(design: &Design, own: usize, stage: &Stage, factor: f64) -> Design {
     if factor == 1.0 {
         return design.clone();
     }

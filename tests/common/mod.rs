@@ -37,6 +37,7 @@ pub fn paper_stage(stiffness: [f64; 3], inertia: f64, pulley: Friction, cart: Fr
         belt: Belt::given(stiffness, [0.0; 3]),
         travel: None,
         encoder: None,
+        scale: None,
     }
 }
 

@@ -97,6 +97,7 @@ pub fn stage(dry: Dry) -> impl Strategy<Value = Stage> {
             belt,
             travel: None,
             encoder: None,
+            scale: None,
         },
     )
 }

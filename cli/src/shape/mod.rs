@@ -54,5 +54,6 @@ fn question(args: &Args) -> Question {
             MotorName::Free => Drive::Free,
             MotorName::Held => Drive::Held,
         }),
+        pairs: args.pairs,
     }
 }

@@ -3,7 +3,7 @@
 use crate::terminal::bold;
 use std::fmt::Write;
 use taut::control::recommendation::{Findings, Found};
-use taut_report::shape::{remark, words};
+use taut_report::shape::{mode_words, pair_words, remark, words};
 
 /// The text on the terminal.
 pub fn text(found: &Findings) -> String {
@@ -15,6 +15,7 @@ pub fn text(found: &Findings) -> String {
         }
         text.push('\n');
         shapers(&mut text, one);
+        modes(&mut text, one);
         let best = one.choice.best();
         let recommended = format!("recommended: {} at {:.1} Hz", best.shaper.form.name(), best.shaper.frequency);
         let _ = write!(text, "\n{}\n{}\n\n", bold(&recommended), one.choice.reason);
@@ -22,6 +23,7 @@ pub fn text(found: &Findings) -> String {
             let _ = writeln!(text, "  {line}");
         }
         text.push('\n');
+        pairs(&mut text, one);
     }
     if let Some(comparison) = &found.comparison {
         let _ = writeln!(text, "{}", bold("Compared"));
@@ -44,4 +46,35 @@ fn shapers(text: &mut String, one: &Found) {
         );
         let _ = writeln!(text, "{}", row.trim_end());
     }
+}
+
+/// Modes along the travel and what is left of them at worst.
+fn modes(text: &mut String, one: &Found) {
+    let all = one.left();
+    if all.is_empty() {
+        return;
+    }
+    let pair = if one.choice.pairs.is_empty() { "" } else { "  best pair leaves" };
+    let _ = writeln!(text, "\n  mode along the travel  damping         moves the cart  recommended leaves{pair}");
+    for left in &all {
+        let [frequency, damping, share, best, paired] = mode_words(left, one.choice.recommended);
+        let mut row = format!("  {:<21}  {damping:<14}  {share:>14}  {best:>16} %", format!("{frequency} Hz"));
+        if !paired.is_empty() {
+            let _ = write!(row, "  {paired:>14} %");
+        }
+        let _ = writeln!(text, "{row}");
+    }
+}
+
+fn pairs(text: &mut String, one: &Found) {
+    let Some(told) = one.pair_told() else { return };
+    let _ = writeln!(text, "{}\n{told}", bold("Pairs"));
+    for pair in &one.choice.pairs {
+        let [vibration, smoothing, acceleration] = pair_words(pair);
+        let _ = writeln!(text, "  {:<36} {vibration:>6} % {smoothing:>7} mm {acceleration:>9} mm/s^2", pair.name());
+    }
+    if let (Some(pair), true) = (one.choice.pairs.first(), one.choice.is_pair_better) {
+        let _ = writeln!(text, "\n  {}", pair.line());
+    }
+    text.push('\n');
 }

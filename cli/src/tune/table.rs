@@ -3,7 +3,9 @@
 use crate::terminal::bold;
 use std::fmt::Write;
 use taut::tune::Verdict;
-use taut_report::tune::{CHOICES, Row, Work, choices, family, gains, given, goal, hunt, margins, moves, verdict};
+use taut_report::tune::{
+    CHOICES, Row, Work, axes, choices, family, gains, given, goal, hunt, limiting, margins, moves, verdict,
+};
 
 fn rows(text: &mut String, title: &str, rows: &[Row]) {
     let width = |pick: fn(&Row) -> &String| rows.iter().map(|row| pick(row).chars().count()).max().unwrap_or(0);
@@ -44,8 +46,8 @@ pub fn text(work: &Work) -> String {
     rows(&mut text, "Gains", &gains(work));
     rows(&mut text, "The axis as the file has it", &margins(&before.nominal, &after.nominal));
     rows(&mut text, "At worst", &margins(&before.worst, &after.worst));
-    let _ = writeln!(text, "  before: {}", tuned.family.words(&before.corner));
-    let _ = writeln!(text, "  after: {}", tuned.family.words(&after.corner));
+    let [first, second] = limiting(work);
+    let _ = writeln!(text, "  before on {first}, after on {second}");
     if let Some(mode) = tuned.undamped {
         let told = "the belt has no damping: what limits Ms near its modes, from";
         let _ = writeln!(text, "note: {told} {mode:.0} Hz on, is an undamped mode; give belt.damping if it is known");
@@ -56,6 +58,10 @@ pub fn text(work: &Work) -> String {
     rows(&mut text, "Objective", &[objective]);
     if !tuned.choices.is_empty() {
         table(&mut text, "Choices, at worst", &CHOICES, choices(work));
+    }
+    let _ = writeln!(text, "\n{}", bold("Axes"));
+    for [name, off] in axes(work) {
+        let _ = writeln!(text, "  {name}: {off}");
     }
     let _ = writeln!(text, "\n{}", bold("Limit cycles at rest"));
     let _ = writeln!(text, "  before: {}\n  after: {}", hunt(&before.hunt), hunt(&after.hunt));

@@ -34,6 +34,10 @@ class Observation:
         """Measured position, m along the belt: whole counts of the encoder."""
 
     @property
+    def scale(self) -> float | None:
+        """The cart's position on a scale beside that encoder, m: whole counts; None without a scale."""
+
+    @property
     def current(self) -> float:
         """Measured motor current, A."""
 

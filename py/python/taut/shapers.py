@@ -35,6 +35,17 @@ class Shape:
         """Lines for Klipper's configuration."""
         return list(self.data["recommended"]["lines"])
 
+    @property
+    def pairs(self) -> list[dict[str, Any]]:
+        """The best pairs of shapers, one behind the other, with their ``impulses``; empty unless ``pairs=True`` was said."""
+        return list(self.data["pairs"])
+
+    @property
+    def pair_line(self) -> str | None:
+        """The line for ``[controller]`` of a case, where a pair is clearly better than the recommended shaper."""
+        best = self.data["recommended_pair"]
+        return None if best is None else str(best["line"])
+
     def to_pandas(self) -> pandas.DataFrame:
         """A pandas.DataFrame of the shapers: frequency (Hz), vibration that is left, smoothing (m), acceleration up to (m/s^2)."""
         rows = self.data["shapers"]
@@ -78,6 +89,7 @@ def shape(
     shapers: Iterable[str] | None = None,
     uncertainty: float | None = None,
     motor: str | None = None,
+    pairs: bool = False,
     changes: Mapping[str, Any] | None = None,
 ) -> Shape:
     """An input shaper from one file of vibration, two that are compared, or several ``together``.
@@ -86,7 +98,8 @@ def shape(
     ``klipper-2025-08``; ``axis`` of the accelerometer is ``x``, ``y`` or ``z``; ``damping`` is a ratio, or ``"fitted"``;
     ``max_smoothing`` is in m, ``max_vibrations`` a share (0.05 is 5 %), ``corner_speed`` in m/s; ``shapers`` are names to choose
     among. Of a case, ``uncertainty`` is by which share its frequencies may be off, ``motor`` is ``held`` or ``free``, and
-    ``changes`` are values by key, as of :meth:`taut.Case.changed`.
+    ``changes`` are values by key, as of :meth:`taut.Case.changed`. With ``pairs`` two shapers one behind the other are looked
+    at, too: for two modes, or for one that moves far along the travel.
     """
     paths = [files] if isinstance(files, (str, PathLike)) else list(files)
     fitted = isinstance(damping, str)
@@ -106,6 +119,7 @@ def shape(
         "shapers": _checks.names("shapers", shapers),
         "uncertainty": _checks.number("uncertainty", uncertainty),
         "motor": _checks.word("motor", motor),
+        "pairs": bool(pairs),
         "changes": [change(key, value) for key, value in (changes or {}).items()],
     }
     return Shape(_native.shape([_checks.path(path) for path in paths], options))

@@ -23,9 +23,11 @@ pub fn promises(found: &Designed) -> Vec<[String; 4]> {
             true => format!("± {}", value(promise.error, promise.unit, 2)),
             false => "not determined".into(),
         };
-        // Of what is zero, of a typical value.
-        let relative = if promise.value == 0.0 { promise.relative } else { promise.error / promise.value.abs() };
-        let relative = if promise.is_determined() { percent(relative) } else { String::new() };
+        let relative = match (promise.is_determined(), promise.value == 0.0) {
+            (false, _) => String::new(),
+            (true, false) => percent(promise.error / promise.value.abs()),
+            (true, true) => format!("{} of a typical value", percent(promise.relative)),
+        };
         [promise.name.clone(), value(promise.value, promise.unit, 4), error, relative]
     };
     let wanted = found.promises.iter().filter(|promise| promise.wanted);

@@ -6,4 +6,4 @@ mod rows;
 
 pub use page::page;
 pub use plots::figures;
-pub use rows::{remark, words};
+pub use rows::{mode_words, pair_words, remark, words};

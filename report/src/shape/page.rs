@@ -1,6 +1,6 @@
 //! The report: one HTML file.
 
-use super::rows::{remark, words};
+use super::rows::{mode_words, pair_words, remark, words};
 use crate::{Callout, Cell, Figure, Page, Table};
 use taut::control::compare::Comparison;
 use taut::control::recommendation::{Findings, Found};
@@ -20,6 +20,8 @@ pub fn page(found: &Findings, figures: &[(String, Figure)]) -> Page {
         }
         page.embed("Lines for Klipper's configuration", &one.lines().join("\n"));
         shapers(&mut page, one);
+        pairs(&mut page, one);
+        modes(&mut page, one);
         for (name, figure) in figures.iter().filter(|(name, _)| name != "compared") {
             if name.ends_with("-2") == (i == 1) {
                 page.figure(figure);
@@ -55,6 +57,42 @@ fn shapers(page: &mut Page, one: &Found) {
         let name = Cell::from(fitted.shaper.form.name());
         let numbers = words(fitted).map(Cell::Number);
         rows.row(std::iter::once(name).chain(numbers).chain([word]));
+    }
+    page.table(&rows);
+}
+
+fn pairs(page: &mut Page, one: &Found) {
+    let Some(told) = one.pair_told() else { return };
+    page.prose(format!("{told}."));
+    let Some(best) = one.choice.pairs.first() else { return };
+    let mut rows = Table::new("The best pairs of shapers, one behind the other.");
+    rows = rows.column("Pair", "").column("Vibration left", "%").column("Smoothing", "mm");
+    rows = rows.column("Acceleration up to", "mm/s^2");
+    for pair in &one.choice.pairs {
+        rows.row(std::iter::once(Cell::from(pair.name())).chain(pair_words(pair).map(Cell::Number)));
+    }
+    page.table(&rows);
+    page.embed("The best pair for [controller] of a case", &best.line());
+}
+
+fn modes(page: &mut Page, one: &Found) {
+    let left = one.left();
+    if left.is_empty() {
+        return;
+    }
+    let mut rows = Table::new(format!(
+        "Modes along the travel, and what is left of each at worst, its frequency being off by up to {} %.",
+        taut::quantity::rounded(100.0 * one.uncertainty)
+    ));
+    rows = rows.column("Frequency", "Hz").column("Damping ratio", "").column("Motion of the cart", "");
+    rows = rows.column("Recommended leaves", "%");
+    let has_pairs = !one.choice.pairs.is_empty();
+    if has_pairs {
+        rows = rows.column("Best pair leaves", "%");
+    }
+    for left in &left {
+        let words = mode_words(left, one.choice.recommended).into_iter().take(if has_pairs { 5 } else { 4 });
+        rows.row(words.map(Cell::Number));
     }
     page.table(&rows);
 }

@@ -6,7 +6,9 @@ mod rows;
 
 pub use page::page;
 pub use plots::figures;
-pub use rows::{CHOICES, Row, choices, family, gains, given, goal, hertz, hunt, margins, moves, verdict};
+pub use rows::{
+    CHOICES, Row, axes, choices, family, gains, given, goal, hertz, hunt, limiting, margins, moves, verdict,
+};
 
 use taut::case::{Case, Tuning};
 use taut::tune::Tuned;

@@ -19,7 +19,6 @@ pub fn page(work: &Work, text: &str, figures: &[(String, Figure)]) -> Page {
         (true, Judgement::Better) => (Callout::Holds, "The moves are better, and the limits hold"),
         (true, Judgement::Unchanged) => (Callout::Holds, "The gains of the file stay; the limits hold"),
     };
-    let worst = tuned.family.words(&tuned.after.corner);
     page.callout(kind, head, format!("{}. Over {}.", told::verdict(work), told::family(work)));
     if let Some(told) = told::given(work) {
         page.prose(told);
@@ -31,7 +30,8 @@ pub fn page(work: &Work, text: &str, figures: &[(String, Figure)]) -> Page {
     page.table(&rows(&told::margins(&tuned.before.nominal, &tuned.after.nominal)));
     page.subsection("At worst");
     page.table(&rows(&told::margins(&tuned.before.worst, &tuned.after.worst)));
-    page.prose(format!("Before: {}. After: {worst}.", tuned.family.words(&tuned.before.corner)));
+    let [before, after] = told::limiting(work);
+    page.prose(format!("Before on {before}, after on {after}."));
     for (_, figure) in figures.iter().take(LOOPS) {
         page.figure(figure);
     }
@@ -50,6 +50,13 @@ pub fn page(work: &Work, text: &str, figures: &[(String, Figure)]) -> Page {
         }
         page.table(&all);
     }
+    page.section("Axes");
+    let mut all =
+        Table::new("What is off on the axes that are worst in something.").column("Axis", "").column("Off", "");
+    for row in told::axes(work) {
+        all.row(row.map(Cell::from));
+    }
+    page.table(&all);
     page.section("Limit cycles at rest");
     page.table(&rows(&[("Hunting".into(), told::hunt(&tuned.before.hunt), told::hunt(&tuned.after.hunt))]));
     page.case("This text has the tuned gains.", "tuned.toml", text);

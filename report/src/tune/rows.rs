@@ -4,7 +4,7 @@ use super::Work;
 use std::f64::consts::PI;
 use taut::control::Deviation;
 use taut::number::engineering;
-use taut::tune::{AtWorst, Hunt, Judgement, Margins, MoveVerdict, Source};
+use taut::tune::{AtWorst, Corner, Hunt, Judgement, Margins, MoveVerdict, Source};
 
 /// A length in µm.
 fn length(metres: f64) -> String {
@@ -63,6 +63,40 @@ pub fn margins(before: &Margins, after: &Margins) -> Vec<Row> {
     rows.iter().map(|(name, shown)| (name.to_string(), shown(before), shown(after))).collect()
 }
 
+/// The number of an axis of the family, by which it is referred to; the words are in [`axes`].
+fn numbered(work: &Work, place: usize) -> String {
+    match place {
+        0 => "the axis of the file".into(),
+        place if place < work.tuned.family.machines.len() => format!("axis {place}"),
+        _ => "the worst corner".into(),
+    }
+}
+
+/// Its place in the family; behind all of them the worst corner.
+fn place(work: &Work, corner: &Corner) -> usize {
+    let machines = &work.tuned.family.machines;
+    machines.iter().position(|machine| machine == corner).unwrap_or(machines.len())
+}
+
+/// The axes on which margins are worst, before and after.
+pub fn limiting(work: &Work) -> [String; 2] {
+    [&work.tuned.before, &work.tuned.after].map(|verdict| numbered(work, place(work, &verdict.corner)))
+}
+
+/// Every axis that is referred to, with what is off on it; each once.
+pub fn axes(work: &Work) -> Vec<[String; 2]> {
+    let family = &work.tuned.family;
+    let mut all: Vec<(usize, &Corner)> = Vec::new();
+    for verdict in [&work.tuned.before, &work.tuned.after] {
+        all.push((place(work, &verdict.corner), &verdict.corner));
+        let erring = verdict.moves.iter().map(|one| one.at_worst.error.1);
+        all.extend(erring.map(|place| (place, family.machines.get(place).unwrap_or(&verdict.corner))));
+    }
+    all.sort_by_key(|(place, _)| *place);
+    all.dedup_by_key(|(place, _)| *place);
+    all.into_iter().map(|(place, corner)| [numbered(work, place), family.words(corner)]).collect()
+}
+
 /// The moves before and after.
 pub fn moves(work: &Work) -> Vec<Row> {
     let (before, after) = (&work.tuned.before.moves, &work.tuned.after.moves);
@@ -75,7 +109,9 @@ pub fn moves(work: &Work) -> Vec<Row> {
         row(&format!("{}: cart error", was.name), &|one| cart(&one.cart));
         row("  settles", &|one| settles(one.settling));
         row("  current", &|one| format!("{} rms", amperes(one.current)));
-        row("  at worst: cart error", &|one| length(one.worst.0));
+        row("  at worst: cart error", &|one| {
+            format!("{} on {}", length(one.worst.0), numbered(work, one.at_worst.error.1))
+        });
         row("  at worst: settles", &|one| settles(slowest(&one.at_worst)));
         row("  at worst: current", &|one| format!("{} rms", amperes(one.at_worst.current)));
         row("  axes that settle", &|one| format!("{} of {}", one.settled.0, one.settled.1));

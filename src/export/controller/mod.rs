@@ -5,10 +5,10 @@ mod forward;
 mod structure;
 
 use super::program::{Expr, Program, Relation, Test, number, variable};
-use crate::control::Standard;
 use crate::control::compensation::Rigid;
 use crate::control::filter::Biquad;
 use crate::control::observer::DisturbanceState;
+use crate::control::{Standard, reads_scale};
 use crate::design::{Design, Filter};
 use crate::error::{Error, Result};
 use crate::stage::Stage;
@@ -41,6 +41,10 @@ impl Target {
 pub(super) fn program(design: &Design, model: &Stage) -> Result<Program> {
     // Designs that `taut move` refuses are refused here.
     Standard::new(design, model)?;
+    if reads_scale(design, model) {
+        return Err(Error::new("this controller reads the scale beside the encoder, which programs have no input for")
+            .next("export it without [scale], or take the FMU, which has both sensors"));
+    }
     let mut p = Program::default();
     let now = Target::input(&mut p, "now", "where the cart should be at this sample");
     let ahead = Target::input(&mut p, "ahead", "where it should be when the command acts");

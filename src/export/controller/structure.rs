@@ -4,7 +4,7 @@
 use super::Target;
 use super::forward::Forward;
 use crate::control::model::{Linear, Quantity};
-use crate::control::state_feedback::{Parts, StateFeedbackState};
+use crate::control::state_feedback::{Law, StateFeedbackState};
 use crate::design::{Cascade, Design, Fuzzy, Pid, SlidingMode, Structure};
 use crate::error::{Error, Result};
 use crate::export::program::{Expr, Program, Relation, Test, number, variable};
@@ -19,7 +19,7 @@ const MOST_PENDING: usize = 64;
 pub(super) enum Core<'d> {
     Pid(&'d Pid, f64),
     Cascade(&'d Cascade, f64),
-    StateFeedback(Box<Parts>, Vec<Quantity>, f64),
+    StateFeedback(Box<Law>, Vec<Quantity>, f64),
     SlidingMode(&'d SlidingMode, f64, Mass),
     Fuzzy(&'d Fuzzy, f64),
 }
@@ -37,13 +37,13 @@ impl<'d> Core<'d> {
             Structure::Pid(gains) => Core::Pid(gains, every),
             Structure::Cascade(gains) => Core::Cascade(gains, every),
             Structure::StateFeedback(weights) => {
-                let parts = StateFeedbackState::new(weights, model, design)?.parts();
-                if parts.pending > MOST_PENDING {
-                    return Err(Error::new(format!("this controller keeps {} commands under way", parts.pending))
+                let law = StateFeedbackState::new(weights, model, design)?.law().clone();
+                if law.pending > MOST_PENDING {
+                    return Err(Error::new(format!("this controller keeps {} commands under way", law.pending))
                         .allowed(format!("up to {MOST_PENDING}"))
                         .next("take a longer sample time, or a shorter delay"));
                 }
-                Core::StateFeedback(Box::new(parts), Linear::of(model).states, model.pulley_radius)
+                Core::StateFeedback(Box::new(law), Linear::of(model).states, model.pulley_radius)
             }
             Structure::SlidingMode(gains) => {
                 let rigid = crate::control::compensation::Rigid::of(model);
@@ -82,8 +82,8 @@ impl<'d> Core<'d> {
                 }
                 cascade(p, gains, *every, target, (position, current), inner)
             }
-            Core::StateFeedback(parts, states, radius) => {
-                state_feedback(p, parts, (states, *radius), forward, now, position)
+            Core::StateFeedback(law, states, radius) => {
+                state_feedback(p, law, (states, *radius), forward, now, position)
             }
             Core::SlidingMode(gains, every, mass) => sliding(p, gains, *every, mass, target, position),
             Core::Fuzzy(rules, every) => fuzzy(p, rules, *every, target, position),
@@ -115,7 +115,7 @@ impl<'d> Core<'d> {
                     push(p, share / inner.proportional);
                 }
             }
-            Core::StateFeedback(parts, ..) => state_feedback_limited(p, parts, excess, effective),
+            Core::StateFeedback(law, ..) => state_feedback_limited(p, law, excess, effective),
             Core::SlidingMode(gains, every, mass) => {
                 if gains.integral > 0.0 {
                     let gain = gains.integral * gains.reaching / gains.boundary;
@@ -263,7 +263,7 @@ fn dot(weights: &[f64], of: impl Fn(usize) -> Expr) -> Expr {
 
 fn state_feedback(
     p: &mut Program,
-    parts: &Parts,
+    law: &Law,
     (states, r): (&[Quantity], f64),
     forward: &Forward,
     reference: &Target,
@@ -305,63 +305,63 @@ fn state_feedback(
         },
         |_| {},
     );
-    let measured: Vec<f64> = parts.measured.iter().copied().collect();
+    let measured: Vec<f64> = law.sensors[0].measured.iter().copied().collect();
     let surprise = p.local("innovation", position.clone() - dot(&measured, |i| estimate[i].clone()));
     for (i, estimate) in estimate.iter().enumerate().take(n) {
-        p.set(&format!("estimate{i}"), surprise.clone() * parts.kalman[i] + estimate.clone());
+        p.set(&format!("estimate{i}"), surprise.clone() * law.sensors[0].kalman[i] + estimate.clone());
     }
     let mut command = number(0.0);
     for i in 0..n {
-        let term = parts.gain[i] * (estimate[i].clone() - wanted[i].clone());
+        let term = law.gain[i] * (estimate[i].clone() - wanted[i].clone());
         // A sum that begins with nothing is the negative of its first term.
         command = if i == 0 { -term } else { command - term };
     }
-    for i in 0..parts.pending {
+    for i in 0..law.pending {
         let own = p.state(&format!("own{i}"), 0.0, "a command under way");
-        command = command - parts.gain[n + i] * &own;
+        command = command - law.gain[n + i] * &own;
     }
-    if parts.integral.is_some() {
+    if law.has_integral {
         let integral = p.state("integral", 0.0, "integral of the measured error, m s");
         p.state("integrated", 0.0, "its last part");
-        command = command - parts.gain[n + parts.pending] * &integral;
+        command = command - law.gain[n + law.pending] * &integral;
         let error = position.clone() - dot(&measured, |i| wanted[i].clone());
         let command = p.local("fed_back", command);
-        p.set("integrated", parts.every * error);
+        p.set("integrated", law.every * error);
         p.set("integral", integral + variable("integrated"));
         return command;
     }
     p.local("fed_back", command)
 }
 
-fn state_feedback_limited(p: &mut Program, parts: &Parts, excess: &Expr, effective: &Expr) {
-    let n = parts.phi.nrows();
-    if parts.integral.is_some() {
-        // A command that has no effect is not gathered.
+fn state_feedback_limited(p: &mut Program, law: &Law, excess: &Expr, effective: &Expr) {
+    let n = law.phi.nrows();
+    if law.has_integral {
+        // What has no effect is not gathered.
         let back = |p: &mut Program| p.set("integral", variable("integral") - variable("integrated"));
         p.when(Test(Relation::More, excess.clone(), number(0.0)), back, |p| {
             p.when(Test(Relation::Less, excess.clone(), number(0.0)), back, |_| {})
         });
     }
-    for i in (1..parts.pending).rev() {
+    for i in (1..law.pending).rev() {
         p.set(&format!("own{i}"), variable(&format!("own{}", i - 1)));
     }
-    if parts.pending > 0 {
+    if law.pending > 0 {
         p.set("own0", variable("fed_back") + excess.clone());
     }
     let given: Vec<Expr> =
-        (0..=parts.pending).map(|i| p.state(&format!("given{i}"), 0.0, "a command as the axis got it")).collect();
-    for i in (1..=parts.pending).rev() {
+        (0..=law.pending).map(|i| p.state(&format!("given{i}"), 0.0, "a command as the axis got it")).collect();
+    for i in (1..=law.pending).rev() {
         p.set(&format!("given{i}"), given[i - 1].clone());
     }
     p.set("given0", effective.clone());
     // x⁺ = Φ x + Γ₀ u_{k−d} + e^{A(T−ρ)} Γ(ρ) u_{k−d−1}
     for i in 0..n {
-        let product = (1..n).fold(parts.phi[(i, 0)] * &variable("estimate0"), |sum, j| {
-            parts.phi[(i, j)] * &variable(&format!("estimate{j}")) + sum
+        let product = (1..n).fold(law.phi[(i, 0)] * &variable("estimate0"), |sum, j| {
+            law.phi[(i, j)] * &variable(&format!("estimate{j}")) + sum
         });
-        let mut next = given[parts.lag].clone() * parts.now[i] + product;
-        if parts.lag < parts.pending {
-            next = given[parts.lag + 1].clone() * parts.before[i] + next;
+        let mut next = given[law.lag()].clone() * law.now[i] + product;
+        if law.lag() < law.pending {
+            next = given[law.lag() + 1].clone() * law.before[i] + next;
         }
         p.local(&format!("estimated{i}"), next);
     }

@@ -21,6 +21,9 @@ const SPREAD: usize = 16;
 const FINALISTS: usize = 3;
 const BARREN: usize = 6;
 
+/// How many times as large as the best a kind's mean relative error may be after its first points, and still be searched.
+const HOPEFUL: f64 = 1.6;
+
 /// First step of the evolution, in the logit of a share, and values that it may ask for: of every kind, and once more
 /// of the best.
 const SIGMA: f64 = 0.7;
@@ -148,8 +151,9 @@ pub(super) fn best(task: &Task, case: &Case, kinds: &[Kind], watch: &mut dyn FnM
     found.sort_by(|a, b| a.0.score.total_cmp(&b.0.score));
     for round in 0..2 {
         let count = if round == 0 { found.len() } else { 1 };
+        let least = found.first().map_or(f64::INFINITY, |(best, _)| best.score);
         for (alternative, point) in found.iter_mut().take(count) {
-            if (task.stop)() {
+            if (task.stop)() || alternative.score > HOPEFUL * least {
                 break;
             }
             let kind = alternative.shape.kind();

@@ -1,0 +1,171 @@
+//! Pairs of shapers: one behind the other, which convolves their impulses. What they leave of a vibration is the product
+//! of what each leaves, so that a pair takes two modes, or the two ends of what one mode goes through along the travel,
+//! where one shaper would have to be long to cover both.
+//!
+//! W. Singhose, E. Crain, W. Seering, "Convolved and simultaneous two-mode input shapers", *IEE Proceedings - Control
+//! Theory and Applications* 144 (1997) 515-520.
+
+use super::shaper::{Form, Pattern, Shaper, max_acceleration, smoothing};
+use super::shaping::{ALLOWED_SMOOTHING, Criterion, Target, score};
+
+/// Frequencies of each shaper that are tried, at equal ratios.
+const GRID: usize = 40;
+
+/// Halvings of the step by which the best pair is then moved.
+const HALVINGS: usize = 7;
+
+/// Pairs that are kept.
+const KEPT: usize = 3;
+
+/// Two shapers, convolved.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pair {
+    /// The one of the lower frequency first.
+    pub parts: [Shaper; 2],
+    /// Vibration that remains, of that without a shaper: 0 to 1, see [`Target::remaining`].
+    pub vibration: f64,
+    /// Smoothing at the criterion's corner, m.
+    pub smoothing: f64,
+    /// Greatest acceleration with at most [`ALLOWED_SMOOTHING`], m/s².
+    pub max_acceleration: f64,
+    /// The score, to be compared with that of single shapers: smaller is better.
+    pub score: f64,
+}
+
+impl Pair {
+    /// Time (s, from 0, ascending) and amplitude of each impulse; the amplitudes are positive and sum to 1.
+    pub fn impulses(&self) -> Vec<(f64, f64)> {
+        convolved(&self.parts[0], &self.parts[1])
+    }
+
+    /// Both names with their frequencies.
+    pub fn name(&self) -> String {
+        let one = |shaper: &Shaper| format!("{} at {:.1} Hz", shaper.form.name(), shaper.frequency);
+        format!("{} with {}", one(&self.parts[0]), one(&self.parts[1]))
+    }
+
+    /// The line for `[controller]` of a case file.
+    pub fn line(&self) -> String {
+        let one = |(t, a): &(f64, f64)| format!("[\"{} s\", {}]", digits(*t), digits(*a));
+        format!("shaper = [{}]", self.impulses().iter().map(one).collect::<Vec<_>>().join(", "))
+    }
+}
+
+/// Ten digits: amplitudes must add up to 1 to within a millionth.
+fn digits(value: f64) -> f64 {
+    format!("{value:.9e}").parse().unwrap_or(value)
+}
+
+/// The impulses of one shaper behind another.
+fn convolved(one: &Shaper, other: &Shaper) -> Vec<(f64, f64)> {
+    let of = |&(t, a): &(f64, f64)| other.impulses().iter().map(move |&(s, b)| (t + s, a * b));
+    let mut all: Vec<(f64, f64)> = one.impulses().iter().flat_map(of).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // Of two shapers alike impulses meet.
+    let near = 1e-9 * all.last().map_or(0.0, |last| last.0);
+    all.dedup_by(|next, before| {
+        let is_same = next.0 - before.0 <= near;
+        if is_same {
+            before.1 += next.1;
+        }
+        is_same
+    });
+    all
+}
+
+/// A form over its frequencies, with what it leaves wherever the target asks.
+struct Tabled {
+    pattern: Pattern,
+    shapers: Vec<(Shaper, Vec<f64>)>,
+}
+
+/// The best pair of each two forms, the best of all first.
+pub(super) fn pairs(target: Target, criterion: &Criterion) -> Vec<Pair> {
+    let tables: Vec<Tabled> = criterion.candidates.iter().filter_map(|form| table(target, criterion, *form)).collect();
+    let mut found: Vec<Pair> = Vec::new();
+    for (place, one) in tables.iter().enumerate() {
+        found.extend(tables[place..].iter().filter_map(|other| best(target, criterion, one, other)));
+    }
+    found.sort_by(|a, b| rank(a, criterion).total_cmp(&rank(b, criterion)));
+    found.truncate(KEPT);
+    found
+}
+
+/// Its score; behind all others what leaves more than is wanted, by what it leaves.
+fn rank(pair: &Pair, criterion: &Criterion) -> f64 {
+    let beyond = criterion.max_vibrations.map_or(0.0, |most| (pair.vibration - most).max(0.0));
+    pair.score + if beyond > 0.0 { 1e6 * (1.0 + beyond) } else { 0.0 }
+}
+
+fn table(target: Target, criterion: &Criterion, form: Form) -> Option<Tabled> {
+    let pattern = Pattern::new(form, criterion.firmware, criterion.damping).ok()?;
+    let grid = target.grid(form.kind());
+    let (low, high) = (*grid.first()?, *grid.last()?);
+    let shapers = (0..GRID).map(|k| {
+        let shaper = pattern.at(low * (high / low).powf(k as f64 / (GRID - 1) as f64));
+        let mut left = Vec::new();
+        target.weighed(&criterion.tested, &mut |f, zeta| {
+            left.push(shaper.residual_vibration(f, zeta));
+            0.0
+        });
+        (shaper, left)
+    });
+    let shapers = shapers.collect();
+    Some(Tabled { pattern, shapers })
+}
+
+/// Two shapers as a pair that leaves `vibration`; none if it smooths too much.
+fn pair(one: &Shaper, other: &Shaper, vibration: f64, criterion: &Criterion) -> Option<Pair> {
+    let impulses = convolved(one, other);
+    let smoothing = smoothing(&impulses, &criterion.corner);
+    if criterion.max_smoothing.is_some_and(|most| smoothing > most) {
+        return None;
+    }
+    let mut parts = [one.clone(), other.clone()];
+    parts.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
+    let max_acceleration = max_acceleration(&impulses, ALLOWED_SMOOTHING, criterion.corner.speed);
+    Some(Pair { parts, vibration, smoothing, max_acceleration, score: score(smoothing, vibration) })
+}
+
+/// The best pair of two forms: of a grid, then moved from there.
+fn best(target: Target, criterion: &Criterion, one: &Tabled, other: &Tabled) -> Option<Pair> {
+    let mut least: Option<(Pair, [f64; 2])> = None;
+    let is_better = |found: &Pair, least: &Option<(Pair, [f64; 2])>| {
+        least.as_ref().is_none_or(|(least, _)| rank(found, criterion) < rank(least, criterion))
+    };
+    for (a, left) in &one.shapers {
+        for (b, right) in &other.shapers {
+            let mut both = left.iter().zip(right).map(|(v, w)| v * w);
+            let vibration = target.weighed(&criterion.tested, &mut |_, _| both.next().unwrap_or(1.0));
+            if let Some(found) = pair(a, b, vibration, criterion).filter(|found| is_better(found, &least)) {
+                least = Some((found, [a.frequency, b.frequency]));
+            }
+        }
+    }
+    let mut at = least.as_ref()?.1;
+    let spread = |table: &Tabled| table.shapers[1].0.frequency / table.shapers[0].0.frequency;
+    let mut step = 0.5 * spread(one).max(spread(other)).ln();
+    let mut take = |at: [f64; 2]| {
+        let (a, b) = (one.pattern.at(at[0]), other.pattern.at(at[1]));
+        let mut left = |f: f64, zeta: f64| a.residual_vibration(f, zeta) * b.residual_vibration(f, zeta);
+        let vibration = target.weighed(&criterion.tested, &mut left);
+        let found = pair(&a, &b, vibration, criterion).filter(|found| is_better(found, &least))?;
+        least = Some((found, at));
+        Some(())
+    };
+    for _ in 0..HALVINGS {
+        let mut is_moved = true;
+        while is_moved {
+            is_moved = false;
+            for (part, way) in [(0, step), (0, -step), (1, step), (1, -step)] {
+                let mut next = at;
+                next[part] *= way.exp();
+                if take(next).is_some() {
+                    (at, is_moved) = (next, true);
+                }
+            }
+        }
+        step *= 0.5;
+    }
+    least.map(|(pair, _)| pair)
+}

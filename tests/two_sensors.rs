@@ -1,0 +1,199 @@
+//! An encoder at the motor and a scale at the cart, both in one loop.
+
+use nalgebra::Complex;
+use std::f64::consts::PI;
+use taut::case::Case;
+use taut::control::feedback::Feedback;
+use taut::control::{Controller, MoveRun, Observation, Setup, Standard, closed_loop, reads_scale};
+use taut::design::Design;
+use taut::measure::measure;
+use taut::signal::profile::Reference;
+use taut::solve::{Ending, Solver, simulate};
+use taut::stage::Measurement;
+use taut::tune::{Margins, Plant};
+
+const SCALE: &str = "scale={ lines = 1e9 }";
+const NO_FORWARD: &str = "controller.feed_forward={ model = \"none\" }";
+
+fn case(name: &str, changes: &[&str]) -> Case {
+    Case::read_with(format!("stages/sollmann-jouaneh/{name}.toml"), changes).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn run(case: &Case, place: usize, until: f64) -> MoveRun {
+    let motion = &case.moves[place];
+    closed_loop(&Setup {
+        stage: &case.stage,
+        model: &case.stage,
+        design: case.controller.as_ref().unwrap(),
+        profile: &motion.profile,
+        until,
+        window: motion.window,
+        solver: Solver::of(&case.stage),
+    })
+    .unwrap()
+}
+
+/// An encoder at the motor alone cannot see that a load holds the belt stretched: the cart stayed away by F/k for ever.
+#[test]
+fn a_scale_takes_away_the_stretch_that_the_motor_does_not_see() {
+    let changes = ["cart.load=-40", "cart.friction={ viscous = 19, coulomb = 0 }"];
+    let both = case("two-sensors/cascade", &changes);
+    let one = case("controllers/cascade", &[changes[0], changes[1], "controller.feed_forward={ model = \"elastic\" }"]);
+    assert!(reads_scale(both.controller.as_ref().unwrap(), &both.stage) && one.stage.scale.is_none());
+    // f = k₁ (y₁ − x) + k₂ k₃/(k₂ + k₃) (y₁ − x) = 40 N
+    let [k1, k2, k3] = one.stage.belt.stiffness;
+    let stretch = 40.0 / (k1 + k2 * k3 / (k2 + k3));
+    let [with, without] = [&both, &one].map(|case| run(case, 0, 3.0).figures.final_cart_error);
+    assert!((without.abs() / stretch - 1.0).abs() < 0.15, "{without} {stretch}");
+    // One count of the scale is 5 µm.
+    assert!(with.abs() < 10e-6 && with.abs() < 0.1 * without.abs(), "{with} {without}");
+}
+
+/// What a controller makes of sines at one of its two sensors is what its linear view says of that sensor.
+#[test]
+fn the_linear_view_has_both_sensors() {
+    for (name, changes) in [
+        ("cascade", vec!["controller.cascade.speed_integral=0"]),
+        ("cascade-current", vec!["controller.cascade.speed_integral=0", "controller.cascade.current.integral=0"]),
+        ("lqg", vec![]),
+        ("lqg", vec!["controller.delay=1.7 ms"]),
+        ("pid-observer", vec!["controller.disturbance_observer={ bandwidth = \"8 Hz\" }"]),
+    ] {
+        let all: Vec<&str> = changes.iter().copied().chain([NO_FORWARD, SCALE]).collect();
+        let case = case(&format!("controllers/{name}"), &all);
+        let design = Design { limit: None, ..case.controller.clone().unwrap() };
+        let feedback = Feedback::new(&design, &case.stage).unwrap();
+        for hertz in [4.0, 40.0, 170.0, 430.0] {
+            for at_cart in [false, true] {
+                let omega = 2.0 * PI * hertz;
+                let terms = feedback.at(omega);
+                let told = -if at_cart { terms.scale } else { terms.position } / terms.own;
+                let found = response(&case, &design, omega, at_cart);
+                let apart = (found - told).norm() / told.norm();
+                let bound = if design.disturbance_observer.is_some() { 2e-2 } else { 1e-6 };
+                assert!(told.norm() > 0.0 && apart < bound, "{name} {changes:?} {hertz} Hz {at_cart}: {found} {told}");
+            }
+        }
+    }
+}
+
+/// The command over the position at one sensor, while the other stands still.
+fn response(case: &Case, design: &Design, omega: f64, at_cart: bool) -> Complex<f64> {
+    let mut controller = Standard::new(design, &case.stage).unwrap();
+    // Whole periods: 1000 samples at 1 kHz and whole Hz.
+    let (n, from) = (1000, 4000);
+    let mut samples = Vec::new();
+    for k in 0..from + n {
+        let phase = omega * design.every * k as f64;
+        let swing = 1e-5 * phase.cos();
+        let [position, scale] = if at_cart { [0.0, swing] } else { [swing, 0.0] };
+        let at = Reference::default();
+        let time = design.every * k as f64;
+        let seen = Observation { time, reference: at, ahead: at, position, scale: Some(scale), current: 0.0 };
+        let command = controller.step(&seen);
+        controller.limited(command);
+        if k >= from {
+            samples.push((phase, swing, command));
+        }
+    }
+    // The loop around an observer's integrator drifts: a straight line is taken out.
+    let mean = |part: &[(f64, f64, f64)]| part.iter().map(|s| s.2).sum::<f64>() / part.len() as f64;
+    let slope = 2.0 * (mean(&samples[n / 2..]) - mean(&samples[..n / 2])) / n as f64;
+    let (mut sum, mut seen) = (Complex::new(0.0, 0.0), Complex::new(0.0, 0.0));
+    for (i, (phase, swing, command)) in samples.iter().enumerate() {
+        let turn = Complex::new(0.0, -phase).exp();
+        sum += turn * (command - slope * i as f64);
+        seen += turn * *swing;
+    }
+    sum / seen
+}
+
+/// Nyquist's criterion with the loop broken at the scale agrees with the loop run in time, on either side of the limit.
+#[test]
+fn stability_with_two_sensors_is_that_of_a_run() {
+    for name in ["cascade", "cascade-current", "lqi", "pid-observer"] {
+        let smooth = |body: &str, viscous: &str| format!("{body}.friction={{ viscous = \"{viscous}\", coulomb = 0 }}");
+        let [a, b, c] = [("cart", "19 N s/m"), ("drive_pulley", "1.6e-3 N m s"), ("idler_pulley", "1.6e-3 N m s")]
+            .map(|(body, viscous)| smooth(body, viscous));
+        let case = case(
+            &format!("controllers/{name}"),
+            &[&a, &b, &c, "encoder.lines=1e9", SCALE, "controller.limit=1e12", NO_FORWARD],
+        );
+        let design = case.controller.clone().unwrap();
+        let feedback = Feedback::new(&design, &case.stage).unwrap();
+        // The axis takes the command for more and more; the controller knows nothing of it.
+        let louder = |step: usize| {
+            let mut stage = case.stage.clone();
+            stage.amplifier.gain *= 1.2f64.powi(step as i32 - 12);
+            stage
+        };
+        let told = |step: usize| {
+            let plant = Plant::of(&louder(step), 0.0, &design, &feedback.corners()).unwrap();
+            Margins::of(&plant, &feedback).stable
+        };
+        let told: Vec<bool> = (0..30).map(told).collect();
+        let mut both = [0, 0];
+        // At the limit itself it grows and dies out too slowly to be seen.
+        for step in (1..29).step_by(3).filter(|&step| told[step - 1] == told[step + 1]) {
+            let motion = &case.moves[0];
+            let setup = Setup {
+                stage: &louder(step),
+                model: &case.stage,
+                design: &design,
+                profile: &motion.profile,
+                until: 12.0,
+                window: 1e-3,
+                solver: Solver::Exact,
+            };
+            let run = closed_loop(&setup).unwrap();
+            let calm = run.outcome.ending == Ending::Complete && run.figures.settling.is_some_and(|s| s < 9.0);
+            assert_eq!(told[step], calm, "{name} at step {step}: {:?} {told:?}", run.figures.cart);
+            both[usize::from(calm)] += 1;
+        }
+        assert!(both[1] > 0 && both[0] > 0, "{name}: {both:?}");
+    }
+}
+
+/// With both sensors the Kalman filter knows the cart better than with either: its estimate of a cart that a force
+/// holds off is the cart's place, where the motor's encoder alone has the belt stretched by what it believes.
+#[test]
+fn the_kalman_filter_weighs_both_sensors() {
+    let changes = ["cart.load=-40", "cart.friction={ viscous = 19, coulomb = 0 }"];
+    let one = case("controllers/lqi", &changes);
+    let both = case("controllers/lqi", &[changes[0], changes[1], "scale={ lines = 50000 }"]);
+    let [with, without] = [&both, &one].map(|case| run(case, 0, 2.0).figures.final_cart_error.abs());
+    assert!(with < 10e-6 && without > 3.0 * with, "{with} {without}");
+}
+
+/// The common motion of motor and cart has no belt in it: a disturbance observer of both sensors can be quicker than
+/// one that sees the motor swing.
+#[test]
+fn a_disturbance_observer_of_both_sensors_keeps_more_margin() {
+    let quick = "controller.disturbance_observer={ bandwidth = \"25 Hz\" }";
+    let peak = |changes: &[&str]| {
+        let case = case("controllers/pid-observer", changes);
+        let design = case.controller.clone().unwrap();
+        let feedback = Feedback::new(&design, &case.stage).unwrap();
+        let plant = Plant::of(&case.stage, 0.0, &design, &feedback.corners()).unwrap();
+        Margins::of(&plant, &feedback)
+    };
+    let softer = "controller.pid={ proportional = 1500, integral = 0, derivative = 5, filter = 200 }";
+    let [with, without] = [peak(&[quick, softer, SCALE]), peak(&[quick, softer])];
+    println!("{with:?}\n{without:?}");
+    assert!(with.stable && with.sensitivity < without.sensitivity, "{with:?} {without:?}");
+}
+
+/// A run shows the scale's counts beside the encoder's, and so does a recorder.
+#[test]
+fn counts_of_both_sensors_are_shown() {
+    let table = case("table4", &["encoder={ at = \"motor\", lines = 512 }", "scale={ counts = 200000 }"]);
+    assert_eq!(table.stage.scale.map(|scale| scale.lines), Some(50_000.0));
+    let experiment = &table.experiments[0];
+    let run = simulate(&table.stage, experiment, Solver::Exact).unwrap();
+    let [counts, cart] = ["scale_count", "cart_position"].map(|name| run.trajectory.get(name).unwrap());
+    assert!(cart.iter().any(|x| x.abs() > 0.01));
+    assert!(counts.iter().zip(cart).all(|(count, x)| *count == (x * 200_000.0).round()));
+    let log = measure(&table.stage, &Measurement::default(), experiment, Solver::Exact).unwrap().trajectory;
+    let recorded = log.get("scale_count").unwrap();
+    assert!(recorded.iter().any(|count| count.abs() > 2000.0) && log.get("encoder_count").is_some());
+}
