@@ -3,7 +3,10 @@
 The problem of `taut sweep`: the paper's machine (Table 4 with the rest of Table 2), all parameters by +-20 %, pulses of 5 V and 10 V for 0.25 s,
 1 s each with a row every millisecond; out come where the cart ends, its peak speed and the peak force in span 1. All on all processors.
 
-- taut: `examples/sweep.rs` on as many threads as there are processors, all 24 figures of a sweep.
+- taut: `examples/sweep.rs` on as many threads as there are processors, all 24 figures of a sweep, and three of them (`--figures`).
+- C in lanes (lanes.c): the same plain Runge-Kutta of fourth order as under Numba, written by hand for vectors: eight machines in the lanes of
+  AVX-512, or four in those of AVX2, ways along the belt, a batch ends when all of its machines rest; one process for each processor. It knows this
+  one axis with this one law of friction, has no events, takes the three figures from rows and nothing else, and its error is that of its step.
 - SciPy: `solve_ivp` with events (speed.py's own loop), multiprocessing.
 - CVODE in C (cvode.c) with root finding, one process for each processor, each the nominal machine at 5 V again and again: its parameters are
   constants of the program.
@@ -40,15 +43,20 @@ TARGET = 1e-6  # m
 TAUT = ["cargo", "run", "--quiet", "--release", "--package", "taut", "--no-default-features", "--example", "sweep", "--"]
 
 
-def by_taut():
+FIGURES = "final_cart_position,peak_cart_speed,peak_span1_force"
+TURNS = 5
+
+
+def by_taut(*figures, seconds=SECONDS):
     """Simulations a second."""
     runs = 1000
     while True:
-        out = subprocess.run([*TAUT, str(runs), str(PROCESSORS)], cwd=HERE.parent, capture_output=True, text=True, check=True).stdout
+        command = [*TAUT, str(runs), str(PROCESSORS), *figures]
+        out = subprocess.run(command, cwd=HERE.parent, capture_output=True, text=True, check=True).stdout
         told = json.loads(out)
-        if told["seconds"] > SECONDS / 2:
+        if told["seconds"] > seconds / 2:
             return told["simulations_per_second"]
-        runs = int(runs * max(2.0, SECONDS / max(told["seconds"], 0.01)))
+        runs = int(runs * max(2.0, seconds / max(told["seconds"], 0.01)))
 
 
 def error(rows, truth):
@@ -139,6 +147,51 @@ def by_cvode(truth):
         running = [subprocess.Popen(command, stdout=subprocess.DEVNULL, cwd=HERE.parent) for _ in range(PROCESSORS)]
         assert all(process.wait() == 0 for process in running)
         return f"CVODE {method} rtol {rtol:.1e}", off, PROCESSORS * count / (time.perf_counter() - begin)
+
+
+# --- C in lanes -----------------------------------------------------------------------------------------------------
+
+
+def lanes_rate(program, steps, seconds):
+    """Simulations a second of one process for each processor."""
+    commands = [[program, "rate", str(steps), str(seconds), str(seed)] for seed in range(PROCESSORS)]
+    running = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for command in commands]
+    told = [process.communicate()[0].split() for process in running]
+    return sum(int(done) / float(took) for done, took, _ in told)
+
+
+def by_lanes(truth, folder):
+    """Name, steps of a row that are near enough, error and program, for vectors of eight and of four numbers."""
+    has_512 = "avx512f" in Path("/proc/cpuinfo").read_text()
+    found = []
+    for lanes in (8, 4) if has_512 else (4,):
+        program = str(Path(folder) / f"lanes{lanes}")
+        options = ["-O3", "-march=native", "-ffast-math", "-Wno-psabi", f"-DLANES={lanes}"]
+        try:
+            subprocess.run(["gcc", *options, "-o", program, str(HERE / "lanes.c"), "-lm"], check=True)
+        except (OSError, subprocess.CalledProcessError):
+            return []
+        for steps in (2, 4, 8, 16, 32, 64):
+            out = subprocess.run([program, "rows", str(steps)], capture_output=True, check=True).stdout
+            off = error(np.frombuffer(out).reshape(1001, 3), truth)
+            if off < TARGET:
+                found.append((f"C, {lanes} lanes, {steps} steps a ms", steps, off, program))
+                break
+    return found
+
+
+def in_turns(truth):
+    """Taut with all figures and with three, and C in lanes: one after another, again and again; the middle of each one's rates."""
+    with tempfile.TemporaryDirectory() as folder:
+        lanes = by_lanes(truth, folder)
+        works = [("taut sweep, 24 figures", None, by_taut), ("taut sweep, 3 figures", None, lambda seconds: by_taut(FIGURES, seconds=seconds))]
+        for name, steps, off, program in lanes:
+            works.append((name, off, lambda seconds, program=program, steps=steps: lanes_rate(program, steps, seconds)))
+        rates = [[] for _ in works]
+        for _ in range(TURNS):
+            for rate_, (_, _, work) in zip(rates, works):
+                rate_.append(work(seconds=SECONDS / 3))
+        return [(name, off, float(np.median(rate_))) for (name, off, _), rate_ in zip(works, rates)]
 
 
 # --- Numba ----------------------------------------------------------------------------------------------------------
@@ -390,14 +443,23 @@ def by_diffrax(truth):
 
 def main():
     truth = speed.Problem("coulomb", 0.0)
-    mine = by_taut()
-    rivals = [by_scipy(truth), by_cvode(truth), *by_numba(truth), *by_mujoco(truth), *by_diffrax(truth)]
+    turns = in_turns(truth)
+    mine = turns[0][2]
+    others = "--turns" not in sys.argv[1:]
+    rivals = [by_scipy(truth), by_cvode(truth), *by_numba(truth), *by_mujoco(truth), *by_diffrax(truth)] if others else []
     lines = [f"{PROCESSORS} processors; position error at 5 V against authority B; simulations a second, and how many times fewer than taut's", ""]
-    lines.append(f"{'taut sweep':34} {'–':>10} {mine:10.0f}")
+    for name, off, rate_ in turns:
+        told = f"{'–':>10}" if off is None else f"{off:8.1e} m"
+        lines.append(f"{name:34} {told} {rate_:10.0f} {mine / rate_:9.2f}")
+    if len(turns) == 2:
+        lines.append("C in lanes: not measured (no compiler)")
     for rival in filter(None, rivals):
         name, off, rate_ = rival
         told = "not reached" if rate_ is None else f"{off:8.1e} m {rate_:10.1f} {mine / rate_:9.0f}"
         lines.append(f"{name:34} {told}")
+    if not others:
+        print("\n".join(lines))
+        return
     if rivals[1] is None:
         lines.append("CVODE: not measured (no compiler or no libsundials-dev, or no tolerance was near enough)")
     if numba is None:

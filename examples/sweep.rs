@@ -1,7 +1,8 @@
 //! Times the kernel of a sweep: the Table 4 machine, all of its parameters by ±20 %, 5 V and 10 V for 0.25 s, one
 //! simulated second at 1 kHz; prints JSON.
 //!
-//! `cargo run --release --package taut --example sweep [-- RUNS [THREADS]]`
+//! `cargo run --release --package taut --example sweep [-- RUNS [THREADS [FIGURES]]]`, figures as `--figures` of `taut sweep`
+//! takes them
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -19,7 +20,11 @@ fn main() -> Result<()> {
     let (runs, threads) = (number(1, 2000), number(2, 1));
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/stages/sollmann-jouaneh/table4.toml");
     let count = format!("sweep.runs={runs}");
-    let case = Case::read_with(file, &[&count, "sweep.design=sobol", "sweep.vary.all=20 %"])?;
+    let mut plan = vec![count, "sweep.design=sobol".to_string(), "sweep.vary.all=20 %".to_string()];
+    if let Some(figures) = std::env::args().nth(3) {
+        plan.push(format!("sweep.figures={:?}", figures.split(',').collect::<Vec<_>>()));
+    }
+    let case = Case::read_with(file, &plan.iter().map(String::as_str).collect::<Vec<_>>())?;
     let sweep = Sweep::new(&case)?;
     let (next, bits) = (AtomicU64::new(0), AtomicU64::new(0));
     let work = || loop {

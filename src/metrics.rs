@@ -14,7 +14,7 @@ pub use watch::{Sum, Watch, Watched};
 use crate::case::Experiment;
 use crate::friction::Motion;
 use crate::mechanism::{AmplifierMode, Mode, State};
-use crate::solve::{Curve, Event, Gap, Observe, QUANTITIES, reading};
+use crate::solve::{Curve, Event, Gap, Observe, QUANTITIES, Reading, reading};
 use crate::stage::Stage;
 use crate::stage::axis::{BODIES, CART, DRIVE, ROTOR};
 
@@ -29,6 +29,9 @@ const RESTING: f64 = 1e-6;
 
 /// The change of a steady speed that is allowed, relative to itself.
 const STEADY: f64 = 0.01;
+
+/// The share of that by which it may be off.
+const NEGLIGIBLE: f64 = 1e-7;
 
 /// The key figures of one run. SI units; r is the pulleys' pitch radius, φ₁ the drive pulley's angle, x the cart's
 /// position.
@@ -147,13 +150,28 @@ impl Peak {
 /// Quantities of a reading that peaks are sought of: the first ones.
 const PEAKS: usize = reading::CURRENT + 1;
 
-/// A bound that passes a peak by no more than this share of it is no reason to look closer.
-const NEWS: f64 = 1e-9;
+/// A bound that passes a peak by no more than this share of it is no reason to look closer: the peak is off by no more,
+/// and its time by the square root of that, as a share of the time in which the quantity bends.
+const NEWS: f64 = 1e-12;
+
+/// A figure, or some of them, that a [`Meter`] has to follow the motion for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sought {
+    /// The peak of a quantity, by its place in a [`reading`].
+    Peak(usize),
+    /// The steady speed.
+    SteadySpeed,
+    /// When everything came to rest.
+    StopTime,
+}
 
 /// Gathers [`Metrics`] from a run that it observes.
 #[derive(Debug, Clone)]
 pub struct Meter {
     stage: Stage,
+    /// The peaks that are sought, and whether the motion has to be followed at all.
+    sought: [bool; PEAKS],
+    follows: bool,
     /// The body that the motor's shaft turns with.
     shaft: usize,
     peaks: [Peak; PEAKS],
@@ -175,6 +193,8 @@ impl Meter {
     pub(crate) fn with(stage: &Stage, held: Option<Held>) -> Self {
         Self {
             stage: stage.clone(),
+            sought: [true; PEAKS],
+            follows: true,
             shaft: if stage.motor.gear_play.is_some() { ROTOR } else { DRIVE },
             peaks: [Peak::default(); PEAKS],
             seen: Metrics::default(),
@@ -182,6 +202,27 @@ impl Meter {
             moved: false,
             rotor: stage.motor.gear_play.map(|_| Rotor::new(reading::ROTOR_SPEED)),
         }
+    }
+
+    /// The same for these figures, and for what is known at the end: peaks and speeds that are not among them stay as
+    /// they are where nothing has moved, and cost nothing.
+    pub(crate) fn seeking(mut self, sought: &[Sought]) -> Self {
+        self.sought = std::array::from_fn(|q| sought.contains(&Sought::Peak(q)));
+        if !sought.contains(&Sought::SteadySpeed) {
+            self.plateau = None;
+        }
+        self.follows = !sought.is_empty() || self.rotor.is_some();
+        self
+    }
+
+    /// The magnitudes above which there is a peak of each quantity.
+    #[inline]
+    fn heights(&self) -> Reading {
+        let mut heights = [f64::INFINITY; QUANTITIES];
+        for ((height, peak), sought) in heights.iter_mut().zip(&self.peaks).zip(self.sought) {
+            *height = if sought { peak.value.abs() } else { f64::INFINITY };
+        }
+        heights
     }
 
     /// The metrics of the run that was observed and whose events these are.
@@ -215,14 +256,14 @@ impl Meter {
 impl Observe for Meter {
     fn pass(&mut self, gap: &Gap) -> bool {
         let end = gap.begin + gap.length;
-        let mut heights = [f64::INFINITY; QUANTITIES];
-        heights.iter_mut().zip(&self.peaks).for_each(|(height, peak)| *height = peak.value.abs());
-        let (news, mut closer) = gap.rises_above(&heights, 1.0 + NEWS);
+        let (news, mut closer) = gap.rises_above(&self.heights(), 1.0 + NEWS);
         if news {
-            for (q, peak) in self.peaks.iter_mut().enumerate() {
+            for (q, peak) in self.peaks.iter_mut().enumerate().filter(|(q, _)| self.sought[*q]) {
                 peak.take(gap.from[q], gap.begin);
                 peak.take(gap.to[q], end);
             }
+            // What its ends have told is no reason to look between them.
+            closer = gap.rises_above(&self.heights(), 1.0 + NEWS).1;
         }
         if let Some(plateau) = &mut self.plateau {
             closer |= plateau.pass(gap);
@@ -236,7 +277,7 @@ impl Observe for Meter {
 
     fn see(&mut self, curve: &Curve) {
         let (lows, highs) = curve.ranges();
-        for (q, peak) in self.peaks.iter_mut().enumerate() {
+        for (q, peak) in self.peaks.iter_mut().enumerate().filter(|(q, _)| self.sought[*q]) {
             if highs[q] > peak.value.abs() {
                 let (s, value) = curve.of(q).greatest(0.0, 1.0);
                 peak.take(value, curve.begin + s * curve.length);
@@ -252,6 +293,15 @@ impl Observe for Meter {
         if let Some(rotor) = &mut self.rotor {
             rotor.see(curve);
         }
+    }
+
+    fn follows(&self) -> bool {
+        self.follows
+    }
+
+    fn can_wait(&self) -> bool {
+        // When a rotor was last fast depends on how fast it had been by then.
+        self.rotor.is_none()
     }
 
     fn end(&mut self, time: f64, state: &State, mode: &Mode) {
@@ -390,7 +440,7 @@ impl Plateau {
             self.last = Some(to);
         }
         let (low, high) = gap.range(reading::CART_SPEED);
-        let news = NEWS * low.abs().max(high.abs());
+        let news = STEADY * NEGLIGIBLE * low.abs().max(high.abs());
         begin < self.late - self.near || low < self.range.0 - news || high > self.range.1 + news
     }
 

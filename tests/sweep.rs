@@ -56,6 +56,26 @@ fn rows_are_the_same_however_they_are_split() {
 }
 
 #[test]
+fn figures_that_are_asked_for_are_those_of_all() {
+    let changes = ["sweep.design=sobol", "sweep.runs=24", "sweep.vary.all=20 %"];
+    let all = rows(&sweep(&changes), 0, 24);
+    for names in [&["final_cart_position"][..], &["stop_time"], &["steady_speed", "peak_span1_force"]] {
+        let figures = format!("sweep.figures={names:?}");
+        let some = rows(&sweep(&[&changes[..], &[&figures]].concat()), 0, 24);
+        let of_experiments = some.columns.iter().skip(17).map(|column| column.name.split_once('.').unwrap().1);
+        let wanted: Vec<&str> = std::iter::once("status").chain(names.iter().copied()).collect();
+        assert_eq!(of_experiments.collect::<Vec<_>>(), [wanted.clone(), wanted].concat());
+        for column in &some.columns {
+            for (own, other) in column.values.iter().zip(all.get(&column.name).unwrap()) {
+                // A peak may be found along another way, to rounding; what is known at the end is the same to the bit.
+                let near = if column.name.contains("peak") { 2e-12 * other.abs() } else { 0.0 };
+                assert!((own - other).abs() <= near, "{}: {own} {other}", column.name);
+            }
+        }
+    }
+}
+
+#[test]
 fn what_lies_beyond_the_last_run_is_left_out() {
     let sweep = sweep(&["sweep.runs=10", "sweep.vary.\"cart.mass\"=5 %"]);
     assert_eq!((sweep.values(8, 5).len(), sweep.values(10, 5).len(), sweep.values(u64::MAX, 5).len()), (2, 0, 0));

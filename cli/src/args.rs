@@ -353,6 +353,9 @@ pub struct Sweep {
     /// Also compute Sobol' indices: N (k + 2) runs for k parameters
     #[arg(long)]
     pub indices: bool,
+    /// Figures to tell, by the names of their columns, separated by commas: others are not sought [default: all]
+    #[arg(long, value_name = "A,B,...", value_delimiter = ',')]
+    pub figures: Vec<String>,
     /// Interval between the rows of --trajectories; figures do not depend on it [default: the experiment's]
     #[arg(long, value_name = "TIME")]
     pub interval: Option<String>,

@@ -52,6 +52,28 @@ fn wait_for(child: &mut Child, folder: &Path, wanted: usize) {
 }
 
 #[test]
+fn figures_are_chosen_and_those_that_nothing_has_are_told() {
+    let folder = TempDir::new().unwrap();
+    let (case, sweep) = (stage("table4.toml"), ["--runs", "3", "--vary", "cart.mass=20%", "--out", "runs.csv"]);
+    let with = |figures: &'static str| [&[case.as_str(), "--figures", figures][..], &sweep].concat();
+    done(folder.path(), &with("peak_cart_speed, stop_time"));
+    let text = fs::read_to_string(folder.path().join("runs.csv")).unwrap();
+    assert_eq!(
+        text.lines().next(),
+        Some(
+            "run,cart.mass_kg,5-v-pulse.status,5-v-pulse.peak_cart_speed_m_s,5-v-pulse.stop_time_s,10-v-pulse.status,\
+             10-v-pulse.peak_cart_speed_m_s,10-v-pulse.stop_time_s"
+        )
+    );
+    let message = told(folder.path(), &with("peak_cart_sped"));
+    let expected = "nothing that is swept has a figure \"peak_cart_sped\"\n  next: leave figures out: the columns of the \
+                    result are named after all there are\n";
+    assert!(message.contains(expected), "{message}");
+    let message = told(folder.path(), &[&[case.as_str(), "--set", "sweep.figures=[]"][..], &sweep].concat());
+    assert!(message.contains("sweep.figures: the list is empty"), "{message}");
+}
+
+#[test]
 fn the_file_is_the_same_on_any_number_of_threads() {
     let folder = TempDir::new().unwrap();
     for ending in ["parquet", "csv"] {

@@ -55,11 +55,24 @@ def test_a_row_is_the_run_of_its_machine(case):
     assert table["5-v-pulse.final_cart_position"][3] == metrics["final_cart_position_m"]
 
 
+def test_figures_are_chosen(case):
+    table = case.sweep(4, vary=VARY, figures=["final_cart_position"])
+    figures = [name for name in table if name.startswith("5-v-pulse.")]
+    assert figures == ["5-v-pulse.status", "5-v-pulse.final_cart_position"]
+    whole = case.sweep(4, vary=VARY)
+    for name in table:
+        assert np.array_equal(table[name].view(np.uint64), whole[name].view(np.uint64)), name
+    with pytest.raises(taut.Error, match='nothing that is swept has a figure "final_cart_positon"'):
+        case.sweep(4, vary=VARY, figures=["final_cart_positon"])
+    with pytest.raises(TypeError, match="figures: a list of names is wanted, and no str"):
+        case.sweep(4, vary=VARY, figures="final_cart_position")
+
+
 def test_the_kernel_takes_any_runs_in_any_order(case):
     arrow = pytest.importorskip("pyarrow")
     from taut.sweeps import _planned, kernel
 
-    planned = _planned(case, 50, VARY, None, None, False, None)
+    planned = _planned(case, 50, VARY, None, None, False, None, None)
     whole = taut.sweep(planned).to_arrow()
     numbers = [7, 8, 9, 3, 49, 0]
     some = kernel(planned.text, "axis.toml", arrow.table({"run": numbers}))

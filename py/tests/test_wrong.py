@@ -481,7 +481,7 @@ def test_sweeps_with_nonsense(short):
         many = isinstance(value, (int, float)) and not isinstance(value, bool) and 1000 < value < 10**12
         if not many:
             allowed(lambda: short.sweep(value, vary=vary), told("sweep", value))
-        for option in "vary", "design", "seed", "indices", "interval", "threads", "client", "chunk":
+        for option in "vary", "design", "seed", "indices", "interval", "figures", "threads", "client", "chunk":
             # A row each nanosecond is long, and not wrong.
             if option == "interval" and isinstance(value, (int, float)) and 0 < value < 1e-4:
                 continue

@@ -28,6 +28,15 @@ pub struct Sweeping {
     pub from: Option<Origin>,
     /// Whether the runs are those that Sobol' indices need.
     pub indices: bool,
+    /// The figures that are told, by name; all where nothing is said.
+    pub figures: Option<Vec<String>>,
+}
+
+impl Sweeping {
+    /// Whether this figure is told.
+    pub fn tells(&self, name: &str) -> bool {
+        self.figures.as_ref().is_none_or(|figures| figures.iter().any(|figure| figure == name))
+    }
 }
 
 impl Default for Sweeping {
@@ -41,6 +50,7 @@ impl Default for Sweeping {
             vary: Vec::new(),
             from: None,
             indices: false,
+            figures: None,
         }
     }
 }
@@ -125,7 +135,7 @@ pub(super) struct Context<'a> {
 pub(super) fn sweeping(root: &Table, context: &Context) -> Result<Option<Sweeping>> {
     let Some(field) = root.optional("sweep") else { return Ok(None) };
     let table = field.table()?;
-    table.check_keys(&["design", "vary", "from", "indices"], &[])?;
+    table.check_keys(&["design", "vary", "from", "indices", "figures"], &[])?;
     let design = table.optional("design").map_or(Ok(Sampling::Random), |field| field.choice(&Sampling::ALL))?;
     let indices = table.optional("indices").map_or(Ok(false), |field| field.truth())?;
     let runs = table.number_if_given("runs")?.map(|runs| runs as u64);
@@ -172,7 +182,10 @@ pub(super) fn sweeping(root: &Table, context: &Context) -> Result<Option<Sweepin
                 .allowed(format!("up to {until} s, and no more than 1e9 rows")));
         }
     }
-    Ok(Some(Sweeping { runs, design, seed: table.seed()?, interval, vary, from, indices }))
+    let name = |field: &Field| field.text().map(str::to_string);
+    let names = |field: Field| field.filled_list()?.iter().map(name).collect::<Result<_>>();
+    let figures = table.optional("figures").map(names).transpose()?;
+    Ok(Some(Sweeping { runs, design, seed: table.seed()?, interval, vary, from, indices, figures }))
 }
 
 fn origin(field: &Field, context: &Context) -> Result<Origin> {

@@ -345,6 +345,7 @@ fn sweep() -> Value {
             ("vary", vary),
             ("from", json!({ "type": "string" })),
             ("indices", json!({ "type": "boolean" })),
+            ("figures", json!({ "type": "array", "items": { "type": "string" }, "minItems": 1 })),
         ],
     )
 }

@@ -1,7 +1,9 @@
 //! Parts that work piece by piece beside the bodies: amplifiers with limits, springs that only pull or only push. Each
 //! is linear in each of its states; the conditions that lead from one to the other are linear forms.
 
-use super::{AmplifierMode, Cause, Contact, Drive, Form, Guard, Limit, Mechanism, Mode, SPRINGS, SpringLaw, Switch};
+use super::{
+    AmplifierMode, Cause, Contact, Drive, Form, Guard, Limit, Mechanism, Mode, SPRINGS, Spring, SpringLaw, Switch,
+};
 use std::f64::consts::PI;
 
 impl Mechanism {
@@ -10,12 +12,16 @@ impl Mechanism {
     /// Back-EMF K_e n φ̇, of the drive pulley or of the rotor if it turns by itself.
     fn back_emf(&self, drive: usize) -> Form {
         let Drive { motor, shaft, .. } = &self.drives[drive];
-        Form::speed(*shaft) * (motor.back_emf_constant * motor.gear_ratio)
+        let mut emf = Form::ZERO;
+        emf.speed[*shaft] = motor.back_emf_constant * motor.gear_ratio;
+        emf
     }
 
     /// The command of the input: gain·u, V or A, before any limit.
     fn command(&self, drive: usize) -> Form {
-        Form::input(drive) * self.drives[drive].amplifier.gain
+        let mut command = Form::ZERO;
+        command.input[drive] = self.drives[drive].amplifier.gain;
+        command
     }
 
     /// The command of the input after the limit on it.
@@ -106,7 +112,7 @@ impl Mechanism {
     /// touches: f = k (s − s_side) + c ṡ.
     pub fn spring_force(&self, spring: usize, mode: &Mode) -> Form {
         let part = &self.springs[spring];
-        let whole = || Form::stretch(spring) * part.stiffness + self.stretch_rate(spring) * part.damping;
+        let whole = || self.pull(spring);
         match part.law {
             SpringLaw::TwoSided => whole(),
             SpringLaw::Tension { pretension } if mode.slack[spring] => Form::constant(-pretension),
@@ -121,6 +127,18 @@ impl Mechanism {
             }
             SpringLaw::Bounds { .. } | SpringLaw::None => Form::ZERO,
         }
+    }
+
+    /// k s + c ṡ of a spring.
+    fn pull(&self, spring: usize) -> Form {
+        let Spring { ref arms, stiffness, damping, .. } = self.springs[spring];
+        let mut pull = Form::ZERO;
+        pull.stretch[spring] = stiffness;
+        if damping != 0.0 {
+            arms.iter().for_each(|&(body, arm)| pull.speed[body] += arm);
+            pull.speed.iter_mut().for_each(|rate| *rate *= damping);
+        }
+        pull
     }
 
     /// How far a spring's length is beyond each of `[high, low]`, and what the flank there then pushes with.
@@ -159,8 +177,8 @@ impl Mechanism {
             match spring.law {
                 SpringLaw::Tension { pretension } => {
                     // Tension T₀ + k s + c ṡ: it only pulls.
-                    let taut = Form::stretch(index) * spring.stiffness + self.stretch_rate(index) * spring.damping;
-                    let tension = taut + Form::constant(pretension);
+                    let mut tension = self.pull(index);
+                    tension.constant += pretension;
                     let slack = mode.slack[index];
                     watch(if slack { -tension } else { tension }, Cause::Switch(Switch::Span(index, !slack)));
                 }

@@ -1,6 +1,6 @@
 //! The equations of motion of each mode, and what ends it.
 
-use super::{BODIES, Cause, Contact, DRIVES, Form, Guard, Mechanism, Mode, SPRINGS, SpringLaw, State};
+use super::{BODIES, Cause, Contact, DRIVES, Drive, Form, Guard, Mechanism, Mode, SPRINGS, SpringLaw, State};
 use crate::friction::{Motion, Side};
 
 /// The equations in one mode: accelerations, rates of currents, and what must stay true.
@@ -111,7 +111,8 @@ impl Mechanism {
                 load.subtract(arm, &forces[spring]);
             }
         }
-        load + Form::constant(self.bodies[body].force)
+        load.constant += self.bodies[body].force;
+        load
     }
 
     /// By what the torque of a spring on a body is multiplied: 1, but 1/e for a rotor behind a compliant gear and loses
@@ -187,17 +188,18 @@ impl Mechanism {
 
     /// Inertia that moves with a body, itself included, per unit of its own way.
     pub(crate) fn mass(&self, leader: usize, inertia: &[f64; BODIES]) -> f64 {
-        self.followers(leader).map(|b| self.ratio(b).powi(2) * inertia[b]).sum()
+        self.followers(leader).map(|b| self.ratio(b) * self.ratio(b) * inertia[b]).sum()
     }
 
     /// The equations that hold in `mode`, and the conditions under which they do.
     pub fn equations(&self, mode: Mode) -> Equations {
         let mut acceleration = [Form::ZERO; BODIES];
         let inertia = self.inertia(&mode);
-        let mut guards = Vec::with_capacity(7);
+        let mut guards = Vec::with_capacity(8);
+        // Where no gear loses power, what acts on a body at rest is the same whichever way it would go.
+        let loses = self.drives.iter().any(Drive::loses);
         let (forces, mut loads) = (self.forces(&mode), [Form::ZERO; BODIES]);
         for body in self.leaders() {
-            let speed = Form::speed(body);
             let motion = mode.motion[body];
             let law = self.friction(body);
             let load = self.load_by(&forces, body, motion != Motion::Backward, &mode);
@@ -205,33 +207,34 @@ impl Mechanism {
             let mass = self.mass(body, &inertia);
             // J φ̈ = load − F_f, with F_f = b v ± F_c                             (15)-(18)
             let sliding = |side: Side, sign: f64| {
-                (load - speed * side.viscous - Form::constant(sign * side.coulomb)) * (1.0 / mass)
+                let mut net = load;
+                net.speed[body] -= side.viscous;
+                net.constant -= sign * side.coulomb;
+                net * (1.0 / mass)
             };
             let own = match motion {
                 Motion::Free => sliding(law.forward, 0.0),
                 Motion::Forward => {
-                    guards.push(Guard { form: speed, cause: Cause::Stop(body) });
+                    guards.push(Guard { form: Form::speed(body), cause: Cause::Stop(body) });
                     sliding(law.forward, 1.0)
                 }
                 Motion::Backward => {
-                    guards.push(Guard { form: -speed, cause: Cause::Stop(body) });
+                    guards.push(Guard { form: -Form::speed(body), cause: Cause::Stop(body) });
                     sliding(law.backward, -1.0)
                 }
                 Motion::Stuck => {
-                    let back = self.load_by(&forces, body, false, &mode);
-                    guards.push(Guard {
-                        form: Form::constant(law.forward.breakaway) - load,
-                        cause: Cause::BreakForward(body),
-                    });
-                    guards.push(Guard {
-                        form: Form::constant(law.backward.breakaway) + back,
-                        cause: Cause::BreakBackward(body),
-                    });
+                    let (mut ahead, mut back) =
+                        (-load, if loses { self.load_by(&forces, body, false, &mode) } else { load });
+                    ahead.constant += law.forward.breakaway;
+                    back.constant += law.backward.breakaway;
+                    guards.push(Guard { form: ahead, cause: Cause::BreakForward(body) });
+                    guards.push(Guard { form: back, cause: Cause::BreakBackward(body) });
                     Form::ZERO
                 }
             };
             for follower in self.followers(body) {
-                acceleration[follower] = own * self.ratio(follower);
+                let ratio = self.ratio(follower);
+                acceleration[follower] = if ratio == 1.0 { own } else { own * ratio };
             }
         }
         for drive in (0..self.drives.len()).rev() {

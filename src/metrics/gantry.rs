@@ -135,6 +135,10 @@ impl Observe for GantryMeter {
         self.watch.see(curve);
     }
 
+    fn can_wait(&self) -> bool {
+        self.watch.can_wait()
+    }
+
     fn end(&mut self, time: f64, state: &State, mode: &Mode) {
         self.watch.end(time, state, mode);
     }

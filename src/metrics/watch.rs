@@ -128,6 +128,10 @@ impl Observe for Watch {
         }
     }
 
+    fn can_wait(&self) -> bool {
+        self.rotors.is_empty()
+    }
+
     fn end(&mut self, time: f64, state: &State, mode: &Mode) {
         (self.end, self.state) = (time, *state);
         let stuck = |body: usize| mode.motion[body] == Motion::Stuck && state.speed[body] == 0.0;

@@ -354,6 +354,17 @@ pub trait Observe {
     /// Takes what is in a gap that it wanted to see closer.
     fn see(&mut self, curve: &Curve);
 
+    /// Whether it wants to be shown the motion at all; if not, only the end is told.
+    fn follows(&self) -> bool {
+        true
+    }
+
+    /// Whether what it wants to see closer may be shown to it later, when it is asked once more: it seeks extremes, and
+    /// a later one may be greater.
+    fn can_wait(&self) -> bool {
+        false
+    }
+
     /// The run has ended, in this state.
     fn end(&mut self, time: f64, state: &State, mode: &Mode);
 }

@@ -237,6 +237,7 @@ impl<'a> Recorder<'a> {
                 mechanism: &self.mechanism,
                 sheets: &self.sheets,
                 segments: &self.segments,
+                stretches: &columns::stretches(&self.segments, &self.sheets, self.written),
                 extra: &self.extra,
                 written: self.written,
                 count: self.count,

@@ -1,12 +1,12 @@
 //! Sweeps of an axis: its experiments and its moves in closed loop.
 
-use super::measures::{Figure, OF_EXPERIMENT, OF_MOVE};
+use super::measures::{Figure, Measure, OF_EXPERIMENT, OF_MOVE};
 use super::{Group, put_figures};
-use crate::case::{Case, Experiment, Move};
+use crate::case::{Case, Experiment, Move, Sweeping};
 use crate::control::{self, MoveRun, Setup};
 use crate::design::Design;
 use crate::error::{Error, Result};
-use crate::metrics::{Held, Meter};
+use crate::metrics::{Held, Meter, Metrics, Sought};
 use crate::solve::{self, Bench, Flow, Outcome, Solver};
 use crate::stage::Stage;
 use crate::trajectory::Trajectory;
@@ -18,19 +18,26 @@ pub(super) struct Axis {
     experiments: Vec<Experiment>,
     moves: Vec<Move>,
     controller: Option<Design>,
+    /// The figures that are told of experiments and of moves, and what experiments are followed for.
+    of_experiment: Vec<&'static Measure<Metrics>>,
+    of_move: Vec<&'static Measure<MoveRun>>,
+    sought: Vec<Sought>,
 }
 
 impl Axis {
-    /// That of a case, with this interval between rows.
-    pub fn of(case: &Case, interval: Option<f64>) -> Self {
+    /// That of a case, as planned.
+    pub fn of(case: &Case, plan: &Sweeping) -> Self {
         let mut experiments = case.experiments.clone();
         for experiment in &mut experiments {
             // What was measured does not count here.
             experiment.log = None;
-            experiment.every = interval.unwrap_or(experiment.every);
+            experiment.every = plan.interval.unwrap_or(experiment.every);
         }
         let (stage, moves, controller) = (case.stage.clone(), case.moves.clone(), case.controller.clone());
-        Self { stage, experiments, moves, controller }
+        let of_experiment: Vec<_> = OF_EXPERIMENT.iter().filter(|measure| plan.tells(measure.name)).collect();
+        let of_move = OF_MOVE.iter().filter(|measure| plan.tells(measure.name)).collect();
+        let sought = of_experiment.iter().flat_map(|measure| measure.seeks).copied().collect();
+        Self { stage, experiments, moves, controller, of_experiment, of_move, sought }
     }
 
     /// The experiments and moves of each machine, and their figures.
@@ -39,13 +46,13 @@ impl Axis {
             name: experiment.name.clone(),
             file: experiment.file_name(),
             is_move: false,
-            figures: OF_EXPERIMENT.iter().map(Figure::of).collect(),
+            figures: self.of_experiment.iter().copied().map(Figure::of).collect(),
         });
         let moves = self.moves.iter().map(|motion| Group {
             name: motion.name.clone(),
             file: motion.file_name(),
             is_move: true,
-            figures: OF_MOVE.iter().map(Figure::of).collect(),
+            figures: self.of_move.iter().copied().map(Figure::of).collect(),
         });
         experiments.chain(moves).collect()
     }
@@ -113,14 +120,14 @@ impl<'a> Worker<'a> {
         let Self { axis, stage, bench, held } = self;
         let machine = bench.mount(stage);
         for (experiment, held) in axis.experiments.iter().zip(held) {
-            let mut meter = Meter::with(stage, *held);
+            let mut meter = Meter::with(stage, *held).seeking(&axis.sought);
             let outcome = machine.clone().and_then(|()| bench.observe(experiment, &mut meter));
             let told = outcome.map(|outcome| (outcome.ending, meter.finish(&outcome.events)));
-            put_figures(told, OF_EXPERIMENT, |measure, metrics| (measure.of)(metrics), values);
+            put_figures(told, &axis.of_experiment, |measure, metrics| (measure.of)(metrics), values);
         }
         for motion in &axis.moves {
             let told = machine.clone().and_then(|()| axis.close(stage, motion)).map(|run| (run.outcome.ending, run));
-            put_figures(told, OF_MOVE, |measure, run| (measure.of)(run), values);
+            put_figures(told, &axis.of_move, |measure, run| (measure.of)(run), values);
         }
     }
 }

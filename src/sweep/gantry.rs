@@ -2,7 +2,7 @@
 
 use super::measures::{OfPart, of_gantry};
 use super::{Group, put_figures};
-use crate::case::{GantryCase, GantryExperiment};
+use crate::case::{GantryCase, GantryExperiment, Sweeping};
 use crate::error::{Error, Result};
 use crate::metrics::{GantryMeter, GantryMetrics};
 use crate::parameter;
@@ -19,13 +19,15 @@ pub(super) struct Swept {
 }
 
 impl Swept {
-    /// That of a case, with this interval between rows.
-    pub fn of(case: &GantryCase, interval: Option<f64>) -> Self {
+    /// That of a case, as planned.
+    pub fn of(case: &GantryCase, plan: &Sweeping) -> Self {
         let mut experiments = case.experiments.clone();
         for experiment in &mut experiments {
-            experiment.every = interval.unwrap_or(experiment.every);
+            experiment.every = plan.interval.unwrap_or(experiment.every);
         }
-        Self { gantry: case.gantry.clone(), experiments, figures: of_gantry(&case.gantry.mechanism()) }
+        let mut figures = of_gantry(&case.gantry.mechanism());
+        figures.retain(|of_part| plan.tells(&of_part.figure.name));
+        Self { gantry: case.gantry.clone(), experiments, figures }
     }
 
     /// The experiments of each machine, and their figures.

@@ -3,7 +3,9 @@
 
 use crate::control::MoveRun;
 use crate::mechanism::{Drive, Label, Mechanism};
-use crate::metrics::{GantryMetrics, Metrics, Peak};
+use crate::metrics::Sought::{self, Peak, SteadySpeed, StopTime};
+use crate::metrics::{GantryMetrics, Metrics};
+use crate::solve::reading::{CART_SPEED, CURRENT, DRIVE_SPEED, FORCE, STRETCH};
 
 /// A key figure, as a column has it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -24,6 +26,7 @@ impl Figure {
 }
 
 /// A key figure, and how it is had from a run.
+#[derive(Debug)]
 pub struct Measure<T> {
     /// Its name, as a column.
     pub name: &'static str,
@@ -33,10 +36,17 @@ pub struct Measure<T> {
     pub words: &'static str,
     /// Its value; NaN where a run has none.
     pub of: fn(&T) -> f64,
+    /// What of the motion has to be followed for it.
+    pub seeks: &'static [Sought],
 }
 
 const fn row<T>(name: &'static str, unit: &'static str, words: &'static str, of: fn(&T) -> f64) -> Measure<T> {
-    Measure { name, unit, words, of }
+    Measure { name, unit, words, of, seeks: &[] }
+}
+
+/// The same, for which these are sought.
+const fn seeking<T>(seeks: &'static [Sought], measure: Measure<T>) -> Measure<T> {
+    Measure { seeks, ..measure }
 }
 
 /// Those of an experiment, in the order of the columns.
@@ -46,19 +56,19 @@ pub const OF_EXPERIMENT: &[Measure<Metrics>] = &[
     row("final_cart_position", "m", "cart position at the end", |m| m.final_cart_position),
     row("final_cart_speed", "m/s", "cart speed at the end", |m| m.final_cart_speed),
     row("final_drive_travel_minus_cart", "m", "drive travel minus cart at the end", |m| m.final_drive_travel - m.final_cart_position),
-    row("peak_cart_speed", "m/s", "peak cart speed", |m| m.peak_cart_speed.value.abs()),
-    row("peak_cart_speed_time", "s", "time of the peak cart speed", |m| m.peak_cart_speed.time),
-    row("peak_drive_speed", "m/s", "peak drive speed r φ₁′", |m| m.peak_drive_speed.value.abs()),
-    row("steady_speed", "m/s", "steady cart speed", |m| m.steady_speed.map_or(f64::NAN, |steady| steady.value)),
-    row("peak_span1_stretch", "m", "peak stretch of span 1", |m| m.peak_stretch[0].value.abs()),
-    row("peak_span2_stretch", "m", "peak stretch of span 2", |m| m.peak_stretch[1].value.abs()),
-    row("peak_span3_stretch", "m", "peak stretch of span 3", |m| m.peak_stretch[2].value.abs()),
-    row("peak_span1_force", "N", "peak force in span 1", |m| m.peak_force[0].value.abs()),
-    row("peak_span2_force", "N", "peak force in span 2", |m| m.peak_force[1].value.abs()),
-    row("peak_span3_force", "N", "peak force in span 3", |m| m.peak_force[2].value.abs()),
-    row("peak_belt_force", "N", "largest force in the belt", |m| magnitude(&m.peak_force)),
-    row("peak_motor_current", "A", "peak motor current", |m| m.peak_current.value.abs()),
-    row("stop_time", "s", "time of the last stop", |m| m.stop_time.unwrap_or(f64::NAN)),
+    seeking(&[Peak(CART_SPEED)], row("peak_cart_speed", "m/s", "peak cart speed", |m| m.peak_cart_speed.value.abs())),
+    seeking(&[Peak(CART_SPEED)], row("peak_cart_speed_time", "s", "time of the peak cart speed", |m| m.peak_cart_speed.time)),
+    seeking(&[Peak(DRIVE_SPEED)], row("peak_drive_speed", "m/s", "peak drive speed r φ₁′", |m| m.peak_drive_speed.value.abs())),
+    seeking(&[SteadySpeed], row("steady_speed", "m/s", "steady cart speed", |m| m.steady_speed.map_or(f64::NAN, |steady| steady.value))),
+    seeking(&[Peak(STRETCH)], row("peak_span1_stretch", "m", "peak stretch of span 1", |m| m.peak_stretch[0].value.abs())),
+    seeking(&[Peak(STRETCH + 1)], row("peak_span2_stretch", "m", "peak stretch of span 2", |m| m.peak_stretch[1].value.abs())),
+    seeking(&[Peak(STRETCH + 2)], row("peak_span3_stretch", "m", "peak stretch of span 3", |m| m.peak_stretch[2].value.abs())),
+    seeking(&[Peak(FORCE)], row("peak_span1_force", "N", "peak force in span 1", |m| m.peak_force[0].value.abs())),
+    seeking(&[Peak(FORCE + 1)], row("peak_span2_force", "N", "peak force in span 2", |m| m.peak_force[1].value.abs())),
+    seeking(&[Peak(FORCE + 2)], row("peak_span3_force", "N", "peak force in span 3", |m| m.peak_force[2].value.abs())),
+    seeking(&[Peak(FORCE), Peak(FORCE + 1), Peak(FORCE + 2)], row("peak_belt_force", "N", "largest force in the belt", |m| magnitude(&m.peak_force))),
+    seeking(&[Peak(CURRENT)], row("peak_motor_current", "A", "peak motor current", |m| m.peak_current.value.abs())),
+    seeking(&[StopTime], row("stop_time", "s", "time of the last stop", |m| m.stop_time.unwrap_or(f64::NAN))),
     row("settled", "", "at rest at the end", |m| f64::from(u8::from(m.settled))),
     row("drive_stops", "", "stops of the drive pulley", |m| m.events[0].stops as f64),
     row("drive_reversals", "", "reversals of the drive pulley", |m| m.events[0].reversals as f64),
@@ -142,6 +152,6 @@ pub fn of_gantry(mechanism: &Mechanism) -> Vec<OfPart> {
 }
 
 /// The largest of peaks, without its sign.
-fn magnitude(peaks: &[Peak]) -> f64 {
+fn magnitude(peaks: &[crate::metrics::Peak]) -> f64 {
     crate::metrics::largest(peaks).1.value.abs()
 }

@@ -2,7 +2,7 @@
 
 use super::distribution::ends;
 use super::points::Points;
-use super::{DIMENSIONS, Distribution, Draws, Parameter, Subject, Sweep, axis, gantry, headings};
+use super::{DIMENSIONS, Distribution, Draws, Group, Parameter, Subject, Sweep, axis, gantry, headings};
 use crate::case::{Case, GantryCase, Kinds, Known, Opened, Origin, Prior, Sampling, Sweeping, Variation};
 use crate::error::{Error, Result};
 use crate::fit;
@@ -22,7 +22,7 @@ impl Sweep {
             Some(Origin::Posterior(file)) => Some(Arc::new(draws(case, plan, file)?)),
             _ => None,
         };
-        Self::planned(Subject::Axis(axis::Axis::of(case, plan.interval)), plan, draws, &case.known)
+        Self::planned(Subject::Axis(axis::Axis::of(case, plan)), plan, draws, &case.known)
     }
 
     /// The sweep that a gantry's case describes. Errors: as [`Sweep::new`].
@@ -39,7 +39,7 @@ impl Sweep {
     /// ```
     pub fn of_gantry(case: &GantryCase) -> Result<Self> {
         let plan = planned(case.sweep.as_ref())?;
-        Self::planned(Subject::Gantry(gantry::Swept::of(case, plan.interval)), plan, None, &[])
+        Self::planned(Subject::Gantry(gantry::Swept::of(case, plan)), plan, None, &[])
     }
 
     /// The sweep that a case of either kind describes.
@@ -88,6 +88,7 @@ impl Sweep {
         };
         subject.check()?;
         let groups = subject.groups();
+        told(plan, &groups)?;
         let headings = headings(draws.as_deref(), &parameters, &groups);
         let (sampling, indices) = (plan.design, plan.indices);
         Ok(Self { subject, groups, parameters, draws, points, sampling, indices, runs, headings })
@@ -100,6 +101,16 @@ fn planned(plan: Option<&Sweeping>) -> Result<&Sweeping> {
         Error::new("this case does not say what is varied")
             .next("give for example --runs 1000 --vary cart.mass=20%, or add a table [sweep]")
     })
+}
+
+/// Refuses figures that none of these has.
+fn told(plan: &Sweeping, groups: &[Group]) -> Result<()> {
+    let is_told = |name: &str| groups.iter().flat_map(|group| &group.figures).any(|figure| figure.name == name);
+    match plan.figures.iter().flatten().find(|name| !is_told(name)) {
+        None => Ok(()),
+        Some(name) => Err(Error::new(format!("nothing that is swept has a figure \"{name}\""))
+            .next("leave figures out: the columns of the result are named after all there are")),
+    }
 }
 
 /// The keys that the plan names.

@@ -32,6 +32,22 @@ fn simulated(case: &GantryCase, experiment: usize) -> GantryMetrics {
 
 /// Each row, its numbers put into the case file by `--set` and simulated, bit for bit.
 #[test]
+fn figures_that_are_asked_for_are_those_of_all() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/stages/h-frame/h-frame.toml");
+    let rows = |more: &[&str]| {
+        let plan = ["sweep.runs=3", "sweep.vary.\"cart.mass\"=20 %"];
+        let case = GantryCase::read_with(file, &[&plan[..], more].concat()).unwrap();
+        Sweep::of_gantry(&case).unwrap().rows(0, 3, &|| false).unwrap()
+    };
+    let (all, some) = (rows(&[]), rows(&["sweep.figures=[\"peak_belt_force\"]"]));
+    let per_experiment = some.columns.iter().filter(|column| column.name.contains('.')).count();
+    assert_eq!(per_experiment % 2, 1, "the parameter, and of each experiment status and force");
+    for column in &some.columns {
+        assert_eq!(Some(&column.values[..]), all.get(&column.name), "{}", column.name);
+    }
+}
+
+#[test]
 fn a_row_is_the_run_of_its_machine() {
     let keys = [
         "cart.mass",

@@ -3,7 +3,8 @@
 //!
 //! Times depend on what else a machine does; instructions do not. valgrind runs `examples/counts.rs` and counts those
 //! of each work. It knows AVX2 and nothing wider. The counts hold for one compiler, which the file names; another one
-//! is told, and its counts are compared all the same.
+//! is told, and its counts are compared all the same. Counts that are kept go into the table of `docs/performance.md`,
+//! too.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -14,6 +15,9 @@ pub const USAGE: &str = "cargo xtask counts [--keep]";
 
 /// Where the counts are kept.
 const KEPT: &str = "benches/counts.txt";
+
+/// The document with a table of them.
+const DOCUMENT: &str = "docs/performance.md";
 
 /// A rise by more than this share is told.
 const RISE: f64 = 0.03;
@@ -39,6 +43,10 @@ pub fn run(words: &[&str]) -> Result<(), String> {
     }
     let rises = compare(&before.counts, &counts);
     if keep {
+        let document = root.join(DOCUMENT);
+        let text = fs::read_to_string(&document).map_err(|error| format!("{DOCUMENT} cannot be read: {error}"))?;
+        fs::write(&document, with_counts(&text, &counts))
+            .map_err(|error| format!("{DOCUMENT} cannot be written: {error}"))?;
         let text = Kept { compiler, counts: counts.into_iter().collect() }.text();
         return fs::write(&file, text).map_err(|error| format!("{KEPT} cannot be written: {error}"));
     }
@@ -111,6 +119,26 @@ fn compare(before: &BTreeMap<String, u64>, now: &[(String, u64)]) -> Vec<String>
     rises
 }
 
+/// The document with these counts in its rows of work, count before, count now and ratio.
+fn with_counts(document: &str, counts: &[(String, u64)]) -> String {
+    document.lines().map(|line| row(line, counts).unwrap_or_else(|| line.to_string()) + "\n").collect()
+}
+
+fn row(line: &str, counts: &[(String, u64)]) -> Option<String> {
+    let cells: Vec<&str> = line.split('|').map(str::trim).collect();
+    let ["", name, before, _, _, ""] = cells[..] else { return None };
+    let before: u64 = before.replace(' ', "").parse().ok()?;
+    let (_, now) = counts.iter().find(|(work, _)| name.trim_matches('`') == work)?;
+    Some(format!("| {name} | {} | {} | {:.2} |", grouped(before), grouped(*now), *now as f64 / before as f64))
+}
+
+/// A whole number with a space before every three digits.
+fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let (first, rest) = digits.split_at((digits.len() - 1) % 3 + 1);
+    rest.as_bytes().chunks(3).fold(first.to_string(), |text, three| text + " " + &String::from_utf8_lossy(three))
+}
+
 /// The counts that are kept.
 #[derive(Debug, Default, PartialEq)]
 struct Kept {
@@ -150,6 +178,14 @@ mod tests {
         let before = BTreeMap::from([("run".to_string(), 1000), ("sweep".to_string(), 1000)]);
         let now = [("run".to_string(), 1029), ("sweep".to_string(), 1031), ("new".to_string(), 5)];
         assert_eq!(compare(&before, &now), ["sweep by 3.1 %"]);
+    }
+
+    #[test]
+    fn the_table_of_the_document_takes_the_counts() {
+        let document = "| work | what it is |\n| `run` | Table 4 |\n| `run` | 931 991 | 654 326 | 0.70 |\ntext\n";
+        let expected = "| work | what it is |\n| `run` | Table 4 |\n| `run` | 931 991 | 465 995 | 0.50 |\ntext\n";
+        assert_eq!(with_counts(document, &[("run".to_string(), 465_995)]), expected);
+        assert_eq!([7, 999, 1000, 12_345_678].map(grouped), ["7", "999", "1 000", "12 345 678"]);
     }
 
     #[test]

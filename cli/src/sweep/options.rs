@@ -22,6 +22,8 @@ pub fn with_changes(args: &Args) -> Result<Common> {
     put("seed", args.seed.map(|seed| seed.to_string()));
     put("interval", args.interval.clone());
     put("indices", args.indices.then(|| "true".to_string()));
+    let figures = args.figures.iter().map(|name| format!("{:?}", name.trim())).collect::<Vec<_>>().join(", ");
+    put("figures", (!args.figures.is_empty()).then(|| format!("[{figures}]")));
     for vary in &args.vary {
         let wrong = || {
             Error::new(format!("\"{vary}\" does not say how something varies"))

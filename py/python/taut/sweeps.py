@@ -6,7 +6,7 @@ import json
 import os
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +36,7 @@ def sweep(
     seed: int | None = None,
     indices: bool = False,
     interval: str | float | None = None,
+    figures: Sequence[str] | None = None,
     threads: int = 0,
     client: Client | None = None,
     chunk: int | None = None,
@@ -45,13 +46,14 @@ def sweep(
     What is not said here is as in [sweep] of the case. ``vary`` says how parameters vary, as ``--vary`` of the command line
     does: ``{"cart.mass": "20 %", "motor.resistance": "normal(0.7 ohm, 0.02 ohm)"}``. ``design`` is ``random``,
     ``latin-hypercube``, ``sobol``, ``grid`` or ``one-at-a-time``, ``seed`` says which draws, ``interval`` (s) how far apart
-    the rows are that figures are taken from, ``indices`` makes the runs those that Sobol' indices need.
+    the rows are that figures are taken from, ``indices`` makes the runs those that Sobol' indices need. ``figures`` are the
+    names of those that are told, ``["peak_cart_speed", "stop_time"]``: others are not sought.
 
     Row ``i`` depends on the case and ``i`` alone: the result is the same to the last bit with any number of ``threads`` (0:
     one for each processor), and on the workers of a ``client`` of Dask, in tasks of ``chunk`` runs. A worker that is lost
     costs time, and no row.
     """
-    changed = _planned(case, n, vary, design, seed, indices, interval)
+    changed = _planned(case, n, vary, design, seed, indices, interval, figures)
     threads = _checks.whole("threads", threads, 0)
     if client is None:
         if chunk is not None:
@@ -73,11 +75,12 @@ def sweep_tables(
     seed: int | None = None,
     indices: bool = False,
     interval: str | float | None = None,
+    figures: Sequence[str] | None = None,
     client: Client,
     chunk: int | None = None,
 ) -> Iterator[pyarrow.Table]:
     """The same rows piece by piece in their order, as tables of Arrow: memory stays flat however many runs there are."""
-    return _tables(_planned(case, n, vary, design, seed, indices, interval), client, chunk)
+    return _tables(_planned(case, n, vary, design, seed, indices, interval, figures), client, chunk)
 
 
 def kernel(text: str, path: str, runs: pyarrow.Table) -> pyarrow.Table:
@@ -117,6 +120,7 @@ def _planned(
     seed: int | None,
     indices: bool,
     interval: str | float | None,
+    figures: Sequence[str] | None,
 ) -> Case:
     """The case with all of it in its text, as the command line does."""
     if not isinstance(getattr(case, "_native", None), _native.Case):
@@ -125,6 +129,10 @@ def _planned(
         raise TypeError(f"vary: a dictionary is wanted, and no {type(vary).__name__}")
     given = {"runs": n, "design": design, "seed": seed, "interval": interval, "indices": True if indices else None}
     changes = {f"sweep.{key}": value for key, value in given.items() if value is not None}
+    if figures is not None:
+        if isinstance(figures, str) or not isinstance(figures, Sequence):
+            raise TypeError(f"figures: a list of names is wanted, and no {type(figures).__name__}")
+        changes["sweep.figures"] = [_checks.text("figures", figure) for figure in figures]
     for key, how in (vary or {}).items():
         changes[f"sweep.vary.{json.dumps(_checks.text('vary', key), ensure_ascii=False)}"] = how
     return case.changed(changes) if changes else case

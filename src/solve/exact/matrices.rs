@@ -7,7 +7,7 @@ use crate::friction::Motion;
 use crate::mechanism::{BODIES, Cause, DRIVES, Form, Layout, Mechanism, Mode, ROUNDING, SPRINGS, State};
 use crate::signal::DEGREE;
 use crate::solve::propagator::{EXPONENTIAL_REACH, Matrix, SERIES_REACH, Series, series_order};
-use guards::{Beside, LANES, Lanes, Row, Values, lanes, side_by_side};
+use guards::{Beside, LANES, Lanes, Row, Values, side_by_side};
 pub(super) use guards::{Room, Watch};
 pub(super) use shown::Shown;
 use std::sync::{Arc, OnceLock};
@@ -77,6 +77,10 @@ impl Space {
     }
 }
 
+fn square(x: f64) -> f64 {
+    x * x
+}
+
 /// Growth rate, 1/s, that is put up with where a part that stores no energy has to be bounded: at least this, and about
 /// this share of an output interval.
 const GROWTH: f64 = 20.0;
@@ -95,11 +99,6 @@ pub(in crate::solve) struct Size {
 impl Size {
     pub(super) const ZERO: Size = Size { mechanical: 0.0, magnetic: 0.0 };
 
-    /// That of a rate `factor` times as large.
-    pub(super) fn times(self, factor: f64) -> Size {
-        Size { mechanical: self.mechanical * factor, magnetic: self.magnetic * factor }
-    }
-
     /// Of both parts together.
     fn whole(self) -> f64 {
         (self.mechanical * self.mechanical + self.magnetic * self.magnetic).sqrt()
@@ -115,7 +114,7 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     /// Whether one of them is the torque of a gear.
     pub(super) has_gear_torque: bool,
     /// The load on each body without its friction; none where a gear loses power, and it is another at rest.
-    load: Vec<Row<N>>,
+    load: Option<[Row<N>; BODIES]>,
     /// |b|: how fast √(2V) of ż can grow per unit of |u̇|.
     pub(super) forcing: [f64; DRIVES],
     /// A bound of ‖A‖, 1/s.
@@ -218,7 +217,7 @@ impl<const N: usize> ModeMatrices<N> {
         let inertia = mechanism.balanced_inertia(&equations, mode);
         let (mut magnetic, mut growth, mut decays, mut coupled) = ([0.0; DRIVES], 0.0, 0.0, false);
         for (index, drive) in mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.has_current_state()) {
-            let moved: f64 = (0..BODIES).map(|j| inertia[j] * equations.acceleration[j].current[index].powi(2)).sum();
+            let moved: f64 = (0..BODIES).map(|j| inertia[j] * square(equations.acceleration[j].current[index])).sum();
             let moves = equations.acceleration[drive.shaft].current[index];
             let own = &equations.current_rate[index];
             let (decay, back) = (-own.current[index], -own.speed[drive.shaft]);
@@ -269,13 +268,13 @@ impl<const N: usize> ModeMatrices<N> {
             let magnetic = currents.fold(0.0, |sum: f64, (current, weight)| sum.hypot(current.abs() / weight.sqrt()));
             Size { mechanical: sum.sqrt() * (1.0 + 1e-9), magnetic: magnetic * (1.0 + 1e-9) }
         };
-        let rows: Vec<[f64; N]> = equations.guards.iter().map(|guard| row_of(&guard.form)).collect();
-        let guards = rows.iter().zip(&equations.guards).map(|(row, guard)| Watch::new(row, guard.cause)).collect();
-        let none = [0.0; LANES];
-        let side = |rows| Beside { rows, mechanical: none, magnetic: none, at_once: [none; DRIVES] };
-        let mut beside: Vec<Beside<N>> = lanes(&rows).map(side).collect();
+        let mut guards = Vec::with_capacity(equations.guards.len());
+        let mut beside = vec![Beside::NONE; equations.guards.len().div_ceil(LANES)];
         for (index, guard) in equations.guards.iter().enumerate() {
+            let row = row_of(&guard.form);
+            guards.push(Watch::new(&row, guard.cause));
             let (dual, beside, lane) = (dual(&guard.form), &mut beside[index / LANES], index % LANES);
+            beside.rows.iter_mut().zip(&row).for_each(|(place, weight)| place[lane] = *weight);
             // Motion and current pass energy to each other: only their sum is bounded.
             (beside.mechanical[lane], beside.magnetic[lane]) = match coupled {
                 true => (dual.whole(), 0.0),
@@ -284,13 +283,15 @@ impl<const N: usize> ModeMatrices<N> {
             (0..DRIVES).for_each(|drive| beside.at_once[drive][lane] = guard.form.input[drive].abs());
         }
         let loses = mechanism.drives.iter().any(|drive| drive.loses());
-        let load = match loses {
-            true => Vec::new(),
-            false => (0..layout.bodies()).map(|body| Row::new(&row_of(&equations.load[body]))).collect(),
-        };
+        let load = (!loses).then(|| {
+            let mut load = [Row::NONE; BODIES];
+            let bodies = load.iter_mut().zip(&equations.load).take(layout.bodies());
+            bodies.for_each(|(row, load)| *row = Row::new(&row_of(load)));
+            load
+        });
         let forcing = std::array::from_fn(|drive| {
-            let push: f64 = (0..BODIES).map(|j| inertia[j] * equations.acceleration[j].input[drive].powi(2)).sum();
-            (push + magnetic[drive] * equations.current_rate[drive].input[drive].powi(2)).sqrt()
+            let push: f64 = (0..BODIES).map(|j| inertia[j] * square(equations.acceleration[j].input[drive])).sum();
+            (push + magnetic[drive] * square(equations.current_rate[drive].input[drive])).sqrt()
         });
 
         // ‖A‖ in the norm of V, from above: stiffness by its Frobenius norm, then all that damps by its trace.
@@ -310,16 +311,24 @@ impl<const N: usize> ModeMatrices<N> {
         let (coarsest, finest) = (halvings(SERIES_REACH), halvings(EXPONENTIAL_REACH));
 
         // 2V = Σ m a² + Σ k ṡ² + Σ w (di/dt)²
-        let mut energy: Vec<[f64; N]> = Vec::with_capacity(LANES);
+        let mut energy: Vec<Lanes<N>> = Vec::with_capacity(2);
+        let mut lane = LANES;
+        let mut next = |energy: &mut Vec<Lanes<N>>| {
+            lane += 1;
+            if lane >= LANES {
+                energy.push([[0.0; LANES]; N]);
+                lane = 0;
+            }
+            lane
+        };
         for body in (0..layout.bodies()).filter(|&body| !stuck[body]) {
-            let mut row = [0.0; N];
-            row[layout.speed[body]] = inertia[body].sqrt();
-            energy.push(row);
+            let lane = next(&mut energy);
+            energy.last_mut().expect("just begun")[layout.speed[body]][lane] = inertia[body].sqrt();
         }
         for spring in (0..mechanism.springs.len()).filter(|&spring| stiffness[spring] > 0.0 && !at_rest[spring]) {
-            let mut row = [0.0; N];
-            layout.weights(spring).for_each(|(body, w)| row[layout.coordinate[body]] = stiffness[spring].sqrt() * w);
-            energy.push(row);
+            let (lane, root) = (next(&mut energy), stiffness[spring].sqrt());
+            let forms = energy.last_mut().expect("just begun");
+            layout.weights(spring).for_each(|(body, w)| forms[layout.coordinate[body]][lane] = root * w);
         }
         let mut magnetic_places = [(0, 0.0); DRIVES];
         for (drive, place) in magnetic_places.iter_mut().enumerate() {
@@ -343,7 +352,7 @@ impl<const N: usize> ModeMatrices<N> {
             growth,
             inertia,
             stiffness,
-            energy: lanes(&energy).collect(),
+            energy,
             magnetic: magnetic_places,
             is_magnetic: magnetic_places.iter().any(|(_, weight)| *weight > 0.0),
             weight_of_current: magnetic,
@@ -441,16 +450,21 @@ impl<const N: usize> ModeMatrices<N> {
         self.forcing.iter().zip(rate).fold(0.0, |sum, (forcing, rate)| sum + forcing * rate)
     }
 
+    /// A size and what the inputs add to it, as the weights of forms part them.
+    #[inline(always)]
+    fn parted(&self, size: Size, push: f64) -> (f64, f64) {
+        match (self.coupled, self.is_magnetic) {
+            (true, _) => (size.whole() + push, 0.0),
+            (false, true) => (size.mechanical, size.magnetic + push),
+            (false, false) => (size.mechanical + push, size.magnetic),
+        }
+    }
+
     /// How fast the guards can change while ż has at most this size times `grow`, the inputs add at most `push` to it,
     /// and change at most at this rate.
     #[inline]
     pub(super) fn steepness(&self, (size, push): (Size, f64), grow: f64, rate: &[f64; DRIVES], steepness: &mut Values) {
-        // As `Size` parts them.
-        let (mechanical, magnetic) = match (self.coupled, self.is_magnetic) {
-            (true, _) => (size.whole() + push, 0.0),
-            (false, true) => (size.mechanical, size.magnetic + push),
-            (false, false) => (size.mechanical + push, size.magnetic),
-        };
+        let (mechanical, magnetic) = self.parted(size, push);
         let (mechanical, magnetic) = (grow * mechanical, grow * magnetic);
         for (steepness, beside) in steepness.as_chunks_mut().0.iter_mut().zip(&self.beside) {
             let mut sum = [0.0; LANES];
@@ -466,7 +480,7 @@ impl<const N: usize> ModeMatrices<N> {
 
     /// The load on a body without its friction, where no gear loses power.
     pub(super) fn load(&self, body: usize) -> Option<&Row<N>> {
-        self.load.get(body)
+        self.load.as_ref().map(|load| &load[body])
     }
 
     /// Current of a drive, made ready when it is first wanted.

@@ -105,8 +105,26 @@ pub(super) struct Common {
 enum Bound<const N: usize> {
     /// No guard falls; here is the end, if it was computed.
     Safe(Option<[f64; N]>),
-    /// Look closer.
-    Unsure,
+    /// Look closer at these.
+    Unsure(Lanes),
+}
+
+/// Guards by their numbers: one bit for each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Lanes(u64);
+
+impl Lanes {
+    const NONE: Self = Self(0);
+
+    fn set(&mut self, lane: usize, is_in: bool) {
+        self.0 |= u64::from(is_in) << lane;
+    }
+
+    fn numbers(self) -> impl Iterator<Item = usize> {
+        std::iter::successors(Some(self.0), |left| Some(left & left.wrapping_sub(1)))
+            .take_while(|left| *left != 0)
+            .map(|left| left.trailing_zeros() as usize)
+    }
 }
 
 impl Common {
@@ -397,7 +415,7 @@ impl<const N: usize> Core<N> {
         if !looked {
             self.look(law);
         }
-        match self.bound(law, length, Some(level)) {
+        match self.bound(law, length, level) {
             Bound::Safe(end) => {
                 match end {
                     Some(end) => self.z = end,
@@ -407,10 +425,10 @@ impl<const N: usize> Core<N> {
                 self.move_on(length);
                 None
             }
-            Bound::Unsure if level < law.coarsest => {
+            Bound::Unsure(_) if level < law.coarsest => {
                 self.cross_interval(law, level + 1, true).or_else(|| self.cross_interval(law, level + 1, false))
             }
-            Bound::Unsure => self.advance_by_series(law, length, true),
+            Bound::Unsure(open) => self.advance_by_series_of(law, length, open),
         }
     }
 
@@ -435,67 +453,77 @@ impl<const N: usize> Core<N> {
     }
 
     /// Decides by the last look, if it can, that no guard falls within `length`.
-    fn bound(&mut self, law: &ModeMatrices<N>, length: f64, level: Option<usize>) -> Bound<N> {
+    fn bound(&mut self, law: &ModeMatrices<N>, length: f64, level: usize) -> Bound<N> {
         if law.guards.is_empty() {
             return Bound::Safe(None);
         }
         self.common.cost.looks += 1;
+        let (unsure, falling) = self.undecided(law, length);
+        match (unsure, falling) {
+            (Lanes::NONE, Lanes::NONE) => Bound::Safe(None),
+            (Lanes::NONE, falling) => {
+                // What falls all the way has not fallen through if it is still positive at the end.
+                let mut end = self.z;
+                law.step(level).advance(&mut end);
+                let value = &mut self.room.slope;
+                law.values(&end, value);
+                match value.iter().take(law.guards.len()).all(|&value| value > 0.0) {
+                    true => Bound::Safe(Some(end)),
+                    false => Bound::Unsure(falling),
+                }
+            }
+            (Lanes(unsure), Lanes(falling)) => Bound::Unsure(Lanes(unsure | falling)),
+        }
+    }
+
+    /// The guards of which the last look does not say that they stay within `length`; and those among the others that
+    /// fall all the way.
+    fn undecided(&mut self, law: &ModeMatrices<N>, length: f64) -> (Lanes, Lanes) {
+        let (mut open, mut falling) = (Lanes::NONE, Lanes::NONE);
         let grow = law.growth_over(length);
         let (input_rate, curvature) = (&self.common.input_rate, &self.common.input_curvature);
         let Room { rate, size, value, steepness, slope, bend, .. } = &mut *self.room;
         law.steepness((*size, law.push(input_rate) * length), grow, input_rate, steepness);
-        let undecided = |lane: usize| {
-            let (g, steepness) = (value[lane], steepness[lane]);
-            !(g > steepness * length || (g >= 0.0 && steepness == 0.0))
-        };
-        let guards = 0..law.guards.len();
-        let Some(first) = guards.clone().find(|&lane| undecided(lane)) else { return Bound::Safe(None) };
+        for (lane, (g, steepness)) in value.iter().zip(&*steepness).enumerate().take(law.guards.len()) {
+            open.set(lane, !(*g > steepness * length || (*g >= 0.0 && *steepness == 0.0)));
+        }
+        if open == Lanes::NONE {
+            return (open, falling);
+        }
 
         // The same one derivative higher: its guards are the slopes.
         let (_, size) = law.look(rate, slope);
         law.steepness((size, law.push(curvature) * length), grow, curvature, bend);
-        let mut falling = false;
-        for lane in (first..guards.end).filter(|&lane| undecided(lane)) {
+        let mut unsure = Lanes::NONE;
+        for lane in open.numbers() {
             let (g, slope, bend) = (value[lane], slope[lane], bend[lane]);
             // g(τ) ≥ g + ġ τ − |g̈| τ²/2
             let stays = g >= 0.0 && g + slope.min(0.0) * length - 0.5 * bend * length * length > 0.0;
             let rises = g >= 0.0 && slope > bend * length;
             let falls = g > 0.0 && slope < -bend * length;
-            match (stays || rises, falls) {
-                (true, _) => {}
-                (false, true) => falling = true,
-                (false, false) => return Bound::Unsure,
-            }
+            falling.set(lane, falls && !(stays || rises));
+            unsure.set(lane, !(stays || rises || falls));
         }
-        let Some(level) = level.filter(|_| falling) else { return Bound::Safe(None) };
-        // What falls all the way has not fallen through if it is still positive at the end.
-        let mut end = self.z;
-        law.step(level).advance(&mut end);
-        law.values(&end, slope);
-        if guards.into_iter().all(|lane| slope[lane] > 0.0) { Bound::Safe(Some(end)) } else { Bound::Unsure }
+        (unsure, falling)
     }
 
     /// Advances by a `distance` within the reach of the Taylor series, to the first guard that falls.
     fn advance_by_series(&mut self, law: &ModeMatrices<N>, distance: f64, looked: bool) -> Option<Cause> {
-        self.common.cost.series += 1;
         if !looked {
             self.look(law);
         }
+        let (Lanes(unsure), Lanes(falling)) = self.undecided(law, distance);
+        self.advance_by_series_of(law, distance, Lanes(unsure | falling))
+    }
+
+    /// The same, where no guards but these can fall.
+    fn advance_by_series_of(&mut self, law: &ModeMatrices<N>, distance: f64, open: Lanes) -> Option<Cause> {
+        self.common.cost.series += 1;
         law.series(&self.z, distance, &mut self.room.series);
         let mut first: Option<(f64, Cause)> = None;
-        // Most guards are too far away to fall, as in `bound`.
-        let rate = self.common.input_rate;
-        let Room { size, value, steepness, series, coefficients, .. } = &mut *self.room;
-        law.steepness(
-            (size.times(distance), law.push(&rate) * distance * distance),
-            law.growth_over(distance),
-            &rate.map(|rate| rate * distance),
-            steepness,
-        );
-        for (lane, guard) in law.guards.iter().enumerate() {
-            if value[lane] > steepness[lane] {
-                continue;
-            }
+        let Room { value, series, coefficients, .. } = &mut *self.room;
+        for lane in open.numbers() {
+            let guard = &law.guards[lane];
             let coefficients = guard.row.along(series, coefficients);
             coefficients[0] = value[lane];
             let mut order = self.common.fresh_order(guard.cause);

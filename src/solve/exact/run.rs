@@ -24,7 +24,7 @@ pub(in crate::solve) struct Run<'a, const N: usize> {
     /// The row where it stands, or that it has passed last.
     row: u64,
     pub(super) recorder: Recorder<'a>,
-    pub(super) watching: Watching,
+    pub(super) watching: Watching<N>,
     known: Known,
 }
 
@@ -43,7 +43,8 @@ impl<'a, const N: usize> Run<'a, N> {
         let inputs = |drive| space.chain(drive, 0);
         let recorder = Recorder::new(&seen, &space.layout, (N, &inputs), grid, output);
         let core = Core::new(seen, Arc::new(space), &start.state, (grid.interval(), grid.end()), list);
-        Self { core, grid, row: 0, recorder, watching: Watching::new(), known }
+        let watching = Watching::new(recorder.observer.as_deref());
+        Self { core, grid, row: 0, recorder, watching, known }
     }
 
     /// The row at or before `time` and how far behind it; next to a row means on it.
@@ -236,7 +237,7 @@ impl<'a, const N: usize> Run<'a, N> {
     }
 
     /// Goes so many intervals on, puts out all rows on the way but the last, and shows the way.
-    fn pass_rows(&mut self, law: &ModeMatrices<N>, intervals: u64, bow: &mut Reading) {
+    fn pass_rows(&mut self, law: &Arc<ModeMatrices<N>>, intervals: u64, bow: &mut Reading) {
         let (step, h) = (law.step(0), self.grid.interval());
         let mut closer = 0;
         for j in 0..intervals {

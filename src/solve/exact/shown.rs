@@ -3,7 +3,7 @@
 use super::matrices::Shown;
 use super::{ModeMatrices, Run};
 use crate::mechanism::Cause;
-use crate::solve::observe::{Curve, Gap, QUANTITIES, Reading};
+use crate::solve::observe::{Curve, Gap, Observe, QUANTITIES, Reading};
 use std::sync::Arc;
 
 /// The error of a curve that is allowed in the middle, as a share of the largest value seen of that quantity.
@@ -22,6 +22,9 @@ const SAME: f64 = 1e-10;
 /// Curves in a row that are right before longer ones are tried.
 const RIGHT: u32 = 32;
 
+/// Gaps that are put off at most.
+const LATER: usize = 256;
+
 /// An instant as an observer sees it; rates, and the terms of curves that begin or end there, are made ready when they
 /// are first wanted.
 struct Sight<const N: usize> {
@@ -32,10 +35,26 @@ struct Sight<const N: usize> {
     terms: Option<[Reading; 2]>,
 }
 
+/// A gap that an observer wants to see closer and need not see at once.
+struct Later<const N: usize> {
+    law: Arc<ModeMatrices<N>>,
+    /// The state at its beginning.
+    z: [f64; N],
+    begin: f64,
+    length: f64,
+    from: Reading,
+    to: Reading,
+    bow: Reading,
+}
+
 /// Where an observer is.
-pub(super) struct Watching {
+pub(super) struct Watching<const N: usize> {
+    /// Whether there is an observer who follows the motion.
+    follows: bool,
     /// The present reading, where nothing has jumped since.
     now: Option<Reading>,
+    /// Gaps to be looked at closer.
+    later: Vec<Later<N>>,
     /// The largest magnitudes seen.
     scale: Reading,
     /// Curves tried.
@@ -45,16 +64,17 @@ pub(super) struct Watching {
     right: u32,
 }
 
-impl Watching {
-    pub(super) fn new() -> Self {
-        Self { now: None, scale: [0.0; QUANTITIES], curves: 0, level: 0, right: 0 }
+impl<const N: usize> Watching<N> {
+    pub(super) fn new(observer: Option<&dyn Observe>) -> Self {
+        let follows = observer.is_some_and(|observer| observer.follows());
+        Self { follows, now: None, later: Vec::new(), scale: [0.0; QUANTITIES], curves: 0, level: 0, right: 0 }
     }
 }
 
 impl<const N: usize> Run<'_, N> {
-    /// Whether somebody observes.
+    /// Whether somebody follows the motion.
     pub(super) fn is_observed(&self) -> bool {
-        self.recorder.observer.is_some()
+        self.watching.follows
     }
 
     /// Input or mode may have jumped: what is read now has to be read anew.
@@ -64,11 +84,11 @@ impl<const N: usize> Run<'_, N> {
 
     /// The run has ended.
     pub(super) fn end_shown(&mut self) {
+        self.show_later();
         let (time, state, mode) = (self.core.time(), self.core.state(), self.core.common.mode);
         if self.is_observed() {
             let law = Arc::clone(&self.core.matrices);
-            let shown = law.shown(&self.core.common.mechanism, &self.core.common.space);
-            self.show(shown, time, 0.0, &self.core.z.clone(), &[0.0; QUANTITIES]);
+            self.show(&law, (time, 0.0), &self.core.z.clone(), &[0.0; QUANTITIES]);
         }
         if let Some(observer) = &mut self.recorder.observer {
             observer.end(time, &state, &mode);
@@ -90,44 +110,90 @@ impl<const N: usize> Run<'_, N> {
         )
     }
 
-    /// Shows the interval of `length` that began at `begin` and has led to `end`; says whether the observer wants to
-    /// see closer.
-    fn show(&mut self, shown: &Shown<N>, begin: f64, length: f64, end: &[f64; N], bow: &Reading) -> bool {
+    /// Shows the interval of `length` that began at `begin` and has led to `end`; the readings at its ends where the
+    /// observer wants to see closer.
+    fn show(
+        &mut self,
+        law: &ModeMatrices<N>,
+        (begin, length): (f64, f64),
+        end: &[f64; N],
+        bow: &Reading,
+    ) -> Option<(Reading, Reading)> {
+        let shown = law.shown(&self.core.common.mechanism, &self.core.common.space);
         let to = self.read(shown, end);
         let from = match self.watching.now {
             Some(from) => from,
             None => self.read(shown, &self.core.z),
         };
         self.watching.now = Some(to);
-        self.ask(begin, length, &from, &to, bow)
+        self.ask(law, (begin, length), &from, &to, bow).then_some((from, to))
     }
 
-    fn ask(&mut self, begin: f64, length: f64, from: &Reading, to: &Reading, bow: &Reading) -> bool {
+    fn ask(
+        &mut self,
+        law: &ModeMatrices<N>,
+        (begin, length): (f64, f64),
+        from: &Reading,
+        to: &Reading,
+        bow: &Reading,
+    ) -> bool {
         for (scale, to) in self.watching.scale.iter_mut().zip(to) {
-            *scale = scale.max(to.abs());
+            *scale = if to.abs() > *scale { to.abs() } else { *scale };
         }
-        let gap = Gap { begin, length, from, to, bow, mode: &self.core.common.mode };
+        let gap = Gap { begin, length, from, to, bow, mode: &law.mode };
         self.recorder.observer.as_mut().is_some_and(|observer| observer.pass(&gap))
     }
 
-    /// Moves on to `end`, `length` from now, in the present mode, and shows the way there; says whether it was looked
-    /// at closer.
+    /// Moves on to `end`, `length` from now, in the present mode, and shows the way there; says whether the observer
+    /// wants to see closer.
     pub(super) fn move_shown(
         &mut self,
-        law: &ModeMatrices<N>,
+        law: &Arc<ModeMatrices<N>>,
         begin: f64,
         length: f64,
         end: [f64; N],
         bow: &Reading,
     ) -> bool {
-        let start = self.core.z;
-        let closer =
-            self.show(law.shown(&self.core.common.mechanism, &self.core.common.space), begin, length, &end, bow);
-        if closer {
-            self.show_closer(law, start, begin, length);
+        let shown = self.show(law, (begin, length), &end, bow);
+        let z = std::mem::replace(&mut self.core.z, end);
+        let Some((from, to)) = shown else { return false };
+        if self.can_wait() {
+            if self.watching.later.len() == LATER {
+                self.show_later();
+            }
+            let (law, bow) = (Arc::clone(law), *bow);
+            if self.watching.later.capacity() == 0 {
+                self.watching.later.reserve_exact(LATER);
+            }
+            self.watching.later.push(Later { law, z, begin, length, from, to, bow });
+        } else {
+            self.show_closer(law, z, begin, length);
         }
-        self.core.z = end;
-        closer
+        true
+    }
+
+    fn can_wait(&self) -> bool {
+        self.recorder.observer.as_ref().is_some_and(|observer| observer.can_wait())
+    }
+
+    /// Shows what was put off, as far as the observer still wants to see it: first where a quantity was largest, for
+    /// what is below a peak that was found there need not be seen.
+    fn show_later(&mut self) {
+        let mut later = std::mem::take(&mut self.watching.later);
+        let largest = self.watching.scale;
+        let has_largest = |from: &Reading, to: &Reading| {
+            let ends = from.iter().zip(to).zip(&largest);
+            ends.into_iter().any(|((from, to), largest)| from != to && f64::max(from.abs(), to.abs()) == *largest)
+        };
+        for first in [true, false] {
+            for Later { law, z, begin, length, from, to, bow } in &later {
+                if has_largest(from, to) == first && self.ask(law, (*begin, *length), from, to, bow) {
+                    self.show_closer(law, *z, *begin, *length);
+                }
+            }
+        }
+        later.clear();
+        self.watching.later = later;
     }
 
     /// Shows a way of any length that begins at `z`, in parts that there are matrices for and a rest that a series
@@ -179,7 +245,7 @@ impl<const N: usize> Run<'_, N> {
             let (a, b) = ((from_slope[q] * length - across).abs(), (to_slope[q] * length - across).abs());
             0.25 * MARGIN * if a > b { a } else { b }
         });
-        self.ask(begin, length, &from.value, &to.value, &bow)
+        self.ask(law, (begin, length), &from.value, &to.value, &bow)
     }
 
     /// Shows an interval of h/2^level as a curve, or two halves of it where that is not right.

@@ -6,7 +6,7 @@
 
 use super::sheet::{Elements, Held, Sheets};
 use super::{BLOCK, Detail, Extra, Segment};
-use crate::mechanism::{DRIVES, Form, Heading, Layout, Mechanism, Shown};
+use crate::mechanism::{BODIES, DRIVES, Form, Heading, Layout, Mechanism, SPRINGS, Shown};
 use crate::solve::coordinates::Coordinates;
 use crate::trajectory::{Grid, Trajectory};
 use std::ops::Range;
@@ -14,46 +14,52 @@ use std::ops::Range;
 /// Values of one quantity in the rows of a block.
 type Values = [f64; BLOCK];
 
+/// Room for the terms of a sum: the load on bodies that move as one has every spring on each of them, and the currents.
+const TERMS: usize = SPRINGS * BODIES + DRIVES;
+
 /// A linear form of columns: places and weights, added in this order, and a constant.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(super) struct Sum {
-    terms: Vec<(usize, f64)>,
+    places: [u8; TERMS],
+    weights: [f64; TERMS],
+    count: usize,
     pub(super) constant: f64,
 }
 
 impl Sum {
-    pub(super) fn of<const N: usize>(terms: [(usize, f64); N], constant: f64) -> Self {
-        let mut sum = Self { terms: Vec::with_capacity(N), constant };
-        terms.into_iter().for_each(|(place, weight)| sum.add(place, weight));
-        sum
+    /// One that is always the same.
+    pub(super) fn constant(constant: f64) -> Self {
+        Self { places: [0; TERMS], weights: [0.0; TERMS], count: 0, constant }
     }
 
     pub(super) fn add(&mut self, place: usize, weight: f64) {
         if weight != 0.0 {
-            self.terms.push((place, weight));
+            (self.places[self.count], self.weights[self.count]) = (place as u8, weight);
+            self.count += 1;
         }
     }
 
     /// Its values in these rows, one for each in `out`. −0 + 0 is 0.
     #[inline(always)]
     fn put(&self, columns: &[Values], rows: Range<usize>, out: &mut [f64]) {
-        let (column, constant) = (|place: usize| &columns[place][rows.clone()], self.constant);
-        let rest = match self.terms[..] {
-            [] => {
-                out.fill(constant);
-                return;
-            }
-            [(a, wa)] => {
+        let (column, constant) = (|place: u8| &columns[usize::from(place)][rows.clone()], self.constant);
+        let (places, weights) = (&self.places[..self.count], &self.weights[..self.count]);
+        let (more, by) = match (places, weights) {
+            (&[a], &[wa]) => {
                 out.iter_mut().zip(column(a)).for_each(|(out, a)| *out = wa * a + constant);
                 return;
             }
-            [(a, wa), (b, wb), ref rest @ ..] => {
+            (&[a, b, ref places @ ..], &[wa, wb, ref weights @ ..]) => {
                 let terms = column(a).iter().zip(column(b));
                 out.iter_mut().zip(terms).for_each(|(out, (a, b))| *out = (wa * a + constant) + wb * b);
-                rest
+                (places, weights)
+            }
+            _ => {
+                out.fill(constant);
+                return;
             }
         };
-        for &(place, weight) in rest {
+        for (&place, &weight) in more.iter().zip(by) {
             out.iter_mut().zip(column(place)).for_each(|(out, value)| *out += weight * value);
         }
     }
@@ -108,7 +114,7 @@ impl Places {
 
     /// A form as a sum of columns.
     pub(super) fn sum(&self, form: &Form) -> Sum {
-        let mut sum = Sum { terms: Vec::new(), constant: form.constant };
+        let mut sum = Sum::constant(form.constant);
         (0..self.springs).for_each(|j| sum.add(self.stretch(j), form.stretch[j]));
         (0..self.bodies).for_each(|j| sum.add(self.speed(j), form.speed[j]));
         let states = (0..self.drives).filter_map(|j| Some((self.layout.current[j]?, form.current[j])));
@@ -117,6 +123,9 @@ impl Places {
         sum
     }
 }
+
+/// Rows one after another with the same [`Elements`], and their number.
+pub(super) type Stretch = (Range<usize>, usize);
 
 /// The columns of a block.
 pub(super) struct Columns {
@@ -134,6 +143,8 @@ pub(super) struct Block<'b> {
     pub(super) mechanism: &'b Mechanism,
     pub(super) sheets: &'b Sheets,
     pub(super) segments: &'b [Segment],
+    /// [`stretches`] of them.
+    pub(super) stretches: &'b [Stretch],
     pub(super) extra: &'b [Extra],
     /// Rows that stand in the columns; those up to `count` are like the last of them.
     pub(super) written: usize,
@@ -155,7 +166,7 @@ impl Columns {
         let (bodies, springs, drives) = (mechanism.bodies.len(), mechanism.springs.len(), mechanism.drives.len());
         let places = Places { bodies, springs, drives, stride, inputs, layout: layout.clone() };
         let stretch = |spring: usize| {
-            let mut sum = Sum::default();
+            let mut sum = Sum::constant(0.0);
             layout.weights(spring).for_each(|(body, weight)| sum.add(places.coordinate(body), weight));
             sum
         };
@@ -383,23 +394,33 @@ impl Block<'_> {
     /// The rows of each segment.
     #[inline(always)]
     fn segments(&self) -> impl Iterator<Item = (Range<usize>, &Segment)> {
-        let ends = self.segments.iter().skip(1).map(|segment| segment.start.min(self.written)).chain([self.written]);
-        self.segments.iter().zip(ends).map(|(segment, end)| (segment.start.min(end)..end, segment))
+        rows_of(self.segments, self.written)
     }
 
-    /// Rows one after another in which amplifiers, gears, belt and stops do the same.
     #[inline(always)]
     fn elements(&self) -> impl Iterator<Item = (Range<usize>, &Elements)> {
-        let of = |segment: &Segment| self.sheets.sheets[segment.sheet].elements;
-        let mut segments = self.segments().peekable();
-        std::iter::from_fn(move || {
-            let (mut rows, first) = segments.next()?;
-            while let Some((more, _)) = segments.next_if(|(_, next)| of(next) == of(first)) {
-                rows.end = more.end;
-            }
-            Some((rows, &self.sheets.elements[of(first)]))
-        })
+        self.stretches.iter().map(|(rows, elements)| (rows.clone(), &self.sheets.elements[*elements]))
     }
+}
+
+/// The rows of each segment, `written` being all of them.
+#[inline(always)]
+fn rows_of(segments: &[Segment], written: usize) -> impl Iterator<Item = (Range<usize>, &Segment)> {
+    let ends = segments.iter().skip(1).map(move |segment| segment.start.min(written)).chain([written]);
+    segments.iter().zip(ends).map(|(segment, end)| (segment.start.min(end)..end, segment))
+}
+
+/// Rows one after another in which amplifiers, gears, belt and stops do the same.
+pub(super) fn stretches(segments: &[Segment], sheets: &Sheets, written: usize) -> Vec<Stretch> {
+    let mut stretches: Vec<Stretch> = Vec::new();
+    for (rows, segment) in rows_of(segments, written) {
+        let own = sheets.sheets[segment.sheet].elements;
+        match stretches.last_mut() {
+            Some((before, elements)) if *elements == own => before.end = rows.end,
+            _ => stretches.push((rows, own)),
+        }
+    }
+    stretches
 }
 
 /// Whether a column is put out.

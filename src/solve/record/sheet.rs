@@ -86,13 +86,17 @@ impl Elements {
 impl Held {
     fn new(mechanism: &Mechanism, places: &Places, body: usize, mode: &Mode) -> Self {
         let law = mechanism.friction(body);
-        let sliding = |viscous: f64, dry: f64| Held::Form(Sum::of([(places.speed(body), viscous)], dry));
+        let sliding = |viscous: f64, dry: f64| {
+            let mut sum = Sum::constant(dry);
+            sum.add(places.speed(body), viscous);
+            Held::Form(sum)
+        };
         match mode.motion[body] {
             // F_f = b v ± F_c                                                   (15)
             Motion::Free => sliding(law.forward.viscous, 0.0),
             Motion::Forward => sliding(law.forward.viscous, law.forward.coulomb),
             Motion::Backward => sliding(law.backward.viscous, -law.backward.coulomb),
-            Motion::Stuck if mechanism.leader(body) != body => Held::Form(Sum::default()),
+            Motion::Stuck if mechanism.leader(body) != body => Held::Form(Sum::constant(0.0)),
             Motion::Stuck => {
                 let drives = |own: usize| mechanism.drives.iter().filter(move |drive| drive.shaft == own);
                 let loses = |own: usize| drives(own).any(|drive| drive.loses() && !drive.has_rotor());
@@ -107,7 +111,7 @@ impl Held {
 
 /// The load on a body at rest beside friction: the inner brackets of (16)-(18).
 fn load(mechanism: &Mechanism, places: &Places, leader: usize) -> Sum {
-    let mut sum = Sum::default();
+    let mut sum = Sum::constant(0.0);
     for body in mechanism.followers(leader) {
         let ratio = mechanism.ratio(body);
         for (index, drive) in mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.shaft == body) {

@@ -5,6 +5,7 @@ use crate::mechanism::{BODIES, Cause, DRIVES, ROUNDING, SPRINGS};
 use crate::solve::propagator::{SERIES_TERMS, Series};
 
 /// A linear form of the vector z.
+#[derive(Clone, Copy)]
 pub(in crate::solve) struct Row<const N: usize> {
     /// Its terms: places in z in ascending order, and their weights. Most others are zero.
     places: [u8; N],
@@ -13,6 +14,8 @@ pub(in crate::solve) struct Row<const N: usize> {
 }
 
 impl<const N: usize> Row<N> {
+    pub(super) const NONE: Self = Self { places: [0; N], weights: [0.0; N], count: 0 };
+
     pub(super) fn new(row: &[f64; N]) -> Self {
         let (mut places, mut weights, mut count) = ([0; N], [0.0; N], 0);
         for (place, weight) in row.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
@@ -127,15 +130,11 @@ pub(super) struct Beside<const N: usize> {
     pub(super) at_once: [[f64; LANES]; DRIVES],
 }
 
-/// The forms of some rows, side by side.
-pub(super) fn lanes<const N: usize>(rows: &[[f64; N]]) -> impl Iterator<Item = Lanes<N>> + '_ {
-    rows.chunks(LANES).map(|rows| {
-        let mut lanes = [[0.0; LANES]; N];
-        for (lane, row) in rows.iter().enumerate() {
-            lanes.iter_mut().zip(row).for_each(|(place, weight)| place[lane] = *weight);
-        }
-        lanes
-    })
+impl<const N: usize> Beside<N> {
+    pub(super) const NONE: Self = {
+        let none = [0.0; LANES];
+        Self { rows: [none; N], mechanical: none, magnetic: none, at_once: [none; DRIVES] }
+    };
 }
 
 /// The values of forms side by side.

@@ -1,6 +1,6 @@
 //! The readings of an observer in a mode, and how far they can be off straight lines.
 
-use super::{ModeMatrices, Size, Space};
+use super::{ModeMatrices, Space};
 use crate::friction::Motion;
 use crate::mechanism::{BODIES, DRIVES, Mechanism};
 use crate::solve::observe::{QUANTITIES, Reading, Readout};
@@ -11,10 +11,9 @@ pub(in crate::solve) struct Shown<const N: usize> {
     pub(in crate::solve) readout: Readout,
     /// The weight of each place of z in each reading.
     matrix: Matrix<QUANTITIES, N>,
-    /// The norm dual to the energy, of what springs hold, speeds and current.
-    dual: [Size; QUANTITIES],
-    /// √(mechanical² + magnetic²) of those.
-    whole: Reading,
+    /// The norm dual to the energy, of what springs hold and speeds, and of currents.
+    mechanical: Reading,
+    magnetic: Reading,
     /// The same for the stretches that no spring holds, per unit of √(2V) of ż: these move as the masses do.
     unsprung: Reading,
     /// Magnitudes of the coefficients of the inputs.
@@ -31,7 +30,8 @@ impl<const N: usize> Shown<N> {
             }
         }
         let stuck = law.mode.motion.map(|motion| motion == Motion::Stuck);
-        let (mut dual, mut unsprung) = ([Size::ZERO; QUANTITIES], [0.0; QUANTITIES]);
+        let (mut mechanical, mut magnetic) = ([0.0; QUANTITIES], [0.0; QUANTITIES]);
+        let mut unsprung = [0.0; QUANTITIES];
         for (q, form) in readout.forms.iter().enumerate() {
             let mut held = 0.0;
             for (index, spring) in mechanism.springs.iter().enumerate() {
@@ -44,7 +44,7 @@ impl<const N: usize> Shown<N> {
                 } else {
                     let arms = mechanism.leading_arms(index);
                     let free = (0..BODIES).filter(|&body| arms[body] != 0.0 && !stuck[body]);
-                    let light: f64 = free.map(|b| arms[b].powi(2) / mechanism.mass(b, &law.inertia)).sum();
+                    let light: f64 = free.map(|b| arms[b] * arms[b] / mechanism.mass(b, &law.inertia)).sum();
                     unsprung[q] += factor.abs() * light.sqrt();
                 }
             }
@@ -53,12 +53,15 @@ impl<const N: usize> Shown<N> {
             }
             let weight = |drive: usize| law.weight_of_current[drive];
             let currents = (0..DRIVES).filter(|&drive| form.current[drive] != 0.0);
-            let magnetic = currents.fold(0.0, |sum: f64, drive| sum.hypot(form.current[drive] / weight(drive).sqrt()));
-            dual[q] = Size { mechanical: held.sqrt(), magnetic };
+            magnetic[q] = currents.fold(0.0, |sum: f64, drive| sum.hypot(form.current[drive] / weight(drive).sqrt()));
+            mechanical[q] = held.sqrt();
+            if law.coupled {
+                // Motion and current pass energy to each other: only their sum is bounded.
+                (mechanical[q], magnetic[q]) = (mechanical[q].hypot(magnetic[q]), 0.0);
+            }
         }
         let input = std::array::from_fn(|drive| readout.forms.map(|form| form.input[drive].abs()));
-        let whole = dual.map(|dual| dual.mechanical.hypot(dual.magnetic));
-        Self { readout, matrix, dual, whole, unsprung, input }
+        Self { readout, matrix, mechanical, magnetic, unsprung, input }
     }
 
     /// The readings in z, ways being counted from `origin`.
@@ -93,20 +96,17 @@ impl<const N: usize> ModeMatrices<N> {
         let grow = self.growth_over(length);
         let (first, second) = (self.size(y), self.size(&self.rate(y)));
         let (first, push) = (first.whole() + self.push(rate) * length, self.push(curvature) * length);
-        // As `steepness` has it.
-        let (mechanical, magnetic) = match (self.coupled, self.is_magnetic) {
-            (true, _) => (second.whole() + push, 0.0),
-            (false, true) => (second.mechanical, second.magnetic + push),
-            (false, false) => (second.mechanical + push, 0.0),
-        };
+        let (mechanical, magnetic) = self.parted(second, push);
         let eighth = 0.125 * interval * interval;
-        std::array::from_fn(|q| {
-            let springs = match self.coupled {
-                true => shown.whole[q] * mechanical,
-                false => shown.dual[q].mechanical * mechanical + shown.dual[q].magnetic * magnetic,
-            };
-            let at_once: f64 = shown.input.iter().zip(curvature).map(|(input, curvature)| input[q] * curvature).sum();
-            eighth * (grow * (springs + shown.unsprung[q] * first) + at_once)
-        })
+        let (mechanical, magnetic, first) =
+            (eighth * grow * mechanical, eighth * grow * magnetic, eighth * grow * first);
+        let mut bow = [0.0; QUANTITIES];
+        for q in 0..QUANTITIES {
+            bow[q] = shown.mechanical[q] * mechanical + shown.magnetic[q] * magnetic + shown.unsprung[q] * first;
+        }
+        for (input, curvature) in shown.input.iter().zip(curvature).filter(|(_, curvature)| **curvature > 0.0) {
+            bow.iter_mut().zip(input).for_each(|(bow, input)| *bow += eighth * input * curvature);
+        }
+        bow
     }
 }
