@@ -83,6 +83,7 @@ impl Field {
             shifted: false,
             mass,
         };
+        field.linear.inputs = mechanism.drives.len();
         field.add_sources();
         field.add_outputs();
         field

@@ -43,6 +43,8 @@ pub(super) struct Linear {
     rows: Vec<States>,
     pub(super) constant: States,
     pub(super) input: [States; DRIVES],
+    /// How many inputs there are.
+    pub(super) inputs: usize,
     pub(super) source: Vec<States>,
     pub(super) outputs: Vec<Output>,
     /// How many of them are arguments of forces.
@@ -55,6 +57,8 @@ pub(super) struct Linear {
     moved: OnceLock<Vec<[States; TERMS]>>,
     /// r_m b_j/νᵐ of the arguments: `[argument][source]`.
     moments: OnceLock<Vec<[f64; TERMS]>>,
+    /// The same of all outputs with all that drives them: `[output][one, inputs, sources]`.
+    driven: OnceLock<Vec<[f64; TERMS]>>,
 }
 
 /// A known force: powers of the share of the step.
@@ -70,8 +74,24 @@ impl Linear {
         let norm = norm(size, &columns).max(f64::MIN_POSITIVE);
         let series = [const { OnceLock::new() }; 2];
         let (source, outputs, arguments) = (Vec::new(), Vec::new(), 0);
-        let (moved, moments) = (OnceLock::new(), OnceLock::new());
-        Self { size, columns, rows, constant, input, source, outputs, arguments, norm, series, moved, moments }
+        let (moved, moments, driven) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
+        let inputs = DRIVES;
+        Self {
+            size,
+            columns,
+            rows,
+            constant,
+            input,
+            inputs,
+            source,
+            outputs,
+            arguments,
+            norm,
+            series,
+            moved,
+            moments,
+            driven,
+        }
     }
 
     /// c A/ν, then c (A/ν)², and so on, for each of `outputs`.
@@ -88,6 +108,16 @@ impl Linear {
         let of = |rows: &[States; TERMS], source: &States| rows.each_ref().map(|row| dot(self.size, row, source));
         let all = || self.of_arguments().iter().flat_map(|rows| self.source.iter().map(move |source| of(rows, source)));
         self.moments.get_or_init(|| all().collect())
+    }
+
+    /// r_m/νᵐ times the column of each drive of an output: of one, of the inputs, of the forces.
+    fn driven(&self, output: usize) -> &[[f64; TERMS]] {
+        let drives = 1 + self.inputs + self.source.len();
+        let columns = || std::iter::once(&self.constant).chain(&self.input[..self.inputs]).chain(&self.source);
+        let rows = || self.of_arguments().iter().chain(self.of_guards());
+        let of = |rows: &[States; TERMS], column: &States| rows.each_ref().map(|row| dot(self.size, row, column));
+        let all = || rows().flat_map(|rows| columns().map(move |column| of(rows, column)));
+        &self.driven.get_or_init(|| all().collect())[output * drives..][..drives]
     }
 
     fn of_guards(&self) -> &[[States; TERMS]] {
@@ -111,7 +141,7 @@ impl Linear {
     }
 
     /// The series of y over `h` under `forcing`, which is in powers of the share of h: t_{k+1} = (A t_k + F_k) h/(k+1).
-    pub(super) fn series(&self, y: &States, h: f64, forcing: &Forcing, terms: &mut Series) {
+    pub(super) fn series(&self, y: &States, h: f64, forcing: &[States], terms: &mut Series) {
         terms.order = radau::order(self.norm * h);
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
@@ -123,12 +153,12 @@ impl Linear {
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn series_by_avx2(&self, y: &States, h: f64, forcing: &Forcing, terms: &mut Series) {
+    fn series_by_avx2(&self, y: &States, h: f64, forcing: &[States], terms: &mut Series) {
         self.series_by_any(y, h, forcing, terms);
     }
 
     #[inline(always)]
-    fn series_by_any(&self, y: &States, h: f64, forcing: &Forcing, terms: &mut Series) {
+    fn series_by_any(&self, y: &States, h: f64, forcing: &[States], terms: &mut Series) {
         match self.size {
             8 => self.series_of::<8>(y, h, forcing, terms),
             12 => self.series_of::<12>(y, h, forcing, terms),
@@ -137,7 +167,7 @@ impl Linear {
     }
 
     #[inline(always)]
-    fn series_of<const N: usize>(&self, y: &States, h: f64, forcing: &Forcing, terms: &mut Series) {
+    fn series_of<const N: usize>(&self, y: &States, h: f64, forcing: &[States], terms: &mut Series) {
         let mut now: [f64; N] = std::array::from_fn(|i| y[i]);
         terms.terms[0][..N].copy_from_slice(&now);
         for k in 0..terms.order {
@@ -171,14 +201,46 @@ impl Series {
 
     /// The states at the share `s` of the step.
     pub(super) fn at(&self, size: usize, s: f64) -> States {
-        let mut sum = [0.0; STATES];
-        for term in self.terms[1..=self.order].iter().rev() {
-            for (sum, term) in sum[..size].iter_mut().zip(term) {
-                *sum = (*sum + term) * s;
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.at_by_avx2(size, s) };
+        }
+        self.at_by_any(size, s)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn at_by_avx2(&self, size: usize, s: f64) -> States {
+        self.at_by_any(size, s)
+    }
+
+    #[inline(always)]
+    fn at_by_any(&self, size: usize, s: f64) -> States {
+        match size {
+            8 => self.at_of::<8>(s),
+            12 => self.at_of::<12>(s),
+            _ => self.at_of::<STATES>(s),
+        }
+    }
+
+    /// Σ t_k sᵏ = t_0 + s (O(s²) + s E(s²)): the chains of odd and even powers do not wait for each other.
+    #[inline(always)]
+    fn at_of<const N: usize>(&self, s: f64) -> States {
+        let (mut odd, mut even, square) = ([0.0; N], [0.0; N], s * s);
+        let pairs = self.terms[1..=self.order].chunks_exact(2);
+        if let [last] = pairs.remainder() {
+            odd.copy_from_slice(&last[..N]);
+        }
+        for pair in pairs.rev() {
+            for i in 0..N {
+                odd[i] = odd[i] * square + pair[0][i];
+                even[i] = even[i] * square + pair[1][i];
             }
         }
-        for (sum, begin) in sum[..size].iter_mut().zip(&self.terms[0]) {
-            *sum += begin;
+        let mut sum = self.terms[0];
+        for i in 0..N {
+            sum[i] += s * (odd[i] + s * even[i]);
         }
         sum
     }
@@ -196,39 +258,58 @@ impl Series {
 
 /// x, M x/ν, (M/ν)² x, …, M given by columns.
 fn powers(size: usize, columns: &[States], x: &States, norm: f64) -> [States; TERMS] {
+    match size {
+        8 => powers_of::<8>(columns, x, norm),
+        12 => powers_of::<12>(columns, x, norm),
+        _ => powers_of::<STATES>(columns, x, norm),
+    }
+}
+
+fn powers_of<const N: usize>(columns: &[States], x: &States, norm: f64) -> [States; TERMS] {
     let mut list = [[0.0; STATES]; TERMS];
-    let (mut now, factor) = (*x, 1.0 / norm);
-    list[0] = now;
+    let factor = 1.0 / norm;
+    list[0] = *x;
+    let mut now: [f64; N] = std::array::from_fn(|i| x[i]);
     for to in &mut list[1..] {
-        let mut sum = [0.0; STATES];
-        for (column, value) in columns[..size].iter().zip(now).filter(|(_, value)| *value != 0.0) {
-            sum[..size].iter_mut().zip(column).for_each(|(sum, entry)| *sum += entry * value);
+        let mut sum = [0.0; N];
+        for (column, value) in columns.iter().zip(now) {
+            sum.iter_mut().zip(column).for_each(|(sum, entry)| *sum += entry * value);
         }
         now = sum.map(|sum| sum * factor);
-        *to = now;
+        to[..N].copy_from_slice(&now);
     }
     list
 }
 
 /// ‖A⁶⁴‖^(1/64): so high a power does not know the units of what it couples.
 fn norm(size: usize, columns: &[States]) -> f64 {
-    let most = |columns: &[States]| columns.iter().flatten().fold(0.0, |most: f64, entry| most.max(entry.abs()));
-    let scale = most(columns);
+    match size {
+        8 => norm_of::<8>(columns),
+        12 => norm_of::<12>(columns),
+        _ => norm_of::<STATES>(columns),
+    }
+}
+
+fn norm_of<const N: usize>(columns: &[States]) -> f64 {
+    let most = |columns: &[[f64; N]; N]| columns.iter().flatten().fold(0.0, |most: f64, entry| most.max(entry.abs()));
+    let mut power = [[0.0; N]; N];
+    for (own, column) in power.iter_mut().zip(columns) {
+        own.copy_from_slice(&column[..N]);
+    }
+    let scale = most(&power);
     if scale == 0.0 || !scale.is_finite() {
         return scale;
     }
     // Each square by its own scale, so that nothing overflows: A⁴ = ((A/a)²/b)² a⁴ b²
-    let mut power: Vec<States> = columns.iter().map(|column| column.map(|entry| entry / scale)).collect();
+    power = power.map(|column| column.map(|entry| entry / scale));
     let (mut logarithm, mut share) = (scale.ln(), 1.0);
     for _ in 0..6 {
-        let square = |column: &States| {
-            let mut sum = [0.0; STATES];
-            for (other, factor) in power[..size].iter().zip(column).filter(|(_, factor)| **factor != 0.0) {
-                sum[..size].iter_mut().zip(other).for_each(|(sum, entry)| *sum += entry * factor);
+        let mut squared = [[0.0; N]; N];
+        for (to, column) in squared.iter_mut().zip(&power) {
+            for (other, factor) in power.iter().zip(column).filter(|(_, factor)| **factor != 0.0) {
+                to.iter_mut().zip(other).for_each(|(sum, entry)| *sum += entry * factor);
             }
-            sum
-        };
-        let squared: Vec<States> = power.iter().map(square).collect();
+        }
         share *= 0.5;
         let own = most(&squared);
         if own == 0.0 {
@@ -236,10 +317,10 @@ fn norm(size: usize, columns: &[States]) -> f64 {
             return scale.sqrt();
         }
         logarithm += share * own.ln();
-        power = squared.iter().map(|column| column.map(|entry| entry / own)).collect();
+        power = squared.map(|column| column.map(|entry| entry / own));
     }
     // The largest row is as long as it has places, at most.
-    (logarithm + share * (size as f64).ln()).exp()
+    (logarithm + share * (N as f64).ln()).exp()
 }
 
 /// What a step of one length makes of a mode.
@@ -247,8 +328,9 @@ pub(super) struct Set {
     pub(super) h: f64,
     /// The highest power of the inputs.
     pub(super) degree: usize,
-    /// What the values of the forces at the points do to the arguments at the nodes: `[argument][source][point]`.
-    weights: Vec<[Lane; POINTS]>,
+    /// What the values of the forces at the points do to the arguments at the nodes, and behind them what ω does:
+    /// `[argument][source][point]`.
+    weights: Vec<[Lane; POINTS + 1]>,
     full: OnceLock<Full>,
 }
 
@@ -259,6 +341,8 @@ pub(super) struct Full {
     nodes: Vec<Lane>,
     pub(super) end: Vec<States>,
     columns: usize,
+    /// How many of them there are without the forces.
+    pub(super) known: usize,
 }
 
 impl Set {
@@ -271,7 +355,7 @@ impl Set {
 
     /// What the forces' values at the points do to an argument at the nodes.
     #[inline(always)]
-    pub(super) fn weights(&self, argument: usize, source: usize, sources: usize) -> &[Lane; POINTS] {
+    pub(super) fn weights(&self, argument: usize, source: usize, sources: usize) -> &[Lane; POINTS + 1] {
         &self.weights[argument * sources + source]
     }
 
@@ -284,9 +368,9 @@ impl Set {
     }
 }
 
-/// The lanes of c y that the five values of a force add, by the moments r_m b/νᵐ.
-fn driven(moments: &[f64; TERMS], h: f64, reach: f64, order: usize) -> [Lane; POINTS] {
-    let mut lanes = [[0.0; NODES]; POINTS];
+/// The lanes of c y that the five values of a force add, and ω, by the moments r_m b/νᵐ.
+fn driven(moments: &[f64; TERMS], h: f64, reach: f64, order: usize) -> [Lane; POINTS + 1] {
+    let mut lanes = [[0.0; NODES]; POINTS + 1];
     let mut factor = h;
     for (moment, tables) in moments.iter().zip(&DRIVEN).take(order) {
         // hᵐ⁺¹ c Aᵐ b
@@ -306,48 +390,48 @@ fn dot(size: usize, a: &States, b: &States) -> f64 {
 impl Full {
     fn new(linear: &Linear, h: f64, degree: usize) -> Self {
         let (size, reach, order) = (linear.size, linear.norm * h, radau::order(linear.norm * h));
-        let inputs = DRIVES * (degree + 1);
-        let sources = linear.source.len() * POINTS;
-        let columns = size + 1 + inputs + sources;
+        let known = size + 1 + linear.inputs * (degree + 1);
+        let columns = known + linear.source.len() * POINTS;
         let mut nodes = vec![[0.0; NODES]; linear.outputs.len() * columns];
         let rows = linear.of_arguments().iter().chain(linear.of_guards());
-        for ((output, rows), nodes) in linear.outputs.iter().zip(rows).zip(nodes.chunks_mut(columns)) {
+        for (index, (rows, nodes)) in rows.zip(nodes.chunks_mut(columns)).enumerate() {
+            let (output, moments) = (&linear.outputs[index], linear.driven(index));
             let (free, forced) = nodes.split_at_mut(size);
             let mut factor = 1.0;
             for (row, table) in rows.iter().zip(&FREE).take(order + 1) {
                 for (lane, weight) in free.iter_mut().zip(row) {
-                    lane.iter_mut().zip(table).for_each(|(lane, value)| *lane += factor * weight * value);
+                    let weight = factor * weight;
+                    lane.iter_mut().zip(table).for_each(|(lane, value)| *lane += weight * value);
                 }
                 factor *= reach;
             }
-            let force = |column: &States, power: usize, lane: &mut Lane| {
+            let force = |moments: &[f64; TERMS], power: usize, lane: &mut Lane| {
                 let mut factor = h;
-                for (row, table) in rows.iter().zip(&FORCED[power]).take(order) {
-                    let moment = factor * dot(size, row, column);
+                for (moment, table) in moments.iter().zip(&FORCED[power]).take(order) {
+                    let moment = factor * moment;
                     lane.iter_mut().zip(table).for_each(|(lane, value)| *lane += moment * value);
                     factor *= reach;
                 }
             };
-            force(&linear.constant, 0, &mut forced[0]);
+            force(&moments[0], 0, &mut forced[0]);
             forced[0].iter_mut().for_each(|lane| *lane += output.constant);
-            for (drive, column) in linear.input.iter().enumerate() {
+            for drive in 0..linear.inputs {
                 for power in 0..=degree {
                     let lane = &mut forced[1 + drive * (degree + 1) + power];
-                    force(column, power, lane);
+                    force(&moments[1 + drive], power, lane);
                     lane.iter_mut().zip(&POWER[power]).for_each(|(lane, at)| *lane += output.input[drive] * at);
                 }
             }
-            for ((lanes, column), at_once) in
-                forced[1 + inputs..].as_chunks_mut::<POINTS>().0.iter_mut().zip(&linear.source).zip(&output.source)
+            let forces = forced[known - size..].as_chunks_mut::<POINTS>().0;
+            for ((lanes, moments), at_once) in forces.iter_mut().zip(&moments[1 + linear.inputs..]).zip(&output.source)
             {
-                let moments = rows.each_ref().map(|row| dot(size, row, column));
-                *lanes = driven(&moments, h, reach, order);
+                lanes.copy_from_slice(&driven(moments, h, reach, order)[..POINTS]);
                 for (node, lane) in lanes[1..].iter_mut().enumerate() {
                     lane[node] += at_once;
                 }
             }
         }
-        Self { nodes, end: Self::ends(linear, h, degree, columns), columns }
+        Self { nodes, end: Self::ends(linear, h, degree, columns), columns, known }
     }
 
     /// The changes of the states over the whole step.
@@ -355,7 +439,7 @@ impl Full {
         let size = linear.size;
         let mut end = Vec::with_capacity(columns);
         let mut series = Series::room();
-        let mut change = |y: &States, forcing: &Forcing| {
+        let mut change = |y: &States, forcing: &[States]| {
             linear.series(y, h, forcing, &mut series);
             let mut sum = [0.0; STATES];
             for term in series.terms[1..=series.order].iter().rev() {
@@ -367,16 +451,16 @@ impl Full {
         for place in 0..size {
             let mut y = [0.0; STATES];
             y[place] = 1.0;
-            end.push(change(&y, &none));
+            end.push(change(&y, &[]));
         }
         let zero = [0.0; STATES];
         let mut forced = |column: &States, power: usize| {
             let mut forcing = none;
             forcing[power] = *column;
-            change(&zero, &forcing)
+            change(&zero, &forcing[..=power])
         };
         end.push(forced(&linear.constant, 0));
-        for column in &linear.input {
+        for column in &linear.input[..linear.inputs] {
             end.extend((0..=degree).map(|power| forced(column, power)));
         }
         let (reach, order) = (linear.norm * h, radau::order(linear.norm * h));
