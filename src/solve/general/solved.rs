@@ -1,8 +1,8 @@
 //! The step that was solved: its end, its series, and guards along it.
 
 use super::field::Field;
-use super::linear::{Full, STATES, Set, States};
-use super::model::{MOST_GUARDS, Vector};
+use super::linear::{EIGHTHS, Full, STATES, Set, States};
+use super::model::Vector;
 use super::radau::{POINTS, TERMS};
 use super::sources::Source;
 use super::step::{Begin, Room, Step, at_nodes, monomials, states};
@@ -42,6 +42,14 @@ impl Room {
             }
         }
         powers
+    }
+
+    /// The whole state at so many eighths of the step that was solved, where its columns are there.
+    pub(super) fn at_eighth(&self, field: &Field, set: &Set, begin: &Begin, eighth: usize) -> Option<Vector> {
+        let full = set.full(&field.linear, false)?;
+        let x = &self.x[..full.end.len()];
+        let states = full.at_eighth(&field.linear, (set.h, set.degree), eighth, x);
+        Some(self.with_bristles(field, begin.y, &states, eighth as f64 / EIGHTHS as f64))
     }
 
     /// The series of the states over the step that was solved.
@@ -96,37 +104,34 @@ impl Room {
         y
     }
 
-    /// The outputs of all guards at the points of the step that was solved, where its columns are there.
-    pub(super) fn guards_at_points(
-        &self,
-        field: &Field,
-        set: &Set,
-        begin: &Begin,
-        values: &mut [[f64; POINTS]; MOST_GUARDS],
-    ) -> bool {
+    /// Tells the outputs of all guards at the points of the step that was solved, where its columns are there.
+    pub(super) fn tell_guards(&mut self, field: &Field, set: &Set, begin: &Begin) -> bool {
         let Some(full) = set.full(&field.linear, false) else { return false };
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
             // SAFETY: the processor has AVX2.
-            unsafe { self.guards_by_avx2(field, full, begin, values) };
+            unsafe { self.tell_guards_by_avx2(field, full, begin) };
             return true;
         }
-        self.guards_by_any(field, full, begin, values);
+        self.tell_guards_by_any(field, full, begin);
         true
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn guards_by_avx2(&self, field: &Field, full: &Full, begin: &Begin, values: &mut [[f64; POINTS]; MOST_GUARDS]) {
-        self.guards_by_any(field, full, begin, values);
+    fn tell_guards_by_avx2(&mut self, field: &Field, full: &Full, begin: &Begin) {
+        self.tell_guards_by_any(field, full, begin);
     }
 
     #[inline(always)]
-    fn guards_by_any(&self, field: &Field, full: &Full, begin: &Begin, values: &mut [[f64; POINTS]; MOST_GUARDS]) {
+    fn tell_guards_by_any(&mut self, field: &Field, full: &Full, begin: &Begin) {
         let x = &self.x[..full.end.len()];
-        for (value, &output) in values.iter_mut().zip(&field.output) {
-            let lane = if output < field.linear.arguments { self.arguments[output] } else { full.output(output, x) };
-            *value = [self.output_at_begin(field, begin, output), lane[0], lane[1], lane[2], lane[3]];
+        for (index, &output) in field.output.iter().enumerate() {
+            let lane = match output.checked_sub(field.linear.arguments) {
+                None => self.arguments[output],
+                Some(guard) => full.guard(guard, x),
+            };
+            self.told[index] = [self.output_at_begin(field, begin, output), lane[0], lane[1], lane[2], lane[3]];
         }
     }
 

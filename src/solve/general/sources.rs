@@ -30,6 +30,9 @@ pub(super) enum Source {
         length: usize,
         /// Bodies that it follows, with their coordinates.
         ways: Vec<(usize, usize)>,
+        /// Its length where the coordinates are zero, m, and by how much it grows with each: arguments and arms.
+        rest: f64,
+        arms: Vec<(usize, f64)>,
     },
 }
 
@@ -53,6 +56,20 @@ pub(super) type Bristles = [Bristle; crate::mechanism::BODIES];
 pub(super) type Slopes = [Lane; NODES];
 
 impl Source {
+    /// That of a spring, with the arguments that are its stretch and the ways of the bodies that it follows.
+    pub(super) fn spring(model: &Model, following: usize, length: usize, ways: Vec<(usize, usize)>) -> Self {
+        let spring = &model.mechanism.springs[model.following[following].spring];
+        let (mut rest, mut arms) = (0.0, Vec::new());
+        if let Some(follows) = &spring.follows {
+            rest = follows.length;
+            for (&(body, arm), &(_, argument)) in follows.arms.iter().zip(&ways) {
+                rest += arm * model.mechanism.origin[body];
+                arms.push((argument, arm));
+            }
+        }
+        Source::Spring { following, length, ways, rest, arms }
+    }
+
     /// The force at the beginning of a step.
     pub(super) fn at_begin(&self, model: &Model, mode: &crate::mechanism::Mode, y: &Vector) -> f64 {
         match self {
@@ -77,13 +94,12 @@ impl Source {
         }
     }
 
-    /// Whether it has a kink within a step from `y` on: bristles turn, or the other side's friction begins.
+    /// Whether it has a kink within a step from `y` on, or what is as narrow: its body turns without being held.
     #[inline(always)]
     pub(super) fn has_kink(&self, model: &Model, y: &Vector, arguments: &[Lane]) -> bool {
         let &Source::Friction { curved, motion: Motion::Free, speed, .. } = self else { return false };
-        let curved = &model.curved[curved];
-        let turns = || arguments[speed].iter().any(|v| v * y[curved.speed] < 0.0);
-        (curved.bristle.is_some() || curved.friction.forward != curved.friction.backward) && turns()
+        let before = y[model.curved[curved].speed];
+        arguments[speed].iter().any(|v| v * before < 0.0)
     }
 
     /// The force at the nodes of a step of length `h` from `y` on; deflections of its bristles go to `bristles`.
@@ -109,8 +125,11 @@ impl Source {
                 }
                 match (curved.friction.law, curved.bristle) {
                     (Law::LuGre { stiffness, damping, .. }, Some(place)) => {
-                        let laws: [Sliding; NODES] = std::array::from_fn(law);
                         let v = &arguments[speed];
+                        let laws = match way {
+                            None if curved.friction.forward == curved.friction.backward => curved.bristles(*v),
+                            _ => std::array::from_fn(law),
+                        };
                         let own = &mut bristles[curved.body];
                         own.is_stiff |= laws.iter().any(|law| h * law.slip > STIFF);
                         let bent = Bent::new(h, &laws, own.is_stiff).deflections(h, y[place], own.rate, v);
@@ -125,13 +144,18 @@ impl Source {
                 }
                 force
             }
-            Source::Spring { following, length, ways } => {
-                let spring = model.following[*following].spring;
-                std::array::from_fn(|i| {
-                    let way =
-                        |body: usize| ways.iter().find(|(b, _)| *b == body).map_or(0.0, |(_, a)| arguments[*a][i]);
-                    model.stiffer(spring, way) * arguments[*length][i]
-                })
+            Source::Spring { following, length, rest, arms, .. } => {
+                let spring = &model.mechanism.springs[model.following[*following].spring];
+                let Some(follows) = &spring.follows else { return [0.0; NODES] };
+                let mut force = [*rest; NODES];
+                for &(argument, arm) in arms {
+                    force.iter_mut().zip(&arguments[argument]).for_each(|(length, way)| *length += arm * way);
+                }
+                // (k(q) − k) s
+                for (force, stretch) in force.iter_mut().zip(&arguments[*length]) {
+                    *force = (follows.rigidity / *force - spring.stiffness) * stretch;
+                }
+                force
             }
         }
     }
@@ -179,7 +203,7 @@ impl Source {
                     }
                 }
             }
-            Source::Spring { following, length, ways } => {
+            Source::Spring { following, length, ways, .. } => {
                 let part = &model.following[*following];
                 let way = |body: usize, i: usize| {
                     ways.iter().find(|(b, _)| *b == body).map_or(0.0, |(_, argument)| arguments[*argument][i])

@@ -21,7 +21,7 @@
 
 use super::field::Field;
 use super::linear::{Forcing, STATES, Series, Set, States};
-use super::model::{MOST, Vector};
+use super::model::{MOST, MOST_GUARDS, Vector};
 use super::newton::Newton;
 use super::radau::{BACKWARD, C, Lane, MONOMIALS, NODES, POINTS, POWER, POWERS, rest};
 use super::sources::{Bristle, Bristles};
@@ -97,6 +97,8 @@ pub(super) struct Room {
     kept: [f64; SOURCES],
     /// By how much a turn of the iteration last contracted.
     feedback: f64,
+    /// Guards at the points of the step.
+    pub(super) told: [[f64; POINTS]; MOST_GUARDS],
     pub(super) evaluations: u64,
 }
 
@@ -138,6 +140,7 @@ impl Room {
             past: None,
             kept: [0.0; SOURCES],
             feedback: 1.0,
+            told: [[0.0; POINTS]; MOST_GUARDS],
             evaluations: 0,
         }
     }
@@ -165,15 +168,14 @@ impl Room {
             Guess::After(ratio) => (1.0, ratio),
             Guess::Within(ratio) => (0.0, ratio),
         };
-        let places = C.map(|place| from + place * ratio);
+        let basis = basis(C.map(|place| from + place * ratio));
         for force in &mut self.forces[..sources] {
-            let powers = monomials(force);
+            let mut along = [0.0; NODES];
+            for (value, weight) in force.iter().zip(&basis) {
+                along.iter_mut().zip(weight).for_each(|(along, weight)| *along += value * weight);
+            }
             if from == 1.0 {
                 force[0] = force[POINTS - 1];
-            }
-            let mut along = [powers[POINTS - 1]; NODES];
-            for power in powers[..POINTS - 1].iter().rev() {
-                along.iter_mut().zip(places).for_each(|(along, s)| *along = *along * s + power);
             }
             let begin = force[0];
             for (value, along) in force[1..].iter_mut().zip(along) {
@@ -224,22 +226,11 @@ impl Room {
     fn set_out(&mut self, step: &Step) {
         let &Step { field, set, begin, whole, .. } = step;
         let (linear, sources) = (&field.linear, field.sources.len());
-        match set.full(linear, whole) {
-            Some(full) => {
-                let known = self.fill(field, begin);
-                for (argument, base) in self.base[..linear.arguments].iter_mut().enumerate() {
-                    *base = full.output(argument, &self.x[..known]);
-                }
-            }
-            None => {
-                let powers = self.forcing(field, begin, 0);
-                linear.series(&states(begin.y), set.h, &self.forcing[..powers], &mut self.series);
-                for (base, output) in self.base.iter_mut().zip(&linear.outputs[..linear.arguments]) {
-                    let mut coefficients = [0.0; super::radau::TERMS];
-                    self.series.along(linear.size, &output.row, &mut coefficients);
-                    *base = at_nodes(&coefficients, self.series.order);
-                }
-            }
+        // Where its columns are worth making they are there from here on.
+        set.full(linear, whole);
+        let known = self.fill(field, begin);
+        for (argument, base) in self.base[..linear.arguments].iter_mut().enumerate() {
+            *base = set.base(argument, &self.x[..known]);
         }
         for (argument, base) in self.base[..linear.arguments].iter_mut().enumerate() {
             for (source, force) in self.forces[..sources].iter().enumerate() {
@@ -367,6 +358,7 @@ impl Room {
         let (arguments, sources) = counts::<A, S>(field);
         // The place of the sixth value, on this step: the third node of the one before.
         let sixth = self.past.map(|past| -(1.0 - C[NODES - 2]) * past / set.h);
+        let there = sixth.map(|s| (basis([s]), rest(s)));
         let cubic = |force: &[f64; POINTS]| {
             force[0] - BACKWARD.iter().zip(&force[1..]).fold(0.0, |sum, (weight, force)| sum + weight * force)
         };
@@ -375,15 +367,15 @@ impl Room {
         let mut share = if sixth.is_some() { self.feedback } else { 1.0 };
         for (source, off) in off[..sources].iter_mut().enumerate() {
             let force = &self.forces[source];
-            *off = match sixth {
+            *off = match &there {
                 // A kink leaves as much to a quartic as to a cubic.
                 _ if field.sources[source].has_kink(&field.model, begin.y, &self.arguments) => {
                     share = 1.0;
                     (0, cubic(force))
                 }
-                Some(s) => {
-                    let quartic = monomials(force).iter().rev().fold(0.0, |sum, power| sum * s + power);
-                    (POINTS, (self.kept[source] - quartic) / rest(s))
+                Some((basis, rest)) => {
+                    let quartic = basis.iter().zip(force).fold(0.0, |sum, ([weight], value)| sum + weight * value);
+                    (POINTS, (self.kept[source] - quartic) / rest)
                 }
                 None => (0, OF_CUBIC * cubic(force)),
             };
@@ -439,6 +431,19 @@ pub(super) fn at_nodes(c: &[f64; super::radau::TERMS], order: usize) -> Lane {
         lane.iter_mut().zip(power).for_each(|(lane, power)| *lane += c * power);
     }
     lane
+}
+
+/// ℓ_p at several places side by side.
+#[inline(always)]
+fn basis<const N: usize>(places: [f64; N]) -> [[f64; N]; POINTS] {
+    let mut values = [[0.0; N]; POINTS];
+    for (point, values) in values.iter_mut().enumerate() {
+        *values = [MONOMIALS[POINTS - 1][point]; N];
+        for power in MONOMIALS[..POINTS - 1].iter().rev() {
+            values.iter_mut().zip(places).for_each(|(value, s)| *value = *value * s + power[point]);
+        }
+    }
+    values
 }
 
 /// The powers of the quartic through five values.
