@@ -401,12 +401,10 @@ impl Set {
         sum_of(&self.base[argument * x.len()..][..x.len()], x)
     }
 
-    /// The rest of it, where it is there already, or `wanted`.
-    pub(super) fn full(&self, linear: &Linear, wanted: bool) -> Option<&Full> {
-        match wanted {
-            true => Some(self.full.get_or_init(|| Full::new(linear, self.h, self.degree))),
-            false => self.full.get(),
-        }
+    /// The rest of it. Whoever asks has taken so many steps of this length that it is worth making: what others know of
+    /// the mode changes nothing.
+    pub(super) fn full(&self, linear: &Linear) -> &Full {
+        self.full.get_or_init(|| Full::new(linear, self.h, self.degree))
     }
 }
 
@@ -703,7 +701,7 @@ mod tests {
         let mut series = Series::room();
         linear.series(&y, h, &forcing, &mut series);
         let set = Set::new(&linear, h, 2);
-        let full = set.full(&linear, true).unwrap();
+        let full = set.full(&linear);
         let mut x = vec![0.0; full.end.len()];
         (x[0], x[1], x[8]) = (y[0], y[1], 1.0);
         x[9..12].copy_from_slice(&u);

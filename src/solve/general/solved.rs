@@ -44,12 +44,12 @@ impl Room {
         powers
     }
 
-    /// The whole state at so many eighths of the step that was solved, where its columns are there.
-    pub(super) fn at_eighth(&self, field: &Field, set: &Set, begin: &Begin, eighth: usize) -> Option<Vector> {
-        let full = set.full(&field.linear, false)?;
+    /// The whole state at so many eighths of the step that was solved by its columns.
+    pub(super) fn at_eighth(&self, field: &Field, set: &Set, begin: &Begin, eighth: usize) -> Vector {
+        let full = set.full(&field.linear);
         let x = &self.x[..full.end.len()];
         let states = full.at_eighth(&field.linear, (set.h, set.degree), eighth, x);
-        Some(self.with_bristles(field, begin.y, &states, eighth as f64 / EIGHTHS as f64))
+        self.with_bristles(field, begin.y, &states, eighth as f64 / EIGHTHS as f64)
     }
 
     /// The series of the states over the step that was solved.
@@ -61,11 +61,12 @@ impl Room {
     /// Takes the state to the end of the step that was solved; without its columns, by its series.
     #[inline(always)]
     pub(super) fn go_to_end(&mut self, step: &Step) {
-        let &Step { field, set, begin, .. } = step;
+        let &Step { field, set, begin, whole, .. } = step;
         let linear = &field.linear;
         let mut end = states(begin.y);
-        match set.full(linear, false) {
-            Some(full) => {
+        match whole {
+            true => {
+                let full = set.full(linear);
                 let known = full.known;
                 for (source, force) in self.forces[..field.sources.len()].iter().enumerate() {
                     self.x[known + source * POINTS..][..POINTS].copy_from_slice(force);
@@ -77,7 +78,7 @@ impl Room {
                     _ => full.advance::<STATES>(&mut end, x),
                 }
             }
-            None => {
+            false => {
                 self.expand(field, set.h, begin);
                 end = self.series.at(linear.size, 1.0);
             }
@@ -104,17 +105,15 @@ impl Room {
         y
     }
 
-    /// Tells the outputs of all guards at the points of the step that was solved, where its columns are there.
-    pub(super) fn tell_guards(&mut self, field: &Field, set: &Set, begin: &Begin) -> bool {
-        let Some(full) = set.full(&field.linear, false) else { return false };
+    /// Tells the outputs of all guards at the points of the step that was solved by its columns.
+    pub(super) fn tell_guards(&mut self, field: &Field, set: &Set, begin: &Begin) {
+        let full = set.full(&field.linear);
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
             // SAFETY: the processor has AVX2.
-            unsafe { self.tell_guards_by_avx2(field, full, begin) };
-            return true;
+            return unsafe { self.tell_guards_by_avx2(field, full, begin) };
         }
         self.tell_guards_by_any(field, full, begin);
-        true
     }
 
     #[cfg(target_arch = "x86_64")]

@@ -74,7 +74,7 @@ pub(super) struct Step<'a> {
     pub(super) number: u64,
     pub(super) set: &'a Set,
     pub(super) begin: &'a Begin<'a>,
-    /// Whether its columns are worth making.
+    /// Whether it is taken by the columns of the whole step, or by its series.
     pub(super) whole: bool,
 }
 
@@ -224,10 +224,8 @@ impl Room {
     /// The arguments at the nodes by what is known: the state, inputs, forces at the beginning.
     #[inline(always)]
     fn set_out(&mut self, step: &Step) {
-        let &Step { field, set, begin, whole, .. } = step;
+        let &Step { field, set, begin, .. } = step;
         let (linear, sources) = (&field.linear, field.sources.len());
-        // Where its columns are worth making they are there from here on.
-        set.full(linear, whole);
         let known = self.fill(field, begin);
         for (argument, base) in self.base[..linear.arguments].iter_mut().enumerate() {
             *base = set.base(argument, &self.x[..known]);

@@ -105,7 +105,7 @@ impl Core {
                     room.keep(set.h, field.sources.len());
                     // The error is of sixth order. A step that had to be short says little of much longer ones.
                     self.step = (SAFETY * set.h * error.powf(-1.0 / 6.0)).min(self.step.max(GROW * set.h));
-                    return self.take(room, (field, stretch, &set), &start, (from, length.to), end, witness);
+                    return self.take(room, (stretch, &step), (from, length.to), end, witness);
                 }
                 (Some(error), Some(_)) if error > 1.0 && !least => {
                     self.step = set.h * (SAFETY * error.powf(-1.0 / 6.0)).clamp(SHRINK, 0.9);
@@ -181,20 +181,20 @@ impl Core {
     fn take(
         &mut self,
         room: &mut Room,
-        (field, stretch, set): (&Field, &Stretch, &Set),
-        start: &Begin,
+        (stretch, step): (&Stretch, &Step),
         (from, to): (f64, f64),
         end: Vector,
         witness: &mut dyn Witness,
     ) -> Option<Hit> {
         self.cost.steps += 1;
+        let (field, start) = (step.field, step.begin);
         let time = stretch.begin + to;
         if self.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS) {
             self.trouble = self.pace.too_stiff(self.cost.steps, time, self.end);
         }
-        let is_expanded = set.full(&field.linear, false).is_none();
-        let mut dense = Dense { field, start, set, h: set.h, is_expanded };
-        let fall = self.first_fall(room, &mut dense, set);
+        let mut dense =
+            Dense { field, start, set: step.set, h: step.set.h, whole: step.whole, is_expanded: !step.whole };
+        let fall = self.first_fall(room, &mut dense);
         let mut hit = fall.map(|fall| self.up_to(room, &mut dense, from, &fall));
         if let Some(hit) = &mut hit {
             hit.tau = hit.tau.min(to);
@@ -220,11 +220,14 @@ impl Core {
     }
 
     /// The first guard to fall in a step.
-    fn first_fall(&mut self, room: &mut Room, dense: &mut Dense, set: &Set) -> Option<Fall> {
+    fn first_fall(&mut self, room: &mut Room, dense: &mut Dense) -> Option<Fall> {
         let (field, start) = (dense.field, dense.start);
         let mut first: Option<Fall> = None;
         let mut coefficients = [0.0; TERMS];
-        let is_told = room.tell_guards(field, set, start);
+        let is_told = dense.whole;
+        if is_told {
+            room.tell_guards(field, dense.set, start);
+        }
         for (index, &cause) in field.watches.iter().enumerate() {
             let shift = if field.shifted { field.shift(cause, start.y) } else { 0.0 };
             let values: [f64; POINTS] = match is_told {
@@ -318,6 +321,8 @@ struct Dense<'a> {
     start: &'a Begin<'a>,
     set: &'a Set,
     h: f64,
+    /// Whether it was taken by the columns of the whole step.
+    whole: bool,
     /// Whether the room has its series.
     is_expanded: bool,
 }
@@ -333,12 +338,9 @@ impl Dense<'_> {
     /// The state at the share `s`.
     fn at(&mut self, room: &mut Room, s: f64) -> Vector {
         let eighths = s * EIGHTHS as f64;
-        let is_regular = self.h == self.set.h && (eighths - eighths.round()).abs() < 1e-9;
-        if is_regular
-            && (0.5..EIGHTHS as f64 - 0.5).contains(&eighths)
-            && let Some(y) = room.at_eighth(self.field, self.set, self.start, eighths.round() as usize)
-        {
-            return y;
+        let is_eighth = (eighths - eighths.round()).abs() < 1e-9 && (0.5..EIGHTHS as f64 - 0.5).contains(&eighths);
+        if self.whole && self.h == self.set.h && is_eighth {
+            return room.at_eighth(self.field, self.set, self.start, eighths.round() as usize);
         }
         self.expand(room);
         let states = room.series.at(self.field.linear.size, s);
