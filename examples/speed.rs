@@ -1,11 +1,12 @@
 //! Times one run of the Table 4 machine: 5 V for 0.25 s, one simulated second, 1000 output intervals, every column;
 //! prints JSON.
 //!
-//! `cargo run --release --package taut --example speed [-- RUNS]`: the exact solver first, then all of `runs`, with
-//! Coulomb friction and with a Stribeck curve on top of it (30 % of Coulomb friction, gone with 0.05 m/s at the belt).
+//! `cargo run --release --package taut --example speed [-- RUNS]`: the exact solver first, then all of `runs`: Coulomb
+//! friction, a Stribeck curve on top of it (30 % of Coulomb friction, gone with 0.05 m/s at the belt), bristles under
+//! the cart (σ₀ = 1e4 and 1e7 N/m), spans that follow the cart; what each costs, and how far it is from a run at 1e-13.
 //!
-//! `… -- coulomb|stribeck exact|TOLERANCE RUNS`: one solver for `authorities/speed.py`, which compares it with others:
-//! the best time in seconds and the number of events, then φ₁, x and φ₃ of every row.
+//! `… -- PROBLEM exact|TOLERANCE RUNS`: one solver for `authorities/speed.py`, which compares it with others: the best
+//! time in seconds and the number of events, then φ₁, x and φ₃ of every row.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -14,25 +15,22 @@ use std::hint::black_box;
 use std::time::Instant;
 use taut::case::Experiment;
 use taut::signal::Signal;
-use taut::solve::{Flow, Solver, simulate, stream};
+use taut::solve::{Flow, Solution, Solver, simulate, stream};
 use taut::stage::Stage;
 
-/// The cart's rest position by independent solutions, m: with Coulomb friction (close reading of the paper, golden
-/// numbers), and with the Stribeck curve (`authorities/output/speed.txt`).
-const CART_AT_REST: [f64; 2] = [0.053746653033, 0.053607946139];
+/// The cart's rest position with Coulomb friction by independent solutions, m: close reading of the paper, golden
+/// numbers.
+const CART_AT_REST: f64 = 0.053746653033;
 
-/// A run, and the place where the cart comes to rest.
-struct Problem {
-    name: &'static str,
-    stage: Stage,
-    at_rest: f64,
-}
-
-fn problems() -> [Problem; 2] {
-    let [coulomb, stribeck] = [common::table4(), common::with_stribeck(common::table4())];
+/// Problems by name.
+fn problems() -> [(&'static str, Stage); 5] {
+    let table4 = common::table4;
     [
-        Problem { name: "coulomb", stage: coulomb, at_rest: CART_AT_REST[0] },
-        Problem { name: "stribeck", stage: stribeck, at_rest: CART_AT_REST[1] },
+        ("coulomb", table4()),
+        ("stribeck", common::with_stribeck(table4())),
+        ("lugre-1e4", common::with_bristles(table4(), 1e4)),
+        ("lugre-1e7", common::with_bristles(table4(), 1e7)),
+        ("follows", common::with_following_spans(table4())),
     ]
 }
 
@@ -61,13 +59,14 @@ fn main() {
     let experiment = common::experiment(Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 }, 1.0);
     match &arguments[..] {
         [problem, solver, runs] => {
-            let problem = problems().into_iter().find(|p| p.name == problem).expect("coulomb or stribeck");
+            let found = problems().into_iter().find(|(name, _)| name == problem);
+            let (_, stage) = found.expect("coulomb, stribeck, lugre-1e4, lugre-1e7 or follows");
             let solver = match solver.as_str() {
                 "exact" => Solver::Exact,
                 tolerance => Solver::General { tolerance: tolerance.parse().expect("exact or a tolerance") },
             };
             let calls = runs.parse().expect("a number of runs");
-            rows(&problem.stage, &experiment, solver, calls);
+            rows(&stage, &experiment, solver, calls);
         }
         _ => summary(&experiment, arguments.first().and_then(|runs| runs.parse().ok()).unwrap_or(2000)),
     }
@@ -84,36 +83,44 @@ fn rows(stage: &Stage, experiment: &Experiment, solver: Solver, calls: u32) {
     }
 }
 
+/// The largest difference at the belt, m.
+fn apart(stage: &Stage, a: &Solution, b: &Solution) -> f64 {
+    let arms = [("drive_angle", stage.pulley_radius), ("cart_position", 1.0), ("idler_angle", stage.pulley_radius)];
+    let worst = arms.map(|(name, arm)| {
+        let column = |solution: &Solution| solution.trajectory.get(name).expect("in every run").to_vec();
+        column(a).iter().zip(column(b)).fold(0.0, |worst: f64, (a, b)| worst.max(arm * (a - b).abs()))
+    });
+    worst.into_iter().fold(0.0, f64::max)
+}
+
 fn summary(experiment: &Experiment, calls: u32) {
-    let problems = problems();
-    let general = |tolerance| Solver::General { tolerance };
-    let all = [(0, Solver::Exact), (0, general(1e-4)), (0, Solver::GENERAL), (1, general(1e-4)), (1, Solver::GENERAL)];
-    let runs = all.map(|(problem, solver)| {
-        let Problem { name, stage, at_rest } = &problems[problem];
-        let (word, tolerance) = match solver {
-            Solver::General { tolerance } => ("general", format!("{tolerance:e}")),
-            _ => ("exact", "null".to_string()),
-        };
-        let calls = if word == "exact" { calls } else { calls / 10 };
-        let solution = simulate(stage, experiment, solver).expect("the machine is sound");
-        let cart = solution.trajectory.get("cart_position").expect("every run has it");
-        let error = (cart[cart.len() - 1] - at_rest).abs();
-        let (time, events) = (seconds(stage, experiment, solver, calls), solution.outcome.events.len());
-        let text = format!(
-            "{{\"problem\": \"{name}\", \"solver\": \"{word}\", \"tolerance\": {tolerance}, \"seconds_per_run\": {time:e}, \
-             \"position_error_m\": {error:e}, \"events\": {events}, \"evaluations\": {}}}",
-            solution.outcome.cost.evaluations
-        );
-        (text, time, error, events)
-    });
-    let kept = best(calls, &|| {
-        black_box(simulate(&problems[0].stage, experiment, Solver::Exact)).expect("the machine is sound");
-    });
-    let (_, streamed, error, events) = &runs[0];
-    let texts: Vec<&str> = runs.iter().map(|(text, ..)| text.as_str()).collect();
+    let run = |stage: &Stage, solver: Solver| simulate(stage, experiment, solver).expect("the machine is sound");
+    let table4 = common::table4();
+    let exact = run(&table4, Solver::Exact);
+    let cart = exact.trajectory.get("cart_position").expect("every run has it");
+    let error = (cart[cart.len() - 1] - CART_AT_REST).abs();
+    let streamed = seconds(&table4, experiment, Solver::Exact, calls);
+    let kept = best(calls, &|| _ = black_box(run(&table4, Solver::Exact)));
+    let mut texts = Vec::new();
+    for (name, stage) in problems() {
+        let tight = run(&stage, Solver::General { tolerance: 1e-13 });
+        for tolerance in [1e-4, 1e-6, 1e-9] {
+            let solver = Solver::General { tolerance };
+            let solution = run(&stage, solver);
+            let (error, time) = (apart(&stage, &solution, &tight), seconds(&stage, experiment, solver, calls / 10));
+            let (events, cost) = (solution.outcome.events.len(), solution.outcome.cost);
+            texts.push(format!(
+                "{{\"problem\": \"{name}\", \"tolerance\": {tolerance:e}, \"seconds_per_run\": {time:e}, \
+                 \"differs_from_1e-13_m\": {error:.1e}, \"events\": {events}, \"steps\": {}, \"evaluations\": {}, \
+                 \"modes\": {}, \"sets\": {}, \"looks\": {}}}",
+                cost.steps, cost.evaluations, cost.modes, cost.propagators, cost.looks
+            ));
+        }
+    }
     println!(
-        "{{\"seconds_per_run\": {streamed:e}, \"seconds_per_run_kept\": {kept:e}, \"position_error_m\": {error:e}, \"events\": {events}, \
-         \"runs\": [\n  {}\n]}}",
+        "{{\"seconds_per_run\": {streamed:e}, \"seconds_per_run_kept\": {kept:e}, \"position_error_m\": {error:e}, \
+         \"events\": {}, \"runs\": [\n  {}\n]}}",
+        exact.outcome.events.len(),
         texts.join(",\n  ")
     );
 }

@@ -9,9 +9,11 @@ use ivp::methods::{DOP853, Tolerance};
 use ivp::prelude::FirstOrderSystem;
 use ivp::solout::{ControlFlag, SolOut};
 use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 use taut::friction::{Along, Friction, Law, Side};
 use taut::signal::Signal;
-use taut::solve::{Ending, Solver, simulate};
+use taut::solve::{Ending, Solution, Solver, simulate};
 use taut::stage::{BeltMake, Stage, Travel};
 
 const RADIUS: f64 = 0.0194;
@@ -158,4 +160,30 @@ proptest! {
         println!("{worst:.1e} m, {:?}", solution.outcome.cost);
         prop_assert!(rows.rows.len() == 301 && worst < 1e-10, "{worst:e} m");
     }
+}
+
+/// A tolerance was that of a step, in radians and metres per second: at 1e-9 a run was off by 1e-13 m, and took twice
+/// the steps.
+#[test]
+fn a_tolerance_is_about_what_positions_are_off_by() {
+    let mut runner =
+        TestRunner::new_with_rng(ProptestConfig::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
+    let mut shares = Vec::new();
+    for _ in 0..40 {
+        let problem = problem().new_tree(&mut runner).unwrap().current();
+        let input = Signal::Sine { amplitude: problem.sine.0, frequency: problem.sine.1, phase: 0.0, offset: 0.0 };
+        let experiment = common::experiment(input, 0.2);
+        let run = |tolerance| simulate(&problem.stage, &experiment, Solver::General { tolerance }).unwrap();
+        let (usual, tight) = (run(1e-9), run(1e-13));
+        let columns = [("drive_angle", RADIUS), ("cart_position", 1.0), ("idler_angle", RADIUS)];
+        let apart = columns.map(|(name, lever)| {
+            let column = |solution: &Solution| solution.trajectory.get(name).unwrap().to_vec();
+            let pairs = column(&usual).into_iter().zip(column(&tight));
+            pairs.fold(0.0, |worst: f64, (a, b)| worst.max(lever * (a - b).abs()))
+        });
+        shares.push(apart.into_iter().fold(0.0, f64::max) / 1e-9);
+    }
+    shares.sort_by(f64::total_cmp);
+    println!("shares of the tolerance: median {:.1e}, most {:.1e}", shares[20], shares[39]);
+    assert!(shares[39] < 10.0 && shares[20] > 1e-3, "median {:e}, most {:e}", shares[20], shares[39]);
 }

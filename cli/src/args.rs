@@ -215,7 +215,7 @@ pub struct Simulate {
     /// How the equations are solved [default: exact, or general where the stage needs it]
     #[arg(long, value_enum)]
     pub solver: Option<SolverName>,
-    /// Error that --solver general allows in each step [default: 1e-9]
+    /// About what positions are off by with --solver general, m [default: 1e-9]
     #[arg(long, value_name = "NUMBER")]
     pub tolerance: Option<f64>,
     /// Step of --solver table3 [default: 0.1 ms]

@@ -45,7 +45,7 @@ pub enum Solver {
     Exact,
     /// Collocation with steps by their error between located events: any friction law, spans that follow the cart.
     General {
-        /// Error allowed in each step: relative, and absolute for what is smaller than 1 rad, rad/s or A, or r and r/s.
+        /// About what positions at the belt are off by, m.
         tolerance: f64,
     },
     /// The paper's Table 3 with a fixed step: a reproduction, not a recommendation.
@@ -58,8 +58,7 @@ pub enum Solver {
 }
 
 impl Solver {
-    /// The general solver with the default tolerance: 3e-12 m on the paper's machine; [`ErrorEstimate`] says it for any
-    /// run.
+    /// The general solver with the default tolerance, a nanometre; [`ErrorEstimate`] says how far any run is off.
     pub const GENERAL: Self = Self::General { tolerance: 1e-9 };
 
     /// The solver for this stage: the exact one where it can be.

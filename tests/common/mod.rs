@@ -12,7 +12,7 @@ pub mod wrong;
 use taut::case::{Experiment, Initial};
 use taut::friction::{Friction, Law, Shape};
 use taut::signal::Signal;
-use taut::stage::{Amplifier, AmplifierMode, Belt, Cart, Motor, Pulley, Stage};
+use taut::stage::{Amplifier, AmplifierMode, Belt, BeltMake, Cart, Motor, Pulley, Stage, Travel};
 
 /// A stage with the paper's motor and radius.
 pub fn paper_stage(stiffness: [f64; 3], inertia: f64, pulley: Friction, cart: Friction) -> Stage {
@@ -77,5 +77,23 @@ pub fn with_stribeck(mut stage: Stage) -> Stage {
         friction.backward.breakaway = 1.3 * friction.backward.coulomb;
         friction.law = Law::Stribeck { velocity, shape: Shape::Gaussian };
     }
+    stage
+}
+
+/// Bristles under the cart: breakaway 30 % above its Coulomb friction, v_s = 0.01 m/s, σ₁ = 60 N s/m.
+pub fn with_bristles(mut stage: Stage, stiffness: f64) -> Stage {
+    let friction = &mut stage.cart.friction;
+    friction.forward.breakaway = 1.3 * friction.forward.coulomb;
+    friction.backward.breakaway = 1.3 * friction.backward.coulomb;
+    friction.law = Law::LuGre { stiffness, damping: 60.0, velocity: 0.01 };
+    stage
+}
+
+/// A belt of the paper's lengths whose spans follow the cart.
+pub fn with_following_spans(mut stage: Stage) -> Stage {
+    let make = BeltMake { modulus: 8.335e9, section: 5.5626e-6, spans: [0.34925, 0.34925, 0.7874] };
+    (stage.belt.make, stage.belt.follows_cart) = (Some(make), true);
+    stage.belt.stiffness = make.stiffness();
+    stage.travel = Some(Travel { min: -0.3, max: 0.3, stop: None });
     stage
 }

@@ -12,28 +12,73 @@ pub(super) fn may_fall(values: &[f64; POINTS]) -> bool {
     !(low > 5.0 * (high - low) || (low == high && low >= 0.0))
 }
 
+/// 2⁻ᵏ.
+const HALVES: [f64; TERMS] = {
+    let (mut table, mut k) = ([1.0; TERMS], 1);
+    while k < TERMS {
+        table[k] = 0.5 * table[k - 1];
+        k += 1;
+    }
+    table
+};
+
+/// ((1 + s)/2)ᵏ by powers of s: `[k][power]`.
+static SECOND: [[f64; SERIES_TERMS]; TERMS] = {
+    let (mut table, mut k) = ([[0.0; SERIES_TERMS]; TERMS], 1);
+    table[0][0] = 1.0;
+    while k < TERMS {
+        let mut j = 0;
+        while j < SERIES_TERMS {
+            table[k][j] = 0.5 * (table[k - 1][j] + if j > 0 { table[k - 1][j - 1] } else { 0.0 });
+            j += 1;
+        }
+        k += 1;
+    }
+    table
+};
+
+/// The coefficients on the second half of a step, from those on the whole.
+fn second_half(c: &[f64]) -> [f64; SERIES_TERMS] {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        return unsafe { second_half_by_avx2(c) };
+    }
+    second_half_by_any(c)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn second_half_by_avx2(c: &[f64]) -> [f64; SERIES_TERMS] {
+    second_half_by_any(c)
+}
+
+#[inline(always)]
+fn second_half_by_any(c: &[f64]) -> [f64; SERIES_TERMS] {
+    let mut second = [0.0; SERIES_TERMS];
+    // The smallest first.
+    for (c, row) in c.iter().zip(&SECOND).rev() {
+        second.iter_mut().zip(row).for_each(|(sum, weight)| *sum += c * weight);
+    }
+    second
+}
+
 /// The place in (0, 1] where Σ c_k sᵏ, `order` being the highest power, first turns negative.
 pub(super) fn first_fall(c: &[f64; TERMS], order: usize) -> Option<f64> {
     if order < SERIES_TERMS {
         return roots::first_fall(&c[..=order]);
     }
-    // Over half the step the powers beyond say nothing any more.
-    let mut first = *c;
-    let mut scale = 1.0;
-    for c in &mut first[..=order] {
-        *c *= scale;
-        scale *= 0.5;
+    let c = &c[..=order];
+    if c[1..].iter().fold(c[0], |sum, &c| sum + if c < 0.0 { c } else { 0.0 }) >= 0.0 {
+        return None;
     }
-    if let Some(s) = roots::first_fall(&first[..SERIES_TERMS]) {
+    // Over half the step the powers beyond say nothing any more.
+    let mut first = [0.0; SERIES_TERMS];
+    first.iter_mut().zip(c).zip(&HALVES).for_each(|((first, c), half)| *first = c * half);
+    if let Some(s) = roots::first_fall(&first) {
         return Some(0.5 * s);
     }
-    // Σ c_k (1 + s)ᵏ, of the first half's coefficients
-    let mut second = first;
-    for i in 0..order {
-        for k in (i..order).rev() {
-            second[k] += second[k + 1];
-        }
-    }
+    let mut second = second_half(c);
     if second[0] <= 0.0 {
         // Zero between the halves: what begins there is told by the first power that is there.
         second[0] = 0.0;
@@ -41,7 +86,7 @@ pub(super) fn first_fall(c: &[f64; TERMS], order: usize) -> Option<f64> {
             return Some(0.5);
         }
     }
-    roots::first_fall(&second[..SERIES_TERMS]).map(|s| 0.5 + 0.5 * s)
+    roots::first_fall(&second).map(|s| 0.5 + 0.5 * s)
 }
 
 /// The place near `s` where Σ c_k sᵏ is zero, by Newton's method; no farther than the reach of the series.

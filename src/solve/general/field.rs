@@ -42,7 +42,8 @@ impl Field {
         let (mut columns, mut constant, mut input) =
             (vec![[0.0; STATES]; size], [0.0; STATES], [[0.0; STATES]; DRIVES]);
         let mut put = |place: usize, rate: &Form| {
-            model.terms(rate).for_each(|(column, value)| columns[column][place] = value);
+            let row = model.row(rate);
+            columns.iter_mut().zip(row).for_each(|(column, value)| column[place] = value);
             constant[place] = rate.constant;
             input.iter_mut().zip(rate.input).for_each(|(column, value)| column[place] = value);
         };
@@ -65,7 +66,7 @@ impl Field {
         }
         let guard = |form: &Form| {
             let mut row = [0.0; STATES];
-            model.terms(form).for_each(|(place, value)| row[place] = value);
+            row.iter_mut().zip(model.row(form)).for_each(|(own, value)| *own = value);
             Guard { row, input: form.input, constant: form.constant }
         };
         let guards = equations.guards.iter().map(|part| guard(&part.form)).collect();
@@ -83,6 +84,7 @@ impl Field {
             shifted: false,
             mass,
         };
+        field.linear.inputs = mechanism.drives.len();
         field.add_sources();
         field.add_outputs();
         field
@@ -140,7 +142,7 @@ impl Field {
             let length = self.argument(row);
             let arms = model.mechanism.springs[following.spring].follows.iter().flat_map(|follows| &follows.arms);
             let ways = arms.map(|&(body, _)| (body, self.argument_at(model.coordinate(body)))).collect();
-            self.sources.push(Source::Spring { following: index, length, ways });
+            self.sources.push(Source::spring(&model, index, length, ways));
             // A slack one pulls at nothing; what it would pull is watched.
             let slack = self.mode.slack[following.spring];
             let arm = |leader: usize| -> f64 {

@@ -43,6 +43,8 @@ pub(super) struct Linear {
     rows: Vec<States>,
     pub(super) constant: States,
     pub(super) input: [States; DRIVES],
+    /// How many inputs there are.
+    pub(super) inputs: usize,
     pub(super) source: Vec<States>,
     pub(super) outputs: Vec<Output>,
     /// How many of them are arguments of forces.
@@ -53,8 +55,15 @@ pub(super) struct Linear {
     series: [OnceLock<Vec<[States; TERMS]>>; 2],
     /// (A/ν)ᵐ b_j.
     moved: OnceLock<Vec<[States; TERMS]>>,
-    /// r_m b_j/νᵐ of the arguments: `[argument][source]`.
-    moments: OnceLock<Vec<[f64; TERMS]>>,
+    /// r_m/νᵐ times what drives them, of the arguments, and of the guards: `[output][one, inputs, forces]`.
+    moments: [OnceLock<Vec<[f64; TERMS]>>; 2],
+}
+
+/// Outputs of one kind.
+#[derive(Clone, Copy)]
+enum Which {
+    Arguments,
+    Guards,
 }
 
 /// A known force: powers of the share of the step.
@@ -68,35 +77,62 @@ impl Linear {
             rows.iter_mut().zip(values).for_each(|(row, value)| row[column] = *value);
         }
         let norm = norm(size, &columns).max(f64::MIN_POSITIVE);
-        let series = [const { OnceLock::new() }; 2];
+        let (series, moments) = ([const { OnceLock::new() }; 2], [const { OnceLock::new() }; 2]);
         let (source, outputs, arguments) = (Vec::new(), Vec::new(), 0);
-        let (moved, moments) = (OnceLock::new(), OnceLock::new());
-        Self { size, columns, rows, constant, input, source, outputs, arguments, norm, series, moved, moments }
+        let (moved, inputs) = (OnceLock::new(), DRIVES);
+        Self { size, columns, rows, constant, input, inputs, source, outputs, arguments, norm, series, moved, moments }
     }
 
-    /// c A/ν, then c (A/ν)², and so on, for each of `outputs`.
-    fn rows_of(&self, outputs: &[Output]) -> Vec<[States; TERMS]> {
-        let of = |output: &Output| powers(self.size, &self.rows, &output.row, self.norm);
-        outputs.iter().map(of).collect()
+    /// x, M x/ν, (M/ν)² x, … of several, M being A by its columns or by its rows.
+    fn chains<'x>(&self, columns: &[States], list: impl ExactSizeIterator<Item = &'x States>) -> Vec<[States; TERMS]> {
+        let mut chains = vec![[[0.0; STATES]; TERMS]; list.len()];
+        chains.iter_mut().zip(list).for_each(|(chain, x)| powers(self.size, columns, x, self.norm, chain));
+        chains
     }
 
-    fn of_arguments(&self) -> &[[States; TERMS]] {
-        self.series[0].get_or_init(|| self.rows_of(&self.outputs[..self.arguments]))
+    /// Those of the arguments, or of the guards.
+    fn rows(&self, which: Which) -> &[[States; TERMS]] {
+        let outputs = match which {
+            Which::Arguments => &self.outputs[..self.arguments],
+            Which::Guards => &self.outputs[self.arguments..],
+        };
+        let rows = outputs.iter().map(|output| &output.row);
+        self.series[which as usize].get_or_init(|| self.chains(&self.rows, rows))
     }
 
-    fn moments(&self) -> &[[f64; TERMS]] {
-        let of = |rows: &[States; TERMS], source: &States| rows.each_ref().map(|row| dot(self.size, row, source));
-        let all = || self.of_arguments().iter().flat_map(|rows| self.source.iter().map(move |source| of(rows, source)));
-        self.moments.get_or_init(|| all().collect())
+    /// Their moments, each as many as there are drives.
+    fn moments(&self, which: Which) -> &[[f64; TERMS]] {
+        let columns = std::iter::once(&self.constant).chain(&self.input[..self.inputs]).chain(&self.source);
+        // Most of their places are zero.
+        let terms = |column: &States| -> Vec<(usize, f64)> {
+            column.iter().copied().enumerate().filter(|(_, value)| *value != 0.0).collect()
+        };
+        let all = || {
+            let columns: Vec<_> = columns.map(terms).collect();
+            let mut all = vec![[0.0; TERMS]; self.rows(which).len() * columns.len()];
+            let each = self.rows(which).iter().flat_map(|rows| columns.iter().map(move |terms| (rows, terms)));
+            for (moments, (rows, terms)) in all.iter_mut().zip(each) {
+                for &(place, value) in terms {
+                    moments.iter_mut().zip(rows).for_each(|(moment, row)| *moment += row[place] * value);
+                }
+            }
+            all
+        };
+        self.moments[which as usize].get_or_init(all)
     }
 
-    fn of_guards(&self) -> &[[States; TERMS]] {
-        self.series[1].get_or_init(|| self.rows_of(&self.outputs[self.arguments..]))
+    /// How many drives there are: one, inputs, forces.
+    fn drives(&self) -> usize {
+        1 + self.inputs + self.source.len()
     }
 
     fn moved(&self) -> &[[States; TERMS]] {
-        let of = |column: &States| powers(self.size, &self.columns, column, self.norm);
-        self.moved.get_or_init(|| self.source.iter().map(of).collect())
+        self.moved.get_or_init(|| self.chains(&self.columns, self.source.iter()))
+    }
+
+    /// Columns of what a step depends on without forces: states, one, inputs and their powers.
+    pub(super) fn known(&self, degree: usize) -> usize {
+        self.size + 1 + self.inputs * (degree + 1)
     }
 
     /// ẏ under these inputs and forces.
@@ -111,7 +147,7 @@ impl Linear {
     }
 
     /// The series of y over `h` under `forcing`, which is in powers of the share of h: t_{k+1} = (A t_k + F_k) h/(k+1).
-    pub(super) fn series(&self, y: &States, h: f64, forcing: &Forcing, terms: &mut Series) {
+    pub(super) fn series(&self, y: &States, h: f64, forcing: &[States], terms: &mut Series) {
         terms.order = radau::order(self.norm * h);
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
@@ -123,12 +159,12 @@ impl Linear {
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn series_by_avx2(&self, y: &States, h: f64, forcing: &Forcing, terms: &mut Series) {
+    fn series_by_avx2(&self, y: &States, h: f64, forcing: &[States], terms: &mut Series) {
         self.series_by_any(y, h, forcing, terms);
     }
 
     #[inline(always)]
-    fn series_by_any(&self, y: &States, h: f64, forcing: &Forcing, terms: &mut Series) {
+    fn series_by_any(&self, y: &States, h: f64, forcing: &[States], terms: &mut Series) {
         match self.size {
             8 => self.series_of::<8>(y, h, forcing, terms),
             12 => self.series_of::<12>(y, h, forcing, terms),
@@ -137,7 +173,7 @@ impl Linear {
     }
 
     #[inline(always)]
-    fn series_of<const N: usize>(&self, y: &States, h: f64, forcing: &Forcing, terms: &mut Series) {
+    fn series_of<const N: usize>(&self, y: &States, h: f64, forcing: &[States], terms: &mut Series) {
         let mut now: [f64; N] = std::array::from_fn(|i| y[i]);
         terms.terms[0][..N].copy_from_slice(&now);
         for k in 0..terms.order {
@@ -171,14 +207,46 @@ impl Series {
 
     /// The states at the share `s` of the step.
     pub(super) fn at(&self, size: usize, s: f64) -> States {
-        let mut sum = [0.0; STATES];
-        for term in self.terms[1..=self.order].iter().rev() {
-            for (sum, term) in sum[..size].iter_mut().zip(term) {
-                *sum = (*sum + term) * s;
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.at_by_avx2(size, s) };
+        }
+        self.at_by_any(size, s)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn at_by_avx2(&self, size: usize, s: f64) -> States {
+        self.at_by_any(size, s)
+    }
+
+    #[inline(always)]
+    fn at_by_any(&self, size: usize, s: f64) -> States {
+        match size {
+            8 => self.at_of::<8>(s),
+            12 => self.at_of::<12>(s),
+            _ => self.at_of::<STATES>(s),
+        }
+    }
+
+    /// Σ t_k sᵏ = t_0 + s (O(s²) + s E(s²)): the chains of odd and even powers do not wait for each other.
+    #[inline(always)]
+    fn at_of<const N: usize>(&self, s: f64) -> States {
+        let (mut odd, mut even, square) = ([0.0; N], [0.0; N], s * s);
+        let pairs = self.terms[1..=self.order].chunks_exact(2);
+        if let [last] = pairs.remainder() {
+            odd.copy_from_slice(&last[..N]);
+        }
+        for pair in pairs.rev() {
+            for i in 0..N {
+                odd[i] = odd[i] * square + pair[0][i];
+                even[i] = even[i] * square + pair[1][i];
             }
         }
-        for (sum, begin) in sum[..size].iter_mut().zip(&self.terms[0]) {
-            *sum += begin;
+        let mut sum = self.terms[0];
+        for i in 0..N {
+            sum[i] += s * (odd[i] + s * even[i]);
         }
         sum
     }
@@ -195,40 +263,74 @@ impl Series {
 }
 
 /// x, M x/ν, (M/ν)² x, …, M given by columns.
-fn powers(size: usize, columns: &[States], x: &States, norm: f64) -> [States; TERMS] {
-    let mut list = [[0.0; STATES]; TERMS];
-    let (mut now, factor) = (*x, 1.0 / norm);
-    list[0] = now;
-    for to in &mut list[1..] {
-        let mut sum = [0.0; STATES];
-        for (column, value) in columns[..size].iter().zip(now).filter(|(_, value)| *value != 0.0) {
-            sum[..size].iter_mut().zip(column).for_each(|(sum, entry)| *sum += entry * value);
+fn powers(size: usize, columns: &[States], x: &States, norm: f64, chain: &mut [States; TERMS]) {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        return unsafe { powers_by_avx2(size, columns, x, norm, chain) };
+    }
+    powers_by_any(size, columns, x, norm, chain);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn powers_by_avx2(size: usize, columns: &[States], x: &States, norm: f64, chain: &mut [States; TERMS]) {
+    powers_by_any(size, columns, x, norm, chain);
+}
+
+#[inline(always)]
+fn powers_by_any(size: usize, columns: &[States], x: &States, norm: f64, chain: &mut [States; TERMS]) {
+    match size {
+        8 => powers_of::<8>(columns, x, norm, chain),
+        12 => powers_of::<12>(columns, x, norm, chain),
+        _ => powers_of::<STATES>(columns, x, norm, chain),
+    }
+}
+
+#[inline(always)]
+fn powers_of<const N: usize>(columns: &[States], x: &States, norm: f64, chain: &mut [States; TERMS]) {
+    let factor = 1.0 / norm;
+    chain[0] = *x;
+    let mut now: [f64; N] = std::array::from_fn(|i| x[i]);
+    for to in &mut chain[1..] {
+        let mut sum = [0.0; N];
+        for (column, value) in columns.iter().zip(now) {
+            sum.iter_mut().zip(column).for_each(|(sum, entry)| *sum += entry * value);
         }
         now = sum.map(|sum| sum * factor);
-        *to = now;
+        to[..N].copy_from_slice(&now);
     }
-    list
 }
 
 /// ‖A⁶⁴‖^(1/64): so high a power does not know the units of what it couples.
 fn norm(size: usize, columns: &[States]) -> f64 {
-    let most = |columns: &[States]| columns.iter().flatten().fold(0.0, |most: f64, entry| most.max(entry.abs()));
-    let scale = most(columns);
+    match size {
+        8 => norm_of::<8>(columns),
+        12 => norm_of::<12>(columns),
+        _ => norm_of::<STATES>(columns),
+    }
+}
+
+fn norm_of<const N: usize>(columns: &[States]) -> f64 {
+    let most = |columns: &[[f64; N]; N]| columns.iter().flatten().fold(0.0, |most: f64, entry| most.max(entry.abs()));
+    let mut power = [[0.0; N]; N];
+    for (own, column) in power.iter_mut().zip(columns) {
+        own.copy_from_slice(&column[..N]);
+    }
+    let scale = most(&power);
     if scale == 0.0 || !scale.is_finite() {
         return scale;
     }
     // Each square by its own scale, so that nothing overflows: A⁴ = ((A/a)²/b)² a⁴ b²
-    let mut power: Vec<States> = columns.iter().map(|column| column.map(|entry| entry / scale)).collect();
+    power = power.map(|column| column.map(|entry| entry / scale));
     let (mut logarithm, mut share) = (scale.ln(), 1.0);
     for _ in 0..6 {
-        let square = |column: &States| {
-            let mut sum = [0.0; STATES];
-            for (other, factor) in power[..size].iter().zip(column).filter(|(_, factor)| **factor != 0.0) {
-                sum[..size].iter_mut().zip(other).for_each(|(sum, entry)| *sum += entry * factor);
+        let mut squared = [[0.0; N]; N];
+        for (to, column) in squared.iter_mut().zip(&power) {
+            for (other, factor) in power.iter().zip(column).filter(|(_, factor)| **factor != 0.0) {
+                to.iter_mut().zip(other).for_each(|(sum, entry)| *sum += entry * factor);
             }
-            sum
-        };
-        let squared: Vec<States> = power.iter().map(square).collect();
+        }
         share *= 0.5;
         let own = most(&squared);
         if own == 0.0 {
@@ -236,10 +338,10 @@ fn norm(size: usize, columns: &[States]) -> f64 {
             return scale.sqrt();
         }
         logarithm += share * own.ln();
-        power = squared.iter().map(|column| column.map(|entry| entry / own)).collect();
+        power = squared.map(|column| column.map(|entry| entry / own));
     }
     // The largest row is as long as it has places, at most.
-    (logarithm + share * (size as f64).ln()).exp()
+    (logarithm + share * (N as f64).ln()).exp()
 }
 
 /// What a step of one length makes of a mode.
@@ -247,46 +349,155 @@ pub(super) struct Set {
     pub(super) h: f64,
     /// The highest power of the inputs.
     pub(super) degree: usize,
-    /// What the values of the forces at the points do to the arguments at the nodes: `[argument][source][point]`.
-    weights: Vec<[Lane; POINTS]>,
+    /// What the values of the forces at the points do to the arguments at the nodes, and behind them what ω does:
+    /// `[argument][source][point]`.
+    weights: Vec<[Lane; POINTS + 1]>,
+    /// What all else does to them: `[argument][column]`.
+    base: Vec<Lane>,
     full: OnceLock<Full>,
 }
 
 /// What a step makes of all that it depends on, column by column: states, one, inputs and their powers, then the values
 /// of the forces at the points.
 pub(super) struct Full {
-    /// `[output][column]`
-    nodes: Vec<Lane>,
+    /// Of the guards: `[guard][column]`.
+    guards: Vec<Lane>,
+    /// Changes of the states over the whole step.
     pub(super) end: Vec<States>,
+    /// The same up to each eighth of it.
+    inner: [OnceLock<Vec<States>>; EIGHTHS - 1],
     columns: usize,
+    /// How many of them there are without the forces.
+    pub(super) known: usize,
 }
+
+/// Shares of a step at which it is known column by column.
+pub(super) const EIGHTHS: usize = 8;
 
 impl Set {
     /// That of a step of length `h` under inputs of this degree.
     pub(super) fn new(linear: &Linear, h: f64, degree: usize) -> Self {
-        let order = radau::order(linear.norm * h);
-        let weights = linear.moments().iter().map(|moments| driven(moments, h, linear.norm * h, order)).collect();
-        Self { h, degree, weights, full: OnceLock::new() }
+        let (known, drives) = (linear.known(degree), linear.drives());
+        let mut base = vec![[0.0; NODES]; linear.arguments * known];
+        let mut weights = Vec::with_capacity(linear.arguments * linear.source.len());
+        let outputs = linear.rows(Which::Arguments).iter().zip(linear.moments(Which::Arguments).chunks(drives));
+        for ((rows, moments), base) in outputs.zip(base.chunks_mut(known)) {
+            lead(linear, rows, moments, (h, degree), base);
+            let reach = linear.norm * h;
+            weights.extend(moments[1 + linear.inputs..].iter().map(|m| driven(m, h, reach, radau::order(reach))));
+        }
+        Self { h, degree, weights, base, full: OnceLock::new() }
     }
 
     /// What the forces' values at the points do to an argument at the nodes.
     #[inline(always)]
-    pub(super) fn weights(&self, argument: usize, source: usize, sources: usize) -> &[Lane; POINTS] {
+    pub(super) fn weights(&self, argument: usize, source: usize, sources: usize) -> &[Lane; POINTS + 1] {
         &self.weights[argument * sources + source]
     }
 
-    /// The rest of it, where it is there already, or `wanted`.
-    pub(super) fn full(&self, linear: &Linear, wanted: bool) -> Option<&Full> {
-        match wanted {
-            true => Some(self.full.get_or_init(|| Full::new(linear, self.h, self.degree))),
-            false => self.full.get(),
-        }
+    /// An argument at the nodes without forces, from the columns of what is known.
+    #[inline(always)]
+    pub(super) fn base(&self, argument: usize, x: &[f64]) -> Lane {
+        sum_of(&self.base[argument * x.len()..][..x.len()], x)
+    }
+
+    /// The rest of it. Whoever asks has taken so many steps of this length that it is worth making: what others know of
+    /// the mode changes nothing.
+    pub(super) fn full(&self, linear: &Linear) -> &Full {
+        self.full.get_or_init(|| Full::new(linear, self.h, self.degree))
     }
 }
 
-/// The lanes of c y that the five values of a force add, by the moments r_m b/νᵐ.
-fn driven(moments: &[f64; TERMS], h: f64, reach: f64, order: usize) -> [Lane; POINTS] {
-    let mut lanes = [[0.0; NODES]; POINTS];
+/// Σ x_k times column k.
+#[inline(always)]
+fn sum_of(columns: &[Lane], x: &[f64]) -> Lane {
+    let mut sum = [0.0; NODES];
+    for (lane, x) in columns.iter().zip(x) {
+        sum.iter_mut().zip(lane).for_each(|(sum, lane)| *sum += lane * x);
+    }
+    sum
+}
+
+/// The lanes of c y that states, one, and inputs add, by the rows r_m and their moments.
+fn lead(
+    linear: &Linear,
+    rows: &[States; TERMS],
+    moments: &[[f64; TERMS]],
+    (h, degree): (f64, usize),
+    base: &mut [Lane],
+) {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        return unsafe { lead_by_avx2(linear, rows, moments, (h, degree), base) };
+    }
+    lead_by_any(linear, rows, moments, (h, degree), base);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn lead_by_avx2(
+    linear: &Linear,
+    rows: &[States; TERMS],
+    moments: &[[f64; TERMS]],
+    step: (f64, usize),
+    base: &mut [Lane],
+) {
+    lead_by_any(linear, rows, moments, step, base);
+}
+
+#[inline(always)]
+fn lead_by_any(
+    linear: &Linear,
+    rows: &[States; TERMS],
+    moments: &[[f64; TERMS]],
+    (h, degree): (f64, usize),
+    base: &mut [Lane],
+) {
+    let (reach, order) = (linear.norm * h, radau::order(linear.norm * h));
+    let (free, forced) = base.split_at_mut(linear.size);
+    for (place, lane) in free.iter_mut().enumerate() {
+        let mut factor = 1.0;
+        for (row, table) in rows[..=order].iter().zip(&FREE) {
+            let weight = factor * row[place];
+            lane.iter_mut().zip(table).for_each(|(lane, value)| *lane += weight * value);
+            factor *= reach;
+        }
+    }
+    let force = |moments: &[f64; TERMS], power: usize, lane: &mut Lane| {
+        let mut factor = h;
+        for (moment, table) in moments[..order].iter().zip(&FORCED[power]) {
+            let moment = factor * moment;
+            lane.iter_mut().zip(table).for_each(|(lane, value)| *lane += moment * value);
+            factor *= reach;
+        }
+    };
+    let (one, inputs) = forced.split_at_mut(1);
+    force(&moments[0], 0, &mut one[0]);
+    for (lanes, moments) in inputs.chunks_mut(degree + 1).zip(&moments[1..]) {
+        lanes.iter_mut().enumerate().for_each(|(power, lane)| force(moments, power, lane));
+    }
+}
+
+/// The lanes of c y that the five values of a force add, and ω, by the moments r_m b/νᵐ.
+fn driven(moments: &[f64; TERMS], h: f64, reach: f64, order: usize) -> [Lane; POINTS + 1] {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        return unsafe { driven_by_avx2(moments, h, reach, order) };
+    }
+    driven_by_any(moments, h, reach, order)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn driven_by_avx2(moments: &[f64; TERMS], h: f64, reach: f64, order: usize) -> [Lane; POINTS + 1] {
+    driven_by_any(moments, h, reach, order)
+}
+
+#[inline(always)]
+fn driven_by_any(moments: &[f64; TERMS], h: f64, reach: f64, order: usize) -> [Lane; POINTS + 1] {
+    let mut lanes = [[0.0; NODES]; POINTS + 1];
     let mut factor = h;
     for (moment, tables) in moments.iter().zip(&DRIVEN).take(order) {
         // hᵐ⁺¹ c Aᵐ b
@@ -299,55 +510,76 @@ fn driven(moments: &[f64; TERMS], h: f64, reach: f64, order: usize) -> [Lane; PO
     lanes
 }
 
-fn dot(size: usize, a: &States, b: &States) -> f64 {
-    a[..size].iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b)
-}
-
 impl Full {
     fn new(linear: &Linear, h: f64, degree: usize) -> Self {
-        let (size, reach, order) = (linear.size, linear.norm * h, radau::order(linear.norm * h));
-        let inputs = DRIVES * (degree + 1);
-        let sources = linear.source.len() * POINTS;
-        let columns = size + 1 + inputs + sources;
-        let mut nodes = vec![[0.0; NODES]; linear.outputs.len() * columns];
-        let rows = linear.of_arguments().iter().chain(linear.of_guards());
-        for ((output, rows), nodes) in linear.outputs.iter().zip(rows).zip(nodes.chunks_mut(columns)) {
-            let (free, forced) = nodes.split_at_mut(size);
-            let mut factor = 1.0;
-            for (row, table) in rows.iter().zip(&FREE).take(order + 1) {
-                for (lane, weight) in free.iter_mut().zip(row) {
-                    lane.iter_mut().zip(table).for_each(|(lane, value)| *lane += factor * weight * value);
-                }
-                factor *= reach;
-            }
-            let force = |column: &States, power: usize, lane: &mut Lane| {
-                let mut factor = h;
-                for (row, table) in rows.iter().zip(&FORCED[power]).take(order) {
-                    let moment = factor * dot(size, row, column);
-                    lane.iter_mut().zip(table).for_each(|(lane, value)| *lane += moment * value);
-                    factor *= reach;
-                }
-            };
-            force(&linear.constant, 0, &mut forced[0]);
-            forced[0].iter_mut().for_each(|lane| *lane += output.constant);
-            for (drive, column) in linear.input.iter().enumerate() {
-                for power in 0..=degree {
-                    let lane = &mut forced[1 + drive * (degree + 1) + power];
-                    force(column, power, lane);
-                    lane.iter_mut().zip(&POWER[power]).for_each(|(lane, at)| *lane += output.input[drive] * at);
+        let (reach, order) = (linear.norm * h, radau::order(linear.norm * h));
+        let (known, drives) = (linear.known(degree), linear.drives());
+        let columns = known + linear.source.len() * POINTS;
+        let outputs = &linear.outputs[linear.arguments..];
+        let mut guards = vec![[0.0; NODES]; outputs.len() * columns];
+        let rows = linear.rows(Which::Guards).iter().zip(linear.moments(Which::Guards).chunks(drives));
+        for ((output, (rows, moments)), lanes) in outputs.iter().zip(rows).zip(guards.chunks_mut(columns)) {
+            let (base, forces) = lanes.split_at_mut(known);
+            lead(linear, rows, moments, (h, degree), base);
+            base[linear.size].iter_mut().for_each(|lane| *lane += output.constant);
+            for (lanes, at_once) in base[linear.size + 1..].chunks_mut(degree + 1).zip(&output.input) {
+                for (lane, power) in lanes.iter_mut().zip(&POWER) {
+                    lane.iter_mut().zip(power).for_each(|(lane, at)| *lane += at_once * at);
                 }
             }
-            for ((lanes, column), at_once) in
-                forced[1 + inputs..].as_chunks_mut::<POINTS>().0.iter_mut().zip(&linear.source).zip(&output.source)
+            let forces = forces.as_chunks_mut::<POINTS>().0;
+            for ((lanes, moments), at_once) in forces.iter_mut().zip(&moments[1 + linear.inputs..]).zip(&output.source)
             {
-                let moments = rows.each_ref().map(|row| dot(size, row, column));
-                *lanes = driven(&moments, h, reach, order);
+                lanes.copy_from_slice(&driven(moments, h, reach, order)[..POINTS]);
                 for (node, lane) in lanes[1..].iter_mut().enumerate() {
                     lane[node] += at_once;
                 }
             }
         }
-        Self { nodes, end: Self::ends(linear, h, degree, columns), columns }
+        let inner = [const { OnceLock::new() }; EIGHTHS - 1];
+        Self { guards, end: Self::ends(linear, h, degree, columns), inner, columns, known }
+    }
+
+    /// The states at so many eighths of a step of this length, from those at its beginning.
+    pub(super) fn at_eighth(&self, linear: &Linear, (h, degree): (f64, usize), eighth: usize, x: &[f64]) -> States {
+        let columns = self.inner[eighth - 1].get_or_init(|| self.inner(linear, (h, degree), eighth));
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { moved_by_avx2(linear.size, columns, x) };
+        }
+        moved(linear.size, columns, x)
+    }
+
+    fn inner(&self, linear: &Linear, (h, degree): (f64, usize), eighth: usize) -> Vec<States> {
+        let (share, mut series) = (eighth as f64 / EIGHTHS as f64, Series::room());
+        let mut change = |y: &States, forcing: &[States]| {
+            linear.series(y, h, forcing, &mut series);
+            let mut sum = series.at(linear.size, share);
+            sum.iter_mut().zip(y).for_each(|(sum, y)| *sum -= y);
+            sum
+        };
+        let mut columns = Vec::with_capacity(self.columns);
+        for place in 0..linear.size {
+            let mut y = [0.0; STATES];
+            y[place] = 1.0;
+            columns.push(change(&y, &[]));
+        }
+        let zero = [0.0; STATES];
+        columns.push(change(&zero, &[linear.constant]));
+        for column in &linear.input[..linear.inputs] {
+            for power in 0..=degree {
+                let mut forcing: Forcing = [zero; POWERS];
+                forcing[power] = *column;
+                columns.push(change(&zero, &forcing[..=power]));
+            }
+        }
+        for column in &linear.source {
+            for point in 0..POINTS {
+                columns.push(change(&zero, &radau::MONOMIALS.map(|row| column.map(|value| row[point] * value))));
+            }
+        }
+        columns
     }
 
     /// The changes of the states over the whole step.
@@ -355,7 +587,7 @@ impl Full {
         let size = linear.size;
         let mut end = Vec::with_capacity(columns);
         let mut series = Series::room();
-        let mut change = |y: &States, forcing: &Forcing| {
+        let mut change = |y: &States, forcing: &[States]| {
             linear.series(y, h, forcing, &mut series);
             let mut sum = [0.0; STATES];
             for term in series.terms[1..=series.order].iter().rev() {
@@ -367,16 +599,16 @@ impl Full {
         for place in 0..size {
             let mut y = [0.0; STATES];
             y[place] = 1.0;
-            end.push(change(&y, &none));
+            end.push(change(&y, &[]));
         }
         let zero = [0.0; STATES];
         let mut forced = |column: &States, power: usize| {
             let mut forcing = none;
             forcing[power] = *column;
-            change(&zero, &forcing)
+            change(&zero, &forcing[..=power])
         };
         end.push(forced(&linear.constant, 0));
-        for column in &linear.input {
+        for column in &linear.input[..linear.inputs] {
             end.extend((0..=degree).map(|power| forced(column, power)));
         }
         let (reach, order) = (linear.norm * h, radau::order(linear.norm * h));
@@ -394,15 +626,10 @@ impl Full {
         end
     }
 
-    /// An output at the nodes, from the first `columns` columns.
+    /// A guard at the nodes.
     #[inline(always)]
-    pub(super) fn output(&self, output: usize, x: &[f64]) -> Lane {
-        let begin = output * self.columns;
-        let mut sum = [0.0; NODES];
-        for (lane, x) in self.nodes[begin..begin + self.columns].iter().zip(x) {
-            sum.iter_mut().zip(lane).for_each(|(sum, lane)| *sum += lane * x);
-        }
-        sum
+    pub(super) fn guard(&self, guard: usize, x: &[f64]) -> Lane {
+        sum_of(&self.guards[guard * self.columns..][..self.columns], x)
     }
 
     /// The states at the end.
@@ -413,6 +640,27 @@ impl Full {
             sum.iter_mut().zip(column).for_each(|(sum, value)| *sum += value * x);
         }
         y.iter_mut().zip(sum).for_each(|(y, sum)| *y += sum);
+    }
+}
+
+/// States moved on by the columns of a place within a step.
+#[inline(always)]
+fn moved(size: usize, columns: &[States], x: &[f64]) -> States {
+    let mut sum = [0.0; STATES];
+    sum[..size].copy_from_slice(&x[..size]);
+    for (column, x) in columns.iter().zip(x) {
+        sum[..size].iter_mut().zip(column).for_each(|(sum, value)| *sum += value * x);
+    }
+    sum
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn moved_by_avx2(size: usize, columns: &[States], x: &[f64]) -> States {
+    match size {
+        8 => moved(8, columns, x),
+        12 => moved(12, columns, x),
+        _ => moved(size, columns, x),
     }
 }
 
@@ -453,7 +701,7 @@ mod tests {
         let mut series = Series::room();
         linear.series(&y, h, &forcing, &mut series);
         let set = Set::new(&linear, h, 2);
-        let full = set.full(&linear, true).unwrap();
+        let full = set.full(&linear);
         let mut x = vec![0.0; full.end.len()];
         (x[0], x[1], x[8]) = (y[0], y[1], 1.0);
         x[9..12].copy_from_slice(&u);
@@ -463,15 +711,16 @@ mod tests {
         for node in 0..NODES {
             let at = series.at(8, radau::C[node]);
             let (want, c) = (0.7 * at[0] + at[1], radau::C[node]);
-            assert!((full.output(0, &x)[node] - want).abs() < 1e-14, "node {node}");
+            let forces = (0..POINTS).fold(0.0, |sum, p| sum + set.weights(0, 0, 1)[p][node] * f[p]);
+            assert!((set.base(0, &x[..15])[node] + forces - want).abs() < 1e-14, "node {node}");
             let guard = want + 0.1 * (u[0] + c * (u[1] + c * u[2])) + 0.2 + 0.5 * f[node + 1];
-            assert!((full.output(1, &x)[node] - guard).abs() < 1e-14, "node {node}");
+            assert!((full.guard(0, &x)[node] - guard).abs() < 1e-14, "node {node}");
             if node == NODES - 1 {
                 assert!((end[0] - at[0]).abs() < 1e-14 && (end[1] - at[1]).abs() < 1e-14);
             }
         }
-        let own: f64 = (0..POINTS).map(|p| set.weights(0, 0, 1)[p][2] * f[p]).sum();
-        let without: f64 = full.output(0, &x)[2] - full.output(0, &x[..15])[2];
-        assert!((own - without).abs() < 1e-15);
+        let quarter = full.at_eighth(&linear, (h, 2), 2, &x);
+        let want = series.at(8, 0.25);
+        assert!((quarter[0] - want[0]).abs() < 1e-14 && (quarter[1] - want[1]).abs() < 1e-14);
     }
 }

@@ -72,6 +72,15 @@ impl Curved {
         beyond
     }
 
+    /// Bristles that are the same in both directions, at several speeds side by side: σ₀ |v|/g(v).
+    #[inline(always)]
+    pub(super) fn bristles<const N: usize>(&self, v: [f64; N]) -> [Sliding; N] {
+        let Law::LuGre { stiffness, .. } = self.friction.law else { return [Sliding::default(); N] };
+        let speed = v.map(f64::abs);
+        let dry = self.friction.dry_at(true, speed);
+        std::array::from_fn(|i| Sliding { slip: stiffness * speed[i] / dry[i], ..Sliding::default() })
+    }
+
     /// The law at `v`, dry friction being multiplied by `factor`. The speed is counted in the direction of motion:
     /// where a trial step overshoots, the law goes on smoothly.
     #[inline(always)]
@@ -176,8 +185,8 @@ impl Model {
         Self { mechanism, layout, place, current, bristle, adds, curved, following }
     }
 
-    /// Coefficients of the integrated quantities in a form that are not zero.
-    pub(super) fn terms(&self, form: &Form) -> impl Iterator<Item = (usize, f64)> + use<> {
+    /// Coefficients of the integrated quantities in a form.
+    pub(super) fn row(&self, form: &Form) -> Vector {
         let mut row = [0.0; MOST];
         let on = self.layout.on_coordinates(form);
         for body in 0..self.mechanism.bodies.len() {
@@ -188,7 +197,7 @@ impl Model {
                 row[*place] = current;
             }
         }
-        row.into_iter().enumerate().filter(|(_, coefficient)| *coefficient != 0.0)
+        row
     }
 
     /// Place of a body's coordinate.
@@ -324,6 +333,9 @@ impl Model {
     /// The difference of a body's own friction from that of the linear equations.
     #[inline(always)]
     pub(super) fn beyond_straight(&self, curved: &Curved, motion: Motion, y: &[f64]) -> f64 {
+        if let (None, Some(forward)) = (&self.mechanism.bodies[curved.body].along, curved.direction(motion)) {
+            return curved.beyond_coulomb(forward, [y[curved.speed]])[0];
+        }
         let (v, factor) = (y[curved.speed], self.factor(curved.body, y));
         let sliding = curved.sliding(motion, v, factor, false);
         match (curved.friction.law, curved.bristle) {

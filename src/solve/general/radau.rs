@@ -39,6 +39,29 @@ pub(super) const POWERS: usize = crate::signal::DEGREE + 1;
 /// Coefficients of ℓ_p by powers of s: `[power][point]`.
 pub(super) const MONOMIALS: [[f64; POINTS]; POINTS] = inverse(PLACES);
 
+/// Coefficients of ω(s) = s ∏ (s − c_i), by powers of s: the shape of what a quartic through the points leaves of a force
+/// whose fifth derivative does not change.
+const REST: [f64; POINTS + 1] = {
+    let (mut product, mut p) = ([0.0; POINTS + 1], 0);
+    product[0] = 1.0;
+    while p < POINTS {
+        let mut k = p + 1;
+        while k > 0 {
+            product[k] = product[k - 1] - PLACES[p] * product[k];
+            k -= 1;
+        }
+        product[0] *= -PLACES[p];
+        p += 1;
+    }
+    product
+};
+
+/// ω(s).
+#[inline(always)]
+pub(super) fn rest(s: f64) -> f64 {
+    PLACES.iter().fold(1.0, |product, place| product * (s - place))
+}
+
 /// The same of the cubics through the nodes alone.
 const CUBICS: [[f64; NODES]; NODES] = inverse(C);
 
@@ -59,6 +82,26 @@ pub(super) const RADAU: [Lane; NODES] = {
                 k += 1;
             }
             j += 1;
+        }
+        i += 1;
+    }
+    matrix
+};
+
+/// The same of the quartic through the beginning and the nodes: ∫ from 0 to c_i of ℓ_p.
+pub(super) const QUARTIC: [[f64; POINTS]; NODES] = {
+    let mut matrix = [[0.0; POINTS]; NODES];
+    let mut i = 0;
+    while i < NODES {
+        let mut p = 0;
+        while p < POINTS {
+            let (mut k, mut power) = (0, 1.0);
+            while k < POINTS {
+                power *= C[i];
+                matrix[i][p] += MONOMIALS[k][p] * power / (k + 1) as f64;
+                k += 1;
+            }
+            p += 1;
         }
         i += 1;
     }
@@ -116,18 +159,25 @@ pub(super) static FORCED: [[Lane; TERMS]; POWERS] = {
     table
 };
 
-/// The same of a force ℓ_p: `[m][p]`.
-pub(super) static DRIVEN: [[Lane; POINTS]; TERMS] = {
-    let mut table = [[[0.0; NODES]; POINTS]; TERMS];
+/// The same of a force ℓ_p, and of ω behind them: `[m][p]`.
+pub(super) static DRIVEN: [[Lane; POINTS + 1]; TERMS] = {
+    let mut table = [[[0.0; NODES]; POINTS + 1]; TERMS];
     let mut m = 0;
     while m < TERMS {
         let mut p = 0;
-        while p < POINTS {
+        while p <= POINTS {
             let mut i = 0;
             while i < NODES {
                 let mut k = 0;
-                while k < POINTS {
-                    table[m][p][i] += MONOMIALS[k][p] * FORCED[k][m][i];
+                while k <= POINTS {
+                    let coefficient = if p == POINTS {
+                        REST[k]
+                    } else if k < POINTS {
+                        MONOMIALS[k][p]
+                    } else {
+                        0.0
+                    };
+                    table[m][p][i] += coefficient * FORCED[k][m][i];
                     k += 1;
                 }
                 i += 1;
@@ -205,6 +255,10 @@ mod tests {
             let quartic: f64 = (0..POINTS).map(|p| DRIVEN[0][p][i] * PLACES[p].powi(4)).sum();
             assert!((quartic - C[i].powi(5) / 5.0).abs() < 1e-15, "{quartic}");
         }
+        // ω itself, and that it leaves nothing of the quadrature to the end: Radau's is exact for it.
+        let s = 0.3;
+        let by_powers = (0..=POINTS).map(|k| REST[k] * f64::powi(s, k as i32)).sum::<f64>();
+        assert!((by_powers - rest(s)).abs() < 1e-16 && DRIVEN[0][POINTS][NODES - 1].abs() < 1e-16);
         let at_begin: f64 = (0..NODES).map(|j| BACKWARD[j] * (1.0 + C[j]).powi(3)).sum();
         assert!((at_begin - 1.0).abs() < 1e-13, "{at_begin}");
         assert_eq!((order(0.1), order(4.0)), (12, 33));

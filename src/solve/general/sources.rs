@@ -1,14 +1,17 @@
 //! The forces of a mode that are not linear: what friction laws and springs that follow the bodies add.
 //!
-//! Bristles are told at the nodes of a step along with their force. With a_i = σ₀ |v_i|/g(v_i) and Radau's matrix R,
-//! ż = v − a z is a linear system for the deflections at the nodes, whatever a is:
+//! Bristles are told at the nodes of a step along with their force. With a_i = σ₀ |v_i|/g(v_i) and the matrix R that
+//! integrates a polynomial to the nodes, ż = v − a z is a linear system for the deflections there, whatever a is:
 //!
 //! ```text
 //! z_i + h Σ_j R_ij a_j z_j = z₀ + h Σ_j R_ij v_j
 //! ```
+//!
+//! Where bristles slip within a step, R is Radau's: z follows g(v) without a sign of ringing. Where they bend, the rate
+//! at the beginning is a fifth value, which makes the quartic of it as good as that of the force.
 
 use super::model::{Curved, Model, Sliding, Vector};
-use super::radau::{Lane, NODES, RADAU};
+use super::radau::{Lane, NODES, QUARTIC, RADAU};
 use crate::friction::{Law, Motion};
 
 /// A force, with the arguments that it depends on by their numbers.
@@ -27,16 +30,46 @@ pub(super) enum Source {
         length: usize,
         /// Bodies that it follows, with their coordinates.
         ways: Vec<(usize, usize)>,
+        /// Its length where the coordinates are zero, m, and by how much it grows with each: arguments and arms.
+        rest: f64,
+        arms: Vec<(usize, f64)>,
     },
 }
 
-/// The deflections of bristles at the nodes.
-pub(super) type Bristles = [Lane; crate::mechanism::BODIES];
+/// Bristles that slip by more than this share of their deflection within a step are stiff.
+const STIFF: f64 = 2.0;
+
+/// The bristles of a body in a step.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Bristle {
+    /// Their deflections at the nodes.
+    pub(super) bent: Lane,
+    /// ż at the beginning.
+    rate: f64,
+    is_stiff: bool,
+}
+
+/// Those of all bodies.
+pub(super) type Bristles = [Bristle; crate::mechanism::BODIES];
 
 /// How a force at each node changes with an argument at each node.
 pub(super) type Slopes = [Lane; NODES];
 
 impl Source {
+    /// That of a spring, with the arguments that are its stretch and the ways of the bodies that it follows.
+    pub(super) fn spring(model: &Model, following: usize, length: usize, ways: Vec<(usize, usize)>) -> Self {
+        let spring = &model.mechanism.springs[model.following[following].spring];
+        let (mut rest, mut arms) = (0.0, Vec::new());
+        if let Some(follows) = &spring.follows {
+            rest = follows.length;
+            for (&(body, arm), &(_, argument)) in follows.arms.iter().zip(&ways) {
+                rest += arm * model.mechanism.origin[body];
+                arms.push((argument, arm));
+            }
+        }
+        Source::Spring { following, length, ways, rest, arms }
+    }
+
     /// The force at the beginning of a step.
     pub(super) fn at_begin(&self, model: &Model, mode: &crate::mechanism::Mode, y: &Vector) -> f64 {
         match self {
@@ -46,6 +79,27 @@ impl Source {
             }
             Source::Spring { following, .. } => model.beyond(&model.following[*following], y),
         }
+    }
+
+    /// Makes its bristles ready for a step of length `h` from `y` on.
+    #[inline(always)]
+    pub(super) fn set_out(&self, model: &Model, h: f64, y: &Vector, bristles: &mut Bristles) {
+        let &Source::Friction { curved, motion, .. } = self else { return };
+        let curved = &model.curved[curved];
+        if let Some(place) = curved.bristle {
+            let (v, factor) = (y[curved.speed], model.factor_at(curved.body, || y[model.coordinate(curved.body)]));
+            let slip = curved.sliding(motion, v, factor, false).slip;
+            let own = &mut bristles[curved.body];
+            (own.rate, own.is_stiff) = (v - slip * y[place], h * slip > STIFF);
+        }
+    }
+
+    /// Whether it has a kink within a step from `y` on, or what is as narrow: its body turns without being held.
+    #[inline(always)]
+    pub(super) fn has_kink(&self, model: &Model, y: &Vector, arguments: &[Lane]) -> bool {
+        let &Source::Friction { curved, motion: Motion::Free, speed, .. } = self else { return false };
+        let before = y[model.curved[curved].speed];
+        arguments[speed].iter().any(|v| v * before < 0.0)
     }
 
     /// The force at the nodes of a step of length `h` from `y` on; deflections of its bristles go to `bristles`.
@@ -71,10 +125,15 @@ impl Source {
                 }
                 match (curved.friction.law, curved.bristle) {
                     (Law::LuGre { stiffness, damping, .. }, Some(place)) => {
-                        let laws: [Sliding; NODES] = std::array::from_fn(law);
                         let v = &arguments[speed];
-                        let bent = Bent::new(h, &laws).deflections(h, y[place], v);
-                        bristles[curved.body] = bent;
+                        let laws = match way {
+                            None if curved.friction.forward == curved.friction.backward => curved.bristles(*v),
+                            _ => std::array::from_fn(law),
+                        };
+                        let own = &mut bristles[curved.body];
+                        own.is_stiff |= laws.iter().any(|law| h * law.slip > STIFF);
+                        let bent = Bent::new(h, &laws, own.is_stiff).deflections(h, y[place], own.rate, v);
+                        own.bent = bent;
                         for (i, force) in force.iter_mut().enumerate() {
                             // σ₀ z + σ₁ ż
                             let rate = v[i] - laws[i].slip * bent[i];
@@ -85,13 +144,18 @@ impl Source {
                 }
                 force
             }
-            Source::Spring { following, length, ways } => {
-                let spring = model.following[*following].spring;
-                std::array::from_fn(|i| {
-                    let way =
-                        |body: usize| ways.iter().find(|(b, _)| *b == body).map_or(0.0, |(_, a)| arguments[*a][i]);
-                    model.stiffer(spring, way) * arguments[*length][i]
-                })
+            Source::Spring { following, length, rest, arms, .. } => {
+                let spring = &model.mechanism.springs[model.following[*following].spring];
+                let Some(follows) = &spring.follows else { return [0.0; NODES] };
+                let mut force = [*rest; NODES];
+                for &(argument, arm) in arms {
+                    force.iter_mut().zip(&arguments[argument]).for_each(|(length, way)| *length += arm * way);
+                }
+                // (k(q) − k) s
+                for (force, stretch) in force.iter_mut().zip(&arguments[*length]) {
+                    *force = (follows.rigidity / *force - spring.stiffness) * stretch;
+                }
+                force
             }
         }
     }
@@ -123,8 +187,8 @@ impl Source {
                 };
                 match curved.friction.law {
                     Law::LuGre { .. } => {
-                        let bent = &bristles[curved.body];
-                        let matrix = Bent::new(h, &laws);
+                        let own = &bristles[curved.body];
+                        let (bent, matrix) = (&own.bent, Bent::new(h, &laws, own.is_stiff));
                         each(speed, &matrix.slopes(h, curved, &laws, |q| 1.0 - laws[q].slip_slope * bent[q], 1.0));
                         if let Some(way) = way {
                             let by_way = |q: usize| laws[q].slip * steep(q) / factor(q) * bent[q];
@@ -139,7 +203,7 @@ impl Source {
                     }
                 }
             }
-            Source::Spring { following, length, ways } => {
+            Source::Spring { following, length, ways, .. } => {
                 let part = &model.following[*following];
                 let way = |body: usize, i: usize| {
                     ways.iter().find(|(b, _)| *b == body).map_or(0.0, |(_, argument)| arguments[*argument][i])
@@ -166,15 +230,16 @@ impl Source {
 struct Bent {
     parts: Slopes,
     order: [usize; NODES],
+    is_stiff: bool,
 }
 
 impl Bent {
-    fn new(h: f64, laws: &[Sliding; NODES]) -> Self {
+    fn new(h: f64, laws: &[Sliding; NODES], is_stiff: bool) -> Self {
         let mut parts: Slopes = std::array::from_fn(|i| {
-            std::array::from_fn(|j| h * RADAU[i][j] * laws[j].slip + if i == j { 1.0 } else { 0.0 })
+            std::array::from_fn(|j| h * weight(is_stiff, i, j) * laws[j].slip + if i == j { 1.0 } else { 0.0 })
         });
         let order = decompose(&mut parts);
-        Self { parts, order }
+        Self { parts, order, is_stiff }
     }
 
     fn solve(&self, right: &Lane) -> Lane {
@@ -193,9 +258,12 @@ impl Bent {
         x
     }
 
-    fn deflections(&self, h: f64, begin: f64, v: &Lane) -> Lane {
-        let right = RADAU.map(|row| begin + h * row.iter().zip(v).fold(0.0, |sum, (weight, v)| sum + weight * v));
-        self.solve(&right)
+    fn deflections(&self, h: f64, begin: f64, rate: f64, v: &Lane) -> Lane {
+        let right = |i: usize| {
+            let known = if self.is_stiff { 0.0 } else { QUARTIC[i][0] * rate };
+            begin + h * v.iter().enumerate().fold(known, |sum, (j, v)| sum + weight(self.is_stiff, i, j) * v)
+        };
+        self.solve(&std::array::from_fn(right))
     }
 
     /// Slopes of the force where the rate of the bristles at node q changes by `by`(q) beside what their deflection
@@ -212,7 +280,7 @@ impl Bent {
         let mut slopes = [[0.0; NODES]; NODES];
         for q in 0..NODES {
             let by = by(q);
-            let bent = self.solve(&std::array::from_fn(|i| h * RADAU[i][q] * by));
+            let bent = self.solve(&std::array::from_fn(|i| h * weight(self.is_stiff, i, q) * by));
             for (i, slopes) in slopes.iter_mut().enumerate() {
                 let own = if i == q { by } else { 0.0 };
                 let rate = own - laws[i].slip * bent[i];
@@ -221,6 +289,12 @@ impl Bent {
         }
         slopes
     }
+}
+
+/// What a rate at node j makes of a deflection at node i.
+#[inline(always)]
+fn weight(is_stiff: bool, i: usize, j: usize) -> f64 {
+    if is_stiff { RADAU[i][j] } else { QUARTIC[i][j + 1] }
 }
 
 /// Parts a matrix in two triangles with exchange of rows; what was where.

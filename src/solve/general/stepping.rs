@@ -2,10 +2,10 @@
 
 use super::fall;
 use super::field::Field;
-use super::linear::Set;
+use super::linear::{EIGHTHS, Set};
 use super::model::Vector;
 use super::radau::{POINTS, REACH, TERMS};
-use super::step::{Begin, Guess, Room, SOURCES};
+use super::step::{ARGUMENTS, Begin, Guess, Lanes, Room, SOURCES, Step};
 use super::stretch::Stretch;
 use super::{Core, Hit, STEPS_BETWEEN_QUESTIONS, Way, Witness};
 use crate::mechanism::Cause;
@@ -13,13 +13,18 @@ use crate::solve::Ending;
 use std::cell::RefCell;
 use std::sync::Arc;
 
-/// The error of the cubic that is allowed, as a multiple of what the quartic may be off by.
-const CUBIC: f64 = 1.0;
+/// The error of a step that is allowed, as a multiple of the tolerance: such that the positions of a whole run are off by
+/// the tolerance in metres at worst, of most machines by a tenth or less of it (`tests/collocation.rs`). Part of what a
+/// speed is off by is lost again before it becomes a way.
+const EASE: f64 = 10.0;
 
 /// Steps are so much shorter than their error asks for, and at most so much shorter or longer at once.
 const SAFETY: f64 = 0.85;
 const SHRINK: f64 = 0.1;
 const GROW: f64 = 4.0;
+
+/// Steps of one length after which columns for it are worth making.
+const WORTH: u32 = 6;
 
 /// Lengths of steps of one mode that are kept.
 const KEPT: usize = 48;
@@ -58,7 +63,7 @@ impl Core {
         let mut guess = Guess::Constant;
         let mut forces = [0.0; SOURCES];
         field.forces(&self.y, &mut forces);
-        room.forces.iter_mut().zip(forces).for_each(|(force, value)| force[0] = value);
+        room.begin(&forces);
         let mut hit = None;
         while hit.is_none() && self.trouble.is_none() {
             if stretch.length() - self.tau <= 64.0 * f64::EPSILON * stretch.length() {
@@ -83,25 +88,27 @@ impl Core {
         witness: &mut dyn Witness,
     ) -> Option<Hit> {
         let (begin, from) = (self.y, self.tau);
-        let allowed = self.allowed(field);
+        let strict = self.strict(field);
         loop {
             let length = self.length(field, stretch);
             let (set, whole) = self.set(field, &length);
-            room.guess(field.sources.len(), guess.of(set.h));
             let input = stretch.inputs(from, set.h);
-            let start = Begin { y: &begin, input: &input, degree: stretch.degree, allowed: &allowed };
-            let error = room.solve(field, self.present as u64, &set, &start, whole).map(|error| error / CUBIC);
-            let end = error.map(|_| room.end(field, &set, &start));
+            let start = Begin { y: &begin, input: &input, degree: stretch.degree, strict: &strict };
+            let number = self.present as u64;
+            let step = Step { field, number, set: &set, begin: &start, whole };
+            let error = room.solve(&step, guess.of(set.h));
+            let end = error.map(|_| room.end);
             let least = set.h <= 256.0 * f64::EPSILON * (stretch.begin + from).max(self.moment);
             match (error, end) {
                 (Some(error), Some(end)) if (error <= 1.0 || least) && end.iter().sum::<f64>().is_finite() => {
                     *guess = Guess::After(set.h);
-                    // The error is of fifth order. A step that had to be short says little of much longer ones.
-                    self.step = (SAFETY * set.h * error.powf(-0.2)).min(self.step.max(GROW * set.h));
-                    return self.take(room, (field, stretch, &set), &start, (from, length.to), end, witness);
+                    room.keep(set.h, field.sources.len());
+                    // The error is of sixth order. A step that had to be short says little of much longer ones.
+                    self.step = (SAFETY * set.h * error.powf(-1.0 / 6.0)).min(self.step.max(GROW * set.h));
+                    return self.take(room, (stretch, &step), (from, length.to), end, witness);
                 }
                 (Some(error), Some(_)) if error > 1.0 && !least => {
-                    self.step = set.h * (SAFETY * error.powf(-0.2)).clamp(SHRINK, 0.9);
+                    self.step = set.h * (SAFETY * error.powf(-1.0 / 6.0)).clamp(SHRINK, 0.9);
                     *guess = Guess::Within(set.h);
                 }
                 _ if least => {
@@ -117,10 +124,13 @@ impl Core {
         }
     }
 
-    /// By how much each argument may be off in a step.
-    fn allowed(&self, field: &Field) -> Vec<f64> {
-        let of = |&place: &usize| self.absolute[place] + self.relative * self.y[place].abs();
-        field.measured.iter().map(of).collect()
+    /// One over what each argument may be off by in a step.
+    fn strict(&self, field: &Field) -> Lanes<f64> {
+        let mut strict = [0.0; ARGUMENTS];
+        for (strict, &place) in strict.iter_mut().zip(&field.measured) {
+            *strict = 1.0 / (EASE * (self.absolute[place] + self.relative * self.y[place].abs()));
+        }
+        strict
     }
 
     /// The length of the next step: halves, quarters, doubles of the interval that end on multiples of themselves, or
@@ -128,7 +138,7 @@ impl Core {
     fn length(&self, field: &Field, stretch: &Stretch) -> Length {
         let left = stretch.length() - self.tau;
         let most = self.step.min(REACH / field.linear.norm);
-        let regular = self.interval * f64::exp2((most / self.interval).log2().floor().clamp(-1000.0, 1000.0));
+        let regular = self.interval * power_of_two_below(most / self.interval);
         let time = stretch.begin + self.tau;
         let near = 8.0 * f64::EPSILON * time + 1e-9 * regular;
         let mut to = ((time + near) / regular).floor() * regular + regular;
@@ -156,7 +166,7 @@ impl Core {
         let fits = |set: &Set| set.degree == degree && is_near(set.h);
         if let Some((set, times)) = known.iter_mut().find(|(set, _)| fits(set)) {
             *times += 1;
-            return (Arc::clone(set), *times > 2);
+            return (Arc::clone(set), *times > WORTH);
         }
         let set = Arc::new(Set::new(&field.linear, length.h, degree));
         self.cost.propagators += 1;
@@ -171,20 +181,20 @@ impl Core {
     fn take(
         &mut self,
         room: &mut Room,
-        (field, stretch, set): (&Field, &Stretch, &Set),
-        start: &Begin,
+        (stretch, step): (&Stretch, &Step),
         (from, to): (f64, f64),
         end: Vector,
         witness: &mut dyn Witness,
     ) -> Option<Hit> {
         self.cost.steps += 1;
+        let (field, start) = (step.field, step.begin);
         let time = stretch.begin + to;
         if self.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS) {
             self.trouble = self.pace.too_stiff(self.cost.steps, time, self.end);
         }
-        let is_expanded = set.full(&field.linear, false).is_none();
-        let mut dense = Dense { field, start, h: set.h, is_expanded };
-        let fall = self.first_fall(room, &mut dense, set);
+        let mut dense =
+            Dense { field, start, set: step.set, h: step.set.h, whole: step.whole, is_expanded: !step.whole };
+        let fall = self.first_fall(room, &mut dense);
         let mut hit = fall.map(|fall| self.up_to(room, &mut dense, from, &fall));
         if let Some(hit) = &mut hit {
             hit.tau = hit.tau.min(to);
@@ -210,18 +220,23 @@ impl Core {
     }
 
     /// The first guard to fall in a step.
-    fn first_fall(&mut self, room: &mut Room, dense: &mut Dense, set: &Set) -> Option<Fall> {
+    fn first_fall(&mut self, room: &mut Room, dense: &mut Dense) -> Option<Fall> {
         let (field, start) = (dense.field, dense.start);
         let mut first: Option<Fall> = None;
         let mut coefficients = [0.0; TERMS];
+        let is_told = dense.whole;
+        if is_told {
+            room.tell_guards(field, dense.set, start);
+        }
         for (index, &cause) in field.watches.iter().enumerate() {
             let shift = if field.shifted { field.shift(cause, start.y) } else { 0.0 };
-            let told = room.guard_at_points(field, set, start, index).map(|at_points| at_points.map(|g| g + shift));
-            let is_told = told.is_none();
-            let values: [f64; POINTS] = told.unwrap_or_else(|| {
-                dense.guard(room, index, shift, &mut coefficients);
-                Room::at_points(&coefficients, room.series.order)
-            });
+            let values: [f64; POINTS] = match is_told {
+                true => room.told[index].map(|value| value + shift),
+                false => {
+                    dense.guard(room, index, shift, &mut coefficients);
+                    Room::at_points(&coefficients, room.series.order)
+                }
+            };
             if let Cause::GearTorque(drive) = cause {
                 self.torque[drive] = values.iter().fold(self.torque[drive], |most, value| most.max(value.abs()));
                 // What was told by nothing but rounding is told by the step.
@@ -242,7 +257,7 @@ impl Core {
                 continue;
             }
             self.cost.looks += 1;
-            if !is_told {
+            if is_told {
                 dense.guard(room, index, shift, &mut coefficients);
             }
             coefficients[0] = (coefficients[0] + slack).max(0.0);
@@ -278,8 +293,8 @@ impl Core {
             let set = Set::new(&field.linear, h, self.stretch.degree);
             let input = self.stretch.inputs(from, h);
             let start = Begin { input: &input, ..*dense.start };
-            room.guess(field.sources.len(), Guess::Within(dense.h).of(h));
-            if room.solve(field, self.present as u64, &set, &start, false).is_none() {
+            let step = Step { field, number: self.present as u64, set: &set, begin: &start, whole: false };
+            if room.solve(&step, Guess::Within(dense.h).of(h)).is_none() {
                 // The longer step was good enough.
                 *room = before;
                 break;
@@ -295,11 +310,19 @@ impl Core {
     }
 }
 
+/// The largest power of two that is not above `ratio`, a positive number: its bits without those of the fraction.
+fn power_of_two_below(ratio: f64) -> f64 {
+    f64::from_bits(ratio.clamp(1e-300, 1e300).to_bits() & (0x7ff << 52))
+}
+
 /// A step that was solved, at any place.
 struct Dense<'a> {
     field: &'a Field,
     start: &'a Begin<'a>,
+    set: &'a Set,
     h: f64,
+    /// Whether it was taken by the columns of the whole step.
+    whole: bool,
     /// Whether the room has its series.
     is_expanded: bool,
 }
@@ -314,6 +337,11 @@ impl Dense<'_> {
 
     /// The state at the share `s`.
     fn at(&mut self, room: &mut Room, s: f64) -> Vector {
+        let eighths = s * EIGHTHS as f64;
+        let is_eighth = (eighths - eighths.round()).abs() < 1e-9 && (0.5..EIGHTHS as f64 - 0.5).contains(&eighths);
+        if self.whole && self.h == self.set.h && is_eighth {
+            return room.at_eighth(self.field, self.set, self.start, eighths.round() as usize);
+        }
         self.expand(room);
         let states = room.series.at(self.field.linear.size, s);
         room.with_bristles(self.field, self.start.y, &states, s)

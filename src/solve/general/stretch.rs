@@ -41,6 +41,12 @@ impl Stretch {
     /// The inputs of a step of length `h` from `tau` on, by powers of its share.
     pub(super) fn inputs(&self, tau: f64, h: f64) -> Inputs {
         let mut inputs = [[0.0; DEGREE + 1]; DRIVES];
+        if self.degree == 0 {
+            for (own, coefficients) in inputs.iter_mut().zip(&self.pieces.coefficients) {
+                own[0] = coefficients[0];
+            }
+            return inputs;
+        }
         for (own, coefficients) in inputs.iter_mut().zip(&self.pieces.coefficients) {
             *own = Pieces::shifted(coefficients, tau);
             let mut power = 1.0;
