@@ -458,7 +458,9 @@ def main():
         told = "not reached" if rate_ is None else f"{off:8.1e} m {rate_:10.1f} {mine / rate_:9.0f}"
         lines.append(f"{name:34} {told}")
     if not others:
-        print("\n".join(lines))
+        text = "\n".join(lines) + "\n"
+        (HERE / "output" / "turns.txt").write_text(text)
+        print(text, end="")
         return
     if rivals[1] is None:
         lines.append("CVODE: not measured (no compiler or no libsundials-dev, or no tolerance was near enough)")

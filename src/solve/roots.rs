@@ -2,7 +2,8 @@
 //!
 //! Most are told by their coefficients: where c₀ and the negative ones add up to zero or more, Σ c_k sᵏ does not fall;
 //! where the coefficients change their sign once, there is one root above zero (Descartes), and the sign at the end
-//! says whether it lies in the interval. What is left is told by Bernstein coefficients.
+//! says whether it lies in the interval. Of others the first fall is approached in steps that cannot pass it, and what all
+//! but touches zero is told by Bernstein coefficients.
 
 use super::propagator::SERIES_TERMS;
 
@@ -29,8 +30,7 @@ pub(crate) fn first_fall(c: &[f64]) -> Option<f64> {
     if c0 < 0.0 {
         return Some(0.0);
     }
-    let least = rest.iter().fold(c0, |sum, &c| sum + if c < 0.0 { c } else { 0.0 });
-    if least >= 0.0 {
+    if c0 + least(rest) >= 0.0 {
         return None;
     }
     if c0 > 0.0 {
@@ -45,6 +45,11 @@ pub(crate) fn first_fall(c: &[f64]) -> Option<f64> {
             return (end < 0.0).then(|| polish(c, (0.0, c0), (1.0, end)));
         }
     }
+    if c0 > 0.0
+        && let Some(told) = by_steps(c)
+    {
+        return told;
+    }
     // Bernstein coefficients, b_i = Σ_{k ≤ i} C(i,k)/C(n,k) c_k: the polynomial lies within their hull.
     match c.len() {
         0..=12 => by_bernstein(c, &RATIOS_12),
@@ -53,6 +58,60 @@ pub(crate) fn first_fall(c: &[f64]) -> Option<f64> {
         _ => by_bernstein(c, &RATIOS_24),
     }
 }
+
+/// Σ min(c_k, 0), in four sums side by side.
+#[inline(always)]
+fn least(c: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    let (fours, rest) = c.as_chunks::<4>();
+    for four in fours {
+        sums.iter_mut().zip(four).for_each(|(sum, &c)| *sum += if c < 0.0 { c } else { 0.0 });
+    }
+    sums.iter_mut().zip(rest).for_each(|(sum, &c)| *sum += if c < 0.0 { c } else { 0.0 });
+    (sums[0] + sums[2]) + (sums[1] + sums[3])
+}
+
+/// Steps after which a polynomial that all but touches zero is left to another way.
+const MOST_STEPS: usize = 12;
+
+/// The first fall of Σ c_k sᵏ, positive at 0, by steps that cannot pass it; none where it takes too many.
+///
+/// With |p″| ≤ B = Σ k (k − 1) |c_k|, p(s + δ) ≥ p + p′ δ − ½ B δ² stays positive up to δ = 2p/(√(p′² + 2 B p) − p′), and
+/// near a fall these steps are those of Newton's method.
+fn by_steps(c: &[f64]) -> Option<Option<f64>> {
+    let mut bends = [0.0; 4];
+    for (c, weights) in c.chunks(4).zip(&BENDS) {
+        bends.iter_mut().zip(c).zip(weights).for_each(|((bend, c), weight)| *bend += weight * c.abs());
+    }
+    let bend = (bends[0] + bends[2]) + (bends[1] + bends[3]);
+    let mut s = 0.0;
+    for _ in 0..MOST_STEPS {
+        let (p, slope) = value_and_slope(c, s);
+        if p <= 0.0 {
+            return Some(Some(s));
+        }
+        let by = 2.0 * p / ((slope * slope + 2.0 * bend * p).sqrt() - slope);
+        if by <= 0.5 * f64::EPSILON * s {
+            return Some(Some(s));
+        }
+        s += by;
+        // What falls just at the end is told by the sign there.
+        if s >= 1.0 {
+            return Some((c.iter().sum::<f64>() < 0.0).then_some(1.0));
+        }
+    }
+    None
+}
+
+/// k (k − 1), four by four.
+static BENDS: [[f64; 4]; SERIES_TERMS / 4] = {
+    let (mut bends, mut k) = ([[0.0; 4]; SERIES_TERMS / 4], 1);
+    while k < SERIES_TERMS {
+        bends[k / 4][k % 4] = (k * (k - 1)) as f64;
+        k += 1;
+    }
+    bends
+};
 
 static RATIOS_12: [[f64; 12]; 12] = ratios();
 static RATIOS_16: [[f64; 16]; 16] = ratios();
@@ -182,6 +241,37 @@ mod tests {
         // (s − 0.3)(s − 0.31) falls at 0.3
         let root = first_fall(&[0.3 * 0.31, -0.61, 1.0]).unwrap();
         assert!((root - 0.3).abs() < 1e-14, "{root}");
+    }
+
+    /// Swings with a slow part, as guards are: the steps find what the hulls of Bernstein coefficients find.
+    #[test]
+    fn steps_find_the_same_falls_as_hulls() {
+        let mut random = rand_pcg::Pcg64::new(7, 1);
+        let mut draw = || 2.0 * crate::chance::uniform(&mut random) - 1.0;
+        let (mut falls, mut stays, mut left) = (0, 0, 0);
+        for _ in 0..20_000 {
+            let (swing, a, b, slow, above) = (2.0 * draw().abs(), draw(), draw(), 0.3 * draw(), 0.3 * draw().abs());
+            let (mut c, mut power) = ([0.0; SERIES_TERMS], 1.0);
+            for (k, c) in c.iter_mut().enumerate() {
+                power *= if k > 0 { swing / k as f64 } else { 1.0 };
+                *c = [a, b, -a, -b][k % 4] * power;
+            }
+            (c[0], c[1]) = (above + 1e-9, c[1] + slow);
+            let hulls = by_bernstein(&c, &RATIOS_24);
+            match by_steps(&c) {
+                None => left += 1,
+                Some(None) => {
+                    assert_eq!(hulls, None, "{c:?}");
+                    stays += 1;
+                }
+                Some(Some(s)) => {
+                    let near = |hull: f64| (s - hull).abs() <= 1e-12 * hull;
+                    assert!(hulls.is_some_and(near), "{s} {hulls:?} {c:?}");
+                    falls += 1;
+                }
+            }
+        }
+        assert!(falls > 5000 && stays > 1000 && left < 200, "{falls} {stays} {left}");
     }
 
     /// Wider vectors do the same operations in the same order.
