@@ -14,6 +14,10 @@ const GRID: usize = 40;
 /// Halvings of the step by which the best pair is then moved.
 const HALVINGS: usize = 7;
 
+/// What is hardly more than the least vibration: so many times as much, and so much more.
+const MORE: f64 = 1.1;
+const HARDLY: f64 = 0.0005;
+
 /// Pairs that are kept.
 const KEPT: usize = 3;
 
@@ -127,32 +131,53 @@ fn pair(one: &Shaper, other: &Shaper, vibration: f64, criterion: &Criterion) -> 
     Some(Pair { parts, vibration, smoothing, max_acceleration, score: score(smoothing, vibration) })
 }
 
-/// The best pair of two forms: of a grid, then moved from there.
+/// The best pair of two forms, by the rule for single ones: of those that leave hardly more than the least vibration the
+/// one with the best score. Each is looked for on a grid, and moved from there.
 fn best(target: Target, criterion: &Criterion, one: &Tabled, other: &Tabled) -> Option<Pair> {
-    let mut least: Option<(Pair, [f64; 2])> = None;
-    let is_better = |found: &Pair, least: &Option<(Pair, [f64; 2])>| {
-        least.as_ref().is_none_or(|(least, _)| rank(found, criterion) < rank(least, criterion))
-    };
+    let mut on_grid: Vec<Pair> = Vec::new();
     for (a, left) in &one.shapers {
         for (b, right) in &other.shapers {
             let mut both = left.iter().zip(right).map(|(v, w)| v * w);
             let vibration = target.weighed(&criterion.tested, &mut |_, _| both.next().unwrap_or(1.0));
-            if let Some(found) = pair(a, b, vibration, criterion).filter(|found| is_better(found, &least)) {
-                least = Some((found, [a.frequency, b.frequency]));
-            }
+            on_grid.extend(pair(a, b, vibration, criterion));
         }
     }
-    let mut at = least.as_ref()?.1;
-    let spread = |table: &Tabled| table.shapers[1].0.frequency / table.shapers[0].0.frequency;
-    let mut step = 0.5 * spread(one).max(spread(other)).ln();
-    let mut take = |at: [f64; 2]| {
+    let range = |table: &Tabled| Some([table.shapers.first()?.0.frequency, table.shapers.last()?.0.frequency]);
+    let ranges = [range(one)?, range(other)?];
+    let look = |at: [f64; 2]| {
+        if at.iter().zip(ranges).any(|(f, [low, high])| !(low..=high).contains(f)) {
+            return None;
+        }
         let (a, b) = (one.pattern.at(at[0]), other.pattern.at(at[1]));
         let mut left = |f: f64, zeta: f64| a.residual_vibration(f, zeta) * b.residual_vibration(f, zeta);
-        let vibration = target.weighed(&criterion.tested, &mut left);
-        let found = pair(&a, &b, vibration, criterion).filter(|found| is_better(found, &least))?;
-        least = Some((found, at));
-        Some(())
+        pair(&a, &b, target.weighed(&criterion.tested, &mut left), criterion)
     };
+    let vibration = |pair: &Pair| pair.vibration;
+    let quietest = on_grid.iter().min_by(|a, b| a.vibration.total_cmp(&b.vibration))?;
+    let least = moved(quietest.clone(), (one, other), &look, &vibration);
+    let most = MORE * least.vibration + HARDLY;
+    let score = |pair: &Pair| if pair.vibration <= most { pair.score } else { f64::INFINITY };
+    on_grid.push(least);
+    let first = on_grid.into_iter().min_by(|a, b| score(a).total_cmp(&score(b)))?;
+    Some(moved(first, (one, other), &look, &score))
+}
+
+/// From a pair on to where `value` is smaller, along each frequency by steps that are halved.
+fn moved(
+    from: Pair,
+    (one, other): (&Tabled, &Tabled),
+    look: &dyn Fn([f64; 2]) -> Option<Pair>,
+    value: &dyn Fn(&Pair) -> f64,
+) -> Pair {
+    // The parts stand in the order of their frequencies.
+    let is_turned = from.parts[0].form != one.pattern.form;
+    let mut at = from.parts.each_ref().map(|part| part.frequency);
+    if is_turned {
+        at.reverse();
+    }
+    let spread = |table: &Tabled| table.shapers[1].0.frequency / table.shapers[0].0.frequency;
+    let mut step = 0.5 * spread(one).max(spread(other)).ln();
+    let mut best = from;
     for _ in 0..HALVINGS {
         let mut is_moved = true;
         while is_moved {
@@ -160,12 +185,12 @@ fn best(target: Target, criterion: &Criterion, one: &Tabled, other: &Tabled) -> 
             for (part, way) in [(0, step), (0, -step), (1, step), (1, -step)] {
                 let mut next = at;
                 next[part] *= way.exp();
-                if take(next).is_some() {
-                    (at, is_moved) = (next, true);
+                if let Some(found) = look(next).filter(|found| value(found) < value(&best)) {
+                    (at, best, is_moved) = (next, found, true);
                 }
             }
         }
         step *= 0.5;
     }
-    least.map(|(pair, _)| pair)
+    best
 }
