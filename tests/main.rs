@@ -45,6 +45,7 @@ mod reference;
 
 mod rounding;
 mod rows;
+mod sensitivity;
 mod shape;
 mod sheet;
 mod stages;

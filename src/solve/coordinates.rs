@@ -100,6 +100,29 @@ impl Coordinates {
         state
     }
 
+    /// The way of a body that is not held, as weights of the positions in the solvers' coordinates and a constant.
+    pub(super) fn way(&self, layout: &Layout, body: usize) -> ([f64; BODIES], f64) {
+        let mut weights = [0.0; BODIES];
+        let Some(replaced) = layout.replaced.iter().find(|replaced| replaced.body == body) else {
+            weights[body] = 1.0;
+            return (weights, self.origin[body]);
+        };
+        weights[body] = 1.0 / replaced.own;
+        if replaced.on_replaced {
+            let mut constant = 0.0;
+            for &(other, arm) in &replaced.others {
+                let (theirs, at) = self.way(layout, other);
+                weights.iter_mut().zip(theirs).for_each(|(own, their)| *own -= arm * their / replaced.own);
+                constant -= arm * at / replaced.own;
+            }
+            return (weights, constant);
+        }
+        for &(other, arm) in &replaced.others {
+            weights[other] -= arm / replaced.own;
+        }
+        (weights, self.start.position[body] - self.strain[body] / replaced.own)
+    }
+
     /// The ways of a body whose place a length takes, row by row: `own` has that length, `others` gives coordinates of
     /// bodies, and ways of those that are placed already.
     #[inline(always)]

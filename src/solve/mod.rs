@@ -17,6 +17,7 @@ mod roots;
 mod rounding;
 mod run;
 mod saved;
+mod sensitivity;
 mod table3;
 
 pub use crate::trajectory::Grid;
@@ -27,6 +28,7 @@ pub use machine::Machine;
 use observe::Output;
 pub use observe::{Curve, Gap, Observe, Polynomial, QUANTITIES, Reading, TERMS, reading};
 pub use run::{Course, Run};
+pub use sensitivity::{Begun, Differentiated, Sensitivities, Variable};
 
 pub(crate) use check::stage as check_stage;
 

@@ -7,6 +7,10 @@
 //! The long loops are compiled twice, for any processor and for those with AVX2, and the right one is chosen at run
 //! time: wider vectors do the same operations in the same order.
 
+mod slopes;
+
+pub(crate) use slopes::{Columns, SlopedStep};
+
 /// An `R` × `C` matrix: the rate of change ż = A z, or a change over some time, z(t + h) − z(t) = P z(t).
 #[derive(Debug, Clone)]
 pub(crate) struct Matrix<const R: usize, const C: usize> {

@@ -81,12 +81,12 @@ impl Known {
         self.0.clear();
     }
 
-    /// The list of a kernel, empty where there is none yet.
-    pub(super) fn list<const N: usize>(&mut self) -> &mut Modes<N> {
-        let index = self.0.iter().position(|list| list.is::<Modes<N>>()).unwrap_or_else(|| {
-            self.0.push(Box::new(Modes::<N>::new()));
+    /// The list of what is of this type, empty where there is none yet: modes of a kernel, or their derivatives.
+    pub(super) fn list<T: Send + 'static>(&mut self) -> &mut Vec<T> {
+        let index = self.0.iter().position(|list| list.is::<Vec<T>>()).unwrap_or_else(|| {
+            self.0.push(Box::new(Vec::<T>::new()));
             self.0.len() - 1
         });
-        self.0[index].downcast_mut().expect("a list of this kernel")
+        self.0[index].downcast_mut().expect("a list of this type")
     }
 }

@@ -4,7 +4,7 @@ mod guards;
 mod shown;
 
 use crate::friction::Motion;
-use crate::mechanism::{BODIES, Cause, DRIVES, Form, Layout, Mechanism, Mode, ROUNDING, SPRINGS, State};
+use crate::mechanism::{BODIES, Cause, DRIVES, Equations, Form, Layout, Mechanism, Mode, ROUNDING, SPRINGS, State};
 use crate::signal::DEGREE;
 use crate::solve::propagator::{EXPONENTIAL_REACH, Matrix, SERIES_REACH, Series, series_order};
 use guards::{Beside, LANES, Lanes, Row, Values, side_by_side};
@@ -55,7 +55,7 @@ impl Space {
     }
 
     /// A form as a row of weights on it.
-    fn row<const N: usize>(&self, form: &Form) -> [f64; N] {
+    pub(super) fn row<const N: usize>(&self, form: &Form) -> [f64; N] {
         let layout = &self.layout;
         let mut row = [0.0; N];
         layout.put(form, &mut row);
@@ -103,6 +103,57 @@ impl Size {
     fn whole(self) -> f64 {
         (self.mechanical * self.mechanical + self.magnetic * self.magnetic).sqrt()
     }
+}
+
+/// Whether both ends of a spring are stuck.
+fn at_rest(mechanism: &Mechanism, stuck: &[bool; BODIES]) -> [bool; SPRINGS] {
+    let mut at_rest = [true; SPRINGS];
+    for (at_rest, spring) in at_rest.iter_mut().zip(&mechanism.springs) {
+        *at_rest = spring.arms.iter().all(|&(body, _)| stuck[body]);
+    }
+    at_rest
+}
+
+/// The equations of a mode, and A.
+pub(super) fn straight<const N: usize>(mechanism: &Mechanism, space: &Space, mode: &Mode) -> (Equations, Matrix<N, N>) {
+    let layout = &space.layout;
+    let mut equations = mechanism.equations(*mode);
+    // What is stuck has no speed, and a span between stuck bodies does not change: leaving both out of the conditions
+    // lets the bounds know it.
+    let stuck = mode.motion.map(|motion| motion == Motion::Stuck);
+    let without_stuck = |form: &mut Form| {
+        for (speed, stuck) in form.speed.iter_mut().zip(stuck) {
+            if stuck {
+                *speed = 0.0;
+            }
+        }
+    };
+    equations.guards.iter_mut().map(|guard| &mut guard.form).for_each(without_stuck);
+    equations.acceleration.iter_mut().for_each(without_stuck);
+
+    let mut rate = Matrix::zero();
+    let put = |rate: &mut Matrix<N, N>, row: usize, form: &Form| {
+        for (column, value) in space.row::<N>(form).into_iter().enumerate() {
+            rate.set(row, column, value);
+        }
+    };
+    for (body, stuck) in stuck.into_iter().enumerate().take(layout.bodies()) {
+        if !stuck {
+            put(&mut rate, layout.speed[body], &equations.acceleration[body]);
+        }
+        let mut way = layout.rate(mechanism, body);
+        without_stuck(&mut way);
+        put(&mut rate, layout.coordinate[body], &way);
+    }
+    for drive in 0..layout.inputs {
+        if let Some(place) = layout.current[drive] {
+            put(&mut rate, place, &equations.current_rate[drive]);
+        }
+        for k in 0..space.highest {
+            rate.set(space.chain(drive, k), space.chain(drive, k + 1), 1.0);
+        }
+    }
+    (equations, rate)
 }
 
 /// The equations of one mode, ż = A z, and what follows from them.
@@ -170,47 +221,10 @@ impl<const N: usize> ModeMatrices<N> {
 
     fn new(mechanism: &Mechanism, space: &Space, mode: &Mode, h: f64) -> Self {
         let layout = &space.layout;
-        let mut equations = mechanism.equations(*mode);
-        // What is stuck has no speed, and a span between stuck bodies does not change: leaving both out of the
-        // conditions lets the bounds know it.
+        let (equations, rate) = straight::<N>(mechanism, space, mode);
         let stuck = mode.motion.map(|motion| motion == Motion::Stuck);
-        let mut at_rest = [true; SPRINGS];
-        for (at_rest, spring) in at_rest.iter_mut().zip(&mechanism.springs) {
-            *at_rest = spring.arms.iter().all(|&(body, _)| stuck[body]);
-        }
-        let without_stuck = |form: &mut Form| {
-            for (speed, stuck) in form.speed.iter_mut().zip(stuck) {
-                if stuck {
-                    *speed = 0.0;
-                }
-            }
-        };
-        equations.guards.iter_mut().map(|guard| &mut guard.form).for_each(without_stuck);
-        equations.acceleration.iter_mut().for_each(without_stuck);
-
+        let at_rest = at_rest(mechanism, &stuck);
         let row_of = |form: &Form| space.row::<N>(form);
-        let mut rate = Matrix::zero();
-        let put = |rate: &mut Matrix<N, N>, row: usize, form: &Form| {
-            for (column, value) in row_of(form).into_iter().enumerate() {
-                rate.set(row, column, value);
-            }
-        };
-        for (body, stuck) in stuck.into_iter().enumerate().take(layout.bodies()) {
-            if !stuck {
-                put(&mut rate, layout.speed[body], &equations.acceleration[body]);
-            }
-            let mut way = layout.rate(mechanism, body);
-            without_stuck(&mut way);
-            put(&mut rate, layout.coordinate[body], &way);
-        }
-        for drive in 0..layout.inputs {
-            if let Some(place) = layout.current[drive] {
-                put(&mut rate, place, &equations.current_rate[drive]);
-            }
-            for k in 0..space.highest {
-                rate.set(space.chain(drive, k), space.chain(drive, k + 1), 1.0);
-            }
-        }
 
         // The current does g i φ̇ of work, and its own rate is −δ i − β φ̇. With the weight w = g/β on its share ½ w i²
         // in V the two cancel. Where there is no β to speak of, a large weight leaves next to nothing.
@@ -365,6 +379,16 @@ impl<const N: usize> ModeMatrices<N> {
     /// ż.
     pub(super) fn rate(&self, z: &[f64; N]) -> [f64; N] {
         self.rate.rate(z)
+    }
+
+    /// A.
+    pub(super) fn rates(&self) -> &Matrix<N, N> {
+        &self.rate
+    }
+
+    /// A bound of ‖A‖, 1/s.
+    pub(super) fn speed(&self) -> f64 {
+        self.speed
     }
 
     /// A look at z: ż and its size, and the guards into `value`; or, with ż for z, at what is one derivative higher.

@@ -15,6 +15,7 @@ mod kernel;
 mod matrices;
 mod run;
 mod saved;
+mod sensitivity;
 mod shown;
 
 use super::coordinates::Coordinates;
@@ -26,12 +27,13 @@ use super::roots;
 use super::rounding::Rounding;
 use super::saved::{Pass, Passed};
 use super::{Cost, Ending, Event, PositionError};
-use crate::mechanism::{Cause, DRIVES, Form, Mechanism, Mode, State};
+use crate::mechanism::{Cause, DRIVES, Form, Layout, Mechanism, Mode, State};
 use kernel::Modes;
 pub(super) use kernel::{Known, Make, in_kernel};
 pub(super) use matrices::Space;
 use matrices::{ModeMatrices, Room, Size};
 pub(super) use run::Run;
+pub(super) use sensitivity::Following;
 use std::sync::Arc;
 
 /// Halvings of an interval that are met exactly: eighths, where a delay ends in the midst of a sample.
@@ -148,16 +150,7 @@ impl<const N: usize> Core<N> {
     ) -> Self {
         let layout = &space.layout;
         let (mut coordinates, inner) = Coordinates::new(layout, start);
-        let mut z = [0.0; N];
-        for body in 0..layout.bodies() {
-            (z[layout.coordinate[body]], z[layout.speed[body]]) = (inner.position[body], inner.speed[body]);
-        }
-        for (place, current) in layout.current.iter().zip(inner.current) {
-            if let Some(place) = place {
-                z[*place] = current;
-            }
-        }
-        z[N - 1] = 1.0;
+        let z = vector(layout, &inner);
         let mode = mechanism.first_mode(start);
         coordinates.hold(layout, &mode, &inner);
         let shared = propagators(&known);
@@ -679,6 +672,21 @@ impl<const N: usize> Engine for Core<N> {
     fn error(&self) -> Option<PositionError> {
         Some(self.clone().bound_of_rounding())
     }
+}
+
+/// The vector z of a state in the solver's coordinates, its inputs zero.
+fn vector<const N: usize>(layout: &Layout, inner: &State) -> [f64; N] {
+    let mut z = [0.0; N];
+    for body in 0..layout.bodies() {
+        (z[layout.coordinate[body]], z[layout.speed[body]]) = (inner.position[body], inner.speed[body]);
+    }
+    for (place, current) in layout.current.iter().zip(inner.current) {
+        if let Some(place) = place {
+            z[*place] = current;
+        }
+    }
+    z[N - 1] = 1.0;
+    z
 }
 
 /// Bounds of |u̇| and |ü| of Σ c_k τᵏ for τ up to `length`.

@@ -39,44 +39,12 @@ impl<'a, const N: usize> Run<'a, N> {
     ) -> Self {
         let grid = Grid::new(start.every, start.until);
         let seen = mechanism.seen_by(&space.layout, &start.state);
-        let list = std::mem::take(known.list::<N>());
+        let list = std::mem::take(known.list::<Arc<ModeMatrices<N>>>());
         let inputs = |drive| space.chain(drive, 0);
         let recorder = Recorder::new(&seen, &space.layout, (N, &inputs), grid, output);
         let core = Core::new(seen, Arc::new(space), &start.state, (grid.interval(), grid.end()), list);
         let watching = Watching::new(recorder.observer.as_deref());
         Self { core, grid, row: 0, recorder, watching, known }
-    }
-
-    /// The row at or before `time` and how far behind it; next to a row means on it.
-    fn locate(&self, time: f64) -> (u64, f64) {
-        let (last, h) = (self.grid.even(), self.grid.interval());
-        // The next row, as where samples fall on rows.
-        if self.row < last && self.grid.time(self.row + 1) == time {
-            return (self.row + 1, 0.0);
-        }
-        // Right but for rounding.
-        let mut row = ((time / h) as u64).min(last);
-        if row > 0 && self.grid.time(row) > time {
-            row -= 1;
-        } else if row < last && self.grid.time(row + 1) <= time {
-            row += 1;
-        }
-        let offset = time - self.grid.time(row);
-        // What a sum of decimal times may be off by; no part of the interval, which may be long.
-        let near = (8.0 * f64::EPSILON * time).min(1e-9 * h);
-        // The last interval may be shorter: what is left of the run behind the last row at this distance.
-        let length = if row < last { h } else { self.grid.rest() };
-        match (row < last, length - offset <= near) {
-            _ if offset <= near => (row, 0.0),
-            (true, true) => (row + 1, 0.0),
-            (false, true) => (row, length),
-            (_, false) => {
-                // Halves, quarters and eighths of the interval, for which there are matrices, are hit to the last bit.
-                let eighth = 0.125 * h;
-                let snapped = (offset / eighth).round() * eighth;
-                (row, if (offset - snapped).abs() <= near { snapped } else { offset })
-            }
-        }
     }
 
     /// Advances to `offset` behind row `row`, event by event.
@@ -271,7 +239,7 @@ impl<const N: usize> Running for Run<'_, N> {
     fn advance(&mut self, until: f64) -> bool {
         let end = self.grid.end();
         if self.core.common.trouble.is_none() {
-            let (row, offset) = self.locate(until.min(end));
+            let (row, offset) = locate(&self.grid, self.row, until.min(end));
             self.reach(row, offset);
         }
         self.core.common.trouble.is_none()
@@ -316,7 +284,39 @@ impl<const N: usize> Running for Run<'_, N> {
     }
 
     fn known(&mut self) -> Known {
-        *self.known.list::<N>() = std::mem::take(&mut self.core.known);
+        *self.known.list() = std::mem::take(&mut self.core.known);
         std::mem::take(&mut self.known)
+    }
+}
+
+/// The row of `grid` at or before `time` and how far behind it, from row `now` on; next to a row means on it.
+pub(super) fn locate(grid: &Grid, now: u64, time: f64) -> (u64, f64) {
+    let (last, h) = (grid.even(), grid.interval());
+    // The next row, as where samples fall on rows.
+    if now < last && grid.time(now + 1) == time {
+        return (now + 1, 0.0);
+    }
+    // Right but for rounding.
+    let mut row = ((time / h) as u64).min(last);
+    if row > 0 && grid.time(row) > time {
+        row -= 1;
+    } else if row < last && grid.time(row + 1) <= time {
+        row += 1;
+    }
+    let offset = time - grid.time(row);
+    // What a sum of decimal times may be off by; no part of the interval, which may be long.
+    let near = (8.0 * f64::EPSILON * time).min(1e-9 * h);
+    // The last interval may be shorter: what is left of the run behind the last row at this distance.
+    let length = if row < last { h } else { grid.rest() };
+    match (row < last, length - offset <= near) {
+        _ if offset <= near => (row, 0.0),
+        (true, true) => (row + 1, 0.0),
+        (false, true) => (row, length),
+        (_, false) => {
+            // Halves, quarters and eighths of the interval, for which there are matrices, are hit to the last bit.
+            let eighth = 0.125 * h;
+            let snapped = (offset / eighth).round() * eighth;
+            (row, if (offset - snapped).abs() <= near { snapped } else { offset })
+        }
     }
 }

@@ -1,0 +1,397 @@
+//! Sensitivities of a run of the exact solver: S = ∂z/∂p beside z, through the same modes and the same events.
+//!
+//! ```text
+//! in a mode            ż = A z,   Ṡ = A S + A_p z
+//! over a step          S ← S + P S + L z                           L = ∂P/∂p (propagator/slopes.rs)
+//! where a guard falls  w·z = 0 at t*:   dt*/dp = −(w·S + w_p·z)/(w·f⁻)
+//!                      S⁺ = S⁻ + (f⁻ − f⁺) dt*/dp                  f = A z before, and in the last of the modes
+//!                                                                  that follow each other at that instant
+//! where the input is   S⁺ = S⁻ + (f⁻ − f⁺) dt/dp                   dt/dp = 1 by a delay, 0 by all else
+//! at the start         S = ∂z₀/∂p
+//! an output y = c·z    ∂y/∂p = c·S + c_p·z
+//! ```
+//!
+//! The state is continuous where modes change: what stops has no speed already, a current that is held at its limit is
+//! there already. So the jump of S needs no other term. In w·f⁻ the input counts with its own rate, since z has the
+//! inputs in it.
+
+mod tangent;
+
+use super::run::locate;
+use super::{Core, Known, Make, ModeMatrices, vector};
+use crate::friction::Motion;
+use crate::mechanism::{Cause, DRIVES};
+use crate::solve::inputs::Pieces;
+use crate::solve::propagator::Series;
+use crate::solve::sensitivity::{Begun, Sensitivities, Task, Variable};
+use crate::trajectory::Grid;
+use std::sync::Arc;
+pub(super) use tangent::Sloped;
+use tangent::{Seen, Tangent, Varied, are_alike};
+
+/// A guard that falls no faster than so many roundings of its rate only grazes.
+const GRAZES: f64 = 1e5;
+
+/// So many roundings of a rate are no jump of it.
+const NO_JUMP: f64 = 40.0;
+
+/// Makes the sensitivities of one run: see [`Task`].
+pub(in crate::solve) struct Following<'t> {
+    pub(in crate::solve) task: Task<'t>,
+    pub(in crate::solve) known: &'t mut Known,
+}
+
+impl Make for Following<'_> {
+    type Made = Option<Sensitivities>;
+
+    fn make<const N: usize>(self) -> Self::Made {
+        let known = std::mem::take(self.known.list::<Arc<ModeMatrices<N>>>());
+        let slopes = std::mem::take(self.known.list::<Sloped<N>>());
+        let mut follower = Follower::<N>::new(self.task, known, slopes)?;
+        let reached = follower.take_up().and_then(|()| follower.along());
+        *self.known.list() = std::mem::take(&mut follower.core.known);
+        *self.known.list() = std::mem::take(&mut follower.slopes);
+        let is_finite = || follower.out.columns.iter().flatten().flatten().all(|value| value.is_finite());
+        (reached.is_some() && is_finite()).then_some(follower.out)
+    }
+}
+
+/// A run and its sensitivities under way.
+struct Follower<'t, const N: usize> {
+    task: Task<'t>,
+    core: Core<N>,
+    grid: Grid,
+    row: u64,
+    /// Rows put out so far.
+    rows: u64,
+    seen: Seen,
+    /// By variable; none for one of the input.
+    varied: Vec<Option<Varied>>,
+    /// The places of the variables in `s`: those that change the equations first.
+    places: Vec<usize>,
+    s: Vec<[f64; N]>,
+    /// What changes of the input that come later do to S, where one falls on a row that is not put out yet.
+    pending: Option<[f64; N]>,
+    /// The modes of this machine, with their derivatives, and what this run needs of them besides.
+    slopes: Vec<Sloped<N>>,
+    tangents: Vec<Tangent>,
+    /// The number of the present mode among them.
+    now: usize,
+    series: Box<Series<N>>,
+    /// Whether it stands on a row or at a change of the input.
+    is_regular: bool,
+    out: Sensitivities,
+}
+
+impl<'t, const N: usize> Follower<'t, N> {
+    fn new(task: Task<'t>, known: super::Modes<N>, slopes: Vec<Sloped<N>>) -> Option<Self> {
+        let Task { mechanism, experiment, variables, outputs } = task;
+        let grid = Grid::new(experiment.every, experiment.until);
+        let start = experiment.initial.state(mechanism);
+        let seen = Seen::new(mechanism, &start, task.space(mechanism));
+        let ends = (grid.interval(), grid.end());
+        let core = Core::new(Arc::clone(&seen.mechanism), Arc::new(task.space(mechanism)), &start, ends, known);
+        let of = |begun: &Begun| Seen::new(&begun.mechanism, &begun.start, task.space(&begun.mechanism));
+        let mut varied = Vec::new();
+        for variable in variables {
+            varied.push(match variable {
+                Variable::Machine { points, weights } => {
+                    let machines = points.each_ref().map(|point| Arc::clone(&point.mechanism));
+                    let points = points.each_ref().map(of);
+                    if !points.iter().all(|point| are_alike(&seen, point)) {
+                        return None;
+                    }
+                    let is_start = points.iter().all(|point| point.mechanism == seen.mechanism);
+                    Some(Varied { machines, points, weights: *weights, is_start })
+                }
+                Variable::Delay(_) | Variable::Offset(..) => None,
+            });
+        }
+        let changes = |j: &usize| varied[*j].as_ref().is_some_and(|varied: &Varied| !varied.is_start);
+        let (first, rest): (Vec<usize>, Vec<usize>) = (0..varied.len()).partition(changes);
+        let order: Vec<usize> = first.into_iter().chain(rest).collect();
+        let mut places = vec![0; order.len()];
+        order.iter().enumerate().for_each(|(place, &j)| places[j] = place);
+        let begun = |j: &usize| varied[*j].as_ref().map_or([0.0; N], |varied| begin(&seen, varied));
+        let s = order.iter().map(begun).collect();
+        let rows = grid.intervals() as usize + 1;
+        let columns = vec![vec![vec![0.0; rows]; variables.len()]; outputs.len()];
+        let series = Box::new(Series::room());
+        let values = vec![vec![0.0; rows]; outputs.len()];
+        let out = Sensitivities { values, columns, events: 0 };
+        let (row, now) = (0, 0);
+        Some(Self {
+            task,
+            core,
+            grid,
+            row,
+            rows: 0,
+            seen,
+            varied,
+            places,
+            s,
+            pending: None,
+            slopes,
+            tangents: Vec::new(),
+            now,
+            series,
+            is_regular: true,
+            out,
+        })
+    }
+
+    /// Runs to the end along the input of the experiment.
+    fn along(&mut self) -> Option<()> {
+        let signals = std::slice::from_ref(&self.task.experiment.input);
+        let mut time = 0.0;
+        loop {
+            let pieces = Pieces::of(signals, time);
+            self.seam(&pieces)?;
+            if time >= self.grid.end() {
+                break;
+            }
+            let until = pieces.end.min(self.grid.end());
+            let (row, offset) = locate(&self.grid, self.row, until);
+            self.reach(row, offset)?;
+            time = time.max(until);
+        }
+        // Behind a last, shorter interval it stands at the last row, too.
+        self.go_to(self.grid.intervals());
+        self.put_out();
+        Some(())
+    }
+
+    /// Takes up new inputs, and what follows from them at once.
+    fn seam(&mut self, pieces: &Pieces) -> Option<()> {
+        let is_start = self.row == 0 && self.core.common.offset == 0.0;
+        let is_moved = self.task.variables.iter().any(|variable| matches!(variable, Variable::Delay(_)));
+        let before = match (is_moved, is_start) {
+            (false, _) => [0.0; N],
+            (true, false) => self.core.matrices.rate(&self.core.z),
+            (true, true) => {
+                // The input that begins at once would begin later: until then there is none.
+                let mut idle = self.core.clone();
+                idle.set_input(&Pieces::held(&[0.0; DRIVES], 0.0, f64::INFINITY));
+                idle.resolve();
+                idle.matrices.rate(&idle.z)
+            }
+        };
+        self.core.set_input(pieces);
+        self.core.resolve();
+        self.take_up()?;
+        self.is_regular = true;
+        let begins = self.core.time();
+        self.offset(begins);
+        rest(&self.core, &mut self.s);
+        if is_moved {
+            let after = self.core.matrices.rate(&self.core.z);
+            let mut jump: [f64; N] = std::array::from_fn(|k| before[k] - after[k]);
+            let space = &self.core.common.space;
+            for place in (0..space.layout.inputs).flat_map(|drive| (0..=space.highest).map(move |k| (drive, k))) {
+                // Where it stands, and how it is from now on: u(t − d).
+                let at = space.chain(place.0, place.1);
+                jump[at] = f64::NAN;
+            }
+            self.pending = Some(jump);
+            if self.core.common.offset != 0.0 || self.row < self.rows {
+                self.move_seam();
+            }
+        }
+        Some(())
+    }
+
+    /// ∂u/∂p of what is added to the input.
+    fn offset(&mut self, time: f64) {
+        let space = &self.core.common.space;
+        for (variable, &place) in self.task.variables.iter().zip(&self.places) {
+            if let Variable::Offset(unit, from) = *variable {
+                self.s[place][space.chain(0, 0)] = if time >= from { unit } else { 0.0 };
+            }
+        }
+    }
+
+    /// What the change of the input at which it stands does to the derivatives by a delay.
+    fn move_seam(&mut self) {
+        let Some(jump) = self.pending.take() else { return };
+        let (space, z) = (&self.core.common.space, &self.core.z);
+        for (variable, &place) in self.task.variables.iter().zip(&self.places) {
+            let (Variable::Delay(unit), s) = (variable, &mut self.s[place]) else { continue };
+            for (k, s) in s.iter_mut().enumerate().filter(|(k, _)| jump[*k].is_finite()) {
+                *s += unit * jump[k];
+            }
+            for drive in 0..space.layout.inputs {
+                for k in 0..=space.highest {
+                    let next = if k < space.highest { z[space.chain(drive, k + 1)] } else { 0.0 };
+                    s[space.chain(drive, k)] = -unit * next;
+                }
+            }
+        }
+        rest(&self.core, &mut self.s);
+    }
+
+    /// Takes up the present mode.
+    fn take_up(&mut self) -> Option<()> {
+        if self.core.common.trouble.is_some() {
+            return None;
+        }
+        let law = &self.core.matrices;
+        let is_of = |tangent: &Tangent| Arc::ptr_eq(&self.slopes[tangent.sloped].law, law);
+        if !self.tangents.get(self.now).is_some_and(is_of) {
+            self.now = match self.tangents.iter().position(is_of) {
+                Some(known) => known,
+                None => {
+                    let changes = self.varied.iter().flatten().filter(|varied| !varied.is_start).collect::<Vec<_>>();
+                    let sloped = Sloped::of(&mut self.slopes, law, &self.seen, &changes)?;
+                    let (seen, varied) = (&self.seen, &self.varied);
+                    self.tangents.push(Tangent::new::<N>(sloped, &law.mode, seen, varied, self.task.outputs)?);
+                    self.tangents.len() - 1
+                }
+            };
+        }
+        Some(())
+    }
+
+    /// Goes on to `offset` behind row `row`, event by event.
+    fn reach(&mut self, row: u64, offset: f64) -> Option<()> {
+        while self.row < row || (self.row == row && self.core.common.offset < offset) {
+            self.core.check();
+            let mut looked = false;
+            if self.core.common.offset == 0.0 {
+                self.put_out();
+                if self.row < row {
+                    let law = Arc::clone(&self.core.matrices);
+                    let (safe, _) = self.core.safe_intervals(&law, row - self.row);
+                    (0..safe).for_each(|_| self.cross_row());
+                    if safe > 0 {
+                        continue;
+                    }
+                    looked = true;
+                }
+            }
+            let ahead = if self.row < row { self.grid.interval() } else { offset };
+            let (begin, from) = (self.core.z, self.core.common.offset);
+            let cause = self.core.advance(ahead - from, looked);
+            self.core.common.asks = false;
+            if self.core.common.trouble.is_some() {
+                return None;
+            }
+            let is_there = cause.is_none() && (ahead - self.core.common.offset).abs() <= 1e-12 * ahead;
+            self.follow(&begin, self.core.common.offset - from, is_there);
+            match cause {
+                Some(cause) => self.event(cause)?,
+                None if !is_there => {}
+                None if self.row < row => self.go_to(self.row + 1),
+                None => self.core.common.offset = offset,
+            }
+        }
+        Some(())
+    }
+
+    fn go_to(&mut self, row: u64) {
+        self.row = row;
+        self.core.count_from(self.grid.time(row));
+    }
+
+    /// Crosses a whole interval on which nothing happens.
+    fn cross_row(&mut self) {
+        self.put_out();
+        let begin = self.core.z;
+        self.follow(&begin, self.grid.interval(), true);
+        self.core.matrices.step(0).advance(&mut self.core.z);
+        self.core.common.cost.steps += 1;
+        self.core.common.since_change += self.grid.interval();
+        self.go_to(self.row + 1);
+    }
+
+    /// Moves S so far from where the state was `begin`, in the present mode.
+    fn follow(&mut self, begin: &[f64; N], distance: f64, ends_regularly: bool) {
+        let sloped = &mut self.slopes[self.tangents[self.now].sloped];
+        let is_regular = self.is_regular && ends_regularly;
+        self.is_regular = ends_regularly;
+        if is_regular && let Some(step) = sloped.step(distance) {
+            step.advance(begin, &mut self.s);
+            return;
+        }
+        let law = &sloped.law;
+        let (mut left, mut z, far) = (distance, *begin, law.far());
+        while left > 0.0 {
+            let now = left.min(far);
+            law.series(&z, now, &mut self.series);
+            law.rates().add_slopes(&sloped.slopes, (&self.series, now, 1.0), &mut self.s);
+            self.series.add_to(&mut z, 1.0);
+            left -= now;
+        }
+    }
+
+    /// Goes through an event: a guard falls.
+    fn event(&mut self, cause: Cause) -> Option<()> {
+        let law = Arc::clone(&self.core.matrices);
+        let guard = law.guards.iter().position(|guard| guard.cause == cause)?;
+        let (watch, z) = (&law.guards[guard], self.core.z);
+        let before = law.rate(&z);
+        let fall = watch.value(&before);
+        let grazes = fall.abs() <= GRAZES * watch.noise(&before);
+        let sloped = &self.slopes[self.tangents[self.now].sloped];
+        let shifts: Vec<f64> = self
+            .s
+            .iter()
+            .enumerate()
+            .map(|(j, s)| -(watch.value(s) + sloped.guard_slope(j, guard, &z)) / fall)
+            .collect();
+        self.core.change(cause);
+        self.core.resolve();
+        self.out.events += 1;
+        let after = self.core.matrices.rate(&self.core.z);
+        let noise = [law.noise_of_rate(&z), self.core.matrices.noise_of_rate(&self.core.z)];
+        let mut jump: [f64; N] = std::array::from_fn(|k| before[k] - after[k]);
+        for (k, jump) in jump.iter_mut().enumerate() {
+            if jump.abs() <= NO_JUMP * (noise[0][k] + noise[1][k]) {
+                *jump = 0.0;
+            }
+        }
+        if jump != [0.0; N] {
+            if grazes && shifts.iter().any(|shift| *shift != 0.0) {
+                return None;
+            }
+            for (s, shift) in self.s.iter_mut().zip(shifts).filter(|(_, shift)| *shift != 0.0) {
+                s.iter_mut().zip(jump).for_each(|(s, jump)| *s += jump * shift);
+            }
+        }
+        rest(&self.core, &mut self.s);
+        self.take_up()
+    }
+
+    /// Puts out the present row, once.
+    fn put_out(&mut self) {
+        let row = self.rows as usize;
+        if self.rows == self.row {
+            self.rows += 1;
+            let (tangent, z) = (&self.tangents[self.now], &self.core.z);
+            for (i, form) in tangent.outputs.iter().enumerate() {
+                self.out.values[i][row] = form.times(z);
+                for (j, &place) in self.places.iter().enumerate() {
+                    self.out.columns[i][j][row] = form.times(&self.s[place]);
+                }
+            }
+            for (i, j, form) in &tangent.output_slopes {
+                self.out.columns[*i][*j][row] += form.times(z);
+            }
+        }
+        self.move_seam();
+    }
+}
+
+/// ∂z/∂p at the start.
+fn begin<const N: usize>(seen: &Seen, varied: &Varied) -> [f64; N] {
+    let at = |seen: &Seen| vector::<N>(&seen.space.layout, &seen.inner);
+    let [here, first, second] = [at(seen), at(&varied.points[0]), at(&varied.points[1])];
+    std::array::from_fn(|k| varied.slope(here[k], first[k], second[k]))
+}
+
+/// What is stuck has no speed, whatever the variables are.
+fn rest<const N: usize>(core: &Core<N>, s: &mut [[f64; N]]) {
+    let (mode, layout) = (&core.common.mode, &core.common.space.layout);
+    for body in (0..layout.bodies()).filter(|&body| mode.motion[body] == Motion::Stuck) {
+        s.iter_mut().for_each(|s| s[layout.speed[body]] = 0.0);
+    }
+}

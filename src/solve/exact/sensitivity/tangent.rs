@@ -1,0 +1,267 @@
+//! One mode as its sensitivities need it: how its equations, guards and outputs change with each variable.
+
+use super::super::ModeMatrices;
+use super::super::matrices::{Space, straight};
+use crate::friction::Motion;
+use crate::mechanism::{Form, Mechanism, Mode, Shown, State};
+use crate::solve::coordinates::Coordinates;
+use crate::solve::propagator::{Columns, Matrix, SlopedStep};
+use crate::solve::sensitivity::Differentiated;
+use std::sync::Arc;
+
+/// Differences up to so many roundings of what they are taken of are none.
+const ROUNDINGS: f64 = 16.0;
+
+/// Distances between rows and changes of the input that have matrices of their own; where there are more, the changes
+/// fall anywhere.
+const DISTANCES: usize = 6;
+
+/// Distances are the same up to this share of themselves.
+const SAME: f64 = 1e-11;
+
+/// A machine counted from where its run begins.
+pub(super) struct Seen {
+    pub(super) mechanism: Arc<Mechanism>,
+    pub(super) space: Space,
+    pub(super) coordinates: Coordinates,
+    pub(super) inner: State,
+}
+
+impl Seen {
+    pub(super) fn new(mechanism: &Arc<Mechanism>, start: &State, space: Space) -> Self {
+        let (coordinates, inner) = Coordinates::new(&space.layout, start);
+        Self { mechanism: mechanism.seen_by(&space.layout, start), space, coordinates, inner }
+    }
+}
+
+/// A variable of the machine: the machine at two other values of it.
+pub(super) struct Varied {
+    /// The machines as they were given, counted from zero.
+    pub(super) machines: [Arc<Mechanism>; 2],
+    pub(super) points: [Seen; 2],
+    pub(super) weights: [f64; 3],
+    /// Whether the start alone differs, and so neither equations nor guards do.
+    pub(super) is_start: bool,
+}
+
+impl Varied {
+    /// Σ wᵢ · the same number of each machine; nothing where it differs by rounding alone.
+    pub(super) fn slope(&self, here: f64, first: f64, second: f64) -> f64 {
+        let [a, b, c] = self.weights;
+        let terms = [a * here, b * first, c * second];
+        let (sum, size) = (terms.iter().sum::<f64>(), terms.iter().map(|term| term.abs()).sum::<f64>());
+        if sum.abs() <= ROUNDINGS * f64::EPSILON * size { 0.0 } else { sum }
+    }
+
+    fn row<const N: usize>(&self, here: &[f64; N], first: &[f64; N], second: &[f64; N]) -> [f64; N] {
+        std::array::from_fn(|k| self.slope(here[k], first[k], second[k]))
+    }
+
+    fn rows<const N: usize>(&self, here: &[[f64; N]], first: &[[f64; N]], second: &[[f64; N]]) -> Vec<Sparse> {
+        let rows = here.iter().zip(first).zip(second);
+        rows.map(|((here, first), second)| Sparse::of(self.row(here, first, second))).collect()
+    }
+}
+
+/// Places of z with weights.
+pub(super) struct Sparse(Vec<(usize, f64)>);
+
+impl Sparse {
+    fn of<const N: usize>(row: [f64; N]) -> Self {
+        Self(row.into_iter().enumerate().filter(|(_, weight)| *weight != 0.0).collect())
+    }
+
+    /// Its value.
+    #[inline]
+    pub(super) fn times<const N: usize>(&self, z: &[f64; N]) -> f64 {
+        self.0.iter().fold(0.0, |sum, (place, weight)| sum + weight * z[*place])
+    }
+}
+
+/// How the equations of one mode change with the variables of the machine: the same in all runs of it.
+pub(in crate::solve::exact) struct Sloped<const N: usize> {
+    pub(super) law: Arc<ModeMatrices<N>>,
+    /// What it was made of.
+    of: Vec<([Arc<Mechanism>; 2], [f64; 3])>,
+    /// A_p of each variable.
+    pub(super) slopes: Vec<Columns<N>>,
+    /// g_p by variable and guard.
+    guards: Vec<Vec<Sparse>>,
+    /// Steps that are made again and again, and how often they were before there were matrices for them.
+    steps: Vec<(f64, u32, Option<SlopedStep<N>>)>,
+}
+
+impl<const N: usize> Sloped<N> {
+    /// That of the mode of `law`, among those that are known, or a new one; none where a variable changes what ends the
+    /// mode.
+    pub(super) fn of(
+        known: &mut Vec<Self>,
+        law: &Arc<ModeMatrices<N>>,
+        seen: &Seen,
+        machines: &[&Varied],
+    ) -> Option<usize> {
+        let same = |(own, weights): &([Arc<Mechanism>; 2], [f64; 3]), varied: &&Varied| {
+            let pairs = own.iter().zip(&varied.machines);
+            *weights == varied.weights && pairs.into_iter().all(|(a, b)| Arc::ptr_eq(a, b) || a == b)
+        };
+        let fits = |known: &Self| {
+            Arc::ptr_eq(&known.law, law)
+                && known.of.len() == machines.len()
+                && known.of.iter().zip(machines).all(|(own, varied)| same(own, varied))
+        };
+        if let Some(index) = known.iter().position(fits) {
+            return Some(index);
+        }
+        known.push(Self::new(law, seen, machines)?);
+        Some(known.len() - 1)
+    }
+
+    fn new(law: &Arc<ModeMatrices<N>>, seen: &Seen, machines: &[&Varied]) -> Option<Self> {
+        let here = Equated::<N>::new(seen, &law.mode);
+        let (mut slopes, mut guards) = (Vec::new(), Vec::new());
+        for varied in machines {
+            let [first, second] = varied.points.each_ref().map(|point| Equated::<N>::new(point, &law.mode));
+            if first.guards.len() != here.guards.len() || second.guards.len() != here.guards.len() {
+                return None;
+            }
+            let columns = (0..N).map(|column| {
+                let of = |rate: &Matrix<N, N>| std::array::from_fn(|row| rate.at(row, column));
+                (column, varied.row(&of(&here.rate), &of(&first.rate), &of(&second.rate)))
+            });
+            slopes.push(Columns(columns.filter(|(_, column): &(_, [f64; N])| *column != [0.0; N]).collect()));
+            guards.push(varied.rows(&here.guards, &first.guards, &second.guards));
+        }
+        let of = machines.iter().map(|varied| (varied.machines.clone(), varied.weights)).collect();
+        Some(Self { law: Arc::clone(law), of, slopes, guards, steps: Vec::new() })
+    }
+
+    /// ∂g/∂p of a guard by a variable, for the state as it is.
+    pub(super) fn guard_slope(&self, variable: usize, guard: usize, z: &[f64; N]) -> f64 {
+        self.guards.get(variable).map_or(0.0, |guards| guards[guard].times(z))
+    }
+
+    /// The matrices for this distance, if it comes again and again.
+    pub(super) fn step(&mut self, distance: f64) -> Option<&SlopedStep<N>> {
+        let same = |(own, ..): &(f64, u32, _)| (own - distance).abs() <= SAME * distance;
+        let index = self.steps.iter().position(same).or_else(|| {
+            (self.steps.len() < DISTANCES).then(|| {
+                self.steps.push((distance, 0, None));
+                self.steps.len() - 1
+            })
+        })?;
+        let (distance, count, step) = &mut self.steps[index];
+        *count += 1;
+        if step.is_none() && *count > FEW {
+            *step = Some(self.law.rates().sloped_step(&self.slopes, *distance, self.law.speed()));
+        }
+        step.as_ref()
+    }
+}
+
+/// How the outputs of one run follow from z in one mode, and how that changes with the variables.
+pub(super) struct Tangent {
+    /// The number of the mode among those that are known.
+    pub(super) sloped: usize,
+    /// The rows of the outputs.
+    pub(super) outputs: Vec<Sparse>,
+    /// Their derivatives, with output and variable, where there are any.
+    pub(super) output_slopes: Vec<(usize, usize, Sparse)>,
+}
+
+impl Tangent {
+    /// That of a mode; none where an output is no straight function of z.
+    pub(super) fn new<const N: usize>(
+        sloped: usize,
+        mode: &Mode,
+        seen: &Seen,
+        variables: &[Option<Varied>],
+        outputs: &[Differentiated],
+    ) -> Option<Self> {
+        let rows = |seen: &Seen| outputs.iter().map(|output| row::<N>(seen, mode, *output)).collect::<Option<Vec<_>>>();
+        let here = rows(seen)?;
+        let mut output_slopes = Vec::new();
+        for (j, varied) in variables.iter().enumerate() {
+            let Some(varied) = varied else { continue };
+            let slopes = varied.rows(&here, &rows(&varied.points[0])?, &rows(&varied.points[1])?);
+            let some = slopes.into_iter().enumerate().filter(|(_, slope)| !slope.0.is_empty());
+            output_slopes.extend(some.map(|(i, slope)| (i, j, slope)));
+        }
+        Some(Self { sloped, outputs: here.into_iter().map(Sparse::of).collect(), output_slopes })
+    }
+}
+
+/// So often a distance is crossed by series before matrices are made for it.
+const FEW: u32 = 4;
+
+/// One machine in one mode: A, and the guards as rows of weights.
+struct Equated<const N: usize> {
+    rate: Matrix<N, N>,
+    guards: Vec<[f64; N]>,
+}
+
+impl<const N: usize> Equated<N> {
+    fn new(seen: &Seen, mode: &Mode) -> Self {
+        let (equations, rate) = straight::<N>(&seen.mechanism, &seen.space, mode);
+        Self { rate, guards: equations.guards.iter().map(|guard| seen.space.row(&guard.form)).collect() }
+    }
+}
+
+/// An output as a form of z; none for what is no straight function of it.
+fn row<const N: usize>(seen: &Seen, mode: &Mode, output: Differentiated) -> Option<[f64; N]> {
+    let (mechanism, space) = (&seen.mechanism, &seen.space);
+    let scaled = |mut row: [f64; N], factor: f64| {
+        row.iter_mut().for_each(|weight| *weight *= factor);
+        row
+    };
+    let shown = match output {
+        // What is stuck is not accelerated.
+        Differentiated::Acceleration(body) if mode.motion[body] == Motion::Stuck => return Some([0.0; N]),
+        Differentiated::Acceleration(body) => {
+            let (equations, _) = straight::<N>(mechanism, space, mode);
+            return Some(space.row(&equations.acceleration[body]));
+        }
+        Differentiated::Shown(shown) => shown,
+    };
+    Some(match shown {
+        Shown::Position(body, factor) => {
+            let (weights, constant) = seen.coordinates.way(&space.layout, body);
+            let mut row = [0.0; N];
+            for other in 0..space.layout.bodies() {
+                row[space.layout.coordinate[other]] = factor * weights[other];
+            }
+            row[N - 1] = factor * constant;
+            row
+        }
+        Shown::Speed(body, factor) => scaled(space.row(&Form::speed(body)), factor),
+        Shown::Stretch(spring) => space.row(&Form::stretch(spring)),
+        Shown::Force(spring, factor) => scaled(space.row(&mechanism.spring_force(spring, mode)), factor),
+        Shown::Current(drive) => space.row(&mechanism.current(drive, mode)),
+        Shown::Voltage(drive) => space.row(&mechanism.voltage(drive, mode)),
+        Shown::Input(drive) => space.row(&Form::input(drive)),
+        Shown::Time
+        | Shown::Friction(_)
+        | Shown::Motion(_)
+        | Shown::Bristle(_)
+        | Shown::Contact(_)
+        | Shown::Counts(..) => return None,
+    })
+}
+
+/// Whether two machines have the same parts, so that one has a derivative by what makes it the other.
+pub(super) fn are_alike(a: &Seen, b: &Seen) -> bool {
+    use std::mem::discriminant;
+    let (own, other) = (&a.mechanism, &b.mechanism);
+    let bodies = own.bodies.len() == other.bodies.len()
+        && (0..own.bodies.len())
+            .all(|body| own.has_modes(body) == other.has_modes(body) && own.leader(body) == other.leader(body));
+    let springs = own.springs.len() == other.springs.len()
+        && own.springs.iter().zip(&other.springs).all(|(a, b)| discriminant(&a.law) == discriminant(&b.law));
+    let drives = own.drives.iter().zip(&other.drives).all(|(a, b)| {
+        a.loses() == b.loses()
+            && a.has_rotor() == b.has_rotor()
+            && a.amplifier.voltage_limit.is_some() == b.amplifier.voltage_limit.is_some()
+            && a.amplifier.current_limit.is_some() == b.amplifier.current_limit.is_some()
+    });
+    let places = |seen: &Seen| (seen.space.layout.states, seen.space.layout.coordinate, seen.space.layout.speed);
+    bodies && springs && drives && places(a) == places(b) && other.is_piecewise_linear()
+}

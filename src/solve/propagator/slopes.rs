@@ -1,0 +1,329 @@
+//! Derivatives of matrix exponentials: how what a linear system does changes with a parameter of its matrix.
+//!
+//! With z(t + h) = z + P z, P = e^{A h} − I, the derivative of z by a parameter moves by
+//!
+//! ```text
+//! S ← S + P S + L z        L = ∂P/∂p, the Fréchet derivative of the exponential at A h along A_p h
+//! L(2h) = 2 L + L P + P L
+//! ```
+//!
+//! Where A_p meets nothing but constants (dry friction, gravity, a held input), ∂z/∂p is what a constant rate does, and
+//! L has those columns alone: l(2h) = 2 l + P l.
+
+use super::{EXPONENTIAL_ORDER, EXPONENTIAL_REACH, Matrix, RECIPROCAL_FACTORIAL, Series};
+
+/// A matrix of which most columns are zero: those that are not.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Columns<const N: usize>(pub(crate) Vec<(usize, [f64; N])>);
+
+impl<const N: usize> Columns<N> {
+    /// Those of a matrix.
+    fn of(matrix: &Matrix<N, N>) -> Self {
+        let columns = matrix.column.iter().enumerate();
+        Self(columns.filter(|(_, column)| column.iter().any(|c| *c != 0.0)).map(|(at, c)| (at, *c)).collect())
+    }
+
+    fn matrix(&self) -> Matrix<N, N> {
+        let mut matrix = Matrix::zero();
+        self.0.iter().for_each(|(at, column)| matrix.column[*at] = *column);
+        matrix
+    }
+
+    /// The product with a vector, added to `sum`.
+    #[inline(always)]
+    fn add_times(&self, z: &[f64; N], sum: &mut [f64; N]) {
+        for (at, column) in &self.0 {
+            let factor = z[*at];
+            sum.iter_mut().zip(column).for_each(|(sum, c)| *sum += c * factor);
+        }
+    }
+}
+
+/// What a linear system and its derivatives do in one and the same time.
+pub(crate) struct SlopedStep<const N: usize> {
+    step: Matrix<N, N>,
+    /// L of each parameter.
+    slopes: Vec<Columns<N>>,
+}
+
+impl<const N: usize> Matrix<N, N> {
+    /// The entry in this row and column.
+    pub(crate) fn at(&self, row: usize, column: usize) -> f64 {
+        self.column[column][row]
+    }
+
+    /// e^{A d} − I, A being `self`, and its derivatives where those of A are `slopes`; `speed` is a bound of ‖A‖.
+    pub(crate) fn sloped_step(&self, slopes: &[Columns<N>], d: f64, speed: f64) -> SlopedStep<N> {
+        let halvings = (speed * d / EXPONENTIAL_REACH).log2().ceil().clamp(0.0, 60.0) as i32;
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.sloped_step_by_avx2(slopes, d, halvings) };
+        }
+        self.sloped_step_by_any(slopes, d, halvings)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn sloped_step_by_avx2(&self, slopes: &[Columns<N>], d: f64, halvings: i32) -> SlopedStep<N> {
+        self.sloped_step_by_any(slopes, d, halvings)
+    }
+
+    #[inline(always)]
+    fn sloped_step_by_any(&self, slopes: &[Columns<N>], d: f64, halvings: i32) -> SlopedStep<N> {
+        let h = d * 0.5_f64.powi(halvings);
+        let powers = Powers::new(self.scaled(h));
+        // P at h, 2h, 4h … d
+        let mut steps = vec![powers.exponential()];
+        for level in 0..halvings as usize {
+            let doubled = steps[level].doubled_by_any();
+            steps.push(doubled);
+        }
+        let (step, before) = steps.split_last().expect("at least one");
+        let is_constant = |at: usize| self.column.iter().all(|column| column[at] == 0.0);
+        let slope = |of: &Columns<N>| {
+            if of.0.iter().all(|(at, _)| is_constant(*at)) {
+                let columns = of.0.iter().map(|(at, column)| (*at, powers.constant(&column.map(|c| c * h), before)));
+                return Columns(columns.collect());
+            }
+            let first = powers.slope(&of.matrix().scaled(h));
+            Columns::of(&before.iter().fold(first, |slope, step| {
+                // L(2h) = 2 L + L P + P L
+                let mut doubled = slope.scaled(2.0);
+                doubled.add(&slope.product(step));
+                doubled.add(&step.product(&slope));
+                doubled
+            }))
+        };
+        SlopedStep { slopes: slopes.iter().map(slope).collect(), step: step.clone() }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, other: &Self) {
+        self.column.iter_mut().flatten().zip(other.column.iter().flatten()).for_each(|(own, other)| *own += other);
+    }
+
+    /// Adds to each of `s` how it changes along `series`, which goes so far as `distance`, up to its share `part` of
+    /// it, where A changes by `slopes`, and not at all for those behind the last of these: T_k = d/k (A T_{k−1} + A_p z_{k−1}).
+    pub(crate) fn add_slopes(
+        &self,
+        slopes: &[Columns<N>],
+        (series, distance, part): (&Series<N>, f64, f64),
+        s: &mut [[f64; N]],
+    ) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.add_slopes_by_avx2(slopes, (series, distance, part), s) };
+        }
+        self.add_slopes_by_any(slopes, (series, distance, part), s);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn add_slopes_by_avx2(&self, slopes: &[Columns<N>], along: (&Series<N>, f64, f64), s: &mut [[f64; N]]) {
+        self.add_slopes_by_any(slopes, along, s);
+    }
+
+    #[inline(always)]
+    fn add_slopes_by_any(
+        &self,
+        slopes: &[Columns<N>],
+        (series, distance, part): (&Series<N>, f64, f64),
+        s: &mut [[f64; N]],
+    ) {
+        for (j, s) in s.iter_mut().enumerate() {
+            let mut term = *s;
+            // z_{k−1} partᵏ⁻¹, by and by
+            let (mut power, d) = (1.0, distance * part);
+            for (k, z) in series.terms[..=series.order].iter().enumerate() {
+                let mut next = self.times(&term);
+                let mut beside = [0.0; N];
+                if let Some(slope) = slopes.get(j) {
+                    slope.add_times(z, &mut beside);
+                }
+                let factor = d / (k + 1) as f64;
+                for ((term, next), beside) in term.iter_mut().zip(&mut next).zip(beside) {
+                    *term = factor * (*next + power * beside);
+                }
+                power *= part;
+                s.iter_mut().zip(&term).for_each(|(s, term)| *s += term);
+            }
+        }
+    }
+}
+
+impl<const N: usize> SlopedStep<N> {
+    /// S ← S + P S + L z for each of `s`, z being where the step begins; those behind the last L have none.
+    pub(crate) fn advance(&self, z: &[f64; N], s: &mut [[f64; N]]) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.advance_by_avx2(z, s) };
+        }
+        self.advance_by_any(z, s);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn advance_by_avx2(&self, z: &[f64; N], s: &mut [[f64; N]]) {
+        self.advance_by_any(z, s);
+    }
+
+    #[inline(always)]
+    fn advance_by_any(&self, z: &[f64; N], s: &mut [[f64; N]]) {
+        for (j, s) in s.iter_mut().enumerate() {
+            let mut change = self.step.times(s);
+            if let Some(slope) = self.slopes.get(j) {
+                slope.add_times(z, &mut change);
+            }
+            s.iter_mut().zip(change).for_each(|(s, change)| *s += change);
+        }
+    }
+}
+
+/// X, X² and X³ of a matrix with ‖X‖ ≤ [`EXPONENTIAL_REACH`], and what e^X − I is gathered from.
+struct Powers<const N: usize> {
+    powers: [Matrix<N, N>; 3],
+    /// Σ of the series from X¹⁰, X⁷ and X⁴ on, each over that power but one: what X³ is multiplied with.
+    rests: [Matrix<N, N>; 3],
+}
+
+impl<const N: usize> Powers<N> {
+    #[inline(always)]
+    fn new(x: Matrix<N, N>) -> Self {
+        let x2 = x.product(&x);
+        let x3 = x.product(&x2);
+        let powers = [&x, &x2, &x3];
+        let fourth = Matrix::gathered(powers, 10, None);
+        let third = Matrix::gathered(powers, 7, Some(&fourth));
+        let second = Matrix::gathered(powers, 4, Some(&third));
+        Self { powers: [x, x2, x3], rests: [fourth, third, second] }
+    }
+
+    /// e^X − I
+    #[inline(always)]
+    fn exponential(&self) -> Matrix<N, N> {
+        Matrix::gathered(self.powers.each_ref(), 1, Some(&self.rests[2]))
+    }
+
+    /// The derivative of e^X along E: that of each product is two, X′Y + X Y′.
+    #[inline(always)]
+    fn slope(&self, e: &Matrix<N, N>) -> Matrix<N, N> {
+        let [x, x2, x3] = &self.powers;
+        let mut e2 = x.product(e);
+        e2.add(&e.product(x));
+        let mut e3 = x.product(&e2);
+        e3.add(&e.product(x2));
+        let own = [e, &e2, &e3];
+        let mut slope = Matrix::gathered(own, 10, None);
+        for (k, rest) in [7, 4, 1].into_iter().zip(&self.rests) {
+            slope = Matrix::gathered(own, k, None).plus(&e3.product(rest)).plus(&x3.product(&slope));
+        }
+        slope
+    }
+
+    /// What a constant rate `e`, over the first of the steps, comes to behind the last: Σ Xᵏ⁻¹ e/k!, doubled.
+    #[inline(always)]
+    fn constant(&self, e: &[f64; N], steps: &[Matrix<N, N>]) -> [f64; N] {
+        let x = &self.powers[0];
+        let mut sum = [0.0; N];
+        for k in (1..=EXPONENTIAL_ORDER).rev() {
+            // Horner's rule: X (… ) + e/k!
+            sum = x.times(&sum);
+            sum.iter_mut().zip(e).for_each(|(sum, e)| *sum += e * RECIPROCAL_FACTORIAL[k]);
+        }
+        for step in steps {
+            let change = step.times(&sum);
+            sum.iter_mut().zip(change).for_each(|(sum, change)| *sum = 2.0 * *sum + change);
+        }
+        sum
+    }
+}
+
+impl<const N: usize> Matrix<N, N> {
+    #[inline(always)]
+    fn plus(mut self, other: &Self) -> Self {
+        self.add(other);
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const N: usize = 8;
+
+    fn drawn(seed: &mut u64) -> f64 {
+        *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (*seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    }
+
+    /// A matrix with an input and a constant behind six states, and a change of it.
+    fn matrices(seed: u64) -> (Matrix<N, N>, Columns<N>) {
+        let mut seed = seed;
+        let mut a = Matrix::zero();
+        let mut slope = Columns::default();
+        for column in 0..N {
+            let mut entries = [0.0; N];
+            for (row, entry) in entries.iter_mut().enumerate().take(6) {
+                a.set(row, column, 3.0 * drawn(&mut seed));
+                *entry = drawn(&mut seed);
+            }
+            if column % 3 == 1 {
+                slope.0.push((column, entries));
+            }
+        }
+        (a, slope)
+    }
+
+    fn moved(a: &Matrix<N, N>, slope: &Columns<N>, by: f64) -> Matrix<N, N> {
+        let mut moved = slope.matrix().scaled(by);
+        moved.add(a);
+        moved
+    }
+
+    /// Central differences of the exponential, of two step widths by Richardson, of matrices with and without constant
+    /// columns alone.
+    #[test]
+    fn slopes_are_what_differences_tend_to() {
+        for seed in 1..30 {
+            let (a, mut slope) = matrices(seed);
+            if seed % 3 == 0 {
+                slope.0.retain(|(at, _)| *at >= 6);
+            }
+            let z: [f64; N] = std::array::from_fn(|k| 1.0 / (1.0 + k as f64));
+            let s = [0.3; N];
+            let (d, speed) = (0.37, 20.0);
+            let at = |by: f64| {
+                let step = moved(&a, &slope, by).sloped_step(&[Columns::default()], d, speed);
+                let mut end = [std::array::from_fn::<f64, N, _>(|k| z[k] + by * s[k])];
+                step.advance(&[0.0; N], &mut end);
+                end[0]
+            };
+            let difference = |by: f64| {
+                let (up, down) = (at(by), at(-by));
+                std::array::from_fn::<f64, N, _>(|k| (up[k] - down[k]) / (2.0 * by))
+            };
+            let (wide, narrow) = (difference(2e-3), difference(1e-3));
+            let mut own = [s];
+            a.sloped_step(std::slice::from_ref(&slope), d, speed).advance(&z, &mut own);
+            let mut by_series = [s];
+            let mut series = Series::room();
+            a.series(&z, d / 8.0, 23, &mut series);
+            let mut now = z;
+            for _ in 0..8 {
+                a.series(&now, d / 4.0, 23, &mut series);
+                // Half of what the series reaches.
+                a.add_slopes(std::slice::from_ref(&slope), (&series, d / 4.0, 0.5), &mut by_series);
+                series.add_to(&mut now, 0.5);
+            }
+            for k in 0..N {
+                let known = (4.0 * narrow[k] - wide[k]) / 3.0;
+                assert!((own[0][k] - known).abs() < 1e-10, "{seed} {k}: {} {known}", own[0][k]);
+                assert!((own[0][k] - by_series[0][k]).abs() < 1e-13, "{seed} {k}: {} {}", own[0][k], by_series[0][k]);
+            }
+        }
+    }
+}
