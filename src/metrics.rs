@@ -262,8 +262,10 @@ impl Observe for Meter {
                 peak.take(gap.from[q], gap.begin);
                 peak.take(gap.to[q], end);
             }
-            // What its ends have told is no reason to look between them.
-            closer = gap.rises_above(&self.heights(), 1.0 + NEWS).1;
+            // What its ends have told is no reason to look between them, where a bound says what is there.
+            if self.can_wait() {
+                closer = gap.rises_above(&self.heights(), 1.0 + NEWS).1;
+            }
         }
         if let Some(plateau) = &mut self.plateau {
             closer |= plateau.pass(gap);

@@ -167,7 +167,7 @@ impl<const N: usize> Run<'_, N> {
             }
             self.watching.later.push(Later { law, z, begin, length, from, to, bow });
         } else {
-            self.show_closer(law, z, begin, length);
+            self.show_closer(law, z, (begin, length), false);
         }
         true
     }
@@ -188,7 +188,8 @@ impl<const N: usize> Run<'_, N> {
         for first in [true, false] {
             for Later { law, z, begin, length, from, to, bow } in &later {
                 if has_largest(from, to) == first && self.ask(law, (*begin, *length), from, to, bow) {
-                    self.show_closer(law, *z, *begin, *length);
+                    // No shape is known yet of what was put off: it is shown whole.
+                    self.show_closer(law, *z, (*begin, *length), true);
                 }
             }
         }
@@ -197,12 +198,18 @@ impl<const N: usize> Run<'_, N> {
     }
 
     /// Shows a way of any length that begins at `z`, in parts that there are matrices for and a rest that a series
-    /// tells.
-    fn show_closer(&mut self, law: &ModeMatrices<N>, mut z: [f64; N], mut begin: f64, mut length: f64) {
+    /// tells; `whole` says that no part is left out because a cubic has nothing to see there.
+    fn show_closer(
+        &mut self,
+        law: &ModeMatrices<N>,
+        mut z: [f64; N],
+        (mut begin, mut length): (f64, f64),
+        whole: bool,
+    ) {
         for level in 0..=law.finest {
             // What a sum of times is off by makes no difference here.
             while length >= law.length(level) * (1.0 - SAME) {
-                z = self.show_level(law, z, begin, level);
+                z = self.show_level(law, z, begin, (level, whole));
                 begin += law.length(level);
                 length -= law.length(level);
             }
@@ -219,7 +226,13 @@ impl<const N: usize> Run<'_, N> {
 
     /// Shows an interval of h/2^level from `z` on in parts so short that cubics tell where there is something to see;
     /// returns its end.
-    fn show_level(&mut self, law: &ModeMatrices<N>, z: [f64; N], begin: f64, level: usize) -> [f64; N] {
+    fn show_level(
+        &mut self,
+        law: &ModeMatrices<N>,
+        z: [f64; N],
+        begin: f64,
+        (level, whole): (usize, bool),
+    ) -> [f64; N] {
         let fine = self.watching.level.saturating_sub(1).clamp(level, law.finest);
         let (parts, length) = (1_u64 << (fine - level).min(60), law.length(fine));
         let mut from = self.sight(law, &z);
@@ -228,8 +241,8 @@ impl<const N: usize> Run<'_, N> {
             law.step(fine).advance(&mut end);
             let mut to = self.sight(law, &end);
             let begin = begin + part as f64 * length;
-            if self.asks(law, &mut from, &mut to, begin, length) {
-                self.show_curve(law, &mut from, &mut to, begin, fine);
+            if whole || self.asks(law, &mut from, &mut to, begin, length) {
+                self.show_curve(law, &mut from, &mut to, begin, (fine, whole));
             }
             from = to;
         }
@@ -249,7 +262,14 @@ impl<const N: usize> Run<'_, N> {
     }
 
     /// Shows an interval of h/2^level as a curve, or two halves of it where that is not right.
-    fn show_curve(&mut self, law: &ModeMatrices<N>, from: &mut Sight<N>, to: &mut Sight<N>, begin: f64, level: usize) {
+    fn show_curve(
+        &mut self,
+        law: &ModeMatrices<N>,
+        from: &mut Sight<N>,
+        to: &mut Sight<N>,
+        begin: f64,
+        (level, whole): (usize, bool),
+    ) {
         self.watching.curves += 1;
         let length = law.length(level);
         let curve = self.curve(law, from, to, begin, length);
@@ -272,11 +292,11 @@ impl<const N: usize> Run<'_, N> {
         }
         (self.watching.right, self.watching.level) = (0, self.watching.level.max(level + 1));
         let half = 0.5 * length;
-        if self.asks(law, from, &mut middle, begin, half) {
-            self.show_curve(law, from, &mut middle, begin, level + 1);
+        if whole || self.asks(law, from, &mut middle, begin, half) {
+            self.show_curve(law, from, &mut middle, begin, (level + 1, whole));
         }
-        if self.asks(law, &mut middle, to, begin + half, half) {
-            self.show_curve(law, &mut middle, to, begin + half, level + 1);
+        if whole || self.asks(law, &mut middle, to, begin + half, half) {
+            self.show_curve(law, &mut middle, to, begin + half, (level + 1, whole));
         }
     }
 
