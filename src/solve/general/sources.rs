@@ -94,12 +94,18 @@ impl Source {
         }
     }
 
-    /// Whether it has a kink within a step from `y` on, or what is as narrow: its body turns without being held.
+    /// Whether it may have a kink within a step from `y` on, or what is as narrow: its body turns without being held, or
+    /// friction along the travel has corners.
     #[inline(always)]
     pub(super) fn has_kink(&self, model: &Model, y: &Vector, arguments: &[Lane]) -> bool {
-        let &Source::Friction { curved, motion: Motion::Free, speed, .. } = self else { return false };
-        let before = y[model.curved[curved].speed];
-        arguments[speed].iter().any(|v| v * before < 0.0)
+        match *self {
+            Source::Friction { way: Some(_), .. } => true,
+            Source::Friction { curved, motion: Motion::Free, speed, .. } => {
+                let before = y[model.curved[curved].speed];
+                arguments[speed].iter().any(|v| v * before < 0.0)
+            }
+            Source::Friction { .. } | Source::Spring { .. } => false,
+        }
     }
 
     /// The force at the nodes of a step of length `h` from `y` on; deflections of its bristles go to `bristles`.

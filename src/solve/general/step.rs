@@ -47,7 +47,14 @@ const FOUND: f64 = 0.01;
 const SLOW: f64 = 0.2;
 
 /// The error of the quartics, as a share of what cubics would be off by, where nothing else is known.
-const OF_CUBIC: f64 = 0.1;
+const OF_CUBIC: f64 = 1.0;
+
+/// What a kink leaves of a force counts so many times: it is told by few values.
+const OF_KINK: f64 = 10.0;
+
+/// The share of what the arguments are off by within a step, at least, that counts beside what they are off by at its
+/// end: rows stand there, too.
+const WITHIN: f64 = 1.0;
 
 /// The values of the forces at the points of a step.
 pub(super) type Forces = [[f64; POINTS]; SOURCES];
@@ -362,14 +369,14 @@ impl Room {
         };
         // Each as the weights that it is led by, and their factor.
         let mut off = [(0, 0.0); S];
-        let mut share = if sixth.is_some() { self.feedback } else { 1.0 };
+        let mut share = if sixth.is_some() { self.feedback.max(WITHIN) } else { 1.0 };
         for (source, off) in off[..sources].iter_mut().enumerate() {
             let force = &self.forces[source];
             *off = match &there {
                 // A kink leaves as much to a quartic as to a cubic.
                 _ if field.sources[source].has_kink(&field.model, begin.y, &self.arguments) => {
                     share = 1.0;
-                    (0, cubic(force))
+                    (0, OF_KINK * cubic(force))
                 }
                 Some((basis, rest)) => {
                     let quartic = basis.iter().zip(force).fold(0.0, |sum, ([weight], value)| sum + weight * value);
