@@ -31,6 +31,7 @@ fn stage(encoder: Option<Encoder>) -> Stage {
         belt: Belt::given([132.76e3, 132.76e3, f64::NAN], [0.0, 3.0, 0.0]),
         travel: None,
         encoder,
+        scale: None,
     }
 }
 
