@@ -210,7 +210,8 @@ impl StateFeedbackState {
         for (i, own) in self.own.iter().enumerate() {
             command -= law.gain[n + i] * own;
         }
-        if let (Some(gain), Some((sensor, position))) = (law.integral(), law.sensors.iter().zip(positions).last()) {
+        if let (Some(gain), Some((sensor, position))) = (law.integral(), law.sensors.iter().zip(positions).next_back())
+        {
             command -= gain * self.integral;
             self.integrated = law.every * (position - sensor.measured.dot(&self.wanted));
             self.integral += self.integrated;
