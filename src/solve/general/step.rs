@@ -15,9 +15,8 @@
 //!
 //! The error is estimated by what the quartics leave of the forces. With a sixth value, from the step before, a force is
 //! known to be off by D ω(s), ω being zero at the five points: led through W, that is what the arguments are off by. Of
-//! this, Radau's nodes leave next to nothing at the end of the step; what is off at the nodes comes back as the force
-//! there, by as much as a turn of the iteration contracts. A step that has none before it is judged by the cubics
-//! through the nodes alone, of which the quartics' error is a share.
+//! this, Radau's nodes leave next to nothing at the end of the step; what is off at the nodes counts, too: it comes back
+//! as a force, and rows stand there. A step that has none before it is judged by the cubics through the nodes alone.
 
 use super::field::Field;
 use super::linear::{Forcing, STATES, Series, Set, States};
@@ -46,15 +45,11 @@ const FOUND: f64 = 0.01;
 /// A contraction above which Newton's method is taken.
 const SLOW: f64 = 0.2;
 
-/// The error of the quartics, as a share of what cubics would be off by, where nothing else is known.
+/// The error of the quartics, as a multiple of what cubics would be off by, where nothing else is known.
 const OF_CUBIC: f64 = 1.0;
 
 /// What a kink leaves of a force counts so many times: it is told by few values.
 const OF_KINK: f64 = 10.0;
-
-/// The share of what the arguments are off by within a step, at least, that counts beside what they are off by at its
-/// end: rows stand there, too.
-const WITHIN: f64 = 1.0;
 
 /// The values of the forces at the points of a step.
 pub(super) type Forces = [[f64; POINTS]; SOURCES];
@@ -102,8 +97,6 @@ pub(super) struct Room {
     /// The length of the step before, where it ended as this one begins, and each force at its third node.
     past: Option<f64>,
     kept: [f64; SOURCES],
-    /// By how much a turn of the iteration last contracted.
-    feedback: f64,
     /// Guards at the points of the step.
     pub(super) told: [[f64; POINTS]; MOST_GUARDS],
     pub(super) evaluations: u64,
@@ -146,7 +139,6 @@ impl Room {
             newton: Newton::default(),
             past: None,
             kept: [0.0; SOURCES],
-            feedback: 1.0,
             told: [[0.0; POINTS]; MOST_GUARDS],
             evaluations: 0,
         }
@@ -155,7 +147,7 @@ impl Room {
     /// Begins anew, with these forces: what was before says nothing of what comes.
     pub(super) fn begin(&mut self, forces: &[f64]) {
         self.forces.iter_mut().zip(forces).for_each(|(force, value)| force[0] = *value);
-        (self.past, self.feedback) = (None, 1.0);
+        self.past = None;
     }
 
     /// The step of length `h` that was solved is taken, and the next one begins at its end.
@@ -328,9 +320,6 @@ impl Room {
             let then: [Lane; A] = self.led(set, counts, &next);
             let most = farthest(&then[..arguments], &now[..arguments], begin.strict)?;
             let contraction = most / before;
-            if before.is_finite() && !newton {
-                self.feedback = contraction.min(1.0);
-            }
             // What runs away is not followed.
             if contraction <= 1.0 || turn == 0 || newton {
                 (forces, now) = (next, then);
@@ -369,13 +358,11 @@ impl Room {
         };
         // Each as the weights that it is led by, and their factor.
         let mut off = [(0, 0.0); S];
-        let mut share = if sixth.is_some() { self.feedback.max(WITHIN) } else { 1.0 };
         for (source, off) in off[..sources].iter_mut().enumerate() {
             let force = &self.forces[source];
             *off = match &there {
                 // A kink leaves as much to a quartic as to a cubic.
                 _ if field.sources[source].has_kink(&field.model, begin.y, &self.arguments) => {
-                    share = 1.0;
                     (0, OF_KINK * cubic(force))
                 }
                 Some((basis, rest)) => {
@@ -393,7 +380,7 @@ impl Room {
                 lane.iter_mut().zip(weight).for_each(|(lane, weight)| *lane += weight * off);
             }
             let within = lane.iter().fold(0.0, |most: f64, off| most.max(off.abs()));
-            let own = (lane[NODES - 1].abs() + share * within) * begin.strict[argument];
+            let own = (lane[NODES - 1].abs() + within) * begin.strict[argument];
             // What is no number counts as no error at all in `max`.
             most = if lane.iter().sum::<f64>().is_finite() { most.max(own) } else { f64::INFINITY };
         }
