@@ -51,6 +51,8 @@ stop_damping = 4
 [encoder]
 at = "motor"
 lines = 512
+[scale]
+lines = 256
 [[experiment]]
 name = "step"
 until = 0.03125
@@ -101,6 +103,7 @@ fn cases() -> Vec<(String, String)> {
     assert!(motor.starts_with("\n[motor]"));
     let drive = format!("[drive]\nforce_per_input = 2\ndrag = 4\n[amplifier]\nmode = \"voltage\"{rest}");
     let drive = drive.replace("bandwidth = 1024\n", "").replace("at = \"motor\"", "at = \"cart\"");
+    let drive = drive.replace("[scale]\nlines = 256\n", "");
     let drive = drive.replace("stiffness = [1024, 1024, 512]", "specific_stiffness = 8192\nspans = [8, 16, 32]");
     let drive = drive.replace("DRIVE", LAWS[0]).replace("IDLER", LAWS[0]).replace("CART", LAWS[0]);
     cases.push((name, drive));
@@ -352,6 +355,7 @@ fn the_table_is_of_one_piece() {
             "belt.",
             "travel.",
             "encoder.",
+            "scale.",
         ];
         let is_machine = machine.iter().any(|table| parameter.key.starts_with(table));
         assert_eq!(is_machine, !places[0], "{}", parameter.key);

@@ -487,7 +487,7 @@ const SCALE: &[Parameter] = &[
     row("scale.lines", "", "", Words("from `counts`"), POSITIVE, "50000", "Lines per metre of a scale at the cart, beside an encoder at motor or drive pulley; in quadrature each gives four counts.")
         .at(part!(|s| s.scale, &mut s.scale => lines)),
     row("scale.counts", "", "", Words("from `lines`"), POSITIVE, "200000", "Counts per metre, every edge counted; instead of `lines`.")
-        .at(Place::part_of("scale.lines")),
+        .at(Place::axis(Field::PartOf("scale.lines"))),
 ];
 
 #[rustfmt::skip]
