@@ -28,7 +28,7 @@ pub(super) struct Sheet {
 /// The source of the friction on a body.
 pub(super) enum Held {
     /// One form.
-    Form(Sum),
+    Form(Box<Sum>),
     /// The load on it at rest, where gears with losses hold a share of their own: the least and the most of it.
     Between,
 }
@@ -89,20 +89,20 @@ impl Held {
         let sliding = |viscous: f64, dry: f64| {
             let mut sum = Sum::constant(dry);
             sum.add(places.speed(body), viscous);
-            Held::Form(sum)
+            Held::Form(Box::new(sum))
         };
         match mode.motion[body] {
             // F_f = b v ± F_c                                                   (15)
             Motion::Free => sliding(law.forward.viscous, 0.0),
             Motion::Forward => sliding(law.forward.viscous, law.forward.coulomb),
             Motion::Backward => sliding(law.backward.viscous, -law.backward.coulomb),
-            Motion::Stuck if mechanism.leader(body) != body => Held::Form(Sum::constant(0.0)),
+            Motion::Stuck if mechanism.leader(body) != body => Held::Form(Box::new(Sum::constant(0.0))),
             Motion::Stuck => {
                 let drives = |own: usize| mechanism.drives.iter().filter(move |drive| drive.shaft == own);
                 let loses = |own: usize| drives(own).any(|drive| drive.loses() && !drive.has_rotor());
                 match mechanism.followers(body).any(loses) {
                     true => Held::Between,
-                    false => Held::Form(load(mechanism, places, body)),
+                    false => Held::Form(Box::new(load(mechanism, places, body))),
                 }
             }
         }

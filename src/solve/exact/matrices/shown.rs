@@ -100,10 +100,9 @@ impl<const N: usize> ModeMatrices<N> {
         let eighth = 0.125 * interval * interval;
         let (mechanical, magnetic, first) =
             (eighth * grow * mechanical, eighth * grow * magnetic, eighth * grow * first);
-        let mut bow = [0.0; QUANTITIES];
-        for q in 0..QUANTITIES {
-            bow[q] = shown.mechanical[q] * mechanical + shown.magnetic[q] * magnetic + shown.unsprung[q] * first;
-        }
+        let mut bow: Reading = std::array::from_fn(|q| {
+            shown.mechanical[q] * mechanical + shown.magnetic[q] * magnetic + shown.unsprung[q] * first
+        });
         for (input, curvature) in shown.input.iter().zip(curvature).filter(|(_, curvature)| **curvature > 0.0) {
             bow.iter_mut().zip(input).for_each(|(bow, input)| *bow += eighth * input * curvature);
         }
