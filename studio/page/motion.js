@@ -176,10 +176,21 @@ class Stage {
   }
 }
 
-/** New texts for the cells that are there: the page lays out only what changed.
- * @param {HTMLElement} root @param {string} cells @param {string[]} texts */
-function retext(root, cells, texts) {
-  root.querySelectorAll(cells).forEach((cell, k) => { if (cell.textContent !== texts[k]) cell.textContent = texts[k]; });
+/** A part of the page whose cells take new texts where nothing else is new: the page lays out only what changed. */
+class Cells {
+  /** @param {HTMLElement} root @param {string} cells the selector of those that have texts */
+  constructor(root, cells) {
+    this.root = root;
+    this.cells = cells;
+    this.shape = "";
+  }
+
+  /** @param {any} shape all of it but the texts @param {string[]} texts @param {() => HTMLElement[]} make */
+  fill(shape, texts, make) {
+    const now = JSON.stringify(shape);
+    if (now !== this.shape) { this.shape = now; this.root.replaceChildren(...make()); return; }
+    this.root.querySelectorAll(this.cells).forEach((cell, k) => { if (cell.textContent !== texts[k]) cell.textContent = texts[k]; });
+  }
 }
 
 /** Quantities that follow from the numbers of the machine. */
@@ -188,22 +199,20 @@ class Glance {
   constructor(root, app) {
     this.body = element("div", {class: "cards"});
     root.append(this.body);
-    let shape = "";
+    const cells = new Cells(this.body, "dd, tbody td");
     app.on("run", () => {
       const overview = app.run && app.run.head.overview;
-      if (!overview) { shape = ""; this.body.replaceChildren(); return; }
-      const {groups, notes: told} = overview, [titles, ...lines] = overview.places;
-      const now = JSON.stringify([groups.map(({name, rows}) => [name, rows.map(row => [row.name, row.how])]), titles, lines.length, told]);
-      if (now === shape) { retext(this.body, "dd, tbody td", [...groups.flatMap(({rows}) => rows.map(row => row.value)), ...lines.flat()]); return; }
-      shape = now;
+      if (!overview) { cells.fill(null, [], () => []); return; }
+      const {groups, notes} = overview, [head, ...places] = overview.places;
       const card = ({name, rows}) => element("div", {class: "card"}, element("h3", {}, name), element("dl", {},
         ...rows.flatMap(row => [element("dt", {title: row.how || null}, row.name), element("dd", {}, row.value)])));
-      const [head, ...places] = overview.places;
-      const table = places.length ? element("div", {class: "card wide"}, element("h3", {}, "Along the travel"), element("div", {class: "scroll", tabindex: "0", role: "group", "aria-label": "Along the travel"},
+      const table = () => places.length ? element("div", {class: "card wide"}, element("h3", {}, "Along the travel"), element("div", {class: "scroll", tabindex: "0", role: "group", "aria-label": "Along the travel"},
         element("table", {}, element("thead", {}, element("tr", {}, ...head.map(text => element("th", {scope: "col"}, text)))),
           element("tbody", {}, ...places.map(row => element("tr", {}, ...row.map(text => element("td", {}, text)))))))) : null;
-      const notes = overview.notes.length ? element("div", {class: "card wide"}, element("h3", {}, "To be known"), element("ul", {}, ...overview.notes.map(note => element("li", {}, note)))) : null;
-      this.body.replaceChildren(...[...overview.groups.map(card), table, notes].filter(Boolean));
+      const noted = () => notes.length ? element("div", {class: "card wide"}, element("h3", {}, "To be known"), element("ul", {}, ...notes.map(note => element("li", {}, note)))) : null;
+      const shape = [groups.map(({name, rows}) => [name, rows.map(row => [row.name, row.how])]), head, places.length, notes];
+      cells.fill(shape, [...groups.flatMap(({rows}) => rows.map(row => row.value)), ...places.flat()],
+        () => [...groups.map(card), table(), noted()].filter(Boolean));
     });
   }
 }
@@ -215,16 +224,14 @@ class Results {
     const figures = element("dl", {class: "figures"}), events = element("div", {class: "events"});
     const ending = element("p", {class: "mistake", hidden: true});
     root.append(ending, element("h2", {}, "Key figures"), figures, element("h2", {}, "Events"), events);
-    let shape = "";
+    const cells = new Cells(figures, "dd");
     app.on("run", () => {
       if (!app.run) return;
       const {rows, ending: told, events: all, events_left_out: left} = app.run.head;
       ending.hidden = !told;
       ending.textContent = told ? `This run ${told}.` : "";
-      const now = JSON.stringify(rows.map(([name]) => name));
-      if (now === shape) retext(figures, "dd", rows.map(([, value]) => value));
-      else figures.replaceChildren(...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
-      shape = now;
+      cells.fill(rows.map(([name]) => name), rows.map(([, value]) => value),
+        () => rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
       if (root.hidden && all.length > 100) return;
       const shown = all.slice(0, 200);
       events.replaceChildren(...shown.map(event => element("button", {type: "button", class: "event", onclick: () => { app.isPlaying = false; app.tell("play"); app.seek(event.time); }},

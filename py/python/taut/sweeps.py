@@ -128,7 +128,7 @@ def _planned(
     if not isinstance(vary, (Mapping, type(None))):
         raise TypeError(f"vary: a dictionary is wanted, and no {type(vary).__name__}")
     given = {"runs": n, "design": design, "seed": seed, "interval": interval, "indices": True if indices else None}
-    changes = {f"sweep.{key}": value for key, value in given.items() if value is not None}
+    changes: dict[str, Any] = {f"sweep.{key}": value for key, value in given.items() if value is not None}
     if figures is not None:
         if isinstance(figures, str) or not isinstance(figures, Sequence):
             raise TypeError(f"figures: a list of names is wanted, and no {type(figures).__name__}")
