@@ -14,7 +14,7 @@ pub use watch::{Sum, Watch, Watched};
 use crate::case::Experiment;
 use crate::friction::Motion;
 use crate::mechanism::{AmplifierMode, Mode, State};
-use crate::solve::{Curve, Event, Gap, Observe, QUANTITIES, Reading, reading};
+use crate::solve::{Closer, Curve, Event, Gap, Gaps, Observe, QUANTITIES, Reading, Stretch, reading};
 use crate::stage::Stage;
 use crate::stage::axis::{BODIES, CART, DRIVE, ROTOR};
 
@@ -254,6 +254,24 @@ impl Meter {
 }
 
 impl Observe for Meter {
+    fn stretch(&mut self, stretch: &Stretch) -> Closer {
+        // When a rotor was last fast depends on how fast it had been by then.
+        if self.rotor.is_some() {
+            return Closer::Now;
+        }
+        self.moved |= stretch.interval > 0.0 && slides(stretch.mode);
+        for (q, peak) in self.peaks.iter_mut().enumerate().filter(|(q, _)| self.sought[*q]) {
+            if stretch.most[q] > peak.value.abs() {
+                let (value, time) = stretch.largest(q);
+                *peak = Peak { value, time };
+            }
+        }
+        Closer::Later(match &self.plateau {
+            Some(plateau) if plateau.meets(stretch) => Gaps::first(stretch.readings.len() - 1),
+            _ => stretch.rising_above(&self.heights(), 1.0 + NEWS),
+        })
+    }
+
     fn pass(&mut self, gap: &Gap) -> bool {
         let end = gap.begin + gap.length;
         let (news, mut closer) = gap.rises_above(&self.heights(), 1.0 + NEWS);
@@ -263,9 +281,7 @@ impl Observe for Meter {
                 peak.take(gap.to[q], end);
             }
             // What its ends have told is no reason to look between them, where a bound says what is there.
-            if self.can_wait() {
-                closer = gap.rises_above(&self.heights(), 1.0 + NEWS).1;
-            }
+            closer = gap.rises_above(&self.heights(), 1.0 + NEWS).1;
         }
         if let Some(plateau) = &mut self.plateau {
             closer |= plateau.pass(gap);
@@ -273,7 +289,7 @@ impl Observe for Meter {
         if let Some(rotor) = &mut self.rotor {
             closer |= rotor.pass(gap);
         }
-        self.moved |= gap.length > 0.0 && gap.mode.motion[..BODIES].iter().any(|motion| *motion != Motion::Stuck);
+        self.moved |= gap.length > 0.0 && slides(gap.mode);
         closer && gap.length > 0.0
     }
 
@@ -301,11 +317,6 @@ impl Observe for Meter {
         self.follows
     }
 
-    fn can_wait(&self) -> bool {
-        // When a rotor was last fast depends on how fast it had been by then.
-        self.rotor.is_none()
-    }
-
     fn end(&mut self, time: f64, state: &State, mode: &Mode) {
         let seen = &mut self.seen;
         seen.end = time;
@@ -319,6 +330,11 @@ impl Observe for Meter {
             rotor.end(state.speed[self.shaft]);
         }
     }
+}
+
+/// Whether any body slides or is free.
+fn slides(mode: &Mode) -> bool {
+    mode.motion[..BODIES].iter().any(|motion| *motion != Motion::Stuck)
 }
 
 /// A rotor that is an inertia of its own: nothing holds it, so it comes to rest as what swings does, by and by.
@@ -426,6 +442,11 @@ impl Plateau {
 
     fn take(&mut self, speed: f64) {
         self.range = (self.range.0.min(speed), self.range.1.max(speed));
+    }
+
+    /// Whether any gap of a stretch may tell of it.
+    fn meets(&self, stretch: &Stretch) -> bool {
+        stretch.end() >= self.late - self.near && stretch.begin <= self.held.end + self.near
     }
 
     fn pass(&mut self, gap: &Gap) -> bool {

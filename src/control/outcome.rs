@@ -412,6 +412,10 @@ impl Observe for Gauge<'_> {
         self.settle(curve);
     }
 
+    fn sees_all(&self) -> bool {
+        true
+    }
+
     fn end(&mut self, time: f64, state: &State, mode: &Mode) {
         self.meter.end(time, state, mode);
         let y = self.profile.at(time).position;

@@ -4,7 +4,7 @@
 use super::watch::{Sum, Watch, Watched};
 use super::{EventCount, Peak};
 use crate::mechanism::{DRIVES, Mechanism, Mode, Roles, Shown, State};
-use crate::solve::{Curve, Event, Gap, Observe};
+use crate::solve::{Closer, Curve, Event, Gap, Observe, Stretch};
 use crate::stage::gantry::{BODIES, Gantry};
 
 /// Peaks before those of the spans: speeds of bridge and cart, errors of both, currents, speeds of the motors.
@@ -127,16 +127,16 @@ impl GantryMeter {
 }
 
 impl Observe for GantryMeter {
+    fn stretch(&mut self, stretch: &Stretch) -> Closer {
+        self.watch.stretch(stretch)
+    }
+
     fn pass(&mut self, gap: &Gap) -> bool {
         self.watch.pass(gap)
     }
 
     fn see(&mut self, curve: &Curve) {
         self.watch.see(curve);
-    }
-
-    fn can_wait(&self) -> bool {
-        self.watch.can_wait()
     }
 
     fn end(&mut self, time: f64, state: &State, mode: &Mode) {

@@ -3,7 +3,7 @@
 use super::{EventCount, NEWS, Peak, Rotor};
 use crate::friction::Motion;
 use crate::mechanism::{Mechanism, Mode, Shown, State};
-use crate::solve::{Curve, Event, Gap, Observe, Polynomial};
+use crate::solve::{Closer, Curve, Event, Gap, Gaps, Observe, Polynomial, Reading, Stretch};
 
 /// A sum of readings, each with its weight: one reading by itself, or a difference of two.
 pub type Sum = Vec<(Shown, f64)>;
@@ -67,6 +67,11 @@ impl Watch {
         }
     }
 
+    /// Whether any body other than rotors slides or is free.
+    fn slides(&self, mode: &Mode) -> bool {
+        mode.motion[..self.bodies].iter().any(|motion| *motion != Motion::Stuck)
+    }
+
     /// The figures of the run whose events these are.
     pub fn finish(self, events: &[Event]) -> Watched {
         let mut counts = vec![EventCount::default(); self.bodies];
@@ -93,13 +98,38 @@ impl Watch {
     }
 }
 
+/// A sum of what is read.
+#[inline]
+fn weighed(sum: &[(usize, f64)], reading: &Reading) -> f64 {
+    sum.iter().map(|&(q, weight)| weight * reading[q]).sum()
+}
+
 impl Observe for Watch {
+    fn stretch(&mut self, stretch: &Stretch) -> Closer {
+        // When a rotor was last fast depends on how fast it had been by then.
+        if !self.rotors.is_empty() {
+            return Closer::Now;
+        }
+        self.moved |= stretch.interval > 0.0 && self.slides(stretch.mode);
+        let mut wanted = Gaps::NONE;
+        for (sum, peak) in self.sums.iter().zip(&mut self.peaks) {
+            for (row, reading) in stretch.readings.iter().enumerate() {
+                peak.take(weighed(sum, reading), stretch.time(row));
+            }
+            let bow = sum.iter().map(|&(q, weight)| weight.abs() * stretch.bow[q]).sum::<f64>();
+            for (gap, [from, to]) in stretch.readings.array_windows().enumerate() {
+                let bound = Gap::bound_of(weighed(sum, from), weighed(sum, to), bow);
+                wanted.set(gap, bound > peak.value.abs() * (1.0 + NEWS));
+            }
+        }
+        Closer::Later(wanted)
+    }
+
     fn pass(&mut self, gap: &Gap) -> bool {
         let end = gap.begin + gap.length;
         let mut closer = false;
         for (sum, peak) in self.sums.iter().zip(&mut self.peaks) {
-            let of = |values: &[f64]| sum.iter().map(|&(q, weight)| weight * values[q]).sum::<f64>();
-            let (from, to) = (of(gap.from), of(gap.to));
+            let (from, to) = (weighed(sum, gap.from), weighed(sum, gap.to));
             peak.take(from, gap.begin);
             peak.take(to, end);
             let bow = sum.iter().map(|&(q, weight)| weight.abs() * gap.bow[q]).sum::<f64>();
@@ -108,7 +138,7 @@ impl Observe for Watch {
         for (_, rotor) in &mut self.rotors {
             closer |= rotor.pass(gap);
         }
-        self.moved |= gap.length > 0.0 && gap.mode.motion[..self.bodies].iter().any(|motion| *motion != Motion::Stuck);
+        self.moved |= gap.length > 0.0 && self.slides(gap.mode);
         closer && gap.length > 0.0
     }
 
@@ -126,10 +156,6 @@ impl Observe for Watch {
         for (_, rotor) in &mut self.rotors {
             rotor.see(curve);
         }
-    }
-
-    fn can_wait(&self) -> bool {
-        self.rotors.is_empty()
     }
 
     fn end(&mut self, time: f64, state: &State, mode: &Mode) {

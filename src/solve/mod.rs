@@ -26,7 +26,7 @@ pub use estimate::ErrorEstimate;
 pub use general::{Dynamics, Quantity};
 pub use machine::Machine;
 use observe::Output;
-pub use observe::{Curve, Gap, Observe, Polynomial, QUANTITIES, Reading, TERMS, reading};
+pub use observe::{Closer, Curve, Gap, Gaps, Observe, Polynomial, QUANTITIES, Reading, Stretch, TERMS, reading};
 pub use run::{Course, Run};
 pub use sensitivity::{Begun, Differentiated, Sensitivities, Variable};
 

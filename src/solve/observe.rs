@@ -97,6 +97,107 @@ impl Gap<'_> {
     }
 }
 
+/// Gaps of a [`Stretch`] by their numbers: one bit for each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Gaps(u64);
+
+impl Gaps {
+    /// None of them.
+    pub const NONE: Self = Self(0);
+
+    /// The first ones, so many.
+    pub fn first(count: usize) -> Self {
+        Self(if count < 64 { (1 << count) - 1 } else { u64::MAX })
+    }
+
+    /// Adds the one with this number.
+    #[inline(always)]
+    pub fn set(&mut self, gap: usize, is_in: bool) {
+        self.0 |= u64::from(is_in) << gap;
+    }
+
+    /// Whether the one with this number is among them.
+    pub fn has(self, gap: usize) -> bool {
+        self.0 >> gap & 1 == 1
+    }
+
+    /// The number behind the last of them.
+    pub fn end(self) -> usize {
+        64 - self.0.leading_zeros() as usize
+    }
+}
+
+/// A part of a run with one mode and no jump of the input in it, told by what is read at even intervals.
+#[derive(Debug, Clone, Copy)]
+pub struct Stretch<'a> {
+    /// Where it begins, s.
+    pub begin: f64,
+    /// How far apart readings are, s; 0 for a single instant.
+    pub interval: f64,
+    /// The readings: at its beginning, and behind each gap, of which there are at most 64.
+    pub readings: &'a [Reading],
+    /// The largest magnitudes of each quantity in them.
+    pub most: Reading,
+    /// By how much a quantity can be off the straight line between two of them; infinite where no bound is known.
+    pub bow: &'a Reading,
+    /// The states of all parts.
+    pub mode: &'a Mode,
+}
+
+impl<'a> Stretch<'a> {
+    pub(super) fn new(
+        (begin, interval): (f64, f64),
+        readings: &'a [Reading],
+        bow: &'a Reading,
+        mode: &'a Mode,
+    ) -> Self {
+        let mut most = [0.0_f64; QUANTITIES];
+        for reading in readings {
+            most.iter_mut().zip(reading).for_each(|(most, r)| *most = if r.abs() > *most { r.abs() } else { *most });
+        }
+        Self { begin, interval, readings, most, bow, mode }
+    }
+
+    /// When it ends, s.
+    pub fn end(&self) -> f64 {
+        self.time(self.readings.len() - 1)
+    }
+
+    /// When a reading was taken, s.
+    pub fn time(&self, reading: usize) -> f64 {
+        self.begin + reading as f64 * self.interval
+    }
+
+    /// The first reading of a quantity with its largest magnitude, and when that was.
+    pub fn largest(&self, q: usize) -> (f64, f64) {
+        let place = self.readings.iter().position(|reading| reading[q].abs() == self.most[q]).unwrap_or(0);
+        (self.readings[place][q], self.time(place))
+    }
+
+    /// The gaps within which the magnitude of any quantity can be above `factor` times its height.
+    pub fn rising_above(&self, heights: &Reading, factor: f64) -> Gaps {
+        let mut gaps = Gaps::NONE;
+        let all = self.most.iter().zip(self.bow).zip(heights);
+        if all.into_iter().any(|((most, bow), height)| most + bow > height * factor) {
+            for (gap, ends) in self.readings.array_windows().enumerate() {
+                let [from, to] = ends;
+                let gap_of = Gap { begin: 0.0, length: self.interval, from, to, bow: self.bow, mode: self.mode };
+                gaps.set(gap, gap_of.rises_above(heights, factor).1);
+            }
+        }
+        gaps
+    }
+}
+
+/// What an observer wants to see closer of a stretch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Closer {
+    /// Every gap, at once, if [`Observe::pass`] says so.
+    Now,
+    /// These gaps, later, when [`Observe::pass`] is asked: it seeks extremes, and there may be greater ones by then.
+    Later(Gaps),
+}
+
 /// By how much a line from −`half` to `half` with a parabola of height `bow` on it rises above zero:
 /// max over s of half (2s − 1) + 4 bow s (1 − s).
 #[inline(always)]
@@ -344,11 +445,18 @@ impl Polynomial {
 
 /// Whoever is shown a run as it goes on: every instant of it, and not only those of its rows.
 ///
-/// The run comes in [`Gap`]s, each beginning where the last one ended; before and after a jump of the input or a change
-/// of mode are two gaps' ends. Whoever wants to know what is in a gap is shown it in smaller ones or as a [`Curve`].
+/// The run comes in [`Stretch`]es, each beginning where the last one ended; before and after a jump of the input or a
+/// change of mode are two stretches' ends. Whoever wants to know what is between readings is shown it in smaller gaps or
+/// as a [`Curve`].
 pub trait Observe {
-    /// Takes the next gap, or one within the last that it wanted to see closer; says whether it wants to see closer
-    /// into this one.
+    /// Takes the next stretch; says which of its gaps it wants to see closer.
+    fn stretch(&mut self, stretch: &Stretch) -> Closer {
+        let _ = stretch;
+        Closer::Now
+    }
+
+    /// Takes a gap of a stretch that it wanted to see closer, or one within such a gap; says whether it wants to see
+    /// closer into this one.
     fn pass(&mut self, gap: &Gap) -> bool;
 
     /// Takes what is in a gap that it wanted to see closer.
@@ -359,9 +467,8 @@ pub trait Observe {
         true
     }
 
-    /// Whether what it wants to see closer may be shown to it later, when it is asked once more: it seeks extremes, and
-    /// a later one may be greater.
-    fn can_wait(&self) -> bool {
+    /// Whether it wants to see all of the motion closely, whatever a bound says.
+    fn sees_all(&self) -> bool {
         false
     }
 

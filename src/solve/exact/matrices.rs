@@ -54,6 +54,20 @@ impl Space {
         inner
     }
 
+    /// Bounds of the derivatives of this order of the inputs in `z`, from now on for `length`: Σ_{k ≥ order} |u⁽ᵏ⁾|
+    /// τ^(k − order)/(k − order)!.
+    pub(in crate::solve) fn input_bounds(&self, z: &[f64], order: usize, length: f64) -> [f64; DRIVES] {
+        let mut bounds = [0.0; DRIVES];
+        for (drive, bound) in bounds.iter_mut().enumerate().take(self.layout.inputs) {
+            let mut factor = 1.0;
+            for k in order..=self.highest {
+                *bound += z[self.chain(drive, k)].abs() * factor;
+                factor *= length / (k - order + 1) as f64;
+            }
+        }
+        bounds
+    }
+
     /// A form as a row of weights on it.
     pub(super) fn row<const N: usize>(&self, form: &Form) -> [f64; N] {
         let layout = &self.layout;

@@ -1,21 +1,14 @@
 //! A run: a machine, and a recorder of its rows.
 
-use super::shown::Watching;
+use super::shown::{ROWS, Watching};
 use super::{Core, Known, ModeMatrices, Space};
 use crate::mechanism::{Mechanism, State};
 use crate::solve::inputs::Pieces;
-use crate::solve::observe::{Output, Reading};
-use crate::solve::propagator::Matrix;
+use crate::solve::observe::Output;
 use crate::solve::record::Recorder;
 use crate::solve::run::{Running, Start};
 use crate::solve::{Detail, Ending, Flow, Grid, Outcome};
 use std::sync::Arc;
-
-/// Intervals looked at closer after which a bound is made anew.
-const OFTEN: usize = 8;
-
-/// Rows at a time where nobody wants them.
-const SCRATCH: usize = 16;
 
 /// A run under way.
 pub(in crate::solve) struct Run<'a, const N: usize> {
@@ -127,10 +120,9 @@ impl<'a, const N: usize> Run<'a, N> {
             return false;
         }
         let h = self.grid.interval();
-        let mut bow = self.is_observed().then(|| self.bow(&law, h, safe as f64 * h));
-        if let (true, Some(bow)) = (resting, &bow) {
+        if resting && self.is_observed() {
             let (begin, z) = (self.core.time(), self.core.z);
-            self.move_shown(&law, begin, safe as f64 * h, z, bow);
+            self.show_way(&law, z, &[z], (begin, safe as f64 * h));
         }
         self.core.common.since_change += safe as f64 * h;
         if resting && self.recorder.detail == Detail::None {
@@ -138,7 +130,6 @@ impl<'a, const N: usize> Run<'a, N> {
             self.go_to(self.row + safe);
             return true;
         }
-        let step = law.step(0);
         if resting {
             // One row, again and again.
             self.row += self.recorder.repeat(safe - 1);
@@ -149,24 +140,23 @@ impl<'a, const N: usize> Run<'a, N> {
             self.go_to(self.row);
             return true;
         }
-        match &mut bow {
-            Some(bow) => self.pass_rows(&law, safe, bow),
-            None => self.take_rows(step, safe),
-        }
+        self.take_rows(&law, safe);
         self.go_to(self.row);
         true
     }
 
-    /// Goes so many intervals on, and puts out all rows on the way but the last.
-    fn take_rows(&mut self, step: &Matrix<N, N>, intervals: u64) {
-        let mut left = intervals - 1;
+    /// Goes so many intervals on, shows the way, and puts out all rows on it but the last.
+    fn take_rows(&mut self, law: &Arc<ModeMatrices<N>>, intervals: u64) {
+        let (step, observed) = (law.step(0), self.is_observed());
+        let most = if observed { ROWS } else { usize::MAX };
+        let (mut left, h) = (intervals, self.grid.interval());
         while left > 0 {
-            let scratch = &mut [[0.0; N]; SCRATCH];
+            let scratch = &mut [[0.0; N]; ROWS];
             let room = match self.recorder.detail {
                 Detail::None => &mut scratch[..],
                 _ => self.recorder.room(),
             };
-            let rows = left.min(room.len() as u64) as usize;
+            let rows = left.min(room.len().min(most) as u64) as usize;
             let core = &mut self.core;
             let (begin, largest) = (core.z, core.largest);
             step.advance_rows(&mut core.z, &mut core.largest, &mut room[..rows]);
@@ -175,57 +165,36 @@ impl<'a, const N: usize> Run<'a, N> {
                 let good = room.iter().take_while(|row| row.iter().sum::<f64>().is_finite()).count();
                 (core.z, core.largest) = (begin, largest);
                 step.advance_rows(&mut core.z, &mut core.largest, &mut room[..good]);
-                self.passed(good);
+                self.passed(good, good);
                 step.advance(&mut self.core.z);
                 self.row += 1;
                 self.core.common.trouble = Some(Ending::Diverged { time: self.grid.time(self.row) });
                 return;
             }
             left -= rows as u64;
-            if !self.passed(rows) {
+            if observed {
+                let common = &self.core.common;
+                let shown = law.shown(&common.mechanism, &common.space);
+                self.watching.read(shown, common.coordinates.origin(), &begin, &room[..rows]);
+                self.show_stretch(law, begin, (self.grid.time(self.row), h));
+            }
+            if !self.passed(rows, if left > 0 { rows } else { rows - 1 }) {
                 return;
             }
         }
-        self.core.common.cost.steps += 1;
-        step.advance(&mut self.core.z);
-        self.row += 1;
     }
 
-    /// Takes so many rows that were passed; false if the receiver wants no more.
-    fn passed(&mut self, rows: usize) -> bool {
+    /// Goes so many rows on, and puts out the first `put` of them; false if the receiver wants no more.
+    fn passed(&mut self, rows: usize, put: usize) -> bool {
         self.row += rows as u64;
         self.core.common.cost.steps += rows as u64;
         match self.recorder.detail {
-            Detail::None => self.recorder.skip(rows as u64),
-            _ => self.recorder.take(rows),
+            Detail::None => self.recorder.skip(put as u64),
+            _ => self.recorder.take(put),
         }
         self.core.count_from(self.grid.time(self.row));
         self.heed();
         self.goes()
-    }
-
-    /// Goes so many intervals on, puts out all rows on the way but the last, and shows the way.
-    fn pass_rows(&mut self, law: &Arc<ModeMatrices<N>>, intervals: u64, bow: &mut Reading) {
-        let (step, h) = (law.step(0), self.grid.interval());
-        let mut closer = 0;
-        for j in 0..intervals {
-            if j > 0 {
-                self.put_out();
-                if self.core.common.trouble.is_some() {
-                    return;
-                }
-            }
-            let mut end = self.core.z;
-            step.advance(&mut end);
-            closer += usize::from(self.move_shown(law, self.grid.time(self.row), h, end, bow));
-            if closer == OFTEN {
-                // What swings has died down since.
-                closer = 0;
-                *bow = self.bow(law, h, (intervals - j) as f64 * h);
-            }
-            self.row += 1;
-            self.core.common.cost.steps += 1;
-        }
     }
 }
 

@@ -2,8 +2,8 @@
 
 use super::matrices::Shown;
 use super::{ModeMatrices, Run};
-use crate::mechanism::Cause;
-use crate::solve::observe::{Curve, Gap, Observe, QUANTITIES, Reading};
+use crate::mechanism::{BODIES, Cause};
+use crate::solve::observe::{Closer, Curve, Gap, Gaps, Observe, QUANTITIES, Reading, Stretch};
 use std::sync::Arc;
 
 /// The error of a curve that is allowed in the middle, as a share of the largest value seen of that quantity.
@@ -13,8 +13,11 @@ const OFF: f64 = 1e-9;
 /// whole.
 const MOST_CURVES: u64 = 2_000_000;
 
-/// Room for what a cubic is off where it only tells whether to look closer.
-const MARGIN: f64 = 1.05;
+/// Rows of a stretch at most: an observer has a bit for each gap, and what swings dies down on the way.
+pub(super) const ROWS: usize = 32;
+
+/// Stretches that are put off at most.
+const LATER: usize = 256;
 
 /// Lengths that differ by less than this share are one.
 const SAME: f64 = 1e-10;
@@ -22,38 +25,55 @@ const SAME: f64 = 1e-10;
 /// Curves in a row that are right before longer ones are tried.
 const RIGHT: u32 = 32;
 
-/// Gaps that are put off at most.
-const LATER: usize = 256;
-
-/// An instant as an observer sees it; rates, and the terms of curves that begin or end there, are made ready when they
-/// are first wanted.
+/// An instant as an observer sees it; rates are made ready when they are first wanted.
 struct Sight<const N: usize> {
     z: [f64; N],
     value: Reading,
+    /// ż, and what is read of it.
     slope: Option<([f64; N], Reading)>,
-    /// q̈ and q⃛
-    terms: Option<[Reading; 2]>,
+    /// z̈ and z⃛.
+    higher: Option<[[f64; N]; 2]>,
 }
 
-/// A gap that an observer wants to see closer and need not see at once.
-struct Later<const N: usize> {
-    law: Arc<ModeMatrices<N>>,
-    /// The state at its beginning.
-    z: [f64; N],
+impl<const N: usize> Sight<N> {
+    fn new(z: [f64; N], value: Reading) -> Self {
+        Self { z, value, slope: None, higher: None }
+    }
+}
+
+/// A part of a run: h/2^level from `begin` on.
+#[derive(Clone, Copy)]
+struct Part {
     begin: f64,
     length: f64,
-    from: Reading,
-    to: Reading,
+    level: usize,
+}
+
+/// A stretch of which an observer wants to see some gaps closer.
+struct Later<const N: usize> {
+    law: Arc<ModeMatrices<N>>,
+    /// The state at its beginning, and where ways are counted from.
+    z: [f64; N],
+    origin: [f64; BODIES],
+    begin: f64,
+    interval: f64,
+    /// What is read at the ends of its first gap.
+    ends: [Reading; 2],
     bow: Reading,
+    wanted: Gaps,
 }
 
 /// Where an observer is.
 pub(super) struct Watching<const N: usize> {
-    /// Whether there is an observer who follows the motion.
+    /// Whether there is an observer who follows the motion, and whether one who wants to see all of it closely.
     follows: bool,
-    /// The present reading, where nothing has jumped since.
-    now: Option<Reading>,
-    /// Gaps to be looked at closer.
+    sees_all: bool,
+    /// What is read at the present, and behind it at the rows of a stretch.
+    readings: Vec<Reading>,
+    /// Whether nothing has jumped since the present was read.
+    is_read: bool,
+    /// Where ways are counted from.
+    origin: [f64; BODIES],
     later: Vec<Later<N>>,
     /// The largest magnitudes seen.
     scale: Reading,
@@ -67,7 +87,31 @@ pub(super) struct Watching<const N: usize> {
 impl<const N: usize> Watching<N> {
     pub(super) fn new(observer: Option<&dyn Observe>) -> Self {
         let follows = observer.is_some_and(|observer| observer.follows());
-        Self { follows, now: None, later: Vec::new(), scale: [0.0; QUANTITIES], curves: 0, level: 0, right: 0 }
+        Self {
+            follows,
+            sees_all: observer.is_some_and(|observer| observer.sees_all()),
+            readings: Vec::with_capacity(if follows { ROWS + 1 } else { 0 }),
+            is_read: false,
+            origin: [0.0; BODIES],
+            later: Vec::new(),
+            scale: [0.0; QUANTITIES],
+            curves: 0,
+            level: 0,
+            right: 0,
+        }
+    }
+
+    /// Reads a stretch that begins in `z` and comes by these rows.
+    pub(super) fn read(&mut self, shown: &Shown<N>, origin: &[f64; BODIES], z: &[f64; N], rows: &[[f64; N]]) {
+        self.origin = *origin;
+        let first = match self.readings.last() {
+            Some(last) if self.is_read => *last,
+            _ => shown.read(z, origin),
+        };
+        self.readings.clear();
+        self.readings.push(first);
+        shown.read_rows(rows, origin, &mut self.readings);
+        self.is_read = true;
     }
 }
 
@@ -79,240 +123,254 @@ impl<const N: usize> Run<'_, N> {
 
     /// Input or mode may have jumped: what is read now has to be read anew.
     pub(super) fn jumped(&mut self) {
-        self.watching.now = None;
+        self.watching.is_read = false;
     }
 
     /// The run has ended.
     pub(super) fn end_shown(&mut self) {
-        self.show_later();
-        let (time, state, mode) = (self.core.time(), self.core.state(), self.core.common.mode);
         if self.is_observed() {
             let law = Arc::clone(&self.core.matrices);
-            self.show(&law, (time, 0.0), &self.core.z.clone(), &[0.0; QUANTITIES]);
+            self.show_way(&law, self.core.z, &[], (self.core.time(), 0.0));
+            self.show_later();
         }
+        let (time, state, mode) = (self.core.time(), self.core.state(), self.core.common.mode);
         if let Some(observer) = &mut self.recorder.observer {
             observer.end(time, &state, &mode);
         }
     }
 
-    /// How far readings can be off a straight line over intervals of this length, within `whole` from now on.
-    pub(super) fn bow(&self, law: &ModeMatrices<N>, interval: f64, whole: f64) -> Reading {
-        self.bow_from(law, &self.core.z, interval, whole)
-    }
-
-    fn bow_from(&self, law: &ModeMatrices<N>, z: &[f64; N], interval: f64, whole: f64) -> Reading {
-        let shown = law.shown(&self.core.common.mechanism, &self.core.common.space);
-        law.bow(
-            shown,
-            &law.rate(z),
-            (&self.core.common.input_rate, &self.core.common.input_curvature),
-            (interval, whole),
-        )
-    }
-
-    /// Shows the interval of `length` that began at `begin` and has led to `end`; the readings at its ends where the
-    /// observer wants to see closer.
-    fn show(
+    /// Shows a stretch of the run in the present mode, that has begun in `z` and come by these rows.
+    pub(super) fn show_way(
         &mut self,
-        law: &ModeMatrices<N>,
-        (begin, length): (f64, f64),
-        end: &[f64; N],
-        bow: &Reading,
-    ) -> Option<(Reading, Reading)> {
-        let shown = law.shown(&self.core.common.mechanism, &self.core.common.space);
-        let to = self.read(shown, end);
-        let from = match self.watching.now {
-            Some(from) => from,
-            None => self.read(shown, &self.core.z),
-        };
-        self.watching.now = Some(to);
-        self.ask(law, (begin, length), &from, &to, bow).then_some((from, to))
+        law: &Arc<ModeMatrices<N>>,
+        z: [f64; N],
+        rows: &[[f64; N]],
+        (begin, interval): (f64, f64),
+    ) {
+        let common = &self.core.common;
+        let shown = law.shown(&common.mechanism, &common.space);
+        self.watching.read(shown, common.coordinates.origin(), &z, rows);
+        self.show_stretch(law, z, (begin, interval));
     }
 
+    /// Shows the stretch that has just been read, from `z` on.
+    pub(super) fn show_stretch(&mut self, law: &Arc<ModeMatrices<N>>, z: [f64; N], (begin, interval): (f64, f64)) {
+        let readings = std::mem::take(&mut self.watching.readings);
+        let whole = interval * (readings.len() - 1) as f64;
+        let bow = match self.watching.sees_all {
+            true => [f64::INFINITY; QUANTITIES],
+            false => self.bow(law, &z, interval, whole),
+        };
+        let stretch = Stretch::new((begin, interval), &readings, &bow, &law.mode);
+        for (scale, most) in self.watching.scale.iter_mut().zip(&stretch.most) {
+            *scale = if *most > *scale { *most } else { *scale };
+        }
+        let closer = self.recorder.observer.as_mut().map_or(Closer::Later(Gaps::NONE), |o| o.stretch(&stretch));
+        let (is_now, wanted) = match closer {
+            Closer::Now => (true, Gaps::first(readings.len() - 1)),
+            Closer::Later(gaps) => (false, gaps),
+        };
+        if wanted != Gaps::NONE {
+            let (law, origin, ends) = (Arc::clone(law), self.watching.origin, [readings[0], readings[1]]);
+            let later = Later { law, z, origin, begin, interval, ends, bow, wanted };
+            match is_now {
+                true => self.show_gaps(&later),
+                false => self.watching.later.push(later),
+            }
+        }
+        self.watching.readings = readings;
+        if self.watching.later.len() == LATER {
+            self.show_later();
+        }
+    }
+
+    /// Shows gaps of a stretch closer, as far as the observer still wants to see them.
+    fn show_gaps(&mut self, later: &Later<N>) {
+        let Later { law, begin, interval, ends, wanted, .. } = later;
+        let (mut z, mut from, count) = (later.z, ends[0], wanted.end());
+        let bends = self.bends(law, &mut Sight::new(z, from), *interval * count as f64);
+        for gap in 0..count {
+            let mut next = z;
+            if count > 1 {
+                law.step(0).advance(&mut next);
+            }
+            let is_read = gap > 0 && (wanted.has(gap) || wanted.has(gap + 1));
+            let to = if is_read { self.sight(law, next).value } else { ends[1] };
+            let begin = begin + gap as f64 * interval;
+            if wanted.has(gap) && self.ask(law, (begin, *interval), [&from, &to], &later.bow) {
+                self.show_closer(law, Sight::new(z, from), (begin, *interval), &bends);
+            }
+            (z, from) = (next, to);
+        }
+    }
+
+    /// Shows what was put off.
+    fn show_later(&mut self) {
+        let mut all = std::mem::take(&mut self.watching.later);
+        let here = self.watching.origin;
+        for later in all.drain(..) {
+            self.watching.origin = later.origin;
+            self.show_gaps(&later);
+        }
+        self.watching.origin = here;
+        self.watching.later = all;
+    }
+
+    /// How far readings can be off a straight line over intervals of this length, within `whole` from `z` on.
+    fn bow(&self, law: &ModeMatrices<N>, z: &[f64; N], interval: f64, whole: f64) -> Reading {
+        let common = &self.core.common;
+        let rates = (&common.input_rate, &common.input_curvature);
+        law.bow(law.shown(&common.mechanism, &common.space), &law.rate(z), rates, (interval, whole))
+    }
+
+    /// Whether the observer wants to see closer into a gap.
     fn ask(
         &mut self,
         law: &ModeMatrices<N>,
         (begin, length): (f64, f64),
-        from: &Reading,
-        to: &Reading,
+        [from, to]: [&Reading; 2],
         bow: &Reading,
     ) -> bool {
-        for (scale, to) in self.watching.scale.iter_mut().zip(to) {
-            *scale = if to.abs() > *scale { to.abs() } else { *scale };
-        }
         let gap = Gap { begin, length, from, to, bow, mode: &law.mode };
         self.recorder.observer.as_mut().is_some_and(|observer| observer.pass(&gap))
     }
 
-    /// Moves on to `end`, `length` from now, in the present mode, and shows the way there; says whether the observer
-    /// wants to see closer.
-    pub(super) fn move_shown(
-        &mut self,
-        law: &Arc<ModeMatrices<N>>,
-        begin: f64,
-        length: f64,
-        end: [f64; N],
-        bow: &Reading,
-    ) -> bool {
-        let shown = self.show(law, (begin, length), &end, bow);
-        let z = std::mem::replace(&mut self.core.z, end);
-        let Some((from, to)) = shown else { return false };
-        if self.can_wait() {
-            if self.watching.later.len() == LATER {
-                self.show_later();
-            }
-            let (law, bow) = (Arc::clone(law), *bow);
-            if self.watching.later.capacity() == 0 {
-                self.watching.later.reserve_exact(LATER);
-            }
-            self.watching.later.push(Later { law, z, begin, length, from, to, bow });
-        } else {
-            self.show_closer(law, z, (begin, length), false);
-        }
-        true
-    }
-
-    fn can_wait(&self) -> bool {
-        self.recorder.observer.as_ref().is_some_and(|observer| observer.can_wait())
-    }
-
-    /// Shows what was put off, as far as the observer still wants to see it: first where a quantity was largest, for
-    /// what is below a peak that was found there need not be seen.
-    fn show_later(&mut self) {
-        let mut later = std::mem::take(&mut self.watching.later);
-        let largest = self.watching.scale;
-        let has_largest = |from: &Reading, to: &Reading| {
-            let ends = from.iter().zip(to).zip(&largest);
-            ends.into_iter().any(|((from, to), largest)| from != to && f64::max(from.abs(), to.abs()) == *largest)
-        };
-        for first in [true, false] {
-            for Later { law, z, begin, length, from, to, bow } in &later {
-                if has_largest(from, to) == first && self.ask(law, (*begin, *length), from, to, bow) {
-                    // No shape is known yet of what was put off: it is shown whole.
-                    self.show_closer(law, *z, (*begin, *length), true);
-                }
-            }
-        }
-        later.clear();
-        self.watching.later = later;
-    }
-
-    /// Shows a way of any length that begins at `z`, in parts that there are matrices for and a rest that a series
-    /// tells; `whole` says that no part is left out because a cubic has nothing to see there.
+    /// Shows a gap of any length closer, in parts that there are matrices for and a rest that a series tells.
     fn show_closer(
         &mut self,
         law: &ModeMatrices<N>,
-        mut z: [f64; N],
+        mut from: Sight<N>,
         (mut begin, mut length): (f64, f64),
-        whole: bool,
+        bends: &Reading,
     ) {
         for level in 0..=law.finest {
+            let part = law.length(level);
             // What a sum of times is off by makes no difference here.
-            while length >= law.length(level) * (1.0 - SAME) {
-                z = self.show_level(law, z, begin, (level, whole));
-                begin += law.length(level);
-                length -= law.length(level);
+            while length >= part * (1.0 - SAME) {
+                let mut to = self.after(law, &from, level);
+                self.show_part(law, &mut from, &mut to, Part { begin, length: part, level }, bends);
+                begin += part;
+                length -= part;
+                from = to;
             }
         }
         if length > SAME * law.reach() {
-            let mut end = z;
+            let mut end = from.z;
             let series = &mut self.core.room.series;
-            law.series(&z, length, series);
+            law.series(&from.z, length, series);
             series.add_to(&mut end, 1.0);
-            let curve = self.curve(law, &mut self.sight(law, &z), &mut self.sight(law, &end), begin, length);
+            let mut to = self.sight(law, end);
+            let curve = self.curve(law, &mut from, &mut to, begin, length);
             self.see(&curve);
         }
     }
 
-    /// Shows an interval of h/2^level from `z` on in parts so short that cubics tell where there is something to see;
-    /// returns its end.
-    fn show_level(
-        &mut self,
-        law: &ModeMatrices<N>,
-        z: [f64; N],
-        begin: f64,
-        (level, whole): (usize, bool),
-    ) -> [f64; N] {
-        let fine = self.watching.level.saturating_sub(1).clamp(level, law.finest);
-        let (parts, length) = (1_u64 << (fine - level).min(60), law.length(fine));
-        let mut from = self.sight(law, &z);
-        for part in 0..parts {
-            let mut end = from.z;
-            law.step(fine).advance(&mut end);
-            let mut to = self.sight(law, &end);
-            let begin = begin + part as f64 * length;
-            if whole || self.asks(law, &mut from, &mut to, begin, length) {
-                self.show_curve(law, &mut from, &mut to, begin, (fine, whole));
-            }
-            from = to;
-        }
-        from.z
+    /// The sight of where h/2^level leads to.
+    fn after(&self, law: &ModeMatrices<N>, from: &Sight<N>, level: usize) -> Sight<N> {
+        let mut z = from.z;
+        law.step(level).advance(&mut z);
+        self.sight(law, z)
     }
 
-    /// Whether the observer wants to see closer what a cubic tells of a way: with slopes a and b at its ends and d
-    /// between, it is off a straight line by s (1 − s) ((a − d)(1 − s) − (b − d) s).
-    fn asks(&mut self, law: &ModeMatrices<N>, from: &mut Sight<N>, to: &mut Sight<N>, begin: f64, length: f64) -> bool {
-        let (from_slope, to_slope) = (self.slope(law, from), self.slope(law, to));
-        let bow: Reading = std::array::from_fn(|q| {
-            let across = to.value[q] - from.value[q];
-            let (a, b) = ((from_slope[q] * length - across).abs(), (to_slope[q] * length - across).abs());
-            0.25 * MARGIN * if a > b { a } else { b }
-        });
-        self.ask(law, (begin, length), &from.value, &to.value, &bow)
+    fn sight(&self, law: &ModeMatrices<N>, z: [f64; N]) -> Sight<N> {
+        let shown = law.shown(&self.core.common.mechanism, &self.core.common.space);
+        Sight::new(z, shown.read(&z, &self.watching.origin))
     }
 
-    /// Shows an interval of h/2^level as a curve, or two halves of it where that is not right.
-    fn show_curve(
+    /// Shows a part as a curve where there is something to see in it, or two halves of it where a curve is not right.
+    fn show_part(
         &mut self,
         law: &ModeMatrices<N>,
         from: &mut Sight<N>,
         to: &mut Sight<N>,
-        begin: f64,
-        (level, whole): (usize, bool),
+        part: Part,
+        bends: &Reading,
     ) {
-        self.watching.curves += 1;
-        let length = law.length(level);
-        let curve = self.curve(law, from, to, begin, length);
-        if level == law.finest || self.watching.curves > MOST_CURVES {
-            self.see(&curve);
+        let Part { begin, length, level } = part;
+        if !self.asks(law, from, to, part, bends) {
             return;
         }
-        let mut middle = from.z;
-        law.step(level + 1).advance(&mut middle);
-        let mut middle = self.sight(law, &middle);
-        let near = |((is, told), scale): ((&f64, f64), &f64)| (is - told).abs() <= OFF * scale;
-        if middle.value.iter().zip(curve.at(0.5)).zip(&self.watching.scale).all(near) {
-            // What has been right for a while may be right over a longer way.
-            self.watching.right += 1;
-            if self.watching.right >= RIGHT {
-                (self.watching.right, self.watching.level) = (0, level.saturating_sub(1));
+        if level == law.finest || self.watching.curves >= MOST_CURVES {
+            let curve = self.curve(law, from, to, begin, length);
+            return self.see(&curve);
+        }
+        let mut middle = self.after(law, from, level + 1);
+        // Where curves have not been right lately, none is tried that is longer than two of those that were.
+        if level + 1 >= self.watching.level {
+            self.watching.curves += 1;
+            let curve = self.curve(law, from, to, begin, length);
+            let near = |((is, told), scale): ((&f64, f64), &f64)| (is - told).abs() <= OFF * scale;
+            if middle.value.iter().zip(curve.at(0.5)).zip(&self.watching.scale).all(near) {
+                // What has been right for a while may be right over a longer way.
+                self.watching.right += 1;
+                if self.watching.right >= RIGHT {
+                    (self.watching.right, self.watching.level) = (0, level.saturating_sub(1));
+                }
+                return self.see(&curve);
             }
-            self.see(&curve);
-            return;
+            (self.watching.right, self.watching.level) = (0, self.watching.level.max(level + 1));
         }
-        (self.watching.right, self.watching.level) = (0, self.watching.level.max(level + 1));
-        let half = 0.5 * length;
-        if whole || self.asks(law, from, &mut middle, begin, half) {
-            self.show_curve(law, from, &mut middle, begin, (level + 1, whole));
-        }
-        if whole || self.asks(law, &mut middle, to, begin + half, half) {
-            self.show_curve(law, &mut middle, to, begin + half, (level + 1, whole));
-        }
+        let half = |begin| Part { begin, length: 0.5 * length, level: level + 1 };
+        self.show_part(law, from, &mut middle, half(begin), bends);
+        self.show_part(law, &mut middle, to, half(begin + 0.5 * length), bends);
     }
 
-    /// The sight of `z`.
-    fn sight(&self, law: &ModeMatrices<N>, z: &[f64; N]) -> Sight<N> {
-        let value = self.read(law.shown(&self.core.common.mechanism, &self.core.common.space), z);
-        Sight { z: *z, value, slope: None, terms: None }
+    /// Whether the observer wants to see closer what a cubic tells of a part, `bends` being a bound of |q⁗|. With slopes
+    /// a and b at its ends and d between, a cubic is off a straight line by s (1 − s) ((a − d)(1 − s) − (b − d) s), and
+    /// what is read is off the cubic by no more than s² (1 − s)² |q⁗| h⁴/24: together by no more than 4 s (1 − s) times
+    /// max(|a − d|, |b − d|)/4 + |q⁗| h⁴/384.
+    fn asks(
+        &mut self,
+        law: &ModeMatrices<N>,
+        from: &mut Sight<N>,
+        to: &mut Sight<N>,
+        Part { begin, length, .. }: Part,
+        bends: &Reading,
+    ) -> bool {
+        if self.watching.sees_all {
+            return true;
+        }
+        let (from_slope, to_slope) = (self.slope(law, from), self.slope(law, to));
+        let square = length * length;
+        let bow: Reading = std::array::from_fn(|q| {
+            let across = to.value[q] - from.value[q];
+            let (a, b) = ((from_slope[q] * length - across).abs(), (to_slope[q] * length - across).abs());
+            0.25 * if a > b { a } else { b } + bends[q] * (square * square / 384.0)
+        });
+        self.ask(law, (begin, length), [&from.value, &to.value], &bow)
+    }
+
+    /// Bounds of the fourth derivatives of what is read, within `length` from a sight on.
+    fn bends(&self, law: &ModeMatrices<N>, from: &mut Sight<N>, length: f64) -> Reading {
+        if self.watching.sees_all {
+            return [f64::INFINITY; QUANTITIES];
+        }
+        let [_, third] = self.higher(law, from);
+        let space = &self.core.common.space;
+        let input = |order| space.input_bounds(&from.z, order, length);
+        law.change_of(law.shown(&self.core.common.mechanism, space), &third, (&input(3), &input(4)), length)
+    }
+
+    /// ż and its rate.
+    fn rate(&self, law: &ModeMatrices<N>, sight: &mut Sight<N>) -> ([f64; N], Reading) {
+        *sight.slope.get_or_insert_with(|| {
+            let rate = law.rate(&sight.z);
+            (rate, self.rates(law, &rate))
+        })
     }
 
     /// The rates of what is read.
     fn slope(&self, law: &ModeMatrices<N>, sight: &mut Sight<N>) -> Reading {
-        let fresh = || {
-            let rate = law.rate(&sight.z);
-            (rate, self.rates(law, &rate))
-        };
-        sight.slope.get_or_insert_with(fresh).1
+        self.rate(law, sight).1
+    }
+
+    /// z̈ and z⃛.
+    fn higher(&self, law: &ModeMatrices<N>, sight: &mut Sight<N>) -> [[f64; N]; 2] {
+        let (rate, _) = self.rate(law, sight);
+        *sight.higher.get_or_insert_with(|| {
+            let second = law.rate(&rate);
+            [second, law.rate(&second)]
+        })
     }
 
     /// Rates of what is read, `rate` being that of z.
@@ -324,12 +382,7 @@ impl<const N: usize> Run<'_, N> {
     /// q⃛ h³/6.
     fn terms(&self, law: &ModeMatrices<N>, sight: &mut Sight<N>, length: f64) -> [Reading; 4] {
         let slope = self.slope(law, sight);
-        let higher = || {
-            let rate = sight.slope.map_or_else(|| law.rate(&sight.z), |(rate, _)| rate);
-            let second = law.rate(&rate);
-            [self.rates(law, &second), self.rates(law, &law.rate(&second))]
-        };
-        let [second, third] = *sight.terms.get_or_insert_with(higher);
+        let [second, third] = self.higher(law, sight).map(|higher| self.rates(law, &higher));
         let [h1, h2, h3] = [length, length * length / 2.0, length * length * length / 6.0];
         [sight.value, slope.map(|v| v * h1), second.map(|v| v * h2), third.map(|v| v * h3)]
     }
@@ -345,11 +398,6 @@ impl<const N: usize> Run<'_, N> {
         }
     }
 
-    /// The readings in `z`.
-    fn read(&self, shown: &Shown<N>, z: &[f64; N]) -> Reading {
-        shown.read(z, self.core.common.coordinates.origin())
-    }
-
     /// The same as [`Core::advance`], and shows the way to whoever observes.
     pub(super) fn advance_shown(&mut self, distance: f64, looked: bool) -> Option<Cause> {
         if !self.is_observed() {
@@ -359,9 +407,7 @@ impl<const N: usize> Run<'_, N> {
         let (law, before, begin, offset) = (Arc::clone(&core.matrices), core.z, core.time(), core.common.offset);
         let cause = core.advance(distance, looked);
         let (after, length) = (core.z, core.common.offset - offset);
-        core.z = before;
-        let bow = self.bow(&law, length, length);
-        self.move_shown(&law, begin, length, after, &bow);
+        self.show_way(&law, before, &[after], (begin, length));
         cause
     }
 }

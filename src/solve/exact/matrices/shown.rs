@@ -70,6 +70,30 @@ impl<const N: usize> Shown<N> {
         self.readout.placed(self.matrix.rate(z), origin)
     }
 
+    /// The same in each of `rows`, added to `readings`.
+    pub(in crate::solve) fn read_rows(&self, rows: &[[f64; N]], origin: &[f64; BODIES], readings: &mut Vec<Reading>) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.read_rows_by_avx2(rows, origin, readings) };
+        }
+        self.read_rows_by_any(rows, origin, readings);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn read_rows_by_avx2(&self, rows: &[[f64; N]], origin: &[f64; BODIES], readings: &mut Vec<Reading>) {
+        self.read_rows_by_any(rows, origin, readings);
+    }
+
+    #[inline(always)]
+    fn read_rows_by_any(&self, rows: &[[f64; N]], origin: &[f64; BODIES], readings: &mut Vec<Reading>) {
+        // Not by an iterator's closure, which would not be compiled for the wider vectors.
+        for z in rows {
+            readings.push(self.readout.placed(self.matrix.times(z), origin));
+        }
+    }
+
     /// The same of a change of z.
     #[inline]
     pub(in crate::solve) fn change(&self, change: &[f64; N]) -> Reading {
@@ -84,28 +108,37 @@ impl<const N: usize> ModeMatrices<N> {
     }
 
     /// By how much readings can be off a straight line over any `interval` within the next `length`, `y` being ż now:
-    /// with bounds of |u̇| and
-    /// |ü| of each input, |q̈| interval²/8.
+    /// with bounds of |u̇| and |ü| of each input, |q̈| interval²/8.
     pub(in crate::solve) fn bow(
         &self,
         shown: &Shown<N>,
         y: &[f64; N],
-        (rate, curvature): (&[f64; DRIVES], &[f64; DRIVES]),
+        rates: (&[f64; DRIVES], &[f64; DRIVES]),
         (interval, length): (f64, f64),
+    ) -> Reading {
+        self.change_of(shown, y, rates, length).map(|second| 0.125 * interval * interval * second)
+    }
+
+    /// Bounds of |q⁽ᵏ⁾| within the next `length`, `y` being z⁽ᵏ⁻¹⁾ now: with bounds of |u⁽ᵏ⁻¹⁾| and |u⁽ᵏ⁾| of each input
+    /// on the way.
+    pub(in crate::solve) fn change_of(
+        &self,
+        shown: &Shown<N>,
+        y: &[f64; N],
+        (rate, curvature): (&[f64; DRIVES], &[f64; DRIVES]),
+        length: f64,
     ) -> Reading {
         let grow = self.growth_over(length);
         let (first, second) = (self.size(y), self.size(&self.rate(y)));
         let (first, push) = (first.whole() + self.push(rate) * length, self.push(curvature) * length);
         let (mechanical, magnetic) = self.parted(second, push);
-        let eighth = 0.125 * interval * interval;
-        let (mechanical, magnetic, first) =
-            (eighth * grow * mechanical, eighth * grow * magnetic, eighth * grow * first);
-        let mut bow: Reading = std::array::from_fn(|q| {
+        let (mechanical, magnetic, first) = (grow * mechanical, grow * magnetic, grow * first);
+        let mut change: Reading = std::array::from_fn(|q| {
             shown.mechanical[q] * mechanical + shown.magnetic[q] * magnetic + shown.unsprung[q] * first
         });
         for (input, curvature) in shown.input.iter().zip(curvature).filter(|(_, curvature)| **curvature > 0.0) {
-            bow.iter_mut().zip(input).for_each(|(bow, input)| *bow += eighth * input * curvature);
+            change.iter_mut().zip(input).for_each(|(change, input)| *change += input * curvature);
         }
-        bow
+        change
     }
 }
