@@ -18,12 +18,19 @@ pub struct CsvWriter {
     text: Vec<u8>,
     /// The digits written last in each column: inputs and states seldom change from row to row.
     last: Vec<Digits>,
+    /// The row written last from its second number on.
+    tail: Vec<u8>,
 }
 
 impl CsvWriter {
     /// Begins the file; its folder exists.
     pub fn create(path: impl AsRef<Path>) -> Result<Self> {
-        Ok(Self { draft: Draft::create(path)?, text: Vec::with_capacity(2 * CHUNK), last: Vec::new() })
+        Ok(Self {
+            draft: Draft::create(path)?,
+            text: Vec::with_capacity(2 * CHUNK),
+            last: Vec::new(),
+            tail: Vec::new(),
+        })
     }
 
     /// Adds the rows of `block`; every block has the same columns.
@@ -34,18 +41,22 @@ impl CsvWriter {
             self.text.push(b'\n');
             self.last = vec![Digits::of(0.0); block.columns.len()];
         }
+        let Some((first, others)) = block.columns.split_first() else { return Ok(()) };
         for row in 0..block.len() {
-            for (column, last) in block.columns.iter().zip(&mut self.last) {
-                let value = column.values[row];
-                if value.to_bits() != last.bits {
-                    *last = Digits::of(value);
+            self.last[0].become_those_of(first.values[row]);
+            self.last[0].write_to(&mut self.text);
+            let same = |(column, last): (&Column, &Digits)| column.values[row].to_bits() == last.bits;
+            if self.tail.is_empty() || !others.iter().zip(&self.last[1..]).all(same) {
+                // What moves; at rest only time goes on.
+                self.tail.clear();
+                for (column, last) in others.iter().zip(&mut self.last[1..]) {
+                    last.become_those_of(column.values[row]);
+                    self.tail.push(b',');
+                    last.write_to(&mut self.tail);
                 }
-                self.text.extend_from_slice(last.text());
-                self.text.push(b',');
+                self.tail.push(b'\n');
             }
-            if let Some(end) = self.text.last_mut() {
-                *end = b'\n';
-            }
+            self.text.extend_from_slice(&self.tail);
             if self.text.len() >= CHUNK {
                 self.draft.write(&self.text)?;
                 self.text.clear();
@@ -85,8 +96,18 @@ impl Digits {
         Self { bits: value.to_bits(), length: digits.len(), text }
     }
 
-    fn text(&self) -> &[u8] {
-        &self.text[..self.length]
+    /// Takes those of another number.
+    fn become_those_of(&mut self, value: f64) {
+        if value.to_bits() != self.bits {
+            *self = Self::of(value);
+        }
+    }
+
+    /// Writes them behind a text: all the room, of known size, and back.
+    fn write_to(&self, text: &mut Vec<u8>) {
+        let end = text.len() + self.length;
+        text.extend_from_slice(&self.text);
+        text.truncate(end);
     }
 }
 
@@ -96,7 +117,9 @@ mod tests {
     use proptest::prelude::*;
 
     fn shown(value: f64) -> String {
-        String::from_utf8(Digits::of(value).text().to_vec()).unwrap()
+        let mut text = Vec::new();
+        Digits::of(value).write_to(&mut text);
+        String::from_utf8(text).unwrap()
     }
 
     #[test]
