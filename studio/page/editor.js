@@ -41,7 +41,7 @@ export class Editor {
     this.lines.scrollTop = this.field.scrollTop;
     const line = this.app.mistake && this.app.mistake.line;
     const height = parseFloat(getComputedStyle(this.field).lineHeight);
-    this.mark.hidden = !line;
+    if (this.mark.hidden === Boolean(line)) this.mark.hidden = !line;
     if (line) {
       this.mark.style.height = height + "px";
       this.mark.style.transform = `translateY(${8 + (line - 1) * height - this.field.scrollTop}px)`;
