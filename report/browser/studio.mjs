@@ -156,6 +156,12 @@ await test("the cursor is shared by the drawing and all plots, and a zoom is com
   expect((await page.locator("#clock").innerText()) === "200\u00a0ms", await page.locator("#clock").innerText());
   const values = await page.locator("[data-panel=position] .value").allInnerTexts();
   expect(values.every(text => Number(text) > 30), `the values say ${values}`);
+  // A crosshair: the mouse over one plot gives the values of all.
+  const over = await page.locator("[data-panel=speed] .area").boundingBox();
+  await page.mouse.move(over.x + 66 + 0.1 * (over.width - 78), over.y + 60);
+  await settled(page);
+  const told = await page.locator("[data-panel=position] .value").allInnerTexts();
+  expect(Math.abs((await page.evaluate(() => window.studio.cursor)) - 0.1) < 0.01 && told.every(text => Number(text) > 10 && Number(text) < 25), `under the mouse ${told}`);
   const area = page.locator("[data-panel=error] .area");
   await area.scrollIntoViewIfNeeded();
   const box = await area.boundingBox(), wide = box.width - 78;
@@ -298,6 +304,16 @@ await test("the report, the rows and a plot can be kept", async open => {
   await keep.locator("summary").click();
   const svg = await kept(() => keep.locator("button", {hasText: "SVG"}).click());
   expect(svg.startsWith("<svg") && svg.includes("<polyline"), svg.slice(0, 200));
+  // The menu closes behind what is kept.
+  await keep.locator("summary").click();
+  const rows = (await kept(() => keep.locator("button", {hasText: "CSV"}).click())).trim().split("\n");
+  const last = await page.evaluate(() => { const {columns} = window.studio.run; return [columns.get("time").at(-1), 1e3 * columns.get("cart_position").at(-1)]; });
+  const [time, , cart] = rows.at(-1).split(",").map(Number);
+  expect(rows[0] === "time_s,drive_travel_mm,cart_position_mm" && rows.length === 1002 && time === last[0] && cart === last[1], `${rows[0]} … ${rows.at(-1)}`);
+  await keep.locator("summary").click();
+  const [download] = await Promise.all([page.waitForEvent("download"), keep.locator("button", {hasText: "PNG"}).click()]);
+  const png = readFileSync(await download.path()), box = await page.locator("[data-panel=position] .area").boundingBox();
+  expect(png.subarray(1, 4).toString() === "PNG" && png.readUInt32BE(16) === Math.round(box.width), `${png.length} bytes, ${png.readUInt32BE(16)} pixels of ${box.width}`);
 });
 
 await test("gallery, tour and frequencies lead where they say", async open => {
