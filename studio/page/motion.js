@@ -33,11 +33,11 @@ function sides(root, app) {
     key, title, panel: element("div", {role: "tabpanel", id: `side-${key}`, "aria-labelledby": `tab-${key}`, class: "side-panel"}),
   }));
   const tabs = panels.map(({key, title}, k) => element("button", {type: "button", role: "tab", id: `tab-${key}`, "aria-controls": `side-${key}`, onclick: () => choose(k)}, title));
-  /** @type {Results | null} */
-  let results = null;
-  const choose = chosen => panels.forEach(({panel}, k) => {
+  /** Those that are kept up to date only in sight. @type {Map<string, {show: () => void}>} */
+  const drawn = new Map();
+  const choose = chosen => panels.forEach(({key, panel}, k) => {
     panel.hidden = k !== chosen;
-    if (k === chosen && results) results.show();
+    if (k === chosen) drawn.get(key)?.show();
     tabs[k].setAttribute("aria-selected", String(k === chosen));
     tabs[k].tabIndex = k === chosen ? 0 : -1;
   });
@@ -51,8 +51,7 @@ function sides(root, app) {
   const problem = element("button", {type: "button", class: "problem", hidden: true, onclick: () => { choose(1); }});
   root.append(list, problem, ...panels.map(({panel}) => panel));
   new Parameters(panels[0].panel, app);
-  new Editor(panels[1].panel, app);
-  results = new Results(panels[2].panel, app);
+  drawn.set("case", new Editor(panels[1].panel, app)).set("results", new Results(panels[2].panel, app));
   choose(0);
   app.on("mistake", () => {
     if (problem.hidden === Boolean(app.mistake)) problem.hidden = !app.mistake;
