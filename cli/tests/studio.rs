@@ -301,7 +301,7 @@ fn a_file_that_a_page_sends_stays_in_its_folder_and_goes_with_the_server() {
     let path = answer.split("\"path\":\"").nth(1).unwrap().split('"').next().unwrap().to_string();
     assert!(path.ends_with("log.csv") && !path.contains(".."), "{path}");
     assert_eq!(fs::read_to_string(&path).unwrap(), "a,b\n1");
-    terminate(&mut studio);
+    terminate(&mut studio, "-TERM");
     assert!(!std::path::Path::new(&path).exists());
 }
 
@@ -498,10 +498,10 @@ fn a_thousand_connections_are_bounded_and_the_server_answers_after_them() {
     }
 }
 
-/// Asks the server to end; how long it took, and its exit status.
-fn terminate(studio: &mut Studio) -> (Duration, Option<i32>) {
+/// Asks the server to end by a signal; how long it took, and its exit status.
+fn terminate(studio: &mut Studio, signal: &str) -> (Duration, Option<i32>) {
     let begun = Instant::now();
-    let asked = Command::new("kill").args(["-TERM", &studio.child.id().to_string()]).status().unwrap();
+    let asked = Command::new("kill").args([signal, &studio.child.id().to_string()]).status().unwrap();
     assert!(asked.success());
     let status = studio.child.wait().unwrap();
     (begun.elapsed(), status.code())
@@ -509,18 +509,21 @@ fn terminate(studio: &mut Studio) -> (Duration, Option<i32>) {
 
 #[test]
 fn it_ends_within_two_seconds_with_sockets_open_and_work_under_way() {
-    let mut studio = Studio::start(&[TABLE4]);
-    let mut pages: Vec<Page> = (0..5).map(|_| studio.page()).collect();
-    let long = text(TABLE4).replace("until = \"1 s\"", "until = \"1e7 s\"");
-    for page in &mut pages {
-        page.ask("run", json!({ "text": long }));
+    // Ctrl-C, and what service managers send.
+    for signal in ["-INT", "-TERM"] {
+        let mut studio = Studio::start(&[TABLE4]);
+        let mut pages: Vec<Page> = (0..5).map(|_| studio.page()).collect();
+        let long = text(TABLE4).replace("until = \"1 s\"", "until = \"1e7 s\"");
+        for page in &mut pages {
+            page.ask("run", json!({ "text": long }));
+        }
+        let half = studio.connect();
+        std::thread::sleep(Duration::from_millis(100));
+        let (took, status) = terminate(&mut studio, signal);
+        assert!(took < Duration::from_secs(2), "{signal}: it took {took:?}");
+        assert_eq!(status, Some(0), "{signal}");
+        drop(half);
     }
-    let half = studio.connect();
-    std::thread::sleep(Duration::from_millis(100));
-    let (took, status) = terminate(&mut studio);
-    assert!(took < Duration::from_secs(2), "it took {took:?}");
-    assert_eq!(status, Some(0));
-    drop(half);
 }
 
 #[test]

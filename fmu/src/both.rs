@@ -52,8 +52,7 @@ both! {
 
     // Model exchange.
     fmi2SetTime fmi3SetTime(time: f64) |handle, name| {
-        handle.instance.only(name, handle.instance.exchanges())?;
-        handle.instance.allow(name, &[Event, Continuous])?;
+        handle.instance.exchanged(name, &[Event, Continuous])?;
         handle.instance.set_time(time)
     };
     fmi2SetContinuousStates fmi3SetContinuousStates(x: *const f64, n: usize) |handle, name| {
@@ -61,23 +60,19 @@ both! {
         handle.instance.set_states(slice(x, n)?)
     };
     fmi2GetContinuousStates fmi3GetContinuousStates(x: *mut f64, n: usize) |handle, name| {
-        handle.instance.only(name, handle.instance.exchanges())?;
-        handle.instance.allow(name, &READ)?;
+        handle.instance.exchanged(name, &READ)?;
         handle.instance.states(room(x, n)?)
     };
     fmi2GetDerivatives fmi3GetContinuousStateDerivatives(rates: *mut f64, n: usize) |handle, name| {
-        handle.instance.only(name, handle.instance.exchanges())?;
-        handle.instance.allow(name, &READ)?;
+        handle.instance.exchanged(name, &READ)?;
         handle.instance.rates(room(rates, n)?)
     };
     fmi2GetEventIndicators fmi3GetEventIndicators(values: *mut f64, n: usize) |handle, name| {
-        handle.instance.only(name, handle.instance.exchanges())?;
-        handle.instance.allow(name, &READ)?;
+        handle.instance.exchanged(name, &READ)?;
         handle.instance.residuals(room(values, n)?)
     };
     fmi2GetNominalsOfContinuousStates fmi3GetNominalsOfContinuousStates(x: *mut f64, n: usize) |handle, name| {
-        handle.instance.only(name, handle.instance.exchanges())?;
-        handle.instance.allow(name, &ALIVE)?;
+        handle.instance.exchanged(name, &ALIVE)?;
         handle.instance.nominals(room(x, n)?)
     };
 }

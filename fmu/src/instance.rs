@@ -246,6 +246,12 @@ impl Instance {
         }
     }
 
+    /// Refuses a function of model exchange in an instance that is not for it, or outside these phases.
+    pub fn exchanged(&self, function: &str, phases: &[Phase]) -> Told<()> {
+        self.only(function, self.exchanges())?;
+        self.allow(function, phases)
+    }
+
     /// Whether it is for model exchange.
     pub fn exchanges(&self) -> bool {
         self.purpose == Use::ModelExchange

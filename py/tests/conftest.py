@@ -1,4 +1,4 @@
-"""What the tests share."""
+"""The fixtures of all tests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What results give to notebooks, to pandas and to matplotlib, and what pickles."""
+"""Results in notebooks, in pandas, in matplotlib, and pickled."""
 
 import copy
 import pickle

@@ -14,7 +14,7 @@ STAGE = "stages/sollmann-jouaneh"
 
 
 def program(root, *arguments):
-    """What ``taut … --json`` prints. ``cargo xtask test`` says where the program is."""
+    """The output of ``taut … --json``. ``cargo xtask test`` says where the program is."""
     path = os.environ.get("TAUT_PROGRAM")
     if path is None:
         pytest.skip("TAUT_PROGRAM does not say where the program taut is")

@@ -9,7 +9,7 @@ import pytest
 
 
 def checked(schema, *files):
-    """What taplo says of these files."""
+    """The output of taplo on these files."""
     program = Path(sys.executable).parent / "taplo"
     if not program.exists():
         pytest.skip("taplo is not installed")

@@ -379,7 +379,7 @@ def test_controllers_that_return_anything(moving):
 
 
 class Planned(Exception):
-    """What a controller of the test raises."""
+    """The error that a controller of the test raises."""
 
 
 def test_controllers_that_raise_anywhere(moving):

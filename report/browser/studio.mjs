@@ -66,6 +66,23 @@ await test("a drag of a slider simulates, and the last picture is of the last va
   expect((await page.evaluate(() => window.studio.text)) === readFileSync(TABLE4, "utf8"), "reset does not bring the case back");
 });
 
+// A drag that began before the answer to the last one came was remembered as the same text: one step undid both.
+await test("a drag that begins before the answer to the last one is undone by itself", async open => {
+  const {page} = await open(), values = async () => [await value(page, "cart.mass"), await value(page, "cart.friction.viscous")].join();
+  await page.evaluate(() => {
+    const app = window.studio;
+    for (const [key, value] of [["cart.mass", 0.5], ["cart.friction.viscous", 30]]) { app.drag(key, value); app.drop(); }
+  });
+  await quiet(page);
+  expect((await values()) === "0.5,30", await values());
+  for (const [button, wanted] of [["undo", "0.5,19.0424"], ["undo", "0.362,19.0424"], ["redo", "0.5,19.0424"], ["redo", "0.5,30"]]) {
+    await page.click(`#${button}`);
+    await quiet(page);
+    expect((await values()) === wanted, `${button} gives ${await values()}, not ${wanted}`);
+  }
+  expect(/mass +="?.*0.5 kg/.test(await page.evaluate(() => window.studio.text)), "the text does not have the mass");
+});
+
 await test("random drags end with the run of the last value", async open => {
   const {page} = await open();
   const lost = await page.evaluate(async () => {
@@ -139,6 +156,12 @@ await test("the cursor is shared by the drawing and all plots, and a zoom is com
   expect((await page.locator("#clock").innerText()) === "200\u00a0ms", await page.locator("#clock").innerText());
   const values = await page.locator("[data-panel=position] .value").allInnerTexts();
   expect(values.every(text => Number(text) > 30), `the values say ${values}`);
+  // A crosshair: the mouse over one plot gives the values of all.
+  const over = await page.locator("[data-panel=speed] .area").boundingBox();
+  await page.mouse.move(over.x + 66 + 0.1 * (over.width - 78), over.y + 60);
+  await settled(page);
+  const told = await page.locator("[data-panel=position] .value").allInnerTexts();
+  expect(Math.abs((await page.evaluate(() => window.studio.cursor)) - 0.1) < 0.01 && told.every(text => Number(text) > 10 && Number(text) < 25), `under the mouse ${told}`);
   const area = page.locator("[data-panel=error] .area");
   await area.scrollIntoViewIfNeeded();
   const box = await area.boundingBox(), wide = box.width - 78;
@@ -173,6 +196,62 @@ await test("it plays, pauses, and is slow down to a microsecond", async open => 
   expect(now < 1e-3, `it ran to ${now} s`);
   await page.waitForTimeout(100);
   expect((await page.evaluate(() => window.studio.cursor)) === now, "it does not pause");
+});
+
+// The text is not filled in out of sight.
+await test("the case text and its mistake are those of the page when their tab is opened", async open => {
+  const {page} = await open();
+  await page.evaluate(() => { window.studio.drag("cart.mass", 0.5); window.studio.drop(); });
+  await quiet(page);
+  await page.click("#tab-case");
+  expect((await page.locator("#text").inputValue()).includes('"0.5 kg"'), "the text is of before the drag");
+  await page.click("#tab-parameters");
+  await page.locator(`${"[data-key='cart.mass']"} input[type=text]`).fill("-1");
+  await page.keyboard.press("Enter");
+  await quiet(page);
+  await page.click(".problem");
+  expect(/mass/.test(await page.locator("#mistake").innerText()), `the mistake says ${await page.locator("#mistake").innerText()}`);
+});
+
+// Events of a run that changed while the tab was out of sight were those of an earlier one when it came in.
+await test("results are those of the run when their tab is opened", async open => {
+  const {page} = await open();
+  await page.click("#tab-results");
+  const before = await page.locator("#side-results .figures").innerText(), events = page.locator("#side-results .event");
+  await page.click("#tab-parameters");
+  await page.evaluate(() => { const app = window.studio; app.edit(app.text.replace('"0.362 kg"', '"3 kg"')); });
+  await quiet(page);
+  await page.click("#tab-results");
+  expect((await page.locator("#side-results .figures").innerText()) !== before, "the figures are of the run before");
+  const told = await page.evaluate(() => window.studio.run.head.events.length);
+  expect((await events.count()) === Math.min(200, told), `${await events.count()} of ${told} events`);
+});
+
+// Each picture of a drag gave every text and number of the page anew, the same too, and had all of it drawn again.
+await test("a drag changes nothing of the page that stays as it is", async open => {
+  const {page} = await open();
+  const touched = await page.evaluate(async () => {
+    const app = window.studio, touched = new Set();
+    const watch = new MutationObserver(list => {
+      for (const {target, attributeName} of list) {
+        const place = target.nodeType === 3 ? target.parentElement : target;
+        touched.add(`${place.closest("[id]").id} ${place.tagName} ${attributeName}`);
+      }
+    });
+    app.drag("cart.mass", 0.4);
+    while (app.wire.isBusy) await new Promise(done => setTimeout(done, 5));
+    await new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)));
+    watch.observe(document, {subtree: true, childList: true, attributes: true, characterData: true});
+    for (let k = 1; k <= 5; k++) {
+      app.drag("cart.mass", 0.4 + 0.001 * k);
+      while (app.wire.isBusy || app.drawn !== app.run) await new Promise(done => setTimeout(done, 5));
+    }
+    watch.disconnect();
+    return [...touched];
+  });
+  // Figures at a glance change.
+  const others = touched.filter(one => !/^view-motion D[DL]|^view-motion TD/.test(one));
+  expect(!others.length, `also ${others.join("; ")}`);
 });
 
 await test("runs are pinned, compared and unpinned", async open => {
@@ -240,6 +319,16 @@ await test("the report, the rows and a plot can be kept", async open => {
   await keep.locator("summary").click();
   const svg = await kept(() => keep.locator("button", {hasText: "SVG"}).click());
   expect(svg.startsWith("<svg") && svg.includes("<polyline"), svg.slice(0, 200));
+  // The menu closes behind what is kept.
+  await keep.locator("summary").click();
+  const rows = (await kept(() => keep.locator("button", {hasText: "CSV"}).click())).trim().split("\n");
+  const last = await page.evaluate(() => { const {columns} = window.studio.run; return [columns.get("time").at(-1), 1e3 * columns.get("cart_position").at(-1)]; });
+  const [time, , cart] = rows.at(-1).split(",").map(Number);
+  expect(rows[0] === "time_s,drive_travel_mm,cart_position_mm" && rows.length === 1002 && time === last[0] && cart === last[1], `${rows[0]} … ${rows.at(-1)}`);
+  await keep.locator("summary").click();
+  const [download] = await Promise.all([page.waitForEvent("download"), keep.locator("button", {hasText: "PNG"}).click()]);
+  const png = readFileSync(await download.path()), box = await page.locator("[data-panel=position] .area").boundingBox();
+  expect(png.subarray(1, 4).toString() === "PNG" && png.readUInt32BE(16) === Math.round(box.width), `${png.length} bytes, ${png.readUInt32BE(16)} pixels of ${box.width}`);
 });
 
 await test("gallery, tour and frequencies lead where they say", async open => {

@@ -147,7 +147,7 @@ const STROKES = {
   crosses: 'stroke-width="1.6" stroke-linecap="round"',
   rings: 'stroke-width="1.6" stroke-linecap="round"',
 };
-// What is drawn at each point, by those styles that draw points by themselves.
+// The mark at each point, of those styles that draw points by themselves.
 const SYMBOLS = {points: "h0", crosses: "m-4-4l8 8m0-8l-8 8", rings: "m-4 0a4 4 0 1 0 8 0a4 4 0 1 0-8 0"};
 const DASHES = 'stroke-width="1.1" stroke-dasharray="1.5 3"';
 

@@ -4,6 +4,8 @@
 import {Wire, Mistake} from "./wire.js";
 
 /** @typedef {import("./wire.js").Answer} Answer */
+/** The case as it was: a text, and the changes that were not in it yet.
+ * @typedef {{text: string, set: [string, number][]}} State */
 /** @typedef {"run"|"text"|"mistake"|"cursor"|"window"|"compare"|"play"|"opened"|"view"|"theme"} What */
 
 const MOST_UNDO = 200, MOST_PINS = 6;
@@ -15,7 +17,7 @@ export class App {
     this.listeners = new Map();
     this.path = "";
     this.name = "studio.toml";
-    /** What the case was opened as. */
+    /** The text that was opened. */
     this.original = "";
     /** The text that changes start from. */
     this.base = "";
@@ -23,9 +25,9 @@ export class App {
     this.text = "";
     /** Changes of a drag under way, keys to SI values. @type {Map<string, number>} */
     this.pending = new Map();
-    /** @type {string[]} */
+    /** @type {State[]} */
     this.past = [];
-    /** @type {string[]} */
+    /** @type {State[]} */
     this.future = [];
     this.experiment = 0;
     /** @type {Answer | null} */
@@ -71,7 +73,7 @@ export class App {
     this.tell("play");
   }
 
-  /** What a link holds. */
+  /** The contents of a link. */
   snapshot() {
     const {text, name, experiment, view, cursor, window, factor, rate} = this;
     return {text, name, experiment, view, cursor, window, factor, rate};
@@ -105,9 +107,13 @@ export class App {
     this.ask(() => this.tell("opened"));
   }
 
-  /** Remembers the text as it is, to be undone to. */
+  /** The case, as it is remembered. @returns {State} */
+  get present() { return {text: this.base, set: [...this.pending]}; }
+
+  /** Remembers the case as it is, to be undone to. */
   remember() {
-    if (this.past[this.past.length - 1] !== this.text) this.past.push(this.text);
+    const {present} = this;
+    if (JSON.stringify(present) !== JSON.stringify(this.past[this.past.length - 1])) this.past.push(present);
     if (this.past.length > MOST_UNDO) this.past.shift();
     this.future = [];
     this.before = this.run;
@@ -141,14 +147,14 @@ export class App {
   redo() { this.turn(this.future, this.past); }
   reset() { if (this.text !== this.original) this.edit(this.original); }
 
-  /** @param {string[]} from @param {string[]} to */
+  /** @param {State[]} from @param {State[]} to */
   turn(from, to) {
-    const text = from.pop();
-    if (text === undefined) return;
-    to.push(this.text);
+    const state = from.pop();
+    if (state === undefined) return;
+    to.push(this.present);
     this.before = this.run;
-    this.base = this.text = text;
-    this.pending.clear();
+    this.base = this.text = state.text;
+    this.pending = new Map(state.set);
     this.needsDescription = true;
     this.tell("text");
     this.ask();

@@ -15,11 +15,17 @@ export class Editor {
       oninput: () => { app.edit(this.field.value, true); this.count(); }, onscroll: () => this.scroll(), onkeydown: event => this.key(event)});
     this.told = element("div", {id: "mistake", class: "mistake", role: "status", "aria-live": "polite"});
     root.append(element("div", {class: "editor"}, this.lines, element("div", {class: "field"}, this.mark, this.field)), this.told);
-    app.on("text", () => this.show());
-    app.on("mistake", () => this.tellMistake());
+    app.on("text", () => { if (!root.hidden) this.fill(); });
+    app.on("mistake", () => { if (!root.hidden) this.tellMistake(); });
   }
 
+  /** Catches up with the text when it comes in sight. */
   show() {
+    this.fill();
+    this.tellMistake();
+  }
+
+  fill() {
     if (this.field.value === this.app.text) return;
     const {scrollTop, selectionStart, selectionEnd} = this.field;
     this.field.value = this.app.text;
@@ -41,7 +47,7 @@ export class Editor {
     this.lines.scrollTop = this.field.scrollTop;
     const line = this.app.mistake && this.app.mistake.line;
     const height = parseFloat(getComputedStyle(this.field).lineHeight);
-    this.mark.hidden = !line;
+    if (this.mark.hidden === Boolean(line)) this.mark.hidden = !line;
     if (line) {
       this.mark.style.height = height + "px";
       this.mark.style.transform = `translateY(${8 + (line - 1) * height - this.field.scrollTop}px)`;

@@ -57,6 +57,18 @@ function set(made, attributes) {
   }
 }
 
+/** Gives an element a text, where it has another: the browser lays out and draws again what is told, even the same.
+ * @param {Element} element @param {string} text */
+export function tell(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+/** The same for attributes. @param {Element} element @param {Object<string, any>} attributes */
+export function put(element, attributes) {
+  for (const [name, value] of Object.entries(attributes))
+    if (element.getAttribute(name) !== String(value)) element.setAttribute(name, String(value));
+}
+
 /** Has the browser keep a file. @param {string} name @param {BlobPart} content @param {string} kind */
 export function download(name, content, kind) {
   const address = URL.createObjectURL(new Blob([content], {type: kind}));

@@ -1,7 +1,7 @@
 // @ts-check
 // Puts the page together: views, the case's menu, keys, themes, links.
 import {App} from "./app.js";
-import {element, download, fileName} from "./format.js";
+import {element, download, fileName, tell} from "./format.js";
 import {fragment, stateOf} from "./link.js";
 import {Mistake} from "./wire.js";
 import * as motion from "./motion.js";
@@ -63,13 +63,13 @@ app.show = key => {
 
 app.on("run", () => {
   if (!app.run) return;
-  find("title").textContent = app.run.head.title;
-  document.title = `${app.run.head.title} · taut studio`;
+  const {title} = app.run.head, named = `${title} · taut studio`;
+  tell(find("title"), title);
+  if (document.title !== named) document.title = named;
 });
 app.on("text", () => {
-  find("undo").disabled = !app.past.length;
-  find("redo").disabled = !app.future.length;
-  find("reset").disabled = app.text === app.original;
+  for (const [id, isIdle] of [["undo", !app.past.length], ["redo", !app.future.length], ["reset", app.text === app.original]])
+    if (find(id).disabled !== isIdle) find(id).disabled = isIdle;
   find("save").hidden = !app.path;
 });
 find("undo").onclick = () => app.undo();

@@ -1,6 +1,6 @@
 // @ts-check
 // The view of the motion: the machine above its plots, the parameters and the text beside them.
-import {element, number, time as timeText} from "./format.js";
+import {element, number, put, tell, time as timeText} from "./format.js";
 import {drawing, extent} from "./stage.js";
 import {Plots} from "./plots.js";
 import {Parameters} from "./parameters.js";
@@ -33,8 +33,11 @@ function sides(root, app) {
     key, title, panel: element("div", {role: "tabpanel", id: `side-${key}`, "aria-labelledby": `tab-${key}`, class: "side-panel"}),
   }));
   const tabs = panels.map(({key, title}, k) => element("button", {type: "button", role: "tab", id: `tab-${key}`, "aria-controls": `side-${key}`, onclick: () => choose(k)}, title));
-  const choose = chosen => panels.forEach(({panel}, k) => {
+  /** Those that are kept up to date only in sight. @type {Map<string, {show: () => void}>} */
+  const drawn = new Map();
+  const choose = chosen => panels.forEach(({key, panel}, k) => {
     panel.hidden = k !== chosen;
+    if (k === chosen) drawn.get(key)?.show();
     tabs[k].setAttribute("aria-selected", String(k === chosen));
     tabs[k].tabIndex = k === chosen ? 0 : -1;
   });
@@ -48,11 +51,10 @@ function sides(root, app) {
   const problem = element("button", {type: "button", class: "problem", hidden: true, onclick: () => { choose(1); }});
   root.append(list, problem, ...panels.map(({panel}) => panel));
   new Parameters(panels[0].panel, app);
-  new Editor(panels[1].panel, app);
-  new Results(panels[2].panel, app);
+  drawn.set("case", new Editor(panels[1].panel, app)).set("results", new Results(panels[2].panel, app));
   choose(0);
   app.on("mistake", () => {
-    problem.hidden = !app.mistake;
+    if (problem.hidden === Boolean(app.mistake)) problem.hidden = !app.mistake;
     if (app.mistake) problem.textContent = `${app.mistake.line ? `Line ${app.mistake.line}: ` : ""}${app.mistake.what}`;
   });
 }
@@ -82,11 +84,11 @@ function bar(app) {
   const from = () => (app.window ? app.window[0] : 0), span = () => (app.window ? app.window[1] - app.window[0] : app.until);
   const show = () => {
     scrub.value = String(Math.round((10000 * (app.cursor - from())) / span()));
-    clock.textContent = timeText(app.cursor, Math.min(span() / 1000, app.isPlaying ? app.rate / 60 : 1));
-    scrub.setAttribute("aria-valuetext", clock.textContent);
-    factorTold.textContent = `× ${number(app.factor)}`;
+    tell(clock, timeText(app.cursor, Math.min(span() / 1000, app.isPlaying ? app.rate / 60 : 1)));
+    put(scrub, {"aria-valuetext": clock.textContent});
+    tell(factorTold, `× ${number(app.factor)}`);
     factor.value = String(Math.round(10 * Math.log10(app.factor)));
-    factor.setAttribute("aria-valuetext", factorTold.textContent);
+    put(factor, {"aria-valuetext": factorTold.textContent});
   };
   app.on("cursor", show);
   app.on("window", () => { all.hidden = !app.window; show(); });
@@ -102,7 +104,7 @@ function bar(app) {
       experiment.dataset.names = names.join("\n");
       experiment.replaceChildren(...names.map((name, k) => element("option", {value: k}, name)));
     }
-    experiment.value = String(app.experiment);
+    if (experiment.value !== String(app.experiment)) experiment.value = String(app.experiment);
     show();
   });
   app.tell("play");
@@ -189,7 +191,7 @@ class Cells {
   fill(shape, texts, make) {
     const now = JSON.stringify(shape);
     if (now !== this.shape) { this.shape = now; this.root.replaceChildren(...make()); return; }
-    this.root.querySelectorAll(this.cells).forEach((cell, k) => { if (cell.textContent !== texts[k]) cell.textContent = texts[k]; });
+    this.root.querySelectorAll(this.cells).forEach((cell, k) => tell(cell, texts[k]));
   }
 }
 
@@ -217,7 +219,7 @@ class Glance {
   }
 }
 
-/** Key figures and events of the run. */
+/** Key figures and events of the run, while they are in sight. */
 class Results {
   /** @param {HTMLElement} root @param {App} app */
   constructor(root, app) {
@@ -225,18 +227,18 @@ class Results {
     const ending = element("p", {class: "mistake", hidden: true});
     root.append(ending, element("h2", {}, "Key figures"), figures, element("h2", {}, "Events"), events);
     const cells = new Cells(figures, "dd");
-    app.on("run", () => {
-      if (!app.run) return;
+    this.show = () => {
+      if (!app.run || root.hidden) return;
       const {rows, ending: told, events: all, events_left_out: left} = app.run.head;
       ending.hidden = !told;
-      ending.textContent = told ? `This run ${told}.` : "";
+      tell(ending, told ? `This run ${told}.` : "");
       cells.fill(rows.map(([name]) => name), rows.map(([, value]) => value),
         () => rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
-      if (root.hidden && all.length > 100) return;
       const shown = all.slice(0, 200);
       events.replaceChildren(...shown.map(event => element("button", {type: "button", class: "event", onclick: () => { app.isPlaying = false; app.tell("play"); app.seek(event.time); }},
         element("span", {}, timeText(event.time, 1e-9)), element("span", {}, event.part), element("span", {class: "quiet"}, `${event.from} → ${event.to}`))),
       ...(all.length + left > shown.length ? [element("p", {class: "quiet"}, `${all.length + left - shown.length} more`)] : all.length ? [] : [element("p", {class: "quiet"}, "None.")]));
-    });
+    };
+    app.on("run", this.show);
   }
 }

@@ -112,7 +112,7 @@ export class Row {
     const share = Number(this.slider.value) / STEPS;
     let value = this.log ? this.low * (this.high / this.low) ** share : this.low + share * (this.high - this.low);
     if (this.parameter.whole) value = Math.round(value);
-    // Six digits are what the text gets.
+    // Four digits are finer than a slider is moved.
     value = Number(value.toPrecision(4));
     this.field.value = String(value);
     this.app.drag(this.parameter.key, value);
@@ -132,7 +132,7 @@ export class Row {
   /** The value as it was before it was typed over. */
   back() {
     this.field.removeAttribute("aria-invalid");
-    this.field.value = String(Number(this.parameter.value.toPrecision(6)));
+    this.field.value = asTyped(this.parameter.value);
   }
 
   show() {
@@ -143,7 +143,7 @@ export class Row {
     if (pending.has(key)) { this.shown = NaN; return; }
     if (value === this.shown) return;
     this.shown = document.activeElement === this.field || document.activeElement === this.slider ? NaN : value;
-    if (document.activeElement !== this.field) this.field.value = String(Number(value.toPrecision(6)));
+    if (document.activeElement !== this.field) this.field.value = asTyped(value);
     if (document.activeElement !== this.slider) {
       if (value < this.low || value > this.high) this.span();
       const share = this.log ? Math.log(value / this.low) / Math.log(this.high / this.low) : (value - this.low) / (this.high - this.low);
@@ -153,6 +153,9 @@ export class Row {
     this.slider.setAttribute("aria-valuetext", words);
   }
 }
+
+/** A value as a field has it. @param {number} value */
+const asTyped = value => String(Number(value.toPrecision(6)));
 
 /** A key as words: `cart.friction.viscous` is "friction viscous" in the group Cart. @param {string} key */
 function nameOf(key) {

@@ -1,7 +1,7 @@
 // @ts-check
 // The plots of a run on canvases: all share the part of time that is seen, and the cursor. Each can be used by keys, and
 // has its values as a table.
-import {element, number, time as timeText, download, fileName} from "./format.js";
+import {element, number, time as timeText, download, fileName, tell} from "./format.js";
 import {lowerBound} from "./app.js";
 
 /** @typedef {import("./app.js").App} App */
@@ -10,6 +10,8 @@ import {lowerBound} from "./app.js";
 const COLOURS = ["blue", "verm", "green", "purple", "amber", "sky"];
 const LEFT = 66, RIGHT = 12, TOP = 8, BOTTOM = 24, HEIGHT = 170, TABLE_ROWS = 50;
 const DASHES = [[], [], [7, 4], [2, 3]];
+/** How far from its points a line may be drawn, in pixels. */
+const NEAR = 0.1;
 /** States of a body: stuck, forward, backward, and sliding without dry friction. */
 const STATES = new Map([[0, ["stuck", "grey"]], [1, ["forward", "blue"]], [-1, ["backward", "verm"]], [2, ["sliding", "green"]]]);
 
@@ -107,13 +109,17 @@ class Plot {
     this.isStale = true;
     /** Width of the area, which is asked of the page once a change: each asking has it laid out. */
     this.wide = 0;
-    /** What the canvas of the cursor shows. */
+    /** The contents of the canvas of the cursor. */
     this.pointed = "";
     /** @type {{low: number, high: number} | null} */
     this.range = null;
     /** @type {{x: number, to?: number, window: [number, number], pans: boolean} | null} */
     this.press = null;
     this.canvas = element("canvas", {"aria-hidden": "true"});
+    /** The ground of the curves, which is on no page, and what it was drawn of. @type {HTMLCanvasElement} */
+    this.back = element("canvas");
+    /** @type {{shape: string, answers: Answer[]}} */
+    this.grounded = {shape: "", answers: []};
     this.over = element("canvas", {class: "over", "aria-hidden": "true"});
     const words = `${panel.words}${panel.unit ? ", in " + panel.unit : ""}. Arrow keys move the cursor, with Shift they slide what is seen; plus, minus and 0 zoom.`;
     this.area = element("div", {
@@ -163,7 +169,7 @@ class Plot {
 
   /** @param {HTMLCanvasElement} canvas */
   pen(canvas) {
-    const k = window.devicePixelRatio || 1, {width, height} = this;
+    const k = density(), {width, height} = this;
     if (canvas.width !== Math.round(width * k) || canvas.height !== Math.round(height * k)) {
       canvas.width = Math.round(width * k);
       canvas.height = Math.round(height * k);
@@ -175,7 +181,7 @@ class Plot {
     return pen;
   }
 
-  /** What is drawn below one another: pins, the run before, the run itself. */
+  /** The runs that are drawn, from the lowest: pins, the run before, the run itself. */
   layers() {
     const {app} = this.plots;
     const layers = app.pins.map(pin => ({answer: pin.answer, style: "pin"}));
@@ -238,26 +244,51 @@ class Plot {
   /** @param {CanvasRenderingContext2D} pen */
   drawCurves(pen) {
     this.fit();
-    const {colours, app} = this.plots, {width, height} = this, range = /** @type {{low: number, high: number}} */ (this.range);
+    pen.drawImage(this.ground(), 0, 0, this.width, this.height);
+    this.clip(pen);
+    this.marks(pen);
+    for (const layer of this.layers()) if (layer.style === "now") this.strokes(pen, layer);
+    pen.restore();
+  }
+
+  /** The grid, and the curves that stay during a drag: drawn anew only where one of them, the range or the colours
+   * change. @returns {HTMLCanvasElement} */
+  ground() {
+    const {colours, seen} = this.plots, {width, height} = this, range = /** @type {{low: number, high: number}} */ (this.range);
+    const below = this.layers().filter(({style}) => style !== "now");
+    const shape = JSON.stringify([width, height, density(), range, seen, [...this.hidden], colours, below.map(({style}) => style)]);
+    const isSame = shape === this.grounded.shape && below.every(({answer}, k) => answer === this.grounded.answers[k]);
+    if (isSame) return this.back;
+    this.grounded = {shape, answers: below.map(({answer}) => answer)};
+    const pen = this.pen(this.back);
     this.grid(pen, ticks(range.low, range.high, 4).map(value => [this.up(value), number(value, 6)]));
+    this.clip(pen);
+    for (const layer of below) this.strokes(pen, layer);
+    pen.restore();
+    return this.back;
+  }
+
+  /** Keeps what follows within the axes, until the pen is restored. @param {CanvasRenderingContext2D} pen */
+  clip(pen) {
     pen.save();
     pen.beginPath();
-    pen.rect(LEFT, TOP - 2, width - LEFT - RIGHT, height - TOP - BOTTOM + 4);
+    pen.rect(LEFT, TOP - 2, this.width - LEFT - RIGHT, this.height - TOP - BOTTOM + 4);
     pen.clip();
-    this.marks(pen);
-    for (const {answer, style} of this.layers()) {
-      this.panel.curves.forEach(({key}, k) => {
-        if (this.hidden.has(key)) return;
-        const {x, y} = this.rows(answer, key);
-        if (!x || !y) return;
-        pen.strokeStyle = style === "pin" ? colours.axis : colours[COLOURS[k % COLOURS.length]];
-        pen.globalAlpha = style === "now" ? (app.mistake ? 0.35 : 1) : style === "before" ? 0.45 : 0.5;
-        pen.lineWidth = style === "now" ? 1.8 : 1.1;
-        pen.setLineDash(style === "before" ? [3, 3] : DASHES[k % 4]);
-        this.curve(pen, x, y);
-      });
-    }
-    pen.restore();
+  }
+
+  /** All curves of a run. @param {CanvasRenderingContext2D} pen @param {{answer: Answer, style: string}} layer */
+  strokes(pen, {answer, style}) {
+    const {colours, app} = this.plots;
+    this.panel.curves.forEach(({key}, k) => {
+      if (this.hidden.has(key)) return;
+      const {x, y} = this.rows(answer, key);
+      if (!x || !y) return;
+      pen.strokeStyle = style === "pin" ? colours.axis : colours[COLOURS[k % COLOURS.length]];
+      pen.globalAlpha = style === "now" ? (app.mistake ? 0.35 : 1) : style === "before" ? 0.45 : 0.5;
+      pen.lineWidth = style === "now" ? 1.8 : 1.1;
+      pen.setLineDash(style === "before" ? [3, 3] : DASHES[k % 4]);
+      this.curve(pen, x, y);
+    });
   }
 
   /** Draws what is seen of a curve: all points, or the least and greatest of those that share a pixel.
@@ -269,7 +300,7 @@ class Plot {
     const together = Math.max(1, Math.floor((last - first) / (this.width - LEFT - RIGHT)));
     // Dashes of what is dense show nothing, and cost most of a picture.
     if (together > 2) pen.setLineDash([]);
-    pen.beginPath();
+    const path = new Path(pen);
     for (let i = first; i < last; i += together) {
       let least = i, greatest = i;
       const end = Math.min(last, i + together);
@@ -278,10 +309,10 @@ class Plot {
         if (y[j] > y[greatest]) greatest = j;
       }
       const a = Math.min(least, greatest), b = Math.max(least, greatest);
-      pen.lineTo(LEFT + (x[a] - from) * kx, TOP + (high - y[a] * scale) * ky);
-      if (b !== a) pen.lineTo(LEFT + (x[b] - from) * kx, TOP + (high - y[b] * scale) * ky);
+      path.to(LEFT + (x[a] - from) * kx, TOP + (high - y[a] * scale) * ky);
+      if (b !== a) path.to(LEFT + (x[b] - from) * kx, TOP + (high - y[b] * scale) * ky);
     }
-    pen.stroke();
+    path.stroke();
     if (last - first < (this.width - LEFT) / 9 && pen.globalAlpha === 1) {
       pen.fillStyle = pen.strokeStyle;
       for (let i = first; i < last; i++) {
@@ -301,13 +332,13 @@ class Plot {
     pen.strokeStyle = colours.grid;
     pen.lineWidth = 1;
     pen.setLineDash([2, 2]);
+    pen.beginPath();
     for (const event of seen) {
       const x = this.across(event.time);
-      pen.beginPath();
       pen.moveTo(x, TOP);
       pen.lineTo(x, this.height - BOTTOM);
-      pen.stroke();
     }
+    pen.stroke();
     pen.setLineDash([]);
   }
 
@@ -389,12 +420,12 @@ class Plot {
     const dots = [];
     this.panel.curves.forEach(({key}, k) => {
       const text = this.words(key, k);
-      if (this.values[k].textContent !== text) this.values[k].textContent = text;
+      tell(this.values[k], text);
       if (this.isStates || this.hidden.has(key) || !isInside) return;
       dots.push([colours[COLOURS[k % COLOURS.length]], this.up(app.value(key, app.cursor) * this.panel.scale)]);
     });
     const box = press && !press.pans && press.to !== undefined ? [press.x, press.to] : null;
-    const pointed = JSON.stringify([x, width, height, box, dots, colours.ink]);
+    const pointed = JSON.stringify([x, width, height, density(), box, dots, colours.ink]);
     if (pointed === this.pointed) return;
     this.pointed = pointed;
     const pen = this.pen(this.over);
@@ -561,6 +592,50 @@ class Plot {
     const steps = ticks(from, to, 8).map(value => text(this.across(value), height - 6, "middle", timeText(value, step(to - from, 8))));
     const frame = `<rect x="${LEFT}" y="${TOP}" width="${width - LEFT - RIGHT}" height="${height - TOP - BOTTOM}" fill="none" stroke="${colours.axis}"/>`;
     return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${width} ${height}" width="${width}" height="${height}"><rect width="100%" height="100%" fill="${colours.paper}"/>${frame}${rows.join("")}${steps.join("")}${lines.join("")}</svg>\n`;
+  }
+}
+
+/** Pixels of the screen for one of the page. */
+const density = () => window.devicePixelRatio || 1;
+
+/** A line through points from left to right. Points that it passes within `NEAR` are left out: where curves are drawn
+ * without a graphics card, each costs time. */
+class Path {
+  /** @param {CanvasRenderingContext2D} pen */
+  constructor(pen) {
+    this.pen = pen;
+    /** The last point drawn, and the last given. */
+    this.x0 = this.y0 = this.x = this.y = NaN;
+    /** The least and greatest slope from the last point drawn that pass all given since. */
+    this.low = this.high = NaN;
+    pen.beginPath();
+  }
+
+  /** @param {number} x @param {number} y */
+  to(x, y) {
+    const slope = (y - this.y0) / (x - this.x0);
+    if (!(slope >= this.low && slope <= this.high)) this.keep(x, y);
+    const by = x - this.x0;
+    this.low = Math.max(this.low, (y - NEAR - this.y0) / by);
+    this.high = Math.min(this.high, (y + NEAR - this.y0) / by);
+    this.x = x;
+    this.y = y;
+  }
+
+  /** Draws to the last point given, or begins at the first. @param {number} x @param {number} y */
+  keep(x, y) {
+    const isFirst = isNaN(this.x);
+    this.x0 = isFirst ? x : this.x;
+    this.y0 = isFirst ? y : this.y;
+    if (isFirst) this.pen.moveTo(x, y); else this.pen.lineTo(this.x0, this.y0);
+    // Of points above one another none is left out.
+    this.low = x > this.x0 ? -Infinity : NaN;
+    this.high = x > this.x0 ? Infinity : NaN;
+  }
+
+  stroke() {
+    this.pen.lineTo(this.x, this.y);
+    this.pen.stroke();
   }
 }
 

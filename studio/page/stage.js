@@ -1,7 +1,7 @@
 // @ts-check
 // The machine, drawn and moved by what was computed: pulleys turn, teeth run, bodies slide, spans are coloured by their
 // force. Stretch and the error between drive and load are magnified by a factor; nothing else is invented.
-import {svg, number} from "./format.js";
+import {svg, number, put, tell} from "./format.js";
 
 /** @typedef {import("./app.js").App} App */
 
@@ -22,7 +22,7 @@ export function drawing(scene) {
   return scene.kind === "axis" ? axis(scene) : gantry(scene);
 }
 
-/** What a curve of a run reaches. @param {import("./wire.js").Answer} run @param {any} scene @returns {Extent} */
+/** The range of each curve of a run, and the largest force. @param {import("./wire.js").Answer} run @param {any} scene @returns {Extent} */
 export function extent(run, scene) {
   const range = name => {
     const values = run.columns.get(name) || new Float64Array(0);
@@ -34,12 +34,21 @@ export function extent(run, scene) {
   return {range, force};
 }
 
+/** Gives a range that holds those it is given, and changes only where it has to, so that a drag does not shake the
+ * drawing. */
+function steady() {
+  let [least, most] = [0, 0];
+  return /** @param {[number, number]} range @returns {[number, number]} */ ([low, high]) => {
+    const span = high - low, isInside = low >= least && high <= most;
+    if (!isInside || span < 0.55 * (most - least)) [least, most] = [low - 0.04 * span, high + 0.04 * span];
+    return [least, most];
+  };
+}
+
 /** A span's colour and width: tight is blue, relieved vermillion, as strong as its share of the largest force.
  * @param {SVGElement} line @param {number} share */
 function tension(line, share) {
-  line.setAttribute("class", `span ${share >= 0 ? "s-blue" : "s-verm"}`);
-  line.setAttribute("stroke-opacity", String(0.3 + 0.7 * Math.min(1, Math.abs(share))));
-  line.setAttribute("stroke-width", String(3 + 3 * Math.min(1, Math.abs(share))));
+  put(line, {class: `span ${share >= 0 ? "s-blue" : "s-verm"}`, "stroke-opacity": 0.3 + 0.7 * Math.min(1, Math.abs(share)), "stroke-width": 3 + 3 * Math.min(1, Math.abs(share))});
 }
 
 /** A stretch of belt: its colour below, its teeth above. @param {SVGElement} root */
@@ -51,11 +60,9 @@ function belt(root) {
     line, teeth,
     /** @param {string} d @param {number} share @param {number} offset of the teeth along the path @param {number} pitch */
     set(d, share, offset, pitch = PITCH) {
-      line.setAttribute("d", d);
-      teeth.setAttribute("d", d);
+      put(line, {d});
       tension(line, share);
-      teeth.setAttribute("stroke-dasharray", `2 ${Math.max(1, pitch - 2)}`);
-      teeth.setAttribute("stroke-dashoffset", String(-(offset % pitch)));
+      put(teeth, {d, "stroke-dasharray": `2 ${Math.max(1, pitch - 2)}`, "stroke-dashoffset": -(offset % pitch)});
     },
   };
 }
@@ -75,9 +82,9 @@ function pulley(root, x, y, r, name) {
   return {
     /** @param {number} angle clockwise on the picture @param {number} state @param {boolean} hasState */
     turn(angle, state, hasState = true) {
-      wheel.setAttribute("transform", `translate(${x} ${y}) rotate(${((angle * 180) / Math.PI) % 360})`);
-      hub.setAttribute("class", `f-${hasState ? COLOUR.get(state) || "grey" : "axis"}`);
-      label.textContent = hasState ? `${name}: ${WORDS.get(state) || ""}` : name;
+      put(wheel, {transform: `translate(${x} ${y}) rotate(${((angle * 180) / Math.PI) % 360})`});
+      put(hub, {class: `f-${hasState ? COLOUR.get(state) || "grey" : "axis"}`});
+      tell(label, hasState ? `${name}: ${WORDS.get(state) || ""}` : name);
     },
   };
 }
@@ -107,11 +114,12 @@ function axis(scene) {
   root.append(ghost, cart, error);
   const way = svg("text", {"text-anchor": "middle", y: 139, class: "f-grey small"});
   root.append(way);
+  const hold = steady();
   let frame = "", scale = 1, middle = 0;
   return {
     root,
     move(value, stateOf, factor, {range, force}) {
-      const reach = range("cart_position"), [low, high] = scene.x || [Math.min(reach[0], -0.02), Math.max(reach[1], 0.02)];
+      const reach = range("cart_position"), [low, high] = scene.x || hold([Math.min(reach[0], -0.02), Math.max(reach[1], 0.02)]);
       const at = x => (LEFT + RIGHT) / 2 - (x - middle) * scale;
       const key = `${low} ${high}`;
       if (frame !== key) {
@@ -123,16 +131,14 @@ function axis(scene) {
       }
       const x = value("cart_position"), first = value("drive_travel"), third = scene.radius * value("idler_angle");
       const place = at(x), away = value("error") * factor;
-      cart.setAttribute("transform", `translate(${place} ${top})`);
-      box.setAttribute("class", `f-paper s-${COLOUR.get(stateOf("cart_state")) || "ink"}`);
-      state.textContent = WORDS.get(stateOf("cart_state")) || "";
+      put(cart, {transform: `translate(${place} ${top})`});
+      put(box, {class: `f-paper s-${COLOUR.get(stateOf("cart_state")) || "ink"}`});
+      tell(state, WORDS.get(stateOf("cart_state")) || "");
       // Where the drive says that the cart is: the error magnified.
       const told = Math.max(LEFT - 40, Math.min(RIGHT + 40, at(x - away)));
-      ghost.setAttribute("x", String(told - CART / 2));
-      ghost.setAttribute("y", String(top - 25));
-      error.setAttribute("x", String(Math.max(120, Math.min(W - 120, place))));
-      error.setAttribute("y", String(top - 38));
-      error.textContent = `x − r φ₁ = ${number(1e6 * value("error"), 4)} µm`;
+      put(ghost, {x: told - CART / 2, y: top - 25});
+      put(error, {x: Math.max(120, Math.min(W - 120, place)), y: top - 38});
+      tell(error, `x − r φ₁ = ${number(1e6 * value("error"), 4)} µm`);
       const strength = name => value(name) / force, stretch = name => factor * value(name) * scale;
       const [a, b] = [place - CART / 2, place + CART / 2];
       const pitch = (name, length) => PITCH * Math.max(0.4, Math.min(3, 1 + stretch(name) / Math.max(20, length)));
@@ -141,14 +147,13 @@ function axis(scene) {
       spans[1].set(`M${b} ${top}H${RIGHT}`, strength("span2_force"), 0, pitch("stretch2", RIGHT - b));
       spans[2].set(`M${LEFT} ${bottom}H${RIGHT}`, strength("span3_force"), (scale * (first + third)) / 2, pitch("stretch3", RIGHT - LEFT));
       [[(LEFT + a) / 2, top - 12], [(b + RIGHT) / 2, top - 12], [(LEFT + RIGHT) / 2, bottom + 22]].forEach(([u, v], k) => {
-        forces[k].setAttribute("x", String(u));
-        forces[k].setAttribute("y", String(v));
-        forces[k].textContent = `${number(value(`span${k + 1}_force`), 3)} N`;
+        put(forces[k], {x: u, y: v});
+        tell(forces[k], `${number(value(`span${k + 1}_force`), 3)} N`);
       });
       // The rim goes as far as the belt on it, whatever the picture's scale.
       drive.turn((-scale * first) / (R - 2), stateOf("drive_state"));
       idler.turn((-scale * third) / (R - 2), stateOf("idler_state"));
-      root.setAttribute("aria-label", `The axis: cart at ${number(1e3 * x, 5)} mm, ${state.textContent}; drive pulley ${WORDS.get(stateOf("drive_state"))}, idler pulley ${WORDS.get(stateOf("idler_state"))}`);
+      put(root, {"aria-label": `The axis: cart at ${number(1e3 * x, 5)} mm, ${state.textContent}; drive pulley ${WORDS.get(stateOf("drive_state"))}, idler pulley ${WORDS.get(stateOf("idler_state"))}`});
 
       function rail() {
         ground.replaceChildren(svg("line", {x1: LEFT - 30, x2: RIGHT + 30, y1: top + 35, y2: top + 35, class: "s-grid", "stroke-width": 3}));
@@ -161,8 +166,8 @@ function axis(scene) {
         }
         if (scene.x) for (const end of scene.x)
           ground.append(svg("line", {x1: at(end) + (end > middle ? -1 : 1) * (CART / 2 + 3), x2: at(end) + (end > middle ? -1 : 1) * (CART / 2 + 3), y1: top - 18, y2: top + 35, class: "s-mark", "stroke-width": 4}));
-        way.setAttribute("x", "176");
-        way.textContent = "← x, mm";
+        put(way, {x: 176});
+        tell(way, "← x, mm");
       }
     },
   };
@@ -192,27 +197,26 @@ function gantry(scene) {
   const forces = scene.spans.map(() => svg("text", {class: "f-mark small"}));
   root.append(...forces);
   root.append(svg("text", {x: RAILS[1] + 40, y: 250, class: "f-grey small"}, "x ↑  y →"));
+  const hold = [steady(), steady()];
   return {
     root,
     move(value, stateOf, factor, {range, force}) {
-      const [xs, ys] = [["bridge_position", scene.x], ["cart_position", scene.y]].map(([name, travel]) => {
+      const [xs, ys] = [["bridge_position", scene.x], ["cart_position", scene.y]].map(([name, travel], k) => {
         const [low, high] = range(name);
-        return travel || [Math.min(low, -0.02), Math.max(high, 0.02)];
+        return travel || hold[k]([Math.min(low, -0.02), Math.max(high, 0.02)]);
       });
       const kx = 230 / (xs[1] - xs[0]), ky = 190 / (ys[1] - ys[0]), k = Math.min(kx, ky);
       const bridgeAt = x => 265 - (x - (xs[0] + xs[1]) / 2) * k, cartAt = y => 450 + (y - (ys[0] + ys[1]) / 2) * k;
       const x = value("bridge_position"), y = value("cart_position"), by = bridgeAt(x), cx = cartAt(y);
-      bridge.setAttribute("transform", `translate(0 ${by})`);
-      bridgeState.textContent = `bridge: ${WORDS.get(stateOf("bridge_state")) || ""}`;
+      put(bridge, {transform: `translate(0 ${by})`});
+      tell(bridgeState, `bridge: ${WORDS.get(stateOf("bridge_state")) || ""}`);
       place(cart, cx, by);
-      cart.setAttribute("class", `f-paper s-${COLOUR.get(stateOf("cart_state")) || "ink"}`);
+      put(cart, {class: `f-paper s-${COLOUR.get(stateOf("cart_state")) || "ink"}`});
       place(ghost, cx - factor * value("y_error") * k, by + factor * value("x_error") * k);
-      cartState.setAttribute("x", String(cx));
-      cartState.setAttribute("y", String(by + 5));
-      cartState.textContent = WORDS.get(stateOf("cart_state")) || "";
-      told.setAttribute("x", String(cx));
-      told.setAttribute("y", String(by - 54));
-      told.textContent = `${number(1e6 * value("x_error"), 3)} µm, ${number(1e6 * value("y_error"), 3)} µm`;
+      put(cartState, {x: cx, y: by + 5});
+      tell(cartState, WORDS.get(stateOf("cart_state")) || "");
+      put(told, {x: cx, y: by - 54});
+      tell(told, `${number(1e6 * value("x_error"), 3)} µm, ${number(1e6 * value("y_error"), 3)} µm`);
       const UP = by - 15, LOW = by + 15, [l, r] = [cx - 48, cx + 48], share = name => value(name) / force;
       const travel = ["left_angle", "right_angle"].map(name => scene.radius * value(name) * k);
       idlers.replaceChildren();
@@ -220,19 +224,16 @@ function gantry(scene) {
       const paths = isH ? hFrame() : coreXy();
       paths.forEach(([d, offset, u, v, anchor], i) => {
         spans[i].set(d, share(scene.spans[i]), offset);
-        forces[i].setAttribute("x", String(u));
-        forces[i].setAttribute("y", String(v));
-        forces[i].setAttribute("text-anchor", anchor);
-        forces[i].textContent = `${number(value(scene.spans[i]), 3)} N`;
+        put(forces[i], {x: u, y: v, "text-anchor": anchor});
+        tell(forces[i], `${number(value(scene.spans[i]), 3)} N`);
       });
       // Angles count clockwise but for drive A of CoreXY.
       drives.forEach((drive, side) => drive.turn((isH || side ? 1 : -1) * travel[side] / (R - 3), stateOf(["left_state", "right_state"][side])));
-      root.setAttribute("aria-label", `The gantry: bridge at ${number(1e3 * x, 5)} mm, ${WORDS.get(stateOf("bridge_state"))}; cart at ${number(1e3 * y, 5)} mm, ${cartState.textContent}`);
+      put(root, {"aria-label": `The gantry: bridge at ${number(1e3 * x, 5)} mm, ${WORDS.get(stateOf("bridge_state"))}; cart at ${number(1e3 * y, 5)} mm, ${cartState.textContent}`});
 
       /** @param {SVGElement} rect @param {number} u @param {number} v */
       function place(rect, u, v) {
-        rect.setAttribute("x", String(u - 48));
-        rect.setAttribute("y", String(v - 42));
+        put(rect, {x: u - 48, y: v - 42});
       }
       // One belt: from the cart to a motor on either side, and from there round the far end and across the bridge.
       function hFrame() {

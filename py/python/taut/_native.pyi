@@ -1,4 +1,4 @@
-"""What is written in Rust."""
+"""The part that is written in Rust."""
 
 from os import PathLike
 from pathlib import Path
@@ -23,7 +23,7 @@ class Bug(RuntimeError):
     """A mistake in taut itself, which no input should bring about; where it happened stands on the standard error."""
 
 class Observation:
-    """What a controller knows at a sample. SI units."""
+    """The knowledge of a controller at a sample. SI units."""
 
     @property
     def time(self) -> float:

@@ -1,4 +1,4 @@
-"""What all plots share: a figure of one's own, or the axes that the caller gives."""
+"""The common part of all plots: a figure of one's own, or the axes that the caller gives."""
 
 from __future__ import annotations
 

@@ -56,12 +56,12 @@ class Case:
 
     @property
     def kind(self) -> str:
-        """What it describes: ``axis``, ``h-frame`` or ``core-xy``."""
+        """The kind of machine: ``axis``, ``h-frame`` or ``core-xy``."""
         return self._native.kind
 
     @property
     def title(self) -> str:
-        """What the case says it is."""
+        """The title of the case."""
         return self._native.title
 
     @property
@@ -85,14 +85,14 @@ class Case:
         return self._native.moves
 
     def __getitem__(self, key: str) -> Any:
-        """What stands under a key such as ``cart.mass`` or ``experiment.0.until``: quantities in SI units."""
+        """The value under a key such as ``cart.mass`` or ``experiment.0.until``: quantities in SI units."""
         try:
             return self._native.value(_checks.text("key", key))
         except _native.Error as error:
             raise KeyError(str(error)) from None
 
     def get(self, key: str, default: Any = None) -> Any:
-        """What stands under a key, or the default."""
+        """The value under a key, or the default."""
         try:
             return self[key]
         except KeyError:
@@ -162,11 +162,11 @@ class Case:
         return runs[0] if one else Runs(runs)
 
     def show(self) -> Shown:
-        """What follows from the numbers: moved mass, stiffness, frequencies, largest speed and acceleration, safety of the belt."""
+        """Quantities that follow from the numbers: moved mass, stiffness, frequencies, largest speed and acceleration, safety of the belt."""
         return Shown(self._native.show())
 
     def check(self) -> Check:
-        """What the logs can tell of the parameters in [fit], before any fit."""
+        """How well the logs determine the parameters in [fit], before any fit."""
         return Check(self._native.check())
 
     def fit(
@@ -469,7 +469,7 @@ def read(path: str | PathLike[str]) -> Case:
 
 
 def show(case: Case | str | PathLike[str]) -> Shown:
-    """What follows from the numbers of a case, or of a case file."""
+    """Quantities that follow from the numbers of a case, or of a case file."""
     return (case if isinstance(case, Case) else read(case)).show()
 
 

@@ -1,4 +1,4 @@
-"""What checks, fits and linear analyses find."""
+"""Results of checks, fits and linear analyses."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Check:
-    """What the logs of a case can tell of its parameters, before any fit."""
+    """How well the logs of a case determine its parameters, before any fit."""
 
     data: dict[str, Any]
-    """What ``taut check --json`` prints."""
+    """The output of ``taut check --json``."""
 
     @property
     def complete(self) -> bool:
@@ -102,9 +102,9 @@ class FitLog:
     units: dict[str, str]
     """The unit of each output."""
     measured: dict[str, NDArray[np.float64]]
-    """What was measured, by output; NaN where nothing was."""
+    """The measured values, by output; NaN where nothing was measured."""
     model: dict[str, NDArray[np.float64]]
-    """What the fitted model shows."""
+    """The values of the fitted model."""
 
     @classmethod
     def _of(cls, told: dict[str, Any]) -> FitLog:
@@ -157,7 +157,7 @@ class Fit:
     """Parameters from logs, and how well they are known."""
 
     data: dict[str, Any]
-    """What ``taut fit --json`` prints."""
+    """The output of ``taut fit --json``."""
     case: Case
     """The case with the estimates in it."""
     draws: Table | None
@@ -240,7 +240,7 @@ class Designed:
     """An experiment that was designed, and what it promises."""
 
     data: dict[str, Any]
-    """What ``taut design --json`` prints."""
+    """The output of ``taut design --json``."""
     case: Case
     """The case with the experiment in it."""
 
@@ -280,7 +280,7 @@ class Tuned:
     """A controller that was tuned or judged, and what its moves come to over a family of machines."""
 
     data: dict[str, Any]
-    """What ``taut tune --json`` prints."""
+    """The output of ``taut tune --json``."""
     case: Case
     """The case with the gains that were found."""
 
@@ -346,7 +346,7 @@ class Comparison:
     """Friction laws and windows by what they predict."""
 
     data: dict[str, Any]
-    """What ``taut fit --compare --json`` prints."""
+    """The output of ``taut fit --compare --json``."""
     case: Case
     """The case with the chosen law and its estimates."""
 
@@ -379,10 +379,10 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Drift:
-    """What single changes make of the errors of a machine."""
+    """The errors of a machine after single changes."""
 
     data: dict[str, Any]
-    """What ``taut fit --drift --json`` prints."""
+    """The output of ``taut fit --drift --json``."""
 
     @property
     def changes(self) -> dict[str, float]:
@@ -438,7 +438,7 @@ class Modes:
     """How a stage swings: its equations linearised while everything slides."""
 
     data: dict[str, Any]
-    """What ``taut modes --json`` prints."""
+    """The output of ``taut modes --json``."""
     model: LinearModel
     """In continuous time."""
     discrete: LinearModel | None
@@ -494,10 +494,10 @@ class Modes:
 
 @dataclass(frozen=True)
 class Shown:
-    """What follows from the numbers of a case: ``shown["total_mass"]`` is a value in SI units."""
+    """Quantities that follow from the numbers of a case: ``shown["total_mass"]`` is a value in SI units."""
 
     data: dict[str, Any]
-    """What ``taut show --json`` prints."""
+    """The output of ``taut show --json``."""
 
     @property
     def rows(self) -> dict[str, tuple[float, str]]:
@@ -506,7 +506,7 @@ class Shown:
 
     @property
     def notes(self) -> dict[str, str]:
-        """What should be known besides, by a word for programs."""
+        """Notes on the result, each by a word for programs."""
         return {note["code"]: note["text"] for note in self.data["notes"]}
 
     def __getitem__(self, key: str) -> float:
@@ -544,7 +544,7 @@ class FrequencyResponses:
     """Frequency responses from logs."""
 
     data: dict[str, Any]
-    """What ``taut frf --json`` prints."""
+    """The output of ``taut frf --json``."""
 
     @property
     def stiffness(self) -> tuple[float, tuple[float, float]] | None:
@@ -593,7 +593,7 @@ class GantryModes:
     """How a gantry swings while everything slides."""
 
     data: dict[str, Any]
-    """What ``taut modes --json`` prints."""
+    """The output of ``taut modes --json``."""
 
     @property
     def resonances(self) -> list[float]:

@@ -131,7 +131,7 @@ class Run(Table):
         return (_restored, (kept, self.metrics, self.events, self._data()))
 
     def _data(self) -> dict[str, Any]:
-        """What the program prints of this run alone."""
+        """The part of the program's output that is about this run."""
         if isinstance(self._native, _Kept):
             return self._native.data
         told = _native.simulation([self._native])
@@ -179,7 +179,7 @@ class Runs(Sequence[Run]):
 
     @property
     def data(self) -> dict[str, Any]:
-        """What ``taut simulate --json`` or ``taut move --json`` prints."""
+        """The output of ``taut simulate --json`` or ``taut move --json``."""
         each = [run._data() for run in self._runs]
         if not each:
             return {}

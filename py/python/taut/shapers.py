@@ -22,7 +22,7 @@ class Shape:
     """Input shapers for a file of vibration, and one that is recommended."""
 
     data: dict[str, Any]
-    """What ``taut shape --json`` prints."""
+    """The output of ``taut shape --json``."""
 
     @property
     def recommended(self) -> tuple[str, float, float]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .case import Case
 
 SECONDS_OF_A_TASK = 2.0
-"""What a task of Dask is to take: long beside what the scheduler needs for it, short beside one's patience."""
+"""How long a task of Dask is to take: long beside what the scheduler needs for it, short beside one's patience."""
 
 TASKS_AHEAD = 4
 """Tasks on their way for each thread of the workers: enough that none waits, few enough that memory stays flat."""

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 const MIT: &str = include_str!("../../../LICENSE-MIT");
 const APACHE: &str = include_str!("../../../LICENSE-APACHE");
 
-/// What an FMU has that its case does not give.
+/// The parts of an FMU that its case does not give.
 #[derive(Debug, Clone, Copy)]
 pub struct Carried<'c> {
     /// The shared object for the platform of this build.

@@ -14,16 +14,7 @@ static void tell(unit *own, int status, const char *message)
     logger(own->environment, own->name, (fmi2Status)status, "logStatusError", "%s", message);
 }
 
-static fmi2Status exchange(void *instance) { return (fmi2Status)refuse(instance, "these sources do no model exchange"); }
-
-static fmi2Status go_into(unit *own, int from, enum phase to)
-{
-    if (!allows(own, from)) {
-        return fmi2Error;
-    }
-    own->now.phase = to;
-    return fmi2OK;
-}
+static fmi2Status exchange(void *instance) { return (fmi2Status)refuse(instance, NO_EXCHANGE_HERE); }
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 
@@ -54,7 +45,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type kind, fmi2String token, 
         } else if (logging != 0) {
             functions->logger(functions->componentEnvironment, name, fmi2Error, "logStatusError", "%s",
                               (kind == fmi2CoSimulation) ? "this is not the token of this FMU"
-                                                         : "these sources do no model exchange");
+                                                         : NO_EXCHANGE_HERE);
         } else {
             /* nobody listens */
         }
@@ -69,38 +60,16 @@ void fmi2FreeInstance(fmi2Component c) { destroy(c); }
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance, fmi2Real start,
                                fmi2Boolean has_stop, fmi2Real stop)
 {
-    unit *own = c;
-    uint32_t k;
-    if (!allows(own, INSTANTIATED)) {
-        return fmi2Error;
-    }
-    if (!is_number(start) || ((has_stop != 0) && !(stop >= start)) || ((has_tolerance != 0) && !(tolerance > 0.0))) {
-        return (fmi2Status)refuse(own, "a run has a finite start, an end behind it and a tolerance above zero");
-    }
-    own->now.time = start;
-    own->now.stop = stop;
-    own->now.has_stop = (has_stop != 0) ? 1U : 0U;
-    for (k = 0U; k < INPUTS; k++) {
-        own->now.since[k] = start;
-    }
-    return fmi2OK;
+    return (fmi2Status)set_up(c, has_tolerance, tolerance, start, has_stop, stop);
 }
 
-fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return go_into(c, INSTANTIATED, INITIALIZING); }
+fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return (fmi2Status)go_into(c, INSTANTIATED, INITIALIZING); }
 
-fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return go_into(c, INITIALIZING, STEPPING); }
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return (fmi2Status)go_into(c, INITIALIZING, STEPPING); }
 
-fmi2Status fmi2Terminate(fmi2Component c) { return go_into(c, STEPPING, TERMINATED); }
+fmi2Status fmi2Terminate(fmi2Component c) { return (fmi2Status)go_into(c, STEPPING, TERMINATED); }
 
-fmi2Status fmi2Reset(fmi2Component c)
-{
-    unit *own = c;
-    if (!allows(own, ALIVE)) {
-        return fmi2Error;
-    }
-    renew(own);
-    return fmi2OK;
-}
+fmi2Status fmi2Reset(fmi2Component c) { return (fmi2Status)start_over(c); }
 
 /* --- values --- */
 
@@ -143,12 +112,7 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) { return (fmi2
 
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
 {
-    unit *own = c;
-    if (place_of(own, state) == own->state_count) {
-        return (fmi2Status)refuse(own, "this is no state of this instance");
-    }
-    *size = BYTES;
-    return fmi2OK;
+    return (fmi2Status)bytes_of(c, state, size);
 }
 
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)

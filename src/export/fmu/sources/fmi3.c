@@ -23,16 +23,7 @@ static fmi3Status none(void *instance, size_t count)
     return (fmi3Status)((count == 0U) ? OK : refuse(own, "there is no variable of this type"));
 }
 
-static fmi3Status exchange(void *instance) { return (fmi3Status)refuse(instance, "these sources do no model exchange"); }
-
-static fmi3Status go_into(unit *own, int from, enum phase to)
-{
-    if (!allows(own, from)) {
-        return fmi3Error;
-    }
-    own->now.phase = to;
-    return fmi3OK;
-}
+static fmi3Status exchange(void *instance) { return (fmi3Status)refuse(instance, NO_EXCHANGE_HERE); }
 
 const char *fmi3GetVersion(void) { return "3.0"; }
 
@@ -56,7 +47,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi
     (void)resources;
     (void)visible;
     if (logging && (log != NULL)) {
-        log(environment, fmi3Error, "logStatusError", "these sources do no model exchange");
+        log(environment, fmi3Error, "logStatusError", NO_EXCHANGE_HERE);
     }
     return NULL;
 }
@@ -114,27 +105,17 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean has_to
                                        fmi3Float64 start, fmi3Boolean has_stop, fmi3Float64 stop)
 {
     unit *own = instance;
-    uint32_t k;
-    if (!allows(own, INSTANTIATED)) {
-        return fmi3Error;
+    const int status = set_up(own, has_tolerance ? 1 : 0, tolerance, start, has_stop ? 1 : 0, stop);
+    if (status == OK) {
+        own->now.phase = INITIALIZING;
     }
-    if (!is_number(start) || (has_stop && !(stop >= start)) || (has_tolerance && !(tolerance > 0.0))) {
-        return (fmi3Status)refuse(own, "a run has a finite start, an end behind it and a tolerance above zero");
-    }
-    own->now.time = start;
-    own->now.stop = stop;
-    own->now.has_stop = has_stop ? 1U : 0U;
-    for (k = 0U; k < INPUTS; k++) {
-        own->now.since[k] = start;
-    }
-    own->now.phase = INITIALIZING;
-    return fmi3OK;
+    return (fmi3Status)status;
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
 {
     unit *own = instance;
-    return go_into(own, INITIALIZING, (own->has_events != 0) ? IN_EVENT : STEPPING);
+    return (fmi3Status)go_into(own, INITIALIZING, (own->has_events != 0) ? IN_EVENT : STEPPING);
 }
 
 fmi3Status fmi3EnterEventMode(fmi3Instance instance)
@@ -143,24 +124,19 @@ fmi3Status fmi3EnterEventMode(fmi3Instance instance)
     if (own->has_events == 0) {
         return (fmi3Status)refuse(own, "event mode was not asked for");
     }
-    return go_into(own, STEPPING, IN_EVENT);
+    return (fmi3Status)go_into(own, STEPPING, IN_EVENT);
 }
 
-fmi3Status fmi3EnterStepMode(fmi3Instance instance) { return go_into(instance, IN_EVENT, STEPPING); }
+fmi3Status fmi3EnterStepMode(fmi3Instance instance) { return (fmi3Status)go_into(instance, IN_EVENT, STEPPING); }
 
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance) { return exchange(instance); }
 
-fmi3Status fmi3Terminate(fmi3Instance instance) { return go_into(instance, IN_EVENT | STEPPING, TERMINATED); }
-
-fmi3Status fmi3Reset(fmi3Instance instance)
+fmi3Status fmi3Terminate(fmi3Instance instance)
 {
-    unit *own = instance;
-    if (!allows(own, ALIVE)) {
-        return fmi3Error;
-    }
-    renew(own);
-    return fmi3OK;
+    return (fmi3Status)go_into(instance, IN_EVENT | STEPPING, TERMINATED);
 }
+
+fmi3Status fmi3Reset(fmi3Instance instance) { return (fmi3Status)start_over(instance); }
 
 fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance)
 {
@@ -340,12 +316,7 @@ fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *state) { return
 
 fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState state, size_t *size)
 {
-    unit *own = instance;
-    if (place_of(own, state) == own->state_count) {
-        return (fmi3Status)refuse(own, "this is no state of this instance");
-    }
-    *size = BYTES;
-    return fmi3OK;
+    return (fmi3Status)bytes_of(instance, state, size);
 }
 
 fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState state, fmi3Byte bytes[], size_t size)

@@ -124,6 +124,45 @@ static void renew(unit *own)
     }
 }
 
+static int go_into(unit *own, int from, enum phase to)
+{
+    if (!allows(own, from)) {
+        return ERROR;
+    }
+    own->now.phase = to;
+    return OK;
+}
+
+/* The span of a run, before its initialization. */
+static int set_up(unit *own, int has_tolerance, double tolerance, double start, int has_stop, double stop)
+{
+    uint32_t k;
+    if (!allows(own, INSTANTIATED)) {
+        return ERROR;
+    }
+    if (!is_number(start) || ((has_stop != 0) && !(stop >= start)) || ((has_tolerance != 0) && !(tolerance > 0.0))) {
+        return refuse(own, "a run has a finite start, an end behind it and a tolerance above zero");
+    }
+    own->now.time = start;
+    own->now.stop = stop;
+    own->now.has_stop = (has_stop != 0) ? 1U : 0U;
+    for (k = 0U; k < INPUTS; k++) {
+        own->now.since[k] = start;
+    }
+    return OK;
+}
+
+static int start_over(unit *own)
+{
+    if (!allows(own, ALIVE)) {
+        return ERROR;
+    }
+    renew(own);
+    return OK;
+}
+
+#define NO_EXCHANGE_HERE "these sources do no model exchange"
+
 static char *copied(const char *text)
 {
     const size_t length = (text == NULL) ? 0U : strlen(text);
@@ -712,6 +751,15 @@ static int let_go(unit *own, void **state)
 
 /* A state as bytes: a mark, a sum over what follows, the state. */
 #define BYTES (8U + 8U + sizeof(kept))
+
+static int bytes_of(unit *own, const void *state, size_t *size)
+{
+    if (place_of(own, state) == own->state_count) {
+        return refuse(own, "this is no state of this instance");
+    }
+    *size = BYTES;
+    return OK;
+}
 
 static uint64_t sum_of(const unsigned char bytes[], size_t count)
 {
