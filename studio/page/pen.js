@@ -3,7 +3,7 @@
 
 export const COLOURS = ["blue", "verm", "green", "purple", "amber", "sky"];
 /** How far from its points a line may be drawn, in pixels. */
-const NEAR = 0.1;
+const NEAR = 0.05;
 
 /** A round step for about so many ticks. @param {number} span @param {number} wanted */
 export function step(span, wanted) {
