@@ -118,7 +118,8 @@ def test_descriptions_are_valid(root: Path, tmp_path: Path, version: int, case: 
 
 @pytest.mark.parametrize(("version", "events"), [(2, False), (3, False), (3, True)])
 def test_co_simulation_is_exact(root: Path, tmp_path: Path, version: int, events: bool) -> None:
-    """The pulse in steps of a millisecond and of a quarter of a second, with importers' defaults and with event mode."""
+    """The pulse in steps of a millisecond and of a quarter of a second, with importers' defaults and with event
+    mode."""
     wanted = rows(root / PAPER, tmp_path / "rows", "10-v-pulse.csv")
     unit = export(root / PAPER, tmp_path / "unit.fmu", version)
     for step in (1e-3, 0.25):
@@ -222,7 +223,8 @@ def test_steps_are_taken_back_by_the_importer(root: Path, tmp_path: Path, versio
 
 
 def test_a_controller_inside_follows_as_taut_move_does(root: Path, tmp_path: Path) -> None:
-    """The reference goes in, the error comes out; PID of the paper's axis with a reference that is known at its samples."""
+    """The reference goes in, the error comes out; PID of the paper's axis with a reference that is known at its
+    samples."""
     case = root / "stages/sollmann-jouaneh/controllers/pid.toml"
     unit = export(case, tmp_path / "unit.fmu", 3, "--part", "both")
     result = simulate_fmu(
@@ -281,7 +283,8 @@ def test_a_second_importer_runs_it(root: Path, tmp_path: Path, version: int) -> 
 
 @pytest.mark.parametrize("version", [2, 3])
 def test_what_the_sources_make_is_the_same_machine(root: Path, tmp_path: Path, version: int) -> None:
-    """The sources in the FMU, compiled by FMPy's own means in the place of the binary: the pulse, and a jump in slope."""
+    """The sources in the FMU, compiled by FMPy's own means in the place of the binary: the pulse, and a jump in
+    slope."""
     wanted = rows(root / PAPER, tmp_path / "rows", "10-v-pulse.csv")
     unit = export(root / PAPER, tmp_path / "unit.fmu", version)
     one, place = sources_of(unit, version)

@@ -1,7 +1,9 @@
-"""Everything public with wrong types, wrong numbers, wrong shapes and controllers that misbehave: documented exceptions only.
+"""Everything public with wrong types, wrong numbers, wrong shapes and controllers that misbehave: documented exceptions
+only.
 
 What may come out stands in docs/python.md under "Exceptions". A panic would be ``taut.Bug``, and what gets past that
-``PanicException``: neither may come. The draws are seeded; ``TAUT_WRONG=10000`` makes more of them, ``TAUT_SEED`` others.
+``PanicException``: neither may come. The draws are seeded; ``TAUT_WRONG=10000`` makes more of them, ``TAUT_SEED``
+others.
 """
 
 from __future__ import annotations

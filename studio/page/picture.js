@@ -1,19 +1,13 @@
 // @ts-check
 // Figures of results: lines, points and bars on a canvas, with a cursor for keys, values as a table, and brushing.
 import {element, number} from "./format.js";
+import {COLOURS, sized, step} from "./pen.js";
 
-const COLOURS = ["blue", "verm", "green", "purple", "amber", "sky"];
 const LEFT = 70, RIGHT = 14, TOP = 10, BOTTOM = 40, ROWS = 60;
 
 /** @typedef {{name: string, x: ArrayLike<number>, y: ArrayLike<number>, kind?: "line"|"points"|"bars"|"cross", colour?: string, dash?: number[], alpha?: number, quiet?: boolean}} Series
  * quiet: neither in the legend nor in the table */
 /** @typedef {{x: string, y: string, xUnit?: string, yUnit?: string, words?: string, height?: number, logX?: boolean, equal?: boolean, xRange?: [number, number], yRange?: [number, number], marks?: {x?: number, y?: number, name: string}[]}} Axes */
-
-/** A round step for about so many ticks. @param {number} span @param {number} wanted */
-function step(span, wanted) {
-  const rough = span / Math.max(1, wanted), power = 10 ** Math.floor(Math.log10(rough));
-  return power * (/** @type {number} */ ([1, 2, 5, 10].find(m => rough / power <= m * 1.0001)));
-}
 
 /** @type {Set<Picture>} */
 const all = new Set();
@@ -106,16 +100,8 @@ export class Picture {
   draw() {
     if (!this.area.clientWidth) return;
     this.wasShown = true;
-    const {canvas, width, height, axes} = this, k = window.devicePixelRatio || 1;
-    if (canvas.width !== Math.round(width * k) || canvas.height !== Math.round(height * k)) {
-      canvas.width = Math.round(width * k);
-      canvas.height = Math.round(height * k);
-      canvas.style.height = height + "px";
-    }
-    const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d")), style = getComputedStyle(document.documentElement);
+    const {width, height, axes} = this, pen = sized(this.canvas, this), style = getComputedStyle(document.documentElement);
     const colour = name => style.getPropertyValue("--" + name).trim() || "#888";
-    pen.setTransform(k, 0, 0, k, 0, 0);
-    pen.clearRect(0, 0, width, height);
     const range = this.ranges(), wide = width - LEFT - RIGHT, high = height - TOP - BOTTOM;
     if (axes.equal) this.square(range, wide / high);
     const place = axes.logX ? x => Math.log10(x) : x => x;

@@ -3,31 +3,15 @@
 // has its values as a table.
 import {element, number, time as timeText, download, fileName, tell} from "./format.js";
 import {lowerBound} from "./app.js";
+import {COLOURS, Path, density, line, sized, step, ticks} from "./pen.js";
 
 /** @typedef {import("./app.js").App} App */
 /** @typedef {import("./wire.js").Answer} Answer */
 
-const COLOURS = ["blue", "verm", "green", "purple", "amber", "sky"];
 const LEFT = 66, RIGHT = 12, TOP = 8, BOTTOM = 24, HEIGHT = 170, TABLE_ROWS = 50;
 const DASHES = [[], [], [7, 4], [2, 3]];
-/** How far from its points a line may be drawn, in pixels. */
-const NEAR = 0.1;
 /** States of a body: stuck, forward, backward, and sliding without dry friction. */
 const STATES = new Map([[0, ["stuck", "grey"]], [1, ["forward", "blue"]], [-1, ["backward", "verm"]], [2, ["sliding", "green"]]]);
-
-/** A round step for about so many ticks. @param {number} span @param {number} wanted */
-function step(span, wanted) {
-  const rough = span / Math.max(1, wanted), power = 10 ** Math.floor(Math.log10(rough));
-  return power * (/** @type {number} */ ([1, 2, 5, 10].find(m => rough / power <= m * 1.0001)));
-}
-
-/** @param {number} low @param {number} high @param {number} wanted @returns {number[]} */
-function ticks(low, high, wanted) {
-  const by = step(high - low, wanted), found = [];
-  if (!(by > 0)) return found;
-  for (let i = Math.ceil(low / by - 1e-6); i * by <= high + 1e-6 * by && found.length < 50; i++) found.push(i * by);
-  return found;
-}
 
 export class Plots {
   /** @param {HTMLElement} root @param {App} app */
@@ -167,20 +151,6 @@ class Plot {
   timeAt(x) { const [a, b] = this.plots.seen; return a + (b - a) * (x - LEFT) / (this.width - LEFT - RIGHT); }
   up(value) { const {low, high} = this.range || {low: 0, high: 1}; return TOP + (this.height - TOP - BOTTOM) * (high - value) / (high - low); }
 
-  /** @param {HTMLCanvasElement} canvas */
-  pen(canvas) {
-    const k = density(), {width, height} = this;
-    if (canvas.width !== Math.round(width * k) || canvas.height !== Math.round(height * k)) {
-      canvas.width = Math.round(width * k);
-      canvas.height = Math.round(height * k);
-      canvas.style.height = height + "px";
-    }
-    const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
-    pen.setTransform(k, 0, 0, k, 0, 0);
-    pen.clearRect(0, 0, width, height);
-    return pen;
-  }
-
   /** The runs that are drawn, from the lowest: pins, the run before, the run itself. */
   layers() {
     const {app} = this.plots;
@@ -210,7 +180,7 @@ class Plot {
 
   draw() {
     this.isStale = false;
-    const pen = this.pen(this.canvas);
+    const pen = sized(this.canvas, this);
     if (this.isStates) this.drawStates(pen); else this.drawCurves(pen);
     if (this.table.open) this.fill(this.table);
   }
@@ -260,7 +230,7 @@ class Plot {
     const isSame = shape === this.grounded.shape && below.every(({answer}, k) => answer === this.grounded.answers[k]);
     if (isSame) return this.back;
     this.grounded = {shape, answers: below.map(({answer}) => answer)};
-    const pen = this.pen(this.back);
+    const pen = sized(this.back, this);
     this.grid(pen, ticks(range.low, range.high, 4).map(value => [this.up(value), number(value, 6)]));
     this.clip(pen);
     for (const layer of below) this.strokes(pen, layer);
@@ -428,7 +398,7 @@ class Plot {
     const pointed = JSON.stringify([x, width, height, density(), box, dots, colours.ink]);
     if (pointed === this.pointed) return;
     this.pointed = pointed;
-    const pen = this.pen(this.over);
+    const pen = sized(this.over, this);
     if (box) {
       pen.fillStyle = colours.blue;
       pen.globalAlpha = 0.12;
@@ -593,56 +563,4 @@ class Plot {
     const frame = `<rect x="${LEFT}" y="${TOP}" width="${width - LEFT - RIGHT}" height="${height - TOP - BOTTOM}" fill="none" stroke="${colours.axis}"/>`;
     return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${width} ${height}" width="${width}" height="${height}"><rect width="100%" height="100%" fill="${colours.paper}"/>${frame}${rows.join("")}${steps.join("")}${lines.join("")}</svg>\n`;
   }
-}
-
-/** Pixels of the screen for one of the page. */
-const density = () => window.devicePixelRatio || 1;
-
-/** A line through points from left to right. Points that it passes within `NEAR` are left out: where curves are drawn
- * without a graphics card, each costs time. */
-class Path {
-  /** @param {CanvasRenderingContext2D} pen */
-  constructor(pen) {
-    this.pen = pen;
-    /** The last point drawn, and the last given. */
-    this.x0 = this.y0 = this.x = this.y = NaN;
-    /** The least and greatest slope from the last point drawn that pass all given since. */
-    this.low = this.high = NaN;
-    pen.beginPath();
-  }
-
-  /** @param {number} x @param {number} y */
-  to(x, y) {
-    const slope = (y - this.y0) / (x - this.x0);
-    if (!(slope >= this.low && slope <= this.high)) this.keep(x, y);
-    const by = x - this.x0;
-    this.low = Math.max(this.low, (y - NEAR - this.y0) / by);
-    this.high = Math.min(this.high, (y + NEAR - this.y0) / by);
-    this.x = x;
-    this.y = y;
-  }
-
-  /** Draws to the last point given, or begins at the first. @param {number} x @param {number} y */
-  keep(x, y) {
-    const isFirst = isNaN(this.x);
-    this.x0 = isFirst ? x : this.x;
-    this.y0 = isFirst ? y : this.y;
-    if (isFirst) this.pen.moveTo(x, y); else this.pen.lineTo(this.x0, this.y0);
-    // Of points above one another none is left out.
-    this.low = x > this.x0 ? -Infinity : NaN;
-    this.high = x > this.x0 ? Infinity : NaN;
-  }
-
-  stroke() {
-    this.pen.lineTo(this.x, this.y);
-    this.pen.stroke();
-  }
-}
-
-/** @param {CanvasRenderingContext2D} pen @param {number} x1 @param {number} y1 @param {number} x2 @param {number} y2 */
-function line(pen, x1, y1, x2, y2) {
-  pen.beginPath();
-  pen.moveTo(Math.round(x1) + 0.5, Math.round(y1) + 0.5);
-  pen.lineTo(Math.round(x2) + 0.5, Math.round(y2) + 0.5);
-  pen.stroke();
 }

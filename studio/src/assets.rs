@@ -33,6 +33,7 @@ const ASSETS: &[Asset] = page![
     "modes.js": SCRIPT,
     "motion.js": SCRIPT,
     "parameters.js": SCRIPT,
+    "pen.js": SCRIPT,
     "picture.js": SCRIPT,
     "plots.js": SCRIPT,
     "shape.js": SCRIPT,

@@ -1,4 +1,5 @@
-"""Arguments, before they go to Rust: wrong types are a ``TypeError``, wrong values a ``ValueError``, each with its name."""
+"""Arguments, before they go to Rust: wrong types are a ``TypeError``, wrong values a ``ValueError``, each with its
+name."""
 
 from __future__ import annotations
 

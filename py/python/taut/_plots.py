@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 
 
 def panels(ax: Axes | Sequence[Axes] | None, count: int, *, shared: bool = True, height: float = 2.0) -> tuple[Figure, list[Any]]:
-    """A figure with ``count`` panels below each other; or that of the axes that are given, of which there have to be as many."""
+    """A figure with ``count`` panels below each other; or that of the axes that are given, of which there have to be as
+    many."""
     if ax is None:
         figure: Figure = needed("taut._notebook", "matplotlib", "plot()").NotebookFigure(
             figsize=(7, 1 + height * max(count, 1)), layout="constrained"

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 class Controller(Protocol):
     """A controller of one's own.
 
-    It may also have ``reset()``, called before a move, and ``limited(given)``, told after each sample what the limit left.
+    It may also have ``reset()``, called before a move, and ``limited(given)``, told after each sample what the limit
+    left.
     """
 
     def step(self, seen: _native.Observation, /) -> float:
@@ -34,14 +35,15 @@ class Controller(Protocol):
 class Case:
     """A case file: a machine, and what is done with it. That of a gantry is a :class:`GantryCase` by itself.
 
-    ``case["cart.mass"]`` reads a value in SI units, ``case["cart.mass"] = "0.6 kg"`` or ``= 0.6`` writes one: by the keys of
-    the case file, with comments and layout kept, and checked as the file is. ``case.text`` is the file.
+    ``case["cart.mass"]`` reads a value in SI units, ``case["cart.mass"] = "0.6 kg"`` or ``= 0.6`` writes one: by the
+    keys of the case file, with comments and layout kept, and checked as the file is. ``case.text`` is the file.
     """
 
     __slots__ = ("_native",)
 
     def __init__(self, text: str, path: str | PathLike[str] = "case.toml") -> None:
-        """Reads a case from text. ``path`` stands in messages; other files that the text names are found from its folder."""
+        """Reads a case from text. ``path`` stands in messages; other files that the text names are found from its
+        folder."""
         self._take(_native.Case.from_text(_checks.path(path), _checks.text("text", text), []))
 
     @classmethod
@@ -152,8 +154,8 @@ class Case:
     ) -> Run | Runs:
         """Runs one experiment by its name, several, or all.
 
-        ``solver`` is ``exact``, ``general`` (with ``tolerance``) or ``table3`` (with ``step``, s, and ``method``, ``rk4`` or
-        ``dp5``); by default the one for this stage.
+        ``solver`` is ``exact``, ``general`` (with ``tolerance``) or ``table3`` (with ``step``, s, and ``method``,
+        ``rk4`` or ``dp5``); by default the one for this stage.
         """
         one = isinstance(experiment, str)
         names = _checks.names("experiment", [experiment] if isinstance(experiment, str) else experiment)
@@ -162,7 +164,8 @@ class Case:
         return runs[0] if one else Runs(runs)
 
     def show(self) -> Shown:
-        """Quantities that follow from the numbers: moved mass, stiffness, frequencies, largest speed and acceleration, safety of the belt."""
+        """Quantities that follow from the numbers: moved mass, stiffness, frequencies, largest speed and acceleration,
+        safety of the belt."""
         return Shown(self._native.show())
 
     def check(self) -> Check:
@@ -192,8 +195,8 @@ class Case:
     ) -> FrequencyResponses:
         """Frequency responses from the logs, without a model, and stiffness, damping and delay fitted to them.
 
-        ``segment`` is the length of the pieces of Welch's method (s), ``period`` that of a multisine (s); ``at`` is where the cart is
-        (m), ``delay`` the time from a sample to its command (s, that of the controller unless said).
+        ``segment`` is the length of the pieces of Welch's method (s), ``period`` that of a multisine (s); ``at`` is
+        where the cart is (m), ``delay`` the time from a sample to its command (s, that of the controller unless said).
         """
         n = _checks.number
         return FrequencyResponses(
@@ -217,12 +220,13 @@ class Case:
         verify: int = 0,
         seed: int = 1,
     ) -> Designed:
-        """The experiment that determines the named parameters best (those of [fit] unless named) within travel, input and current.
+        """The experiment that determines the named parameters best (those of [fit] unless named) within travel, input
+        and current.
 
-        ``inputs`` are those to choose among: ``trapezoid``, ``sweep``, ``chirp``, ``multisine``, ``prbs``; ``criterion`` is ``d`` or
-        ``a``; ``margin`` is the share of each limit that is left free, ``doubt`` that by which each parameter may be off and the limits
-        hold; ``measured`` has quantities with the standard deviations of their noise. ``verify`` logs are simulated and fitted. Ctrl-C
-        ends it with the best so far.
+        ``inputs`` are those to choose among: ``trapezoid``, ``sweep``, ``chirp``, ``multisine``, ``prbs``;
+        ``criterion`` is ``d`` or ``a``; ``margin`` is the share of each limit that is left free, ``doubt`` that by
+        which each parameter may be off and the limits hold; ``measured`` has quantities with the standard deviations of
+        their noise. ``verify`` logs are simulated and fitted. Ctrl-C ends it with the best so far.
         """
         n = _checks.number
         noises = [(_checks.text("measured", name), n(f"measured[{name!r}]", noise) or 0.0) for name, noise in dict(measured or {}).items()]
@@ -249,10 +253,10 @@ class Case:
     ) -> Tuned:
         """Finds gains and filters for the case's controller, judged by moves over a family of machines that can exist.
 
-        ``spread`` is by which share parameters may be off (0.1 is 10 %; that of [tune] unless said, 0 for the machine of the file
-        alone); with ``corners`` all of them are off at once in the worst directions; ``draws`` is a file of draws from the posterior of
-        a fit, of which the machines are taken instead. With ``evaluate`` nothing is searched for: the
-        gains of the file are judged. Ctrl-C ends it.
+        ``spread`` is by which share parameters may be off (0.1 is 10 %; that of [tune] unless said, 0 for the machine
+        of the file alone); with ``corners`` all of them are off at once in the worst directions; ``draws`` is a file of
+        draws from the posterior of a fit, of which the machines are taken instead. With ``evaluate`` nothing is
+        searched for: the gains of the file are judged. Ctrl-C ends it.
         """
         data, case = self._native.tune(
             _checks.number("spread", spread), bool(corners), bool(evaluate), None if draws is None else _checks.path(draws)
@@ -270,10 +274,11 @@ class Case:
     ) -> Case:
         """Another case with one more experiment, whose log is a DataFrame, a Table or a dictionary of arrays.
 
-        ``columns`` says which column is what, as the table ``log`` of a case file does: ``time`` (s), ``input`` (V or A), and what was
-        measured, such as ``drive_angle`` (rad) or ``cart_position`` (m): ``{"time": "t", "input": "u", "drive_angle": "phi"}``.
-        ``settings`` are other keys of that table, such as ``hold="linear"``. The log is written as CSV to ``path``, where the case finds
-        it from then on; without one, to a folder that is removed when Python ends.
+        ``columns`` says which column is what, as the table ``log`` of a case file does: ``time`` (s), ``input`` (V or
+        A), and what was measured, such as ``drive_angle`` (rad) or ``cart_position`` (m): ``{"time": "t", "input": "u",
+        "drive_angle": "phi"}``. ``settings`` are other keys of that table, such as ``hold="linear"``. The log is
+        written as CSV to ``path``, where the case finds it from then on; without one, to a folder that is removed when
+        Python ends.
         """
         written = write_log(log, None if path is None else _checks.path(path), _checks.text("name", name))
         if not isinstance(columns, Mapping):
@@ -287,8 +292,8 @@ class Case:
     ) -> Comparison:
         """Friction laws and windows by the error on parts of the logs that are held out, and a fit with the best.
 
-        ``laws`` are of ``viscous``, ``coulomb``, ``asymmetric``, ``stribeck``, ``along`` and ``lugre``, by default all but the
-        last; ``windows`` are lengths, s, and None for whole logs.
+        ``laws`` are of ``viscous``, ``coulomb``, ``asymmetric``, ``stribeck``, ``along`` and ``lugre``, by default all
+        but the last; ``windows`` are lengths, s, and None for whole logs.
         """
         names = _checks.names("laws", [laws] if isinstance(laws, str) else laws)
         lengths = None if windows is None else [_checks.number("windows", window) for window in windows]
@@ -313,9 +318,10 @@ class Case:
     ) -> Modes:
         """Linearises the stage while everything slides: matrices, poles, zeros, frequency response, resonances.
 
-        ``at`` is where the cart is (m), ``speed`` how fast it slides (m/s, 0.1 if not said), ``stuck`` which of ``drive``,
-        ``cart``, ``idler`` are held. With ``sample_time`` (s) also a discrete-time model, whose input is held (``zero``,
-        ``first`` or ``tustin``) and late by ``delay`` (s). ``lowest`` and ``highest`` bound the response, Hz.
+        ``at`` is where the cart is (m), ``speed`` how fast it slides (m/s, 0.1 if not said), ``stuck`` which of
+        ``drive``, ``cart``, ``idler`` are held. With ``sample_time`` (s) also a discrete-time model, whose input is
+        held (``zero``, ``first`` or ``tustin``) and late by ``delay`` (s). ``lowest`` and ``highest`` bound the
+        response, Hz.
         """
         n = _checks.number
         found = self._native.modes(
@@ -375,10 +381,10 @@ class Case:
     ) -> Run | Runs:
         """Runs one move in closed loop by its name, several, or all; with the case's controller, or one of your own.
 
-        ``controller`` is a function of the measured position and the reference (m), or an object with ``step(seen)``; it
-        returns the command (V or A) and is called once a sample. ``every`` (sample time, s), ``delay`` (from sample to
-        command, s) and ``limit`` (of the command) are the case's unless said. What it raises comes out here. ``spread``
-        also tries the case's controller with each parameter off by this share.
+        ``controller`` is a function of the measured position and the reference (m), or an object with ``step(seen)``;
+        it returns the command (V or A) and is called once a sample. ``every`` (sample time, s), ``delay`` (from sample
+        to command, s) and ``limit`` (of the command) are the case's unless said. What it raises comes out here.
+        ``spread`` also tries the case's controller with each parameter off by this share.
         """
         if controller is None and (every, delay, limit) != (None, None, None):
             raise TypeError("every, delay and limit go with a controller of your own; the case's are in [controller]")
@@ -406,9 +412,9 @@ class Case:
     ) -> Table:
         """Runs ``n`` machines with parameters varied; a row of parameters and key figures for each.
 
-        ``vary`` says by how much, ``{"cart.mass": "20 %"}``; ``design`` is ``random``, ``latin-hypercube``, ``sobol``, ``grid`` or
-        ``one-at-a-time``; ``interval`` (s) is how far apart the rows are that figures are taken from. All of it is told at
-        :func:`taut.sweep`, which this is.
+        ``vary`` says by how much, ``{"cart.mass": "20 %"}``; ``design`` is ``random``, ``latin-hypercube``, ``sobol``,
+        ``grid`` or ``one-at-a-time``; ``interval`` (s) is how far apart the rows are that figures are taken from. All
+        of it is told at :func:`taut.sweep`, which this is.
         """
         return sweep(
             self,
@@ -485,9 +491,9 @@ def export(
 ) -> list[Path]:
     """Writes a case, or a case file, for another tool, as ``taut export`` does, and returns the files.
 
-    ``target`` is ``fmu``, ``c``, ``st``, ``matlab``, ``python`` or ``json``. ``out`` names the file where it ends as the
-    target's files do, else a folder. ``part`` is ``plant``, ``controller`` or ``both``, ``real`` the numbers of C (``float`` or
-    ``double``), ``step`` the step of the plant, s, ``fmi`` the version of an FMU: 2 or 3.
+    ``target`` is ``fmu``, ``c``, ``st``, ``matlab``, ``python`` or ``json``. ``out`` names the file where it ends as
+    the target's files do, else a folder. ``part`` is ``plant``, ``controller`` or ``both``, ``real`` the numbers of C
+    (``float`` or ``double``), ``step`` the step of the plant, s, ``fmi`` the version of an FMU: 2 or 3.
     """
     found = case if isinstance(case, Case) else read(case)
     how = (_checks.word("part", part), _checks.text("real", real), _checks.number("step", step), _checks.whole("fmi", fmi, 2, 3))

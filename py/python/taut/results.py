@@ -167,7 +167,8 @@ class Fit:
 
     @property
     def residuals(self) -> dict[str, NDArray[np.float64]]:
-        """By output, the residuals (model minus measured, SI units) of all rows that were fitted, one log after the other."""
+        """By output, the residuals (model minus measured, SI units) of all rows that were fitted, one log after the
+        other."""
         parts: dict[str, list[NDArray[np.float64]]] = {}
         for log in self.logs:
             if not log.held_out:
@@ -251,7 +252,8 @@ class Designed:
 
     @property
     def errors(self) -> dict[str, float | None]:
-        """The standard error that is promised of each parameter, SI; None where the experiment does not determine it."""
+        """The standard error that is promised of each parameter, SI; None where the experiment does not determine
+        it."""
         return {row["name"]: row["standard_error"] for row in self.data["parameters"]}
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -301,7 +303,8 @@ class Tuned:
         return {row["key"]: (row["before"], row["after"], row["unit"]) for row in self.data["gains"]}
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A pandas.DataFrame of the moves: error (m), settling (s) and current (A), as in the file and at worst, before and after."""
+        """A pandas.DataFrame of the moves: error (m), settling (s) and current (A), as in the file and at worst, before
+        and after."""
         rows = []
         for when in ("before", "after"):
             for move in self.data[when]["moves"]:
@@ -548,12 +551,14 @@ class FrequencyResponses:
 
     @property
     def stiffness(self) -> tuple[float, tuple[float, float]] | None:
-        """The factor on the stiffness of the case's belt with its 95 % interval; None where the responses do not tell it."""
+        """The factor on the stiffness of the case's belt with its 95 % interval; None where the responses do not tell
+        it."""
         fit = self.data["fit"]
         return None if fit is None else (fit["stiffness"]["value"], tuple(fit["stiffness"]["interval"]))
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A pandas.DataFrame with a row for each frequency of each response; ``real`` and ``imaginary`` are output per V or A."""
+        """A pandas.DataFrame with a row for each frequency of each response; ``real`` and ``imaginary`` are output per
+        V or A."""
         columns: dict[str, list[Any]] = {}
         for one in self.data["responses"]:
             count = len(one["frequency_Hz"])
@@ -618,14 +623,16 @@ class GantryModes:
         return bridge, cart, hertz
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A pandas.DataFrame of the elastic modes: frequency (Hz), damping ratio, and how far each body moves at the belt."""
+        """A pandas.DataFrame of the elastic modes: frequency (Hz), damping ratio, and how far each body moves at the
+        belt."""
         rows = self.data["elastic"]
         bodies = list(dict.fromkeys(body for row in rows for body in row["shape_at_belt"]))
         columns = {key: [row[key] for row in rows] for key in ("frequency_Hz", "damping_ratio")}
         return frame(columns | {body: [row["shape_at_belt"].get(body) for row in rows] for body in bodies})
 
     def plot(self, mode: int = 0, *, ax: Axes | None = None) -> Figure:
-        """The frequency of an elastic mode over the working area; where it is the same everywhere, all modes as bars."""
+        """The frequency of an elastic mode over the working area; where it is the same everywhere, all modes as
+        bars."""
         figure, (axis,) = _plots.panels(ax, 1, height=3.0)
         area = self.map
         if area is None:

@@ -75,18 +75,21 @@ class Run(Table):
 
     @property
     def position_error(self) -> float | None:
-        """By how much positions at the belt may be off, m: the exact solver's bound of rounding; ``None`` for the others."""
+        """By how much positions at the belt may be off, m: the exact solver's bound of rounding; ``None`` for the
+        others."""
         return self._native.position_error
 
     @property
     def metrics(self) -> dict[str, Any]:
-        """The key figures, as ``taut simulate --json`` has them, of a move also those of ``taut move --json``; keys say their units."""
+        """The key figures, as ``taut simulate --json`` has them, of a move also those of ``taut move --json``; keys say
+        their units."""
         figures: dict[str, Any] = self._native.figures()
         return figures
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """Every stick, slip and reversal: ``time_s``, ``part``, ``from``, ``to``, ``load``, ``load_unit``, ``by_rounding``."""
+        """Every stick, slip and reversal: ``time_s``, ``part``, ``from``, ``to``, ``load``, ``load_unit``,
+        ``by_rounding``."""
         events: list[dict[str, Any]] = self._native.events()
         return events
 
@@ -103,8 +106,8 @@ class Run(Table):
     def plot(self, *columns: str, ax: Axes | Sequence[Axes] | None = None) -> Figure:
         """A matplotlib figure of these columns over time, one panel for each unit.
 
-        Without names: where the cart is and should be, its speed, and the voltage; of a gantry also those of the bridge and both drives.
-        ``ax`` is what to draw into: one Axes, or as many as there are units.
+        Without names: where the cart is and should be, its speed, and the voltage; of a gantry also those of the bridge
+        and both drives. ``ax`` is what to draw into: one Axes, or as many as there are units.
         """
         usual = ["reference", "bridge_position", "cart_position", "bridge_speed", "cart_speed"]
         usual += ["voltage", "left_voltage", "right_voltage"]

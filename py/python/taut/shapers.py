@@ -37,7 +37,8 @@ class Shape:
 
     @property
     def pairs(self) -> list[dict[str, Any]]:
-        """The best pairs of shapers, one behind the other, with their ``impulses``; empty unless ``pairs=True`` was said."""
+        """The best pairs of shapers, one behind the other, with their ``impulses``; empty unless ``pairs=True`` was
+        said."""
         return list(self.data["pairs"])
 
     @property
@@ -47,13 +48,15 @@ class Shape:
         return None if best is None else str(best["line"])
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A pandas.DataFrame of the shapers: frequency (Hz), vibration that is left, smoothing (m), acceleration up to (m/s^2)."""
+        """A pandas.DataFrame of the shapers: frequency (Hz), vibration that is left, smoothing (m), acceleration up to
+        (m/s^2)."""
         rows = self.data["shapers"]
         keys = ("shaper", "frequency", "vibration", "smoothing", "max_acceleration", "candidate")
         return frame({key: [row[key] for row in rows] for key in keys})
 
     def plot(self, *, ax: Axes | None = None) -> Figure:
-        """The vibration that each shaper leaves; over a measured spectrum the spectrum, with the shapers' frequencies."""
+        """The vibration that each shaper leaves; over a measured spectrum the spectrum, with the shapers'
+        frequencies."""
         figure, (axis,) = _plots.panels(ax, 1, height=3.0)
         spectrum = self.data.get("spectrum")
         if spectrum is None:
@@ -94,12 +97,13 @@ def shape(
 ) -> Shape:
     """An input shaper from one file of vibration, two that are compared, or several ``together``.
 
-    A file is a spectrum or samples of an accelerometer as Klipper writes them, or a case. ``firmware`` is ``klipper`` or
-    ``klipper-2025-08``; ``axis`` of the accelerometer is ``x``, ``y`` or ``z``; ``damping`` is a ratio, or ``"fitted"``;
-    ``max_smoothing`` is in m, ``max_vibrations`` a share (0.05 is 5 %), ``corner_speed`` in m/s; ``shapers`` are names to choose
-    among. Of a case, ``uncertainty`` is by which share its frequencies may be off, ``motor`` is ``held`` or ``free``, and
-    ``changes`` are values by key, as of :meth:`taut.Case.changed`. With ``pairs`` two shapers one behind the other are looked
-    at, too: for two modes, or for one that moves far along the travel.
+    A file is a spectrum or samples of an accelerometer as Klipper writes them, or a case. ``firmware`` is ``klipper``
+    or ``klipper-2025-08``; ``axis`` of the accelerometer is ``x``, ``y`` or ``z``; ``damping`` is a ratio, or
+    ``"fitted"``; ``max_smoothing`` is in m, ``max_vibrations`` a share (0.05 is 5 %), ``corner_speed`` in m/s;
+    ``shapers`` are names to choose among. Of a case, ``uncertainty`` is by which share its frequencies may be off,
+    ``motor`` is ``held`` or ``free``, and ``changes`` are values by key, as of :meth:`taut.Case.changed`. With
+    ``pairs`` two shapers one behind the other are looked at, too: for two modes, or for one that moves far along the
+    travel.
     """
     paths = [files] if isinstance(files, (str, PathLike)) else list(files)
     fitted = isinstance(damping, str)

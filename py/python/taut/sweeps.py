@@ -41,17 +41,18 @@ def sweep(
     client: Client | None = None,
     chunk: int | None = None,
 ) -> Table:
-    """Runs ``n`` machines, each with every experiment and move of the case: a row of parameters and key figures for each.
+    """Runs ``n`` machines, each with every experiment and move of the case: a row of parameters and key figures for
+    each.
 
-    What is not said here is as in [sweep] of the case. ``vary`` says how parameters vary, as ``--vary`` of the command line
-    does: ``{"cart.mass": "20 %", "motor.resistance": "normal(0.7 ohm, 0.02 ohm)"}``. ``design`` is ``random``,
-    ``latin-hypercube``, ``sobol``, ``grid`` or ``one-at-a-time``, ``seed`` says which draws, ``interval`` (s) how far apart
-    the rows are that figures are taken from, ``indices`` makes the runs those that Sobol' indices need. ``figures`` are the
-    names of those that are told, ``["peak_cart_speed", "stop_time"]``: others are not sought.
+    What is not said here is as in [sweep] of the case. ``vary`` says how parameters vary, as ``--vary`` of the command
+    line does: ``{"cart.mass": "20 %", "motor.resistance": "normal(0.7 ohm, 0.02 ohm)"}``. ``design`` is ``random``,
+    ``latin-hypercube``, ``sobol``, ``grid`` or ``one-at-a-time``, ``seed`` says which draws, ``interval`` (s) how far
+    apart the rows are that figures are taken from, ``indices`` makes the runs those that Sobol' indices need.
+    ``figures`` are the names of those that are told, ``["peak_cart_speed", "stop_time"]``: others are not sought.
 
-    Row ``i`` depends on the case and ``i`` alone: the result is the same to the last bit with any number of ``threads`` (0:
-    one for each processor), and on the workers of a ``client`` of Dask, in tasks of ``chunk`` runs. A worker that is lost
-    costs time, and no row.
+    Row ``i`` depends on the case and ``i`` alone: the result is the same to the last bit with any number of ``threads``
+    (0: one for each processor), and on the workers of a ``client`` of Dask, in tasks of ``chunk`` runs. A worker that
+    is lost costs time, and no row.
     """
     changed = _planned(case, n, vary, design, seed, indices, interval, figures)
     threads = _checks.whole("threads", threads, 0)
@@ -79,14 +80,16 @@ def sweep_tables(
     client: Client,
     chunk: int | None = None,
 ) -> Iterator[pyarrow.Table]:
-    """The same rows piece by piece in their order, as tables of Arrow: memory stays flat however many runs there are."""
+    """The same rows piece by piece in their order, as tables of Arrow: memory stays flat however many runs there
+    are."""
     return _tables(_planned(case, n, vary, design, seed, indices, interval, figures), client, chunk)
 
 
 def kernel(text: str, path: str, runs: pyarrow.Table) -> pyarrow.Table:
     """Arrow in, Arrow out: the rows of the runs whose numbers stand in the column ``run``, in that order.
 
-    ``text`` and ``path`` are those of a case with [sweep]. This is what a worker runs; it keeps the last cases it was given.
+    ``text`` and ``path`` are those of a case with [sweep]. This is what a worker runs; it keeps the last cases it was
+    given.
     """
     arrow = needed("pyarrow", "pyarrow", "the sweep kernel")
     numbers = runs.column("run").to_pylist()

@@ -71,8 +71,8 @@ class Table(Mapping[str, NDArray[np.float64]]):
     def to_arrow(self) -> pyarrow.Table:
         """A pyarrow.Table over the same memory, named and described as in our Parquet files.
 
-        Columns have headings with units; the schema's metadata holds ``unit.cart_position_m`` = ``m`` and so on, and each
-        field's ``unit`` besides.
+        Columns have headings with units; the schema's metadata holds ``unit.cart_position_m`` = ``m`` and so on, and
+        each field's ``unit`` besides.
         """
         return arrow_table(self._arrays, self._names)
 
@@ -88,7 +88,8 @@ class Table(Mapping[str, NDArray[np.float64]]):
         return frame
 
     def plot(self, *columns: str, ax: Axes | Sequence[Axes] | None = None) -> Figure:
-        """A histogram of one column, or the second over the first as points; of a sweep, its figures over its parameters."""
+        """A histogram of one column, or the second over the first as points; of a sweep, its figures over its
+        parameters."""
         if len(columns) not in (1, 2):
             raise TypeError("plot() takes one column for a histogram, or two for points: plot('x', 'y')")
         figure, (axis,) = _plots.panels(ax, 1, height=3.0)
