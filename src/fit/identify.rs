@@ -7,6 +7,7 @@
 
 use super::combinations::{self, Combination};
 use super::problem::Problem;
+use super::triangle::shortened;
 use crate::parameter::{Arm, Free, Sum, named, value};
 use nalgebra::{DMatrix, SVD};
 
@@ -348,7 +349,7 @@ fn projected(jacobian: &DMatrix<f64>, n: usize) -> Option<DMatrix<f64>> {
     let all = jacobian.ncols();
     if all == n {
         let rows = jacobian.nrows();
-        return if rows > n { Some(jacobian.clone().qr().unpack_r()) } else { Some(jacobian.clone()) };
+        return if rows > n { Some(shortened(jacobian).qr().unpack_r()) } else { Some(jacobian.clone()) };
     }
     // Others first: the last block of R is what they leave of the rest.
     let order: Vec<usize> = (n..all).chain(0..n).collect();
@@ -356,7 +357,7 @@ fn projected(jacobian: &DMatrix<f64>, n: usize) -> Option<DMatrix<f64>> {
     if ordered.nrows() < all {
         return None;
     }
-    let r = ordered.qr().unpack_r();
+    let r = shortened(&ordered).qr().unpack_r();
     Some(r.view((all - n, all - n), (n, n)).into_owned())
 }
 

@@ -15,6 +15,7 @@
 //! before it is called stalled.
 
 use super::cmaes;
+use super::triangle::shortened;
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector};
 
@@ -25,6 +26,10 @@ const COARSER: [f64; 2] = [1.0, 10.0];
 /// the cost has kinks, they see past the small ones; where it has none, they are as good as others.
 const NEAR: f64 = 1.0;
 const FINE: f64 = 0.3;
+
+/// So many standard errors from where it leads, a step along exact derivatives that does not do what they promised, but
+/// for a quarter, is one over kinks.
+const SMOOTH: f64 = 3.0;
 
 /// Most variables that are searched by evolution, and how often.
 const MOST_EVOLVED: usize = 16;
@@ -47,6 +52,11 @@ pub trait Residuals {
 
     /// r(x); false where it cannot be computed.
     fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool;
+
+    /// Whether the last Jacobian is exact, whatever differences were asked for.
+    fn is_exact(&self) -> bool {
+        false
+    }
 
     /// ∂r/∂x by differences within the bounds; `r` = r(x). Zero for a variable whose bounds hold it.
     fn jacobian(&mut self, x: &[f64], r: &[f64], bounds: &Bounds, how: &Differences) -> Option<DMatrix<f64>> {
@@ -116,6 +126,11 @@ impl Step {
             (true, false, true) => Self { first: x + h, second: Some(x + 2.0 * h), at: x },
             (_, _, true) => Self { first: x - h, second: Some(x - 2.0 * h), at: x },
         }
+    }
+
+    /// The weights in that slope of the values at x and at the two points.
+    pub fn weights(&self) -> [f64; 3] {
+        [self.slope(1.0, 0.0, 0.0), self.slope(0.0, 1.0, 0.0), self.slope(0.0, 0.0, 1.0)]
     }
 
     /// The slope at x of a function with these values at x and at the two points.
@@ -267,6 +282,7 @@ pub fn minimise(
     let mut scale = DVector::zeros(n);
     let mut trial = vec![0.0; rows];
     let (mut evolved, mut coarser, mut slow) = (0, 0, 0);
+    let (mut fine, mut kinked) = (false, false);
     loop {
         if watch(&best.x, best.cost) == Flow::Stop {
             best.ending = Ending::Interrupted;
@@ -278,6 +294,7 @@ pub fn minimise(
         };
         best.iterations += 1;
         best.jacobian = jacobian;
+        let is_exact = problem.is_exact();
         let model = Linear::new(&best, options.huber);
         for j in 0..n {
             scale[j] = f64::max(scale[j], model.norm(j));
@@ -300,14 +317,14 @@ pub fn minimise(
         best.decrement = model.reach(&newton) / deviation.max(f64::MIN_POSITIVE);
         let tiny = (0..n).all(|j| newton[j].abs() <= 1e-11 * best.x[j].abs().max(1.0));
         if best.decrement <= options.tolerance || tiny {
-            if how == Differences::Central || coarser > 0 {
+            if how == Differences::Central || coarser > 0 || is_exact {
                 best.ending = Ending::Converged;
                 return best;
             }
             how = Differences::Central;
             continue;
         }
-        if best.decrement < NEAR && how == Differences::Forward {
+        if best.decrement < NEAR && how == Differences::Forward && (!is_exact || kinked) {
             let errors = model.errors(&held, deviation);
             how = Differences::Coarse(errors.iter().map(|error| FINE * error).collect());
         } else if best.decrement < 100.0 * options.tolerance && coarser == 0 {
@@ -343,6 +360,7 @@ pub fn minimise(
                 // Less than shows, far less than was promised: a kink is near.
                 let shows = 0.5 * (SHOWS * deviation).powi(2);
                 let fallen = best.cost - cost;
+                kinked |= best.decrement < SMOOTH && (gain - 1.0).abs() > 0.25;
                 slow = if fallen < shows && (gain < 0.25 || best.decrement > 2.0 * SHOWS) { slow + 1 } else { 0 };
                 best.x = x;
                 best.cost = cost;
@@ -362,7 +380,7 @@ pub fn minimise(
             continue;
         }
         slow = 0;
-        if coarser == 0 && how != Differences::Central {
+        if coarser == 0 && how != Differences::Central && !is_exact {
             // The cheap derivatives may be to blame.
             (how, lambda) = (Differences::Central, None);
             continue;
@@ -371,7 +389,12 @@ pub fn minimise(
             best.ending = Ending::Converged;
             return best;
         }
-        if coarser < COARSER.len() {
+        if is_exact && !fine {
+            // Between two kinks the slope is not that across them.
+            let errors = model.errors(&held, deviation);
+            how = Differences::Coarse(errors.iter().map(|error| FINE * error).collect());
+            fine = true;
+        } else if coarser < COARSER.len() {
             let errors = model.errors(&held, deviation);
             how = Differences::Coarse(errors.iter().map(|error| COARSER[coarser] * error).collect());
             best.coarse = COARSER[coarser];
@@ -500,7 +523,11 @@ impl Linear {
         if jacobian.nrows() < n {
             return Self { r: jacobian, qtr: residual };
         }
-        let qr = jacobian.qr();
+        let mut beside = jacobian.insert_column(n, 0.0);
+        beside.set_column(n, &residual);
+        let short = shortened(&beside);
+        let mut residual = short.column(n).into_owned();
+        let qr = short.remove_column(n).qr();
         qr.q_tr_mul(&mut residual);
         Self { r: qr.unpack_r(), qtr: residual.rows(0, n).into_owned() }
     }

@@ -32,7 +32,9 @@ mod result;
 mod run;
 mod scores;
 mod search;
+mod sensitivity;
 mod sub_records;
+mod triangle;
 mod uncertainty;
 
 pub use check::{Check, check, check_watched};
