@@ -16,6 +16,9 @@ pub(super) const ROUNDING: f64 = 1e-10;
 /// A delay that is known to so many samples is known.
 const LATE: f64 = 10.0;
 
+/// Standard errors of its speed by which a log has to begin in motion, to be taken to.
+const MOVES: f64 = 5.0;
+
 /// Noise of first order that keeps to itself for 30 samples is so many times what neighbouring values differ by.
 const SHARED: f64 = 5.0;
 
@@ -218,7 +221,10 @@ impl<'a> Problem<'a> {
                 }
             }
             if initial_state || windowed {
-                let start = if windowed { slope_at_start(run, r) } else { 0.0 };
+                let (slope, doubt) = slope_at_start(run, r, &noise);
+                // A log begins at rest, unless it shows that it does not: a start at rest sticks, and a search from
+                // there sees nothing of the speed.
+                let start = if windowed || slope.abs() > MOVES * doubt { slope } else { 0.0 };
                 let (low, high) = (start - 20.0 * fast, start + 20.0 * fast);
                 run.extras.push(Extra { what: Nuisance::StartSpeed, start, unit: fast, low, high, known: None });
             }
@@ -624,9 +630,9 @@ pub(super) fn extent(values: &[f64]) -> f64 {
     if high >= low { high - low } else { 0.0 }
 }
 
-/// Speed of the cart at the start of a window, m/s, from a line through its first rows.
-fn slope_at_start(run: &Run, r: f64) -> f64 {
-    let Some(seen) = run.seen.iter().find(|seen| is_position(seen.quantity)) else { return 0.0 };
+/// Speed of the cart at the start of a log or window, m/s, from a line through its first rows, and its standard error.
+fn slope_at_start(run: &Run, r: f64, noise: &Noise) -> (f64, f64) {
+    let Some(seen) = run.seen.iter().find(|seen| is_position(seen.quantity)) else { return (0.0, 0.0) };
     let rows: Vec<usize> = (0..run.time.len().min(15)).filter(|&k| seen.values[k].is_finite()).collect();
     let n = rows.len().max(1) as f64;
     let (t, y) =
@@ -636,8 +642,8 @@ fn slope_at_start(run: &Run, r: f64) -> f64 {
         above += (run.time[k] - t) * (seen.values[k] - y);
         below += (run.time[k] - t).powi(2);
     }
-    let slope = if below > 0.0 { above / below } else { 0.0 };
-    if seen.quantity == Quantity::CartPosition { slope } else { slope * r }
+    let arm = if seen.quantity == Quantity::CartPosition { 1.0 } else { r };
+    if below > 0.0 { (arm * above / below, arm * noise.of(seen.quantity) / below.sqrt()) } else { (0.0, 0.0) }
 }
 
 /// The scale on which a parameter is searched for.

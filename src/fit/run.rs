@@ -23,6 +23,9 @@ const FEWEST: usize = 2;
 /// speeds, all else straight lines. With h the raster, that is off by at most h⁴|x⁗|/384, and h²|ÿ|/8.
 const RASTER: f64 = 8.0;
 
+/// Rows of input that are kept from before a window: more than a delay that is fitted along comes to.
+const EARLIER: usize = 60;
+
 /// A nuisance of a log: fitted along, one for each log.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Nuisance {
@@ -195,12 +198,15 @@ impl Run {
         // On the raster, where the solver need not stop twice for a sample.
         let grid = Grid::new(every, until);
         let times = if even { (0..n as u64).map(|k| grid.time(k)).collect() } else { time.clone() };
-        let input = match &experiment.input {
-            Signal::Sampled { times: own, .. } if *own == log.time => {
-                Signal::Sampled { times, values: logged.clone(), hold: log.hold }
-            }
-            _ if whole => experiment.input.clone(),
-            _ => Signal::Sampled { times, values: logged.clone(), hold: log.hold },
+        let is_logged = matches!(&experiment.input, Signal::Sampled { times: own, .. } if *own == log.time);
+        let input = if whole && !is_logged {
+            experiment.input.clone()
+        } else {
+            // A window that is late still has the input of what came before it.
+            let earlier = rows.start.saturating_sub(EARLIER)..rows.start;
+            let before = log.time[earlier.clone()].iter().map(|t| t - shift);
+            let values = log.input[earlier].iter().chain(&logged).copied().collect();
+            Signal::Sampled { times: before.chain(times).collect(), values, hold: log.hold }
         };
         let limit = setting.fitted_until.map_or(f64::INFINITY, |until| until - shift);
         let fitted_rows = if setting.held_out { 0 } else { time.partition_point(|&t| t < limit) };
