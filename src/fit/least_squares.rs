@@ -11,9 +11,11 @@
 //! `tolerance` of a standard error, and no variable at its bound is pushed inwards.
 //!
 //! Logs with dry friction make the cost kinked where sticks and slips change their order. Where no damped step helps
-//! and the test is not passed, derivatives over longer steps are tried, and then an evolution strategy that needs none,
-//! before it is called stalled.
+//! and the test is not passed, a bundle of exact gradients goes on (`bundle.rs`), which knows a minimum on kinks. Where
+//! gradients are none or do not lead there, derivatives over longer steps are tried, and then an evolution strategy that
+//! needs none, before it is called stalled.
 
+use super::bundle::{self, Coordinates};
 use super::cmaes;
 use super::triangle::shortened;
 use crate::solve::Flow;
@@ -27,10 +29,6 @@ const COARSER: [f64; 2] = [1.0, 10.0];
 const NEAR: f64 = 1.0;
 const FINE: f64 = 0.3;
 
-/// So many standard errors from where it leads, a step along exact derivatives that does not do what they promised, but
-/// for a quarter, is one over kinks.
-const SMOOTH: f64 = 3.0;
-
 /// Most variables that are searched by evolution, and how often.
 const MOST_EVOLVED: usize = 16;
 const MOST_EVOLUTIONS: usize = 2;
@@ -38,7 +36,8 @@ const MOST_EVOLUTIONS: usize = 2;
 /// Generations without a gain that shows, after which an evolution ends.
 const BARREN: usize = 8;
 
-/// Where the cost has kinks, the standard errors that the last step may promise: no step of any length fulfilled it.
+/// Where the cost has kinks, the standard errors that the last step may promise: all the gradients around together, or
+/// one by itself, and no step of any length fulfilled it.
 const KINK: f64 = 0.1;
 
 /// Two steps after each other that gain less than this many standard errors, and little of what they promised, are at a
@@ -95,6 +94,8 @@ pub enum Differences {
     /// kink for each of them; steps of about a standard error see the slope that matters and not that between two
     /// kinks.
     Coarse(Vec<f64>),
+    /// Exact where that can be, and else to both sides by these steps.
+    ExactOr(Vec<f64>),
 }
 
 /// Where a derivative is measured.
@@ -116,7 +117,9 @@ impl Step {
         let h = match how {
             Differences::Forward => 1e-7 * size,
             Differences::Central => 6e-6 * size,
-            Differences::Coarse(steps) => f64::min(steps[j].max(6e-6 * size), (high - low) / 3.0),
+            Differences::Coarse(steps) | Differences::ExactOr(steps) => {
+                f64::min(steps[j].max(6e-6 * size), (high - low) / 3.0)
+            }
         };
         match (x + h <= high, x - h >= low, central) {
             (true, true, true) => Self { first: x + h, second: Some(x - h), at: x },
@@ -235,6 +238,8 @@ pub struct Minimum {
     pub ending: Ending,
     /// Steps of the derivatives, in standard errors, where the cost has kinks; 0 where it is smooth.
     pub coarse: f64,
+    /// How many gradients around balance there; more than one at a kink.
+    pub pieces: usize,
     /// How often an evolution strategy went on where derivatives did not help.
     pub evolved: usize,
     /// Jacobians computed.
@@ -244,7 +249,7 @@ pub struct Minimum {
 }
 
 /// ½ Σ ρ(r), ρ = r² up to the threshold and 2 k |r| − k² beyond.
-fn cost_of(r: &[f64], k: f64) -> f64 {
+pub(super) fn cost_of(r: &[f64], k: f64) -> f64 {
     r.iter().map(|&r| if r.abs() <= k { 0.5 * r * r } else { k * r.abs() - 0.5 * k * k }).sum()
 }
 
@@ -267,6 +272,7 @@ pub fn minimise(
         at_bound: vec![false; n],
         ending: Ending::Failed,
         coarse: 0.0,
+        pieces: 1,
         evolved: 0,
         iterations: 0,
         evaluations: 1,
@@ -282,7 +288,7 @@ pub fn minimise(
     let mut scale = DVector::zeros(n);
     let mut trial = vec![0.0; rows];
     let (mut evolved, mut coarser, mut slow) = (0, 0, 0);
-    let (mut fine, mut kinked) = (false, false);
+    let mut balanced = false;
     loop {
         if watch(&best.x, best.cost) == Flow::Stop {
             best.ending = Ending::Interrupted;
@@ -324,7 +330,7 @@ pub fn minimise(
             how = Differences::Central;
             continue;
         }
-        if best.decrement < NEAR && how == Differences::Forward && (!is_exact || kinked) {
+        if best.decrement < NEAR && how == Differences::Forward && !is_exact {
             let errors = model.errors(&held, deviation);
             how = Differences::Coarse(errors.iter().map(|error| FINE * error).collect());
         } else if best.decrement < 100.0 * options.tolerance && coarser == 0 {
@@ -360,7 +366,6 @@ pub fn minimise(
                 // Less than shows, far less than was promised: a kink is near.
                 let shows = 0.5 * (SHOWS * deviation).powi(2);
                 let fallen = best.cost - cost;
-                kinked |= best.decrement < SMOOTH && (gain - 1.0).abs() > 0.25;
                 slow = if fallen < shows && (gain < 0.25 || best.decrement > 2.0 * SHOWS) { slow + 1 } else { 0 };
                 best.x = x;
                 best.cost = cost;
@@ -389,11 +394,17 @@ pub fn minimise(
             best.ending = Ending::Converged;
             return best;
         }
-        if is_exact && !fine {
-            // Between two kinks the slope is not that across them.
-            let errors = model.errors(&held, deviation);
-            how = Differences::Coarse(errors.iter().map(|error| FINE * error).collect());
-            fine = true;
+        if is_exact && !balanced {
+            balanced = true;
+            let free = (0..n).filter(|&j| !held[j] && model.norm(j) > 0.0).collect();
+            let at = Coordinates::new(&best, &model.r, free, bounds, (deviation, options.huber));
+            if let Some(found) = bundle::descend(problem, &mut best, &at, (KINK, options.iterations), watch) {
+                (best.decrement, best.jacobian, best.pieces) = (found.promise, found.jacobian, found.pieces);
+                if found.promise <= KINK {
+                    best.ending = Ending::Converged;
+                    return best;
+                }
+            }
         } else if coarser < COARSER.len() {
             let errors = model.errors(&held, deviation);
             how = Differences::Coarse(errors.iter().map(|error| COARSER[coarser] * error).collect());

@@ -4,6 +4,7 @@
 //! seen, all logs at once. The recipe is [`fit`]; before it, [`check`] says what the logs can determine.
 
 mod acceleration;
+mod bundle;
 mod case_text;
 mod check;
 mod cmaes;
