@@ -23,6 +23,9 @@ fn main() -> taut::Result<()> {
             if estimate.at_bound { " at its bound" } else { "" }
         );
     }
+    for finding in &fit.findings {
+        println!("{finding}");
+    }
     for log in &fit.logs {
         for output in &log.outputs {
             let shown = |score: Option<taut::fit::Score>| {

@@ -4,10 +4,11 @@ use crate::common::chance;
 use crate::common::logged;
 use chance::Chance;
 use logged::logged;
+use nalgebra::DMatrix;
 use taut::case::{Case, Nuisances, Plan, Scope, TEMPLATE};
 use taut::control::{Loop, Rows, Standard, stream};
 use taut::design;
-use taut::fit::least_squares::{Bounds, Ending, Options, Residuals, minimise};
+use taut::fit::least_squares::{Bounds, Differences, Ending, Options, Residuals, minimise};
 use taut::fit::{Estimate, Fit, check, fit, inverse_of_square, profiles};
 use taut::parameter::{Free, values};
 use taut::signal::profile::{Leg, Limits, Profile};
@@ -106,6 +107,49 @@ fn certified_problems_of_nist_are_met() {
     }
 }
 
+/// A valley along b = a² whose sides meet at a kink, with exact derivatives; least at (1, 1).
+struct Kinked;
+
+impl Residuals for Kinked {
+    fn rows(&self) -> usize {
+        30
+    }
+
+    fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool {
+        r.fill(1.0);
+        (r[0], r[1]) = (10.0 + 4.0 * (x[1] - x[0] * x[0]).abs(), 3.0 * (1.0 - x[0]));
+        true
+    }
+
+    fn is_exact(&self) -> bool {
+        true
+    }
+
+    fn jacobian(&mut self, x: &[f64], _: &[f64], _: &Bounds, _: &Differences) -> Option<DMatrix<f64>> {
+        let mut jacobian = DMatrix::zeros(30, 2);
+        let side = 4.0 * (x[1] - x[0] * x[0]).signum();
+        (jacobian[(0, 0)], jacobian[(0, 1)], jacobian[(1, 0)]) = (-2.0 * side * x[0], side, -3.0);
+        Some(jacobian)
+    }
+}
+
+/// A fit of EMPS ended where its sticks change their order, and was called stalled there: on a kink no gradient is zero,
+/// but at its minimum those of both sides balance.
+#[test]
+fn a_minimum_on_a_kink_is_one() {
+    let options = Options::default();
+    for start in [[0.6, 0.9], [1.5, 1.0], [3.0, 2.0]] {
+        let found = minimise(&mut Kinked, &start, &Bounds::none(2), &options, &mut |_, _| Flow::Continue);
+        assert_eq!(found.ending, Ending::Converged, "{start:?}: {} {:?}", found.decrement, found.x);
+        assert!(found.pieces > 1 && found.decrement < 0.1, "{start:?}: {} {}", found.pieces, found.decrement);
+        // A standard error along the valley is 0.9.
+        let [off, aside] = [found.x[0] - 1.0, found.x[1] - found.x[0] * found.x[0]];
+        assert!(off.abs() < 0.18 && aside.abs() < 1e-2, "{start:?}: {:?}", found.x);
+        let push = found.jacobian.tr_mul(&nalgebra::DVector::from_vec(found.residuals));
+        assert!(push.norm() < 1.5, "{push}");
+    }
+}
+
 /// The machine of the template with some numbers changed, and the logs of both pulses that its encoder makes of an
 /// angle that trembles with this deviation, rad.
 fn recorded(changes: &[&str], seed: u64, noise: f64) -> Case {
@@ -170,6 +214,26 @@ fn a_shared_offset_of_the_input_has_the_unit_of_what_the_amplifier_commands() {
         assert_eq!(offset.unit, unit);
         assert!(offset.value.abs() < 0.1, "{}", offset.value);
     }
+}
+
+/// Windows of a log that answers late began without an input, as if it had only then been switched on.
+#[test]
+fn windows_of_a_late_log_have_the_input_from_before() {
+    let mut case = recorded(&["cart.friction.coulomb=0.4"], 3, 1e-3);
+    for experiment in &mut case.experiments {
+        let mut log = (**experiment.log.as_ref().unwrap()).clone();
+        let values = &mut log.outputs[0].values;
+        let first = values[0];
+        values.rotate_right(5);
+        values[..5].fill(first);
+        experiment.log = Some(std::sync::Arc::new(log));
+    }
+    let mut plan = plan(&["cart.friction.viscous", "cart.friction.coulomb"]);
+    plan.windows = Some(0.2);
+    plan.nuisance.delay = Scope::Shared;
+    let found = fit(&case, &plan, None, &mut |_| Flow::Continue).unwrap();
+    let delay = found.estimates.iter().find(|one| one.name == "delay").unwrap();
+    assert!((delay.value - 5e-3).abs() < 4e-4, "{} {:?}", delay.value, delay.error);
 }
 
 /// Whatever was fitted, and however the file has it: the file that is written is the machine that was found.

@@ -108,6 +108,25 @@ fn a_law_that_was_not_asked_for_widens_intervals_and_is_named() {
     assert!(held >= 3 * machines - 2, "{held} of {}", 3 * machines);
 }
 
+/// Logs without noise, as a program writes them to six digits or to twelve, were said to speak for Coulomb friction "that
+/// is 640 nN less forward than backward": such a law moves an angle by less than the last digit.
+#[test]
+fn last_digits_of_a_log_speak_for_no_law() {
+    for digits in [6, 7, 12] {
+        let mut case = Case::from_text("axis.toml", TEMPLATE).unwrap();
+        let stage = case.stage.clone();
+        for experiment in &mut case.experiments {
+            let run = simulate(&stage, experiment, Solver::of(&stage)).unwrap().trajectory;
+            let told = |angle: &f64| format!("{angle:.digits$}").parse().unwrap();
+            let values = run.get("drive_angle").unwrap().iter().map(told).collect();
+            experiment.log = Some(logged(&experiment.name, &run, values));
+        }
+        let found = fitted(&case, &plan(&["cart.mass", KEYS[0], KEYS[1]]));
+        assert_eq!(found.other_law.map(|law| law.words), None, "{digits} digits");
+        assert!((found.estimates[0].value / stage.cart.mass - 1.0).abs() < 1e-5);
+    }
+}
+
 /// The right law is suspected of nothing more often than noise is.
 #[test]
 fn the_right_law_is_not_suspected() {

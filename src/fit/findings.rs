@@ -4,7 +4,7 @@ use super::Fit;
 use super::controller::reproduced;
 use super::least_squares::Ending;
 use super::problem::Problem;
-use super::regression::{Balance, regression_late};
+use super::regression::{Balance, balance, smoothed};
 use super::run::is_position;
 use super::search::Searched;
 use crate::case::{Case, Plan, Scope};
@@ -180,7 +180,8 @@ fn of_delay(plan: &Plan, problem: &Problem) -> Option<Finding> {
     if plan.nuisance.delay != Scope::Off || plan.closed_loop {
         return None;
     }
-    let left: Vec<f64> = (0..=LATEST).map_while(|late| Some(regression_late(problem, late)?.unexplained)).collect();
+    let logs = smoothed(problem);
+    let left: Vec<f64> = (0..=LATEST).map_while(|late| Some(balance(&logs, late)?.unexplained)).collect();
     let late = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]))?;
     if late < LATE || left[late] > 0.75 * left[0] || left[0] - left[late] < 0.03 {
         return None;

@@ -44,6 +44,8 @@ pub struct Fit {
     pub starts: Vec<f64>,
     /// Steps of derivatives, in standard errors, where the order of events left none; 0 where the cost was smooth.
     pub coarse: f64,
+    /// How many gradients around the estimates balance there; more than one at a kink.
+    pub pieces: usize,
     /// How often an evolution strategy, which needs no derivatives, went on.
     pub evolved: usize,
     /// Values that count.

@@ -7,6 +7,7 @@
 
 use super::combinations::{self, Combination};
 use super::problem::Problem;
+use super::triangle::shortened;
 use crate::parameter::{Arm, Free, Sum, named, value};
 use nalgebra::{DMatrix, SVD};
 
@@ -92,7 +93,7 @@ impl Identifiability {
         let mut names: Vec<String> = problem.parameters.iter().map(|parameter| parameter.name.clone()).collect();
         names.extend(problem.shared.iter().map(|extra| extra.what.name().to_string()));
         let sensitivity = norms.iter().map(|norm| norm / deviation / rows.sqrt()).collect();
-        let least = shows(problem) * rows.sqrt();
+        let least = shows(problem).least * rows.sqrt();
         let lost: Vec<usize> =
             (0..v.ncols()).filter(|&i| i >= *alive || singular[i] < least || off[i] > LIMIT).collect();
         let goes_with = |j: usize| lost.iter().map(|&i| v[(j, i)].powi(2)).sum::<f64>().sqrt();
@@ -107,7 +108,7 @@ impl Identifiability {
             .collect();
         let singular = singular.iter().map(|s| s / deviation).collect();
         let mut result = Self { names, sensitivity, singular, error, groups: Vec::new(), leads: leads(v, &lost) };
-        result.groups = result.grouped(problem, directions, &lost, x, of);
+        result.groups = result.grouped(problem, directions, (&lost, off), x, of);
         result
     }
 
@@ -116,7 +117,7 @@ impl Identifiability {
         &self,
         problem: &Problem,
         directions: &Directions,
-        lost: &[usize],
+        (lost, off): (&[usize], &[f64]),
         x: &[f64],
         of: &dyn Fn(&[f64]) -> f64,
     ) -> Vec<Group> {
@@ -146,7 +147,11 @@ impl Identifiability {
             members.sort_unstable();
             let gone = members.iter().map(|&j| hidden(j, j)).sum::<f64>().round() as usize;
             let determined = members.len().saturating_sub(gone.max(1));
-            let words = self.words(problem, &members, determined, &hidden, x);
+            let told = directions.told_by_noise(lost, &members, off);
+            let words = match told {
+                Some(strongest) if determined == 0 => self.too_little(problem, &members, strongest),
+                _ => self.words(problem, &members, determined, &hidden, x),
+            };
             let combinations = if determined == 0 {
                 Vec::new()
             } else {
@@ -155,6 +160,23 @@ impl Identifiability {
             groups.push(Group { members, determined, words, combinations });
         }
         groups
+    }
+
+    /// That no machine is the model to so little as these move the outputs: by `strongest`, of what all values weigh.
+    fn too_little(&self, problem: &Problem, members: &[usize], strongest: f64) -> String {
+        let names: Vec<&str> = members.iter().map(|&j| self.names[j].as_str()).collect();
+        let Least { least, range } = shows(problem);
+        let percent = |share: f64| crate::number::significant(100.0 * share, 2);
+        let by = match least > MODEL * range {
+            true => "less than a fifth of what their converter rounds".to_string(),
+            false => format!(
+                "{} % of how far they range, and no model is good to less than {} %",
+                percent(strongest / range),
+                percent(MODEL)
+            ),
+        };
+        let verb = if names.len() == 1 { "shows" } else { "show" };
+        format!("{} {verb} too little in these logs: a change by 100 % moves the outputs by {by}", listed(&names))
     }
 
     fn words(
@@ -303,6 +325,18 @@ impl Directions {
     }
 }
 
+impl Directions {
+    /// Root mean square by which a change by 100 % along the strongest of the lost directions of these members moves the
+    /// values, if noise alone would leave all of them determined.
+    fn told_by_noise(&self, lost: &[usize], members: &[usize], off: &[f64]) -> Option<f64> {
+        let goes = |i: &&usize| members.iter().map(|&j| self.v[(j, **i)].powi(2)).sum::<f64>() > SHARE;
+        let own: Vec<usize> = lost.iter().filter(goes).copied().collect();
+        let is_told = |&i: &usize| i < self.alive && off[i] <= LIMIT;
+        let strongest = own.iter().map(|&i| self.singular[i]).fold(0.0, f64::max);
+        (!own.is_empty() && own.iter().all(is_told)).then(|| strongest / self.rows.sqrt())
+    }
+}
+
 /// For each of the lost directions a parameter of its own that moves much along it: by elimination with the greatest
 /// pivots.
 fn leads(v: &DMatrix<f64>, lost: &[usize]) -> Vec<usize> {
@@ -333,14 +367,22 @@ fn leads(v: &DMatrix<f64>, lost: &[usize]) -> Vec<usize> {
     leads
 }
 
-/// The least root mean square of a value's change, in its weights, that a machine shows.
-fn shows(problem: &Problem) -> f64 {
+/// What a change of a value has to come to, so that a machine shows it, and how far the values range: in their weights.
+struct Least {
+    least: f64,
+    range: f64,
+}
+
+/// The least root mean square of a value's change that a machine shows.
+fn shows(problem: &Problem) -> Least {
     let seen = problem.runs.iter().flat_map(|run| &run.seen);
     let of = |seen: &super::run::MeasuredOutput| {
         let weight = seen.weights.iter().copied().fold(0.0, f64::max);
-        weight * (SHOWS * seen.step / 12f64.sqrt()).max(MODEL * super::problem::extent(&seen.values))
+        let range = weight * super::problem::extent(&seen.values);
+        Least { least: f64::max(weight * SHOWS * seen.step / 12f64.sqrt(), MODEL * range), range }
     };
-    seen.map(of).filter(|least| *least > 0.0).fold(f64::INFINITY, f64::min).min(1e300)
+    let all = seen.map(of).filter(|one| one.least > 0.0 && one.least < 1e300);
+    all.min_by(|a, b| a.least.total_cmp(&b.least)).unwrap_or(Least { least: 1e300, range: 1e300 })
 }
 
 /// Columns of the first `n` variables without what the others can do.
@@ -348,7 +390,7 @@ fn projected(jacobian: &DMatrix<f64>, n: usize) -> Option<DMatrix<f64>> {
     let all = jacobian.ncols();
     if all == n {
         let rows = jacobian.nrows();
-        return if rows > n { Some(jacobian.clone().qr().unpack_r()) } else { Some(jacobian.clone()) };
+        return if rows > n { Some(shortened(jacobian).qr().unpack_r()) } else { Some(jacobian.clone()) };
     }
     // Others first: the last block of R is what they leave of the rest.
     let order: Vec<usize> = (n..all).chain(0..n).collect();
@@ -356,7 +398,7 @@ fn projected(jacobian: &DMatrix<f64>, n: usize) -> Option<DMatrix<f64>> {
     if ordered.nrows() < all {
         return None;
     }
-    let r = ordered.qr().unpack_r();
+    let r = shortened(&ordered).qr().unpack_r();
     Some(r.view((all - n, all - n), (n, n)).into_owned())
 }
 

@@ -11,10 +11,13 @@
 //! `tolerance` of a standard error, and no variable at its bound is pushed inwards.
 //!
 //! Logs with dry friction make the cost kinked where sticks and slips change their order. Where no damped step helps
-//! and the test is not passed, derivatives over longer steps are tried, and then an evolution strategy that needs none,
-//! before it is called stalled.
+//! and the test is not passed, a bundle of exact gradients goes on (`bundle.rs`), which knows a minimum on kinks. Where
+//! gradients are none or do not lead there, derivatives over longer steps are tried, and then an evolution strategy that
+//! needs none, before it is called stalled.
 
+use super::bundle::{self, Coordinates};
 use super::cmaes;
+use super::triangle::shortened;
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector};
 
@@ -33,7 +36,8 @@ const MOST_EVOLUTIONS: usize = 2;
 /// Generations without a gain that shows, after which an evolution ends.
 const BARREN: usize = 8;
 
-/// Where the cost has kinks, the standard errors that the last step may promise: no step of any length fulfilled it.
+/// Where the cost has kinks, the standard errors that the last step may promise: all the gradients around together, or
+/// one by itself, and no step of any length fulfilled it.
 const KINK: f64 = 0.1;
 
 /// Two steps after each other that gain less than this many standard errors, and little of what they promised, are at a
@@ -47,6 +51,11 @@ pub trait Residuals {
 
     /// r(x); false where it cannot be computed.
     fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool;
+
+    /// Whether the last Jacobian is exact, whatever differences were asked for.
+    fn is_exact(&self) -> bool {
+        false
+    }
 
     /// ∂r/∂x by differences within the bounds; `r` = r(x). Zero for a variable whose bounds hold it.
     fn jacobian(&mut self, x: &[f64], r: &[f64], bounds: &Bounds, how: &Differences) -> Option<DMatrix<f64>> {
@@ -85,6 +94,8 @@ pub enum Differences {
     /// kink for each of them; steps of about a standard error see the slope that matters and not that between two
     /// kinks.
     Coarse(Vec<f64>),
+    /// Exact where that can be, and else to both sides by these steps.
+    ExactOr(Vec<f64>),
 }
 
 /// Where a derivative is measured.
@@ -106,7 +117,9 @@ impl Step {
         let h = match how {
             Differences::Forward => 1e-7 * size,
             Differences::Central => 6e-6 * size,
-            Differences::Coarse(steps) => f64::min(steps[j].max(6e-6 * size), (high - low) / 3.0),
+            Differences::Coarse(steps) | Differences::ExactOr(steps) => {
+                f64::min(steps[j].max(6e-6 * size), (high - low) / 3.0)
+            }
         };
         match (x + h <= high, x - h >= low, central) {
             (true, true, true) => Self { first: x + h, second: Some(x - h), at: x },
@@ -116,6 +129,11 @@ impl Step {
             (true, false, true) => Self { first: x + h, second: Some(x + 2.0 * h), at: x },
             (_, _, true) => Self { first: x - h, second: Some(x - 2.0 * h), at: x },
         }
+    }
+
+    /// The weights in that slope of the values at x and at the two points.
+    pub fn weights(&self) -> [f64; 3] {
+        [self.slope(1.0, 0.0, 0.0), self.slope(0.0, 1.0, 0.0), self.slope(0.0, 0.0, 1.0)]
     }
 
     /// The slope at x of a function with these values at x and at the two points.
@@ -220,6 +238,8 @@ pub struct Minimum {
     pub ending: Ending,
     /// Steps of the derivatives, in standard errors, where the cost has kinks; 0 where it is smooth.
     pub coarse: f64,
+    /// How many gradients around balance there; more than one at a kink.
+    pub pieces: usize,
     /// How often an evolution strategy went on where derivatives did not help.
     pub evolved: usize,
     /// Jacobians computed.
@@ -229,7 +249,7 @@ pub struct Minimum {
 }
 
 /// ½ Σ ρ(r), ρ = r² up to the threshold and 2 k |r| − k² beyond.
-fn cost_of(r: &[f64], k: f64) -> f64 {
+pub(super) fn cost_of(r: &[f64], k: f64) -> f64 {
     r.iter().map(|&r| if r.abs() <= k { 0.5 * r * r } else { k * r.abs() - 0.5 * k * k }).sum()
 }
 
@@ -252,6 +272,7 @@ pub fn minimise(
         at_bound: vec![false; n],
         ending: Ending::Failed,
         coarse: 0.0,
+        pieces: 1,
         evolved: 0,
         iterations: 0,
         evaluations: 1,
@@ -267,6 +288,7 @@ pub fn minimise(
     let mut scale = DVector::zeros(n);
     let mut trial = vec![0.0; rows];
     let (mut evolved, mut coarser, mut slow) = (0, 0, 0);
+    let mut balanced = false;
     loop {
         if watch(&best.x, best.cost) == Flow::Stop {
             best.ending = Ending::Interrupted;
@@ -278,6 +300,7 @@ pub fn minimise(
         };
         best.iterations += 1;
         best.jacobian = jacobian;
+        let is_exact = problem.is_exact();
         let model = Linear::new(&best, options.huber);
         for j in 0..n {
             scale[j] = f64::max(scale[j], model.norm(j));
@@ -300,14 +323,14 @@ pub fn minimise(
         best.decrement = model.reach(&newton) / deviation.max(f64::MIN_POSITIVE);
         let tiny = (0..n).all(|j| newton[j].abs() <= 1e-11 * best.x[j].abs().max(1.0));
         if best.decrement <= options.tolerance || tiny {
-            if how == Differences::Central || coarser > 0 {
+            if how == Differences::Central || coarser > 0 || is_exact {
                 best.ending = Ending::Converged;
                 return best;
             }
             how = Differences::Central;
             continue;
         }
-        if best.decrement < NEAR && how == Differences::Forward {
+        if best.decrement < NEAR && how == Differences::Forward && !is_exact {
             let errors = model.errors(&held, deviation);
             how = Differences::Coarse(errors.iter().map(|error| FINE * error).collect());
         } else if best.decrement < 100.0 * options.tolerance && coarser == 0 {
@@ -362,7 +385,7 @@ pub fn minimise(
             continue;
         }
         slow = 0;
-        if coarser == 0 && how != Differences::Central {
+        if coarser == 0 && how != Differences::Central && !is_exact {
             // The cheap derivatives may be to blame.
             (how, lambda) = (Differences::Central, None);
             continue;
@@ -371,7 +394,18 @@ pub fn minimise(
             best.ending = Ending::Converged;
             return best;
         }
-        if coarser < COARSER.len() {
+        if is_exact && !balanced {
+            balanced = true;
+            let free = (0..n).filter(|&j| !held[j] && model.norm(j) > 0.0).collect();
+            let at = Coordinates::new(&best, &model.r, free, bounds, (deviation, options.huber));
+            if let Some(found) = bundle::descend(problem, &mut best, &at, (KINK, options.iterations), watch) {
+                (best.decrement, best.jacobian, best.pieces) = (found.promise, found.jacobian, found.pieces);
+                if found.promise <= KINK {
+                    best.ending = Ending::Converged;
+                    return best;
+                }
+            }
+        } else if coarser < COARSER.len() {
             let errors = model.errors(&held, deviation);
             how = Differences::Coarse(errors.iter().map(|error| COARSER[coarser] * error).collect());
             best.coarse = COARSER[coarser];
@@ -500,7 +534,11 @@ impl Linear {
         if jacobian.nrows() < n {
             return Self { r: jacobian, qtr: residual };
         }
-        let qr = jacobian.qr();
+        let mut beside = jacobian.insert_column(n, 0.0);
+        beside.set_column(n, &residual);
+        let short = shortened(&beside);
+        let mut residual = short.column(n).into_owned();
+        let qr = short.remove_column(n).qr();
         qr.q_tr_mul(&mut residual);
         Self { r: qr.unpack_r(), qtr: residual.rows(0, n).into_owned() }
     }

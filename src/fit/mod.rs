@@ -4,6 +4,7 @@
 //! seen, all logs at once. The recipe is [`fit`]; before it, [`check`] says what the logs can determine.
 
 mod acceleration;
+mod bundle;
 mod case_text;
 mod check;
 mod cmaes;
@@ -32,7 +33,9 @@ mod result;
 mod run;
 mod scores;
 mod search;
+mod sensitivity;
 mod sub_records;
+mod triangle;
 mod uncertainty;
 
 pub use check::{Check, check, check_watched};

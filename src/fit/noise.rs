@@ -403,95 +403,130 @@ impl Estimate {
 
 /// Products Σ v vᵀ/F of the innovations of all columns, upper half, and Σ ln F.
 fn filter(series: &Series, slow: &[Slow]) -> (Vec<f64>, f64) {
+    // States: one for each slow noise, two for one that swings.
+    let states = |one: &Slow| if one.frequency == 0.0 { 1 } else { 2 };
+    match slow.iter().map(states).sum() {
+        0 => filter_of::<0>(series, slow),
+        1 => filter_of::<1>(series, slow),
+        2 => filter_of::<2>(series, slow),
+        _ => filter_of::<STATES>(series, slow),
+    }
+}
+
+/// How the S states of slow noises go on: x ← T x + fresh noise.
+struct Turning<'s, const S: usize> {
+    slow: &'s [Slow],
+    /// The noise that a state is of.
+    owner: [usize; S],
+    /// 1 for the state of each noise that shows, 0 for the other of one that swings.
+    shown: [f64; S],
+    /// The time that it is for, s.
+    step: f64,
+    turn: [[f64; S]; S],
+    fresh: [f64; S],
+}
+
+impl<'s, const S: usize> Turning<'s, S> {
+    fn new(slow: &'s [Slow]) -> Self {
+        let of =
+            slow.iter().enumerate().flat_map(|(k, one)| std::iter::repeat_n(k, 1 + usize::from(one.frequency != 0.0)));
+        let (mut owner, mut shown) = ([0; S], [1.0; S]);
+        owner.iter_mut().zip(of).for_each(|(owner, of)| *owner = of);
+        for i in 1..S {
+            shown[i] = if owner[i] == owner[i - 1] { 0.0 } else { 1.0 };
+        }
+        Self { slow, owner, shown, step: f64::NAN, turn: [[0.0; S]; S], fresh: [0.0; S] }
+    }
+
+    /// Over so much time.
+    fn over(&mut self, step: f64) {
+        if (step - self.step).abs() <= 1e-9 * step {
+            return;
+        }
+        self.step = step;
+        self.turn = [[0.0; S]; S];
+        for i in 0..S {
+            let one = &self.slow[self.owner[i]];
+            let decay = (-step / one.time).exp();
+            let (sin, cos) = (one.frequency * step).sin_cos();
+            self.fresh[i] = one.variance * (1.0 - decay * decay);
+            self.turn[i][i] = decay * cos;
+            if self.shown[i] == 0.0 {
+                (self.turn[i - 1][i], self.turn[i][i - 1]) = (-decay * sin, decay * sin);
+            }
+        }
+    }
+
+    /// T x
+    fn times(&self, x: &[f64; S]) -> [f64; S] {
+        std::array::from_fn(|i| (0..S).map(|k| self.turn[i][k] * x[k]).sum())
+    }
+
+    /// T P Tᵀ + the fresh noise.
+    fn spread(&self, p: &[[f64; S]; S]) -> [[f64; S]; S] {
+        // P is symmetric: its rows are its columns.
+        let half: [[f64; S]; S] = std::array::from_fn(|j| self.times(&p[j]));
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                let sum: f64 = (0..S).map(|k| half[k][i] * self.turn[j][k]).sum();
+                sum + if i == j { self.fresh[i] } else { 0.0 }
+            })
+        })
+    }
+
+    /// What shows of x.
+    fn shown(&self, x: &[f64; S]) -> f64 {
+        x.iter().zip(&self.shown).map(|(x, shown)| x * shown).sum()
+    }
+}
+
+/// [`filter`] with S states.
+fn filter_of<const S: usize>(series: &Series, slow: &[Slow]) -> (Vec<f64>, f64) {
     let wide = series.moved.len() + 1;
     let mut products = vec![0.0; wide * wide];
-    let mut logs = 0.0;
-    // States: one for each slow noise, two for one that swings.
-    let mut owner = [0; STATES];
-    let mut states = 0;
-    for (index, one) in slow.iter().enumerate() {
-        for _ in 0..if one.frequency == 0.0 { 1 } else { 2 } {
-            if states < STATES {
-                owner[states] = index;
-                states += 1;
-            }
-        }
+    let (mut logs, mut product) = (0.0, 1.0);
+    let mut turning = Turning::<S>::new(slow);
+    let mut p = [[0.0; S]; S];
+    for i in 0..S {
+        p[i][i] = slow[turning.owner[i]].variance;
     }
-    let shown: [bool; STATES] = std::array::from_fn(|i| i < states && (i == 0 || owner[i] != owner[i - 1]));
-    let mut p = [[0.0; STATES]; STATES];
-    for i in 0..states {
-        p[i][i] = slow[owner[i]].variance;
-    }
-    let mut a = vec![[0.0; STATES]; wide];
+    let mut a = vec![[0.0; S]; wide];
     let mut v = vec![0.0; wide];
-    let mut last = f64::NAN;
-    let mut past = f64::NAN;
-    let mut turn = [[0.0; STATES]; STATES];
-    let mut fresh = [0.0; STATES];
+    let mut last = None;
     for ((row, &gain), &time) in series.rows.chunks(wide).zip(&series.gain).zip(&series.time) {
-        if !last.is_nan() && states > 0 {
-            let step = time - last;
-            if (step - past).abs() > 1e-9 * step || past.is_nan() {
-                past = step;
-                turn = [[0.0; STATES]; STATES];
-                for i in 0..states {
-                    let one = &slow[owner[i]];
-                    let decay = (-step / one.time).exp();
-                    let (sin, cos) = (one.frequency * step).sin_cos();
-                    fresh[i] = one.variance * (1.0 - decay * decay);
-                    turn[i][i] = decay * cos;
-                    if i > 0 && owner[i] == owner[i - 1] {
-                        (turn[i - 1][i], turn[i][i - 1]) = (-decay * sin, decay * sin);
-                    }
-                }
-            }
-            let before = p;
-            let mut half = [[0.0; STATES]; STATES];
-            for i in 0..states {
-                for j in 0..states {
-                    half[i][j] = (0..states).map(|k| turn[i][k] * before[k][j]).sum();
-                }
-            }
-            for i in 0..states {
-                for j in 0..states {
-                    p[i][j] = (0..states).map(|k| half[i][k] * turn[j][k]).sum();
-                }
-                p[i][i] += fresh[i];
-            }
-            for a in &mut a {
-                let old = *a;
-                for i in 0..states {
-                    a[i] = (0..states).map(|k| turn[i][k] * old[k]).sum();
-                }
-            }
+        if let (Some(last), true) = (last, S > 0) {
+            turning.over(time - last);
+            p = turning.spread(&p);
+            a.iter_mut().for_each(|a| *a = turning.times(a));
         }
-        last = time;
+        last = Some(time);
         // F = g² Σ P + 1, K = g P h/F
-        let mut ph = [0.0; STATES];
-        for i in 0..states {
-            ph[i] = (0..states).filter(|&k| shown[k]).map(|k| p[i][k]).sum::<f64>() * gain;
+        let ph: [f64; S] = std::array::from_fn(|i| gain * turning.shown(&p[i]));
+        let f = 1.0 + gain * turning.shown(&ph);
+        product *= f;
+        if product > 1e100 {
+            logs += f64::ln(product);
+            product = 1.0;
         }
-        let f = 1.0 + gain * (0..states).filter(|&k| shown[k]).map(|k| ph[k]).sum::<f64>();
-        logs += f.ln();
         let scale = 1.0 / f;
+        let k: [f64; S] = ph.map(|ph| ph * scale);
         for ((v, a), value) in v.iter_mut().zip(&mut a).zip(row) {
-            let seen: f64 = (0..states).filter(|&k| shown[k]).map(|k| a[k]).sum();
-            *v = value - gain * seen;
-            for i in 0..states {
-                a[i] += ph[i] * scale * *v;
+            *v = value - gain * turning.shown(a);
+            for i in 0..S {
+                a[i] += k[i] * *v;
             }
         }
-        for i in 0..states {
-            for j in 0..states {
-                p[i][j] -= ph[i] * ph[j] * scale;
+        for i in 0..S {
+            for j in 0..S {
+                p[i][j] -= k[i] * ph[j];
             }
         }
-        for i in 0..wide {
+        for (i, products) in products.chunks_mut(wide).enumerate() {
             let factor = v[i] * scale;
-            for (out, v) in products[i * wide + i..(i + 1) * wide].iter_mut().zip(&v[i..]) {
+            for (out, v) in products[i..].iter_mut().zip(&v[i..]) {
                 *out += factor * v;
             }
         }
     }
-    (products, logs)
+    (products, logs + product.ln())
 }

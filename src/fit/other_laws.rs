@@ -14,7 +14,7 @@
 
 use super::drifting;
 use super::noise::{half_width, spreads};
-use super::problem::Problem;
+use super::problem::{Problem, ROUNDING};
 use super::run::Run;
 use super::search::Searched;
 use super::uncertainty::{Judged, NORMAL, inverse_of_square};
@@ -35,6 +35,9 @@ const MOST: f64 = 3.0;
 
 /// Standard errors of its amplitude by which a law has to show.
 const SHOWN: f64 = 3.0;
+
+/// Share of how far the outputs range that a law has to move them by: below are the last digits of logs and solvers.
+const DUST: f64 = 1e-6;
 
 /// Parts of a log along which friction drifts.
 const PARTS: usize = 10;
@@ -324,6 +327,11 @@ impl Place<'_> {
         columns.columns_mut(0, g).copy_from(&self.jacobian.columns(0, g));
         columns.set_column(g, &tried.column);
         columns.columns_mut(g + 1, n - g).copy_from(&self.jacobian.columns(g, n - g));
+        // Of logs without noise any law takes off some of what their last digits left.
+        let moved = (&tried.column * tried.amplitude).amax();
+        if moved < DUST / ROUNDING * self.problem.rounding() {
+            return None;
+        }
         let inverse = inverse_of_square(&columns)?;
         let left = &self.residuals + &tried.column * tried.amplitude;
         let spreads = spreads(self.problem, left.as_slice(), &columns, g + 1, &inverse);

@@ -16,6 +16,9 @@ pub(super) const ROUNDING: f64 = 1e-10;
 /// A delay that is known to so many samples is known.
 const LATE: f64 = 10.0;
 
+/// Standard errors of its speed by which a log has to begin in motion, to be taken to.
+const MOVES: f64 = 5.0;
+
 /// Noise of first order that keeps to itself for 30 samples is so many times what neighbouring values differ by.
 const SHARED: f64 = 5.0;
 
@@ -38,6 +41,8 @@ pub struct Problem<'a> {
     pub held_out: Vec<Run>,
     /// Simulated runs so far.
     pub simulations: u64,
+    /// Runs that the last Jacobian took differences of.
+    pub differences: usize,
     units: Vec<Scale>,
     /// Whether to end the work.
     stop: Option<Stop<'a>>,
@@ -125,6 +130,7 @@ impl<'a> Problem<'a> {
             runs,
             held_out,
             simulations: 0,
+            differences: 0,
             stop: None,
         };
         problem.add_extras(case, plan);
@@ -145,6 +151,7 @@ impl<'a> Problem<'a> {
             runs: vec![run],
             held_out: Vec::new(),
             simulations: 0,
+            differences: 0,
             units: Vec::new(),
             stop: None,
         }
@@ -214,7 +221,10 @@ impl<'a> Problem<'a> {
                 }
             }
             if initial_state || windowed {
-                let start = if windowed { slope_at_start(run, r) } else { 0.0 };
+                let (slope, doubt) = slope_at_start(run, r, &noise);
+                // A log begins at rest, unless it shows that it does not: a start at rest sticks, and a search from
+                // there sees nothing of the speed.
+                let start = if windowed || slope.abs() > MOVES * doubt { slope } else { 0.0 };
                 let (low, high) = (start - 20.0 * fast, start + 20.0 * fast);
                 run.extras.push(Extra { what: Nuisance::StartSpeed, start, unit: fast, low, high, known: None });
             }
@@ -481,20 +491,69 @@ impl<'a> Problem<'a> {
         self.runs[..index].iter().map(Run::rows).sum()
     }
 
-    /// Residuals of the runs of a part of the logs, those of the others left as they are; of all of them without a
-    /// part.
-    fn evaluate_part(&mut self, part: Option<usize>, x: &[f64], r: &mut [f64]) -> bool {
+    /// Residuals of all runs.
+    fn residuals(&mut self, x: &[f64], r: &mut [f64]) -> bool {
         let stages = self.stages(x);
         let mut bench = Bench::default();
         let mut first = 0;
         for index in 0..self.runs.len() {
             let (rows, own) = (self.runs[index].rows(), self.runs[index].part);
-            if part.is_none_or(|part| part == own)
-                && !self.one(&mut bench, index, &stages[own], x, &mut r[first..first + rows])
-            {
+            if !self.one(&mut bench, index, &stages[own], x, &mut r[first..first + rows]) {
                 return false;
             }
             first += rows;
+        }
+        true
+    }
+
+    /// The columns of what only shifts the outputs of a run.
+    fn shifts(&self, stage: &Stage, (index, first): (usize, usize), jacobian: &mut DMatrix<f64>) {
+        let run = &self.runs[index];
+        let mut shift = vec![0.0; run.rows()];
+        for (j, extra) in self.own_variables(index).into_iter().filter(|(_, extra)| run.only_shifts(stage, extra)) {
+            run.shift(stage, &extra, &mut shift);
+            jacobian.view_mut((first, j), (shift.len(), 1)).copy_from_slice(&shift);
+        }
+    }
+
+    /// The columns of `left`, runs with where their residuals begin and the variables that move them, by differences;
+    /// false where a run cannot be computed.
+    fn by_differences(
+        &mut self,
+        left: &[(usize, usize, Vec<usize>)],
+        (x, r): (&[f64], &[f64]),
+        bounds: &Bounds,
+        how: &Differences,
+        jacobian: &mut DMatrix<f64>,
+    ) -> bool {
+        let mut moved = x.to_vec();
+        let (mut a, mut b) = (vec![0.0; r.len()], vec![0.0; r.len()]);
+        for j in 0..x.len() {
+            if !left.iter().any(|(.., columns)| columns.contains(&j)) {
+                continue;
+            }
+            let step = Step::new(x, bounds, j, how);
+            let points = [Some((step.first, &mut a)), step.second.map(|second| (second, &mut b))];
+            for (to, out) in points.into_iter().flatten() {
+                moved[j] = to;
+                // Runs of one machine share what it has made ready.
+                let (stages, mut bench) = (self.stages(&moved), Bench::default());
+                for &(index, first, ref columns) in left {
+                    let run = &self.runs[index];
+                    let (rows, stage) = (run.rows(), &stages[run.part]);
+                    if columns.contains(&j)
+                        && !self.one(&mut bench, index, stage, &moved, &mut out[first..first + rows])
+                    {
+                        return false;
+                    }
+                }
+            }
+            moved[j] = x[j];
+            for (index, first, _) in left.iter().filter(|(.., columns)| columns.contains(&j)) {
+                for k in *first..first + self.runs[*index].rows() {
+                    jacobian[(k, j)] = step.slope(r[k], a[k], b[k]);
+                }
+            }
         }
         true
     }
@@ -559,13 +618,8 @@ pub fn parameters(stage: &Stage, plan: &Plan, others: &[&str]) -> Result<Vec<Fre
     plan.names().map(|name| Free::new(stage, &name, &all, &plan.bounds)).collect()
 }
 
-/// Whether it matters where the cart is, and not only how far it goes.
-fn placed(stage: &Stage) -> bool {
-    stage.cart.along.is_some() || stage.belt.follows_cart || stage.travel.is_some()
-}
-
 /// Extras that have room to vary and belong to the run alone.
-fn variable_extras(run: &Run) -> impl Iterator<Item = &Extra> {
+pub(super) fn variable_extras(run: &Run) -> impl Iterator<Item = &Extra> {
     run.extras.iter().filter(|extra| extra.low < extra.high)
 }
 
@@ -576,9 +630,9 @@ pub(super) fn extent(values: &[f64]) -> f64 {
     if high >= low { high - low } else { 0.0 }
 }
 
-/// Speed of the cart at the start of a window, m/s, from a line through its first rows.
-fn slope_at_start(run: &Run, r: f64) -> f64 {
-    let Some(seen) = run.seen.iter().find(|seen| is_position(seen.quantity)) else { return 0.0 };
+/// Speed of the cart at the start of a log or window, m/s, from a line through its first rows, and its standard error.
+fn slope_at_start(run: &Run, r: f64, noise: &Noise) -> (f64, f64) {
+    let Some(seen) = run.seen.iter().find(|seen| is_position(seen.quantity)) else { return (0.0, 0.0) };
     let rows: Vec<usize> = (0..run.time.len().min(15)).filter(|&k| seen.values[k].is_finite()).collect();
     let n = rows.len().max(1) as f64;
     let (t, y) =
@@ -588,8 +642,8 @@ fn slope_at_start(run: &Run, r: f64) -> f64 {
         above += (run.time[k] - t) * (seen.values[k] - y);
         below += (run.time[k] - t).powi(2);
     }
-    let slope = if below > 0.0 { above / below } else { 0.0 };
-    if seen.quantity == Quantity::CartPosition { slope } else { slope * r }
+    let arm = if seen.quantity == Quantity::CartPosition { 1.0 } else { r };
+    if below > 0.0 { (arm * above / below, arm * noise.of(seen.quantity) / below.sqrt()) } else { (0.0, 0.0) }
 }
 
 /// The scale on which a parameter is searched for.
@@ -643,75 +697,34 @@ impl Residuals for Problem<'_> {
     }
 
     fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool {
-        self.evaluate_part(None, x, r)
+        self.residuals(x, r)
     }
 
     fn jacobian(&mut self, x: &[f64], r: &[f64], bounds: &Bounds, how: &Differences) -> Option<DMatrix<f64>> {
-        let (rows, n, globals) = (r.len(), x.len(), self.globals());
+        let (rows, n) = (r.len(), x.len());
         let mut jacobian = DMatrix::zeros(rows, n);
-        let mut moved = x.to_vec();
-        let (mut a, mut b) = (vec![0.0; rows], vec![0.0; rows]);
-        for j in (0..globals).filter(|&j| !bounds.hold(j)) {
-            let step = Step::new(x, bounds, j, how);
-            let part = self.of.get(j).copied().flatten();
-            if part.is_some() {
-                // What it does not concern stays as it is.
-                a.copy_from_slice(r);
-                b.copy_from_slice(r);
-            }
-            moved[j] = step.first;
-            let mut good = self.evaluate_part(part, &moved, &mut a);
-            if let Some(second) = step.second {
-                moved[j] = second;
-                good &= self.evaluate_part(part, &moved, &mut b);
-            }
-            moved[j] = x[j];
-            if !good {
-                return None;
-            }
-            let mut column = jacobian.column_mut(j);
-            for (slope, ((r, a), b)) in column.iter_mut().zip(r.iter().zip(&a).zip(&b)) {
-                *slope = step.slope(*r, *a, *b);
-            }
-        }
-        // What belongs to one run moves its residuals alone.
         let stages = self.stages(x);
         let mut bench = Bench::default();
-        let mut first = 0;
+        let is_exact = |how: &Differences| !matches!(how, Differences::Coarse(_));
+        let (mut first, mut left) = (0, Vec::new());
         for index in 0..self.runs.len() {
-            let rows = self.runs[index].rows();
-            let stage = &stages[self.runs[index].part];
-            for (j, extra) in self.own_variables(index) {
-                let signed = self.runs[index].seen.iter().all(|seen| !seen.absolute);
-                let shifts = match extra.what {
-                    Nuisance::Bias(_) => true,
-                    Nuisance::StartPosition => signed && !placed(stage),
-                    _ => false,
-                };
-                if shifts {
-                    self.runs[index].shift(stage, &extra, &mut a[..rows]);
-                    for k in 0..rows {
-                        jacobian[(first + k, j)] = a[k];
-                    }
-                    continue;
-                }
-                let step = Step::new(x, bounds, j, how);
-                moved[j] = step.first;
-                let mut good = self.one(&mut bench, index, stage, &moved, &mut a[..rows]);
-                if let Some(second) = step.second {
-                    moved[j] = second;
-                    good &= self.one(&mut bench, index, stage, &moved, &mut b[..rows]);
-                }
-                moved[j] = x[j];
-                if !good {
-                    return None;
-                }
-                for k in 0..rows {
-                    jacobian[(first + k, j)] = step.slope(r[first + k], a[k], b[k]);
-                }
+            if self.is_stopped() {
+                return None;
             }
-            first += rows;
+            let stage = &stages[self.runs[index].part];
+            self.shifts(stage, (index, first), &mut jacobian);
+            let columns = self.movers(index, stage, bounds);
+            let block = (index, first);
+            if !is_exact(how) || !self.exact_block((&mut bench, stage), block, (x, bounds), &columns, &mut jacobian) {
+                left.push((index, first, columns));
+            }
+            first += self.runs[index].rows();
         }
-        Some(jacobian)
+        self.differences = left.len();
+        self.by_differences(&left, (x, r), bounds, how, &mut jacobian).then_some(jacobian)
+    }
+
+    fn is_exact(&self) -> bool {
+        self.differences == 0
     }
 }

@@ -48,18 +48,38 @@ pub struct Balance {
 
 /// The balance over all logs of a problem; none where they hold no positions on an even raster, or do not move enough.
 pub fn regression(problem: &Problem) -> Option<Balance> {
-    regression_late(problem, 0)
+    balance(&smoothed(problem), 0)
 }
 
-/// The same with the inputs so many rows later than logged.
-pub(super) fn regression_late(problem: &Problem, late: usize) -> Option<Balance> {
+/// A log with the derivatives of its position.
+pub(super) struct Smoothed<'a> {
+    run: &'a Run,
+    stage: &'a Stage,
+    output: usize,
+    /// Rows without derivatives at each end.
+    margin: usize,
+    /// φ̇ and φ̈
+    derivatives: Vec<[f64; 2]>,
+}
+
+/// The logs of a problem that hold positions on an even raster, as [`balance`] wants them.
+pub(super) fn smoothed<'a>(problem: &'a Problem) -> Vec<Smoothed<'a>> {
     let noise = problem.noise();
-    let mut rows: Vec<[f64; 5]> = Vec::new();
+    let mut all = Vec::new();
     for run in problem.runs.iter().filter(|run| run.is_even()) {
         let seen = run.seen.iter().position(|seen| is_position(seen.quantity) && !seen.absolute);
         if let Some(output) = seen {
-            add(run, output, &problem.stage, noise.of(run.seen[output].quantity), late, &mut rows);
+            all.extend(Smoothed::new(run, &problem.stage, output, noise.of(run.seen[output].quantity)));
         }
+    }
+    all
+}
+
+/// The balance with the inputs so many rows later than logged.
+pub(super) fn balance(logs: &[Smoothed], late: usize) -> Option<Balance> {
+    let mut rows: Vec<[f64; 5]> = Vec::new();
+    for log in logs {
+        log.add_to(late, &mut rows);
     }
     let n = rows.len();
     if n < 12 {
@@ -82,51 +102,61 @@ pub(super) fn regression_late(problem: &Problem, late: usize) -> Option<Balance>
     })
 }
 
-/// Adds the equations of one output of a run: φ̈, φ̇, sgn φ̇, 1 and the torque.
-fn add(run: &Run, output: usize, stage: &Stage, noise: f64, late: usize, rows: &mut Vec<[f64; 5]>) {
-    let seen = &run.seen[output];
-    let (n, h) = (run.fitted_rows.min(run.time.len()), run.interval());
-    let to_angle = if seen.quantity == Quantity::CartPosition { 1.0 / stage.pulley_radius } else { 1.0 };
-    let mut derivatives = None;
-    for width in WIDTHS {
-        let Some(found) = derived(&seen.values[..n], width, h) else { break };
-        let size = (found.iter().map(|[_, a]| a * a).sum::<f64>() / found.len() as f64).sqrt();
-        // Deviation of white noise behind the second derivative of a Gaussian: σ √(3/(8 √π)) / w^(5/2), per interval
-        // squared
-        let trembles = noise * (3.0 / (8.0 * std::f64::consts::PI.sqrt())).sqrt() / width.powf(2.5) / (h * h);
-        derivatives = Some((width, found));
-        if trembles < NOISE * size {
-            break;
-        }
-    }
-    let Some((width, derivatives)) = derivatives else { return };
-    let margin = reach(width);
-    let motor = &stage.motor;
-    let (n_gear, amplifier) = (motor.gear_ratio, &stage.amplifier);
-    let per_ampere = motor.gear_efficiency * n_gear * motor.torque_constant;
-    let mut block: Vec<[f64; 5]> = Vec::with_capacity(BLOCK);
-    for (k, [speed, acceleration]) in derivatives.iter().enumerate() {
-        let row = k + margin;
-        let (speed, acceleration) = (speed * to_angle, acceleration * to_angle);
-        let given = amplifier.gain * run.logged[row.saturating_sub(late)];
-        let clipped = |value: f64, limit: Option<f64>| limit.map_or(value, |limit| value.clamp(-limit, limit));
-        // τ_M = η n K_t i, i = (V − K_e n φ̇)/R
-        let current = match amplifier.mode {
-            AmplifierMode::Current => given,
-            AmplifierMode::Voltage => {
-                (clipped(given, amplifier.voltage_limit) - motor.back_emf_constant * n_gear * speed) / motor.resistance
+impl<'a> Smoothed<'a> {
+    /// That of one output of a run; none where it is too short.
+    fn new(run: &'a Run, stage: &'a Stage, output: usize, noise: f64) -> Option<Self> {
+        let seen = &run.seen[output];
+        let (n, h) = (run.fitted_rows.min(run.time.len()), run.interval());
+        let mut derivatives = None;
+        for width in WIDTHS {
+            let Some(found) = derived(&seen.values[..n], width, h) else { break };
+            let size = (found.iter().map(|[_, a]| a * a).sum::<f64>() / found.len() as f64).sqrt();
+            // Deviation of white noise behind the second derivative of a Gaussian: σ √(3/(8 √π)) / w^(5/2), per
+            // interval squared
+            let trembles = noise * (3.0 / (8.0 * std::f64::consts::PI.sqrt())).sqrt() / width.powf(2.5) / (h * h);
+            derivatives = Some((width, found));
+            if trembles < NOISE * size {
+                break;
             }
-        };
-        let torque = per_ampere * clipped(current, amplifier.current_limit);
-        let moves = speed != 0.0 && seen.repeats[row] < REST && seen.alike[row] < REST;
-        if moves && torque.is_finite() && acceleration.is_finite() {
-            block.push([acceleration, speed, speed.signum(), 1.0, torque]);
-        } else {
-            block.clear();
         }
-        if block.len() == BLOCK {
-            rows.push(std::array::from_fn(|j| block.iter().map(|row| row[j]).sum::<f64>() / BLOCK as f64));
-            block.clear();
+        let (width, mut derivatives) = derivatives?;
+        if seen.quantity == Quantity::CartPosition {
+            derivatives.iter_mut().flatten().for_each(|value| *value /= stage.pulley_radius);
+        }
+        Some(Self { run, stage, output, margin: reach(width), derivatives })
+    }
+
+    /// Adds its equations: φ̈, φ̇, sgn φ̇, 1 and the torque.
+    fn add_to(&self, late: usize, rows: &mut Vec<[f64; 5]>) {
+        let Self { run, stage, .. } = self;
+        let seen = &run.seen[self.output];
+        let motor = &stage.motor;
+        let (n_gear, amplifier) = (motor.gear_ratio, &stage.amplifier);
+        let per_ampere = motor.gear_efficiency * n_gear * motor.torque_constant;
+        let mut block: Vec<[f64; 5]> = Vec::with_capacity(BLOCK);
+        for (k, &[speed, acceleration]) in self.derivatives.iter().enumerate() {
+            let row = k + self.margin;
+            let given = amplifier.gain * run.logged[row.saturating_sub(late)];
+            let clipped = |value: f64, limit: Option<f64>| limit.map_or(value, |limit| value.clamp(-limit, limit));
+            // τ_M = η n K_t i, i = (V − K_e n φ̇)/R
+            let current = match amplifier.mode {
+                AmplifierMode::Current => given,
+                AmplifierMode::Voltage => {
+                    (clipped(given, amplifier.voltage_limit) - motor.back_emf_constant * n_gear * speed)
+                        / motor.resistance
+                }
+            };
+            let torque = per_ampere * clipped(current, amplifier.current_limit);
+            let moves = speed != 0.0 && seen.repeats[row] < REST && seen.alike[row] < REST;
+            if moves && torque.is_finite() && acceleration.is_finite() {
+                block.push([acceleration, speed, speed.signum(), 1.0, torque]);
+            } else {
+                block.clear();
+            }
+            if block.len() == BLOCK {
+                rows.push(std::array::from_fn(|j| block.iter().map(|row| row[j]).sum::<f64>() / BLOCK as f64));
+                block.clear();
+            }
         }
     }
 }

@@ -135,6 +135,7 @@ pub(super) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         cost: best.cost,
         starts: starts.clone(),
         coarse: best.coarse,
+        pieces: best.pieces,
         evolved: best.evolved,
         values: problem.counted(),
         variables: problem.variables(),

@@ -23,6 +23,9 @@ const FEWEST: usize = 2;
 /// speeds, all else straight lines. With h the raster, that is off by at most h⁴|x⁗|/384, and h²|ÿ|/8.
 const RASTER: f64 = 8.0;
 
+/// Rows of input that are kept from before a window: more than a delay that is fitted along comes to.
+const EARLIER: usize = 60;
+
 /// A nuisance of a log: fitted along, one for each log.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Nuisance {
@@ -195,12 +198,15 @@ impl Run {
         // On the raster, where the solver need not stop twice for a sample.
         let grid = Grid::new(every, until);
         let times = if even { (0..n as u64).map(|k| grid.time(k)).collect() } else { time.clone() };
-        let input = match &experiment.input {
-            Signal::Sampled { times: own, .. } if *own == log.time => {
-                Signal::Sampled { times, values: logged.clone(), hold: log.hold }
-            }
-            _ if whole => experiment.input.clone(),
-            _ => Signal::Sampled { times, values: logged.clone(), hold: log.hold },
+        let is_logged = matches!(&experiment.input, Signal::Sampled { times: own, .. } if *own == log.time);
+        let input = if whole && !is_logged {
+            experiment.input.clone()
+        } else {
+            // A window that is late still has the input of what came before it.
+            let earlier = rows.start.saturating_sub(EARLIER)..rows.start;
+            let before = log.time[earlier.clone()].iter().map(|t| t - shift);
+            let values = log.input[earlier].iter().chain(&logged).copied().collect();
+            Signal::Sampled { times: before.chain(times).collect(), values, hold: log.hold }
         };
         let limit = setting.fitted_until.map_or(f64::INFINITY, |until| until - shift);
         let fitted_rows = if setting.held_out { 0 } else { time.partition_point(|&t| t < limit) };
@@ -275,6 +281,17 @@ impl Run {
         pairs.filter_map(|(extra, value)| extra.known.map(|deviation| (value - extra.start) / deviation))
     }
 
+    /// Whether an extra does no more than shift outputs.
+    pub(super) fn only_shifts(&self, stage: &Stage, extra: &Extra) -> bool {
+        // Whether it matters where the cart is, and not only how far it goes.
+        let is_placed = stage.cart.along.is_some() || stage.belt.follows_cart || stage.travel.is_some();
+        match extra.what {
+            Nuisance::Bias(_) => true,
+            Nuisance::StartPosition => self.seen.iter().all(|seen| !seen.absolute) && !is_placed,
+            Nuisance::Delay | Nuisance::InputGain | Nuisance::InputOffset | Nuisance::StartSpeed => false,
+        }
+    }
+
     /// ∂r/∂x of an extra that only shifts outputs, x being its variable.
     pub fn shift(&self, stage: &Stage, extra: &Extra, out: &mut [f64]) {
         let n = self.time.len();
@@ -310,20 +327,36 @@ impl Run {
         self.even
     }
 
+    /// The value of an extra among these; none if it has no such one.
+    pub(super) fn extra(&self, what: Nuisance, extras: &[f64]) -> Option<f64> {
+        let mut pairs = self.extras.iter().chain(&self.shared).zip(extras);
+        pairs.find(|(extra, _)| extra.what == what).map(|(_, value)| *value)
+    }
+
+    /// The input as logged, or as the case gives it.
+    pub(super) fn input(&self) -> &Signal {
+        &self.input
+    }
+
+    /// Where the model begins with these values of the extras, which set the gain of its amplifier, too.
+    pub(super) fn initial(&self, stage: &mut Stage, extras: &[f64]) -> Initial {
+        stage.amplifier.gain *= self.extra(Nuisance::InputGain, extras).unwrap_or(1.0);
+        let r = stage.pulley_radius;
+        let mut initial = self.initial;
+        if let Some(position) = self.extra(Nuisance::StartPosition, extras) {
+            (initial.cart_position, initial.drive_angle, initial.idler_angle) = (position, position / r, position / r);
+        }
+        if let Some(speed) = self.extra(Nuisance::StartSpeed, extras) {
+            (initial.cart_speed, initial.drive_speed, initial.idler_speed) = (speed, speed / r, speed / r);
+        }
+        initial
+    }
+
     /// The experiment that the model is put through, with these values of the extras.
     pub fn experiment(&self, stage: &mut Stage, extras: &[f64]) -> Experiment {
-        let (mut delay, mut offset) = (0.0, 0.0);
-        let (mut position, mut speed) = (None, None);
-        for (extra, &value) in self.extras.iter().chain(&self.shared).zip(extras) {
-            match extra.what {
-                Nuisance::Delay => delay = value,
-                Nuisance::InputGain => stage.amplifier.gain *= value,
-                Nuisance::InputOffset => offset = value,
-                Nuisance::StartPosition => position = Some(value),
-                Nuisance::StartSpeed => speed = Some(value),
-                Nuisance::Bias(_) => {}
-            }
-        }
+        let initial = self.initial(stage, extras);
+        let delay = self.extra(Nuisance::Delay, extras).unwrap_or(0.0);
+        let offset = self.extra(Nuisance::InputOffset, extras).unwrap_or(0.0);
         let mut input = match &self.input {
             Signal::Sampled { times, values, hold } if delay != 0.0 || offset != 0.0 => Signal::Sampled {
                 times: times.iter().map(|t| t + delay).collect(),
@@ -340,14 +373,6 @@ impl Run {
             if offset != 0.0 {
                 input = Signal::Sum(vec![input, Signal::Step { value: offset, at: 0.0 }]);
             }
-        }
-        let r = stage.pulley_radius;
-        let mut initial = self.initial;
-        if let Some(position) = position {
-            (initial.cart_position, initial.drive_angle, initial.idler_angle) = (position, position / r, position / r);
-        }
-        if let Some(speed) = speed {
-            (initial.cart_speed, initial.drive_speed, initial.idler_speed) = (speed, speed / r, speed / r);
         }
         Experiment { input, initial, until: self.until, every: self.every, ..empty() }
     }
@@ -463,6 +488,12 @@ fn solve_slot(signal: Signal, lasts: f64) -> crate::signal::Slot {
 
 /// The column of a run that an output is compared with.
 pub(super) fn column(block: &Trajectory, quantity: Quantity) -> &[f64] {
+    let (name, other) = heading_of(quantity);
+    block.get(name).or_else(|| block.get(other)).unwrap_or(&[])
+}
+
+/// The heading of the column of a quantity, and of that which takes its place where there is none.
+pub(super) fn heading_of(quantity: Quantity) -> (&'static str, &'static str) {
     let name = quantity.name();
     let other = match name {
         "motor_voltage" => "voltage",
@@ -470,11 +501,11 @@ pub(super) fn column(block: &Trajectory, quantity: Quantity) -> &[f64] {
         "rotor_speed" => "drive_speed",
         _ => name,
     };
-    block.get(name).or_else(|| block.get(other)).unwrap_or(&[])
+    (name, other)
 }
 
 /// The speed that belongs to a position.
-fn speed_of(quantity: Quantity) -> Option<Quantity> {
+pub(super) fn speed_of(quantity: Quantity) -> Option<Quantity> {
     match quantity {
         Quantity::DriveAngle => Some(Quantity::DriveSpeed),
         Quantity::CartPosition => Some(Quantity::CartSpeed),
@@ -488,7 +519,7 @@ pub fn is_position(quantity: Quantity) -> bool {
 }
 
 /// The value at `at` rows of a raster of `h`.
-fn between(values: &[f64], slopes: &[f64], at: f64, h: f64) -> f64 {
+pub(super) fn between(values: &[f64], slopes: &[f64], at: f64, h: f64) -> f64 {
     let cell = (at.floor().max(0.0) as usize).min(values.len().saturating_sub(2));
     let s = at - cell as f64;
     let (a, b) = (values[cell], values[cell + 1]);

@@ -9,6 +9,7 @@ use super::noise::{self, Spread, half_width};
 use super::other_laws::OtherLaw;
 use super::problem::Problem;
 use super::sub_records::Disagreement;
+use super::triangle::shortened;
 use nalgebra::{DMatrix, DVector};
 
 /// Standard deviations that 95 % of a normal distribution keep to.
@@ -191,7 +192,7 @@ pub fn inverse_of_square(jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     for (j, norm) in norms.iter().enumerate() {
         scaled.column_mut(j).scale_mut(1.0 / norm);
     }
-    let r = scaled.qr().unpack_r();
+    let r = shortened(&scaled).qr().unpack_r();
     if (0..n).any(|j| r[(j, j)].abs() < 1e-10) {
         return None;
     }

@@ -56,6 +56,11 @@ pub fn ending(fit: &Fit) -> String {
                 fit.ending_word().replace('_', " ")
             )
         }
+        Ending::Converged if fit.pieces > 1 => format!(
+            "converged at a kink, where sticks and slips change their order: another step would move the estimates by {:.1e} \
+             standard errors",
+            fit.decrement
+        ),
         Ending::Converged => {
             format!("converged: another step would move the estimates by {:.1e} standard errors", fit.decrement)
         }
