@@ -189,6 +189,20 @@ def test_tuning_is_the_command_lines(root, moving):
         taut.Case(taut.template()).tune()
 
 
+def test_pairs_of_shapers_are_the_command_lines(root):
+    from test_results import program
+
+    case = "stages/sollmann-jouaneh/table4.toml"
+    told = program(root, "shape", case, "--pairs")
+    found = taut.shape(root / case, pairs=True)
+    assert {**found.data, "file": ""} == {**told, "file": ""}
+    assert len(found.pairs) == 3
+    for pair in found.pairs:
+        assert sum(amplitude for _, amplitude in pair["impulses"]) == pytest.approx(1.0)
+        assert len(pair["parts"]) == 2
+    assert taut.shape(root / case).pairs == []
+
+
 def test_shapers_are_the_command_lines(root):
     from test_results import program
 

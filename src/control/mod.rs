@@ -7,6 +7,7 @@
 //! [`Design`]: crate::design::Design
 //! [`Profile`]: crate::signal::profile::Profile
 
+mod at_samples;
 pub mod compare;
 pub mod compensation;
 pub mod damping;
@@ -36,6 +37,7 @@ pub mod state_feedback;
 mod stepped;
 mod welch;
 
+pub(crate) use at_samples::closed_loop_at_samples;
 pub use outcome::{Deviation, Figures, MoveRun, Rows, Setup, close, closed_loop, stream};
 pub(crate) use outcome::{closed_loop_briefly, follow};
 pub use rest::Swing;

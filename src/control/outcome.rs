@@ -118,13 +118,13 @@ pub(crate) fn closed_loop_briefly(
     let mut gauge = Gauge { is_brief: true, ..Gauge::new(stage, &experiment, profile, window) };
     let sink = &mut |_: &Trajectory| Flow::Continue;
     let mut run = solve::Run::new(stage, &experiment, solver, Detail::None, Some(&mut gauge), sink)?;
-    sampled.drive(&mut run, experiment.until);
+    sampled.drive(&mut run, experiment.until, |_, _, _| {});
     let outcome = run.finish();
     Ok((gauge.finish(&outcome.events).0, outcome.ending))
 }
 
 /// A run from rest at the start of a profile, without an input of its own.
-fn at_rest(stage: &Stage, profile: &Profile, until: f64, every: f64) -> Experiment {
+pub(super) fn at_rest(stage: &Stage, profile: &Profile, until: f64, every: f64) -> Experiment {
     let start = profile.start();
     let angle = start / stage.pulley_radius;
     Experiment {
@@ -200,7 +200,7 @@ fn run(
     let mut sampled = Sampled::new(stage, controller, *timing, profile, keep).until(rows.until);
     let mut gauge = Gauge::new(stage, &experiment, profile, rows.window);
     let mut run = solve::Run::new(stage, &experiment, solver, detail, Some(&mut gauge), sink)?;
-    sampled.drive(&mut run, experiment.until);
+    sampled.drive(&mut run, experiment.until, |_, _, _| {});
     let outcome = run.finish();
     let (mut figures, metrics) = gauge.finish(&outcome.events);
     figures.limited = sampled.held_back;
@@ -226,7 +226,7 @@ pub(crate) fn follow(
     let mut sampled = Sampled::new(stage, &mut controller, Loop::of(design), profile, false).exactly().with(added);
     let stage = Stage { encoder: None, ..stage.clone() };
     let mut run = solve::Run::new(&stage, experiment, solver, Detail::Full, None, sink)?;
-    sampled.drive(&mut run, experiment.until);
+    sampled.drive(&mut run, experiment.until, |_, _, _| {});
     Ok(run.finish())
 }
 

@@ -178,10 +178,13 @@ impl<'a> Sampled<'a> {
 }
 
 impl Sampled<'_> {
-    /// Drives a run to its end, `until`, s: the input is held from one decision to the next.
-    pub(super) fn drive(&mut self, run: &mut Run, until: f64) {
+    /// Drives a run to its end, `until`, s: the input is held from one decision to the next. `see` is shown time, state
+    /// and the motor's current, A, at each of them and at the end.
+    pub(super) fn drive(&mut self, run: &mut Run, until: f64, mut see: impl FnMut(f64, &State, f64)) {
         loop {
-            let (input, end) = self.decide(&run.state(), run.current(0));
+            let (state, current) = (run.state(), run.current(0));
+            see(run.time(), &state, current);
+            let (input, end) = self.decide(&state, current);
             let is_at_end = run.time() >= until;
             if !self.hold(run, input, end) || is_at_end {
                 return;

@@ -4,6 +4,7 @@
 //! The recipe is [`tune`]; [`evaluate`] judges without a search. What is found is rounded to four digits, and
 //! everything that is said holds for the rounded gains.
 
+mod by_moves;
 mod evolution;
 mod family;
 mod gains;
@@ -35,15 +36,10 @@ use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::stage::BeltModel;
+use by_moves::{Bars, MEMBERS, Tried, Watch, Weighed};
 use std::path::Path;
 use verdict::{compare, forced};
-use work::{Bars, Work};
-
-/// Machines that moves are run on while searching, the axis of the file with them.
-const SOME: usize = 4;
-
-/// How often a search goes on with the machines that are worst for what it found.
-const POLISHED: usize = 2;
+use work::{Finalist, Work};
 
 /// Searches for what makes no figure worse, each with the machines on which one was.
 const KEPT: usize = 6;
@@ -56,9 +52,6 @@ const NEARBY: usize = 2;
 /// and where nothing may be.
 const SOFT: f64 = 3.0;
 const HARD: f64 = 30.0;
-
-/// Designs of each balance that are looked at before none is taken.
-const TRIES: usize = 6;
 
 /// The result of a tuning.
 #[derive(Debug, Clone)]
@@ -152,16 +145,14 @@ pub fn tune(case: &Case, tuning: &Tuning, stop: &dyn Fn() -> bool) -> Result<Tun
     let (after, choices) = match cost {
         Cost::Disturbance => (work.verdict(&best.design)?, Vec::new()),
         Cost::Moves | Cost::Squares | Cost::Peak => {
-            let leading = work.verdict(&best.design)?;
-            let mut some = some_of(&leading);
             let figures = before.at_worst();
-            let bars = Some(Bars { figures: &figures, steep: SOFT });
-            let weighed = work::Weighed { cost, bars };
-            let mut archive = work.by_moves(&finalists, &some, &weighed)?;
-            let leading = work.polished(&finalists, &mut archive, &mut some, &weighed, leading)?;
+            let weighed = Weighed { cost, bars: Some(Bars { figures: &figures, steep: SOFT }) };
+            let (mut archive, watch) = work.by_moves(&finalists, &weighed)?;
+            let leading = work.best_of(&archive, cost, &BALANCES[1], weighed.bars)?;
+            let leading = work.verdict(leading.as_ref().unwrap_or(&best.design))?;
             let (after, choices) = work.chosen(&archive, cost, &before, leading)?;
             match compare(&before, &after) {
-                Judgement::Worse => work.kept(&finalists, &mut archive, some, cost, &before, after)?,
+                Judgement::Worse => work.kept(&finalists, &mut archive, watch, cost, &before, after)?,
                 Judgement::Better | Judgement::Unchanged => (after, choices),
             }
         }
@@ -181,24 +172,12 @@ fn beginning<'a>(case: &'a Case, tuning: &Tuning) -> Result<(&'a Design, Family,
     Ok((design, Family::of(case, tuning)?, moves::of(case, design)?))
 }
 
-/// The machines that are worst in some figure of a design, and the axis of the file.
-fn some_of(verdict: &Verdict) -> Vec<usize> {
-    let mut some = vec![0];
-    let ranked = verdict.moves.iter().flat_map(|one| [one.at_worst.error.1, one.slowest]);
-    for place in ranked {
-        if !some.contains(&place) && some.len() < SOME {
-            some.push(place);
-        }
-    }
-    some
-}
-
 impl Work<'_> {
     /// The design that is best by the objective over all machines, one that makes no move worse before any other; and
     /// what other balances choose.
     fn chosen(
         &mut self,
-        archive: &[work::Tried],
+        archive: &[Tried],
         cost: Cost,
         before: &Verdict,
         leading: Verdict,
@@ -214,7 +193,7 @@ impl Work<'_> {
         let mut choices: Vec<Choice> = Vec::new();
         for (place, bars) in [(1, bars), (1, None), (0, None), (2, None)] {
             let balance = &BALANCES[place];
-            let Some(design) = self.best_of(archive, cost, balance, bars, TRIES)? else { continue };
+            let Some(design) = self.best_of(archive, cost, balance, bars)? else { continue };
             let known = choices.iter().find(|choice| choice.design == design).map(|c| (c.objective, c.worst.clone()));
             let (value, worst) = match known {
                 Some(known) => known,
@@ -255,53 +234,20 @@ impl Work<'_> {
 }
 
 impl Work<'_> {
-    /// The best design so far on the whole family, searched on from with the machines that are worst for it, too, as
-    /// long as there are new ones.
-    fn polished(
-        &mut self,
-        finalists: &[work::Finalist],
-        archive: &mut Vec<work::Tried>,
-        some: &mut Vec<usize>,
-        weighed: &work::Weighed,
-        mut leading: Verdict,
-    ) -> Result<Verdict> {
-        for _ in 0..POLISHED {
-            if (self.stop)() || self.is_spent() {
-                break;
-            }
-            let Some(design) = self.best_of(archive, weighed.cost, &BALANCES[1], weighed.bars, TRIES)? else { break };
-            let verdict = self.verdict(&design)?;
-            let known = some.len();
-            for place in some_of(&verdict) {
-                if place < self.family.machines.len() && !some.contains(&place) {
-                    some.push(place);
-                }
-            }
-            if verdict.objective < leading.objective {
-                leading = verdict;
-            }
-            if some.len() == known {
-                break;
-            }
-            self.further(finalists, archive, some, weighed)?;
-        }
-        Ok(leading)
-    }
-
     /// The best design with no figure worse than before, by differential evolution in the layouts of filters that came
     /// nearest to that; each time on the machines, too, on which a figure was worse.
     fn kept(
         &mut self,
-        finalists: &[work::Finalist],
-        archive: &mut Vec<work::Tried>,
-        mut some: Vec<usize>,
+        finalists: &[Finalist],
+        archive: &mut Vec<Tried>,
+        mut watch: Watch,
         cost: Cost,
         before: &Verdict,
         mut after: Verdict,
     ) -> Result<(Verdict, Vec<Choice>)> {
         let figures = before.at_worst();
         let bars = Some(Bars { figures: &figures, steep: HARD });
-        let weighed = work::Weighed { cost, bars };
+        let weighed = Weighed { cost, bars };
         let mut latest = after.clone();
         // What makes no figure worse may cost once more as much.
         self.most += self.spent.get();
@@ -309,20 +255,15 @@ impl Work<'_> {
             if (self.stop)() || self.is_spent() {
                 break;
             }
-            for place in latest.worse_on(before) {
-                // A corner that is none of the machines has no place among them.
-                if place < self.family.machines.len() && !some.contains(&place) {
-                    some.push(place);
-                }
-            }
+            watch.join(&latest.worse_on(before, self.stages.len()));
             for layout in self.nearest(archive, &weighed) {
-                self.again(archive, (layout, work::MEMBERS / 2), &some, &weighed);
+                self.again(archive, (layout, MEMBERS / 2), &watch, &weighed);
                 match round < NEARBY {
-                    true => self.onward(finalists, Some(layout), &some, &weighed, archive)?,
-                    false => self.evolved(finalists, layout, &some, &weighed, archive)?,
+                    true => self.onward(finalists, Some(layout), &watch, &weighed, archive)?,
+                    false => self.evolved(finalists, layout, &watch, &weighed, archive)?,
                 }
             }
-            let Some(design) = self.best_of(archive, cost, &BALANCES[1], bars, TRIES)? else { break };
+            let Some(design) = self.best_of(archive, cost, &BALANCES[1], bars)? else { break };
             if design == latest.design && round >= NEARBY {
                 break;
             }

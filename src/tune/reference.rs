@@ -1,11 +1,12 @@
 //! How far a tuning is from what a long differential evolution of the same objective finds: for tables, and for those
 //! who doubt it.
 
+use super::by_moves::{Bars, Weighed};
 use super::evolution::evolve;
 use super::search::Found;
 use super::verdict::{Judgement, Verdict, compare};
-use super::work::{Bars, Finalist, Weighed, Work};
-use super::{HARD, Tuned, some_of};
+use super::work::{Finalist, Work};
+use super::{HARD, Tuned};
 use crate::case::{Case, Cost, Tuning};
 use crate::chance::uniform;
 use crate::error::Result;
@@ -38,13 +39,13 @@ pub fn evolved(
     let bars = (!is_worse).then_some(Bars { figures: &figures, steep: HARD });
     let weighed = Weighed { cost, bars };
     let finalist = Finalist::at(&tuned.after.design, given.filters.len());
-    let mut some = some_of(&tuned.before);
+    let mut watch = tuned.before.watch(&work);
     let mut best: Option<Verdict> = None;
     for round in 0..ROUNDS {
         let mut random = Pcg64::seed_from_u64(97 + round as u64);
         let mut archive = Vec::new();
         let mut value =
-            |x: &[f64], bar: f64| work.of_moves((&finalist, 0, x), &some, &weighed, (0.0, bar), &mut archive);
+            |x: &[f64], bar: f64| work.of_moves((&finalist, 0, x), &watch, &weighed, (0.0, bar), &mut archive);
         let count = finalist.powers.len();
         let members = (0..MEMBERS).map(|_| {
             let x: Vec<f64> = (0..count).map(|_| SCATTER * (2.0 * uniform(&mut random) - 1.0)).collect();
@@ -52,13 +53,9 @@ pub fn evolved(
         });
         let members = members.collect();
         evolve(members, generations, 97 + round as u64, &mut value);
-        let Some(design) = work.best_of(&archive, cost, &super::BALANCES[1], bars, 20)? else { continue };
+        let Some(design) = work.best_of(&archive, cost, &super::BALANCES[1], bars)? else { continue };
         let verdict = work.verdict(&design)?;
-        for place in some_of(&verdict) {
-            if place < tuned.family.machines.len() && !some.contains(&place) {
-                some.push(place);
-            }
-        }
+        watch.join(&verdict.watch(&work));
         let is_allowed = bars.is_none() || compare(&tuned.before, &verdict) != Judgement::Worse;
         if is_allowed && best.as_ref().is_none_or(|best| verdict.objective < best.objective) {
             best = Some(verdict);

@@ -1,5 +1,6 @@
 //! The verdict on a controller over the family, and whether one is better than another.
 
+use super::by_moves::Watch;
 use super::family::{Corner, Family, modes_along};
 use super::hunting::{Hunt, hunting};
 use super::margins::Margins;
@@ -53,9 +54,7 @@ pub struct MoveVerdict {
     pub settled: (usize, usize),
     /// All figures at worst.
     pub at_worst: AtWorst,
-    /// The axis that takes longest to settle, by its place in the list.
-    pub(super) slowest: usize,
-    seen: Vec<MoveFigures>,
+    pub(super) seen: Vec<MoveFigures>,
 }
 
 /// The judgement on a controller.
@@ -137,22 +136,29 @@ impl Verdict {
         all
     }
 
-    /// Machines on which a figure is worse than it was at worst, of each move the two that are worst.
-    pub(super) fn worse_on(&self, before: &Verdict) -> Vec<usize> {
-        let mut all = Vec::new();
-        for (is, was) in self.moves.iter().zip(&before.moves) {
+    /// The axes that are worst in a figure, a corner that is none of the machines apart.
+    pub(super) fn watch(&self, work: &Work) -> Watch {
+        let count = work.stages.len();
+        let seen: Vec<Vec<MoveFigures>> = self.moves.iter().map(|one| one.seen[..count].to_vec()).collect();
+        Watch::of(&seen, work.family.left_out(count))
+    }
+
+    /// Axes on which a figure is worse than it was at worst, of each move the two that are worst and one more for each
+    /// that a figure leaves out; of so many, a corner that is none of them apart.
+    pub(super) fn worse_on(&self, before: &Verdict, count: usize) -> Watch {
+        let of_move = |(is, was): (&MoveVerdict, &MoveVerdict)| {
             let beyond = |seen: &MoveFigures| {
                 let later = (seen.settles - was.at_worst.settles.0) / was.at_worst.settles.0.max(0.05);
                 let left = if seen.settling.is_none() && is.settled.0 < was.settled.0 { 1.0 } else { 0.0 };
                 (seen.error / was.at_worst.error.0).ln().max(later).max(left)
             };
             let mut ranked: Vec<(f64, usize)> =
-                is.seen.iter().map(beyond).enumerate().map(|(place, value)| (value, place)).collect();
+                is.seen.iter().take(count).map(beyond).enumerate().map(|(place, value)| (value, place)).collect();
             ranked.retain(|(value, _)| *value > 0.0);
             ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-            all.extend(ranked.into_iter().take(2).map(|(_, place)| place));
-        }
-        all
+            ranked.into_iter().take(3).map(|(_, place)| place).collect()
+        };
+        Watch { axes: self.moves.iter().zip(&before.moves).map(of_move).collect() }
     }
 }
 
@@ -209,8 +215,6 @@ impl Work<'_> {
             let (profile, solver) = (&motion.profile, Solver::of(stage));
             let own = closed_loop(&Setup { stage, model: stage, design, profile, until, window, solver })?;
             let at_worst = AtWorst::of(&seen, left_out);
-            let slowest =
-                (0..seen.len()).max_by(|&a, &b| seen[a].settles.total_cmp(&seen[b].settles)).unwrap_or_default();
             moves.push(MoveVerdict {
                 name: motion.name.clone(),
                 cart: own.figures.cart,
@@ -219,7 +223,6 @@ impl Work<'_> {
                 worst: (at_worst.error.0, self.family.words(&machines[at_worst.error.1])),
                 settled: (at_worst.settled, machines.len()),
                 at_worst,
-                slowest,
                 seen,
             });
         }

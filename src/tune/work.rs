@@ -1,23 +1,18 @@
 //! The search: many designs by what steps of command and reference do within the limits, which needs no run; the best
 //! of them by moves.
 
-use super::evolution::evolve;
 use super::family::{Family, modes_along};
 use super::gains::{self, rounded, searched, shaped};
 use super::margins::{Margins, Peaks, Plant, Rough};
-use super::objective::{AtWorst, BALANCES, Balance, MoveFigures, Runner, objective};
 use super::rules::{layouts, starts};
-use super::search::{Found, minimise, minimise_below};
+use super::search::minimise;
 use super::verdict::Verdict;
-use crate::case::{Case, Cost, Move, Tuning};
-use crate::chance::uniform;
+use crate::case::{Case, Move, Tuning};
 use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::Result;
 use crate::signal::profile::Profile;
 use crate::stage::Stage;
-use rand_pcg::Pcg64;
-use rand_pcg::rand_core::SeedableRng;
 use std::cell::{Cell, RefCell};
 use std::f64::consts::PI;
 
@@ -27,35 +22,18 @@ const WITHIN: f64 = 0.98;
 /// Rounds of a search, each with the axis that passed a limit in the one before.
 const ROUNDS: usize = 5;
 
-/// Values that a search without moves may ask for, more for each gain, and those that one with moves may.
+/// Values that a search without moves may ask for, and more for each gain.
 const VALUES: usize = 40;
 const MORE: usize = 24;
-const MOVES: usize = 30;
 
-/// Edge of the simplex of a search by moves, at first and where it goes on.
-const FIRST: f64 = 0.25;
-const FURTHER: f64 = 0.12;
-
-/// Members and generations of differential evolution, how far members are scattered about the best (natural logarithm
-/// of gains), and how often it is done again with an axis more.
-pub(super) const MEMBERS: usize = 12;
-const GENERATIONS: usize = 8;
-const SCATTER: f64 = 0.4;
-const EVOLVED: usize = 2;
-
-/// Designs that are looked at by moves before any is searched from, and how much worse than the best (ln J) one may be
-/// and still be searched from.
-const FINALISTS: usize = 3;
-const NEAR: f64 = 0.3;
-
-/// Samples of moves that a search may simulate: a few seconds of a processor.
-const SAMPLES: u64 = 6_000_000;
+/// Designs that are looked at by moves before any is searched from.
+pub(super) const FINALISTS: usize = 3;
 
 /// Share by which filters that are added have to make the cost smaller.
 const PAYS: f64 = 0.02;
 
 /// Weight of what is beyond a limit, in ln J.
-const STEEP: f64 = 30.0;
+pub(super) const STEEP: f64 = 30.0;
 
 /// A tuning on its way.
 pub(super) struct Work<'a> {
@@ -79,6 +57,8 @@ pub(super) struct Work<'a> {
     /// Samples of moves that were simulated, and most that a search may ask for.
     pub spent: Cell<u64>,
     pub most: u64,
+    /// The least current of each move that was seen at worst, A.
+    pub least: RefCell<Vec<f64>>,
     /// Verdicts that were given.
     pub known: RefCell<Vec<Verdict>>,
     pub stop: &'a dyn Fn() -> bool,
@@ -89,8 +69,8 @@ pub(super) struct Work<'a> {
 pub(super) struct Finalist {
     pub design: Design,
     /// The design that it was made from, the number of its filters, and the powers that lead to it.
-    start: Design,
-    own: usize,
+    pub start: Design,
+    pub own: usize,
     pub powers: Vec<f64>,
     /// ln of what steps do.
     value: f64,
@@ -102,30 +82,6 @@ impl Finalist {
         let powers = vec![0.0; searched(design, own)];
         Self { design: design.clone(), start: design.clone(), own, powers, value: f64::INFINITY }
     }
-}
-
-/// A design that was run.
-#[derive(Debug, Clone)]
-pub(super) struct Tried {
-    pub design: Design,
-    pub worst: Vec<AtWorst>,
-    /// The finalist that it was made from, and the powers that lead to it.
-    pub layout: usize,
-    powers: Vec<f64>,
-}
-
-/// By what a search by moves weighs a design.
-pub(super) struct Weighed<'a> {
-    pub cost: Cost,
-    /// Figures that none may be worse than.
-    pub bars: Option<Bars<'a>>,
-}
-
-/// Figures before, and how steeply ln J grows with what a figure is worse.
-#[derive(Clone, Copy)]
-pub(super) struct Bars<'a> {
-    pub figures: &'a [AtWorst],
-    pub steep: f64,
 }
 
 impl<'a> Work<'a> {
@@ -155,7 +111,8 @@ impl<'a> Work<'a> {
             tried: 0,
             rounds: 0,
             spent: Cell::new(0),
-            most: SAMPLES,
+            most: 0,
+            least: RefCell::new(vec![0.0; moves.len()]),
             known: RefCell::default(),
             stop,
         })
@@ -190,7 +147,7 @@ impl<'a> Work<'a> {
     }
 
     /// Where a design passes a limit, if it does; what is worst joins the set.
-    fn passes(&mut self, design: &Design) -> Result<bool> {
+    pub fn passes(&mut self, design: &Design) -> Result<bool> {
         let feedback = self.feedback(design)?;
         let (place, excess, _) = self.worst(&feedback);
         if excess > 1.0 {
@@ -210,7 +167,7 @@ impl<'a> Work<'a> {
     }
 
     /// How far a design is beyond the limits on the set, and what steps of command and reference do there at worst.
-    fn on_set(&mut self, design: &Design) -> (f64, f64) {
+    pub fn on_set(&mut self, design: &Design) -> (f64, f64) {
         self.tried += 1;
         let Ok(feedback) = self.feedback(design) else { return (f64::INFINITY, f64::INFINITY) };
         let (mut most, mut slow) = (0.0_f64, 0.0_f64);
@@ -288,9 +245,14 @@ impl<'a> Work<'a> {
         }
         found.sort_by(|a, b| a.value.total_cmp(&b.value));
         found.truncate(FINALISTS);
-        if is_given_good {
-            let value = self.on_set(given).1.ln();
-            found.push(Finalist { value, ..Finalist::at(given, given.filters.len()) });
+        // The gains of the file, slower where they do not keep the limits.
+        let own = match is_given_good {
+            true => Some(given.clone()),
+            false => self.softened(given, given.filters.len())?.map(|(design, _)| design),
+        };
+        if let Some(design) = own {
+            let value = self.on_set(&design).1.ln();
+            found.push(Finalist { value, ..Finalist::at(&design, given.filters.len()) });
         }
         Ok((found, placed))
     }
@@ -338,7 +300,7 @@ impl<'a> Work<'a> {
     }
 
     /// As far from what keeps the limits towards what does not as they allow.
-    fn pulled(&mut self, start: &Design, own: usize, from: &[f64], to: &[f64]) -> Result<Vec<f64>> {
+    pub fn pulled(&mut self, start: &Design, own: usize, from: &[f64], to: &[f64]) -> Result<Vec<f64>> {
         let between = |part: f64| -> Vec<f64> { from.iter().zip(to).map(|(a, b)| a + part * (b - a)).collect() };
         let (mut near, mut far) = (0.0, 1.0);
         for _ in 0..7 {
@@ -346,233 +308,6 @@ impl<'a> Work<'a> {
             if self.passes(&rounded(&shaped(start, own, &between(part))))? { far = part } else { near = part }
         }
         Ok(between(near))
-    }
-
-    /// The figures of a design on these machines, and ln J by the balance of the search; as soon as it is at least
-    /// `bar`, those of the machines that were looked at until then: another machine makes no figure at worst smaller.
-    fn run(&self, design: &Design, some: &[usize], weighed: &Weighed, bar: f64) -> (Vec<AtWorst>, f64) {
-        let mut seen: Vec<Vec<MoveFigures>> = vec![Vec::new(); self.moves.len()];
-        let mut found = (Vec::new(), f64::INFINITY);
-        let Ok(mut runner) = Runner::new(&self.case.stage, design) else { return found };
-        // The axis of the file is seldom the worst.
-        for &place in some.iter().rev() {
-            let Ok(one) = self.looked(&mut runner, design, &self.stages[place]) else {
-                return (Vec::new(), f64::INFINITY);
-            };
-            seen.iter_mut().zip(one).for_each(|(all, one)| all.push(one));
-            let worst: Vec<AtWorst> = seen.iter().map(|seen| AtWorst::of(seen, 0)).collect();
-            let value = self.valued(weighed.cost, &BALANCES[1], &worst, weighed.bars);
-            found = (worst, value);
-            if value >= bar {
-                break;
-            }
-        }
-        found
-    }
-
-    /// The figures of all moves on one axis.
-    pub fn looked(&self, runner: &mut Runner, design: &Design, stage: &Stage) -> Result<Vec<MoveFigures>> {
-        let one = |(motion, shaped): (&Move, &Profile)| {
-            self.spend(design, motion);
-            runner.look(stage, motion, shaped)
-        };
-        self.moves.iter().zip(&self.shaped).map(one).collect()
-    }
-
-    /// Searches by moves on the machines `some`: with the simplex from each of the best finalists, then with
-    /// differential evolution about the best. All that was run and keeps the limits on the set.
-    pub fn by_moves(&mut self, finalists: &[Finalist], some: &[usize], weighed: &Weighed) -> Result<Vec<Tried>> {
-        let mut archive: Vec<Tried> = Vec::new();
-        let mut ranked: Vec<(f64, usize)> = Vec::new();
-        for (layout, finalist) in finalists.iter().enumerate() {
-            let (worst, _) = self.run(&finalist.design, some, weighed, f64::INFINITY);
-            // Where a search begins need not be good in every figure.
-            ranked.push((self.valued(weighed.cost, &BALANCES[1], &worst, None), layout));
-            archive.push(Tried { design: finalist.design.clone(), worst, layout, powers: finalist.powers.clone() });
-        }
-        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut best: Option<(f64, usize)> = None;
-        let least = ranked.first().map_or(f64::INFINITY, |(value, _)| *value);
-        ranked.retain(|(value, _)| *value <= least + NEAR);
-        for (_, layout) in ranked.into_iter().take(FINALISTS) {
-            let from = finalists[layout].powers.clone();
-            let (value, _) = self.moved(finalists, layout, &from, (some, FIRST), weighed, &mut archive)?;
-            if best.is_none_or(|(least, _)| value < least) {
-                best = Some((value, layout));
-            }
-        }
-        if let Some((_, layout)) = best {
-            self.evolved(finalists, layout, some, weighed, &mut archive)?;
-        }
-        Ok(archive)
-    }
-
-    /// ln J of a finalist with these powers, by moves on the machines `some`, and what it is beyond the limits on the
-    /// set, of which `slack` is allowed; what keeps them and is below the bar joins the archive. Infinite once the
-    /// search is to end.
-    pub fn of_moves(
-        &mut self,
-        (finalist, layout, powers): (&Finalist, usize, &[f64]),
-        some: &[usize],
-        weighed: &Weighed,
-        (slack, bar): (f64, f64),
-        archive: &mut Vec<Tried>,
-    ) -> f64 {
-        if (self.stop)() || self.is_spent() {
-            return f64::INFINITY;
-        }
-        let design = rounded(&shaped(&finalist.start, finalist.own, powers));
-        let beyond = self.on_set(&design).0;
-        if beyond > slack {
-            return 1e3 + beyond.min(1e6);
-        }
-        let (worst, value) = self.run(&design, some, weighed, bar - STEEP * beyond);
-        if beyond == 0.0 && value < bar {
-            archive.push(Tried { design, worst, layout, powers: powers.to_vec() });
-        }
-        value + STEEP * beyond
-    }
-
-    /// Counts the samples of a move.
-    pub fn spend(&self, design: &Design, motion: &Move) {
-        self.spent.set(self.spent.get() + (motion.until / design.every) as u64);
-    }
-
-    /// Whether the samples of moves that a search may ask for are used up.
-    pub fn is_spent(&self) -> bool {
-        self.spent.get() >= self.most
-    }
-
-    /// One search by moves with the simplex; its value, and the powers.
-    fn moved(
-        &mut self,
-        finalists: &[Finalist],
-        layout: usize,
-        from: &[f64],
-        (some, step): (&[usize], f64),
-        weighed: &Weighed,
-        archive: &mut Vec<Tried>,
-    ) -> Result<(f64, Vec<f64>)> {
-        let finalist = &finalists[layout];
-        let (start, own) = (&finalist.start, finalist.own);
-        // A simplex goes along the edge of the limits: a little beyond is allowed, and costs.
-        let mut value = |x: &[f64], bar: f64| self.of_moves((finalist, layout, x), some, weighed, (0.05, bar), archive);
-        let found = minimise_below(from, step, 1e-3, MOVES, &mut value);
-        let (mut value, mut powers) = (found.value, found.x);
-        if self.passes(&rounded(&shaped(start, own, &powers)))? {
-            powers = self.pulled(start, own, from, &powers)?;
-            let design = rounded(&shaped(start, own, &powers));
-            let (worst, now) = self.run(&design, some, weighed, f64::INFINITY);
-            value = now;
-            archive.push(Tried { design, worst, layout, powers: powers.clone() });
-        }
-        Ok((value, powers))
-    }
-
-    /// Differential evolution about the best designs of a layout that were run, once more where what it finds passes a
-    /// limit on an axis that was not looked at.
-    pub fn evolved(
-        &mut self,
-        finalists: &[Finalist],
-        layout: usize,
-        some: &[usize],
-        weighed: &Weighed,
-        archive: &mut Vec<Tried>,
-    ) -> Result<()> {
-        let finalist = &finalists[layout];
-        let (start, own) = (&finalist.start, finalist.own);
-        for round in 0..EVOLVED {
-            if self.is_spent() {
-                return Ok(());
-            }
-            let mut known: Vec<Found> = Vec::new();
-            for tried in archive.iter().filter(|tried| tried.layout == layout) {
-                let value = self.worth(tried, weighed);
-                known.push(Found { x: tried.powers.clone(), value });
-            }
-            known.sort_by(|a, b| a.value.total_cmp(&b.value));
-            let Some(best) = known.first().cloned() else { return Ok(()) };
-            known.truncate(MEMBERS / 2);
-            let mut random = Pcg64::seed_from_u64(15 + round as u64);
-            while known.len() < MEMBERS {
-                let x = best.x.iter().map(|x| x + SCATTER * (2.0 * uniform(&mut random) - 1.0)).collect();
-                known.push(Found { x, value: f64::INFINITY });
-            }
-            // Members of a population are told apart by moves alone: what is beyond the limits is none.
-            let mut value =
-                |x: &[f64], bar: f64| self.of_moves((finalist, layout, x), some, weighed, (0.0, bar), archive);
-            for member in &mut known {
-                member.value = value(&member.x, f64::INFINITY);
-            }
-            let found = evolve(known, GENERATIONS, 15 + round as u64, &mut value);
-            let Some(best) = found.first() else { break };
-            if (self.stop)() || !self.passes(&rounded(&shaped(start, own, &best.x)))? {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    /// ln J of a design that was run, by what a search weighs.
-    fn worth(&self, tried: &Tried, weighed: &Weighed) -> f64 {
-        self.valued(weighed.cost, &BALANCES[1], &tried.worst, weighed.bars)
-    }
-
-    /// On with the simplex from the best design of all on machines that are more now.
-    pub fn further(
-        &mut self,
-        finalists: &[Finalist],
-        archive: &mut Vec<Tried>,
-        some: &[usize],
-        weighed: &Weighed,
-    ) -> Result<()> {
-        for layout in self.nearest(archive, weighed) {
-            self.again(archive, (layout, FINALISTS), some, weighed);
-        }
-        self.onward(finalists, None, some, weighed, archive)
-    }
-
-    /// With the simplex from the best design that was run, of a layout if one is named.
-    pub fn onward(
-        &mut self,
-        finalists: &[Finalist],
-        layout: Option<usize>,
-        some: &[usize],
-        weighed: &Weighed,
-        archive: &mut Vec<Tried>,
-    ) -> Result<()> {
-        let own = archive.iter().filter(|tried| layout.is_none_or(|layout| tried.layout == layout));
-        let best = own.min_by(|a, b| self.worth(a, weighed).total_cmp(&self.worth(b, weighed)));
-        if let Some((layout, powers)) = best.map(|tried| (tried.layout, tried.powers.clone())) {
-            self.moved(finalists, layout, &powers, (some, FURTHER), weighed, archive)?;
-        }
-        Ok(())
-    }
-
-    /// The two layouts with a design that is best where none of the figures may be worse.
-    pub fn nearest(&self, archive: &[Tried], weighed: &Weighed) -> Vec<usize> {
-        let mut ranked: Vec<(f64, usize)> =
-            archive.iter().map(|tried| (self.worth(tried, weighed), tried.layout)).collect();
-        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut layouts: Vec<usize> = Vec::new();
-        for (_, layout) in ranked {
-            if !layouts.contains(&layout) && layouts.len() < 2 {
-                layouts.push(layout);
-            }
-        }
-        layouts
-    }
-
-    /// Runs the best designs of a layout, at most so many, again, on other machines, and forgets the rest of it.
-    pub fn again(&self, archive: &mut Vec<Tried>, (layout, most): (usize, usize), some: &[usize], weighed: &Weighed) {
-        let (mut own, other): (Vec<Tried>, Vec<Tried>) = archive.drain(..).partition(|tried| tried.layout == layout);
-        own.sort_by(|a, b| self.worth(a, weighed).total_cmp(&self.worth(b, weighed)));
-        own.truncate(most);
-        for tried in &mut own {
-            tried.worst = self.run(&tried.design, some, weighed, f64::INFINITY).0;
-        }
-        archive.extend(other);
-        archive.extend(own);
     }
 
     /// A design without those of its added filters, from number `own` on, without which the limits hold and it is as
@@ -598,42 +333,6 @@ impl<'a> Work<'a> {
             }
         }
         Ok(verdict)
-    }
-
-    /// ln J, and what figures are worse than before.
-    pub fn valued(&self, cost: Cost, balance: &Balance, worst: &[AtWorst], bars: Option<Bars>) -> f64 {
-        if worst.len() != self.moves.len() {
-            return f64::INFINITY;
-        }
-        let mut value = objective(cost, balance, self.moves, &self.asked, worst);
-        let (figures, steep) = bars.map_or((&[][..], 0.0), |bars| (bars.figures, bars.steep));
-        for ((is, was), motion) in worst.iter().zip(figures).zip(self.moves) {
-            value += steep * (is.error.0 / was.error.0).ln().max(0.0);
-            // As a share of the profile's duration, as J counts it.
-            let duration = motion.profile.end().max(f64::MIN_POSITIVE);
-            value += steep * (is.settles.0 - was.settles.0).max(0.0) / duration;
-        }
-        if value.is_nan() { f64::INFINITY } else { value }
-    }
-
-    /// The designs of an archive that are best by each balance and keep the limits, at most `tries` looked at for each.
-    pub fn best_of(
-        &mut self,
-        archive: &[Tried],
-        cost: Cost,
-        balance: &Balance,
-        bars: Option<Bars>,
-        tries: usize,
-    ) -> Result<Option<Design>> {
-        let mut ranked: Vec<(f64, &Tried)> =
-            archive.iter().map(|tried| (self.valued(cost, balance, &tried.worst, bars), tried)).collect();
-        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for (value, tried) in ranked.into_iter().take(tries) {
-            if value.is_finite() && !self.passes(&tried.design)? {
-                return Ok(Some(tried.design.clone()));
-            }
-        }
-        Ok(None)
     }
 }
 
