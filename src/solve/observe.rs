@@ -189,7 +189,7 @@ impl<'a> Stretch<'a> {
     }
 }
 
-/// What an observer wants to see closer of a stretch.
+/// The gaps of a stretch that an observer wants to see closer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Closer {
     /// Every gap, at once, if [`Observe::pass`] says so.

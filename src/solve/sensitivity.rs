@@ -46,7 +46,7 @@ impl Variable {
     }
 }
 
-/// What is differentiated.
+/// The quantity that is differentiated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Differentiated {
     /// A column of the run: of way, speed, stretch, force, current, voltage or input.
@@ -114,7 +114,7 @@ impl Bench {
     }
 }
 
-/// What is to be differentiated by what.
+/// Quantities, and the variables that they are differentiated by.
 #[derive(Clone, Copy)]
 pub(super) struct Task<'t> {
     pub(super) mechanism: &'t Arc<Mechanism>,

@@ -36,7 +36,7 @@ pub struct Measure<T> {
     pub words: &'static str,
     /// Its value; NaN where a run has none.
     pub of: fn(&T) -> f64,
-    /// What of the motion has to be followed for it.
+    /// The part of the motion that has to be followed for it.
     pub seeks: &'static [Sought],
 }
 

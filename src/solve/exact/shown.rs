@@ -57,7 +57,7 @@ struct Later<const N: usize> {
     origin: [f64; BODIES],
     begin: f64,
     interval: f64,
-    /// What is read at the ends of its first gap.
+    /// Readings at the ends of its first gap.
     ends: [Reading; 2],
     bow: Reading,
     wanted: Gaps,
@@ -68,7 +68,7 @@ pub(super) struct Watching<const N: usize> {
     /// Whether there is an observer who follows the motion, and whether one who wants to see all of it closely.
     follows: bool,
     sees_all: bool,
-    /// What is read at the present, and behind it at the rows of a stretch.
+    /// Readings at the beginning of a stretch and at its rows; the last one is the present.
     readings: Vec<Reading>,
     /// Whether nothing has jumped since the present was read.
     is_read: bool,

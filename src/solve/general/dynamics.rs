@@ -9,7 +9,7 @@ use crate::solve::saved::{Pass, Passed, restored};
 use crate::solve::{Ending, check};
 use std::sync::Arc;
 
-/// What rounding and a stranger's integrator may be off by, as a share of what a quantity is.
+/// Allowance for rounding and for a stranger's integrator, as a share of a quantity.
 const TOLERANCE: f64 = 1e-9;
 
 /// Changes of mode at one instant.
@@ -215,7 +215,7 @@ impl Dynamics {
     }
 }
 
-/// What there is to integrate.
+/// The quantities that are integrated.
 fn quantities(mechanism: &Mechanism) -> Vec<Quantity> {
     let mut list: Vec<Quantity> =
         mechanism.leaders().flat_map(|body| [Quantity::Position(body), Quantity::Speed(body)]).collect();

@@ -106,7 +106,7 @@ impl Field {
         self.argument(row)
     }
 
-    /// What a force on a leader does to the states.
+    /// Rates of the states by a force on a leader.
     fn column(&self, loads: impl Fn(usize) -> f64) -> States {
         let (model, mechanism) = (&self.model, &self.model.mechanism);
         let mut column = [0.0; STATES];
@@ -187,7 +187,7 @@ impl Field {
         self.linear.outputs.iter_mut().for_each(|output| output.source.resize(sources, 0.0));
     }
 
-    /// What the forces add to a guard at once.
+    /// Value that the forces add to a guard at once.
     fn on_sources(&self, cause: Cause) -> Vec<f64> {
         let mechanism = &*self.model.mechanism;
         // By the loads on a body, and by the friction that is taken off it.

@@ -31,7 +31,7 @@ pub(super) struct Output {
     pub(super) row: States,
     pub(super) input: [f64; DRIVES],
     pub(super) constant: f64,
-    /// What the forces add to it at once.
+    /// Value that the forces add to it at once.
     pub(super) source: Vec<f64>,
 }
 
@@ -344,20 +344,20 @@ fn norm_of<const N: usize>(columns: &[States]) -> f64 {
     (logarithm + share * (N as f64).ln()).exp()
 }
 
-/// What a step of one length makes of a mode.
+/// The matrices of one mode for steps of one length.
 pub(super) struct Set {
     pub(super) h: f64,
     /// The highest power of the inputs.
     pub(super) degree: usize,
-    /// What the values of the forces at the points do to the arguments at the nodes, and behind them what ω does:
+    /// Change of the arguments at the nodes by the values of the forces at the points, and behind them by ω:
     /// `[argument][source][point]`.
     weights: Vec<[Lane; POINTS + 1]>,
-    /// What all else does to them: `[argument][column]`.
+    /// Their change by all else: `[argument][column]`.
     base: Vec<Lane>,
     full: OnceLock<Full>,
 }
 
-/// What a step makes of all that it depends on, column by column: states, one, inputs and their powers, then the values
+/// The results of a step by all that it depends on, column by column: states, one, inputs and their powers, then the values
 /// of the forces at the points.
 pub(super) struct Full {
     /// Of the guards: `[guard][column]`.
@@ -389,7 +389,7 @@ impl Set {
         Self { h, degree, weights, base, full: OnceLock::new() }
     }
 
-    /// What the forces' values at the points do to an argument at the nodes.
+    /// Change of an argument at the nodes by the forces' values at the points.
     #[inline(always)]
     pub(super) fn weights(&self, argument: usize, source: usize, sources: usize) -> &[Lane; POINTS + 1] {
         &self.weights[argument * sources + source]

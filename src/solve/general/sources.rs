@@ -297,7 +297,7 @@ impl Bent {
     }
 }
 
-/// What a rate at node j makes of a deflection at node i.
+/// Deflection at node i by a rate at node j.
 #[inline(always)]
 fn weight(is_stiff: bool, i: usize, j: usize) -> f64 {
     if is_stiff { RADAU[i][j] } else { QUARTIC[i][j + 1] }

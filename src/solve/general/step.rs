@@ -39,7 +39,7 @@ const COLUMNS: usize = STATES + 1 + DRIVES * (DEGREE + 1) + SOURCES * POINTS;
 /// Turns of the iteration at most.
 const TURNS: usize = 12;
 
-/// What is left of a change after which it counts as found, as a share of the tolerance.
+/// A change that is this share of the tolerance counts as found.
 const FOUND: f64 = 0.01;
 
 /// A contraction above which Newton's method is taken.
@@ -48,7 +48,7 @@ const SLOW: f64 = 0.2;
 /// The error of the quartics, as a multiple of what cubics would be off by, where nothing else is known.
 const OF_CUBIC: f64 = 1.0;
 
-/// What a kink leaves of a force counts so many times: it is told by few values.
+/// The rest that a kink leaves of a force counts so many times: it is told by few values.
 const OF_KINK: f64 = 10.0;
 
 /// The values of the forces at the points of a step.
@@ -60,7 +60,7 @@ pub(super) type Inputs = [[f64; DEGREE + 1]; DRIVES];
 /// A thing for each argument.
 pub(super) type Lanes<T> = [T; ARGUMENTS];
 
-/// What a step begins with.
+/// The state and the inputs that a step begins with.
 pub(super) struct Begin<'a> {
     pub(super) y: &'a Vector,
     pub(super) input: &'a Inputs,

@@ -155,7 +155,7 @@ impl Core {
         Length { h: if is_whole { regular } else { h }, to: to - stretch.begin, regular: is_whole }
     }
 
-    /// What a step of this length makes of the mode, and whether it is worth its columns.
+    /// The matrices of the mode for steps of this length, and whether they are worth their columns.
     fn set(&mut self, field: &Field, length: &Length) -> (Arc<Set>, bool) {
         let (known, degree) = (&mut self.known[self.present].sets, self.stretch.degree);
         let near = 8.0 * f64::EPSILON * (self.stretch.begin + self.tau).max(length.h);

@@ -39,7 +39,7 @@ impl<const N: usize> Columns<N> {
     }
 }
 
-/// What a linear system and its derivatives do in one and the same time.
+/// Change of a linear system and of its derivatives over one time.
 pub(crate) struct SlopedStep<const N: usize> {
     step: Matrix<N, N>,
     /// L of each parameter.
@@ -223,7 +223,7 @@ impl<const N: usize> Powers<N> {
         slope
     }
 
-    /// What a constant rate `e`, over the first of the steps, comes to behind the last: Σ Xᵏ⁻¹ e/k!, doubled.
+    /// Change behind the last of the steps by a constant rate `e` over the first: Σ Xᵏ⁻¹ e/k!, doubled.
     #[inline(always)]
     fn constant(&self, e: &[f64; N], steps: &[Matrix<N, N>]) -> [f64; N] {
         let x = &self.powers[0];

@@ -70,7 +70,7 @@ struct Follower<'t, const N: usize> {
     /// The places of the variables in `s`: those that change the equations first.
     places: Vec<usize>,
     s: Vec<[f64; N]>,
-    /// What changes of the input that come later do to S, where one falls on a row that is not put out yet.
+    /// Jumps of S by later changes of the input, where one falls on a row that is not put out yet.
     pending: Option<[f64; N]>,
     /// The modes of this machine, with their derivatives, and what this run needs of them besides.
     slopes: Vec<Sloped<N>>,
@@ -210,7 +210,7 @@ impl<'t, const N: usize> Follower<'t, N> {
         }
     }
 
-    /// What the change of the input at which it stands does to the derivatives by a delay.
+    /// Jump of the derivatives by a delay at the change of the input at which it stands.
     fn move_seam(&mut self) {
         let Some(jump) = self.pending.take() else { return };
         let (space, z) = (&self.core.common.space, &self.core.z);
@@ -388,7 +388,7 @@ fn begin<const N: usize>(seen: &Seen, varied: &Varied) -> [f64; N] {
     std::array::from_fn(|k| varied.slope(here[k], first[k], second[k]))
 }
 
-/// What is stuck has no speed, whatever the variables are.
+/// Stuck bodies have no speed, whatever the variables are.
 fn rest<const N: usize>(core: &Core<N>, s: &mut [[f64; N]]) {
     let (mode, layout) = (&core.common.mode, &core.common.space.layout);
     for body in (0..layout.bodies()).filter(|&body| mode.motion[body] == Motion::Stuck) {

@@ -81,7 +81,7 @@ impl Sparse {
 /// How the equations of one mode change with the variables of the machine: the same in all runs of it.
 pub(in crate::solve::exact) struct Sloped<const N: usize> {
     pub(super) law: Arc<ModeMatrices<N>>,
-    /// What it was made of.
+    /// The machines at the points of each variable's differences, and the weights of the points.
     of: Vec<([Arc<Mechanism>; 2], [f64; 3])>,
     /// A_p of each variable.
     pub(super) slopes: Vec<Columns<N>>,
