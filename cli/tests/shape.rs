@@ -90,6 +90,28 @@ fn pairs_of_shapers() {
     assert!(told.contains("\nPairs\n") && told.contains("mode along the travel"), "{told}");
 }
 
+/// Bad input with `--pairs` ends as it does without: a message, and nothing on the standard output.
+#[test]
+fn mistakes_with_pairs_have_their_messages() {
+    let case = "stages/printer-axis/printer-axis.toml";
+    for (arguments, message) in [
+        (vec![case, "--pairs=3"], "error: unexpected value '3' for '--pairs' found; no more were expected\n"),
+        (
+            vec!["tests/bad/shape/density-nan.csv", "--pairs"],
+            "error: tests/bad/shape/density-nan.csv:9:26: `nan` in column `psd_z` is not a finite number\n",
+        ),
+        (
+            vec!["stages/emps/emps.toml", "--pairs"],
+            "error: stages/emps/emps.toml: a rigid belt has no resonance\n  allowed: belt.model = \"elastic\" or \"two-mass\"\n",
+        ),
+    ] {
+        let output = taut().arg("shape").args(&arguments).output().unwrap();
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
+        assert!(output.stdout.is_empty() && told.starts_with(message), "{arguments:?}: {told}");
+    }
+}
+
 #[test]
 fn mistakes_end_with_status_2() {
     let case = "stages/printer-axis/printer-axis.toml";

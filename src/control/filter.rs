@@ -64,7 +64,7 @@ impl Biquad {
         self.state = [0.0; 2];
     }
 
-    /// What it remembers.
+    /// Shows its memory to a function that takes all of it.
     pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
         all(&mut self.state, memory)
     }

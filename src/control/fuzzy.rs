@@ -44,7 +44,7 @@ impl FuzzyState {
         self.command = 0.0;
     }
 
-    /// What it remembers.
+    /// Shows its memory to a function that takes all of it.
     pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
         self.speed.memory(memory)?;
         memory(&mut self.command)

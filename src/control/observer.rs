@@ -74,7 +74,7 @@ impl DisturbanceState {
         self.state = None;
     }
 
-    /// What it remembers.
+    /// Shows its memory to a function that takes all of it.
     pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
         let mut state = self.state.map(|state| [state[0], state[1], state[2]]);
         optional(&mut state, memory)?;

@@ -14,7 +14,7 @@ const GRID: usize = 40;
 /// Halvings of the step by which the best pair is then moved.
 const HALVINGS: usize = 7;
 
-/// What is hardly more than the least vibration: so many times as much, and so much more.
+/// Vibration that is hardly more than the least: so many times as much, and so much more.
 const MORE: f64 = 1.1;
 const HARDLY: f64 = 0.0005;
 

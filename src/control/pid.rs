@@ -50,7 +50,7 @@ impl PidState {
         *self = Self::new(&self.gains, self.every);
     }
 
-    /// What it remembers.
+    /// Shows its memory to a function that takes all of it.
     pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
         all([&mut self.integral, &mut self.slope], memory)?;
         last(&mut self.last, memory)
@@ -127,7 +127,7 @@ impl CascadeState {
         *self = Self::new(&self.gains, self.every);
     }
 
-    /// What it remembers.
+    /// Shows its memory to a function that takes all of it.
     pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
         self.speed.memory(memory)?;
         all([&mut self.speed_integral, &mut self.current_integral], memory)

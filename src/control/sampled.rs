@@ -406,7 +406,7 @@ impl Speed {
         (self.last, self.value) = (None, 0.0);
     }
 
-    /// What it remembers.
+    /// Shows its memory to a function that takes all of it.
     pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
         last(&mut self.last, memory)?;
         memory(&mut self.value)

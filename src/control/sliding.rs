@@ -52,7 +52,7 @@ impl SlidingState {
         *self = Self::new(&self.gains, &self.rigid, self.every);
     }
 
-    /// What it remembers.
+    /// Shows its memory to a function that takes all of it.
     pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
         self.speed.memory(memory)?;
         memory(&mut self.integral)

@@ -118,7 +118,7 @@ fn check(design: &Design, model: &Stage) -> Result<()> {
 }
 
 impl Standard {
-    /// What it remembers from sample to sample.
+    /// Shows its memory from sample to sample to a function that takes all of it.
     pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
         match &mut self.core {
             Core::Pid(core) => core.memory(memory)?,

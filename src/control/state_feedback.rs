@@ -72,7 +72,7 @@ impl Law {
 }
 
 impl StateFeedbackState {
-    /// What of it does not change in time.
+    /// The part of it that does not change in time.
     pub(crate) fn law(&self) -> &Law {
         &self.law
     }
@@ -248,7 +248,7 @@ impl StateFeedbackState {
         (self.integral, self.integrated, self.last_own) = (0.0, 0.0, 0.0);
     }
 
-    /// What it remembers.
+    /// Shows its memory to a function that takes all of it.
     pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
         flag(&mut self.started, memory)?;
         all(self.estimate.iter_mut().chain(&mut self.own).chain(&mut self.given), memory)?;

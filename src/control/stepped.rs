@@ -29,7 +29,7 @@ pub(super) struct Clocked {
 /// A command at a sample.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Decision {
-    /// What was seen.
+    /// Measurements and references at the sample.
     pub seen: Observation,
     /// The command before the limit and after it, V or A.
     pub asked: f64,

@@ -2,16 +2,16 @@
 //! told of a design comes from whole runs on all axes.
 
 use super::evolution::evolve;
+use super::gains::{rounded, shaped};
 use super::objective::{AtWorst, BALANCES, Balance, MoveFigures, Runner, objective};
 use super::search::{Found, minimise_below};
-use super::work::{FINALISTS, Finalist, STEEP, Work};
+use super::work::{FINALISTS, Finalist, STEEP, Work, slowing};
 use crate::case::{Cost, Move};
 use crate::chance::uniform;
-use crate::design::Design;
+use crate::design::{Design, Structure};
 use crate::error::Result;
 use crate::signal::profile::Profile;
 use crate::stage::Stage;
-use crate::tune::gains::{rounded, shaped};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 
@@ -22,21 +22,49 @@ const MOVES: usize = 60;
 const FIRST: f64 = 0.25;
 const FURTHER: f64 = 0.12;
 
-/// Members and generations of differential evolution, how far members are scattered about the best (natural logarithm
-/// of gains), and how often it is done again with an axis more.
-pub(super) const MEMBERS: usize = 12;
-const GENERATIONS: usize = 12;
-const SCATTER: f64 = 0.4;
-const EVOLVED: usize = 2;
+/// Members of differential evolution, and how often it is done again with an axis more.
+const MEMBERS: usize = 12;
+const EVOLVED: u64 = 2;
+
+/// A differential evolution: generations, how far members are scattered about the best (natural logarithm of gains),
+/// the limits as it takes them, and its seed.
+#[derive(Clone, Copy)]
+pub(super) struct Spread {
+    generations: usize,
+    scatter: f64,
+    edge: Edge,
+    seed: u64,
+}
+
+/// The first one, and those that follow where no other axis is worst for what was found.
+pub(super) const WIDE: Spread = Spread { generations: 12, scatter: 0.4, edge: Edge::Beyond(0.0), seed: 15 };
+const NARROW: Spread = Spread { generations: 8, scatter: 0.3, edge: Edge::Eased, seed: 16 };
+
+/// The limits to a search: it may go so far beyond them, which costs, or a loop that passes them is made slower.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Edge {
+    Beyond(f64),
+    Eased,
+}
+
+/// How far beyond the limits the first simplex may go: it goes along their edge.
+const SLACK: f64 = 0.05;
+
+/// ln of the slowest loop that limits make of one that passes them, halvings on the way to the fastest that does not,
+/// and how often that is done for axes that were not looked at.
+const SLOWEST: f64 = -0.7;
+const HALVINGS: usize = 5;
+const EASED: usize = 3;
 
 /// How much worse than the best (ln J) a finalist may be and still be searched from.
 const NEAR: f64 = 0.3;
 
-/// Samples of moves that a search may simulate: a few seconds of a processor.
-const SAMPLES: u64 = 6_000_000;
+/// Samples of moves that a search may simulate, each design that it looks at counted as some more: a few seconds of a
+/// processor.
+const SAMPLES: u64 = 5_000_000;
 
 /// How often a search goes on with the axes that are worst for what it found.
-const POLISHED: usize = 4;
+const POLISHED: usize = 8;
 
 /// Axes that are watched for each figure, beside those that a figure at worst leaves out.
 const WATCHED: usize = 2;
@@ -44,8 +72,8 @@ const WATCHED: usize = 2;
 /// Share of a figure before by which one at samples has to be less: a peak between them may be that much higher.
 const BETWEEN: f64 = 2e-3;
 
-/// What is beyond the limits at least where they are passed on an axis between the points of the grid.
-const LEAST_BEYOND: f64 = 1e-3;
+/// Designs of each balance that are looked at before none is taken.
+const TRIES: usize = 20;
 
 /// Weight of an axis on which the cart settles no more, as a share of that of an error.
 const LOST: f64 = 0.2;
@@ -177,7 +205,7 @@ impl Work<'_> {
     /// best, and on with the simplex as long as other axes are worst for what is found. All that was run and keeps the
     /// limits on the set, and the axes that are watched.
     pub fn by_moves(&mut self, finalists: &[Finalist], weighed: &Weighed) -> Result<(Vec<Tried>, Watch)> {
-        self.most = self.spent.get() + SAMPLES;
+        self.grant();
         let mut watch = Watch::default();
         let mut archive: Vec<Tried> = Vec::new();
         if let Some(first) = finalists.first() {
@@ -196,26 +224,30 @@ impl Work<'_> {
         ranked.retain(|(value, _)| *value <= least + NEAR);
         for (_, layout) in ranked.into_iter().take(FINALISTS) {
             let from = finalists[layout].powers.clone();
-            let (value, _) = self.moved(finalists, layout, &from, (&watch, FIRST), weighed, &mut archive)?;
+            let edge = Edge::Beyond(SLACK);
+            let value = self.moved(finalists, (layout, &from), (&watch, FIRST, edge), weighed, &mut archive)?;
             if best.is_none_or(|(least, _)| value < least) {
                 best = Some((value, layout));
             }
         }
         if let Some((_, layout)) = best {
-            self.evolved(finalists, layout, &watch, weighed, &mut archive)?;
+            self.evolved(finalists, (layout, WIDE), &watch, weighed, &mut archive)?;
         }
-        for _ in 0..POLISHED {
+        for round in 0..POLISHED {
             if (self.stop)() || self.is_spent() {
                 break;
             }
             let Some(design) = self.best_of(&archive, weighed.cost, &BALANCES[1], weighed.bars)? else { break };
-            if !self.watched_by(&design, &mut watch)? {
-                break;
+            let layouts = self.nearest(&archive, weighed);
+            if self.watched_by(&design, &mut watch)? {
+                for &layout in &layouts {
+                    self.again(&mut archive, layout, &watch, weighed);
+                }
+                self.onward(finalists, None, &watch, weighed, &mut archive)?;
+            } else if let Some(&layout) = layouts.first() {
+                let spread = Spread { seed: NARROW.seed + round as u64, ..NARROW };
+                self.evolved(finalists, (layout, spread), &watch, weighed, &mut archive)?;
             }
-            for layout in self.nearest(&archive, weighed) {
-                self.again(&mut archive, (layout, FINALISTS), &watch, weighed);
-            }
-            self.onward(finalists, None, &watch, weighed, &mut archive)?;
         }
         Ok((archive, watch))
     }
@@ -226,17 +258,20 @@ impl Work<'_> {
         Ok(watch.join(&Watch::of(&seen, self.family.left_out(self.stages.len()))))
     }
 
-    /// ln J of a finalist with these powers, by moves on the axes that are watched, and what it is beyond the limits on
-    /// the set, of which `slack` is allowed; what keeps them and is below the bar joins the archive. Infinite once the
-    /// search is to end.
+    /// ln J of a finalist with these powers, by moves on the axes that are watched; what keeps the limits on the set and
+    /// is below the bar joins the archive. Infinite once the search is to end.
     pub fn of_moves(
         &mut self,
         (finalist, layout, powers): (&Finalist, usize, &[f64]),
         watch: &Watch,
         weighed: &Weighed,
-        (slack, bar): (f64, f64),
+        (edge, bar): (Edge, f64),
         archive: &mut Vec<Tried>,
     ) -> f64 {
+        let slack = match edge {
+            Edge::Eased => return self.of_eased((finalist, layout, powers), watch, weighed, bar, archive),
+            Edge::Beyond(slack) => slack,
+        };
         if (self.stop)() || self.is_spent() {
             return f64::INFINITY;
         }
@@ -247,17 +282,66 @@ impl Work<'_> {
         }
         let (worst, value) = self.run(&design, watch, weighed, bar - STEEP * beyond);
         if beyond == 0.0 && value < bar {
-            // What is worth keeping has to keep the limits on all axes; the one on which it does not joins the set.
+            archive.push(Tried { design, worst, layout, powers: powers.to_vec() });
+        }
+        value + STEEP * beyond
+    }
+
+    /// The same with the loop as much slower as the limits make it; what is below the bar keeps them on all axes.
+    fn of_eased(
+        &mut self,
+        (finalist, layout, powers): (&Finalist, usize, &[f64]),
+        watch: &Watch,
+        weighed: &Weighed,
+        bar: f64,
+        archive: &mut Vec<Tried>,
+    ) -> f64 {
+        let mut powers = powers.to_vec();
+        for _ in 0..EASED {
+            if (self.stop)() || self.is_spent() {
+                return f64::INFINITY;
+            }
+            powers = match self.eased(finalist, &powers) {
+                Ok(powers) => powers,
+                Err(beyond) => return 1e3 + beyond.min(1e6),
+            };
+            let design = rounded(&shaped(&finalist.start, finalist.own, &powers));
+            let (worst, value) = self.run(&design, watch, weighed, bar);
+            if value >= bar {
+                return value;
+            }
+            // What is worth keeping has to keep the limits on all axes; one on which it does not joins the set.
             match self.passes(&design) {
-                Ok(false) => archive.push(Tried { design, worst, layout, powers: powers.to_vec() }),
-                Ok(true) => {
-                    let beyond = self.on_set(&design).0.max(LEAST_BEYOND);
-                    return if beyond > slack { 1e3 + beyond.min(1e6) } else { value + STEEP * beyond };
+                Ok(false) => {
+                    archive.push(Tried { design, worst, layout, powers });
+                    return value;
                 }
+                Ok(true) => {}
                 Err(_) => return f64::INFINITY,
             }
         }
-        value + STEEP * beyond
+        f64::INFINITY
+    }
+
+    /// These powers with the loop as much slower as the limits make it on the set; where half as fast is not enough, how
+    /// far it is beyond them.
+    fn eased(&mut self, finalist: &Finalist, powers: &[f64]) -> std::result::Result<Vec<f64>, f64> {
+        let slowing = slowing(&finalist.start, finalist.own, &self.case.stage);
+        let at = |log: f64| -> Vec<f64> { powers.iter().zip(&slowing).map(|(x, slow)| x + log * slow).collect() };
+        let mut beyond = |x: &[f64]| self.on_set(&rounded(&shaped(&finalist.start, finalist.own, x))).0;
+        if beyond(powers) == 0.0 {
+            return Ok(powers.to_vec());
+        }
+        let (mut slow, mut fast) = (SLOWEST, 0.0);
+        let left = beyond(&at(slow));
+        if left > 0.0 {
+            return Err(left);
+        }
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (slow + fast);
+            if beyond(&at(middle)) > 0.0 { fast = middle } else { slow = middle }
+        }
+        Ok(at(slow))
     }
 
     /// Counts the samples of a move.
@@ -265,36 +349,52 @@ impl Work<'_> {
         self.spent.set(self.spent.get() + (motion.until / design.every) as u64);
     }
 
-    /// Whether the samples of moves that a search may ask for are used up.
-    pub fn is_spent(&self) -> bool {
-        self.spent.get() >= self.most
+    /// Lets a search ask for as much as one may from now on.
+    pub fn grant(&mut self) {
+        self.most = self.charged() + SAMPLES;
     }
 
-    /// One search with the simplex; its value, and the powers.
+    /// Whether the samples of moves that a search may ask for are used up.
+    pub fn is_spent(&self) -> bool {
+        self.charged() >= self.most
+    }
+
+    /// Samples that were simulated, and those that the designs which were looked at are worth.
+    fn charged(&self) -> u64 {
+        self.spent.get() + self.tried as u64 * self.design_costs()
+    }
+
+    /// Samples that take as long as the limits of one design on the set: with state feedback two Riccati equations are
+    /// solved, too.
+    fn design_costs(&self) -> u64 {
+        match self.case.controller.as_ref().map(|design| &design.structure) {
+            Some(Structure::StateFeedback(_)) => 2000,
+            _ => 500,
+        }
+    }
+
+    /// One search with the simplex; its value.
     fn moved(
         &mut self,
         finalists: &[Finalist],
-        layout: usize,
-        from: &[f64],
-        (watch, step): (&Watch, f64),
+        (layout, from): (usize, &[f64]),
+        (watch, step, edge): (&Watch, f64, Edge),
         weighed: &Weighed,
         archive: &mut Vec<Tried>,
-    ) -> Result<(f64, Vec<f64>)> {
+    ) -> Result<f64> {
         let finalist = &finalists[layout];
-        let (start, own) = (&finalist.start, finalist.own);
-        // A simplex goes along the edge of the limits: a little beyond is allowed, and costs.
         let mut value =
-            |x: &[f64], bar: f64| self.of_moves((finalist, layout, x), watch, weighed, (0.05, bar), archive);
+            |x: &[f64], bar: f64| self.of_moves((finalist, layout, x), watch, weighed, (edge, bar), archive);
         let found = minimise_below(from, step, 1e-3, MOVES, &mut value);
-        let (mut value, mut powers) = (found.value, found.x);
-        if self.passes(&rounded(&shaped(start, own, &powers)))? {
-            powers = self.pulled(start, own, from, &powers)?;
-            let design = rounded(&shaped(start, own, &powers));
-            let (worst, now) = self.run(&design, watch, weighed, f64::INFINITY);
-            value = now;
-            archive.push(Tried { design, worst, layout, powers: powers.clone() });
+        let (start, own) = (&finalist.start, finalist.own);
+        if edge == Edge::Eased || !self.passes(&rounded(&shaped(start, own, &found.x)))? {
+            return Ok(found.value);
         }
-        Ok((value, powers))
+        let powers = self.pulled(start, own, from, &found.x)?;
+        let design = rounded(&shaped(start, own, &powers));
+        let (worst, value) = self.run(&design, watch, weighed, f64::INFINITY);
+        archive.push(Tried { design, worst, layout, powers });
+        Ok(value)
     }
 
     /// Differential evolution about the best designs of a layout that were run, once more where what it finds passes a
@@ -302,39 +402,35 @@ impl Work<'_> {
     pub fn evolved(
         &mut self,
         finalists: &[Finalist],
-        layout: usize,
+        (layout, spread): (usize, Spread),
         watch: &Watch,
         weighed: &Weighed,
         archive: &mut Vec<Tried>,
     ) -> Result<()> {
         let finalist = &finalists[layout];
-        let (start, own) = (&finalist.start, finalist.own);
-        for round in 0..EVOLVED {
+        for seed in spread.seed..spread.seed + EVOLVED {
             if self.is_spent() {
-                return Ok(());
+                break;
             }
-            let mut known: Vec<Found> = Vec::new();
-            for tried in archive.iter().filter(|tried| tried.layout == layout) {
-                let value = self.worth(tried, weighed);
-                known.push(Found { x: tried.powers.clone(), value });
-            }
-            known.sort_by(|a, b| a.value.total_cmp(&b.value));
-            let Some(best) = known.first().cloned() else { return Ok(()) };
+            let own = archive.iter().filter(|tried| tried.layout == layout);
+            let mut known: Vec<(f64, Vec<f64>)> =
+                own.map(|tried| (self.worth(tried, weighed), tried.powers.clone())).collect();
+            known.sort_by(|a, b| a.0.total_cmp(&b.0));
             known.truncate(MEMBERS / 2);
-            let mut random = Pcg64::seed_from_u64(15 + round as u64);
-            while known.len() < MEMBERS {
-                let x = best.x.iter().map(|x| x + SCATTER * (2.0 * uniform(&mut random) - 1.0)).collect();
-                known.push(Found { x, value: f64::INFINITY });
+            let mut all: Vec<Vec<f64>> = known.into_iter().map(|(_, x)| x).collect();
+            let Some(best) = all.first().cloned() else { break };
+            let mut random = Pcg64::seed_from_u64(seed);
+            while all.len() < MEMBERS {
+                all.push(best.iter().map(|x| x + spread.scatter * (2.0 * uniform(&mut random) - 1.0)).collect());
             }
-            // Members of a population are told apart by moves alone: what is beyond the limits is none.
             let mut value =
-                |x: &[f64], bar: f64| self.of_moves((finalist, layout, x), watch, weighed, (0.0, bar), archive);
-            for member in &mut known {
-                member.value = value(&member.x, f64::INFINITY);
-            }
-            let found = evolve(known, GENERATIONS, 15 + round as u64, &mut value);
+                |x: &[f64], bar: f64| self.of_moves((finalist, layout, x), watch, weighed, (spread.edge, bar), archive);
+            let members = all.into_iter().map(|x| Found { value: value(&x, f64::INFINITY), x }).collect();
+            let found = evolve(members, spread.generations, seed, &mut value);
             let Some(best) = found.first() else { break };
-            if (self.stop)() || !self.passes(&rounded(&shaped(start, own, &best.x)))? {
+            let design = rounded(&shaped(&finalist.start, finalist.own, &best.x));
+            // What was eased keeps the limits.
+            if spread.edge == Edge::Eased || (self.stop)() || !self.passes(&design)? {
                 break;
             }
         }
@@ -358,7 +454,7 @@ impl Work<'_> {
         let own = archive.iter().filter(|tried| layout.is_none_or(|layout| tried.layout == layout));
         let best = own.min_by(|a, b| self.worth(a, weighed).total_cmp(&self.worth(b, weighed)));
         if let Some((layout, powers)) = best.map(|tried| (tried.layout, tried.powers.clone())) {
-            self.moved(finalists, layout, &powers, (watch, FURTHER), weighed, archive)?;
+            self.moved(finalists, (layout, &powers), (watch, FURTHER, Edge::Beyond(SLACK)), weighed, archive)?;
         }
         Ok(())
     }
@@ -377,11 +473,11 @@ impl Work<'_> {
         layouts
     }
 
-    /// Runs the best designs of a layout, at most so many, again, on other axes, and forgets the rest of it.
-    pub fn again(&self, archive: &mut Vec<Tried>, (layout, most): (usize, usize), watch: &Watch, weighed: &Weighed) {
+    /// Runs the best designs of a layout, as many as a population begins with, again, on other axes, and forgets the rest of it.
+    pub fn again(&self, archive: &mut Vec<Tried>, layout: usize, watch: &Watch, weighed: &Weighed) {
         let (mut own, other): (Vec<Tried>, Vec<Tried>) = archive.drain(..).partition(|tried| tried.layout == layout);
         own.sort_by(|a, b| self.worth(a, weighed).total_cmp(&self.worth(b, weighed)));
-        own.truncate(most);
+        own.truncate(MEMBERS / 2);
         for tried in &mut own {
             tried.worst = self.run(&tried.design, watch, weighed, f64::INFINITY).0;
         }
@@ -425,6 +521,3 @@ impl Work<'_> {
         Ok(None)
     }
 }
-
-/// Designs of each balance that are looked at before none is taken.
-const TRIES: usize = 20;

@@ -49,17 +49,6 @@ pub fn scaled(design: &Design, powers: &[f64]) -> Design {
     other
 }
 
-/// State feedback with weights that make its bandwidth about √`soft` of what it is: of the integral, which has a time
-/// in it, more so.
-pub fn softer(design: &Design, stage: &Stage, soft: f64) -> Design {
-    let power = |gain: Gain| match gain.key {
-        key if key.ends_with(".integral") => -2.0 * soft.ln(),
-        key if key.ends_with(".disturbance") => 0.0,
-        _ => -soft.ln(),
-    };
-    scaled(design, &gains(design, stage).into_iter().map(power).collect::<Vec<_>>())
-}
-
 /// The design with its searched gains, and frequencies and widths of its filters from number `own` on, multiplied by e
 /// to these powers.
 pub fn shaped(design: &Design, own: usize, powers: &[f64]) -> Design {

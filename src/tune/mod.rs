@@ -36,7 +36,7 @@ use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::stage::BeltModel;
-use by_moves::{Bars, MEMBERS, Tried, Watch, Weighed};
+use by_moves::{Bars, Tried, WIDE, Watch, Weighed};
 use std::path::Path;
 use verdict::{compare, forced};
 use work::{Finalist, Work};
@@ -47,8 +47,8 @@ const KEPT: usize = 6;
 /// Of these, how many look nearby with the simplex before differential evolution does.
 const NEARBY: usize = 2;
 
-/// How steeply ln J grows with the logarithm of what an error is worse than before, and with what settling is later, as a
-/// share of the move: some times as steeply as J falls with either, so that a search does not end where one is worse,
+/// How steeply ln J grows with the logarithm of what an error is worse than before, and with what settling is later, as
+/// a share of the move: some times as steeply as J falls with either, so that a search does not end where one is worse,
 /// and where nothing may be.
 const SOFT: f64 = 3.0;
 const HARD: f64 = 30.0;
@@ -250,17 +250,17 @@ impl Work<'_> {
         let weighed = Weighed { cost, bars };
         let mut latest = after.clone();
         // What makes no figure worse may cost once more as much.
-        self.most += self.spent.get();
+        self.grant();
         for round in 0..KEPT {
             if (self.stop)() || self.is_spent() {
                 break;
             }
             watch.join(&latest.worse_on(before, self.stages.len()));
             for layout in self.nearest(archive, &weighed) {
-                self.again(archive, (layout, MEMBERS / 2), &watch, &weighed);
+                self.again(archive, layout, &watch, &weighed);
                 match round < NEARBY {
                     true => self.onward(finalists, Some(layout), &watch, &weighed, archive)?,
-                    false => self.evolved(finalists, layout, &watch, &weighed, archive)?,
+                    false => self.evolved(finalists, (layout, WIDE), &watch, &weighed, archive)?,
                 }
             }
             let Some(design) = self.best_of(archive, cost, &BALANCES[1], bars)? else { break };

@@ -128,7 +128,7 @@ pub struct AtWorst {
 }
 
 impl AtWorst {
-    /// What cannot be better with this current, A.
+    /// Figures that nothing with this current, A, falls below.
     pub(super) fn at_least(current: f64) -> Self {
         Self { error: (0.0, 0), rms: 0.0, settles: (0.0, true), current, settled: 0, unsettled: 0 }
     }

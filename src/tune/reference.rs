@@ -1,7 +1,7 @@
 //! How far a tuning is from what a long differential evolution of the same objective finds: for tables, and for those
 //! who doubt it.
 
-use super::by_moves::{Bars, Weighed};
+use super::by_moves::{Bars, Edge, Weighed};
 use super::evolution::evolve;
 use super::search::Found;
 use super::verdict::{Judgement, Verdict, compare};
@@ -45,7 +45,7 @@ pub fn evolved(
         let mut random = Pcg64::seed_from_u64(97 + round as u64);
         let mut archive = Vec::new();
         let mut value =
-            |x: &[f64], bar: f64| work.of_moves((&finalist, 0, x), &watch, &weighed, (0.0, bar), &mut archive);
+            |x: &[f64], bar: f64| work.of_moves((&finalist, 0, x), &watch, &weighed, (Edge::Eased, bar), &mut archive);
         let count = finalist.powers.len();
         let members = (0..MEMBERS).map(|_| {
             let x: Vec<f64> = (0..count).map(|_| SCATTER * (2.0 * uniform(&mut random) - 1.0)).collect();

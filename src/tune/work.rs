@@ -336,28 +336,33 @@ impl<'a> Work<'a> {
     }
 }
 
-/// A design with a slower loop: of a PID or a cascade as if time went by more slowly, of state feedback with less
-/// weight on errors.
+/// A design with a loop slower by this factor.
 fn slower(design: &Design, own: usize, stage: &Stage, factor: f64) -> Design {
     if factor == 1.0 {
         return design.clone();
     }
+    let powers: Vec<f64> = slowing(design, own, stage).iter().map(|power| power * factor.ln()).collect();
+    shaped(design, own, &powers)
+}
+
+/// The power of the speed of a loop that each gain, and each number of filters from number `own` on, is to be multiplied
+/// by: of a PID or a cascade as if time went by more slowly, of state feedback by its weights.
+pub(super) fn slowing(design: &Design, own: usize, stage: &Stage) -> Vec<f64> {
     let power = |key: &str| match key {
         "controller.pid.proportional" => 2.0,
         "controller.pid.integral" => 3.0,
         "controller.pid.derivative" | "controller.cascade.position" | "controller.cascade.speed" => 1.0,
         "controller.cascade.speed_integral" => 2.0,
         "controller.cascade.current.proportional" | "controller.cascade.current.integral" => 0.5,
+        // About the square root of what the bandwidth is; more so of the integral, which has a time in it.
+        key if key.ends_with(".integral") => -2.0,
+        "controller.state_feedback.position" | "controller.state_feedback.speed" => -1.0,
         _ => 0.0,
     };
-    match design.structure {
-        crate::design::Structure::StateFeedback(_) => gains::softer(design, stage, factor),
-        _ => {
-            let all = gains::gains(design, stage).into_iter().filter(|gain| gain.searched);
-            let powers: Vec<f64> = all.map(|gain| power(gain.key) * factor.ln()).collect();
-            shaped(design, own.max(design.filters.len()), &powers)
-        }
-    }
+    let gains = gains::gains(design, stage).into_iter().filter(|gain| gain.searched);
+    let mut all: Vec<f64> = gains.map(|gain| power(gain.key)).collect();
+    all.resize(searched(design, own), 0.0);
+    all
 }
 
 /// Frequency of a top in Hz: of the mode of the axis that is within a fifth of it, or its own.
