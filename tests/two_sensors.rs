@@ -52,7 +52,7 @@ fn a_scale_takes_away_the_stretch_that_the_motor_does_not_see() {
     assert!(with.abs() < 10e-6 && with.abs() < 0.25 * without.abs(), "{with} {without}");
 }
 
-/// What a controller makes of sines at one of its two sensors is what its linear view says of that sensor.
+/// The answer of a controller to sines at one of its two sensors is that of its linear view of that sensor.
 #[test]
 fn the_linear_view_has_both_sensors() {
     for (name, changes) in [
