@@ -216,26 +216,6 @@ fn a_shared_offset_of_the_input_has_the_unit_of_what_the_amplifier_commands() {
     }
 }
 
-/// Windows of a log that answers late began without an input, as if it had only then been switched on.
-#[test]
-fn windows_of_a_late_log_have_the_input_from_before() {
-    let mut case = recorded(&["cart.friction.coulomb=0.4"], 3, 1e-3);
-    for experiment in &mut case.experiments {
-        let mut log = (**experiment.log.as_ref().unwrap()).clone();
-        let values = &mut log.outputs[0].values;
-        let first = values[0];
-        values.rotate_right(5);
-        values[..5].fill(first);
-        experiment.log = Some(std::sync::Arc::new(log));
-    }
-    let mut plan = plan(&["cart.friction.viscous", "cart.friction.coulomb"]);
-    plan.windows = Some(0.2);
-    plan.nuisance.delay = Scope::Shared;
-    let found = fit(&case, &plan, None, &mut |_| Flow::Continue).unwrap();
-    let delay = found.estimates.iter().find(|one| one.name == "delay").unwrap();
-    assert!((delay.value - 5e-3).abs() < 4e-4, "{} {:?}", delay.value, delay.error);
-}
-
 /// Whatever was fitted, and however the file has it: the file that is written is the machine that was found.
 #[test]
 fn what_is_written_is_the_machine_that_was_found() {

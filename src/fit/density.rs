@@ -200,14 +200,14 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         std::iter::once(jacobian).chain(all.unwrap_or_default()).collect()
     }
 
-    /// Residuals and their Jacobian: exact, or over steps of a part of a standard error.
+    /// Residuals and their Jacobian, over steps of a part of a standard error.
     fn measured(&self, problem: &mut R, x: &[f64]) -> Option<(Vec<f64>, DMatrix<f64>)> {
         let mut residuals = vec![0.0; problem.rows()];
         if !problem.evaluate(x, &mut residuals) {
             return None;
         }
         let steps = self.errors.iter().map(|error| STEP * error).collect();
-        let jacobian = problem.jacobian(x, &residuals, &self.ingredients.bounds, &Differences::ExactOr(steps))?;
+        let jacobian = problem.jacobian(x, &residuals, &self.ingredients.bounds, &Differences::Coarse(steps))?;
         Some((residuals, jacobian))
     }
 

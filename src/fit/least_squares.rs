@@ -94,8 +94,6 @@ pub enum Differences {
     /// kink for each of them; steps of about a standard error see the slope that matters and not that between two
     /// kinks.
     Coarse(Vec<f64>),
-    /// Exact where that can be, and else to both sides by these steps.
-    ExactOr(Vec<f64>),
 }
 
 /// Where a derivative is measured.
@@ -117,9 +115,7 @@ impl Step {
         let h = match how {
             Differences::Forward => 1e-7 * size,
             Differences::Central => 6e-6 * size,
-            Differences::Coarse(steps) | Differences::ExactOr(steps) => {
-                f64::min(steps[j].max(6e-6 * size), (high - low) / 3.0)
-            }
+            Differences::Coarse(steps) => f64::min(steps[j].max(6e-6 * size), (high - low) / 3.0),
         };
         match (x + h <= high, x - h >= low, central) {
             (true, true, true) => Self { first: x + h, second: Some(x - h), at: x },
