@@ -221,7 +221,8 @@ class Plot {
     });
     const widths = panels.filter(P => P.yTicks !== P.ticks).flatMap(P => P.yTicks).map(([, text]) => textWidth(text, 12));
     const left = Math.max(base.left, 16 + Math.max(0, ...widths)), wide = width - left - RIGHT;
-    const xTicks = view.x === home.x ? base.ticks : ticks(xScale, Math.round((base.width - left - RIGHT) / 80));
+    // As many as layout.rs has: not fewer because this browser's digits are wider.
+    const xTicks = view.x === home.x ? base.ticks : ticks(xScale, Math.round((base.width - base.left - RIGHT) / 80));
     let height = base.height;
     if (spec.ratio) {
       height += spec.ratio * wide - panels[0].height;
