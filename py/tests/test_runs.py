@@ -35,7 +35,7 @@ def test_a_run_has_columns_units_and_figures(case):
     assert run["cart_position_m"] is run["cart_position"]
     assert list(run)[:3] == ["time", "voltage", "drive_angle"]
     # Ours, from the README's JSON.
-    assert run.metrics["final_cart_position_m"] == run["cart_position"][-1] == 0.05382078557945905
+    assert run.metrics["final_cart_position_m"] == run["cart_position"][-1] == 0.05382078557945904
     assert len(run.events) == 15
     assert run.events[0]["part"] == "drive" and run.events[0]["load_unit"] == "N m"
     assert not run.events[0]["by_rounding"] and run.position_error is not None and run.position_error < 1e-9

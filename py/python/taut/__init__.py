@@ -4,7 +4,7 @@
     >>> case = taut.Case(taut.template())
     >>> run = case.simulate("5 V pulse")
     >>> float(run["cart_position"][-1])  # m
-    0.05382078557945905
+    0.05382078557945904
 
 Numbers are in SI units everywhere; names of columns and keys of dictionaries say which where they hold bare numbers.
 Mistakes are :class:`taut.Error`, a ``ValueError`` with the text that the command line shows.
