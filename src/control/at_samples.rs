@@ -3,17 +3,16 @@
 //! Nobody observes the motion, which takes a third of the time. What is between samples is missing: a peak by about
 //! (ω T)²/8 of itself at a frequency ω and a sample time T, 1e-3 at 14 Hz and 1 kHz.
 
-use super::outcome::{Deviation, Figures, at_rest};
-use super::sampled::{Controller, Loop, Sampled};
+use super::outcome::{Deviation, Figures, at_rest, unrecorded};
+use super::sampled::Loop;
 use super::standard::Standard;
 use crate::error::Result;
 use crate::mechanism::State;
-use crate::metrics::Peak;
+use crate::metrics::{Meter, Peak};
 use crate::signal::profile::Profile;
-use crate::solve::{self, Detail, Flow, Solver};
+use crate::solve::{self, Solver};
 use crate::stage::Stage;
 use crate::stage::axis::CART;
-use crate::trajectory::Trajectory;
 
 /// Runs a move and gathers the cart's error, settling and the root mean square of the current at samples alone, with
 /// straight lines between; the figures, and how the run ended. Motion and commands are those of
@@ -28,13 +27,10 @@ pub(crate) fn closed_loop_at_samples(
 ) -> Result<(Figures, solve::Ending)> {
     timing.check(until)?;
     let experiment = at_rest(stage, profile, until, timing.every.min(until));
-    controller.reset();
-    let mut sampled = Sampled::new(stage, controller, *timing, profile, false).until(until);
     let mut gathered = Gathered::new(profile, window);
-    let sink = &mut |_: &Trajectory| Flow::Continue;
-    let mut run = solve::Run::new(stage, &experiment, solver, Detail::None, None, sink)?;
-    sampled.drive(&mut run, until, |time, state, current| gathered.see(time, state, current));
-    Ok((gathered.finish(), run.finish().ending))
+    let see = |time: f64, state: &State, current: f64| gathered.see(time, state, current);
+    let outcome = unrecorded((stage, &experiment), controller, (timing, profile), solver, None::<&mut Meter>, see)?;
+    Ok((gathered.finish(), outcome.ending))
 }
 
 /// Figures at samples.

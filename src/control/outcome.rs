@@ -113,14 +113,28 @@ pub(crate) fn closed_loop_briefly(
 ) -> Result<(Figures, solve::Ending)> {
     timing.check(until)?;
     let experiment = at_rest(stage, profile, until, timing.every.min(until));
-    controller.reset();
-    let mut sampled = Sampled::new(stage, controller, *timing, profile, false).until(until);
     let mut gauge = Gauge { is_brief: true, ..Gauge::new(stage, &experiment, profile, window) };
-    let sink = &mut |_: &Trajectory| Flow::Continue;
-    let mut run = solve::Run::new(stage, &experiment, solver, Detail::None, Some(&mut gauge), sink)?;
-    sampled.drive(&mut run, experiment.until, |_, _, _| {});
-    let outcome = run.finish();
+    let outcome =
+        unrecorded((stage, &experiment), controller, (timing, profile), solver, Some(&mut gauge), |_, _, _| {})?;
     Ok((gauge.finish(&outcome.events).0, outcome.ending))
+}
+
+/// Runs a controller along a profile without rows; `see` is shown its samples, as [`Sampled::drive`] says.
+pub(super) fn unrecorded(
+    (stage, experiment): (&Stage, &Experiment),
+    controller: &mut Standard,
+    (timing, profile): (&Loop, &Profile),
+    solver: Solver,
+    observer: Option<&mut impl Observe>,
+    see: impl FnMut(f64, &State, f64),
+) -> Result<solve::Outcome> {
+    controller.reset();
+    let mut sampled = Sampled::new(stage, controller, *timing, profile, false).until(experiment.until);
+    let sink = &mut |_: &Trajectory| Flow::Continue;
+    let observer = observer.map(|observer| observer as &mut dyn Observe);
+    let mut run = solve::Run::new(stage, experiment, solver, Detail::None, observer, sink)?;
+    sampled.drive(&mut run, experiment.until, see);
+    Ok(run.finish())
 }
 
 /// A run from rest at the start of a profile, without an input of its own.
