@@ -176,7 +176,8 @@ impl<'a, const N: usize> Run<'a, N> {
                 let common = &self.core.common;
                 let shown = law.shown(&common.mechanism, &common.space);
                 self.watching.read(shown, common.coordinates.origin(), &begin, &room[..rows]);
-                self.show_stretch(law, begin, (self.grid.time(self.row), h));
+                let first = room[0];
+                self.show_stretch(law, [begin, first], (self.grid.time(self.row), h));
             }
             if !self.passed(rows, if left > 0 { rows } else { rows - 1 }) {
                 return;

@@ -26,6 +26,7 @@ const SAME: f64 = 1e-10;
 const RIGHT: u32 = 32;
 
 /// An instant as an observer sees it; rates are made ready when they are first wanted.
+#[derive(Clone, Copy)]
 struct Sight<const N: usize> {
     z: [f64; N],
     value: Reading,
@@ -52,14 +53,12 @@ struct Part {
 /// A stretch of which an observer wants to see some gaps closer.
 struct Later<const N: usize> {
     law: Arc<ModeMatrices<N>>,
-    /// The state at its beginning, and where ways are counted from.
-    z: [f64; N],
+    /// The states at both ends of its first gap, what is read there, and where ways are counted from.
+    z: [[f64; N]; 2],
+    ends: [Reading; 2],
     origin: [f64; BODIES],
     begin: f64,
     interval: f64,
-    /// Readings at the ends of its first gap.
-    ends: [Reading; 2],
-    bow: Reading,
     wanted: Gaps,
 }
 
@@ -87,13 +86,14 @@ pub(super) struct Watching<const N: usize> {
 impl<const N: usize> Watching<N> {
     pub(super) fn new(observer: Option<&dyn Observe>) -> Self {
         let follows = observer.is_some_and(|observer| observer.follows());
+        let sees_all = observer.is_some_and(|observer| observer.sees_all());
         Self {
             follows,
-            sees_all: observer.is_some_and(|observer| observer.sees_all()),
+            sees_all,
             readings: Vec::with_capacity(if follows { ROWS + 1 } else { 0 }),
             is_read: false,
             origin: [0.0; BODIES],
-            later: Vec::new(),
+            later: Vec::with_capacity(if follows && !sees_all { LATER / 4 } else { 0 }),
             scale: [0.0; QUANTITIES],
             curves: 0,
             level: 0,
@@ -150,17 +150,13 @@ impl<const N: usize> Run<'_, N> {
         let common = &self.core.common;
         let shown = law.shown(&common.mechanism, &common.space);
         self.watching.read(shown, common.coordinates.origin(), &z, rows);
-        self.show_stretch(law, z, (begin, interval));
+        self.show_stretch(law, [z, rows.first().copied().unwrap_or(z)], (begin, interval));
     }
 
-    /// Shows the stretch that has just been read, from `z` on.
-    pub(super) fn show_stretch(&mut self, law: &Arc<ModeMatrices<N>>, z: [f64; N], (begin, interval): (f64, f64)) {
+    /// Shows the stretch that has just been read, whose first gap has these ends.
+    pub(super) fn show_stretch(&mut self, law: &Arc<ModeMatrices<N>>, z: [[f64; N]; 2], (begin, interval): (f64, f64)) {
         let readings = std::mem::take(&mut self.watching.readings);
-        let whole = interval * (readings.len() - 1) as f64;
-        let bow = match self.watching.sees_all {
-            true => [f64::INFINITY; QUANTITIES],
-            false => self.bow(law, &z, interval, whole),
-        };
+        let bow = self.bow(law, &z[0], interval, interval * (readings.len() - 1) as f64);
         let stretch = Stretch::new((begin, interval), &readings, &bow, &law.mode);
         for (scale, most) in self.watching.scale.iter_mut().zip(&stretch.most) {
             *scale = if *most > *scale { *most } else { *scale };
@@ -172,7 +168,7 @@ impl<const N: usize> Run<'_, N> {
         };
         if wanted != Gaps::NONE {
             let (law, origin, ends) = (Arc::clone(law), self.watching.origin, [readings[0], readings[1]]);
-            let later = Later { law, z, origin, begin, interval, ends, bow, wanted };
+            let later = Later { law, z, ends, origin, begin, interval, wanted };
             match is_now {
                 true => self.show_gaps(&later),
                 false => self.watching.later.push(later),
@@ -186,21 +182,27 @@ impl<const N: usize> Run<'_, N> {
 
     /// Shows gaps of a stretch closer, as far as the observer still wants to see them.
     fn show_gaps(&mut self, later: &Later<N>) {
-        let Later { law, begin, interval, ends, wanted, .. } = later;
-        let (mut z, mut from, count) = (later.z, ends[0], wanted.end());
-        let bends = self.bends(law, &mut Sight::new(z, from), *interval * count as f64);
+        let Later { law, begin, interval, wanted, .. } = later;
+        let count = wanted.end();
+        let bends = self.bends(law, &later.z[0], *interval * count as f64);
+        let mut from = Sight::new(later.z[0], later.ends[0]);
+        let mut to = Sight::new(later.z[1], later.ends[1]);
         for gap in 0..count {
-            let mut next = z;
-            if count > 1 {
-                law.step(0).advance(&mut next);
+            if gap > 0 {
+                law.step(0).advance(&mut to.z);
+                if wanted.has(gap) || wanted.has(gap + 1) {
+                    to.value = self.reading(law, &to.z);
+                }
             }
-            let is_read = gap > 0 && (wanted.has(gap) || wanted.has(gap + 1));
-            let to = if is_read { self.sight(law, next).value } else { ends[1] };
-            let begin = begin + gap as f64 * interval;
-            if wanted.has(gap) && self.ask(law, (begin, *interval), [&from, &to], &later.bow) {
-                self.show_closer(law, Sight::new(z, from), (begin, *interval), &bends);
+            if wanted.has(gap) {
+                let ends = (begin + gap as f64 * interval, *interval);
+                let bow = self.bow_between(law, [&mut from, &mut to], *interval, &bends);
+                if self.ask(law, ends, [&from.value, &to.value], &bow) {
+                    self.show_closer(law, &mut from, &mut to, ends, &bends);
+                }
             }
-            (z, from) = (next, to);
+            (from.z, from.value, from.slope) = (to.z, to.value, to.slope.take());
+            from.higher = to.higher.take();
         }
     }
 
@@ -218,6 +220,9 @@ impl<const N: usize> Run<'_, N> {
 
     /// How far readings can be off a straight line over intervals of this length, within `whole` from `z` on.
     fn bow(&self, law: &ModeMatrices<N>, z: &[f64; N], interval: f64, whole: f64) -> Reading {
+        if self.watching.sees_all {
+            return [f64::INFINITY; QUANTITIES];
+        }
         let common = &self.core.common;
         let rates = (&common.input_rate, &common.input_curvature);
         law.bow(law.shown(&common.mechanism, &common.space), &law.rate(z), rates, (interval, whole))
@@ -235,32 +240,34 @@ impl<const N: usize> Run<'_, N> {
         self.recorder.observer.as_mut().is_some_and(|observer| observer.pass(&gap))
     }
 
-    /// Shows a gap of any length closer, in parts that there are matrices for and a rest that a series tells.
+    /// Shows a gap of any length closer: as it is where there are matrices for it, else in parts that there are matrices
+    /// for, and a rest that a series tells.
     fn show_closer(
         &mut self,
         law: &ModeMatrices<N>,
-        mut from: Sight<N>,
+        from: &mut Sight<N>,
+        to: &mut Sight<N>,
         (mut begin, mut length): (f64, f64),
         bends: &Reading,
     ) {
+        // What a sum of times is off by makes no difference here.
+        let reaches = |length: f64, part: f64| length >= part * (1.0 - SAME);
+        if reaches(length, law.length(0)) && reaches(law.length(0), length) {
+            return self.show_part(law, from, to, Part { begin, length, level: 0 }, bends);
+        }
+        let mut from = *from;
         for level in 0..=law.finest {
             let part = law.length(level);
-            // What a sum of times is off by makes no difference here.
-            while length >= part * (1.0 - SAME) {
+            while reaches(length, part) {
                 let mut to = self.after(law, &from, level);
-                self.show_part(law, &mut from, &mut to, Part { begin, length: part, level }, bends);
+                self.show_asked(law, &mut from, &mut to, Part { begin, length: part, level }, bends);
                 begin += part;
                 length -= part;
                 from = to;
             }
         }
         if length > SAME * law.reach() {
-            let mut end = from.z;
-            let series = &mut self.core.room.series;
-            law.series(&from.z, length, series);
-            series.add_to(&mut end, 1.0);
-            let mut to = self.sight(law, end);
-            let curve = self.curve(law, &mut from, &mut to, begin, length);
+            let curve = self.curve(law, &mut from, to, begin, length);
             self.see(&curve);
         }
     }
@@ -273,11 +280,32 @@ impl<const N: usize> Run<'_, N> {
     }
 
     fn sight(&self, law: &ModeMatrices<N>, z: [f64; N]) -> Sight<N> {
-        let shown = law.shown(&self.core.common.mechanism, &self.core.common.space);
-        Sight::new(z, shown.read(&z, &self.watching.origin))
+        Sight::new(z, self.reading(law, &z))
     }
 
-    /// Shows a part as a curve where there is something to see in it, or two halves of it where a curve is not right.
+    fn reading(&self, law: &ModeMatrices<N>, z: &[f64; N]) -> Reading {
+        law.shown(&self.core.common.mechanism, &self.core.common.space).read(z, &self.watching.origin)
+    }
+
+    /// Shows a part if the observer wants to see closer what a cubic tells of it.
+    fn show_asked(
+        &mut self,
+        law: &ModeMatrices<N>,
+        from: &mut Sight<N>,
+        to: &mut Sight<N>,
+        part: Part,
+        bends: &Reading,
+    ) {
+        if !self.watching.sees_all {
+            let bow = self.bow_between(law, [from, to], part.length, bends);
+            if !self.ask(law, (part.begin, part.length), [&from.value, &to.value], &bow) {
+                return;
+            }
+        }
+        self.show_part(law, from, to, part, bends);
+    }
+
+    /// Shows a part as a curve, or two halves of it where a curve is not right.
     fn show_part(
         &mut self,
         law: &ModeMatrices<N>,
@@ -287,9 +315,6 @@ impl<const N: usize> Run<'_, N> {
         bends: &Reading,
     ) {
         let Part { begin, length, level } = part;
-        if !self.asks(law, from, to, part, bends) {
-            return;
-        }
         if level == law.finest || self.watching.curves >= MOST_CURVES {
             let curve = self.curve(law, from, to, begin, length);
             return self.see(&curve);
@@ -311,43 +336,41 @@ impl<const N: usize> Run<'_, N> {
             (self.watching.right, self.watching.level) = (0, self.watching.level.max(level + 1));
         }
         let half = |begin| Part { begin, length: 0.5 * length, level: level + 1 };
-        self.show_part(law, from, &mut middle, half(begin), bends);
-        self.show_part(law, &mut middle, to, half(begin + 0.5 * length), bends);
+        self.show_asked(law, from, &mut middle, half(begin), bends);
+        self.show_asked(law, &mut middle, to, half(begin + 0.5 * length), bends);
     }
 
-    /// Whether the observer wants to see closer what a cubic tells of a part, `bends` being a bound of |q⁗|. With slopes
+    /// By how much readings can be off the straight line between two sights, `bends` being a bound of |q⁗|. With slopes
     /// a and b at its ends and d between, a cubic is off a straight line by s (1 − s) ((a − d)(1 − s) − (b − d) s), and
     /// what is read is off the cubic by no more than s² (1 − s)² |q⁗| h⁴/24: together by no more than 4 s (1 − s) times
     /// max(|a − d|, |b − d|)/4 + |q⁗| h⁴/384.
-    fn asks(
-        &mut self,
+    fn bow_between(
+        &self,
         law: &ModeMatrices<N>,
-        from: &mut Sight<N>,
-        to: &mut Sight<N>,
-        Part { begin, length, .. }: Part,
+        [from, to]: [&mut Sight<N>; 2],
+        length: f64,
         bends: &Reading,
-    ) -> bool {
-        if self.watching.sees_all {
-            return true;
-        }
-        let (from_slope, to_slope) = (self.slope(law, from), self.slope(law, to));
-        let square = length * length;
-        let bow: Reading = std::array::from_fn(|q| {
-            let across = to.value[q] - from.value[q];
-            let (a, b) = ((from_slope[q] * length - across).abs(), (to_slope[q] * length - across).abs());
-            0.25 * if a > b { a } else { b } + bends[q] * (square * square / 384.0)
-        });
-        self.ask(law, (begin, length), [&from.value, &to.value], &bow)
-    }
-
-    /// Bounds of the fourth derivatives of what is read, within `length` from a sight on.
-    fn bends(&self, law: &ModeMatrices<N>, from: &mut Sight<N>, length: f64) -> Reading {
+    ) -> Reading {
         if self.watching.sees_all {
             return [f64::INFINITY; QUANTITIES];
         }
-        let [_, third] = self.higher(law, from);
+        let (from_slope, to_slope) = (self.slope(law, from), self.slope(law, to));
+        let square = length * length;
+        std::array::from_fn(|q| {
+            let across = to.value[q] - from.value[q];
+            let (a, b) = ((from_slope[q] * length - across).abs(), (to_slope[q] * length - across).abs());
+            0.25 * if a > b { a } else { b } + bends[q] * (square * square / 384.0)
+        })
+    }
+
+    /// Bounds of the fourth derivatives of what is read, within `length` from a state on.
+    fn bends(&self, law: &ModeMatrices<N>, z: &[f64; N], length: f64) -> Reading {
+        if self.watching.sees_all {
+            return [f64::INFINITY; QUANTITIES];
+        }
         let space = &self.core.common.space;
-        let input = |order| space.input_bounds(&from.z, order, length);
+        let input = |order| space.input_bounds(z, order, length);
+        let third = law.rate(&law.rate(&law.rate(z)));
         law.change_of(law.shown(&self.core.common.mechanism, space), &third, (&input(3), &input(4)), length)
     }
 
