@@ -8,7 +8,7 @@ use taut::case::{Case, Sampling};
 use taut::metrics::Meter;
 use taut::solve::{Bench, Flow, Solver, stream_observed};
 use taut::stage::Stage;
-use taut::sweep::{DIMENSIONS, OF_EXPERIMENT, Sobol, Spread, Status, Sweep, indices, rank_correlation};
+use taut::sweep::{DIMENSIONS, OF_EXPERIMENT, Ranked, Sobol, Spread, Status, Sweep, indices};
 use taut::trajectory::Trajectory;
 
 const TABLE4: &str = include_str!("../stages/sollmann-jouaneh/table4.toml");
@@ -479,8 +479,38 @@ fn statistics_of_a_column() {
     assert_eq!(spread.counts.iter().sum::<usize>(), 101);
     assert_eq!(Spread::of(&[f64::NAN]), None);
     let squares: Vec<f64> = values.iter().map(|value| value * value).collect();
+    let rank_correlation = |x: &[f64], y: &[f64]| Ranked::of(x).correlation(&Ranked::of(y));
     assert!((rank_correlation(&values, &squares) - 1.0).abs() < 1e-12);
     let falling: Vec<f64> = values.iter().map(|value| (-value / 9.0).exp()).collect();
     assert!((rank_correlation(&values, &falling) + 1.0).abs() < 1e-12);
     assert_eq!(rank_correlation(&[1.0, 2.0], &[3.0, 3.0]), 0.0);
+}
+
+/// A column that is ranked once is ranked anew among the runs that another column has, too.
+#[test]
+fn rank_correlations_are_those_of_the_definition_where_values_are_equal_or_missing() {
+    let sequence = Sobol::new(2, 7);
+    let columns: Vec<[f64; 2]> = (0..200)
+        .map(|run| {
+            let [x, y] = [sequence.coordinate(run, 0), sequence.coordinate(run, 1)];
+            // A dozen values, so that many are equal, and holes that differ.
+            let missing = |is: bool, value: f64| if is { f64::NAN } else { (12.0 * value).floor() };
+            [missing(run % 17 == 3, x), missing(run % 11 == 5, x + y * y)]
+        })
+        .collect();
+    let [x, y] = [0, 1].map(|place| columns.iter().map(|pair| pair[place]).collect::<Vec<f64>>());
+    let both: Vec<&[f64; 2]> = columns.iter().filter(|pair| pair.iter().all(|value| value.is_finite())).collect();
+    // The rank: how many are less, and half of the others that are equal.
+    let rank = |place: usize, of: f64| {
+        let less = both.iter().filter(|pair| pair[place] < of).count() as f64;
+        less + 0.5 * (both.iter().filter(|pair| pair[place] == of).count() as f64 - 1.0)
+    };
+    let mean = (both.len() as f64 - 1.0) / 2.0;
+    let product =
+        |a: usize, b: usize| both.iter().map(|pair| (rank(a, pair[a]) - mean) * (rank(b, pair[b]) - mean)).sum::<f64>();
+    let expected = product(0, 1) / (product(0, 0) * product(1, 1)).sqrt();
+    let (x, y) = (Ranked::of(&x), Ranked::of(&y));
+    assert!(expected > 0.3 && both.len() < 175, "{expected} of {}", both.len());
+    assert_eq!([x.correlation(&y), y.correlation(&x)].map(|is| (is - expected).abs() < 1e-14), [true; 2]);
+    assert_eq!(x.correlation(&x), 1.0);
 }

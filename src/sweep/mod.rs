@@ -35,7 +35,7 @@ pub use distribution::Distribution;
 pub use indices::{Estimate, Index, indices};
 pub use measures::{Figure, Measure, OF_EXPERIMENT, OF_MOVE, OfPart, of_gantry};
 pub use sobol::{DIMENSIONS, Sobol};
-pub use statistics::{SHARES, Spread, rank_correlation};
+pub use statistics::{Ranked, SHARES, Spread};
 pub use summary::{Drawn, Measured, Shown, Summary};
 
 use crate::case::Sampling;

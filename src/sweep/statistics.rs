@@ -57,27 +57,78 @@ impl Spread {
     }
 }
 
-/// Spearman's rank correlation of the pairs that are both numbers; 0 where one of them does not vary.
-pub fn rank_correlation(x: &[f64], y: &[f64]) -> f64 {
-    let pairs: Vec<(f64, f64)> =
-        x.iter().copied().zip(y.iter().copied()).filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
-    let (x, y) = (ranks(pairs.iter().map(|pair| pair.0)), ranks(pairs.iter().map(|pair| pair.1)));
-    let middle = (pairs.len() as f64 - 1.0) / 2.0;
-    let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - middle) * (b - middle)).sum::<f64>();
-    let size = (sum(&x, &x) * sum(&y, &y)).sqrt();
-    if size > 0.0 { sum(&x, &y) / size } else { 0.0 }
+/// A column with the rank of each of its values, for Spearman's correlations with other columns of the same runs: sorted
+/// once, however many these are.
+#[derive(Debug, Clone)]
+pub struct Ranked {
+    /// Places of the values that are numbers, by value; equal ones have the same second number.
+    order: Vec<(usize, usize)>,
+    /// By place, whether there is a number, and its rank less the mean of all ranks; 0 where there is none.
+    is_number: Vec<bool>,
+    ranks: Vec<f64>,
 }
 
-/// The place of each value among all of them; equal ones share the mean of their places.
-fn ranks(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let values: Vec<f64> = values.collect();
-    let mut order: Vec<usize> = (0..values.len()).collect();
-    order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
-    let mut ranks = vec![0.0; values.len()];
+impl Ranked {
+    /// Ranks these values.
+    pub fn of(values: &[f64]) -> Self {
+        let mut sorted: Vec<usize> = (0..values.len()).filter(|place| values[*place].is_finite()).collect();
+        sorted.sort_unstable_by(|a, b| values[*a].total_cmp(&values[*b]));
+        let mut order: Vec<(usize, usize)> = Vec::with_capacity(sorted.len());
+        for place in sorted {
+            let class = match order.last() {
+                Some(&(before, class)) if values[before] == values[place] => class,
+                Some(&(_, class)) => class + 1,
+                None => 0,
+            };
+            order.push((place, class));
+        }
+        let ranks = centred(&order, values.len());
+        Self { order, is_number: values.iter().map(|value| value.is_finite()).collect(), ranks }
+    }
+
+    /// Spearman's rank correlation of the pairs that are both numbers; 0 where one of them does not vary.
+    ///
+    /// # Panics
+    ///
+    /// Where the columns are not equally long.
+    pub fn correlation(&self, other: &Self) -> f64 {
+        assert_eq!(self.ranks.len(), other.ranks.len(), "columns of the same runs are equally long");
+        if self.is_number == other.is_number {
+            return normed(&self.ranks, &other.ranks);
+        }
+        let among = |column: &Self, other: &Self| {
+            let both = column.order.iter().copied().filter(|&(place, _)| other.is_number[place]);
+            centred(&both.collect::<Vec<_>>(), column.ranks.len())
+        };
+        normed(&among(self, other), &among(other, self))
+    }
+}
+
+/// Σ x y / √(Σ x² Σ y²); 0 where one of them does not vary.
+fn normed(x: &[f64], y: &[f64]) -> f64 {
+    let size = (dot(x, x) * dot(y, y)).sqrt();
+    if size > 0.0 { dot(x, y) / size } else { 0.0 }
+}
+
+/// Σ x y of ranks: twice a rank is a whole number, so that the sum is exact in any order, and four are kept.
+fn dot(x: &[f64], y: &[f64]) -> f64 {
+    let ((x, x_rest), (y, y_rest)) = (x.as_chunks::<4>(), y.as_chunks::<4>());
+    let mut sums = [0.0; 4];
+    for (x, y) in x.iter().zip(y) {
+        sums.iter_mut().zip(x).zip(y).for_each(|((sum, x), y)| *sum += x * y);
+    }
+    sums.iter().sum::<f64>() + x_rest.iter().zip(y_rest).map(|(x, y)| x * y).sum::<f64>()
+}
+
+/// By place, the rank of each among these less the mean of all ranks, equal ones sharing the mean of theirs; 0 at other
+/// places.
+fn centred(order: &[(usize, usize)], count: usize) -> Vec<f64> {
+    let mean = (order.len() as f64 - 1.0) / 2.0;
+    let mut ranks = vec![0.0; count];
     let mut begin = 0;
-    for equal in order.chunk_by(|a, b| values[*a] == values[*b]) {
+    for equal in order.chunk_by(|a, b| a.1 == b.1) {
         let middle = begin as f64 + (equal.len() as f64 - 1.0) / 2.0;
-        equal.iter().for_each(|place| ranks[*place] = middle);
+        equal.iter().for_each(|(place, _)| ranks[*place] = middle - mean);
         begin += equal.len();
     }
     ranks

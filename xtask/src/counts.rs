@@ -3,8 +3,10 @@
 //!
 //! Times depend on what else a machine does; instructions do not. valgrind runs `examples/counts.rs` and counts those
 //! of each work. It knows AVX2 and nothing wider. The counts hold for one compiler, which the file names; another one
-//! is told, and its counts are compared all the same. Counts that are kept go into the table of `docs/performance.md`,
-//! too.
+//! is told, and its counts are compared all the same. Counts that are kept go into the tables of `docs/performance.md`,
+//! too, with the share that each kind of work has in a run and in a sweep.
+
+mod shares;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -12,6 +14,9 @@ use std::path::Path;
 use std::process::Command;
 
 pub const USAGE: &str = "cargo xtask counts [--keep]";
+
+/// A kind of work, and its share.
+type Share = (&'static str, f64);
 
 /// Where the counts are kept.
 const KEPT: &str = "benches/counts.txt";
@@ -45,8 +50,8 @@ pub fn run(words: &[&str]) -> Result<(), String> {
     if keep {
         let document = root.join(DOCUMENT);
         let text = fs::read_to_string(&document).map_err(|error| format!("{DOCUMENT} cannot be read: {error}"))?;
-        fs::write(&document, with_counts(&text, &counts))
-            .map_err(|error| format!("{DOCUMENT} cannot be written: {error}"))?;
+        let text = with_shares(&with_counts(&text, &counts), [shares(root, 0)?, shares(root, 1)?]);
+        fs::write(&document, text).map_err(|error| format!("{DOCUMENT} cannot be written: {error}"))?;
         let text = Kept { compiler, counts: counts.into_iter().collect() }.text();
         return fs::write(&file, text).map_err(|error| format!("{KEPT} cannot be written: {error}"));
     }
@@ -77,12 +82,21 @@ fn count(root: &Path) -> Result<Vec<(String, u64)>, String> {
     names
         .enumerate()
         .map(|(index, name)| {
-            let file = folder.join(format!("out.{}", index + 1));
-            let text =
-                fs::read_to_string(&file).map_err(|error| format!("valgrind made no {}: {error}", file.display()))?;
-            Ok((name.to_string(), total(&text).ok_or_else(|| format!("{} has no sum", file.display()))?))
+            let sum = total(&profile(root, index)?).ok_or_else(|| format!("the profile of {name} has no sum"))?;
+            Ok((name.to_string(), sum))
         })
         .collect()
+}
+
+/// The profile of the work with this number, from 0 on.
+fn profile(root: &Path, index: usize) -> Result<String, String> {
+    let file = root.join(format!("target/counts/out.{}", index + 1));
+    fs::read_to_string(&file).map_err(|error| format!("valgrind made no {}: {error}", file.display()))
+}
+
+/// The share of each kind of work in the one with this number.
+fn shares(root: &Path, index: usize) -> Result<Vec<Share>, String> {
+    Ok(shares::of(&profile(root, index)?))
 }
 
 /// The sum of the costs in a file of callgrind's: the number behind `summary:`, or behind `totals:`.
@@ -122,6 +136,16 @@ fn compare(before: &BTreeMap<String, u64>, now: &[(String, u64)]) -> Vec<String>
 /// The document with these counts in its rows of work, count before, count now and ratio.
 fn with_counts(document: &str, counts: &[(String, u64)]) -> String {
     document.lines().map(|line| row(line, counts).unwrap_or_else(|| line.to_string()) + "\n").collect()
+}
+
+/// The document with these shares in its rows of kind of work, share in a run, share in a sweep.
+fn with_shares(document: &str, [run, sweep]: [Vec<Share>; 2]) -> String {
+    let row = |line: &str| {
+        let name = line.strip_prefix("| ")?.split(" |").next()?;
+        let share = |of: &[Share]| of.iter().find(|(kind, _)| *kind == name).map(|(_, share)| 100.0 * share);
+        Some(format!("| {name} | {:.0} % | {:.0} % |", share(&run)?, share(&sweep)?))
+    };
+    document.lines().map(|line| row(line).unwrap_or_else(|| line.to_string()) + "\n").collect()
 }
 
 fn row(line: &str, counts: &[(String, u64)]) -> Option<String> {
@@ -186,6 +210,13 @@ mod tests {
         let expected = "| work | what it is |\n| `run` | Table 4 |\n| `run` | 931 991 | 465 995 | 0.50 |\ntext\n";
         assert_eq!(with_counts(document, &[("run".to_string(), 465_995)]), expected);
         assert_eq!([7, 999, 1000, 12_345_678].map(grouped), ["7", "999", "1 000", "12 345 678"]);
+    }
+
+    #[test]
+    fn the_shares_of_the_document_take_the_profiles() {
+        let document = "| | `run` | `sweep` |\n| the rest | 1 % | 2 % |\n| others | 1 % | 2 % |\n";
+        let expected = "| | `run` | `sweep` |\n| the rest | 12 % | 5 % |\n| others | 1 % | 2 % |\n";
+        assert_eq!(with_shares(document, [vec![("the rest", 0.119)], vec![("the rest", 0.05)]]), expected);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::store::Store;
 use rayon::prelude::*;
 use taut::Result;
 use taut::case::Sampling;
-use taut::sweep::{Drawn, Measured, Shown, Spread, Status, Summary, indices, rank_correlation};
+use taut::sweep::{Drawn, Measured, Ranked, Shown, Spread, Status, Summary, indices};
 
 /// Values of a column that shares are computed from.
 pub const MOST_VALUES: u64 = 1 << 20;
@@ -41,15 +41,17 @@ pub fn summary(work: &Work, store: &Store) -> Result<Summary> {
         let step = values.len().div_ceil(most).max(1);
         values.iter().step_by(step).copied().collect()
     };
+    let is_drawn = sweep.sampling() != Sampling::OneAtATime;
     let drawn = (1..inputs)
         .into_par_iter()
         .map(|place| {
             let values = column(place)?;
             let heading = &sweep.columns()[place];
-            Ok((heading, Spread::of(&values), thinned(&values, MOST_RANKED)))
+            let few = thinned(&values, MOST_RANKED);
+            let ranked = if is_drawn { Ranked::of(&few) } else { Ranked::of(&[]) };
+            Ok((heading, Spread::of(&values), few, ranked))
         })
         .collect::<Result<Vec<_>>>()?;
-    let is_drawn = sweep.sampling() != Sampling::OneAtATime;
     let mut groups = Vec::new();
     let mut place = inputs;
     for group in sweep.groups() {
@@ -61,8 +63,14 @@ pub fn summary(work: &Work, store: &Store) -> Result<Summary> {
         place = first + group.figures.len();
         let measured = group.figures.par_iter().enumerate().map(|(number, figure)| {
             let values = column(first + number)?;
-            let ranked = thinned(&values, MOST_RANKED);
-            let of_drawn = |(_, _, x): &(_, _, Vec<f64>)| rank_correlation(x, &ranked);
+            let few = thinned(&values, MOST_RANKED);
+            let ranks = match is_drawn {
+                true => {
+                    let ranked = Ranked::of(&few);
+                    drawn.iter().map(|(.., of_drawn)| of_drawn.correlation(&ranked)).collect()
+                }
+                false => Vec::new(),
+            };
             let indices = match sweep.indices() {
                 true => indices(&store.column(first + number, block, every)?, sweep.parameters().len(), REPLICATES, 1),
                 false => None,
@@ -72,18 +80,18 @@ pub fn summary(work: &Work, store: &Store) -> Result<Summary> {
                 unit: figure.unit,
                 words: figure.words.clone(),
                 spread: Spread::of(&values),
-                ranks: if is_drawn { drawn.iter().map(of_drawn).collect() } else { Vec::new() },
+                ranks,
                 indices,
                 nominal: if is_drawn { f64::NAN } else { values.first().copied().unwrap_or(f64::NAN) },
                 tornado: if is_drawn { Vec::new() } else { tornado(work, &values) },
-                points: thinned(&ranked, POINTS),
+                points: thinned(&few, POINTS),
             })
         });
         groups.push(Shown { name: group.name.clone(), endings, measures: measured.collect::<Result<_>>()? });
     }
     let parameters = drawn
         .into_iter()
-        .map(|(heading, spread, values)| Drawn {
+        .map(|(heading, spread, values, _)| Drawn {
             name: heading.name.clone(),
             unit: heading.unit.clone(),
             spread,

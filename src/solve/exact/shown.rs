@@ -185,10 +185,12 @@ impl<const N: usize> Run<'_, N> {
         let Later { law, begin, interval, wanted, .. } = later;
         let count = wanted.end();
         let bends = self.bends(law, &later.z[0], *interval * count as f64);
-        let mut from = Sight::new(later.z[0], later.ends[0]);
-        let mut to = Sight::new(later.z[1], later.ends[1]);
+        let [first, second] = [0, 1].map(|end| Sight::new(later.z[end], later.ends[end]));
+        let (mut from, mut to) = (&mut { first }, &mut { second });
         for gap in 0..count {
             if gap > 0 {
+                std::mem::swap(&mut from, &mut to);
+                (to.z, to.slope, to.higher) = (from.z, None, None);
                 law.step(0).advance(&mut to.z);
                 if wanted.has(gap) || wanted.has(gap + 1) {
                     to.value = self.reading(law, &to.z);
@@ -196,13 +198,11 @@ impl<const N: usize> Run<'_, N> {
             }
             if wanted.has(gap) {
                 let ends = (begin + gap as f64 * interval, *interval);
-                let bow = self.bow_between(law, [&mut from, &mut to], *interval, &bends);
+                let bow = self.bow_between(law, [from, to], *interval, &bends);
                 if self.ask(law, ends, [&from.value, &to.value], &bow) {
-                    self.show_closer(law, &mut from, &mut to, ends, &bends);
+                    self.show_closer(law, from, to, ends, &bends);
                 }
             }
-            (from.z, from.value, from.slope) = (to.z, to.value, to.slope.take());
-            from.higher = to.higher.take();
         }
     }
 
@@ -354,10 +354,11 @@ impl<const N: usize> Run<'_, N> {
         if self.watching.sees_all {
             return [f64::INFINITY; QUANTITIES];
         }
-        let (from_slope, to_slope) = (self.slope(law, from), self.slope(law, to));
+        let (from_value, to_value) = (from.value, to.value);
+        let ((_, from_slope), (_, to_slope)) = (self.rate(law, from), self.rate(law, to));
         let square = length * length;
         std::array::from_fn(|q| {
-            let across = to.value[q] - from.value[q];
+            let across = to_value[q] - from_value[q];
             let (a, b) = ((from_slope[q] * length - across).abs(), (to_slope[q] * length - across).abs());
             0.25 * if a > b { a } else { b } + bends[q] * (square * square / 384.0)
         })
@@ -374,23 +375,18 @@ impl<const N: usize> Run<'_, N> {
         law.change_of(law.shown(&self.core.common.mechanism, space), &third, (&input(3), &input(4)), length)
     }
 
-    /// ż and its rate.
-    fn rate(&self, law: &ModeMatrices<N>, sight: &mut Sight<N>) -> ([f64; N], Reading) {
-        *sight.slope.get_or_insert_with(|| {
+    /// ż, and what is read of it.
+    fn rate<'s>(&self, law: &ModeMatrices<N>, sight: &'s mut Sight<N>) -> &'s ([f64; N], Reading) {
+        sight.slope.get_or_insert_with(|| {
             let rate = law.rate(&sight.z);
             (rate, self.rates(law, &rate))
         })
     }
 
-    /// The rates of what is read.
-    fn slope(&self, law: &ModeMatrices<N>, sight: &mut Sight<N>) -> Reading {
-        self.rate(law, sight).1
-    }
-
     /// z̈ and z⃛.
-    fn higher(&self, law: &ModeMatrices<N>, sight: &mut Sight<N>) -> [[f64; N]; 2] {
-        let (rate, _) = self.rate(law, sight);
-        *sight.higher.get_or_insert_with(|| {
+    fn higher<'s>(&self, law: &ModeMatrices<N>, sight: &'s mut Sight<N>) -> &'s [[f64; N]; 2] {
+        let rate = self.rate(law, sight).0;
+        sight.higher.get_or_insert_with(|| {
             let second = law.rate(&rate);
             [second, law.rate(&second)]
         })
@@ -404,8 +400,8 @@ impl<const N: usize> Run<'_, N> {
     /// A reading and its first three derivatives, each times h to its order and over its factorial: q, q̇ h, q̈ h²/2,
     /// q⃛ h³/6.
     fn terms(&self, law: &ModeMatrices<N>, sight: &mut Sight<N>, length: f64) -> [Reading; 4] {
-        let slope = self.slope(law, sight);
-        let [second, third] = self.higher(law, sight).map(|higher| self.rates(law, &higher));
+        let slope = self.rate(law, sight).1;
+        let [second, third] = self.higher(law, sight).each_ref().map(|higher| self.rates(law, higher));
         let [h1, h2, h3] = [length, length * length / 2.0, length * length * length / 6.0];
         [sight.value, slope.map(|v| v * h1), second.map(|v| v * h2), third.map(|v| v * h3)]
     }
