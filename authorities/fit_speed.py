@@ -61,20 +61,15 @@ def clock():
     return sum(used.ru_utime + used.ru_stime for used in both)
 
 
-class Machine(speed.Problem):
+def machine(parameters, volts):
     """The paper's machine with these four numbers, and a pulse of so many volts."""
-
-    def __init__(self, parameters, volts):
-        b, cart_b, c, cart_c = parameters
-        self.curved, self.above = False, [0.0] * 3
-        self.viscous, self.coulomb = (b, cart_b, b), (c, cart_c, c)
-        self.breakaway = self.coulomb
-        self.edges = ((0.0, volts), (0.25, 0.0))
+    b, cart_b, c, cart_c = parameters
+    return speed.Pulse((b, cart_b, b), (c, cart_c, c), volts)
 
 
 def by_scipy(method, rtol):
     """Drive angle and cart position at the samples."""
-    return lambda p, volts: speed.scipy_run(Machine(p, volts), method, rtol)[0][:, [0, 2]].T
+    return lambda p, volts: speed.scipy_run(machine(p, volts), method, rtol)[0][:, [0, 2]].T
 
 
 class Cvode:

@@ -221,6 +221,15 @@ class Problem:
         return rate, jacobian
 
 
+class Pulse(Problem):
+    """The machine with Coulomb friction alone, other numbers of it and another voltage."""
+
+    def __init__(self, viscous, coulomb, volts):
+        super().__init__("coulomb")
+        self.viscous, self.coulomb, self.breakaway = viscous, coulomb, coulomb
+        self.edges = ((0.0, volts), (0.25, 0.0))
+
+
 def watched(problem, modes, volts, left, since):
     """(inertia, mode it may go to or None where its load decides, function falling through zero there).
 

@@ -67,15 +67,11 @@ def error(rows, truth):
 # --- SciPy ----------------------------------------------------------------------------------------------------------
 
 
-class Machine(speed.Problem):
-    """Table 4, every parameter times one of these factors."""
-
-    def __init__(self, factors, volts):
-        self.curved, self.above = False, [0.0] * 3
-        self.viscous = tuple(b * f for b, f in zip(speed.VISCOUS, factors[:3]))
-        self.coulomb = tuple(c * f for c, f in zip(speed.COULOMB, factors[3:6]))
-        self.breakaway = self.coulomb
-        self.edges = ((0.0, volts), (0.25, 0.0))
+def machine(factors, volts):
+    """Table 4, every parameter of friction times one of these factors."""
+    viscous = tuple(b * f for b, f in zip(speed.VISCOUS, factors[:3]))
+    coulomb = tuple(c * f for c, f in zip(speed.COULOMB, factors[3:6]))
+    return speed.Pulse(viscous, coulomb, volts)
 
 
 def scipy_runs(job):
@@ -86,7 +82,7 @@ def scipy_runs(job):
     while time.perf_counter() - begin < seconds:
         factors = random.uniform(0.8, 1.2, 6)
         for volts in (5.0, 10.0):
-            states = speed.scipy_run(Machine(factors, volts), method, rtol)[0]
+            states = speed.scipy_run(machine(factors, volts), method, rtol)[0]
             (states[-1, 2], np.max(np.abs(states[:, 3])))
             count += 1
     return count
@@ -127,10 +123,10 @@ def by_cvode(truth):
             return None
         best = None
         for method in ("bdf", "adams", "adams-fixed"):
-            run = speed.program_rival(truth, [program], [method], 20)
+            run = speed.program_rival(truth, [program], [method])
             for rtol in speed.TOLERANCES:
                 try:
-                    took, off, _ = run(rtol, 5)
+                    took, off, _ = run(rtol, 0.1)
                 except (RuntimeError, ValueError, subprocess.CalledProcessError):
                     continue
                 if off < TARGET:
@@ -442,7 +438,7 @@ def by_diffrax(truth):
 
 
 def main():
-    truth = speed.Problem("coulomb", 0.0)
+    truth = speed.Problem("coulomb")
     turns = in_turns(truth)
     mine = turns[0][2]
     others = "--turns" not in sys.argv[1:]
