@@ -2,7 +2,7 @@
 //!
 //! A law with more parameters meets the records that it is fitted to better, and others worse once it fits what does
 //! not come again. So each candidate is fitted with a part of the records left out, and judged by its error there. With
-//! e_cf the squared error of candidate c in part f, the one with the fewest parameters is chosen whose mean error
+//! e_cf the squared error of candidate c in part f, the fewest parameters are chosen with which a mean error
 //! exceeds that of the best by no more than a standard error of the differences e_cf − e_bf (the rule of one standard
 //! error, L. Breiman and others 1984).
 
@@ -268,10 +268,11 @@ impl Course<'_> {
         Ok(errors.iter().map(|one| (one.quantity, one.rmse.powi(2) * one.count as f64, one.count)).collect())
     }
 
-    /// The windows that predict best so far; none where nothing was tried yet.
+    /// The windows with which the laws of straight lines predict best; none where none was tried yet.
     fn best_window(&self) -> Option<Option<f64>> {
         let squares = |tried: &Tried| tried.errors.iter().flatten().map(|(_, squares, _)| squares).sum::<f64>();
-        let tried = self.tried.iter().filter(|tried| tried.candidate.failed.is_none());
+        let is_simple = |tried: &&Tried| tried.candidate.failed.is_none() && !tried.candidate.law.is_above();
+        let tried = self.tried.iter().filter(is_simple);
         tried.min_by(|a, b| squares(a).total_cmp(&squares(b))).map(|tried| tried.candidate.window)
     }
 
@@ -342,10 +343,10 @@ impl Course<'_> {
         }
         let top = self.tried[0].candidate.held_out;
         let near = |one: &Candidate| one.held_out.powi(2) - top * top <= one.error;
-        let chosen = (0..self.tried.len())
-            .filter(|&k| self.tried[k].candidate.failed.is_none() && near(&self.tried[k].candidate))
-            .min_by_key(|&k| (self.tried[k].candidate.parameters, k))
-            .unwrap_or(0);
+        let fewest = self.tried.iter().map(|tried| &tried.candidate).filter(|one| one.failed.is_none() && near(one));
+        let fewest = fewest.map(|one| one.parameters).min().unwrap_or(usize::MAX);
+        // The first of so many parameters predicts best of them.
+        let chosen = self.tried.iter().position(|tried| tried.candidate.parameters == fewest).unwrap_or(0);
         let by_training = (0..self.tried.len())
             .filter(|&k| self.tried[k].candidate.failed.is_none())
             .min_by(|&a, &b| self.tried[a].candidate.training.total_cmp(&self.tried[b].candidate.training))
@@ -403,7 +404,8 @@ impl Comparison {
         let why = match self.chosen {
             0 => format!("{} predicts best what was held out", shown(chosen)),
             _ => format!(
-                "{} has the fewest parameters, {}, of those whose error is within one standard error of the least, that of {}",
+                "{} predicts best of those with {} parameters, the fewest with which an error is within one standard \
+                 error of the least, that of {}",
                 shown(chosen),
                 chosen.parameters,
                 shown(best)
