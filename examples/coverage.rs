@@ -311,8 +311,9 @@ fn recorded(cell: &Cell, truth: [f64; 3], chance: &mut Chance) -> Case {
     case
 }
 
-/// Half-widths of the intervals that noise of first order would have if it were known; none for other faults.
-fn known(cell: &Cell, case: &Case, plan: &Plan, truth: [f64; 3]) -> Option<[f64; 3]> {
+/// Half-widths of the intervals that noise of first order would have if it were known, with the weights of the fit;
+/// none for other faults.
+fn known(cell: &Cell, case: &Case, plan: &Plan, truth: [f64; 3], noise: &[(Quantity, f64)]) -> Option<[f64; 3]> {
     let (slow, white) = match cell.fault {
         Fault::White(white) => (None, white),
         Fault::First(deviation, time, white) => (Some((deviation, time)), white),
@@ -325,7 +326,10 @@ fn known(cell: &Cell, case: &Case, plan: &Plan, truth: [f64; 3]) -> Option<[f64;
     }
     case.stage.cart.mass = truth[2];
     let mut problem = Problem::new(&case, plan).ok()?;
-    let weight = problem.runs[0].seen[0].weights[0];
+    for &(quantity, deviation) in noise {
+        problem.weigh(quantity, deviation, true);
+        problem.doubt_starts(quantity, deviation);
+    }
     let x = problem.start();
     let mut residuals = vec![0.0; problem.rows()];
     if !problem.evaluate(&x, &mut residuals) {
@@ -340,11 +344,14 @@ fn known(cell: &Cell, case: &Case, plan: &Plan, truth: [f64; 3]) -> Option<[f64;
     Some(std::array::from_fn(|j| {
         let mut sum = 0.0;
         for (index, run) in problem.runs.iter().enumerate() {
-            let first = problem.first_row(index);
-            let rows = first..first + run.time.len();
+            let (first, n) = (problem.first_row(index), run.time.len());
+            let mut moves: Vec<f64> = (0..n).map(|k| influence[(first + k, j)] * run.seen[0].weights[k]).collect();
+            // The start is known by the first value, and as far as that is.
+            for (k, deviation) in run.extras.iter().filter_map(|extra| extra.known).enumerate() {
+                moves[0] += influence[(first + n + k, j)] * case.stage.pulley_radius / deviation;
+            }
             let mut state = 0.0;
-            for row in rows {
-                let w = influence[(row, j)] * weight;
+            for w in moves {
                 sum += w * w * white;
                 if let Some((deviation, time)) = slow {
                     sum += deviation * deviation * (w * w + 2.0 * w * state);
@@ -378,7 +385,8 @@ fn one(cell: &Cell, seed: u64, found: &Mutex<Found>) {
     let case = recorded(cell, truth, &mut chance);
     let plan = Plan { free: KEYS.iter().map(|key| key.to_string()).collect(), ..Plan::default() };
     let fitted = fit(&case, &plan, None, &mut |_| Flow::Continue);
-    let known = known(cell, &case, &plan, truth);
+    let noise = fitted.as_ref().map_or(&[][..], |fitted| &fitted.noise);
+    let known = known(cell, &case, &plan, truth, noise);
     let mut found = found.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     found.machines += 1;
     let Ok(fitted) = fitted else {

@@ -1,10 +1,13 @@
-//! Draws from a density that is known up to a factor, by the No-U-Turn sampler, and what says whether to believe them.
+//! Draws from a density that is known up to a factor, by the No-U-Turn sampler or a random walk, and what says whether
+//! to believe them.
 //!
-//! `chain.rs` has the sampler, `adaptation.rs` what it learns before draws count, `mixing.rs` the diagnostics.
+//! `chain.rs` has the sampler, `walk.rs` the walk, `adaptation.rs` what both learn before draws count, `mixing.rs` the
+//! diagnostics.
 
 mod adaptation;
 mod chain;
 mod mixing;
+mod walk;
 
 use crate::error::{Error, Result};
 use adaptation::{Steps, Windows, factor};
@@ -71,6 +74,9 @@ pub struct Draws {
 /// The logarithm of the density at a point, and its gradient into the second argument; none where the density is zero.
 pub type LogDensity<'a> = dyn Fn(&[f64], &mut [f64]) -> Option<f64> + Sync + 'a;
 
+/// The logarithm of the density at a point alone; none where the density is zero.
+pub type Plain<'a> = dyn Fn(&[f64]) -> Option<f64> + Sync + 'a;
+
 /// Told how many draws all chains have made so far, those for tuning included, at each evaluation of the density; says
 /// whether to go on.
 pub type Watch<'a> = dyn Fn(usize) -> bool + Sync + 'a;
@@ -80,23 +86,43 @@ pub type Watch<'a> = dyn Fn(usize) -> bool + Sync + 'a;
 ///
 /// Variables that are about as wide as one, and not correlated, save draws for tuning; they need not be.
 pub fn sample(log: &LogDensity, starts: &[Vec<f64>], effort: Effort, watch: &Watch) -> Result<Draws> {
+    chains(starts, effort, watch, &|job, start, random| job.chain(log, start, random))
+}
+
+/// The same by a random walk, which needs no slopes: for densities with kinks.
+pub fn walk(log: &Plain, starts: &[Vec<f64>], effort: Effort, watch: &Watch) -> Result<Draws> {
+    chains(starts, effort, watch, &|job, start, random| walk::chain(job, log, start, random))
+}
+
+/// A chain from a start, with random numbers of its own.
+type MakeChain<'a> = dyn Fn(&Job, &[f64], Pcg64) -> Result<Drawn> + Sync + 'a;
+
+/// All chains beside each other.
+fn chains(starts: &[Vec<f64>], effort: Effort, watch: &Watch, chain: &MakeChain) -> Result<Draws> {
     effort.check()?;
     let dimension = starts.first().map_or(0, Vec::len);
     if dimension == 0 || starts.iter().any(|start| start.len() != dimension) {
         return Err(Error::new("a sampler needs points of one or more dimensions to start from"));
     }
-    let job = Job { log, effort, watch, made: AtomicUsize::new(0), stopped: AtomicBool::new(false) };
-    let chains: Vec<Result<Drawn>> = std::thread::scope(|scope| {
-        let job = &job;
-        let threads: Vec<_> =
-            (0..effort.chains).map(|k| scope.spawn(move || job.chain(k, &starts[k % starts.len()]))).collect();
+    let job = Job { effort, watch, made: AtomicUsize::new(0), stopped: AtomicBool::new(false) };
+    let one = |number: usize| {
+        // Each chain has a stream of its own.
+        let own = effort.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(number as u64);
+        let drawn = chain(&job, &starts[number % starts.len()], Pcg64::seed_from_u64(own));
+        // Whoever watches sees the end, too.
+        job.goes_on();
+        drawn
+    };
+    let all: Vec<Result<Drawn>> = std::thread::scope(|scope| {
+        let one = &one;
+        let threads: Vec<_> = (0..effort.chains).map(|k| scope.spawn(move || one(k))).collect();
         threads
             .into_iter()
             .map(|thread| thread.join().unwrap_or_else(|_| Err(Error::new("a chain broke off"))))
             .collect()
     });
     let mut draws = Draws { chains: Vec::new(), divergences: 0, evaluations: 0, interrupted: false };
-    for chain in chains {
+    for chain in all {
         let chain = chain?;
         draws.interrupted |= chain.draws.len() < effort.draws;
         draws.chains.push(chain.draws);
@@ -110,7 +136,6 @@ pub fn sample(log: &LogDensity, starts: &[Vec<f64>], effort: Effort, watch: &Wat
 
 /// All chains together.
 struct Job<'a> {
-    log: &'a LogDensity<'a>,
     effort: Effort,
     watch: &'a Watch<'a>,
     made: AtomicUsize,
@@ -135,24 +160,34 @@ impl Job<'_> {
         goes_on
     }
 
-    fn chain(&self, number: usize, start: &[f64]) -> Result<Drawn> {
-        let Effort { tune, draws, seed, .. } = self.effort;
-        // Each chain has a stream of its own.
-        let random = Pcg64::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(number as u64));
-        let watch = || self.goes_on();
-        let mut chain = Chain::new(self.log, &watch, start, random).ok_or_else(|| {
-            Error::new("the density is zero where a chain would start").next("start from a fit that has converged")
-        })?;
+    /// Counts a draw.
+    fn count(&self) {
+        self.made.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// The draws that count, each with whether it diverged; as many as there are before none comes.
+    fn keep(&self, next: &mut dyn FnMut() -> Option<(Vec<f64>, bool)>) -> Drawn {
         let mut drawn = Drawn::default();
-        if self.tune(&mut chain, tune) {
-            while drawn.draws.len() < draws && chain.draw().is_some() {
-                drawn.divergences += u64::from(chain.diverged);
-                drawn.draws.push(chain.position().to_vec());
-                self.made.fetch_add(1, Ordering::Relaxed);
-            }
+        while drawn.draws.len() < self.effort.draws
+            && let Some((draw, diverged)) = next()
+        {
+            drawn.divergences += u64::from(diverged);
+            drawn.draws.push(draw);
+            self.count();
         }
-        // Whoever watches sees the end, too.
-        self.goes_on();
+        drawn
+    }
+
+    fn chain(&self, log: &LogDensity, start: &[f64], random: Pcg64) -> Result<Drawn> {
+        let watch = || self.goes_on();
+        let mut chain = Chain::new(log, &watch, start, random).ok_or_else(walk::nowhere)?;
+        let mut drawn = Drawn::default();
+        if self.tune(&mut chain, self.effort.tune) {
+            drawn = self.keep(&mut || {
+                chain.draw()?;
+                Some((chain.position().to_vec(), chain.diverged))
+            });
+        }
         drawn.evaluations = chain.evaluations;
         Ok(drawn)
     }
@@ -164,7 +199,7 @@ impl Job<'_> {
         let (mut steps, mut window) = (Steps::new(chain.step), Vec::new());
         for k in 1..=tune {
             let Some(acceptance) = chain.draw() else { return false };
-            self.made.fetch_add(1, Ordering::Relaxed);
+            self.count();
             chain.step = steps.next(acceptance);
             if k > begin {
                 window.push(chain.position().to_vec());

@@ -1,10 +1,10 @@
-//! Descent past kinks by a proximal bundle method (C. Lemaréchal 1975; K. C. Kiwiel 1990; for costs that are not convex,
-//! M. M. Mäkelä and P. Neittaanmäki 1992).
+//! Descent past kinks by a proximal bundle method (C. Lemaréchal 1975; K. C. Kiwiel 1990; for costs that are not
+//! convex, M. M. Mäkelä and P. Neittaanmäki 1992).
 //!
-//! Between two changes in the order of sticks and slips the cost is smooth, and its gradient exact; across them it has a
-//! kink. At a minimum on kinks no gradient is zero: those of the pieces that meet there balance. So the gradients gₖ at
-//! points yₖ around are kept, in coordinates u with the standard error for their unit, in which each smooth piece has
-//! the second derivative I, and each is continued to where the search is:
+//! Between two changes in the order of sticks and slips the cost is smooth, and its gradient exact; across them it has
+//! a kink. At a minimum on kinks no gradient is zero: those of the pieces that meet there balance. So the gradients gₖ
+//! at points yₖ around are kept, in coordinates u with the standard error for their unit, in which each smooth piece
+//! has the second derivative I, and each is continued to where the search is:
 //!
 //! ```text
 //! φₖ(d) = φ − αₖ + g̃ₖ·d + ½ ‖d‖²       g̃ₖ = gₖ − (yₖ − u)       αₖ = φ − φ(yₖ) − gₖ·(u − yₖ) − ½ ‖u − yₖ‖²
@@ -112,7 +112,8 @@ pub(super) fn descend(
 ) -> Option<Balanced> {
     let unit = 1.0 / (at.deviation * at.deviation);
     let mut u = DVector::zeros(at.free.len());
-    let mut pieces = vec![at.piece(problem, best)?];
+    let first = problem.jacobian(&best.x, &best.residuals, at.bounds, &Differences::Central)?;
+    let mut pieces = vec![at.piece(best, &first)?];
     let mut trial = best.clone();
     let mut taken = 1;
     loop {
@@ -131,12 +132,13 @@ pub(super) fn descend(
             taken += 1;
             best.evaluations += 1;
             trial.x = at.place(&(&u - &promise.mean * length));
-            if !problem.evaluate(&trial.x, &mut trial.residuals) {
+            let how = Differences::Central;
+            let Some(jacobian) = problem.linearised(&trial.x, &mut trial.residuals, at.bounds, &how) else {
                 length *= 0.5;
                 continue;
-            }
+            };
             trial.cost = cost_of(&trial.residuals, at.huber);
-            let piece = at.piece(problem, &trial)?;
+            let piece = at.piece(&trial, &jacobian)?;
             let (y, seen) = (piece.y.clone(), piece.seen_from(&u, cost));
             pieces.push(piece);
             if unit * (best.cost - trial.cost) >= KEPT * length * promise.fall {
@@ -204,9 +206,8 @@ impl<'a> Coordinates<'a> {
         x
     }
 
-    /// The piece of the cost at a point.
-    fn piece(&self, problem: &mut dyn Residuals, at: &Minimum) -> Option<Piece> {
-        let jacobian = problem.jacobian(&at.x, &at.residuals, self.bounds, &Differences::Central)?;
+    /// The piece of the cost at a point with this Jacobian.
+    fn piece(&self, at: &Minimum, jacobian: &DMatrix<f64>) -> Option<Piece> {
         let n = self.free.len();
         let moved = DVector::from_fn(n, |i, _| at.x[self.free[i]] - self.start[self.free[i]]);
         // ρ′(r)
@@ -230,10 +231,8 @@ impl<'a> Coordinates<'a> {
         let mut jacobian = DMatrix::zeros(residuals.len(), self.start.len());
         let counting = || pieces.iter().zip(weights).filter(|(_, weight)| **weight > 0.0);
         for (piece, weight) in counting() {
-            if !problem.evaluate(&piece.x, &mut residuals) {
-                return None;
-            }
-            jacobian += problem.jacobian(&piece.x, &residuals, self.bounds, &Differences::Central)? * *weight;
+            let own = problem.linearised(&piece.x, &mut residuals, self.bounds, &Differences::Central)?;
+            jacobian += own * *weight;
         }
         Some(Balanced { promise, jacobian, pieces: counting().count() })
     }

@@ -1,5 +1,5 @@
-//! The evolution strategy CMA-ES, which needs no derivatives (N. Hansen, "The CMA Evolution Strategy: A Tutorial", 2016),
-//! in Hansen's names and with his default constants:
+//! The evolution strategy CMA-ES, which needs no derivatives (N. Hansen, "The CMA Evolution Strategy: A Tutorial",
+//! 2016), in Hansen's names and with his default constants:
 //!
 //! ```text
 //! λ, μ          offspring of a generation, and those that count, with weights w; μ_eff = 1/Σ w²

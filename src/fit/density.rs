@@ -11,11 +11,16 @@
 //! covariance at the fit, so that z is nearly standard normal. A path is a leapfrog along a slope; any slope that
 //! depends on the place alone leaves the draws right (Neal 2011, "MCMC using Hamiltonian dynamics", section 5.5), since
 //! they are taken by the density itself. So slopes are Jᵀψ with J = J₀ + Σ zₖ ∂J/∂zₖ about the fit, one simulation
-//! each, where that is near enough, and measured anew at each place otherwise.
+//! each, where that is near enough.
+//!
+//! Otherwise a random walk draws from the density alone, in x itself, and a step over a bound is not taken. Costs may
+//! have kinks, where sticks and slips change their order, at which paths along slopes are turned about; and parameters
+//! that go together, a delay that may be zero with a gain say, have a ridge that is straight in x and long and narrow:
+//! the logarithm of the distance to a bound bends it, and no step fits it then.
 
 use super::least_squares::{Bounds, Differences, Residuals};
 use crate::chance::uniform;
-use crate::nuts::{Draws, Effort, LogDensity, Watch, sample};
+use crate::nuts::{Draws, Effort, LogDensity, Watch, sample, walk};
 use nalgebra::{DMatrix, DVector};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
@@ -24,7 +29,7 @@ use std::sync::Mutex;
 /// A bound further away than so many standard errors is not felt.
 const FELT: f64 = 1e3;
 
-/// How far the slopes at the fit may be off, where one is a standard error's, before slopes are measured at each place.
+/// How far the slopes at the fit may be off, where one is a standard error's, before they are not followed.
 const OFF: f64 = 0.3;
 
 /// Most variables for which the Jacobian's own derivatives are measured.
@@ -61,7 +66,7 @@ pub struct Ingredients<'a, R> {
 pub struct Sampled {
     /// Values of the variables.
     pub draws: Draws,
-    /// Whether slopes were those of the fit.
+    /// Whether slopes, those of the fit, were followed; a random walk otherwise.
     pub fixed: bool,
 }
 
@@ -118,9 +123,13 @@ struct Density<'a, R> {
     changes: Vec<Change>,
     centre: DVector<f64>,
     spread: DMatrix<f64>,
+    /// The fit, a little away from bounds.
+    inside: Vec<f64>,
     /// Standard errors.
     errors: Vec<f64>,
-    /// The Jacobian about the fit, and its derivatives by z; none where slopes are measured at each place.
+    /// L of the correlations.
+    correlation: DMatrix<f64>,
+    /// The Jacobian about the fit, and its derivatives by z; none where these do not say how the density goes on.
     fixed: Option<Vec<DMatrix<f64>>>,
 }
 
@@ -134,10 +143,14 @@ pub fn draw<R: Residuals + Clone + Send + Sync>(
     let mut random = Pcg64::seed_from_u64(effort.seed ^ 0x5eed);
     if !density.is_straight(&mut random) {
         density.fixed = None;
+        density.change(vec![Change::None; density.inside.len()]);
     }
     let starts: Vec<Vec<f64>> = (0..effort.chains.max(1)).map(|_| density.start(&mut random)).collect();
-    let log: &LogDensity = &|z, gradient| density.log(z, gradient);
-    let mut draws = sample(log, &starts, effort, watch)?;
+    let log: &LogDensity = &|z, gradient| density.log(z, Some(gradient));
+    let mut draws = match density.fixed.is_some() {
+        true => sample(log, &starts, effort, watch)?,
+        false => walk(&|z| density.log(z, None), &starts, effort, watch)?,
+    };
     for draw in draws.chains.iter_mut().flatten() {
         *draw = density.place(draw).iter().map(|place| place[0]).collect();
     }
@@ -166,20 +179,36 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         }
         let covariance = covariance(ingredients, &jacobian);
         let errors = deviations(&covariance);
-        let changes: Vec<Change> =
-            (0..n).map(|j| Change::of(inside[j], errors[j], bounds.low[j], bounds.high[j])).collect();
-        let centre = DVector::from_fn(n, |j, _| changes[j].variable(inside[j]));
         let correlation = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / (errors[i] * errors[j]));
-        let mut spread = correlation.cholesky().map_or_else(|| DMatrix::identity(n, n), |found| found.l());
-        for j in 0..n {
-            // Near a bound a standard error reaches beyond it.
-            let slope = changes[j].at(centre[j])[1].abs();
-            spread.row_mut(j).scale_mut(f64::min(errors[j] / slope, 2.0));
-        }
-        let pool = Mutex::new(vec![problem]);
-        let mut density = Self { pool, ingredients, changes, centre, spread, errors, fixed: None };
+        let correlation = correlation.cholesky().map_or_else(|| DMatrix::identity(n, n), |found| found.l());
+        let mut density = Self {
+            pool: Mutex::new(vec![problem]),
+            ingredients,
+            changes: Vec::new(),
+            centre: DVector::zeros(n),
+            spread: correlation.clone(),
+            inside,
+            errors,
+            correlation,
+            fixed: None,
+        };
+        let near = |j: usize| Change::of(density.inside[j], density.errors[j], bounds.low[j], bounds.high[j]);
+        density.change((0..n).map(near).collect());
         density.fixed = Some(density.bent(jacobian));
         density
+    }
+
+    /// Takes these changes of variables.
+    fn change(&mut self, changes: Vec<Change>) {
+        self.centre = DVector::from_fn(changes.len(), |j, _| changes[j].variable(self.inside[j]));
+        self.spread = self.correlation.clone();
+        for (j, change) in changes.iter().enumerate() {
+            let slope = change.at(self.centre[j])[1].abs();
+            // Near a bound a standard error reaches beyond it.
+            let wide = if *change == Change::None { self.errors[j] } else { f64::min(self.errors[j] / slope, 2.0) };
+            self.spread.row_mut(j).scale_mut(wide);
+        }
+        self.changes = changes;
     }
 
     /// The Jacobian about the fit and, if they can be had, its derivatives along each z, over a standard error to each
@@ -217,11 +246,12 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         self.changes.iter().zip(u.iter()).map(|(change, u)| change.at(*u)).collect()
     }
 
-    fn log(&self, z: &[f64], gradient: &mut [f64]) -> Option<f64> {
+    /// ln p and, where it is asked for, its gradient.
+    fn log(&self, z: &[f64], gradient: Option<&mut [f64]>) -> Option<f64> {
         self.log_with(self.fixed.as_deref(), z, gradient)
     }
 
-    fn log_with(&self, fixed: Option<&[DMatrix<f64>]>, z: &[f64], gradient: &mut [f64]) -> Option<f64> {
+    fn log_with(&self, fixed: Option<&[DMatrix<f64>]>, z: &[f64], gradient: Option<&mut [f64]>) -> Option<f64> {
         let own = self.pool.lock().ok()?.pop();
         let mut problem = own.unwrap_or_else(|| self.ingredients.problem.clone());
         let result = self.log_of(&mut problem, fixed, z, gradient);
@@ -229,7 +259,13 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         result
     }
 
-    fn log_of(&self, problem: &mut R, fixed: Option<&[DMatrix<f64>]>, z: &[f64], gradient: &mut [f64]) -> Option<f64> {
+    fn log_of(
+        &self,
+        problem: &mut R,
+        fixed: Option<&[DMatrix<f64>]>,
+        z: &[f64],
+        gradient: Option<&mut [f64]>,
+    ) -> Option<f64> {
         let Ingredients { bounds, priors, inflation, huber, .. } = self.ingredients;
         let places = self.place(z);
         let x: Vec<f64> = places.iter().map(|place| place[0]).collect();
@@ -237,17 +273,16 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         if x.iter().zip(bounds.low.iter().zip(&bounds.high)).any(|(x, (low, high))| !(low <= x && x <= high)) {
             return None;
         }
-        let (mut residuals, measured) = match fixed {
-            Some(_) => {
+        let (mut residuals, measured) = match (fixed, &gradient) {
+            (None, Some(_)) => self.measured(problem, &x).map(|(residuals, jacobian)| (residuals, Some([jacobian])))?,
+            (Some(_), _) | (_, None) => {
                 let mut residuals = vec![0.0; problem.rows()];
                 if !problem.evaluate(&x, &mut residuals) {
                     return None;
                 }
                 (residuals, None)
             }
-            None => self.measured(problem, &x).map(|(residuals, jacobian)| (residuals, Some([jacobian])))?,
         };
-        let jacobians = fixed.or(measured.as_ref().map(|own| &own[..]))?;
         // ρ = ½ r², from k on k |r| − ½ k²; ψ = ρ′
         let mut cost = 0.0;
         for r in &mut residuals {
@@ -256,15 +291,20 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
             *r = r.clamp(-huber, *huber);
         }
         let mut log = -cost / inflation;
+        let of_priors: Vec<(f64, f64)> =
+            priors.iter().zip(&x).map(|(prior, x)| prior.as_ref().map_or((0.0, 0.0), |prior| prior(*x))).collect();
+        for ((own, _), [_, _, log_dx, _]) in of_priors.iter().zip(&places) {
+            log += own + log_dx;
+        }
+        let Some(gradient) = gradient else { return Some(log).filter(|log| log.is_finite()) };
         // −(J₀ + Σ zₖ ∂J/∂zₖ)ᵀ ψ / T
+        let jacobians = fixed.or(measured.as_ref().map(|own| &own[..]))?;
         let psi = DVector::from_column_slice(&residuals);
         let mut slopes = DVector::zeros(x.len());
         for (jacobian, factor) in jacobians.iter().zip(std::iter::once(&1.0).chain(z)) {
             slopes.gemv_tr(-factor / inflation, jacobian, &psi, 1.0);
         }
-        for (j, [x, dx, log_dx, slope_of_log]) in places.into_iter().enumerate() {
-            let (own, slope) = priors[j].as_ref().map_or((0.0, 0.0), |prior| prior(x));
-            log += own + log_dx;
+        for (j, ([_, dx, _, slope_of_log], (_, slope))) in places.into_iter().zip(of_priors).enumerate() {
             slopes[j] = (slopes[j] + slope) * dx + slope_of_log;
         }
         gradient.copy_from_slice(self.spread.tr_mul(&slopes).as_slice());
@@ -278,7 +318,7 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         for _ in 0..PLACES {
             let z = normal(random, n);
             let (mut a, mut b) = (vec![0.0; n], vec![0.0; n]);
-            if self.log(&z, &mut a).is_some() && self.log_with(None, &z, &mut b).is_some() {
+            if self.log(&z, Some(&mut a)).is_some() && self.log_with(None, &z, Some(&mut b)).is_some() {
                 squares += a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
                 count += n;
             }
@@ -289,11 +329,10 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
     /// Somewhere to begin, drawn from the covariance at the fit.
     fn start(&self, random: &mut Pcg64) -> Vec<f64> {
         let n = self.errors.len();
-        let mut gradient = vec![0.0; n];
         for attempt in 0..20 {
             let size = 0.9f64.powi(attempt);
             let z: Vec<f64> = normal(random, n).into_iter().map(|z| size * z).collect();
-            if self.log(&z, &mut gradient).is_some() {
+            if self.log(&z, None).is_some() {
                 return z;
             }
         }

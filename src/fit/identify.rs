@@ -326,8 +326,8 @@ impl Directions {
 }
 
 impl Directions {
-    /// Root mean square by which a change by 100 % along the strongest of the lost directions of these members moves the
-    /// values, if noise alone would leave all of them determined.
+    /// Root mean square by which a change by 100 % along the strongest of the lost directions of these members moves
+    /// the values, if noise alone would leave all of them determined.
     fn told_by_noise(&self, lost: &[usize], members: &[usize], off: &[f64]) -> Option<f64> {
         let goes = |i: &&usize| members.iter().map(|&j| self.v[(j, **i)].powi(2)).sum::<f64>() > SHARE;
         let own: Vec<usize> = lost.iter().filter(goes).copied().collect();

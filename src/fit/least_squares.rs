@@ -12,8 +12,8 @@
 //!
 //! Logs with dry friction make the cost kinked where sticks and slips change their order. Where no damped step helps
 //! and the test is not passed, a bundle of exact gradients goes on (`bundle.rs`), which knows a minimum on kinks. Where
-//! gradients are none or do not lead there, derivatives over longer steps are tried, and then an evolution strategy that
-//! needs none, before it is called stalled.
+//! gradients are none or do not lead there, derivatives over longer steps are tried, and then an evolution strategy
+//! that needs none, before it is called stalled.
 
 use super::bundle::{self, Coordinates};
 use super::cmaes;
@@ -29,9 +29,8 @@ const COARSER: [f64; 2] = [1.0, 10.0];
 const NEAR: f64 = 1.0;
 const FINE: f64 = 0.3;
 
-/// Most variables that are searched by evolution, and how often.
+/// Most variables that are searched by evolution.
 const MOST_EVOLVED: usize = 16;
-const MOST_EVOLUTIONS: usize = 2;
 
 /// Generations without a gain that shows, after which an evolution ends.
 const BARREN: usize = 8;
@@ -79,6 +78,11 @@ pub trait Residuals {
             }
         }
         Some(jacobian)
+    }
+
+    /// r(x), into `r`, and ∂r/∂x there; for what gives both at once. None where one of them cannot be computed.
+    fn linearised(&mut self, x: &[f64], r: &mut [f64], bounds: &Bounds, how: &Differences) -> Option<DMatrix<f64>> {
+        if self.evaluate(x, r) { self.jacobian(x, r, bounds, how) } else { None }
     }
 }
 
@@ -177,13 +181,15 @@ pub struct Options {
     pub huber: f64,
     /// One-sided differences until the last few steps.
     pub frugal: bool,
+    /// How often an evolution strategy may go on where derivatives do not help.
+    pub evolutions: usize,
     /// Residuals as small as this are taken for rounding, and not for what tells how good a step has to be.
     pub rounding: f64,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { tolerance: 1e-3, iterations: 100, huber: f64::INFINITY, frugal: true, rounding: 0.0 }
+        Self { tolerance: 1e-3, iterations: 100, huber: f64::INFINITY, frugal: true, evolutions: 2, rounding: 0.0 }
     }
 }
 
@@ -285,12 +291,15 @@ pub fn minimise(
     let mut trial = vec![0.0; rows];
     let (mut evolved, mut coarser, mut slow) = (0, 0, 0);
     let mut balanced = false;
+    // The Jacobian at a trial point that was taken, and whether trial points are likely to be.
+    let (mut ahead, mut likely): (Option<DMatrix<f64>>, bool) = (None, true);
     loop {
         if watch(&best.x, best.cost) == Flow::Stop {
             best.ending = Ending::Interrupted;
             return best;
         }
-        let Some(jacobian) = problem.jacobian(&best.x, &best.residuals, bounds, &how) else {
+        let own = ahead.take().or_else(|| problem.jacobian(&best.x, &best.residuals, bounds, &how));
+        let Some(jacobian) = own else {
             best.ending = Ending::Stalled;
             return best;
         };
@@ -352,10 +361,19 @@ pub fn minimise(
                 continue;
             }
             best.evaluations += 1;
-            let good = problem.evaluate(&x, &mut trial);
+            // Exact derivatives come with the residuals, for little more than these.
+            let mut with = None;
+            let good = if is_exact && likely {
+                with = problem.linearised(&x, &mut trial, bounds, &how);
+                with.is_some()
+            } else {
+                problem.evaluate(&x, &mut trial)
+            };
             let cost = if good { cost_of(&trial, options.huber) } else { f64::INFINITY };
             let gain = (best.cost - cost) / promised;
-            if cost < best.cost && gain > 1e-4 {
+            likely = cost < best.cost && gain > 1e-4;
+            if likely {
+                ahead = with.filter(|_| problem.is_exact());
                 // λ shrinks the better the linear model was (Nielsen 1999).
                 damping *= f64::max(1.0 / 5.0, 1.0 - (2.0 * gain - 1.0).powi(3));
                 grow = 2.0;
@@ -380,7 +398,7 @@ pub fn minimise(
         if accepted {
             continue;
         }
-        slow = 0;
+        (slow, ahead) = (0, None);
         if coarser == 0 && how != Differences::Central && !is_exact {
             // The cheap derivatives may be to blame.
             (how, lambda) = (Differences::Central, None);
@@ -407,7 +425,7 @@ pub fn minimise(
             best.coarse = COARSER[coarser];
             coarser += 1;
         } else if best.decrement > 1.0
-            && evolved < MOST_EVOLUTIONS
+            && evolved < options.evolutions
             && evolve(problem, &mut best, bounds, &model, &held, deviation, options.huber)
         {
             evolved += 1;

@@ -201,7 +201,8 @@ impl<'a> Problem<'a> {
             let long = run.time.last().copied().unwrap_or(1.0);
             let fast = f64::max(span / long, fastest).max(1e-6);
             let wide = span.max(1e-6);
-            let windowed = plan.windows.is_some();
+            // A window in the middle of a log begins in motion; the first begins as the log does.
+            let windowed = run.window > 0;
             if let Some(start) = first {
                 let free = initial_state || windowed;
                 // Positions count from where the log begins, unless the case says where that is; its first value says
@@ -309,7 +310,7 @@ impl<'a> Problem<'a> {
     /// A first value is no better than any other: what is known of starts beforehand is as uncertain as this deviation
     /// of a position, as far as noise that neighbouring values share can be more than what they differ by; beyond that
     /// it is the model that is off, and not the value.
-    pub(super) fn doubt_starts(&mut self, quantity: Quantity, deviation: f64) {
+    pub fn doubt_starts(&mut self, quantity: Quantity, deviation: f64) {
         let r = self.stage.pulley_radius;
         for run in &mut self.runs {
             let Some(first) = run.seen.iter().find(|seen| is_position(seen.quantity)) else { continue };
@@ -516,11 +517,48 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// The Jacobian as far as it is exact, and the runs that are left with where their residuals begin and the
+    /// variables that move them; the residuals of all runs, where they are asked for. None where a run cannot be
+    /// computed.
+    fn blocks(
+        &mut self,
+        x: &[f64],
+        mut residuals: Option<&mut [f64]>,
+        bounds: &Bounds,
+        how: &Differences,
+    ) -> Option<(DMatrix<f64>, Vec<Left>)> {
+        let mut jacobian = DMatrix::zeros(self.rows(), x.len());
+        let stages = self.stages(x);
+        let mut bench = Bench::default();
+        let is_exact = !matches!(how, Differences::Coarse(_));
+        let (mut first, mut left) = (0, Vec::new());
+        for index in 0..self.runs.len() {
+            if self.is_stopped() {
+                return None;
+            }
+            let (stage, rows) = (&stages[self.runs[index].part], self.runs[index].rows());
+            let mut own = residuals.as_mut().map(|residuals| &mut residuals[first..first + rows]);
+            self.shifts(stage, (index, first), &mut jacobian);
+            let columns = self.movers(index, stage, bounds);
+            let block = (index, first);
+            let out = (&mut jacobian, own.as_deref_mut());
+            if !is_exact || !self.exact_block((&mut bench, stage), block, (x, bounds), &columns, out) {
+                if own.is_some_and(|own| !self.one(&mut bench, index, stage, x, own)) {
+                    return None;
+                }
+                left.push((index, first, columns));
+            }
+            first += rows;
+        }
+        self.differences = left.len();
+        Some((jacobian, left))
+    }
+
     /// The columns of `left`, runs with where their residuals begin and the variables that move them, by differences;
     /// false where a run cannot be computed.
     fn by_differences(
         &mut self,
-        left: &[(usize, usize, Vec<usize>)],
+        left: &[Left],
         (x, r): (&[f64], &[f64]),
         bounds: &Bounds,
         how: &Differences,
@@ -567,6 +605,9 @@ impl<'a> Problem<'a> {
         self.runs[index].residuals(bench, stage, &extras, out)
     }
 }
+
+/// A run, where its residuals begin, and the variables that move them.
+type Left = (usize, usize, Vec<usize>);
 
 /// Parameters, the part of the logs that each is for, and the names of the parts.
 type Separated = (Vec<Free>, Vec<Option<usize>>, Vec<String>);
@@ -701,26 +742,12 @@ impl Residuals for Problem<'_> {
     }
 
     fn jacobian(&mut self, x: &[f64], r: &[f64], bounds: &Bounds, how: &Differences) -> Option<DMatrix<f64>> {
-        let (rows, n) = (r.len(), x.len());
-        let mut jacobian = DMatrix::zeros(rows, n);
-        let stages = self.stages(x);
-        let mut bench = Bench::default();
-        let is_exact = |how: &Differences| !matches!(how, Differences::Coarse(_));
-        let (mut first, mut left) = (0, Vec::new());
-        for index in 0..self.runs.len() {
-            if self.is_stopped() {
-                return None;
-            }
-            let stage = &stages[self.runs[index].part];
-            self.shifts(stage, (index, first), &mut jacobian);
-            let columns = self.movers(index, stage, bounds);
-            let block = (index, first);
-            if !is_exact(how) || !self.exact_block((&mut bench, stage), block, (x, bounds), &columns, &mut jacobian) {
-                left.push((index, first, columns));
-            }
-            first += self.runs[index].rows();
-        }
-        self.differences = left.len();
+        let (mut jacobian, left) = self.blocks(x, None, bounds, how)?;
+        self.by_differences(&left, (x, r), bounds, how, &mut jacobian).then_some(jacobian)
+    }
+
+    fn linearised(&mut self, x: &[f64], r: &mut [f64], bounds: &Bounds, how: &Differences) -> Option<DMatrix<f64>> {
+        let (mut jacobian, left) = self.blocks(x, Some(r), bounds, how)?;
         self.by_differences(&left, (x, r), bounds, how, &mut jacobian).then_some(jacobian)
     }
 

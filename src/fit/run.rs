@@ -298,8 +298,7 @@ impl Run {
         for (i, seen) in self.seen.iter().enumerate() {
             let per_unit = match extra.what {
                 Nuisance::Bias(index) if index == i => 1.0,
-                Nuisance::StartPosition if seen.quantity.name().ends_with("_position") => 1.0,
-                Nuisance::StartPosition if is_position(seen.quantity) => 1.0 / stage.pulley_radius,
+                Nuisance::StartPosition => per_position(seen.quantity, stage.pulley_radius),
                 _ => 0.0,
             };
             for (out, weight) in out[i * n..(i + 1) * n].iter_mut().zip(&seen.weights) {
@@ -518,6 +517,15 @@ pub fn is_position(quantity: Quantity) -> bool {
     quantity.name().ends_with("_angle") || quantity.name().ends_with("_position")
 }
 
+/// By how much a quantity is more for each metre that the start is further on.
+pub(super) fn per_position(quantity: Quantity, pulley_radius: f64) -> f64 {
+    match (quantity.name().ends_with("_position"), is_position(quantity)) {
+        (true, _) => 1.0,
+        (_, true) => 1.0 / pulley_radius,
+        (_, false) => 0.0,
+    }
+}
+
 /// The value at `at` rows of a raster of `h`.
 pub(super) fn between(values: &[f64], slopes: &[f64], at: f64, h: f64) -> f64 {
     let cell = (at.floor().max(0.0) as usize).min(values.len().saturating_sub(2));
@@ -593,6 +601,10 @@ pub fn rounding_at_rest(step: f64, deviation: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::case::TEMPLATE;
+    use crate::log::Output;
+    use crate::signal::Hold;
+    use crate::solve::simulate;
 
     #[test]
     fn steps_of_converters_are_found() {
@@ -609,6 +621,56 @@ mod tests {
         assert_eq!((&found[..3], &found[3..11], &found[11..]), (&[1.0; 3][..], &[8.0; 8][..], &[1.0; 2][..]));
         assert!((rounding_at_rest(2.0, 0.0) / (4.0 / 12.0) - 1.0).abs() < 5e-3);
         assert!(rounding_at_rest(2.0, 2.0) < 1e-15);
+    }
+
+    /// The input of a window was nothing until the delay had passed, as if the machine had been switched on there: the
+    /// model's windows left the whole run at their first rows, and a delay could not be found in them.
+    #[test]
+    fn a_window_that_is_late_goes_on_with_the_input_from_before_it() {
+        let changes = ["belt={ model = \"rigid\" }"];
+        let case = Case::from_text_with("axis.toml", TEMPLATE, &changes).unwrap();
+        let mut experiment = case.experiments[1].clone();
+        let rows = simulate(&case.stage, &experiment, Solver::of(&case.stage)).unwrap().trajectory;
+        let column = |name: &str| rows.get(name).unwrap().to_vec();
+        let outputs = [Quantity::CartPosition, Quantity::CartSpeed];
+        let log = Log {
+            name: experiment.name.clone(),
+            file: Default::default(),
+            time: column("time"),
+            input: column("voltage"),
+            added: None,
+            hold: Hold::Zero,
+            reference: None,
+            outputs: outputs
+                .map(|quantity| Output { quantity, absolute: false, values: column(quantity.name()) })
+                .to_vec(),
+            ended: None,
+        };
+        experiment.input = Signal::Sampled { times: log.time.clone(), values: log.input.clone(), hold: log.hold };
+        let predicted = |run: &mut Run, known: &[(Nuisance, f64)]| {
+            let extra = |what| Extra { what, start: 0.0, unit: 1.0, low: -1.0, high: 1.0, known: None };
+            run.extras = known.iter().map(|(what, _)| extra(*what)).collect();
+            let values: Vec<f64> = known.iter().map(|(_, value)| *value).collect();
+            let mut columns = vec![Vec::new(); 2];
+            assert!(run.predict(&mut Bench::default(), &case.stage, &values, &outputs, &mut columns));
+            columns
+        };
+        let late = (Nuisance::Delay, 12e-3);
+        let whole = predicted(&mut Run::all(&experiment, &log, &Setting::default())[0], &[late]);
+        // Windows of 40 rows: seams in every phase of the pulses, and more delay than some inputs last in a window.
+        let setting = Setting { window: Some(0.04), ..Setting::default() };
+        let mut first = 0;
+        for mut run in Run::all(&experiment, &log, &setting) {
+            let begin = [(Nuisance::StartPosition, whole[0][first]), (Nuisance::StartSpeed, whole[1][first])];
+            let own = predicted(&mut run, &[late, begin[0], begin[1]]);
+            for (own, whole) in own.iter().zip(&whole) {
+                for (k, (own, whole)) in own.iter().zip(&whole[first..]).enumerate() {
+                    assert!((own - whole).abs() < 1e-9, "window {}, row {k}: {own} {whole}", run.window);
+                }
+            }
+            first += run.time.len() - 1;
+        }
+        assert_eq!(first + 1, log.time.len());
     }
 
     #[test]

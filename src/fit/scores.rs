@@ -60,8 +60,8 @@ pub struct Score {
     pub memory: f64,
 }
 
-/// A run beside the log of its experiment, with nothing fitted: it starts where the experiment does, and sensors have no
-/// offset. None where the experiment has no log.
+/// A run beside the log of its experiment, with nothing fitted: it starts where the experiment does, and sensors have
+/// no offset. None where the experiment has no log.
 pub fn beside_log(stage: &Stage, experiment: &Experiment) -> Option<LogFit> {
     let log = experiment.log.as_ref()?;
     let run = Run::all(experiment, log, &Setting::default()).pop()?;

@@ -34,7 +34,8 @@ pub(super) struct Searched<'a> {
 }
 
 impl Searched<'_> {
-    /// The information of the logs there, and whether their parts agree and their law is the right one; none if numbers fail.
+    /// The information of the logs there, and whether their parts agree and their law is the right one; none if numbers
+    /// fail.
     pub fn judged(&self, case: &Case, plan: &Plan) -> Option<Judged> {
         let Minimum { residuals, jacobian, x, at_bound, .. } = &self.best;
         let mut judged = Judged::new(&self.problem, residuals, jacobian, x, at_bound)?;
@@ -52,6 +53,27 @@ pub(super) fn search<'a>(
     stop: Option<Stop<'a>>,
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
 ) -> Result<Searched<'a>> {
+    let whole = Options::default();
+    let mut found = search_as_far(case, plan, stop, &whole, watch)?;
+    let Searched { problem, best, work, .. } = &mut found;
+    let huber = if plan.huber { HUBER } else { f64::INFINITY };
+    let options = Options { huber, rounding: problem.rounding(), ..whole };
+    if best.ending != Ending::Interrupted {
+        hold_undetermined(problem, best, &options, watch, work);
+    }
+    work.simulations = problem.simulations;
+    Ok(found)
+}
+
+/// The same, as far as `whole` says, and to wherever that leads along directions that are not determined.
+pub(super) fn search_as_far<'a>(
+    case: &Case,
+    plan: &Plan,
+    stop: Option<Stop<'a>>,
+    whole: &Options,
+    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
+) -> Result<Searched<'a>> {
+    let whole = *whole;
     let mut problem = Problem::new(case, plan)?.stopped_by(stop);
     let mut work = Work::default();
     let mut descend = |problem: &mut Problem, x: &[f64], options: &Options| {
@@ -65,7 +87,6 @@ pub(super) fn search<'a>(
         work.evaluations += minimum.evaluations;
         minimum
     };
-    let whole = Options::default();
     let start = first_guess(&mut problem);
     let mut best = descend(&mut problem, &start, &whole);
     if best.ending == Ending::Failed {
@@ -79,7 +100,11 @@ pub(super) fn search<'a>(
             break;
         }
         let x = elsewhere(&problem, &mut random);
-        let trial = descend(&mut problem, &x, &Options { iterations: TRIAL_ITERATIONS, tolerance: 0.1, ..whole });
+        let trial = descend(
+            &mut problem,
+            &x,
+            &Options { iterations: TRIAL_ITERATIONS, tolerance: whole.tolerance.max(0.1), ..whole },
+        );
         let near = trial.cost < 1.2 * best.cost;
         let trial =
             if near && trial.ending != Ending::Failed { descend(&mut problem, &trial.x, &whole) } else { trial };
@@ -123,11 +148,6 @@ pub(super) fn search<'a>(
     }
     if noise.is_empty() {
         noise = noise_of(&problem, &best, plan.huber);
-    }
-    let options =
-        Options { huber: if plan.huber { HUBER } else { f64::INFINITY }, rounding: problem.rounding(), ..whole };
-    if best.ending != Ending::Interrupted {
-        hold_undetermined(&mut problem, &mut best, &options, watch, &mut work);
     }
     work.simulations = problem.simulations;
     Ok(Searched { problem, best, noise, starts, work })

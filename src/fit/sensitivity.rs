@@ -2,7 +2,7 @@
 
 use super::least_squares::{Bounds, Differences, Step};
 use super::problem::Problem;
-use super::run::{Nuisance, Run, between, heading_of, speed_of};
+use super::run::{Nuisance, Run, between, heading_of, per_position, speed_of};
 use crate::log::Quantity;
 use crate::mechanism::Mechanism;
 use crate::signal::Signal;
@@ -21,14 +21,14 @@ const START: f64 = 1e-2;
 
 impl Problem<'_> {
     /// Puts the derivatives of the residuals of run `index`, which begin at row `first`, into the columns of these
-    /// variables; false where they cannot be told exactly.
+    /// variables, and the residuals where they are asked for; false where derivatives cannot be told exactly.
     pub(super) fn exact_block(
         &mut self,
         (bench, stage): (&mut Bench, &Stage),
         (index, first): (usize, usize),
         (x, bounds): (&[f64], &Bounds),
         columns: &[usize],
-        jacobian: &mut DMatrix<f64>,
+        (jacobian, residuals): (&mut DMatrix<f64>, Option<&mut [f64]>),
     ) -> bool {
         if self.runs[index].is_closed() || !stage.is_piecewise_linear() {
             return false;
@@ -37,8 +37,8 @@ impl Problem<'_> {
             let all = columns.iter().map(|&j| self.variable_of((index, j), x, bounds, is_moved));
             all.collect::<Option<Vec<_>>>()
         };
-        // Where it does not matter where the cart begins, it begins at the origin, so that all runs count from there and
-        // share what the machine has made ready; but angles there depend on the radius.
+        // Where it does not matter where the cart begins, it begins at the origin, so that all runs count from there
+        // and share what the machine has made ready; but angles there depend on the radius.
         let mut is_moved = self.runs[index].is_shifted(stage);
         let Some(mut all) = variables(is_moved) else { return false };
         if is_moved && all.iter().any(|variable| changes_radius(stage, variable)) {
@@ -54,6 +54,18 @@ impl Problem<'_> {
         self.simulations += 1;
         let run = &self.runs[index];
         let rows = run.time.len();
+        if let Some(residuals) = residuals {
+            let own = self.extras_of(index, x);
+            let start = if is_moved { run.extra(Nuisance::StartPosition, &own).unwrap_or(0.0) } else { 0.0 };
+            let shown = run.seen.iter().zip(&slopes).map(|(seen, (values, _))| {
+                let by = start * per_position(seen.quantity, stage.pulley_radius);
+                values.iter().map(|value| value + by).collect()
+            });
+            let shown: Vec<Vec<f64>> = shown.collect();
+            if !run.compare(&shown, &own, residuals) {
+                return false;
+            }
+        }
         for (i, (seen, (values, slopes))) in run.seen.iter().zip(&slopes).enumerate() {
             for (&j, slopes) in columns.iter().zip(slopes) {
                 let mut column = jacobian.column_mut(j);

@@ -59,6 +59,7 @@ pub(super) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &
     let mut problem = Problem::new(case, &windowed).ok()?;
     for &(quantity, deviation) in &found.noise {
         problem.weigh(quantity, deviation, true);
+        problem.doubt_starts(quantity, deviation);
     }
     let mut start = problem.start();
     start[..g].copy_from_slice(&found.best.x[..g]);

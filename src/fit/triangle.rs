@@ -9,8 +9,8 @@ use nalgebra::DMatrix;
 /// Rows that are made small at once.
 const STRETCH: usize = 256;
 
-/// A matrix of no more rows and at least as many as columns, unless there are fewer, that is the same but for a rotation
-/// of its rows.
+/// A matrix of no more rows and at least as many as columns, unless there are fewer, that is the same but for a
+/// rotation of its rows.
 pub(super) fn shortened(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let (rows, columns) = matrix.shape();
     if rows <= 2 * STRETCH.max(columns) {

@@ -16,7 +16,7 @@ pub fn ending(drawn: &Posterior) -> String {
 
 /// The effort of the draws, in a sentence.
 pub fn effort(drawn: &Posterior) -> String {
-    let slopes = if drawn.fixed_slopes { "slopes of the fit" } else { "slopes measured at each place" };
+    let slopes = if drawn.fixed_slopes { "with slopes of the fit" } else { "of a random walk" };
     let memory = match drawn.inflation {
         factor if factor > 1.0 + 1e-3 => {
             format!("; residuals are autocorrelated, so the logarithm of the likelihood is divided by {factor:.2}")
@@ -24,7 +24,7 @@ pub fn effort(drawn: &Posterior) -> String {
         _ => String::new(),
     };
     format!(
-        "{} draws of {} chains, {} divergences, {} evaluations with {slopes}{memory}",
+        "{} draws of {} chains, {} divergences, {} evaluations {slopes}{memory}",
         drawn.count(),
         drawn.draws.chains.len(),
         drawn.draws.divergences,

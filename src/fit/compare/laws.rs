@@ -74,6 +74,16 @@ impl FrictionLaw {
     }
 }
 
+impl FrictionLaw {
+    /// Whether it has no exact solution between events, so that a fit takes a hundred times as long.
+    pub(super) fn is_curved(self) -> bool {
+        match self {
+            Self::Viscous | Self::Coulomb | Self::Asymmetric | Self::Along => false,
+            Self::Stribeck | Self::LuGre => true,
+        }
+    }
+}
+
 /// The body whose friction is compared: that of which most is searched for; the cart where that is none.
 pub(super) fn body(plan: &Plan) -> &'static str {
     let count = |body: &str| {

@@ -2,7 +2,7 @@
 //!
 //! A law with more parameters meets the records that it is fitted to better, and others worse once it fits what does
 //! not come again. So each candidate is fitted with a part of the records left out, and judged by its error there. With
-//! e_cf the squared error of candidate c in part f, the one with the fewest parameters is chosen whose mean error
+//! e_cf the squared error of candidate c in part f, the fewest parameters are chosen with which a mean error
 //! exceeds that of the best by no more than a standard error of the differences e_cf − e_bf (the rule of one standard
 //! error, L. Breiman and others 1984).
 
@@ -14,10 +14,11 @@ pub use laws::FrictionLaw;
 use super::drift::nothing;
 use super::found::{Fit, Work};
 use super::held_out::met;
+use super::least_squares::Options;
 use super::problem::{Problem, Stop};
 use super::result::known;
 use super::scores::together;
-use super::search::search;
+use super::search::{search, search_as_far};
 use super::told;
 use crate::case::{Case, Plan};
 use crate::error::{Error, Result};
@@ -29,6 +30,16 @@ use std::path::Path;
 
 /// Share of a record to which its start is fitted; the rest of it is foretold.
 const BEGIN: f64 = 0.1;
+
+/// How far the fits go that are compared: what another step would move them by is far less than what laws differ by in
+/// records that were held out. Fits to parts begin where that to the whole ended.
+fn compared(iterations: usize) -> Options {
+    Options { tolerance: 0.1, iterations, evolutions: 0, ..Options::default() }
+}
+
+/// Most steps of a fit to all logs, and of one to a part of them.
+const STEPS: usize = 20;
+const STEPS_IN_PART: usize = 10;
 
 /// The laws and windows to compare.
 #[derive(Debug, Clone, PartialEq)]
@@ -157,7 +168,11 @@ pub fn compare(
         let sided = law == FrictionLaw::Asymmetric || (law.is_above() && course.is_sided_better());
         let (own, searched) = laws::with(case, name, plan, law, sided, &from)?;
         let mut start = own.stage.clone();
-        for &window in &setting.windows {
+        let windows = match law.is_curved() {
+            true => course.best_window().map_or(setting.windows.clone(), |window| vec![window]),
+            false => setting.windows.clone(),
+        };
+        for window in windows {
             let told = Candidate::new(law, sided, window, searched.names().count());
             if watch(&told.name()) == Flow::Stop || stop.is_some_and(|stop| stop()) {
                 return Err(Error::new("interrupted before all laws were compared"));
@@ -224,7 +239,7 @@ impl Course<'_> {
 
     /// The fit to all logs, and its errors over whole logs with their starts fitted.
     fn whole(&mut self, case: &Case, plan: &Plan) -> Result<(Stage, Vec<(Quantity, f64)>)> {
-        let found = search(case, plan, self.stop, &mut |_, _| Flow::Continue)?;
+        let found = search_as_far(case, plan, self.stop, &compared(STEPS), &mut |_, _| Flow::Continue)?;
         self.work.add(&found.work);
         let stages = found.problem.stages(&found.best.x);
         let known = known(&found);
@@ -241,7 +256,7 @@ impl Course<'_> {
         let mut plan = Plan { held_out: Vec::new(), separate: Vec::new(), ..plan.clone() };
         plan.nuisance.initial_state |= self.parts.is_cut;
         let own = Case { experiments: fitted.clone(), ..case.clone() };
-        let found = search(&own, &plan, self.stop, &mut |_, _| Flow::Continue)?;
+        let found = search_as_far(&own, &plan, self.stop, &compared(STEPS_IN_PART), &mut |_, _| Flow::Continue)?;
         self.work.add(&found.work);
         let stage = found.problem.stage_at(&found.best.x);
         let known = known(&found);
@@ -251,6 +266,14 @@ impl Course<'_> {
             Problem::new(&held, &scored)?.runs.iter().map(|run| met(run, &stage, &known, BEGIN)).collect();
         let errors = together(&logs, |_| String::new());
         Ok(errors.iter().map(|one| (one.quantity, one.rmse.powi(2) * one.count as f64, one.count)).collect())
+    }
+
+    /// The windows with which the laws of straight lines predict best; none where none was tried yet.
+    fn best_window(&self) -> Option<Option<f64>> {
+        let squares = |tried: &Tried| tried.errors.iter().flatten().map(|(_, squares, _)| squares).sum::<f64>();
+        let is_simple = |tried: &&Tried| tried.candidate.failed.is_none() && !tried.candidate.law.is_above();
+        let tried = self.tried.iter().filter(is_simple);
+        tried.min_by(|a, b| squares(a).total_cmp(&squares(b))).map(|tried| tried.candidate.window)
     }
 
     /// Whether friction with a value for each direction predicts better than without, as far as both were tried.
@@ -320,10 +343,10 @@ impl Course<'_> {
         }
         let top = self.tried[0].candidate.held_out;
         let near = |one: &Candidate| one.held_out.powi(2) - top * top <= one.error;
-        let chosen = (0..self.tried.len())
-            .filter(|&k| self.tried[k].candidate.failed.is_none() && near(&self.tried[k].candidate))
-            .min_by_key(|&k| (self.tried[k].candidate.parameters, k))
-            .unwrap_or(0);
+        let fewest = self.tried.iter().map(|tried| &tried.candidate).filter(|one| one.failed.is_none() && near(one));
+        let fewest = fewest.map(|one| one.parameters).min().unwrap_or(usize::MAX);
+        // The first of so many parameters predicts best of them.
+        let chosen = self.tried.iter().position(|tried| tried.candidate.parameters == fewest).unwrap_or(0);
         let by_training = (0..self.tried.len())
             .filter(|&k| self.tried[k].candidate.failed.is_none())
             .min_by(|&a, &b| self.tried[a].candidate.training.total_cmp(&self.tried[b].candidate.training))
@@ -381,7 +404,8 @@ impl Comparison {
         let why = match self.chosen {
             0 => format!("{} predicts best what was held out", shown(chosen)),
             _ => format!(
-                "{} has the fewest parameters, {}, of those whose error is within one standard error of the least, that of {}",
+                "{} predicts best of those with {} parameters, the fewest with which an error is within one standard \
+                 error of the least, that of {}",
                 shown(chosen),
                 chosen.parameters,
                 shown(best)

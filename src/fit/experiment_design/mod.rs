@@ -250,8 +250,8 @@ fn usual_interval(case: &Case) -> f64 {
     recorder.or(shortest).unwrap_or(EVERY)
 }
 
-/// Outputs that are measured, and how well: as asked for; else the encoder and the recorder of the case; else the outputs of its
-/// logs, with the noise that they show.
+/// Outputs that are measured, and how well: as asked for; else the encoder and the recorder of the case; else the
+/// outputs of its logs, with the noise that they show.
 fn measured(case: &Case, request: &Request) -> Result<Vec<Channel>> {
     if !request.measured.is_empty() {
         return Ok(request.measured.clone());

@@ -21,7 +21,8 @@ const SPREAD: usize = 16;
 const FINALISTS: usize = 3;
 const BARREN: usize = 6;
 
-/// How many times as large as the best a kind's mean relative error may be after its first points, and still be searched.
+/// How many times as large as the best a kind's mean relative error may be after its first points, and still be
+/// searched.
 const HOPEFUL: f64 = 1.6;
 
 /// First step of the evolution, in the logit of a share, and values that it may ask for: of every kind, and once more
