@@ -461,6 +461,59 @@ mod tests {
         assert!(draws.divergences < 30, "{}", draws.divergences);
     }
 
+    /// A delay that may be zero and a gain that goes along with it, 300 times more closely than either is known; the
+    /// slope along both has a kink at 0.7.
+    #[derive(Clone)]
+    struct Ridge;
+
+    impl Ridge {
+        fn along(delay: f64) -> f64 {
+            delay - 0.5 + 0.8 * (delay - 0.7).abs()
+        }
+    }
+
+    impl Residuals for Ridge {
+        fn rows(&self) -> usize {
+            2
+        }
+
+        fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool {
+            (r[0], r[1]) = (300.0 * (x[0] - x[1]), Self::along(x[0]));
+            true
+        }
+    }
+
+    /// No draw of a delay and a gain came in four minutes: in the logarithm of the delay their ridge was bent, and steps
+    /// as short as it was narrow led nowhere.
+    #[test]
+    fn a_narrow_ridge_that_ends_at_a_bound_is_drawn_from() {
+        let ingredients = Ingredients {
+            problem: Ridge,
+            at: vec![0.3, 0.3],
+            jacobian: DMatrix::from_row_slice(2, 2, &[300.0, -300.0, 0.2, 0.0]),
+            bounds: Bounds { low: vec![0.0, f64::NEG_INFINITY], high: vec![f64::INFINITY; 2] },
+            priors: vec![None, None],
+            inflation: 1.0,
+            huber: f64::INFINITY,
+        };
+        let effort = Effort { draws: 2000, ..Effort::default() };
+        let Sampled { draws, fixed } = draw(&ingredients, effort, &|_| true).unwrap();
+        assert!(!fixed && draws.evaluations < 100_000, "{fixed} {}", draws.evaluations);
+        // The gain has no say in how likely a delay is.
+        let density = |delay: f64| (-0.5 * Ridge::along(delay).powi(2)).exp();
+        let points: Vec<f64> = (0..40_000).map(|k| 1e-4 * (f64::from(k) + 0.5)).collect();
+        let all: f64 = points.iter().map(|d| density(*d)).sum();
+        for j in 0..2 {
+            assert!(draws.r_hat(j) < 1.01 && draws.effective(j) > 400.0, "{} {}", draws.r_hat(j), draws.effective(j));
+            for share in [0.025, 0.5, 0.975] {
+                let found = draws.quantile(j, share);
+                let below: f64 = points.iter().filter(|d| **d < found).map(|d| density(*d)).sum();
+                let allowed = 5.0 * (share * (1.0 - share) / draws.effective(j)).sqrt() + 0.003;
+                assert!((below / all - share).abs() < allowed, "{j} {share}: {found} {}", below / all);
+            }
+        }
+    }
+
     #[test]
     fn the_changes_of_variables_have_their_slopes() {
         for change in [Change::None, Change::Above(1.0), Change::Below(2.0), Change::Between(-1.0, 3.0)] {
