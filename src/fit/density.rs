@@ -142,19 +142,25 @@ pub fn draw<R: Residuals + Clone + Send + Sync>(
     let mut density = Density::new(ingredients);
     let mut random = Pcg64::seed_from_u64(effort.seed ^ 0x5eed);
     if !density.is_straight(&mut random) {
-        density.fixed = None;
-        density.change(vec![Change::None; density.inside.len()]);
+        density.walk();
     }
-    let starts: Vec<Vec<f64>> = (0..effort.chains.max(1)).map(|_| density.start(&mut random)).collect();
-    let log: &LogDensity = &|z, gradient| density.log(z, Some(gradient));
-    let mut draws = match density.fixed.is_some() {
-        true => sample(log, &starts, effort, watch)?,
-        false => walk(&|z| density.log(z, None), &starts, effort, watch)?,
-    };
-    for draw in draws.chains.iter_mut().flatten() {
-        *draw = density.place(draw).iter().map(|place| place[0]).collect();
+    density.draws(&mut random, effort, watch)
+}
+
+impl<R: Residuals + Clone + Send + Sync> Density<'_, R> {
+    /// Draws along slopes, or by a walk.
+    fn draws(&self, random: &mut Pcg64, effort: Effort, watch: &Watch) -> crate::error::Result<Sampled> {
+        let starts: Vec<Vec<f64>> = (0..effort.chains.max(1)).map(|_| self.start(random)).collect();
+        let log: &LogDensity = &|z, gradient| self.log(z, Some(gradient));
+        let mut draws = match self.fixed.is_some() {
+            true => sample(log, &starts, effort, watch)?,
+            false => walk(&|z| self.log(z, None), &starts, effort, watch)?,
+        };
+        for draw in draws.chains.iter_mut().flatten() {
+            *draw = self.place(draw).iter().map(|place| place[0]).collect();
+        }
+        Ok(Sampled { draws, fixed: self.fixed.is_some() })
     }
-    Ok(Sampled { draws, fixed: density.fixed.is_some() })
 }
 
 impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
@@ -196,6 +202,12 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         density.change((0..n).map(near).collect());
         density.fixed = Some(density.bent(jacobian));
         density
+    }
+
+    /// Has it draw by a walk, in the variables themselves.
+    fn walk(&mut self) {
+        self.fixed = None;
+        self.change(vec![Change::None; self.inside.len()]);
     }
 
     /// Takes these changes of variables.
@@ -497,8 +509,10 @@ mod tests {
             huber: f64::INFINITY,
         };
         let effort = Effort { draws: 2000, ..Effort::default() };
-        let Sampled { draws, fixed } = draw(&ingredients, effort, &|_| true).unwrap();
-        assert!(!fixed && draws.evaluations < 100_000, "{fixed} {}", draws.evaluations);
+        let mut density = Density::new(&ingredients);
+        density.walk();
+        let Sampled { draws, .. } = density.draws(&mut Pcg64::seed_from_u64(1), effort, &|_| true).unwrap();
+        assert!(draws.evaluations < 100_000, "{}", draws.evaluations);
         // The gain has no say in how likely a delay is.
         let density = |delay: f64| (-0.5 * Ridge::along(delay).powi(2)).exp();
         let points: Vec<f64> = (0..40_000).map(|k| 1e-4 * (f64::from(k) + 0.5)).collect();
