@@ -142,19 +142,25 @@ pub fn draw<R: Residuals + Clone + Send + Sync>(
     let mut density = Density::new(ingredients);
     let mut random = Pcg64::seed_from_u64(effort.seed ^ 0x5eed);
     if !density.is_straight(&mut random) {
-        density.fixed = None;
-        density.change(vec![Change::None; density.inside.len()]);
+        density.walk();
     }
-    let starts: Vec<Vec<f64>> = (0..effort.chains.max(1)).map(|_| density.start(&mut random)).collect();
-    let log: &LogDensity = &|z, gradient| density.log(z, Some(gradient));
-    let mut draws = match density.fixed.is_some() {
-        true => sample(log, &starts, effort, watch)?,
-        false => walk(&|z| density.log(z, None), &starts, effort, watch)?,
-    };
-    for draw in draws.chains.iter_mut().flatten() {
-        *draw = density.place(draw).iter().map(|place| place[0]).collect();
+    density.draws(&mut random, effort, watch)
+}
+
+impl<R: Residuals + Clone + Send + Sync> Density<'_, R> {
+    /// Draws along slopes, or by a walk.
+    fn draws(&self, random: &mut Pcg64, effort: Effort, watch: &Watch) -> crate::error::Result<Sampled> {
+        let starts: Vec<Vec<f64>> = (0..effort.chains.max(1)).map(|_| self.start(random)).collect();
+        let log: &LogDensity = &|z, gradient| self.log(z, Some(gradient));
+        let mut draws = match self.fixed.is_some() {
+            true => sample(log, &starts, effort, watch)?,
+            false => walk(&|z| self.log(z, None), &starts, effort, watch)?,
+        };
+        for draw in draws.chains.iter_mut().flatten() {
+            *draw = self.place(draw).iter().map(|place| place[0]).collect();
+        }
+        Ok(Sampled { draws, fixed: self.fixed.is_some() })
     }
-    Ok(Sampled { draws, fixed: density.fixed.is_some() })
 }
 
 impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
@@ -196,6 +202,12 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         density.change((0..n).map(near).collect());
         density.fixed = Some(density.bent(jacobian));
         density
+    }
+
+    /// Has it draw by a walk, in the variables themselves.
+    fn walk(&mut self) {
+        self.fixed = None;
+        self.change(vec![Change::None; self.inside.len()]);
     }
 
     /// Takes these changes of variables.
@@ -459,6 +471,61 @@ mod tests {
             assert!((found - want).abs() < 0.1, "{share}: {found} instead of {want}");
         }
         assert!(draws.divergences < 30, "{}", draws.divergences);
+    }
+
+    /// A delay that may be zero and a gain that goes along with it, 300 times more closely than either is known; the
+    /// slope along both has a kink at 0.7.
+    #[derive(Clone)]
+    struct Ridge;
+
+    impl Ridge {
+        fn along(delay: f64) -> f64 {
+            delay - 0.5 + 0.8 * (delay - 0.7).abs()
+        }
+    }
+
+    impl Residuals for Ridge {
+        fn rows(&self) -> usize {
+            2
+        }
+
+        fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool {
+            (r[0], r[1]) = (300.0 * (x[0] - x[1]), Self::along(x[0]));
+            true
+        }
+    }
+
+    /// No draw of a delay and a gain came in four minutes: in the logarithm of the delay their ridge was bent, and steps
+    /// as short as it was narrow led nowhere.
+    #[test]
+    fn a_narrow_ridge_that_ends_at_a_bound_is_drawn_from() {
+        let ingredients = Ingredients {
+            problem: Ridge,
+            at: vec![0.3, 0.3],
+            jacobian: DMatrix::from_row_slice(2, 2, &[300.0, -300.0, 0.2, 0.0]),
+            bounds: Bounds { low: vec![0.0, f64::NEG_INFINITY], high: vec![f64::INFINITY; 2] },
+            priors: vec![None, None],
+            inflation: 1.0,
+            huber: f64::INFINITY,
+        };
+        let effort = Effort { draws: 2000, ..Effort::default() };
+        let mut density = Density::new(&ingredients);
+        density.walk();
+        let Sampled { draws, .. } = density.draws(&mut Pcg64::seed_from_u64(1), effort, &|_| true).unwrap();
+        assert!(draws.evaluations < 100_000, "{}", draws.evaluations);
+        // The gain has no say in how likely a delay is.
+        let density = |delay: f64| (-0.5 * Ridge::along(delay).powi(2)).exp();
+        let points: Vec<f64> = (0..40_000).map(|k| 1e-4 * (f64::from(k) + 0.5)).collect();
+        let all: f64 = points.iter().map(|d| density(*d)).sum();
+        for j in 0..2 {
+            assert!(draws.r_hat(j) < 1.01 && draws.effective(j) > 400.0, "{} {}", draws.r_hat(j), draws.effective(j));
+            for share in [0.025, 0.5, 0.975] {
+                let found = draws.quantile(j, share);
+                let below: f64 = points.iter().filter(|d| **d < found).map(|d| density(*d)).sum();
+                let allowed = 5.0 * (share * (1.0 - share) / draws.effective(j)).sqrt() + 0.003;
+                assert!((below / all - share).abs() < allowed, "{j} {share}: {found} {}", below / all);
+            }
+        }
     }
 
     #[test]

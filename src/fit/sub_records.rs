@@ -2,8 +2,9 @@
 //!
 //! A friction that drifts, or one of another law, leaves residuals that the parameters follow as far as they can: the
 //! estimates go where the integrated error is least, and noise says nothing of how far that is from the truth. So the
-//! logs are cut into windows, each with a start of its own, in which errors cannot add up, and the same parameters are
-//! fitted to all of them. With ĝ_c = J_cᵀ r_c of window c and A = (JᵀJ)⁻¹ the windows disagree by
+//! logs are cut into windows, each but the first of a log with a start of its own, in which errors cannot add up, and
+//! the same parameters are fitted to all of them. With ĝ_c = J_cᵀ r_c of window c and A = (JᵀJ)⁻¹ the windows disagree
+//! by
 //!
 //! ```text
 //! V = A (Σ_c ĝ_c ĝ_cᵀ) A G/(G−1)           (K.-Y. Liang and S. L. Zeger 1986)

@@ -509,7 +509,7 @@ const FIT: &[Parameter] = &[
     row("fit.starts", "", "", Value(1.0), Range::whole(1.0, 1000.0), "8", "From how many points the search starts: that of the file, and others within the bounds."),
     row("fit.seed", "", "", Value(1.0), SEED, "1", "Which other points."),
     row("fit.until", "", "s", Words("all of each log"), DURATION, "8 s", "Time in each log after which it is only compared, not fitted."),
-    row("fit.windows", "", "s", Words("each log is one"), DURATION, "1 s", "Length of the windows into which logs are cut, each with a start of its own."),
+    row("fit.windows", "", "s", Words("each log is one"), DURATION, "1 s", "Length of the windows into which logs are cut, each but the first of a log with a start of its own."),
 ];
 
 #[rustfmt::skip]
