@@ -115,6 +115,11 @@ impl Frf {
     pub fn coherent(&self) -> impl Iterator<Item = &Point> {
         self.points.iter().filter(|point| point.coherence >= COHERENT && point.radius < point.value.norm())
     }
+
+    /// Number of the line that a point is.
+    fn line(&self, point: &Point) -> f64 {
+        (point.omega * self.length as f64 * self.every / (2.0 * PI)).round()
+    }
 }
 
 /// The frequency responses of a log, one for each of its outputs that has a sign.
@@ -345,5 +350,34 @@ fn is_kinematic(quantity: Quantity) -> bool {
         | Quantity::IdlerSpeed
         | Quantity::RotorAngle
         | Quantity::RotorSpeed => true,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chance::normal;
+    use rand_pcg::Pcg64;
+    use rand_pcg::rand_core::SeedableRng;
+
+    /// Intervals of the delay held 92.5 % for 95 %: the fit took noise at neighbouring lines for independent.
+    #[test]
+    fn noise_at_neighbouring_lines_is_alike_by_what_the_fit_takes() {
+        let mut random = Pcg64::seed_from_u64(6);
+        let mut sums = [0.0; 4];
+        for _ in 0..100 {
+            let mut white = || -> Vec<f64> { (0..4096).map(|_| normal(&mut random)).collect() };
+            let [u, y] = [white(), white()].map(|values| transforms(&values, 0, 256, 128, false));
+            let points = points(&u, &y, &u, 1e-3, 256, false);
+            for (distance, sum) in sums.iter_mut().enumerate() {
+                let pairs = points.iter().zip(&points[distance..]);
+                *sum += pairs.map(|(a, b)| (a.value / a.deviation * (b.value / b.deviation).conj()).re).sum::<f64>()
+                    / (points.len() - distance) as f64;
+            }
+        }
+        for (distance, rho) in [(1, fit::ALIKE[0]), (2, fit::ALIKE[1]), (3, 0.0)] {
+            let seen = sums[distance] / sums[0];
+            assert!((seen - rho).abs() < 0.02, "{distance}: {seen} {rho}");
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! Gains: placement, margins of the sampled loop, the worst axis, limit cycles.
 
+use crate::common::stability::{LINEAR, is_that_of_runs};
 use nalgebra::Complex;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
@@ -168,50 +169,7 @@ fn a_placed_loop_swings_as_asked() {
 fn stability_is_that_of_a_run() {
     for name in ["pid.toml", "cascade.toml", "cascade-current.toml", "lqi.toml", "pid-observer.toml", "pid-shaped.toml"]
     {
-        let friction =
-            |body: &str, viscous: &str| format!("{body}.friction={{ viscous = \"{viscous}\", coulomb = 0 }}");
-        let (a, b, c) = (
-            friction("cart", "19 N s/m"),
-            friction("drive_pulley", "1.6e-3 N m s"),
-            friction("idler_pulley", "1.6e-3 N m s"),
-        );
-        let case = case(name, &[&a, &b, &c, "encoder.lines=1e9", "controller.limit=1e12"]);
-        let design = case.controller.clone().unwrap();
-        // The axis takes the command for more and more; the controller knows nothing of it.
-        let louder = |step: i32| {
-            let mut stage = case.stage.clone();
-            stage.amplifier.gain *= 1.2f64.powi(step - 12);
-            stage
-        };
-        let feedback = Feedback::new(&design, &case.stage).unwrap();
-        let told = |step: i32| {
-            let plant = Plant::of(&louder(step), 0.0, &design, &feedback.corners()).unwrap();
-            Margins::of(&plant, &feedback).stable
-        };
-        let told: Vec<bool> = (0..30).map(told).collect();
-        let mut both = [0, 0];
-        for step in (1..29).step_by(2) {
-            // At the limit itself it grows and dies out too slowly to be seen.
-            if told[step - 1] != told[step + 1] {
-                continue;
-            }
-            let motion = &case.moves[0];
-            let setup = Setup {
-                stage: &louder(step as i32),
-                model: &case.stage,
-                design: &design,
-                profile: &motion.profile,
-                until: 12.0,
-                window: 1e-3,
-                solver: Solver::Exact,
-            };
-            let run = closed_loop(&setup).unwrap();
-            let calm = run.outcome.ending == Ending::Complete && run.figures.settling.is_some_and(|s| s < 9.0);
-            assert_eq!(told[step], calm, "{name} at step {step}: {:?} {told:?}", run.figures.cart);
-            both[usize::from(calm)] += 1;
-        }
-        println!("{name}: {} unstable, {} stable", both[0], both[1]);
-        assert!(both[1] > 0 && both[0] > 0, "{name}: {both:?}");
+        is_that_of_runs(name, &case(name, &LINEAR), 2);
     }
 }
 
@@ -387,6 +345,26 @@ fn no_move_gets_worse_unless_a_limit_forces_it() {
     assert_ne!(next.judgement, Judgement::Worse);
     let judged = evaluate(&again, &Tuning::default()).unwrap();
     assert_eq!(judged.before.objective, tuned.after.objective);
+}
+
+/// A limit was named where it happened to be active at the gains that were found, and none where a search had stopped
+/// short of it: what keeps a controller from being as good as the file stands on the way to the file.
+#[test]
+fn what_forces_a_worse_verdict_stands_on_the_way_to_the_file() {
+    let placed = |case: &Case, hertz: f64| {
+        let tuning = Tuning { cost: None, bandwidth: Some(hertz), ..Tuning::default() };
+        tune(case, &tuning, &|| false).unwrap()
+    };
+    let broken = placed(&case("pid-elastic.toml", &[]), 0.5);
+    assert!(broken.before.worst.excess(1.8, 1.8) > 1.0 && broken.after.worst.excess(1.8, 1.8) < 0.96);
+    assert_eq!(broken.judgement, Judgement::Worse);
+    let forced = broken.forced.expect("the limit between the two");
+    assert!(forced.mode > 1.0 && (0.0..=0.31).contains(&forced.place), "{forced:?}");
+    // Gains of the file that keep the limits themselves: nothing forces a worse choice.
+    let gains = "controller.pid={ proportional = \"400 V/m\", integral = \"1 kV/(m s)\", derivative = \"10 V s/m\" }";
+    let kept = placed(&case("pid-elastic.toml", &[gains]), 0.5);
+    assert!(kept.before.worst.excess(1.8, 1.8) < 1.0, "{:?}", kept.before.worst);
+    assert!(kept.judgement == Judgement::Worse && kept.forced.is_none(), "{:?}", kept.forced);
 }
 
 /// K_t and K_e of a motor are one number in SI units; a family in which one is 20 % more and the other 20 % less cannot

@@ -1,5 +1,6 @@
 //! An encoder at the motor and a scale at the cart, both in one loop.
 
+use crate::common::stability::{LINEAR, is_that_of_runs};
 use nalgebra::Complex;
 use std::f64::consts::PI;
 use taut::case::Case;
@@ -8,7 +9,7 @@ use taut::control::{Controller, MoveRun, Observation, Setup, Standard, closed_lo
 use taut::design::Design;
 use taut::measure::measure;
 use taut::signal::profile::Reference;
-use taut::solve::{Ending, Solver, simulate};
+use taut::solve::{Solver, simulate};
 use taut::stage::Measurement;
 use taut::tune::{Margins, Plant};
 
@@ -115,45 +116,8 @@ fn response(case: &Case, design: &Design, omega: f64, at_cart: bool) -> Complex<
 #[test]
 fn stability_with_two_sensors_is_that_of_a_run() {
     for name in ["cascade", "cascade-current", "lqi", "pid-observer"] {
-        let smooth = |body: &str, viscous: &str| format!("{body}.friction={{ viscous = \"{viscous}\", coulomb = 0 }}");
-        let [a, b, c] = [("cart", "19 N s/m"), ("drive_pulley", "1.6e-3 N m s"), ("idler_pulley", "1.6e-3 N m s")]
-            .map(|(body, viscous)| smooth(body, viscous));
-        let case = case(
-            &format!("controllers/{name}"),
-            &[&a, &b, &c, "encoder.lines=1e9", SCALE, "controller.limit=1e12", NO_FORWARD],
-        );
-        let design = case.controller.clone().unwrap();
-        let feedback = Feedback::new(&design, &case.stage).unwrap();
-        // The axis takes the command for more and more; the controller knows nothing of it.
-        let louder = |step: usize| {
-            let mut stage = case.stage.clone();
-            stage.amplifier.gain *= 1.2f64.powi(step as i32 - 12);
-            stage
-        };
-        let told = |step: usize| {
-            let plant = Plant::of(&louder(step), 0.0, &design, &feedback.corners()).unwrap();
-            Margins::of(&plant, &feedback).stable
-        };
-        let told: Vec<bool> = (0..30).map(told).collect();
-        let mut both = [0, 0];
-        // At the limit itself it grows and dies out too slowly to be seen.
-        for step in (1..29).step_by(3).filter(|&step| told[step - 1] == told[step + 1]) {
-            let motion = &case.moves[0];
-            let setup = Setup {
-                stage: &louder(step),
-                model: &case.stage,
-                design: &design,
-                profile: &motion.profile,
-                until: 12.0,
-                window: 1e-3,
-                solver: Solver::Exact,
-            };
-            let run = closed_loop(&setup).unwrap();
-            let calm = run.outcome.ending == Ending::Complete && run.figures.settling.is_some_and(|s| s < 9.0);
-            assert_eq!(told[step], calm, "{name} at step {step}: {:?} {told:?}", run.figures.cart);
-            both[usize::from(calm)] += 1;
-        }
-        assert!(both[1] > 0 && both[0] > 0, "{name}: {both:?}");
+        let changes = [&LINEAR[..], &[SCALE, NO_FORWARD]].concat();
+        is_that_of_runs(name, &case(&format!("controllers/{name}"), &changes), 3);
     }
 }
 

@@ -43,6 +43,9 @@ pub fn stage_drawing(stage: &Stage) -> String {
     pulley(&mut out, IDLER, "φ₃");
     motor(&mut out, stage);
     encoder(&mut out, stage, cart, top);
+    if let Some(lines) = stage.scale.map(|scale| scale.lines) {
+        rail(&mut out, &format!("scale, {} lines/m", engineering(lines, "", 6)), cart, top);
+    }
 
     // Above the labels of the spans, which damping makes higher.
     let base = top - if stage.belt.damping == [0.0; 3] { 36.0 } else { 58.0 };
@@ -241,7 +244,7 @@ fn motor(out: &mut Svg, stage: &Stage) {
     }
 }
 
-/// A small disc with lines where the encoder sits, or a scale along the rail.
+/// A small disc with lines where the encoder sits, or lines along the rail.
 fn encoder(out: &mut Svg, stage: &Stage, cart: f64, top: f64) {
     let Some(encoder) = stage.encoder else { return };
     let green = Colour::Green.paint();
@@ -258,23 +261,27 @@ fn encoder(out: &mut Svg, stage: &Stage, cart: f64, top: f64) {
             disc(out, (DRIVE.0, 274.0), 11.0);
             out.text((DRIVE.0 + 20.0, 278.5), 12.5, Anchor::Start, green, "", &text);
         }
-        EncoderPlace::Cart => {
-            let y = top + CART.1 / 2.0 + 62.0;
-            let (from, to) = (DRIVE.0 + RADIUS + 26.0, IDLER.0 - RADIUS - 26.0);
-            out.line((from, y), (to, y), green, 1.2);
-            let mut ticks = String::new();
-            let mut x = from;
-            while x <= to {
-                ticks.push_str(&format!("M{} {}v5", n(x), n(y)));
-                x += 7.0;
-            }
-            out.path(&ticks, green, 0.9, "");
-            let head = (cart - 44.0, top + CART.1 / 2.0);
-            out.path(&format!("M{} {}V{}", n(head.0), n(head.1), n(y - 9.0)), green, 1.4, "");
-            out.head((head.0, y - 1.0), (0.0, 1.0), 9.0, green);
-            out.text((to, y - 7.0), 12.5, Anchor::End, green, "", &text);
-        }
+        EncoderPlace::Cart => rail(out, &text, cart, top),
     }
+}
+
+/// Lines along the rail, read by a head at the cart.
+fn rail(out: &mut Svg, text: &str, cart: f64, top: f64) {
+    let green = Colour::Green.paint();
+    let y = top + CART.1 / 2.0 + 62.0;
+    let (from, to) = (DRIVE.0 + RADIUS + 26.0, IDLER.0 - RADIUS - 26.0);
+    out.line((from, y), (to, y), green, 1.2);
+    let mut ticks = String::new();
+    let mut x = from;
+    while x <= to {
+        ticks.push_str(&format!("M{} {}v5", n(x), n(y)));
+        x += 7.0;
+    }
+    out.path(&ticks, green, 0.9, "");
+    let head = (cart - 44.0, top + CART.1 / 2.0);
+    out.path(&format!("M{} {}V{}", n(head.0), n(head.1), n(y - 9.0)), green, 1.4, "");
+    out.head((head.0, y - 1.0), (0.0, 1.0), 9.0, green);
+    out.text((to, y - 7.0), 12.5, Anchor::End, green, "", text);
 }
 
 fn disc(out: &mut Svg, (x, y): (f64, f64), r: f64) {

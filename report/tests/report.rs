@@ -128,6 +128,18 @@ fn every_picture_is_well_formed_and_can_be_rasterised() {
     }
 }
 
+/// A stage with an encoder at the motor and a scale at the cart was drawn with the encoder alone.
+#[test]
+fn a_scale_beside_an_encoder_is_drawn() {
+    let encoder = Encoder { at: EncoderPlace::Motor, lines: 512.0 };
+    let alone = stage(Some(encoder));
+    let scale = Some(Encoder { at: EncoderPlace::Cart, lines: 50e3 });
+    let [without, with] = [alone.clone(), Stage { scale, ..alone }].map(|stage| stage_drawing(&stage));
+    well_formed(&with);
+    assert!(with.contains("encoder, 512 lines") && with.contains("scale, 50 k lines/m"), "{with}");
+    assert!(without.contains("encoder, 512 lines") && !without.contains("lines/m"));
+}
+
 #[test]
 fn a_png_has_the_size_of_its_svg() {
     let svg = figures()[1].svg();

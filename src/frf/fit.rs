@@ -9,7 +9,12 @@
 //! is made least by Gauss and Newton's method, damped after Levenberg and Marquardt. One number τ stands for all spans,
 //! whose damping then is in proportion to their stiffness; g takes up what mass and friction of the model are off.
 //! Errors are those of the linearised problem, widened by the root of χ² per degree of freedom where the curves fit
-//! worse than noise allows.
+//! worse than noise allows. Noise at neighbouring lines is alike under a window, by ρ of [`ALIKE`], so that with the rows
+//! J_k of the residuals at line k
+//!
+//! ```text
+//! cov x = (Σ J_kᵀ J_k)⁻¹ (Σ ρ(k − l) J_kᵀ J_l) (Σ J_kᵀ J_k)⁻¹
+//! ```
 
 use super::{Frf, Point};
 use crate::error::{Error, Result};
@@ -76,6 +81,11 @@ const WINDOW: [(f64, f64); 11] = [
     (2.0, -0.0417),
     (2.5, -0.0048),
 ];
+
+/// Correlation of the noise of a response with that one and two lines on. Under Hann's window products of two spectra
+/// are alike by ρ₀ = (2/3)² and (1/6)²; sums less a sixth of their second difference, w = (−1/6, 4/3, −1/6), by
+/// Σ w_i w_j ρ₀(d + i − j) over the same at d = 0, of which nothing is left at d = 3.
+pub(super) const ALIKE: [f64; 2] = [0.25723, -0.08250];
 
 /// ln s, ln τ, t_d, ln g.
 const UNKNOWNS: usize = 4;
@@ -171,6 +181,30 @@ impl Problem<'_> {
     }
 }
 
+impl Problem<'_> {
+    /// That of the unknowns, with the rows of the residuals two for each point that is used.
+    fn covariance(&self, jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let inverse = (jacobian.transpose() * jacobian).try_inverse()?;
+        let mut middle = jacobian.transpose() * jacobian;
+        let mut first = 0;
+        for frf in self.frfs {
+            let lines: Vec<f64> = frf.points.iter().filter(|point| is_used(point)).map(|one| frf.line(one)).collect();
+            for (k, line) in lines.iter().enumerate().filter(|_| !frf.periodic) {
+                // Points that are used need not be neighbours.
+                for (l, other) in lines.iter().enumerate().skip(k + 1).take(ALIKE.len()) {
+                    let Some(rho) = ALIKE.get((other - line).round() as usize - 1) else { continue };
+                    for part in 0..2 {
+                        let (a, b) = (jacobian.row(first + 2 * k + part), jacobian.row(first + 2 * l + part));
+                        middle += (a.transpose() * b + b.transpose() * a) * *rho;
+                    }
+                }
+            }
+            first += 2 * lines.len();
+        }
+        Some(&inverse * middle * &inverse)
+    }
+}
+
 fn is_used(point: &Point) -> bool {
     point.coherence >= super::COHERENT && point.deviation > 0.0 && point.radius < point.value.norm()
 }
@@ -211,8 +245,7 @@ pub fn fit(stage: &Stage, known: &Known, frfs: &[Frf]) -> Result<FrfFit> {
     };
     let rows = 2 * points;
     let chi = squares / (rows - UNKNOWNS) as f64;
-    let jacobian = problem.jacobian(&x, rows)?;
-    let covariance = (jacobian.transpose() * &jacobian).try_inverse();
+    let covariance = problem.covariance(&problem.jacobian(&x, rows)?);
     let wide = |j: usize| {
         let variance = covariance.as_ref().map_or(f64::INFINITY, |covariance| covariance[(j, j)].max(0.0));
         1.96 * (variance * chi.max(1.0)).sqrt()

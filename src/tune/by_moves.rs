@@ -6,6 +6,7 @@ use super::gains::{rounded, shaped};
 use super::objective::{AtWorst, BALANCES, Balance, MoveFigures, Runner, objective};
 use super::search::{Found, minimise_below};
 use super::work::{FINALISTS, Finalist, STEEP, Work, slowing};
+use super::{HARD, SOFT};
 use crate::case::{Cost, Move};
 use crate::chance::uniform;
 use crate::design::{Design, Structure};
@@ -18,8 +19,11 @@ use rand_pcg::rand_core::SeedableRng;
 /// Values that a simplex may ask for.
 const MOVES: usize = 60;
 
+/// Designs of a rough search that are run on all axes that are watched.
+const ROUGH: usize = 3;
+
 /// Edge of the simplex at first and where it goes on.
-const FIRST: f64 = 0.25;
+const FIRST: f64 = 0.3;
 const FURTHER: f64 = 0.12;
 
 /// Members of differential evolution, and how often it is done again with an axis more.
@@ -61,7 +65,7 @@ const NEAR: f64 = 0.3;
 
 /// Samples of moves that a search may simulate, each design that it looks at counted as some more: a few seconds of a
 /// processor.
-const SAMPLES: u64 = 5_000_000;
+const SAMPLES: u64 = 6_000_000;
 
 /// How often a search goes on with the axes that are worst for what it found.
 const POLISHED: usize = 8;
@@ -106,19 +110,26 @@ pub(super) struct Bars<'a> {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Watch {
     pub axes: Vec<Vec<usize>>,
+    /// How many of them each figure leaves out.
+    pub left_out: usize,
 }
+
+/// The axes by a figure, the worst first.
+fn order(seen: &[MoveFigures], figure: fn(&MoveFigures) -> f64) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..seen.len()).collect();
+    order.sort_by(|&a, &b| figure(&seen[b]).total_cmp(&figure(&seen[a])));
+    order
+}
+
+/// The figures that choose the axes on which a search runs a move.
+const FIGURES: [fn(&MoveFigures) -> f64; 2] = [|seen| seen.error, |seen| seen.settles];
 
 impl Watch {
     /// Those that are worst in a figure, of each so many more than it leaves out.
     pub fn of(seen: &[Vec<MoveFigures>], left_out: usize) -> Self {
         let of_move = |seen: &Vec<MoveFigures>| {
             let mut axes: Vec<usize> = Vec::new();
-            let figures: [fn(&MoveFigures) -> f64; 2] = [|seen| seen.error, |seen| seen.settles];
-            let orders = figures.map(|figure| {
-                let mut order: Vec<usize> = (0..seen.len()).collect();
-                order.sort_by(|&a, &b| figure(&seen[b]).total_cmp(&figure(&seen[a])));
-                order
-            });
+            let orders = FIGURES.map(|figure| order(seen, figure));
             for rank in 0..(left_out + WATCHED).min(seen.len()) {
                 for order in &orders {
                     if !axes.contains(&order[rank]) {
@@ -128,7 +139,18 @@ impl Watch {
             }
             axes
         };
-        Self { axes: seen.iter().map(of_move).collect() }
+        Self { axes: seen.iter().map(of_move).collect(), left_out }
+    }
+
+    /// Of each figure the axis alone that makes it what it is at worst, which a rough search takes for all.
+    fn roughly(seen: &[Vec<MoveFigures>], left_out: usize) -> Self {
+        let of_move = |seen: &Vec<MoveFigures>| {
+            let mut axes: Vec<usize> =
+                FIGURES.iter().filter_map(|figure| order(seen, *figure).get(left_out).copied()).collect();
+            axes.dedup();
+            axes
+        };
+        Self { axes: seen.iter().map(of_move).collect(), left_out: 0 }
     }
 
     /// Those of another first, too; whether any is new.
@@ -141,6 +163,7 @@ impl Watch {
             all.extend(own.iter().filter(|axis| !other.contains(axis)));
             *own = all;
         }
+        self.left_out = self.left_out.max(other.left_out);
         is_new
     }
 }
@@ -174,7 +197,7 @@ impl Work<'_> {
     fn run(&self, design: &Design, watch: &Watch, weighed: &Weighed, bar: f64) -> (Vec<AtWorst>, f64) {
         let nothing = (Vec::new(), f64::INFINITY);
         let Ok(mut runner) = Runner::new(&self.case.stage, design) else { return nothing };
-        let left_out = self.family.left_out(self.stages.len());
+        let left_out = watch.left_out;
         let mut seen: Vec<Vec<MoveFigures>> = vec![Vec::new(); self.moves.len()];
         let mut worst: Vec<AtWorst> = self.least.borrow().iter().map(|&current| AtWorst::at_least(current)).collect();
         let most = watch.axes.iter().map(Vec::len).max().unwrap_or_default();
@@ -201,9 +224,9 @@ impl Work<'_> {
         (worst, value)
     }
 
-    /// Searches by moves: with the simplex from each of the best finalists, then with differential evolution about the
-    /// best, and on with the simplex as long as other axes are worst for what is found. All that was run and keeps the
-    /// limits on the set, and the axes that are watched.
+    /// Searches by moves: roughly with the simplex from each of the best finalists, then with differential evolution
+    /// about the best, and on with the simplex as long as other axes are worst for what is found. All that was run and
+    /// keeps the limits on the set, and the axes that are watched.
     pub fn by_moves(&mut self, finalists: &[Finalist], weighed: &Weighed) -> Result<(Vec<Tried>, Watch)> {
         self.grant();
         let mut watch = Watch::default();
@@ -219,18 +242,19 @@ impl Work<'_> {
             archive.push(Tried { design: finalist.design.clone(), worst, layout, powers: finalist.powers.clone() });
         }
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut best: Option<(f64, usize)> = None;
         let least = ranked.first().map_or(f64::INFINITY, |(value, _)| *value);
         ranked.retain(|(value, _)| *value <= least + NEAR);
-        for (_, layout) in ranked.into_iter().take(FINALISTS) {
-            let from = finalists[layout].powers.clone();
-            let edge = Edge::Beyond(SLACK);
-            let value = self.moved(finalists, (layout, &from), (&watch, FIRST, edge), weighed, &mut archive)?;
-            if best.is_none_or(|(least, _)| value < least) {
-                best = Some((value, layout));
+        if let Some(&(_, layout)) = ranked.first() {
+            let seen = self.glanced(&finalists[layout].design)?;
+            let rough = Watch::roughly(&seen, self.family.left_out(self.stages.len()));
+            for (_, layout) in ranked.into_iter().take(FINALISTS) {
+                archive.extend(self.roughly(finalists, layout, (&rough, &watch), weighed)?);
             }
         }
-        if let Some((_, layout)) = best {
+        for layout in self.nearest(&archive, weighed) {
+            self.onward(finalists, Some(layout), &watch, weighed, &mut archive)?;
+        }
+        if let Some(&layout) = self.nearest(&archive, weighed).first() {
             self.evolved(finalists, (layout, WIDE), &watch, weighed, &mut archive)?;
         }
         for round in 0..POLISHED {
@@ -250,6 +274,25 @@ impl Work<'_> {
             }
         }
         Ok((archive, watch))
+    }
+
+    /// The best designs of a simplex along the edge of the limits, on few axes, as they are on those that are watched.
+    fn roughly(
+        &mut self,
+        finalists: &[Finalist],
+        layout: usize,
+        (rough, watch): (&Watch, &Watch),
+        weighed: &Weighed,
+    ) -> Result<Vec<Tried>> {
+        let mut found = Vec::new();
+        let from = &finalists[layout].powers;
+        self.moved(finalists, (layout, from), (rough, FIRST, Edge::Eased), weighed, &mut found)?;
+        found.sort_by(|a, b| self.worth(a, weighed).total_cmp(&self.worth(b, weighed)));
+        found.truncate(ROUGH);
+        for tried in &mut found {
+            tried.worst = self.run(&tried.design, watch, weighed, f64::INFINITY).0;
+        }
+        Ok(found)
     }
 
     /// Joins the axes that are worst for a design to those that are watched; whether any is new.
@@ -310,6 +353,9 @@ impl Work<'_> {
             if value >= bar {
                 return value;
             }
+            if !self.is_best_by_any(&worst, archive, weighed) {
+                return value;
+            }
             // What is worth keeping has to keep the limits on all axes; one on which it does not joins the set.
             match self.passes(&design) {
                 Ok(false) => {
@@ -321,6 +367,15 @@ impl Work<'_> {
             }
         }
         f64::INFINITY
+    }
+
+    /// Whether no design that was run is better by what a search weighs, or by a balance that designs are chosen by.
+    fn is_best_by_any(&self, worst: &[AtWorst], archive: &[Tried], weighed: &Weighed) -> bool {
+        let [strict, soft] = [HARD, SOFT].map(|steep| weighed.bars.map(|bars| Bars { steep, ..bars }));
+        [(1, strict), (1, soft), (1, None), (0, None), (2, None)].into_iter().any(|(place, bars)| {
+            let value = |worst: &[AtWorst]| self.valued(weighed.cost, &BALANCES[place], worst, bars);
+            value(worst) < archive.iter().map(|tried| value(&tried.worst)).fold(f64::INFINITY, f64::min)
+        })
     }
 
     /// These powers with the loop as much slower as the limits make it on the set; where half as fast is not enough, how

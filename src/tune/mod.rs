@@ -18,6 +18,7 @@ mod rules;
 mod search;
 pub mod trouble;
 mod verdict;
+mod way_back;
 mod work;
 
 pub use evolution::evolve;
@@ -38,7 +39,7 @@ use crate::error::{Error, Result};
 use crate::stage::BeltModel;
 use by_moves::{Bars, Tried, WIDE, Watch, Weighed};
 use std::path::Path;
-use verdict::{compare, forced};
+use verdict::compare;
 use work::{Finalist, Work};
 
 /// Searches for what makes no figure worse, each with the machines on which one was.
@@ -52,6 +53,9 @@ const NEARBY: usize = 2;
 /// and where nothing may be.
 const SOFT: f64 = 3.0;
 const HARD: f64 = 30.0;
+
+/// The name of what was taken where no balance chose it.
+const CHOSEN: &str = "chosen";
 
 /// The result of a tuning.
 #[derive(Debug, Clone)]
@@ -106,7 +110,7 @@ pub fn evaluate(case: &Case, tuning: &Tuning) -> Result<Tuned> {
     let (design, family, moves) = beginning(case, tuning)?;
     let work = Work::new(case, &family, tuning, &moves, design, &|| false)?;
     let before = work.verdict(design)?;
-    Ok(Tuned { searched: false, ..ended(&work, before.clone(), before, Vec::new(), None)? })
+    Ok(Tuned { searched: false, ..ended(&work, before.clone(), (before, None), Vec::new(), None)? })
 }
 
 /// Tunes the controller of a case; `stop` is asked now and then, and ends a search early with the best so far.
@@ -129,7 +133,8 @@ pub fn tune(case: &Case, tuning: &Tuning, stop: &dyn Fn() -> bool) -> Result<Tun
         let hertz = bandwidth.unwrap_or(first(design, swing));
         let placed = place(design, &case.stage, hertz, tuning.damping).unwrap_or(design.clone());
         let after = work.verdict(&gains::rounded(&placed))?;
-        return ended(&work, before, after, Vec::new(), Some(hertz));
+        let forced = work.way_back(&before, after.clone())?.1;
+        return ended(&work, before, (after, forced), Vec::new(), Some(hertz));
     };
     let is_good = work.excess(&before.worst) <= 1.0;
     let (finalists, placed) = work.screened(design, is_good)?;
@@ -142,8 +147,12 @@ pub fn tune(case: &Case, tuning: &Tuning, stop: &dyn Fn() -> bool) -> Result<Tun
             "allow a larger tune.sensitivity and tune.complementary, a smaller spread, or give it another structure",
         ));
     };
-    let (after, choices) = match cost {
-        Cost::Disturbance => (work.verdict(&best.design)?, Vec::new()),
+    let (after, forced, choices) = match cost {
+        Cost::Disturbance => {
+            let after = work.verdict(&best.design)?;
+            let forced = work.way_back(&before, after.clone())?.1;
+            (after, forced, Vec::new())
+        }
         Cost::Moves | Cost::Squares | Cost::Peak => {
             let figures = before.at_worst();
             let weighed = Weighed { cost, bars: Some(Bars { figures: &figures, steep: SOFT }) };
@@ -151,15 +160,17 @@ pub fn tune(case: &Case, tuning: &Tuning, stop: &dyn Fn() -> bool) -> Result<Tun
             let leading = work.best_of(&archive, cost, &BALANCES[1], weighed.bars)?;
             let leading = work.verdict(leading.as_ref().unwrap_or(&best.design))?;
             let (after, choices) = work.chosen(&archive, cost, &before, leading)?;
-            match compare(&before, &after) {
+            let (after, choices) = match compare(&before, &after) {
                 Judgement::Worse => work.kept(&finalists, &mut archive, watch, cost, &before, after)?,
                 Judgement::Better | Judgement::Unchanged => (after, choices),
-            }
+            };
+            let (after, forced) = work.way_back(&before, after)?;
+            (after.clone(), forced, marked(choices, &after))
         }
     };
     // What is no better stays as it was.
     let after = if is_good && compare(&before, &after) != Judgement::Better { before.clone() } else { after };
-    ended(&work, before, after, choices, placed)
+    ended(&work, before, (after, forced), choices, placed)
 }
 
 /// The controller, the family and the moves of a case.
@@ -221,14 +232,11 @@ impl Work<'_> {
         let own = before.design.filters.len();
         let whole = after.design.clone();
         let after = self.pruned(after, own, &|was, is| !rank(is).0 || rank(was).0)?;
-        for choice in &mut choices {
-            choice.chosen = choice.design == whole;
+        // What added filters were taken from stands as it is now.
+        if whole != after.design {
+            choices.retain(|choice| choice.design != whole);
         }
-        if choices.iter().all(|choice| !choice.chosen) || whole != after.design {
-            choices.retain(|choice| !choice.chosen);
-            let (design, worst) = (after.design.clone(), after.at_worst());
-            choices.push(Choice { name: "chosen", design, objective: after.objective, worst, chosen: true });
-        }
+        let choices = marked(choices, &after);
         Ok((after, choices))
     }
 }
@@ -280,15 +288,30 @@ impl Work<'_> {
     }
 }
 
-/// All of it, told.
-fn ended(work: &Work, before: Verdict, after: Verdict, choices: Vec<Choice>, placed: Option<f64>) -> Result<Tuned> {
+/// The choices with that one marked which was taken, and with a row of its own if it is none of them.
+fn marked(mut choices: Vec<Choice>, after: &Verdict) -> Vec<Choice> {
+    for choice in &mut choices {
+        choice.chosen = choice.design == after.design;
+    }
+    choices.retain(|choice| choice.chosen || choice.name != CHOSEN);
+    if !choices.is_empty() && choices.iter().all(|choice| !choice.chosen) {
+        let (design, worst) = (after.design.clone(), after.at_worst());
+        choices.push(Choice { name: CHOSEN, design, objective: after.objective, worst, chosen: true });
+    }
+    choices
+}
+
+/// All of it, told; with the limit that forces it to be worse, where one does.
+fn ended(
+    work: &Work,
+    before: Verdict,
+    (after, forced): (Verdict, Option<Forced>),
+    choices: Vec<Choice>,
+    placed: Option<f64>,
+) -> Result<Tuned> {
     let judgement = compare(&before, &after);
     let before = work.watched(before)?;
     let after = if before.design == after.design { before.clone() } else { work.watched(after)? };
-    let breaks = work.excess(&before.worst) > 1.0;
-    let forced = (judgement == Judgement::Worse && breaks && work.excess(&after.worst) <= 1.0)
-        .then(|| forced(work.family, &after, work.tuning))
-        .flatten();
     let belt = &work.case.stage.belt;
     let modes = work.modes().map(|(modes, _)| modes).unwrap_or_default();
     let is_undamped = belt.model != BeltModel::Rigid && belt.damping.iter().all(|damping| *damping == 0.0);

@@ -158,7 +158,7 @@ impl Verdict {
             ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
             ranked.into_iter().take(3).map(|(_, place)| place).collect()
         };
-        Watch { axes: self.moves.iter().zip(&before.moves).map(of_move).collect() }
+        Watch { axes: self.moves.iter().zip(&before.moves).map(of_move).collect(), left_out: 0 }
     }
 }
 

@@ -32,6 +32,10 @@ pub(super) const FINALISTS: usize = 3;
 /// Share by which filters that are added have to make the cost smaller.
 const PAYS: f64 = 0.02;
 
+/// Step in the logarithm of a gain of the file that is changed alone until the limits hold, and most of them.
+const ALONE: f64 = 0.25;
+const ALONE_STEPS: u8 = 16;
+
 /// Weight of what is beyond a limit, in ln J.
 pub(super) const STEEP: f64 = 30.0;
 
@@ -245,16 +249,41 @@ impl<'a> Work<'a> {
         }
         found.sort_by(|a, b| a.value.total_cmp(&b.value));
         found.truncate(FINALISTS);
-        // The gains of the file, slower where they do not keep the limits.
-        let own = match is_given_good {
-            true => Some(given.clone()),
-            false => self.softened(given, given.filters.len())?.map(|(design, _)| design),
-        };
-        if let Some(design) = own {
-            let value = self.on_set(&design).1.ln();
-            found.push(Finalist { value, ..Finalist::at(&design, given.filters.len()) });
-        }
+        found.extend(self.of_file(given, is_given_good)?);
         Ok((found, placed))
+    }
+
+    /// The gains of the file; where they do not keep the limits, all of them slower until they do, and each alone.
+    fn of_file(&mut self, given: &Design, is_good: bool) -> Result<Vec<Finalist>> {
+        let own = given.filters.len();
+        let mut found = Vec::new();
+        let together = if is_good { Some(given.clone()) } else { self.softened(given, own)?.map(|(design, _)| design) };
+        if let Some(design) = together {
+            let value = self.on_set(&design).1.ln();
+            found.push(Finalist { value, ..Finalist::at(&design, own) });
+        }
+        if is_good {
+            return Ok(found);
+        }
+        let slowing = slowing(given, own, &self.case.stage);
+        for (j, power) in slowing.iter().enumerate() {
+            // Weights of state feedback grow where a loop is to be slower, gains become less.
+            let step = if *power < 0.0 { ALONE } else { -ALONE };
+            for count in 1..=ALONE_STEPS {
+                let powers: Vec<f64> =
+                    (0..slowing.len()).map(|k| if k == j { step * f64::from(count) } else { 0.0 }).collect();
+                let design = rounded(&shaped(given, own, &powers));
+                let (beyond, slow) = self.on_set(&design);
+                if beyond == 0.0 && !self.passes(&design)? {
+                    found.push(Finalist { design, start: given.clone(), own, powers, value: slow.ln() });
+                    break;
+                }
+                if (self.stop)() {
+                    return Ok(found);
+                }
+            }
+        }
+        Ok(found)
     }
 
     /// A start that keeps the limits on all machines: with its loop made slower as long as it does not. And the share

@@ -7,6 +7,7 @@ pub mod document;
 pub mod ignored;
 pub mod logged;
 pub mod random;
+pub mod stability;
 pub mod wrong;
 
 use taut::case::{Experiment, Initial};
