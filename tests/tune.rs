@@ -347,26 +347,6 @@ fn no_move_gets_worse_unless_a_limit_forces_it() {
     assert_eq!(judged.before.objective, tuned.after.objective);
 }
 
-/// A limit was named where it happened to be active at the gains that were found, and none where a search had stopped
-/// short of it: what keeps a controller from being as good as the file stands on the way to the file.
-#[test]
-fn what_forces_a_worse_verdict_stands_on_the_way_to_the_file() {
-    let placed = |case: &Case, hertz: f64| {
-        let tuning = Tuning { cost: None, bandwidth: Some(hertz), ..Tuning::default() };
-        tune(case, &tuning, &|| false).unwrap()
-    };
-    let broken = placed(&case("pid-elastic.toml", &[]), 0.5);
-    assert!(broken.before.worst.excess(1.8, 1.8) > 1.0 && broken.after.worst.excess(1.8, 1.8) < 0.96);
-    assert_eq!(broken.judgement, Judgement::Worse);
-    let forced = broken.forced.expect("the limit between the two");
-    assert!(forced.mode > 1.0 && (0.0..=0.31).contains(&forced.place), "{forced:?}");
-    // Gains of the file that keep the limits themselves: nothing forces a worse choice.
-    let gains = "controller.pid={ proportional = \"400 V/m\", integral = \"1 kV/(m s)\", derivative = \"10 V s/m\" }";
-    let kept = placed(&case("pid-elastic.toml", &[gains]), 0.5);
-    assert!(kept.before.worst.excess(1.8, 1.8) < 1.0, "{:?}", kept.before.worst);
-    assert!(kept.judgement == Judgement::Worse && kept.forced.is_none(), "{:?}", kept.forced);
-}
-
 /// K_t and K_e of a motor are one number in SI units; a family in which one is 20 % more and the other 20 % less cannot
 /// exist.
 #[test]

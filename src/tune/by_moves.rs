@@ -244,7 +244,9 @@ impl Work<'_> {
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
         let least = ranked.first().map_or(f64::INFINITY, |(value, _)| *value);
         ranked.retain(|(value, _)| *value <= least + NEAR);
-        if let Some(&(_, layout)) = ranked.first() {
+        if let Some(&(_, layout)) = ranked.first()
+            && !(self.stop)()
+        {
             let seen = self.glanced(&finalists[layout].design)?;
             let rough = Watch::roughly(&seen, self.family.left_out(self.stages.len()));
             for (_, layout) in ranked.into_iter().take(FINALISTS) {
