@@ -8,10 +8,13 @@ mod common;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
+use std::sync::Arc;
 use taut::case::Experiment;
 use taut::friction::{Friction, Law, Shape};
+use taut::mechanism::Shown;
 use taut::signal::{Hold, Signal};
-use taut::solve::{Flow, Solver, simulate, stream};
+use taut::solve::{Begun, Bench, Differentiated, Flow, Solver, Variable, simulate, stream};
+use taut::stage::axis::{CART, DRIVE};
 use taut::stage::{BeltMake, Stage, Travel};
 
 fn pulse() -> Signal {
@@ -114,5 +117,41 @@ fn general(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, table4, rows, events, edges, general);
+/// The derivatives of two columns by ten numbers of the machine, and the run that they belong to.
+fn derivatives(c: &mut Criterion) {
+    let (stage, experiment) = (common::table4(), common::experiment(pulse(), 1.0));
+    let changes: [fn(&mut Stage, f64); 10] = [
+        |stage, by| stage.motor.resistance *= 1.0 + by,
+        |stage, by| stage.motor.torque_constant *= 1.0 + by,
+        |stage, by| stage.motor.back_emf_constant *= 1.0 + by,
+        |stage, by| stage.drive_pulley.inertia *= 1.0 + by,
+        |stage, by| stage.idler_pulley.inertia *= 1.0 + by,
+        |stage, by| stage.cart.mass *= 1.0 + by,
+        |stage, by| stage.belt.stiffness[0] *= 1.0 + by,
+        |stage, by| stage.belt.stiffness[1] *= 1.0 + by,
+        |stage, by| stage.belt.stiffness[2] *= 1.0 + by,
+        |stage, by| stage.pulley_radius *= 1.0 + by,
+    ];
+    let variables = changes.map(|change| {
+        Variable::central(1e-5, |by| {
+            let mut stage = stage.clone();
+            change(&mut stage, by);
+            let mechanism = Arc::new(stage.mechanism());
+            Begun { start: experiment.initial.state(&mechanism), mechanism }
+        })
+    });
+    let outputs = [Shown::Position(DRIVE, 1.0), Shown::Position(CART, 1.0)].map(Differentiated::Shown);
+    let mut group = c.benchmark_group("derivatives, 5 V pulse, 1 s, 1001 rows");
+    group.bench_function("the run alone", |b| b.iter(|| streamed(&stage, &experiment)));
+    group.bench_function("two columns by ten parameters", |b| {
+        b.iter(|| {
+            let mut bench = Bench::default();
+            bench.mount(&stage).expect("the machine is sound");
+            bench.sensitivities(&experiment, &variables, &outputs).expect("the machine is sound").is_some()
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, table4, rows, events, edges, general, derivatives);
 criterion_main!(benches);

@@ -136,7 +136,7 @@ fn a_scale_beside_an_encoder_is_drawn() {
     let scale = Some(Encoder { at: EncoderPlace::Cart, lines: 50e3 });
     let [without, with] = [alone.clone(), Stage { scale, ..alone }].map(|stage| stage_drawing(&stage));
     well_formed(&with);
-    assert!(with.contains("encoder, 512 lines") && with.contains("scale, 50 k lines/m"), "{with}");
+    assert!(with.contains("encoder, 512 lines") && with.contains("scale, 50000 lines/m"), "{with}");
     assert!(without.contains("encoder, 512 lines") && !without.contains("lines/m"));
 }
 
