@@ -267,7 +267,7 @@ impl Observe for Meter {
             }
         }
         Closer::Later(match &self.plateau {
-            Some(plateau) if plateau.meets(stretch.begin, stretch.end()) => Gaps::first(stretch.readings.len() - 1),
+            Some(plateau) if plateau.meets(stretch) => Gaps::first(stretch.readings.len() - 1),
             _ => stretch.rising_above(&self.heights(), 1.0 + NEWS),
         })
     }
@@ -444,9 +444,9 @@ impl Plateau {
         self.range = (self.range.0.min(speed), self.range.1.max(speed));
     }
 
-    /// Whether what is between these times may tell of it.
-    fn meets(&self, begin: f64, end: f64) -> bool {
-        end >= self.late - self.near && begin <= self.held.end + self.near
+    /// Whether a stretch may tell of it.
+    fn meets(&self, stretch: &Stretch) -> bool {
+        stretch.end() >= self.late - self.near && stretch.begin <= self.held.end + self.near
     }
 
     fn pass(&mut self, gap: &Gap) -> bool {

@@ -179,13 +179,11 @@ impl Problem<'_> {
         }
         Ok(jacobian)
     }
-}
 
-impl Problem<'_> {
     /// That of the unknowns, with the rows of the residuals two for each point that is used.
     fn covariance(&self, jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-        let inverse = (jacobian.transpose() * jacobian).try_inverse()?;
         let mut middle = jacobian.transpose() * jacobian;
+        let inverse = middle.clone().try_inverse()?;
         let mut first = 0;
         for frf in self.frfs {
             let lines: Vec<f64> = frf.points.iter().filter(|point| is_used(point)).map(|one| frf.line(one)).collect();

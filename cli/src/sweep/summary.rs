@@ -41,17 +41,17 @@ pub fn summary(work: &Work, store: &Store) -> Result<Summary> {
         let step = values.len().div_ceil(most).max(1);
         values.iter().step_by(step).copied().collect()
     };
-    let is_drawn = sweep.sampling() != Sampling::OneAtATime;
     let drawn = (1..inputs)
         .into_par_iter()
         .map(|place| {
             let values = column(place)?;
             let heading = &sweep.columns()[place];
             let few = thinned(&values, MOST_RANKED);
-            let ranked = if is_drawn { Ranked::of(&few) } else { Ranked::of(&[]) };
+            let ranked = Ranked::of(&few);
             Ok((heading, Spread::of(&values), few, ranked))
         })
         .collect::<Result<Vec<_>>>()?;
+    let is_drawn = sweep.sampling() != Sampling::OneAtATime;
     let mut groups = Vec::new();
     let mut place = inputs;
     for group in sweep.groups() {

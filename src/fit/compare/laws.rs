@@ -72,10 +72,8 @@ impl FrictionLaw {
             Self::Stribeck | Self::Along | Self::LuGre => true,
         }
     }
-}
 
-impl FrictionLaw {
-    /// Whether it has no exact solution between events, so that a fit takes a hundred times as long.
+    /// Whether it curves with speed: a run takes a hundred times as long then.
     pub(super) fn is_curved(self) -> bool {
         match self {
             Self::Viscous | Self::Coulomb | Self::Asymmetric | Self::Along => false,

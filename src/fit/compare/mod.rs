@@ -211,6 +211,13 @@ struct Tried {
     plan: Plan,
 }
 
+impl Tried {
+    /// The sum over all that was held out.
+    fn squares(&self) -> f64 {
+        self.errors.iter().flatten().map(|(_, squares, _)| squares).sum()
+    }
+}
+
 impl Course<'_> {
     /// Fits a candidate to all logs and to all but a part; the machine of the fit to all.
     fn try_one(&mut self, case: &Case, plan: &Plan, mut candidate: Candidate, start: &Stage) -> Option<Stage> {
@@ -270,18 +277,16 @@ impl Course<'_> {
 
     /// The windows with which the laws of straight lines predict best; none where none was tried yet.
     fn best_window(&self) -> Option<Option<f64>> {
-        let squares = |tried: &Tried| tried.errors.iter().flatten().map(|(_, squares, _)| squares).sum::<f64>();
         let is_simple = |tried: &&Tried| tried.candidate.failed.is_none() && !tried.candidate.law.is_above();
         let tried = self.tried.iter().filter(is_simple);
-        tried.min_by(|a, b| squares(a).total_cmp(&squares(b))).map(|tried| tried.candidate.window)
+        tried.min_by(|a, b| a.squares().total_cmp(&b.squares())).map(|tried| tried.candidate.window)
     }
 
     /// Whether friction with a value for each direction predicts better than without, as far as both were tried.
     fn is_sided_better(&self) -> bool {
         let of = |law: FrictionLaw| {
             let own = self.tried.iter().filter(|tried| tried.candidate.law == law && tried.candidate.failed.is_none());
-            own.map(|tried| tried.errors.iter().flatten().map(|(_, squares, _)| squares).sum::<f64>())
-                .min_by(f64::total_cmp)
+            own.map(Tried::squares).min_by(f64::total_cmp)
         };
         match (of(FrictionLaw::Coulomb), of(FrictionLaw::Asymmetric)) {
             (Some(one), Some(each)) => each < one,
