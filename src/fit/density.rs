@@ -19,7 +19,7 @@
 //! the logarithm of the distance to a bound bends it, and no step fits it then.
 
 use super::least_squares::{Bounds, Differences, Residuals};
-use crate::chance::uniform;
+use crate::chance::normal;
 use crate::nuts::{Draws, Effort, LogDensity, Watch, sample, walk};
 use nalgebra::{DMatrix, DVector};
 use rand_pcg::Pcg64;
@@ -328,7 +328,7 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         let n = self.errors.len();
         let (mut squares, mut count) = (0.0, 0);
         for _ in 0..PLACES {
-            let z = normal(random, n);
+            let z: Vec<f64> = (0..n).map(|_| normal(random)).collect();
             let (mut a, mut b) = (vec![0.0; n], vec![0.0; n]);
             if self.log(&z, Some(&mut a)).is_some() && self.log_with(None, &z, Some(&mut b)).is_some() {
                 squares += a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
@@ -343,7 +343,7 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         let n = self.errors.len();
         for attempt in 0..20 {
             let size = 0.9f64.powi(attempt);
-            let z: Vec<f64> = normal(random, n).into_iter().map(|z| size * z).collect();
+            let z: Vec<f64> = (0..n).map(|_| size * normal(random)).collect();
             if self.log(&z, None).is_some() {
                 return z;
             }
@@ -372,12 +372,6 @@ fn covariance<R>(ingredients: &Ingredients<R>, jacobian: &DMatrix<f64>) -> DMatr
 
 fn deviations(covariance: &DMatrix<f64>) -> Vec<f64> {
     covariance.diagonal().iter().map(|variance| variance.sqrt()).collect()
-}
-
-/// Standard normal numbers, by Box and Muller.
-fn normal(random: &mut Pcg64, n: usize) -> Vec<f64> {
-    let mut uniform = || uniform(random);
-    (0..n).map(|_| (-2.0 * (1.0 - uniform()).ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()).collect()
 }
 
 #[cfg(test)]

@@ -35,10 +35,7 @@ pub(super) fn met(run: &Run, stage: &Stage, known: &Known, share: f64) -> LogFit
     let rows = alone.time.len();
     alone.fitted_rows = ((rows as f64 * share).ceil() as usize).clamp(FEWEST.min(rows), rows);
     let mut problem = Problem::alone(stage.clone(), alone);
-    for &(quantity, deviation) in known.noise {
-        problem.weigh(quantity, deviation, true);
-        problem.doubt_starts(quantity, deviation);
-    }
+    problem.weigh_by(known.noise);
     let mut x = problem.start();
     if !x.is_empty() {
         let options = Options { iterations: 15, tolerance: 0.05, rounding: problem.rounding(), ..Options::default() };

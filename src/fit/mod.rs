@@ -21,6 +21,7 @@ mod found;
 mod held_out;
 mod identify;
 pub mod least_squares;
+mod marginal;
 mod noise;
 mod other_laws;
 mod posterior;

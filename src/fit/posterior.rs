@@ -9,6 +9,7 @@
 use super::Fit;
 use super::density::{Ingredients, Prior as OnVariable, Sampled, draw};
 use super::least_squares::{Bounds, Differences, Ending, Residuals};
+use super::marginal::Marginal;
 use super::problem::Problem;
 use super::run::{Extra, Nuisance, Run};
 use super::uncertainty::{Covariance, inverse_of_square};
@@ -17,6 +18,8 @@ use crate::error::{Error, Result};
 use crate::nuts::{Draws, Effort, Watch};
 use crate::trajectory::{Column, Trajectory};
 use nalgebra::DMatrix;
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::SeedableRng;
 
 /// R̂ above which nothing counts as converged.
 pub const R_HAT: f64 = 1.01;
@@ -79,9 +82,7 @@ pub fn posterior(case: &Case, plan: &Plan, fit: &Fit, effort: Effort, watch: &Wa
     }
     refuse_undetermined(fit)?;
     let mut problem = Problem::new(case, plan)?;
-    for &(quantity, deviation) in &fit.noise {
-        problem.weigh(quantity, deviation, true);
-    }
+    problem.weigh_by(&fit.noise);
     let mut bounds = problem.bounds();
     let at = fit.point.clone();
     let mut residuals = vec![0.0; problem.rows()];
@@ -94,9 +95,26 @@ pub fn posterior(case: &Case, plan: &Plan, fit: &Fit, effort: Effort, watch: &Wa
     let scales = scales(&problem);
     let priors = priors(&scales, plan, &mut bounds)?;
     let huber = if plan.huber { super::HUBER } else { f64::INFINITY };
-    let ingredients =
-        Ingredients { problem: problem.clone(), at, jacobian, bounds, priors, inflation: variance * inflation, huber };
+    let variance = variance * inflation;
+    // Starts and offsets are integrated over, where the loss is a square.
+    let known: Vec<bool> = priors.iter().map(|prior| huber.is_finite() || prior.is_some()).collect();
+    let deviations = inverse_of_square(&jacobian).map(|inverse| inverse.diagonal().map(|own| (own * variance).sqrt()));
+    let deviations = deviations.map_or_else(|| vec![f64::INFINITY; at.len()], |own| own.as_slice().to_vec());
+    let marginal = Marginal::new(problem.clone(), (&at, &bounds), variance, &deviations, &|j| known[j]);
+    let kept = marginal.kept().to_vec();
+    let jacobian =
+        marginal.clone().jacobian(&marginal.of(&at), &[], &marginal.bounds_of(&bounds), &Differences::Central);
+    let ingredients = Ingredients {
+        problem: marginal.clone(),
+        at: marginal.of(&at),
+        jacobian: jacobian.ok_or_else(failed)?,
+        bounds: marginal.bounds_of(&bounds),
+        priors: priors.into_iter().enumerate().filter(|(j, _)| kept.contains(j)).map(|(_, prior)| prior).collect(),
+        inflation: variance,
+        huber,
+    };
     let Sampled { mut draws, fixed } = draw(&ingredients, effort, watch)?;
+    complete(&mut draws, &marginal, effort, watch);
     for draw in draws.chains.iter_mut().flatten() {
         for (value, scale) in draw.iter_mut().zip(&scales) {
             *value = scale.value(*value);
@@ -117,6 +135,29 @@ pub fn posterior(case: &Case, plan: &Plan, fit: &Fit, effort: Effort, watch: &Wa
         })
         .collect();
     Ok(Posterior { variables, globals: problem.globals(), draws, inflation, fixed_slopes: fixed })
+}
+
+/// Draws the shifts that were integrated over beside each draw; if that is ended early, as many of each chain are left.
+fn complete(draws: &mut Draws, marginal: &Marginal, effort: Effort, watch: &Watch) {
+    let made = effort.chains * (effort.tune + effort.draws);
+    // What there was when it was interrupted is completed: that takes one simulation each.
+    let goes_on = || draws.interrupted || watch(made);
+    let one = |number: usize, chain: &[Vec<f64>]| {
+        let mut random = Pcg64::seed_from_u64(effort.seed.wrapping_add(number as u64) ^ 0xc0de);
+        let mut marginal = marginal.clone();
+        let completed = |draw: &Vec<f64>| goes_on().then(|| marginal.completed(draw, &mut random));
+        chain.iter().map_while(completed).collect::<Vec<_>>()
+    };
+    let chains: Vec<Vec<Vec<f64>>> = std::thread::scope(|scope| {
+        let one = &one;
+        let chains = draws.chains.iter().enumerate();
+        let threads: Vec<_> = chains.map(|(number, chain)| scope.spawn(move || one(number, chain))).collect();
+        threads.into_iter().map(|thread| thread.join().unwrap_or_default()).collect()
+    });
+    let shortest = chains.iter().map(Vec::len).min().unwrap_or(0);
+    draws.interrupted |= shortest < draws.chains.first().map_or(0, Vec::len);
+    draws.chains = chains;
+    draws.chains.iter_mut().for_each(|chain| chain.truncate(shortest));
 }
 
 /// Draws of what the logs do not determine would wander between its bounds for as long as one waits.

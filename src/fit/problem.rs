@@ -284,6 +284,14 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// Weighs all quantities by the deviations of their residuals, and doubts starts as much.
+    pub fn weigh_by(&mut self, noise: &[(Quantity, f64)]) {
+        for &(quantity, deviation) in noise {
+            self.weigh(quantity, deviation, true);
+            self.doubt_starts(quantity, deviation);
+        }
+    }
+
     /// Weighs a quantity: each value with the variance σ² of the noise and of what rounding makes of m equal values in
     /// a row, which is one error and not one for each: σ² + (m − 1) Δ²/12; or of m that go to and fro at rest:
     /// `rounding_at_rest`.
@@ -480,6 +488,13 @@ impl<'a> Problem<'a> {
         variable_extras(&self.runs[index]).enumerate().map(|(i, extra)| (first + i, *extra)).collect()
     }
 
+    /// Those of them that do no more than shift outputs.
+    pub(super) fn own_shifts(&self, index: usize, stage: &Stage) -> Vec<(usize, Extra)> {
+        let mut own = self.own_variables(index);
+        own.retain(|(_, extra)| self.runs[index].only_shifts(stage, extra));
+        own
+    }
+
     fn prepare(&mut self) {
         let shared = self.shared.clone();
         for run in self.runs.iter_mut().chain(&mut self.held_out) {
@@ -511,7 +526,7 @@ impl<'a> Problem<'a> {
     fn shifts(&self, stage: &Stage, (index, first): (usize, usize), jacobian: &mut DMatrix<f64>) {
         let run = &self.runs[index];
         let mut shift = vec![0.0; run.rows()];
-        for (j, extra) in self.own_variables(index).into_iter().filter(|(_, extra)| run.only_shifts(stage, extra)) {
+        for (j, extra) in self.own_shifts(index, stage) {
             run.shift(stage, &extra, &mut shift);
             jacobian.view_mut((first, j), (shift.len(), 1)).copy_from_slice(&shift);
         }

@@ -62,9 +62,7 @@ impl Profile {
 /// cost allow; a parameter that is at a bound or not determined has none.
 pub fn profiles(case: &Case, plan: &Plan, fit: &Fit, stop: Option<Stop>) -> Result<Vec<Profile>> {
     let mut problem = Problem::new(case, plan)?.stopped_by(stop);
-    for &(quantity, deviation) in &fit.noise {
-        problem.weigh(quantity, deviation, true);
-    }
+    problem.weigh_by(&fit.noise);
     let most = FEWEST_SIMULATIONS.max(WORK * fit.work.simulations);
     let mut profiles = Vec::new();
     let Some(bottom) = Bottom::new(&mut problem, plan, fit) else { return Ok(profiles) };

@@ -127,10 +127,7 @@ pub(super) fn search_as_far<'a>(
             break;
         }
         let before = first_weight(&problem);
-        for &(quantity, deviation) in &fresh {
-            problem.weigh(quantity, deviation, true);
-            problem.doubt_starts(quantity, deviation);
-        }
+        problem.weigh_by(&fresh);
         let alike = fresh.len() == 1 && !plan.huber && !told_beforehand(&problem, &fresh) && uniform(&problem);
         noise = fresh;
         let options = Options { huber: if plan.huber { HUBER } else { f64::INFINITY }, ..whole };
