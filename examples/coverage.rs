@@ -311,12 +311,13 @@ fn recorded(cell: &Cell, truth: [f64; 3], chance: &mut Chance) -> Case {
     case
 }
 
-/// Half-widths of the intervals that noise of first order would have if it were known, with the weights of the fit;
+/// Half-widths of the intervals that noises of first order would have if they were known, with the weights of the fit;
 /// none for other faults.
 fn known(cell: &Cell, case: &Case, plan: &Plan, truth: [f64; 3], noise: &[(Quantity, f64)]) -> Option<[f64; 3]> {
     let (slow, white) = match cell.fault {
-        Fault::White(white) => (None, white),
-        Fault::First(deviation, time, white) => (Some((deviation, time)), white),
+        Fault::White(white) => (vec![], white),
+        Fault::First(deviation, time, white) => (vec![(deviation, time)], white),
+        Fault::Two(a, quick, b, slow, white) => (vec![(a, quick), (b, slow)], white),
         _ => return None,
     };
     let mut case = case.clone();
@@ -350,10 +351,10 @@ fn known(cell: &Cell, case: &Case, plan: &Plan, truth: [f64; 3], noise: &[(Quant
             for (k, deviation) in run.extras.iter().filter_map(|extra| extra.known).enumerate() {
                 moves[0] += influence[(first + n + k, j)] * case.stage.pulley_radius / deviation;
             }
-            let mut state = 0.0;
-            for w in moves {
-                sum += w * w * white;
-                if let Some((deviation, time)) = slow {
+            sum += moves.iter().map(|w| w * w * white).sum::<f64>();
+            for (deviation, time) in &slow {
+                let mut state = 0.0;
+                for w in &moves {
                     sum += deviation * deviation * (w * w + 2.0 * w * state);
                     state = (state + w) * (-EVERY / time).exp();
                 }

@@ -1,12 +1,12 @@
 //! Warnings and notes on a fit, before its numbers are used: faults of the logs, and of the search.
 
-use super::Fit;
 use super::controller::reproduced;
 use super::least_squares::Ending;
 use super::problem::Problem;
 use super::regression::{Balance, balance, smoothed};
 use super::run::is_position;
 use super::search::Searched;
+use super::{Fit, Wave};
 use crate::case::{Case, Plan, Scope};
 use crate::log::{Note, Severity, Survey};
 use crate::number::engineering;
@@ -261,6 +261,16 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
             found.words, found.standard_errors
         );
         all.push(finding(Grade::Note, "other_law", text));
+    }
+    for Wave { quantity, length, amplitude } in &fit.waves {
+        let text = format!(
+            "{}: its error comes again at the same place, by ±{} every {}: a pulley or an encoder out of centre, teeth, a \
+             motor that cogs; the intervals are widened by what that moves",
+            quantity.name(),
+            engineering(*amplitude, quantity.unit(), 2).replace('\u{a0}', " "),
+            plain(*length, quantity.unit())
+        );
+        all.push(finding(Grade::Note, "place", text));
     }
     all
 }

@@ -1,7 +1,7 @@
 //! The result of a fit, and how well it is known.
 
 use super::scores::LogFit;
-use super::{Combination, Disagreement, Ending, Finding, Grade, Identifiability, OtherLaw};
+use super::{Combination, Disagreement, Ending, Finding, Grade, Identifiability, OtherLaw, Wave};
 use crate::log::Quantity;
 use crate::stage::Stage;
 
@@ -29,6 +29,8 @@ pub struct Fit {
     pub disagreement: Option<Disagreement>,
     /// A friction law that the case does not have and the residuals speak for.
     pub other_law: Option<OtherLaw>,
+    /// Errors of an output that come again at the same place.
+    pub waves: Vec<Wave>,
     /// Findings on logs and search, warnings first.
     pub findings: Vec<Finding>,
     /// The variables of the search where it ended.

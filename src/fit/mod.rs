@@ -47,6 +47,7 @@ pub use findings::{Finding, Grade};
 pub use found::{Estimate, Fit, Work};
 pub use identify::{Group, Identifiability, LIMIT, MODEL, SHOWS};
 pub use least_squares::Ending;
+pub use noise::Wave;
 pub use other_laws::OtherLaw;
 pub use posterior::{Credible, EFFECTIVE, Posterior, R_HAT, posterior};
 pub use problem::{Problem, Stop};

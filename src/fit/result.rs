@@ -128,6 +128,7 @@ pub(super) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         identifiability,
         disagreement: judged.and_then(|judged| judged.disagreement.clone()),
         other_law: judged.and_then(|judged| judged.other_law.clone()),
+        waves: judged.iter().flat_map(|judged| &judged.spreads).flat_map(|spread| spread.waves.clone()).collect(),
         findings: Vec::new(),
         point: best.x.clone(),
         ending: best.ending,

@@ -5,7 +5,7 @@
 //! ([`super::noise`]).
 
 use super::identify::{Directions, Identifiability};
-use super::noise::{self, Spread, half_width};
+use super::noise::{self, Spread, Wave, half_width};
 use super::other_laws::OtherLaw;
 use super::problem::Problem;
 use super::sub_records::Disagreement;
@@ -144,14 +144,25 @@ impl Judged {
                 told.push(format!("{} over {}", quantity.name(), own.join(" and ")));
             }
         }
-        match told.is_empty() {
-            true => "which is as good as independent from sample to sample".into(),
-            false => format!(
-                "which is alike over time ({}): errors are {:.1} times those of independent residuals",
-                told.join(", "),
-                self.inflation
-            ),
+        let mut words = match told.is_empty() {
+            true => "which is as good as independent from sample to sample".to_string(),
+            false => format!("which is alike over time ({})", told.join(", ")),
+        };
+        for (spread, quantity) in self.spreads.iter().zip(&quantities).filter(|(spread, _)| spread.unevenness > 1.0) {
+            words.push_str(&format!(
+                "; {} is {:.1} times larger in some places than in others",
+                quantity.name(),
+                spread.unevenness
+            ));
         }
+        for Wave { quantity, length, amplitude } in self.spreads.iter().flat_map(|spread| &spread.waves) {
+            let (length, amplitude) = (shown(*length, quantity.unit()), shown(*amplitude, quantity.unit()));
+            words.push_str(&format!("; {} comes again by ±{amplitude} every {length}", quantity.name()));
+        }
+        if words.contains("alike") || words.contains(';') {
+            words.push_str(&format!(": errors are {:.1} times those of independent residuals", self.inflation));
+        }
+        words
     }
 }
 

@@ -1,0 +1,103 @@
+//! Errors that come again at the same place, forward and backward: a pulley or an encoder out of centre, teeth, a motor
+//! that cogs.
+//!
+//! ```text
+//! r(t) = J(t) δ + a cos κ ŷ(t) + b sin κ ŷ(t) + noise
+//! ```
+//!
+//! They are no noise: what they move the estimates by is as long as the logs are, and comes again with the same input.
+//! The wave numbers κ of one wave in the travel to one in two blocks are tried.
+
+use super::Slow;
+use super::filter::innovations;
+use super::series::Series;
+use std::f64::consts::TAU;
+
+/// Steps of a wave in the travel, and the most wave numbers.
+const STEP: f64 = 0.5;
+const MOST: usize = 200;
+
+/// How often the step is halved around the best.
+const FINER: usize = 4;
+
+/// By so much waves have to raise the logarithm of the likelihood beyond that of the number that was tried.
+pub(super) const CLEAR: f64 = 6.0;
+
+/// A wave along the way.
+pub(super) struct Found {
+    /// Its wave number, rad in the quantity's unit.
+    pub kappa: f64,
+    /// By how much it raises the logarithm of the likelihood at least.
+    pub gain: f64,
+    /// How many were tried.
+    pub tried: usize,
+}
+
+/// The wave that takes most off the residuals, those without the waves that the rows have already with these
+/// amplitudes.
+pub(super) fn wave(all: &[Series], amplitudes: &[f64], slow: &[Slow], white: f64) -> Option<Found> {
+    let values = || all.iter().flat_map(|series| &series.value).copied();
+    let (low, high) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+    let travel = high - low;
+    // A quarter of the blocks moves faster than this.
+    let mut steps: Vec<f64> =
+        all.iter().flat_map(|series| series.value.windows(2)).map(|v| (v[1] - v[0]).abs()).collect();
+    steps.sort_by(f64::total_cmp);
+    let coarse = *steps.get(steps.len() * 3 / 4)?;
+    if !(travel > 0.0 && coarse > 0.0) {
+        return None;
+    }
+    let first = TAU / travel;
+    let count = (((TAU / (2.0 * coarse) / first - 1.0) / STEP).max(0.0) as usize).min(MOST);
+    let of = |kappa: f64| gain(all, amplitudes, slow, kappa) / white;
+    let tried = (0..count).map(|k| first * (1.0 + STEP * k as f64)).map(|kappa| (kappa, of(kappa)));
+    let (mut kappa, mut most) = tried.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    if most >= CLEAR {
+        let mut step = 0.5 * STEP * first;
+        for _ in 0..FINER {
+            for near in [kappa - step, kappa + step] {
+                let gain = of(near);
+                if gain > most {
+                    (kappa, most) = (near, gain);
+                }
+            }
+            step *= 0.5;
+        }
+    }
+    Some(Found { kappa, gain: most, tried: count })
+}
+
+/// By how much a wave raises the logarithm of the likelihood, times the variance of white noise.
+fn gain(all: &[Series], amplitudes: &[f64], slow: &[Slow], kappa: f64) -> f64 {
+    // Σ c c, c s, s s, c r, s r of the innovations.
+    let mut sums = [0.0; 5];
+    for series in all {
+        let waves = columns(series, kappa);
+        let wide = series.wide();
+        let before = wide - 1 - series.more;
+        let left =
+            |row: &[f64]| row[wide - 1] - row[before..wide - 1].iter().zip(amplitudes).map(|(c, a)| c * a).sum::<f64>();
+        let own = series.rows.chunks(wide).enumerate();
+        let rows: Vec<f64> = own.flat_map(|(k, row)| [waves[0][k], waves[1][k], left(row)]).collect();
+        innovations(series, &rows, 3, slow, |v, f| {
+            let [c, s, r] = [v[0], v[1], v[2]];
+            for (sum, product) in sums.iter_mut().zip([c * c, c * s, s * s, c * r, s * r]) {
+                *sum += product / f;
+            }
+        });
+    }
+    let [cc, cs, ss, cr, sr] = sums;
+    let determinant = cc * ss - cs * cs;
+    if determinant <= 1e-6 * cc * ss {
+        return 0.0;
+    }
+    0.5 * (cr * cr * ss - 2.0 * cr * sr * cs + sr * sr * cc) / determinant
+}
+
+/// cos κ ŷ and sin κ ŷ as they stand in rows.
+pub(super) fn columns(series: &Series, kappa: f64) -> [Vec<f64>; 2] {
+    let of = |wave: fn(f64) -> f64| {
+        series.value.iter().zip(&series.gain).map(|(value, gain)| gain * wave(kappa * value)).collect()
+    };
+    [of(f64::cos), of(f64::sin)]
+}

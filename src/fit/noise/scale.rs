@@ -1,0 +1,100 @@
+//! Whether noise is larger in some places than in others: with speed, or along the logs.
+//!
+//! The innovations v of white noise beside slow ones are independent, of one variance. Their blocks are put into K
+//! classes, of speed or of time; with the mean squares s_k² of n_k each and s² of all n, the classes raise the
+//! logarithm of the likelihood by
+//!
+//! ```text
+//! Σ n_k ln(s/s_k) − (K − 1)/2 ln n           (G. Schwarz 1978)
+//! ```
+//!
+//! Where that is enough, D Σ D with the s_k/s on the diagonal of D is a second covariance of the noise beside Σ. Of a
+//! variance the greater counts: where a model is wrong its errors are small at rest and large in motion, too, and there
+//! they tell nothing of how well a parameter is known that the motion at rest determines.
+
+use super::Slow;
+use super::filter::innovations;
+use super::series::Series;
+
+/// Classes, and the fewest blocks of one.
+const CLASSES: usize = 6;
+const FEWEST: usize = 12;
+
+/// Share of the greatest speed below which a block is at rest.
+const REST: f64 = 0.01;
+
+/// By so much classes have to raise the logarithm of the likelihood.
+const CLEAR: f64 = 3.0;
+
+/// The size of the noise in each block of each series; none where it is the same as far as the residuals show it.
+pub(super) fn scales(all: &[Series], slow: &[Slow]) -> Option<Vec<Vec<f64>>> {
+    let mut squares: Vec<f64> = Vec::new();
+    for series in all {
+        let wide = series.wide();
+        let residuals: Vec<f64> = series.rows.chunks(wide).map(|row| row[wide - 1]).collect();
+        innovations(series, &residuals, 1, slow, |v, f| squares.push(v[0] * v[0] / f));
+    }
+    let n = squares.len() as f64;
+    let mean = squares.iter().sum::<f64>() / n;
+    let raised = |classes: &[usize]| {
+        let (mut sums, mut counts) = ([0.0; CLASSES], [0.0; CLASSES]);
+        for (&class, square) in classes.iter().zip(&squares) {
+            sums[class] += square;
+            counts[class] += 1.0;
+        }
+        let there = (0..CLASSES).filter(|&k| counts[k] > 0.0);
+        let gain: f64 = there.clone().map(|k| 0.5 * counts[k] * (mean * counts[k] / sums[k]).ln()).sum();
+        let sizes: [f64; CLASSES] = std::array::from_fn(|k| (sums[k] / (counts[k] * mean)).sqrt());
+        (gain - 0.5 * (there.count() as f64 - 1.0) * n.ln(), sizes)
+    };
+    let best = [by_speed(all), by_time(all)]
+        .into_iter()
+        .flatten()
+        .map(|classes| {
+            let (gain, sizes) = raised(&classes);
+            (gain, classes, sizes)
+        })
+        .max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (gain, classes, sizes) = best;
+    if gain.is_nan() || gain < CLEAR {
+        return None;
+    }
+    let mut sizes = classes.into_iter().map(|class| sizes[class]);
+    Some(all.iter().map(|series| sizes.by_ref().take(series.time.len()).collect()).collect())
+}
+
+/// Classes of speed: at rest, and the rest in equal numbers; none where too few blocks are in one.
+fn by_speed(all: &[Series]) -> Option<Vec<usize>> {
+    let speeds: Vec<f64> = all.iter().flat_map(|series| &series.speed).copied().collect();
+    let rest = REST * speeds.iter().copied().fold(0.0, f64::max);
+    let mut moving: Vec<f64> = speeds.iter().copied().filter(|v| *v > rest).collect();
+    let resting = speeds.len() - moving.len();
+    if moving.len() < (CLASSES - 1) * FEWEST {
+        return None;
+    }
+    moving.sort_by(f64::total_cmp);
+    let edges: Vec<f64> = (1..CLASSES - 1).map(|k| moving[k * moving.len() / (CLASSES - 1)]).collect();
+    let class = |v: f64| match v > rest || resting < FEWEST {
+        true => 1 + edges.iter().filter(|edge| v >= **edge).count(),
+        false => 0,
+    };
+    Some(speeds.into_iter().map(class).collect())
+}
+
+/// Classes of time: parts of one log, or logs.
+fn by_time(all: &[Series]) -> Option<Vec<usize>> {
+    let blocks: usize = all.iter().map(|series| series.time.len()).sum();
+    let parts = (CLASSES / all.len()).max(1);
+    if blocks < CLASSES * FEWEST {
+        return None;
+    }
+    let mut classes = Vec::with_capacity(blocks);
+    for (index, series) in all.iter().enumerate() {
+        let n = series.time.len();
+        classes.extend((0..n).map(|k| match all.len() > CLASSES {
+            true => index * CLASSES / all.len(),
+            false => index * parts + k * parts / n,
+        }));
+    }
+    Some(classes)
+}
