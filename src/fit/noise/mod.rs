@@ -47,8 +47,10 @@ const APART: f64 = 1.0;
 /// How often one of two slow noises is sought anew beside the other.
 const TURNS: usize = 3;
 
-/// Most waves along the way.
+/// Most waves along the way, and the least amplitude of one in steps of the converter: rounding alone makes waves of 1/π
+/// of them.
 const WAVES: usize = 3;
+const ROUNDED: f64 = 0.5;
 
 /// A slow noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -159,7 +161,9 @@ pub(super) fn spreads(
         .map(|quantity| {
             let (series, weight) = series::series(problem, quantity, residuals, jacobian, globals);
             let influence = influence(&series, globals, inverse);
-            Estimate { quantity, weight, series, globals, influence }
+            let seen = problem.runs.iter().flat_map(|run| &run.seen).filter(|seen| seen.quantity == quantity);
+            let step = seen.map(|seen| seen.step).fold(0.0, f64::max);
+            Estimate { quantity, weight, step, series, globals, influence }
         })
         .filter(|estimate| estimate.blocks() >= 4)
         .collect();
@@ -177,6 +181,8 @@ struct Estimate {
     quantity: Quantity,
     /// The greatest weight of its values.
     weight: f64,
+    /// The greatest step of its converters.
+    step: f64,
     series: Vec<Series>,
     globals: usize,
     /// By how much each block moves each global, by series, as the fit weighs them.
@@ -402,8 +408,8 @@ impl Estimate {
         let mut amplitudes = DVector::zeros(0);
         while lengths.len() < WAVES {
             let found = place::wave(&self.series, amplitudes.as_slice(), &noise.slow, noise.white);
-            let Some(place::Found { kappa, gain, tried }) = found else { break };
-            if gain < place::CLEAR + (tried as f64).ln() {
+            let Some(place::Found { kappa, gain, amplitude, tried }) = found else { break };
+            if gain < place::CLEAR + (tried as f64).ln() || amplitude / self.weight < ROUNDED * self.step {
                 break;
             }
             let columns: Vec<_> = self.series.iter().map(|series| place::columns(series, kappa)).collect();

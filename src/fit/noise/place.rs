@@ -29,6 +29,8 @@ pub(super) struct Found {
     pub kappa: f64,
     /// By how much it raises the logarithm of the likelihood at least.
     pub gain: f64,
+    /// Its amplitude, in standard deviations of a value with the greatest weight.
+    pub amplitude: f64,
     /// How many were tried.
     pub tried: usize,
 }
@@ -49,26 +51,26 @@ pub(super) fn wave(all: &[Series], amplitudes: &[f64], slow: &[Slow], white: f64
     }
     let first = TAU / travel;
     let count = (((TAU / (2.0 * coarse) / first - 1.0) / STEP).max(0.0) as usize).min(MOST);
-    let of = |kappa: f64| gain(all, amplitudes, slow, kappa) / white;
+    let of = |kappa: f64| gain(all, amplitudes, slow, kappa);
     let tried = (0..count).map(|k| first * (1.0 + STEP * k as f64)).map(|kappa| (kappa, of(kappa)));
-    let (mut kappa, mut most) = tried.max_by(|a, b| a.1.total_cmp(&b.1))?;
-    if most >= CLEAR {
+    let (mut kappa, mut most) = tried.max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+    if most.0 >= CLEAR * white {
         let mut step = 0.5 * STEP * first;
         for _ in 0..FINER {
             for near in [kappa - step, kappa + step] {
                 let gain = of(near);
-                if gain > most {
+                if gain.0 > most.0 {
                     (kappa, most) = (near, gain);
                 }
             }
             step *= 0.5;
         }
     }
-    Some(Found { kappa, gain: most, tried: count })
+    Some(Found { kappa, gain: most.0 / white, amplitude: most.1, tried: count })
 }
 
-/// By how much a wave raises the logarithm of the likelihood, times the variance of white noise.
-fn gain(all: &[Series], amplitudes: &[f64], slow: &[Slow], kappa: f64) -> f64 {
+/// By how much a wave raises the logarithm of the likelihood, times the variance of white noise; and its amplitude.
+fn gain(all: &[Series], amplitudes: &[f64], slow: &[Slow], kappa: f64) -> (f64, f64) {
     // Σ c c, c s, s s, c r, s r of the innovations.
     let mut sums = [0.0; 5];
     for series in all {
@@ -89,9 +91,10 @@ fn gain(all: &[Series], amplitudes: &[f64], slow: &[Slow], kappa: f64) -> f64 {
     let [cc, cs, ss, cr, sr] = sums;
     let determinant = cc * ss - cs * cs;
     if determinant <= 1e-6 * cc * ss {
-        return 0.0;
+        return (0.0, 0.0);
     }
-    0.5 * (cr * cr * ss - 2.0 * cr * sr * cs + sr * sr * cc) / determinant
+    let (a, b) = ((cr * ss - sr * cs) / determinant, (sr * cc - cr * cs) / determinant);
+    (0.5 * (a * cr + b * sr), f64::hypot(a, b))
 }
 
 /// cos κ ŷ and sin κ ŷ as they stand in rows.
