@@ -4,14 +4,14 @@
 //!
 //! cargo run --release --example tuning -- [--evolution N] [--drawn N] stages/sollmann-jouaneh/controllers/*.toml
 //!
-//! `--drawn N` also tunes N machines that are drawn: masses, friction, belt and motor of the first case off by up to a
-//! factor of two.
+//! `--drawn N` also tunes N machines that are drawn about the first case named: mass, friction, pulleys' inertia and motor
+//! off by up to a factor of two. `--only-drawn` leaves out the cases themselves.
 
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 use taut::case::Case;
 use taut::chance::uniform;
-use taut::tune::{Tuned, Verdict, evolved, tune};
+use taut::tune::{Judgement, Tuned, Verdict, evolved, tune};
 
 /// The quantities that are drawn, as factors of the case's own.
 const DRAWN: [&str; 7] = [
@@ -26,12 +26,13 @@ const DRAWN: [&str; 7] = [
 
 fn main() {
     let mut args = std::env::args().skip(1);
-    let (mut generations, mut drawn, mut paths) = (0, 0, Vec::new());
+    let (mut generations, mut drawn, mut only, mut paths) = (0, 0, false, Vec::new());
     while let Some(arg) = args.next() {
         let mut number = || args.next().and_then(|text| text.parse().ok()).unwrap_or(0);
         match &arg[..] {
             "--evolution" => generations = number(),
             "--drawn" => drawn = number(),
+            "--only-drawn" => only = true,
             _ => paths.push(arg),
         }
     }
@@ -40,7 +41,7 @@ fn main() {
         "| case | verdict | J | cart error at worst, mm | axes that settle | current at worst, A | active limit | processor, s |{more}"
     );
     println!("|---|---|---|---|---|---|---|---|{}", if generations > 0 { "---|" } else { "" });
-    for path in &paths {
+    for path in paths.iter().filter(|_| !only) {
         let name = path.rsplit('/').next().unwrap_or(path).trim_end_matches(".toml").to_string();
         one(&name, Case::read(path), generations);
     }
@@ -90,14 +91,21 @@ fn one(name: &str, case: taut::Result<Case>, generations: usize) {
     }
 }
 
-/// Cost that the evolution found, and by how much the tuning is worse (better, below zero).
-fn beside(tuned: &Tuned, other: Option<Option<Verdict>>) -> String {
+/// Cost that the evolution found, and by how much the tuning is worse (better, below zero); whether a figure of what it
+/// found is worse than before, where one of the tuning's is.
+fn beside(tuned: &Tuned, other: Option<Option<(Verdict, Judgement)>>) -> String {
     match other {
         None => String::new(),
         Some(None) => " none |".into(),
-        Some(Some(verdict)) => {
+        Some(Some((verdict, judgement))) => {
             let worse = 100.0 * ((tuned.after.objective - verdict.objective).exp() - 1.0);
-            format!(" {:.3} ({worse:+.1} %) |", verdict.objective.exp())
+            let figures = match (tuned.judgement, judgement) {
+                (Judgement::Worse, Judgement::Worse) => ", a figure worse too",
+                (Judgement::Worse, _) => ", no figure worse",
+                (_, Judgement::Worse) => ", a figure worse",
+                _ => "",
+            };
+            format!(" {:.3} ({worse:+.1} %{figures}) |", verdict.objective.exp())
         }
     }
 }

@@ -1,12 +1,13 @@
 //! The search by moves, on the axes that are worst for what it finds and at the samples of the controller; whatever is
 //! told of a design comes from whole runs on all axes.
 
+use super::edge::Edge;
 use super::evolution::evolve;
 use super::gains::{rounded, shaped};
 use super::objective::{AtWorst, BALANCES, Balance, MoveFigures, Runner, objective};
 use super::search::{Found, minimise_below};
-use super::work::{FINALISTS, Finalist, STEEP, Work, slowing};
-use super::{HARD, SOFT};
+use super::watch::Watch;
+use super::work::{FINALISTS, Finalist, Work};
 use crate::case::{Cost, Move};
 use crate::chance::uniform;
 use crate::design::{Design, Structure};
@@ -44,21 +45,8 @@ pub(super) struct Spread {
 pub(super) const WIDE: Spread = Spread { generations: 12, scatter: 0.4, edge: Edge::Beyond(0.0), seed: 15 };
 const NARROW: Spread = Spread { generations: 8, scatter: 0.3, edge: Edge::Eased, seed: 16 };
 
-/// The limits to a search: it may go so far beyond them, which costs, or a loop that passes them is made slower.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Edge {
-    Beyond(f64),
-    Eased,
-}
-
 /// How far beyond the limits the first simplex may go: it goes along their edge.
 const SLACK: f64 = 0.05;
-
-/// ln of the slowest loop that limits make of one that passes them, halvings on the way to the fastest that does not,
-/// and how often that is done for axes that were not looked at.
-const SLOWEST: f64 = -0.7;
-const HALVINGS: usize = 5;
-const EASED: usize = 3;
 
 /// How much worse than the best (ln J) a finalist may be and still be searched from.
 const NEAR: f64 = 0.3;
@@ -69,9 +57,6 @@ const SAMPLES: u64 = 6_000_000;
 
 /// How often a search goes on with the axes that are worst for what it found.
 const POLISHED: usize = 8;
-
-/// Axes that are watched for each figure, beside those that a figure at worst leaves out.
-const WATCHED: usize = 2;
 
 /// Share of a figure before by which one at samples has to be less: a peak between them may be that much higher.
 const BETWEEN: f64 = 2e-3;
@@ -89,7 +74,7 @@ pub(super) struct Tried {
     pub worst: Vec<AtWorst>,
     /// The finalist that it was made from, and the powers that lead to it.
     pub layout: usize,
-    powers: Vec<f64>,
+    pub powers: Vec<f64>,
 }
 
 /// By what a search by moves weighs a design.
@@ -104,68 +89,6 @@ pub(super) struct Weighed<'a> {
 pub(super) struct Bars<'a> {
     pub figures: &'a [AtWorst],
     pub steep: f64,
-}
-
-/// Of each move the axes on which a search runs it, the worst first.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Watch {
-    pub axes: Vec<Vec<usize>>,
-    /// How many of them each figure leaves out.
-    pub left_out: usize,
-}
-
-/// The axes by a figure, the worst first.
-fn order(seen: &[MoveFigures], figure: fn(&MoveFigures) -> f64) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..seen.len()).collect();
-    order.sort_by(|&a, &b| figure(&seen[b]).total_cmp(&figure(&seen[a])));
-    order
-}
-
-/// The figures that choose the axes on which a search runs a move.
-const FIGURES: [fn(&MoveFigures) -> f64; 2] = [|seen| seen.error, |seen| seen.settles];
-
-impl Watch {
-    /// Those that are worst in a figure, of each so many more than it leaves out.
-    pub fn of(seen: &[Vec<MoveFigures>], left_out: usize) -> Self {
-        let of_move = |seen: &Vec<MoveFigures>| {
-            let mut axes: Vec<usize> = Vec::new();
-            let orders = FIGURES.map(|figure| order(seen, figure));
-            for rank in 0..(left_out + WATCHED).min(seen.len()) {
-                for order in &orders {
-                    if !axes.contains(&order[rank]) {
-                        axes.push(order[rank]);
-                    }
-                }
-            }
-            axes
-        };
-        Self { axes: seen.iter().map(of_move).collect(), left_out }
-    }
-
-    /// Of each figure the axis alone that makes it what it is at worst, which a rough search takes for all.
-    fn roughly(seen: &[Vec<MoveFigures>], left_out: usize) -> Self {
-        let of_move = |seen: &Vec<MoveFigures>| {
-            let mut axes: Vec<usize> =
-                FIGURES.iter().filter_map(|figure| order(seen, *figure).get(left_out).copied()).collect();
-            axes.dedup();
-            axes
-        };
-        Self { axes: seen.iter().map(of_move).collect(), left_out: 0 }
-    }
-
-    /// Those of another first, too; whether any is new.
-    pub fn join(&mut self, other: &Self) -> bool {
-        self.axes.resize(self.axes.len().max(other.axes.len()), Vec::new());
-        let mut is_new = false;
-        for (own, other) in self.axes.iter_mut().zip(&other.axes) {
-            is_new |= other.iter().any(|axis| !own.contains(axis));
-            let mut all = other.clone();
-            all.extend(own.iter().filter(|axis| !other.contains(axis)));
-            *own = all;
-        }
-        self.left_out = self.left_out.max(other.left_out);
-        is_new
-    }
 }
 
 impl Work<'_> {
@@ -194,7 +117,7 @@ impl Work<'_> {
     /// The figures at worst of a design on the axes that are watched, at samples, and ln J by the balance of the
     /// search; as soon as it is at least `bar` those of what was run until then: another axis makes no figure at worst
     /// smaller.
-    fn run(&self, design: &Design, watch: &Watch, weighed: &Weighed, bar: f64) -> (Vec<AtWorst>, f64) {
+    pub fn run(&self, design: &Design, watch: &Watch, weighed: &Weighed, bar: f64) -> (Vec<AtWorst>, f64) {
         let nothing = (Vec::new(), f64::INFINITY);
         let Ok(mut runner) = Runner::new(&self.case.stage, design) else { return nothing };
         let left_out = watch.left_out;
@@ -301,104 +224,6 @@ impl Work<'_> {
     fn watched_by(&self, design: &Design, watch: &mut Watch) -> Result<bool> {
         let seen = self.glanced(design)?;
         Ok(watch.join(&Watch::of(&seen, self.family.left_out(self.stages.len()))))
-    }
-
-    /// ln J of a finalist with these powers, by moves on the axes that are watched; what keeps the limits on the set and
-    /// is below the bar joins the archive. Infinite once the search is to end.
-    pub fn of_moves(
-        &mut self,
-        (finalist, layout, powers): (&Finalist, usize, &[f64]),
-        watch: &Watch,
-        weighed: &Weighed,
-        (edge, bar): (Edge, f64),
-        archive: &mut Vec<Tried>,
-    ) -> f64 {
-        let slack = match edge {
-            Edge::Eased => return self.of_eased((finalist, layout, powers), watch, weighed, bar, archive),
-            Edge::Beyond(slack) => slack,
-        };
-        if (self.stop)() || self.is_spent() {
-            return f64::INFINITY;
-        }
-        let design = rounded(&shaped(&finalist.start, finalist.own, powers));
-        let beyond = self.on_set(&design).0;
-        if beyond > slack {
-            return 1e3 + beyond.min(1e6);
-        }
-        let (worst, value) = self.run(&design, watch, weighed, bar - STEEP * beyond);
-        if beyond == 0.0 && value < bar {
-            archive.push(Tried { design, worst, layout, powers: powers.to_vec() });
-        }
-        value + STEEP * beyond
-    }
-
-    /// The same with the loop as much slower as the limits make it; what is below the bar keeps them on all axes.
-    fn of_eased(
-        &mut self,
-        (finalist, layout, powers): (&Finalist, usize, &[f64]),
-        watch: &Watch,
-        weighed: &Weighed,
-        bar: f64,
-        archive: &mut Vec<Tried>,
-    ) -> f64 {
-        let mut powers = powers.to_vec();
-        for _ in 0..EASED {
-            if (self.stop)() || self.is_spent() {
-                return f64::INFINITY;
-            }
-            powers = match self.eased(finalist, &powers) {
-                Ok(powers) => powers,
-                Err(beyond) => return 1e3 + beyond.min(1e6),
-            };
-            let design = rounded(&shaped(&finalist.start, finalist.own, &powers));
-            let (worst, value) = self.run(&design, watch, weighed, bar);
-            if value >= bar {
-                return value;
-            }
-            if !self.is_best_by_any(&worst, archive, weighed) {
-                return value;
-            }
-            // What is worth keeping has to keep the limits on all axes; one on which it does not joins the set.
-            match self.passes(&design) {
-                Ok(false) => {
-                    archive.push(Tried { design, worst, layout, powers });
-                    return value;
-                }
-                Ok(true) => {}
-                Err(_) => return f64::INFINITY,
-            }
-        }
-        f64::INFINITY
-    }
-
-    /// Whether no design that was run is better by what a search weighs, or by a balance that designs are chosen by.
-    fn is_best_by_any(&self, worst: &[AtWorst], archive: &[Tried], weighed: &Weighed) -> bool {
-        let [strict, soft] = [HARD, SOFT].map(|steep| weighed.bars.map(|bars| Bars { steep, ..bars }));
-        [(1, strict), (1, soft), (1, None), (0, None), (2, None)].into_iter().any(|(place, bars)| {
-            let value = |worst: &[AtWorst]| self.valued(weighed.cost, &BALANCES[place], worst, bars);
-            value(worst) < archive.iter().map(|tried| value(&tried.worst)).fold(f64::INFINITY, f64::min)
-        })
-    }
-
-    /// These powers with the loop as much slower as the limits make it on the set; where half as fast is not enough, how
-    /// far it is beyond them.
-    fn eased(&mut self, finalist: &Finalist, powers: &[f64]) -> std::result::Result<Vec<f64>, f64> {
-        let slowing = slowing(&finalist.start, finalist.own, &self.case.stage);
-        let at = |log: f64| -> Vec<f64> { powers.iter().zip(&slowing).map(|(x, slow)| x + log * slow).collect() };
-        let mut beyond = |x: &[f64]| self.on_set(&rounded(&shaped(&finalist.start, finalist.own, x))).0;
-        if beyond(powers) == 0.0 {
-            return Ok(powers.to_vec());
-        }
-        let (mut slow, mut fast) = (SLOWEST, 0.0);
-        let left = beyond(&at(slow));
-        if left > 0.0 {
-            return Err(left);
-        }
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (slow + fast);
-            if beyond(&at(middle)) > 0.0 { fast = middle } else { slow = middle }
-        }
-        Ok(at(slow))
     }
 
     /// Counts the samples of a move.

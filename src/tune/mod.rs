@@ -5,6 +5,7 @@
 //! everything that is said holds for the rounded gains.
 
 mod by_moves;
+mod edge;
 mod evolution;
 mod family;
 mod gains;
@@ -18,6 +19,7 @@ mod rules;
 mod search;
 pub mod trouble;
 mod verdict;
+mod watch;
 mod way_back;
 mod work;
 
@@ -37,9 +39,10 @@ use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::stage::BeltModel;
-use by_moves::{Bars, Tried, WIDE, Watch, Weighed};
+use by_moves::{Bars, Tried, WIDE, Weighed};
 use std::path::Path;
 use verdict::compare;
+use watch::Watch;
 use work::{Finalist, Work};
 
 /// Searches for what makes no figure worse, each with the machines on which one was.

@@ -1,7 +1,8 @@
 //! How far a tuning is from what a long differential evolution of the same objective finds: for tables, and for those
 //! who doubt it.
 
-use super::by_moves::{Bars, Edge, Weighed};
+use super::by_moves::{Bars, Weighed};
+use super::edge::Edge;
 use super::evolution::evolve;
 use super::search::Found;
 use super::verdict::{Judgement, Verdict, compare};
@@ -21,26 +22,26 @@ const SCATTER: f64 = 1.0;
 const ROUNDS: usize = 3;
 
 /// The best verdict of a differential evolution over the gains and filters that a tuning chose, begun without it: on
-/// the same family, moves, limits and objective, and with no figure worse than before where the tuning has none. `None`
-/// where nothing keeps the limits.
+/// the same family, moves, limits and objective; one with no figure worse than before goes before any other, and the
+/// judgement says whether it is one. `None` where nothing keeps the limits.
 pub fn evolved(
     case: &Case,
     tuning: &Tuning,
     tuned: &Tuned,
     generations: usize,
     stop: &dyn Fn() -> bool,
-) -> Result<Option<Verdict>> {
+) -> Result<Option<(Verdict, Judgement)>> {
     let given = &tuned.before.design;
     let mut work = Work::new(case, &tuned.family, tuning, &tuned.moves, given, stop)?;
     work.most = u64::MAX;
     let cost = tuning.cost.unwrap_or(Cost::Moves);
     let figures = tuned.before.at_worst();
-    let is_worse = compare(&tuned.before, &tuned.after) == Judgement::Worse;
-    let bars = (!is_worse).then_some(Bars { figures: &figures, steep: HARD });
+    let bars = Some(Bars { figures: &figures, steep: HARD });
     let weighed = Weighed { cost, bars };
     let finalist = Finalist::at(&tuned.after.design, given.filters.len());
     let mut watch = tuned.before.watch(&work);
-    let mut best: Option<Verdict> = None;
+    let rank = |(verdict, judgement): &(Verdict, Judgement)| (*judgement == Judgement::Worse, verdict.objective);
+    let mut best: Option<(Verdict, Judgement)> = None;
     for round in 0..ROUNDS {
         let mut random = Pcg64::seed_from_u64(97 + round as u64);
         let mut archive = Vec::new();
@@ -56,9 +57,10 @@ pub fn evolved(
         let Some(design) = work.best_of(&archive, cost, &super::BALANCES[1], bars)? else { continue };
         let verdict = work.verdict(&design)?;
         watch.join(&verdict.watch(&work));
-        let is_allowed = bars.is_none() || compare(&tuned.before, &verdict) != Judgement::Worse;
-        if is_allowed && best.as_ref().is_none_or(|best| verdict.objective < best.objective) {
-            best = Some(verdict);
+        let judgement = compare(&tuned.before, &verdict);
+        let found = (verdict, judgement);
+        if best.as_ref().is_none_or(|best| rank(&found) < rank(best)) {
+            best = Some(found);
         }
     }
     Ok(best)

@@ -1,10 +1,10 @@
 //! The verdict on a controller over the family, and whether one is better than another.
 
-use super::by_moves::Watch;
 use super::family::{Corner, Family, modes_along};
 use super::hunting::{Hunt, hunting};
 use super::margins::Margins;
 use super::objective::{AtWorst, BALANCES, MoveFigures, Runner, objective};
+use super::watch::Watch;
 use super::work::{Work, mode_at};
 use crate::case::{Cost, Tuning};
 use crate::control::{Deviation, Setup, closed_loop};

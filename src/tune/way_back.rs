@@ -73,3 +73,64 @@ fn powers(from: &Design, to: &Design, stage: &Stage) -> Option<Vec<f64>> {
     let all = from.len() == to.len() && from.iter().zip(&to).all(|(a, b)| a.key == b.key && a.value * b.value > 0.0);
     all.then(|| pairs.map(|(from, to)| (to.value / from.value).ln()).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Case;
+    use crate::design::Structure;
+    use crate::tune::family::Family;
+    use std::path::Path;
+
+    fn pid() -> Case {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
+        Case::read(folder.join("pid-elastic.toml")).unwrap()
+    }
+
+    /// The file's proportional gain and its filter's corner, and the other two gains times a half.
+    fn calmer(design: &Design) -> Design {
+        let mut other = design.clone();
+        let Structure::Pid(pid) = &mut other.structure else { panic!("not a PID") };
+        (pid.integral, pid.derivative) = (0.5 * pid.integral, 0.5 * pid.derivative);
+        other
+    }
+
+    #[test]
+    fn the_way_ends_at_the_gains_of_the_file() {
+        let case = pid();
+        let file = case.controller.clone().unwrap();
+        let powers = powers(&calmer(&file), &file, &case.stage).unwrap();
+        assert_eq!(rounded(&shaped(&calmer(&file), file.filters.len(), &powers)), rounded(&file));
+        assert!((powers[1] - 2f64.ln()).abs() < 1e-12 && powers[0] == 0.0, "{powers:?}");
+        // There is no way in logarithms to a gain that is zero.
+        let mut without = file.clone();
+        let Structure::Pid(pid) = &mut without.structure else { panic!("not a PID") };
+        pid.integral = 0.0;
+        assert_eq!(super::powers(&file, &without, &case.stage), None);
+    }
+
+    /// What is taken from the way keeps the limits, and a little nearer to the file they are broken.
+    #[test]
+    fn its_edge_is_where_the_limits_begin_to_hold() {
+        let case = pid();
+        let tuning = case.tune.clone().unwrap_or_default();
+        let file = case.controller.clone().unwrap();
+        let family = Family::of(&case, &tuning).unwrap();
+        let mut work = Work::new(&case, &family, &tuning, &case.moves, &file, &|| false).unwrap();
+        assert!(work.passes(&file).unwrap());
+        // Slow enough to keep the limits: a third of the speed.
+        let powers: Vec<f64> = [2.0, 3.0, 1.0, 0.0].iter().map(|power| power * 3f64.ln()).collect();
+        let slow: Vec<f64> = powers.iter().map(|power| -power).collect();
+        let slow = shaped(&file, file.filters.len(), &slow);
+        let at = |part: f64| {
+            let powers: Vec<f64> = powers.iter().map(|power| part * power).collect();
+            rounded(&shaped(&slow, file.filters.len(), &powers))
+        };
+        let first = work.first_kept(&at).unwrap().expect("a third of the speed keeps the limits");
+        assert!(first < STRETCHES);
+        let edge = work.edge(&at, first).unwrap();
+        assert!(!work.passes(&at(edge)).unwrap());
+        let step = 1.0 / (STRETCHES << HALVINGS) as f64;
+        assert!(work.passes(&at(edge + 1.01 * step)).unwrap(), "{edge}");
+    }
+}

@@ -6,14 +6,16 @@
 //! ```
 //!
 //! They are no noise: what they move the estimates by is as long as the logs are, and comes again with the same input.
-//! The wave numbers κ of one wave in the travel to one in two blocks are tried.
+//! The wave numbers κ of two waves in the travel to one in two blocks are tried.
 
 use super::Slow;
 use super::filter::innovations;
 use super::series::Series;
 use std::f64::consts::TAU;
 
-/// Steps of a wave in the travel, and the most wave numbers.
+/// Fewest waves in the travel: what does not come again there is a law, not a place. Steps of a wave in the travel, and
+/// the most wave numbers.
+const FEWEST: f64 = 2.0;
 const STEP: f64 = 0.5;
 const MOST: usize = 200;
 
@@ -49,15 +51,16 @@ pub(super) fn wave(all: &[Series], amplitudes: &[f64], slow: &[Slow], white: f64
     if !(travel > 0.0 && coarse > 0.0) {
         return None;
     }
-    let first = TAU / travel;
-    let count = (((TAU / (2.0 * coarse) / first - 1.0) / STEP).max(0.0) as usize).min(MOST);
+    let once = TAU / travel;
+    let first = FEWEST * once;
+    let count = (((TAU / (2.0 * coarse) - first) / (STEP * once)).max(0.0) as usize).min(MOST);
     let of = |kappa: f64| gain(all, amplitudes, slow, kappa);
-    let tried = (0..count).map(|k| first * (1.0 + STEP * k as f64)).map(|kappa| (kappa, of(kappa)));
+    let tried = (0..count).map(|k| first + STEP * once * k as f64).map(|kappa| (kappa, of(kappa)));
     let (mut kappa, mut most) = tried.max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
     if most.0 >= CLEAR * white {
-        let mut step = 0.5 * STEP * first;
+        let mut step = 0.5 * STEP * once;
         for _ in 0..FINER {
-            for near in [kappa - step, kappa + step] {
+            for near in [(kappa - step).max(first), kappa + step] {
                 let gain = of(near);
                 if gain.0 > most.0 {
                     (kappa, most) = (near, gain);

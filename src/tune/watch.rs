@@ -1,0 +1,68 @@
+//! The axes on which a search runs its moves: those that are worst for what it finds.
+
+use super::objective::MoveFigures;
+
+/// Axes that are watched for each figure, beside those that a figure at worst leaves out.
+const WATCHED: usize = 2;
+
+/// Of each move the axes on which a search runs it, the worst first.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Watch {
+    pub axes: Vec<Vec<usize>>,
+    /// How many of them each figure leaves out.
+    pub left_out: usize,
+}
+
+/// The axes by a figure, the worst first.
+fn order(seen: &[MoveFigures], figure: fn(&MoveFigures) -> f64) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..seen.len()).collect();
+    order.sort_by(|&a, &b| figure(&seen[b]).total_cmp(&figure(&seen[a])));
+    order
+}
+
+/// The figures that choose the axes on which a search runs a move.
+const FIGURES: [fn(&MoveFigures) -> f64; 2] = [|seen| seen.error, |seen| seen.settles];
+
+impl Watch {
+    /// Those that are worst in a figure, of each so many more than it leaves out.
+    pub fn of(seen: &[Vec<MoveFigures>], left_out: usize) -> Self {
+        let of_move = |seen: &Vec<MoveFigures>| {
+            let mut axes: Vec<usize> = Vec::new();
+            let orders = FIGURES.map(|figure| order(seen, figure));
+            for rank in 0..(left_out + WATCHED).min(seen.len()) {
+                for order in &orders {
+                    if !axes.contains(&order[rank]) {
+                        axes.push(order[rank]);
+                    }
+                }
+            }
+            axes
+        };
+        Self { axes: seen.iter().map(of_move).collect(), left_out }
+    }
+
+    /// Of each figure the axis alone that makes it what it is at worst, which a rough search takes for all.
+    pub fn roughly(seen: &[Vec<MoveFigures>], left_out: usize) -> Self {
+        let of_move = |seen: &Vec<MoveFigures>| {
+            let mut axes: Vec<usize> =
+                FIGURES.iter().filter_map(|figure| order(seen, *figure).get(left_out).copied()).collect();
+            axes.dedup();
+            axes
+        };
+        Self { axes: seen.iter().map(of_move).collect(), left_out: 0 }
+    }
+
+    /// Those of another first, too; whether any is new.
+    pub fn join(&mut self, other: &Self) -> bool {
+        self.axes.resize(self.axes.len().max(other.axes.len()), Vec::new());
+        let mut is_new = false;
+        for (own, other) in self.axes.iter_mut().zip(&other.axes) {
+            is_new |= other.iter().any(|axis| !own.contains(axis));
+            let mut all = other.clone();
+            all.extend(own.iter().filter(|axis| !other.contains(axis)));
+            *own = all;
+        }
+        self.left_out = self.left_out.max(other.left_out);
+        is_new
+    }
+}
