@@ -389,6 +389,20 @@ fn what_is_asked_to_stop_says_what_it_has() {
     assert!(tuned.is_ok_and(|tuned| tuned.holds));
 }
 
+/// A search that may take longer simulates more and finds what is no worse; what may not be is refused.
+#[test]
+fn a_search_takes_the_effort_that_it_may() {
+    let case = case("pid.toml", &[]);
+    let of = |effort| tune(&case, &Tuning { effort, ..Tuning::default() }, &|| false);
+    let (less, more) = (of(0.1).unwrap(), of(0.4).unwrap());
+    assert!(2 * less.samples < more.samples, "{} {}", less.samples, more.samples);
+    assert!(more.after.objective <= less.after.objective, "{} {}", less.after.objective, more.after.objective);
+    for effort in [0.0, f64::NAN, 101.0] {
+        let told = of(effort).unwrap_err().to_string();
+        assert_eq!(told, format!("an effort of {effort} cannot be\n  allowed: from 0.1 to 100"));
+    }
+}
+
 #[test]
 fn a_search_is_as_good_as_its_simplex() {
     let found = minimise(&[3.0, -2.0], 0.5, 1e-9, 1000, &mut |x| (x[0] - 1.0).powi(2) + 4.0 * (x[1] + 1.0).powi(4));

@@ -315,12 +315,14 @@ impl Case {
         corners: bool,
         judged: bool,
         draws: Option<PathBuf>,
+        effort: f64,
     ) -> PyResult<(Py<PyAny>, Py<Case>)> {
         let case = self.axis(py)?;
         let mut tuning = case.tune.clone().unwrap_or_default();
         tuning.spread = spread.or(tuning.spread);
         tuning.corners = corners;
         tuning.draws = draws;
+        tuning.effort = effort;
         let interrupt = Interrupt::listen();
         let found = unlocked(py, || match judged {
             true => evaluate(case, &tuning),

@@ -27,7 +27,7 @@ pub use get::{Given, Number};
 pub use motion::Move;
 pub use sweep::{Kinds, Origin, Sampling, Sweeping, Variation};
 pub use template::{TEMPLATE, Template, gantry_template};
-pub use tune::{Cost, Known, Tuning};
+pub use tune::{Cost, EFFORTS, Known, Tuning};
 
 use crate::chance::hash;
 use crate::design::Design;

@@ -31,7 +31,12 @@ pub struct Tuning {
     pub corners: bool,
     /// Draws of `taut fit --posterior`, of which the family is made instead.
     pub draws: Option<PathBuf>,
+    /// How many times as long as usual a search may take, one of [`EFFORTS`].
+    pub effort: f64,
 }
+
+/// Efforts that a search may take.
+pub const EFFORTS: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 
 impl Default for Tuning {
     /// The default: the best moves with Ms ≤ 1.8.
@@ -47,6 +52,7 @@ impl Default for Tuning {
             places: 7,
             corners: false,
             draws: None,
+            effort: 1.0,
         }
     }
 }
@@ -149,6 +155,7 @@ pub(super) fn tuning(root: &Table, design: Option<&Design>, moves: &[Move]) -> R
         places: table.number("places")? as usize,
         corners: false,
         draws: None,
+        effort: default.effort,
     }))
 }
 

@@ -31,6 +31,7 @@ pub fn tuned(case: &Case, tuning: &Tuning, tuned: &Tuned) -> Value {
         "undamped_mode_Hz": tuned.undamped,
         "began_with_Hz": tuned.placed,
         "holds": tuned.holds,
+        "effort": tuning.effort,
         "rounds": tuned.work.0,
         "designs": tuned.work.1,
         "gains": tuned.changes().into_iter().map(change).collect::<Vec<_>>(),

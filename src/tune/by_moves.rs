@@ -51,8 +51,8 @@ const SLACK: f64 = 0.05;
 /// How much worse than the best (ln J) a finalist may be and still be searched from.
 const NEAR: f64 = 0.3;
 
-/// Samples of moves that a search may simulate, each design that it looks at counted as some more: a few seconds of a
-/// processor.
+/// Samples of moves that a search of usual effort may simulate, each design that it looks at counted as some more: a few
+/// seconds of a processor.
 const SAMPLES: u64 = 6_000_000;
 
 /// How often a search goes on with the axes that are worst for what it found.
@@ -233,7 +233,7 @@ impl Work<'_> {
 
     /// Lets a search ask for as much as one may from now on.
     pub fn grant(&mut self) {
-        self.most = self.charged() + SAMPLES;
+        self.most = self.charged() + (self.tuning.effort * SAMPLES as f64) as u64;
     }
 
     /// Whether the samples of moves that a search may ask for are used up.

@@ -34,7 +34,7 @@ pub use reference::evolved;
 pub use search::{Found, minimise, minimise_below};
 pub use verdict::{Forced, Judgement, Limit, MoveVerdict, Verdict};
 
-use crate::case::{Case, Cost, Move, Tuning};
+use crate::case::{Case, Cost, EFFORTS, Move, Tuning};
 use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::{Error, Result};
@@ -183,6 +183,12 @@ fn beginning<'a>(case: &'a Case, tuning: &Tuning) -> Result<(&'a Design, Family,
             .next("add [controller] with every and for example pid = { proportional = \"2 V/mm\" }")
     })?;
     Feedback::new(design, &case.stage)?;
+    if !EFFORTS.contains(&tuning.effort) {
+        let (least, most) = (EFFORTS.start(), EFFORTS.end());
+        return Err(
+            Error::new(format!("an effort of {} cannot be", tuning.effort)).allowed(format!("from {least} to {most}"))
+        );
+    }
     Ok((design, Family::of(case, tuning)?, moves::of(case, design)?))
 }
 

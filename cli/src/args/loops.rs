@@ -1,8 +1,8 @@
 //! Vibrations and controllers: `modes`, `tune`, `shape`.
 
 use super::values::{
-    corner_speed, damping, delay, hertz, metres, metres_per_second, seconds, shapers, share, smoothing, uncertainty,
-    vibrations,
+    corner_speed, damping, delay, effort, hertz, metres, metres_per_second, seconds, shapers, share, smoothing,
+    uncertainty, vibrations,
 };
 use crate::command::Common;
 use clap::ValueEnum;
@@ -40,6 +40,9 @@ pub struct Tune {
     /// Take the machines from the draws of `taut fit --posterior`, whatever the file says of how far they are off
     #[arg(long, value_name = "FILE", conflicts_with = "spread")]
     pub draws: Option<PathBuf>,
+    /// Let the search take so many times as long: the gains it finds get better by some per cent
+    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = effort, conflicts_with = "evaluate")]
+    pub effort: f64,
     #[command(flatten)]
     pub common: Common,
 }

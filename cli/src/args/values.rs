@@ -1,6 +1,7 @@
 //! Values of options: numbers with units, and words.
 
 use super::loops::Shapers;
+use taut::case::EFFORTS;
 use taut::control::recommendation::Damping;
 use taut::control::shaper::Form;
 use taut::quantity;
@@ -20,6 +21,14 @@ pub fn share(text: &str) -> Result<f64, String> {
         Err(_) => quantity::read(text, "").map_err(|e| e.to_string())?,
     };
     if (0.0..1.0).contains(&share) { Ok(share) } else { Err("a share from 0 to below 1 is needed, such as 20%".into()) }
+}
+
+pub fn effort(text: &str) -> Result<f64, String> {
+    let (least, most) = (EFFORTS.start(), EFFORTS.end());
+    match text.parse() {
+        Ok(effort) if EFFORTS.contains(&effort) => Ok(effort),
+        _ => Err(format!("a number from {least} to {most} is needed, such as 4")),
+    }
 }
 
 /// A number in the SI unit, or with a unit of its own.

@@ -96,6 +96,7 @@ fn tuning(args: &Args, case: &Case) -> Tuning {
     tuning.spread = args.spread.or(tuning.spread);
     tuning.corners = args.corners;
     tuning.draws = args.draws.clone();
+    tuning.effort = args.effort;
     tuning
 }
 

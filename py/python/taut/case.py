@@ -250,16 +250,22 @@ class Case:
         corners: bool = False,
         evaluate: bool = False,
         draws: str | PathLike[str] | None = None,
+        effort: float = 1.0,
     ) -> Tuned:
         """Finds gains and filters for the case's controller, judged by moves over a family of machines that can exist.
 
         ``spread`` is by which share parameters may be off (0.1 is 10 %; that of [tune] unless said, 0 for the machine
         of the file alone); with ``corners`` all of them are off at once in the worst directions; ``draws`` is a file of
-        draws from the posterior of a fit, of which the machines are taken instead. With ``evaluate`` nothing is
-        searched for: the gains of the file are judged. Ctrl-C ends it.
+        draws from the posterior of a fit, of which the machines are taken instead. ``effort`` is how many times as
+        long as usual the search may take. With ``evaluate`` nothing is searched for: the gains of the file are judged.
+        Ctrl-C ends it.
         """
         data, case = self._native.tune(
-            _checks.number("spread", spread), bool(corners), bool(evaluate), None if draws is None else _checks.path(draws)
+            _checks.number("spread", spread),
+            bool(corners),
+            bool(evaluate),
+            None if draws is None else _checks.path(draws),
+            _checks.given("effort", effort),
         )
         return Tuned(data, self._of(case))
 

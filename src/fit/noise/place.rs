@@ -13,9 +13,14 @@ use super::filter::innovations;
 use super::series::Series;
 use std::f64::consts::TAU;
 
-/// Fewest waves in the travel: what does not come again there is a law, not a place. Steps of a wave in the travel, and
-/// the most wave numbers.
+/// Fewest waves in the travel: what does not come again there is a law, not a place.
 const FEWEST: f64 = 2.0;
+
+/// How much of the travel is passed forward and backward at least: what is wrong in a law turns with the direction, what
+/// belongs to a place does not, and one way does not tell them apart.
+const BOTH_WAYS: f64 = 0.5;
+
+/// Steps of a wave in the travel, and the most wave numbers.
 const STEP: f64 = 0.5;
 const MOST: usize = 200;
 
@@ -44,11 +49,15 @@ pub(super) fn wave(all: &[Series], amplitudes: &[f64], slow: &[Slow], white: f64
     let (low, high) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
     let travel = high - low;
     // A quarter of the blocks moves faster than this.
-    let mut steps: Vec<f64> =
-        all.iter().flat_map(|series| series.value.windows(2)).map(|v| (v[1] - v[0]).abs()).collect();
-    steps.sort_by(f64::total_cmp);
-    let coarse = *steps.get(steps.len() * 3 / 4)?;
+    let steps = || all.iter().flat_map(|series| series.value.windows(2)).map(|v| v[1] - v[0]);
+    let mut sizes: Vec<f64> = steps().map(f64::abs).collect();
+    sizes.sort_by(f64::total_cmp);
+    let coarse = *sizes.get(sizes.len() * 3 / 4)?;
     if !(travel > 0.0 && coarse > 0.0) {
+        return None;
+    }
+    let way = |sign: f64| steps().map(|step| (sign * step).max(0.0)).sum::<f64>();
+    if way(1.0).min(way(-1.0)) < BOTH_WAYS * travel {
         return None;
     }
     let once = TAU / travel;
