@@ -52,6 +52,9 @@ const TURNS: usize = 3;
 const WAVES: usize = 3;
 const ROUNDED: f64 = 0.5;
 
+/// Share of how far a quantity ranges below which a wave is nothing.
+const NOTHING: f64 = 1e-6;
+
 /// A slow noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Slow {
@@ -408,8 +411,9 @@ impl Estimate {
         let mut amplitudes = DVector::zeros(0);
         while lengths.len() < WAVES {
             let found = place::wave(&self.series, amplitudes.as_slice(), &noise.slow, noise.white);
-            let Some(place::Found { kappa, gain, amplitude, tried }) = found else { break };
-            if gain < place::CLEAR + (tried as f64).ln() || amplitude / self.weight < ROUNDED * self.step {
+            let Some(place::Found { kappa, gain, amplitude, travel, tried }) = found else { break };
+            let least = (ROUNDED * self.step).max(NOTHING * travel);
+            if gain < place::CLEAR + (tried as f64).ln() || amplitude / self.weight < least {
                 break;
             }
             let columns: Vec<_> = self.series.iter().map(|series| place::columns(series, kappa)).collect();

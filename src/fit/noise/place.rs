@@ -36,8 +36,10 @@ pub(super) struct Found {
     pub kappa: f64,
     /// By how much it raises the logarithm of the likelihood at least.
     pub gain: f64,
-    /// Its amplitude, in standard deviations of a value with the greatest weight.
+    /// Its amplitude, in standard deviations of a value with the greatest weight; and how far the quantity ranges, in its
+    /// unit.
     pub amplitude: f64,
+    pub travel: f64,
     /// How many were tried.
     pub tried: usize,
 }
@@ -78,7 +80,7 @@ pub(super) fn wave(all: &[Series], amplitudes: &[f64], slow: &[Slow], white: f64
             step *= 0.5;
         }
     }
-    Some(Found { kappa, gain: most.0 / white, amplitude: most.1, tried: count })
+    Some(Found { kappa, gain: most.0 / white, amplitude: most.1, travel, tried: count })
 }
 
 /// By how much a wave raises the logarithm of the likelihood, times the variance of white noise; and its amplitude.

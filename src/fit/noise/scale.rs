@@ -23,6 +23,9 @@ const FEWEST: usize = 12;
 /// Share of the greatest speed below which a block is at rest.
 const REST: f64 = 0.01;
 
+/// The least size of a class, in that of all.
+const LEAST: f64 = 0.01;
+
 /// By so much classes have to raise the logarithm of the likelihood.
 const CLEAR: f64 = 3.0;
 
@@ -42,6 +45,8 @@ pub(super) fn scales(all: &[Series], slow: &[Slow]) -> Option<Vec<Vec<f64>>> {
             sums[class] += square;
             counts[class] += 1.0;
         }
+        // What is exact at rest is not infinitely so.
+        sums.iter_mut().zip(counts).for_each(|(sum, count)| *sum = sum.max(LEAST * LEAST * mean * count));
         let there = (0..CLASSES).filter(|&k| counts[k] > 0.0);
         let gain: f64 = there.clone().map(|k| 0.5 * counts[k] * (mean * counts[k] / sums[k]).ln()).sum();
         let sizes: [f64; CLASSES] = std::array::from_fn(|k| (sums[k] / (counts[k] * mean)).sqrt());
