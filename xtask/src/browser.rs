@@ -140,9 +140,16 @@ pub fn install(packages: &[&str]) {
     if path_of("apt-get").is_none() || !is_root() {
         return;
     }
-    let mut command = Command::new("apt-get");
-    command.args(["install", "--yes", "--quiet", "--no-install-recommends"]).args(packages);
-    let _ = command.env("DEBIAN_FRONTEND", "noninteractive").stdout(Stdio::null()).status();
+    let did = |words: &[&str]| {
+        let mut command = Command::new("apt-get");
+        command.args(words).env("DEBIAN_FRONTEND", "noninteractive").stdout(Stdio::null());
+        command.status().is_ok_and(|status| status.success())
+    };
+    let install = [&["install", "--yes", "--quiet", "--no-install-recommends"], packages].concat();
+    // Lists that are older than what they list name packages that cannot be had together any more.
+    if !did(&install) && did(&["update", "--quiet"]) {
+        did(&install);
+    }
 }
 
 fn is_root() -> bool {
