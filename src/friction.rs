@@ -1,9 +1,7 @@
 //! The friction laws: what resists a body that slides, and how much a body at rest can hold.
 
-mod along;
 mod law;
 
-pub use along::Along;
 pub use law::{Law, Shape, decay_of_velocity, velocity_of_decay};
 
 /// Friction with breakaway, each side of zero speed with its own values, and the law that joins them.

@@ -82,6 +82,7 @@ pub mod number;
 pub mod nuts;
 pub mod overview;
 pub mod parameter;
+pub mod polyline;
 pub mod quantity;
 pub mod reduction;
 pub mod signal;

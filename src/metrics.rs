@@ -498,7 +498,7 @@ pub enum Balance {
     At(f64),
     /// At none: nothing limits the speed (a commanded current, and no viscous friction).
     Never,
-    /// At no single one: friction or the belt changes along the travel.
+    /// At no single one: friction, the belt or a force changes along the travel, or a force with the speed.
     Changing,
 }
 
@@ -518,7 +518,7 @@ impl Balance {
 /// Everything slides in the direction of the input, by its friction law, and limits of voltage and current hold. Where
 /// a law's curve lets the forces balance at several speeds, it is the one that the axis comes to from `near`, m/s.
 pub fn balanced_speed(stage: &Stage, input: f64, near: f64) -> Balance {
-    if stage.cart.along.is_some() || stage.belt.follows_cart {
+    if stage.changes_along_travel() || stage.cart.forces.by_speed.is_some() {
         return Balance::Changing;
     }
     let (motor, amplifier) = (&stage.motor, &stage.amplifier);

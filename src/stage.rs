@@ -5,8 +5,9 @@ pub mod gantry;
 mod sheet;
 mod swing;
 
-use crate::friction::{Along, Friction};
+use crate::friction::Friction;
 pub use crate::mechanism::{Amplifier, AmplifierMode, GearPlay, Motor};
+use crate::polyline::Polyline;
 pub use sheet::{BELTS, BeltSheet, BeltType, Rating, SimpleDrive, Width};
 use std::f64::consts::PI;
 pub use swing::slowest_swing;
@@ -45,6 +46,11 @@ impl Stage {
         laws.iter().all(Friction::is_piecewise_linear) && self.cart.along.is_none() && !follows
     }
 
+    /// Whether it is another machine elsewhere along its travel, but for the ends.
+    pub fn changes_along_travel(&self) -> bool {
+        self.cart.along.is_some() || self.cart.forces.along.is_some() || self.belt.follows_cart
+    }
+
     /// The first part of it that the paper's equations do not have, in words.
     pub fn beyond_the_paper(&self) -> Option<&'static str> {
         let amplifier = &self.amplifier;
@@ -56,6 +62,7 @@ impl Stage {
             (self.belt.pretension.is_some(), "spans that go slack"),
             (self.belt.model != BeltModel::Elastic, "a reduced model of the belt"),
             (self.cart.constant_force() != 0.0, "a constant force on the cart"),
+            (self.cart.forces != CartForces::default(), "a force on the cart that changes"),
             (self.travel.is_some(), "the ends of the travel"),
         ];
         parts.into_iter().find(|(there, _)| *there).map(|(_, words)| words)
@@ -79,12 +86,24 @@ pub struct Cart {
     /// Friction force, N over m/s.
     pub friction: Friction,
     /// How its dry friction changes along the travel, if it does.
-    pub along: Option<Along>,
+    pub along: Option<Polyline>,
+    /// Forces on the cart that change along the travel or with its speed, if any.
+    pub forces: CartForces,
     /// A constant force on the cart F_L, N, positive towards larger x: what a hanging mass or a spring of constant
     /// force pulls.
     pub load: f64,
     /// Inclination of the axis, rad: positive if the cart climbs towards larger x.
     pub inclination: f64,
+}
+
+/// Forces on the cart that are the same in both directions of motion, N over m and over m/s, positive towards larger x:
+/// what a cable chain, magnets, a tilted rail or a fan do, and what a model leaves.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct CartForces {
+    /// Over the cart's position.
+    pub along: Option<Polyline>,
+    /// Over its speed.
+    pub by_speed: Option<Polyline>,
 }
 
 /// Standard acceleration of gravity, m/s² (CGPM 1901).
@@ -93,7 +112,7 @@ pub const GRAVITY: f64 = 9.80665;
 impl Cart {
     /// A cart on a level axis with nothing pulling at it.
     pub fn new(mass: f64, friction: Friction) -> Self {
-        Self { mass, friction, along: None, load: 0.0, inclination: 0.0 }
+        Self { mass, friction, along: None, forces: CartForces::default(), load: 0.0, inclination: 0.0 }
     }
 
     /// The constant force on the cart, N: F_L − M g sin θ.

@@ -135,7 +135,7 @@ fn mistakes_in_a_set_value_say_so() {
     );
     assert_eq!(
         shown("cart.mas=1 kg"),
-        "--set:1:10: `cart` has no key `mas`\n  1 | cart.mas=1 kg\n    |          ^^^^\n  allowed: mass, load, inclination, friction\n  next: did you mean `mass`?"
+        "--set:1:10: `cart` has no key `mas`\n  1 | cart.mas=1 kg\n    |          ^^^^\n  allowed: mass, load, inclination, friction, force_along, force_by_speed\n  next: did you mean `mass`?"
     );
     assert_eq!(
         shown("cart.mass"),

@@ -11,7 +11,8 @@ use ivp::solout::{ControlFlag, SolOut};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
-use taut::friction::{Along, Friction, Law, Side};
+use taut::friction::{Friction, Law, Side};
+use taut::polyline::Polyline;
 use taut::signal::Signal;
 use taut::solve::{Ending, Solution, Solver, simulate};
 use taut::stage::{BeltMake, Stage, Travel};
@@ -69,7 +70,7 @@ impl FirstOrderSystem for Problem {
         let laws = [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction];
         let inertia = [stage.drive_pulley.inertia, stage.cart.mass, stage.idler_pulley.inertia];
         for body in 0..3 {
-            let factor = stage.cart.along.as_ref().filter(|_| body == 1).map_or(1.0, |along| along.factor(x));
+            let factor = stage.cart.along.as_ref().filter(|_| body == 1).map_or(1.0, |along| along.value(x));
             let (friction, bristle) = Self::friction(&laws[body], factor, y[2 * body + 1], y[6 + body]);
             rate[2 * body] = y[2 * body + 1];
             rate[2 * body + 1] = (loads[body] - friction) / inertia[body];
@@ -129,7 +130,7 @@ fn problem() -> impl Strategy<Value = Problem> {
             stage.travel = Some(Travel { min: -0.25, max: 0.25, stop: None });
         }
         if belt.1 {
-            stage.cart.along = Along::new(vec![[-0.2, 1.4], [-0.01, 1.0], [0.03, 1.6], [0.2, 0.7]]);
+            stage.cart.along = Polyline::new(vec![[-0.2, 1.4], [-0.01, 1.0], [0.03, 1.6], [0.2, 0.7]]);
         }
         Problem { stage, sine }
     })

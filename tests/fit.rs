@@ -376,6 +376,40 @@ fn friction_that_changes_along_the_travel_is_found_again() {
     }
 }
 
+/// What keeps its sign with the direction is a force of its own, over the travel or over the speed, found from nothing.
+#[test]
+fn forces_that_are_lines_are_found_again() {
+    let line = |key: &str, over: [f64; 3], forces: [f64; 3]| {
+        let [[a, b, c], [x, y, z]] = [over, forces];
+        format!("cart.{key}=[[{a}, {x}], [{b}, {y}], [{c}, {z}]]")
+    };
+    let truth = [0.5, -1.0, 0.8];
+    for (key, over) in [("force_along", [0.0, 0.03, 0.06]), ("force_by_speed", [0.05, 0.15, 0.3])] {
+        let made = recorded(&[&line(key, over, truth)], 1, 1e-3);
+        let mut case = Case::from_text_with("axis.toml", TEMPLATE, &[&line(key, over, [0.0; 3])]).unwrap();
+        for (own, other) in case.experiments.iter_mut().zip(made.experiments) {
+            own.log = other.log;
+        }
+        let keys: Vec<String> = (0..3).map(|point| format!("cart.{key}.{point}.force")).collect();
+        let mut keys: Vec<&str> = keys.iter().map(String::as_str).collect();
+        keys.push("cart.mass");
+        let found = fit(&case, &plan(&keys), None, &mut |_| Flow::Continue).unwrap();
+        assert_eq!(found.ending, Ending::Converged, "{key}");
+        for (estimate, truth) in found.estimates.iter().zip(truth.into_iter().chain([0.362])) {
+            let (value, error) = (estimate.value, estimate.error.unwrap());
+            assert!((value - truth).abs() < 4.0 * error, "{}: {value} ± {error}, is {truth}", estimate.name);
+            assert!(error < 0.2 * truth.abs(), "{}: ± {error}", estimate.name);
+        }
+        // What is written is the machine that was found.
+        let text = found.case_text(&case, "axis.toml".as_ref()).unwrap();
+        let again = Case::from_text("fitted.toml", &text).unwrap().stage.cart.forces;
+        let written = again.along.or(again.by_speed).unwrap();
+        for (point, estimate) in written.points().iter().zip(&found.estimates) {
+            assert!((point[1] - estimate.value).abs() < 1e-9, "{text}");
+        }
+    }
+}
+
 #[test]
 fn the_profile_of_what_is_well_known_is_that_of_a_linear_model() {
     let case = recorded(&[], 1, 1e-3);

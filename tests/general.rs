@@ -4,7 +4,8 @@ use crate::common;
 use common::random::{self, Dry};
 use proptest::prelude::*;
 use taut::case::{Experiment, Initial};
-use taut::friction::{Along, Friction, Law, Shape};
+use taut::friction::{Friction, Law, Shape};
+use taut::polyline::Polyline;
 use taut::signal::Signal;
 use taut::solve::{Ending, Solution, Solver, simulate};
 use taut::stage::{BeltMake, Stage, Travel};
@@ -56,7 +57,7 @@ proptest! {
     /// Where both solvers apply they agree.
     #[test]
     fn general_is_exact(
-        stage in prop_oneof![random::stage(Dry::Any).boxed(), random::equipped(Dry::Any).boxed()],
+        stage in prop_oneof![random::stage(Dry::Any).boxed(), random::lined(Dry::Any).boxed()],
         input in random::input()
     ) {
         // Flanks and spans that rattle undamped are chaotic.
@@ -114,7 +115,7 @@ fn pulse() -> Signal {
 fn power_is_balanced_under_every_law() {
     for law in LAWS {
         for mut stage in [stage_of(law), following(law)] {
-            stage.cart.along = Along::new(vec![[0.0, 1.0], [0.05, 1.5], [0.1, 0.8]]);
+            stage.cart.along = Polyline::new(vec![[0.0, 1.0], [0.05, 1.5], [0.1, 0.8]]);
             let every = 1e-5;
             let solution = run(&stage, &experiment(&pulse(), 0.4, every), Solver::General { tolerance: 1e-12 });
             let column = |name: &str| solution.trajectory.get(name).unwrap();
@@ -298,7 +299,7 @@ fn every_law_converges() {
 fn a_factor_along_the_travel_is_coulomb_friction_times_it() {
     let mut stage = common::table4();
     let twice = experiment(&pulse(), 0.5, 1e-3);
-    stage.cart.along = Along::new(vec![[0.0, 2.0], [0.1, 2.0]]);
+    stage.cart.along = Polyline::new(vec![[0.0, 2.0], [0.1, 2.0]]);
     let along = run(&stage, &twice, Solver::GENERAL);
     stage.cart = taut::stage::Cart { friction: Friction::symmetric(19.0424, 0.4), along: None, ..stage.cart };
     let exact = run(&stage, &twice, Solver::Exact);

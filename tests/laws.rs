@@ -118,7 +118,7 @@ proptest! {
     /// The same balance at every row with limits, backlash, slack spans and end stops; limits hold to the last bit, and
     /// what is slack or apart carries nothing.
     #[test]
-    fn every_element_keeps_the_balance(stage in random::equipped(Dry::Any), input in random::input()) {
+    fn every_element_keeps_the_balance(stage in random::lined(Dry::Any), input in random::input()) {
         let mechanism = stage.mechanism();
         let solution = run(&stage, &input, 0.2, 1e-3);
         let trajectory = &solution.trajectory;
@@ -192,7 +192,7 @@ proptest! {
     /// u → −u turns the motion around, bit for bit.
     #[test]
     fn the_mirror_image_moves_as_the_image(
-        stage in prop_oneof![random::stage(Dry::Symmetric).boxed(), random::equipped(Dry::Symmetric).boxed()],
+        stage in prop_oneof![random::stage(Dry::Symmetric).boxed(), random::lined(Dry::Symmetric).boxed()],
         input in random::input()
     ) {
         let there = run(&stage, &input, 0.3, 1e-3);
@@ -214,7 +214,7 @@ proptest! {
     /// `authorities.rs`.)
     #[test]
     fn the_output_interval_changes_nothing(
-        stage in prop_oneof![random::stage(Dry::Any).boxed(), random::equipped(Dry::Any).boxed()],
+        stage in prop_oneof![random::stage(Dry::Any).boxed(), random::lined(Dry::Any).boxed()],
         input in random::input()
     ) {
         // Flanks and spans that rattle undamped are chaotic: an error of the last bit grows tenfold every few impacts.

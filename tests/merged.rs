@@ -10,8 +10,9 @@ use crate::common;
 use common::random;
 use proptest::prelude::*;
 use taut::case::{Case, Experiment, Initial};
-use taut::friction::{Along, Friction, Law, Shape, Side};
+use taut::friction::{Friction, Law, Shape, Side};
 use taut::linear::{Operation, StateSpace};
+use taut::polyline::Polyline;
 use taut::signal::Signal;
 use taut::solve::{Ending, Solution, Solver, simulate};
 use taut::stage::{BeltModel, Stage};
@@ -78,12 +79,12 @@ fn apart(a: &Solution, b: &Solution, name: &str) -> f64 {
 struct Member {
     friction: Friction,
     ratio: f64,
-    along: Option<Along>,
+    along: Option<Polyline>,
 }
 
 impl Member {
     fn factor(&self, way: f64) -> f64 {
-        self.along.as_ref().map_or(1.0, |along| along.factor(way))
+        self.along.as_ref().map_or(1.0, |along| along.value(way))
     }
 
     fn never_sticks(&self) -> bool {
@@ -372,7 +373,7 @@ fn merged() -> impl Strategy<Value = Stage> {
             (stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction) = (drive, cart, idler);
             stage.cart.mass = mass;
             stage.belt.model = if rigid { BeltModel::Rigid } else { BeltModel::TwoMass };
-            stage.cart.along = along.and_then(|(a, b)| Along::new(vec![[-0.02, a], [0.0, 1.0], [0.03, b]]));
+            stage.cart.along = along.and_then(|(a, b)| Polyline::new(vec![[-0.02, a], [0.0, 1.0], [0.03, b]]));
             stage.motor.gear_efficiency = gear;
             stage
         },
@@ -403,7 +404,7 @@ proptest! {
         image.cart.friction = turned(stage.cart.friction);
         image.idler_pulley.friction = turned(stage.idler_pulley.friction);
         image.cart.along = stage.cart.along.as_ref().and_then(|along| {
-            Along::new(along.points().iter().rev().map(|[x, factor]| [-x, *factor]).collect())
+            Polyline::new(along.points().iter().rev().map(|[x, factor]| [-x, *factor]).collect())
         });
         let Signal::Square { amplitude, frequency, .. } = input else { panic!() };
         let opposite = wave(-amplitude, frequency);

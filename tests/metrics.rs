@@ -5,8 +5,9 @@ use common::random::{self, Dry};
 use common::{experiment, table1, table4};
 use proptest::prelude::*;
 use taut::case::Experiment;
-use taut::friction::{Along, Friction, Law, Shape};
+use taut::friction::{Friction, Law, Shape};
 use taut::metrics::{Balance, Meter, Metrics, Peak, balanced_speed, largest};
+use taut::polyline::Polyline;
 use taut::signal::{Signal, Slot};
 use taut::solve::{Ending, Flow, Method, Solution, Solver, stream_observed};
 use taut::stage::{AmplifierMode, GearPlay, Stage};
@@ -244,7 +245,7 @@ fn where_a_curve_has_several_balances_the_one_nearby_counts() {
         (0.023 * (1.5 - 0.023 * v / 0.0194) / 0.71, 0.03 + 0.0032 * v / 0.0194 + 0.0194 * (0.2 + 5.0 * v));
     assert!(v > 0.04 && (drive - load).abs() < 1e-9, "{v}: {drive} and {load}");
 
-    stage.cart.along = Along::new(vec![[0.0, 1.0], [0.1, 2.0]]);
+    stage.cart.along = Polyline::new(vec![[0.0, 1.0], [0.1, 2.0]]);
     assert_eq!(balanced_speed(&stage, 1.5, 0.0), Balance::Changing);
 }
 

@@ -39,6 +39,8 @@ mass = 4
 load = 2
 inclination = 0.125
 friction = { CART, along = [[-1, 1], [0.5, 2], [4, 1]] }
+force_along = [[-1, 0.5], [0.5, -2], [4, 1]]
+force_by_speed = [[-1, 0.25], [2, -0.5]]
 [belt]
 stiffness = [1024, 1024, 512]
 damping = [1, 2, 4]
@@ -254,7 +256,7 @@ fn keys_that_cannot_be_free_say_what_can() {
     );
     for (stage, key, part) in [
         (&plain, "belt.modulus", "allowed: belt.stiffness.0, belt.stiffness.1, belt.stiffness.2, belt.damping.0"),
-        (&plain, "cart.friction.along.1.factor", "has no value in this case"),
+        (&plain, "cart.friction.along.1.factor", "give along to start from"),
         (&plain, "drive_pulley.teeth", "next: name `drive_pulley.radius` instead"),
         (&plain, "controller.every", "is no number of the machine"),
         (&plain, "cart.friction", "is no parameter of the machine"),
@@ -267,6 +269,9 @@ fn keys_that_cannot_be_free_say_what_can() {
             "cart.friction.along.3.factor",
             "allowed: cart.friction.along.0.factor to cart.friction.along.2.factor",
         ),
+        (&plain, "cart.force_along.1.force", "give force_along to start from"),
+        (&plain, "cart.force_by_speed.force", "give force_by_speed to start from"),
+        (&whole, "cart.force_by_speed.2.force", "allowed: cart.force_by_speed.0.force to cart.force_by_speed.1.force"),
         (&whole, "cart.friction.along.factor.1", "allowed: cart.friction.along.0.factor to"),
         (&whole, "drive_pulley.friction.static", "next: it follows from coulomb and stribeck.force: name one of these"),
         (&whole, "motor.gear_efficiency", "next: a compliant gear has none: name gear_damping"),

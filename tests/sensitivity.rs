@@ -1,7 +1,7 @@
 //! Exact sensitivities against differences of runs, on random stages with every element.
 
 use crate::common;
-use crate::common::random::{Dry, cases, equipped};
+use crate::common::random::{Dry, cases, lined};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
@@ -145,7 +145,7 @@ fn setup(dry: Dry) -> impl Strategy<Value = Setup> {
     let sample = (2e-3..2e-2_f64, -12.0..12.0_f64);
     let start = prop_oneof![2 => Just((0.0, 0.0)), 1 => (-0.5..0.5_f64, -0.02..0.02_f64)];
     let hold = prop_oneof![2 => Just(Hold::Zero), 1 => Just(Hold::Linear)];
-    (equipped(dry), prop::collection::vec(sample, 6..30), hold, 1e-5..3e-3_f64, start).prop_map(
+    (lined(dry), prop::collection::vec(sample, 6..30), hold, 1e-5..3e-3_f64, start).prop_map(
         |(stage, samples, hold, delay, (speed, position))| {
             let (mut time, mut times, mut values) = (0.0, Vec::new(), Vec::new());
             for (wait, value) in samples {

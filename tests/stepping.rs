@@ -121,19 +121,30 @@ proptest! {
     }
 }
 
-/// The template's stage, in lengths: within 1e-12 m of one go.
+/// The template's stage, in lengths: within 1e-12 m of one go; with forces that are lines, too, whose pieces a copy and
+/// what is saved remember.
 #[test]
 fn a_thousand_patterns_of_steps_end_within_a_picometre() {
     let case = taut::case::Case::from_text("axis.toml", taut::case::TEMPLATE).unwrap();
-    let stage = &case.stage;
+    let lines = [
+        "cart.force_along=[[-0.01, 0.5], [0.0, 0.0], [0.005, -1.0], [0.02, 0.4]]",
+        "cart.force_by_speed=[[-0.2, 0.4], [-0.05, 0.0], [0.1, -0.6], [0.2, 0.1]]",
+    ];
+    let lined = taut::case::Case::from_text_with("axis.toml", taut::case::TEMPLATE, &lines).unwrap();
     let input = Signal::Square { amplitude: 8.0, frequency: 13.0, duty: 0.4 };
-    let (last, events) = in_one_go(stage, &input, Solver::Exact);
+    for stage in [&case.stage, &lined.stage] {
+        steps_end_where_one_go_does(stage, &input);
+    }
+}
+
+fn steps_end_where_one_go_does(stage: &Stage, input: &Signal) {
+    let (last, events) = in_one_go(stage, input, Solver::Exact);
     assert!(events.len() > 10);
     let mut runner = proptest::test_runner::TestRunner::new(random::cases(1000));
     runner
         .run(&(shares(), any::<bool>()), |(shares, copies)| {
             let machine = Machine::new(stage, Solver::Exact).unwrap();
-            let (machine, stepped) = stepped(machine, std::slice::from_ref(&input), UNTIL, &shares, copies);
+            let (machine, stepped) = stepped(machine, std::slice::from_ref(input), UNTIL, &shares, copies);
             same(&stepped, &events, 1e-11)?;
             let at = |name: &str| last.iter().find(|(column, _)| column == name).unwrap().1;
             let state = machine.state();

@@ -35,13 +35,15 @@ pub enum Kind {
     Slack,
     /// Ends of the travel.
     Travel,
+    /// Forces on the cart that are lines.
+    Lines,
     /// A start beyond 1 m from the origin.
     Far,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Kind; 13] = [
+    pub const ALL: [Kind; 14] = [
         Kind::Wide,
         Kind::Symmetric,
         Kind::Reduced,
@@ -54,6 +56,7 @@ impl Kind {
         Kind::Play,
         Kind::Slack,
         Kind::Travel,
+        Kind::Lines,
         Kind::Far,
     ];
 
@@ -72,6 +75,7 @@ impl Kind {
             Kind::Play => "gear that gives way, backlash",
             Kind::Slack => "spans that go slack",
             Kind::Travel => "end stops and ends of the travel",
+            Kind::Lines => "forces along the travel and by speed",
             Kind::Far => "starts 1 m to 1 km from the origin",
         }
     }
@@ -86,12 +90,16 @@ pub struct Drawn {
     pub kinds: Vec<Kind>,
 }
 
+/// What makes the seed of lines, which are drawn by themselves.
+const LINES: u64 = 0x6c69_6e65;
+
 /// The stage of this number.
 pub fn stage(seed: u64, number: u64) -> Drawn {
     let mut draw = Draw::new(seed, number);
+    let lines = Random::new(seed ^ LINES, number);
     let title = format!("seed {seed}, stage {number}");
     let sizes = draw.sizes();
-    draw.machine(title, sizes)
+    draw.machine(title, sizes, lines)
 }
 
 /// Inertias as masses at the belt, stiffnesses and what follows from them.
@@ -215,12 +223,13 @@ impl Draw {
         Sizes { radius: self.decades(2e-3, 0.3), mass, stiffness, damping, model, symmetric, time, way, force }
     }
 
-    fn machine(mut self, title: String, sizes: Sizes) -> Drawn {
+    fn machine(mut self, title: String, sizes: Sizes, lines: Random) -> Drawn {
         let _ = writeln!(self.text, "title = \"{title}\"");
         let scale = self.motor(&sizes);
         self.bodies(&sizes);
         self.belt(&sizes);
         let start = self.place();
+        self.lines(&sizes, start, lines);
         self.travel(&sizes, start);
         self.experiment(&sizes, start, &scale);
         self.kinds.sort();

@@ -53,6 +53,8 @@ pub struct Mode {
     pub gear: Touch,
     /// End stops.
     pub stop: Touch,
+    /// Points passed of the forces over the cart's way and over its speed.
+    pub passed: [usize; 2],
     /// Voltage limit.
     pub voltage: Limit,
     /// Current limit.
@@ -74,6 +76,8 @@ pub enum Change {
     Gear(Touch),
     /// End stops.
     Stop(Touch),
+    /// As many points of a force are passed.
+    Passed(usize, usize),
     /// The cart leaves its travel.
     Leave,
     /// A sliding body comes to rest.
@@ -158,7 +162,8 @@ impl Builder<'_> {
         }
         let [f1, f2, f3] = self.spans();
         let stop = self.stop_force();
-        let belt = [f3 - f1, f1 - f2 + Form::constant(machine.force) - stop, f2 - f3];
+        let lines = self.line_force(0, way(1)) + self.line_force(1, speed(1));
+        let belt = [f3 - f1, f1 - f2 + Form::constant(machine.force) + lines - stop, f2 - f3];
         for leader in (0..3).filter(|&body| machine.leader(body) == body) {
             let load = machine.followers(leader).fold(Form::default(), |sum, body| sum + belt[body]);
             let own = self.body(leader, load, motor, gear);
@@ -294,6 +299,24 @@ impl Builder<'_> {
                 Form::default()
             }
             Some(Ends::Stops(flanks)) => self.flanks(way(1), speed(1), &flanks, self.mode.stop, Change::Stop),
+        }
+    }
+
+    /// A force over x: between points (x₀, y₀) and (x₁, y₁) it is y₀ + (x − x₀) (y₁ − y₀)/(x₁ − x₀).
+    fn line_force(&mut self, which: usize, x: Form) -> Form {
+        let Some(line) = &self.machine.lines[which] else { return Form::default() };
+        let passed = self.mode.passed[which];
+        let (before, after) = (passed.checked_sub(1).map(|k| line.points[k]), line.points.get(passed).copied());
+        if let Some([end, _]) = after {
+            self.watch(Form::constant(end) - x, Change::Passed(which, passed + 1));
+        }
+        if let Some([begin, _]) = before {
+            self.watch(x - Form::constant(begin), Change::Passed(which, passed - 1));
+        }
+        match (before, after) {
+            (Some([x0, y0]), Some([x1, y1])) => (x - Form::constant(x0)) * ((y1 - y0) / (x1 - x0)) + Form::constant(y0),
+            (Some([_, y]), None) | (None, Some([_, y])) => Form::constant(y),
+            (None, None) => Form::default(),
         }
     }
 

@@ -65,6 +65,13 @@ pub enum Ends {
     Stops(Flanks),
 }
 
+/// A force on the cart by straight lines between points, the first and the last value held beyond them.
+#[derive(Debug, Clone)]
+pub struct Line {
+    /// Way from the start or speed, and force.
+    pub points: Vec<[Double; 2]>,
+}
+
 /// The machine and its start.
 #[derive(Debug, Clone)]
 pub struct Machine {
@@ -82,6 +89,8 @@ pub struct Machine {
     pub pretension: Option<Double>,
     /// Constant force on the cart.
     pub force: Double,
+    /// Forces on the cart over its way and over its speed.
+    pub lines: [Option<Line>; 2],
     /// Ends of the travel.
     pub ends: Option<Ends>,
     /// Force at the belt per ampere, before the gear's losses.
@@ -140,6 +149,8 @@ impl Machine {
         let force = taken(stage.cart.load) - mass[1] * slope * GRAVITY;
         let origin = Double::from(experiment.initial.cart_position);
         let (play, ends) = (play(stage, taken, r), ends(stage, taken, origin));
+        let forces = &stage.cart.forces;
+        let lines = [line(forces.along.as_ref(), taken, origin), line(forces.by_speed.as_ref(), taken, Double::ZERO)];
         let amplifier = &stage.amplifier;
         Self {
             model: stage.belt.model,
@@ -149,6 +160,7 @@ impl Machine {
             belt: [k, c],
             pretension: stage.belt.pretension.map(&mut *taken),
             force,
+            lines,
             ends,
             grip: n * taken(motor.torque_constant) / r,
             back_emf: n * taken(motor.back_emf_constant) / r,
@@ -213,6 +225,12 @@ impl Machine {
     pub fn current_moves(&self) -> bool {
         if self.current_mode { self.bandwidth.is_some() } else { self.inductance > Double::ZERO }
     }
+}
+
+/// A line, over what is left of x without `origin`.
+fn line(line: Option<&taut::polyline::Polyline>, taken: Taken, origin: Double) -> Option<Line> {
+    let point = |&[x, force]: &[f64; 2]| [(Double::from(x) - origin) * taken(1.0), taken(force)];
+    Some(Line { points: line?.points().iter().map(point).collect() })
 }
 
 /// The gear, where it is compliant.

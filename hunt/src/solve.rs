@@ -138,6 +138,7 @@ impl<'a, 'b> Solver<'a, 'b> {
             slack: [false; 3],
             gear: Touch::Apart,
             stop: Touch::Apart,
+            passed: [0; 2],
             voltage: Limit::Within,
             current: Limit::Within,
         };
@@ -372,6 +373,7 @@ impl<'a, 'b> Solver<'a, 'b> {
             Change::Span(j, slack) => mode.slack[j] = slack,
             Change::Gear(touch) => mode.gear = touch,
             Change::Stop(touch) => mode.stop = touch,
+            Change::Passed(which, points) => mode.passed[which] = points,
             Change::Leave => self.ending = Ending::LeftTravel(self.time.high),
             Change::Rest(leader) => {
                 for body in self.machine.followers(leader) {

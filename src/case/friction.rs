@@ -1,8 +1,9 @@
 //! The friction of a body: viscous, Coulomb, breakaway, and the law that joins them.
 
-use super::reader::Table;
+use super::reader::{Field, Table};
 use crate::error::Result;
-use crate::friction::{Along, Friction, Law, Shape, Side, velocity_of_decay};
+use crate::friction::{Friction, Law, Shape, Side, velocity_of_decay};
+use crate::polyline::{MOST_POINTS, Polyline};
 use crate::quantity::show;
 
 /// Laws other than the paper's, by their keys; at most one of them.
@@ -109,23 +110,32 @@ fn stribeck(table: &Table, law: &Table, friction: Friction) -> Result<Friction> 
 }
 
 /// How the cart's friction changes along its travel.
-pub(super) fn along(cart: &Table) -> Result<Option<Along>> {
+pub(super) fn along(cart: &Table) -> Result<Option<Polyline>> {
     let Some(friction) = cart.optional("friction") else { return Ok(None) };
-    let Some(field) = friction.table()?.optional("along") else { return Ok(None) };
+    friction.table()?.optional("along").map(|field| line(&field, ["position", "factor"])).transpose()
+}
+
+/// A line through the points of a list, two numbers each.
+pub(super) fn line(field: &Field, [over, value]: [&str; 2]) -> Result<Polyline> {
     let mut points: Vec<[f64; 2]> = Vec::new();
     for point in field.filled_list()? {
         let pair = point.list()?;
-        let [x, factor] = &pair[..] else {
+        let [x, y] = &pair[..] else {
             return Err(point
                 .fail(format!("the point has {} values", pair.len()))
-                .allowed("two values: [position, factor]"));
+                .allowed(format!("two values: [{over}, {value}]")));
         };
         let named = |key: &str| format!("{}.{key}", field.section);
-        let next = [x.clone().named(named("position")).number()?, factor.clone().named(named("factor")).number()?];
+        let next = [x.clone().named(named(over)).number()?, y.clone().named(named(value)).number()?];
         if points.last().is_some_and(|last| next[0] <= last[0]) {
-            return Err(x.fail("the positions do not grow").allowed("above the one before"));
+            return Err(x.fail(format!("the {over}s do not grow")).allowed("above the one before"));
         }
         points.push(next);
     }
-    Ok(Along::new(points))
+    if points.len() > MOST_POINTS {
+        return Err(field
+            .fail(format!("the line has {} points", points.len()))
+            .allowed(format!("up to {MOST_POINTS}")));
+    }
+    Polyline::new(points).ok_or_else(|| field.fail("this is no line").allowed("at least one point"))
 }

@@ -1,6 +1,6 @@
 //! The machine's tables: motor, amplifier, pulleys, belt, cart, encoder.
 
-use super::friction::{along, friction};
+use super::friction::{along, friction, line};
 use super::reader::{Field, Table};
 use super::sheet;
 use crate::error::Result;
@@ -42,6 +42,10 @@ pub(super) fn stage(root: &Table) -> Result<Stage> {
             mass: cart.number("mass")?,
             friction: friction(&cart)?,
             along: along(&cart)?,
+            forces: CartForces {
+                along: cart.optional("force_along").map(|field| line(&field, ["position", "force"])).transpose()?,
+                by_speed: cart.optional("force_by_speed").map(|field| line(&field, ["speed", "force"])).transpose()?,
+            },
             load: cart.number("load")?,
             inclination: cart.number("inclination")?,
         },

@@ -103,7 +103,7 @@ impl Packed {
                     }
                 }
                 ElementKind::Voltage(_) => 2,
-                ElementKind::Span(_) | ElementKind::Gap(_) => 4,
+                ElementKind::Span(_) | ElementKind::Gap(_) | ElementKind::Line(_) => 4,
             };
             self.elements.push([element.states.len() as i64, kind, at_rest[index] as i64]);
         }

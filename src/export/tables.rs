@@ -41,6 +41,8 @@ pub enum ElementKind {
     Span(usize),
     /// A spring that only pushes.
     Gap(usize),
+    /// A spring whose force is a line.
+    Line(usize),
 }
 
 /// A thing that a part does.
@@ -56,6 +58,8 @@ pub enum Does {
     Slack(bool),
     /// Of flanks and end stops.
     Touches(Contact),
+    /// Of a line: which piece of it holds.
+    Follows(u8),
 }
 
 impl Does {
@@ -70,6 +74,7 @@ impl Does {
             Does::Touches(Contact::LowLoose) => "negative side, loose",
             Does::Touches(Contact::HighLoose) => "positive side, loose",
             Does::Touches(contact) => Status::Contact(contact).word(),
+            Does::Follows(piece) => Status::Piece(piece).word(),
         }
     }
 }
@@ -260,6 +265,7 @@ impl Tables {
             Does::Limits(limit) => Status::Limit(limit).code(),
             Does::Slack(slack) => Status::Slack(slack).code(),
             Does::Touches(contact) => Status::Contact(contact).code(),
+            Does::Follows(piece) => Status::Piece(piece).code(),
         }
     }
 
@@ -313,6 +319,7 @@ impl ElementKind {
             ElementKind::Current(drive) => Does::Limits(mode.drive[drive].current),
             ElementKind::Span(spring) => Does::Slack(mode.slack[spring]),
             ElementKind::Gap(spring) => Does::Touches(mode.contact[spring]),
+            ElementKind::Line(spring) => Does::Follows(mode.piece[spring]),
         }
     }
 
@@ -336,6 +343,7 @@ impl ElementKind {
             ElementKind::Current(drive) => Some(What::Current(drive)),
             ElementKind::Span(spring) => Some(What::Span(spring)),
             ElementKind::Gap(spring) => Some(What::Gap(spring)),
+            ElementKind::Line(spring) => Some(What::Line(spring)),
         }
     }
 }
@@ -356,6 +364,7 @@ impl Element {
             Cause::GearTorque(_) => return Then::Become(1 - state),
             Cause::Switch(Switch::Span(_, slack)) => Does::Slack(slack),
             Cause::Switch(Switch::Gap(_, contact)) => Does::Touches(contact),
+            Cause::Switch(Switch::Line(_, piece)) => Does::Follows(piece),
             Cause::Switch(Switch::Voltage(_, limit) | Switch::Current(_, limit)) => Does::Limits(limit),
         };
         Then::Become(self.code(to))
@@ -385,7 +394,7 @@ fn elements(mechanism: &Mechanism) -> Vec<Element> {
         }
     }
     for (index, spring) in mechanism.springs.iter().enumerate() {
-        match spring.law {
+        match &spring.law {
             SpringLaw::Tension { .. } => {
                 add(ElementKind::Span(index), spring.label.key, &[false, true].map(Does::Slack));
             }
@@ -396,6 +405,10 @@ fn elements(mechanism: &Mechanism) -> Vec<Element> {
             SpringLaw::Gap { .. } => {
                 let sides = [Contact::Low, Contact::Apart, Contact::High];
                 add(ElementKind::Gap(index), spring.label.key, &sides.map(Does::Touches));
+            }
+            SpringLaw::Line { line, .. } => {
+                let pieces: Vec<Does> = (0..=line.points().len()).map(|piece| Does::Follows(piece as u8)).collect();
+                add(ElementKind::Line(index), spring.label.key, &pieces);
             }
             SpringLaw::TwoSided | SpringLaw::Bounds { .. } | SpringLaw::None => {}
         }

@@ -7,12 +7,13 @@ use crate::trajectory::Trajectory;
 pub(super) fn cart_acceleration(rows: &Trajectory, cart: &Cart) -> Vec<f64> {
     let column = |name: &str| rows.get(name).unwrap_or(&[]);
     let [first, second, friction] = ["span1_force", "span2_force", "cart_friction"].map(column);
-    let stop = rows.get("stop_force");
+    let others: Vec<&[f64]> =
+        ["stop_force", "force_along", "force_by_speed"].iter().filter_map(|name| rows.get(name)).collect();
     let forces = first.iter().zip(second).zip(friction).enumerate();
     forces
         .map(|(k, ((first, second), friction))| {
-            let stop = stop.map_or(0.0, |stop| stop[k]);
-            (first - second - friction + stop + cart.constant_force()) / cart.mass
+            let other: f64 = others.iter().map(|force| force[k]).sum();
+            (first - second - friction + other + cart.constant_force()) / cart.mass
         })
         .collect()
 }

@@ -284,7 +284,7 @@ impl Run {
     /// Whether an extra does no more than shift outputs.
     pub(super) fn only_shifts(&self, stage: &Stage, extra: &Extra) -> bool {
         // Whether it matters where the cart is, and not only how far it goes.
-        let is_placed = stage.cart.along.is_some() || stage.belt.follows_cart || stage.travel.is_some();
+        let is_placed = stage.changes_along_travel() || stage.travel.is_some();
         match extra.what {
             Nuisance::Bias(_) => true,
             Nuisance::StartPosition => self.seen.iter().all(|seen| !seen.absolute) && !is_placed,

@@ -149,7 +149,16 @@ fn slide(section: &str) -> Value {
 
 /// Of an axis and of a gantry, whose cart has a travel of its own.
 fn cart() -> Value {
-    table("cart", &[("friction", reference("friction")), ("travel", table("travel", &[]))])
+    let line = |words: &str| described(list(list(plain())), words);
+    table(
+        "cart",
+        &[
+            ("friction", reference("friction")),
+            ("travel", table("travel", &[])),
+            ("force_along", line("Points [position, force] along the travel")),
+            ("force_by_speed", line("Points [speed, force]")),
+        ],
+    )
 }
 
 fn friction(section: &str) -> Value {

@@ -5,7 +5,7 @@ use crate::case::Opened;
 use crate::error::Result;
 use crate::export::{self, ElementKind, Exported, Row, Tables, Then};
 use crate::linear::{Operation, StateSpace, Variable};
-use crate::mechanism::{Kind, Mechanism, SpringLaw};
+use crate::mechanism::{Kind, Mechanism, Over, SpringLaw};
 use crate::parameter::{self, Numbers};
 use serde_json::{Value, json};
 
@@ -83,11 +83,14 @@ fn bodies(mechanism: &Mechanism) -> Vec<Value> {
 
 fn springs(mechanism: &Mechanism) -> Vec<Value> {
     let one = |spring: &crate::mechanism::Spring| {
-        let law = match spring.law {
+        let law = match &spring.law {
             SpringLaw::TwoSided => json!({ "kind": "two-sided" }),
             SpringLaw::Tension { pretension } => json!({ "kind": "tension", "pretension_newton": pretension }),
-            SpringLaw::Gap { low, high } => json!({ "kind": "gap", "low": number(low), "high": number(high) }),
-            SpringLaw::Bounds { low, high } => json!({ "kind": "bounds", "low": number(low), "high": number(high) }),
+            SpringLaw::Gap { low, high } => json!({ "kind": "gap", "low": number(*low), "high": number(*high) }),
+            SpringLaw::Line { over, line } => {
+                json!({ "kind": if *over == Over::Length { "line-over-length" } else { "line-over-rate" }, "points": line.points() })
+            }
+            SpringLaw::Bounds { low, high } => json!({ "kind": "bounds", "low": number(*low), "high": number(*high) }),
             SpringLaw::None => json!({ "kind": "none" }),
         };
         let arm = |&(body, arm): &(usize, f64)| json!({ "body": mechanism.bodies[body].label.key, "arm": arm });
@@ -113,6 +116,7 @@ fn equations(tables: &Tables) -> Value {
             ElementKind::Current(_) => "current-limit",
             ElementKind::Span(_) => "span",
             ElementKind::Gap(_) => "gap",
+            ElementKind::Line(_) => "line",
         };
         json!({
             "key": element.key,

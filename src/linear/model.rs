@@ -3,7 +3,7 @@
 use super::frame::{Frame, has_rotor};
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
-use crate::mechanism::{AmplifierMode, Contact, Form, Mechanism, Mode, SPRINGS};
+use crate::mechanism::{AmplifierMode, Contact, Form, Mechanism, Mode, Over, SpringLaw};
 use crate::stage::axis::{BODIES, ROTOR, SPANS};
 use crate::stage::{BeltModel, Stage};
 use nalgebra::{DMatrix, DVector};
@@ -156,7 +156,13 @@ fn mode(plant: &Mechanism, held: [bool; 3], speed: f64) -> Mode {
         (_, _, true) => Motion::Forward,
         (_, _, false) => Motion::Backward,
     });
-    let mut mode = Mode { contact: [Contact::Apart; SPRINGS], ..Mode::of(motion) }.with_torque(forward);
+    let mut mode = Mode::of(motion).with_torque(forward);
+    // A force that is a line over the speed is followed, one over the way stays as it is.
+    for (index, spring) in plant.springs.iter().enumerate() {
+        if let SpringLaw::Line { over: Over::Rate, line } = &spring.law {
+            mode.piece[index] = line.piece_at(speed) as u8;
+        }
+    }
     if has_rotor(plant) {
         // Between its end stops, on the driving flank of its gear.
         mode.contact[SPANS] = if forward { Contact::High } else { Contact::Low };
@@ -224,7 +230,7 @@ impl Linear<'_> {
 
     /// By what the dry friction of a body is multiplied where the cart is.
     fn factor(&self, body: usize) -> f64 {
-        self.plant.bodies[body].along.as_ref().map_or(1.0, |along| along.factor(self.operation.position))
+        self.plant.bodies[body].along.as_ref().map_or(1.0, |along| along.value(self.operation.position))
     }
 
     /// ∂F_f/∂v of a body's own friction beyond the viscous friction that stands in the equations, and ∂F_f/∂z of a

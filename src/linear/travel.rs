@@ -3,7 +3,7 @@
 use super::{Operation, Root, StateSpace};
 use crate::error::Result;
 use crate::friction::{Friction, Law, Side};
-use crate::stage::{Amplifier, AmplifierMode, Stage};
+use crate::stage::{Amplifier, AmplifierMode, CartForces, Stage};
 
 /// The resonances with the cart at one place. All frequencies in Hz, the lowest first.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,7 +68,7 @@ pub fn undamped(stage: &Stage) -> Stage {
     let mut bare = stage.clone();
     let none = Friction { forward: Side::default(), backward: Side::default(), law: Law::Coulomb };
     (bare.drive_pulley.friction, bare.cart.friction, bare.idler_pulley.friction) = (none, none, none);
-    bare.cart.along = None;
+    (bare.cart.along, bare.cart.forces) = (None, CartForces::default());
     bare.belt.damping = [0.0; 3];
     if let Some(play) = &mut bare.motor.gear_play {
         play.damping = 0.0;

@@ -23,6 +23,14 @@ pub fn assumptions(stage: &Stage, operation: Operation) -> Vec<String> {
         let at = engineering_typed(operation.position, "m", 4);
         words.push(format!("friction that changes along the travel is taken as it is at x = {at}, and not followed"));
     }
+    let forces = &stage.cart.forces;
+    if forces.along.is_some() {
+        words.push("the force that changes along the travel is taken as it is at the place, and not followed".into());
+    }
+    if forces.by_speed.is_some() && moving.contains(&plant.leader(CART)) {
+        let at = engineering_typed(operation.speed, "m/s", 4);
+        words.push(format!("the force that changes with the speed is a damper as steep as it is at {at}"));
+    }
     let amplifier = &stage.amplifier;
     if amplifier.voltage_limit.is_some() || amplifier.current_limit.is_some() {
         words.push("the amplifier is taken within its limits".into());

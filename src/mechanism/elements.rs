@@ -1,8 +1,9 @@
-//! Parts that work piece by piece beside the bodies: amplifiers with limits, springs that only pull or only push. Each
-//! is linear in each of its states; the conditions that lead from one to the other are linear forms.
+//! Parts that work piece by piece beside the bodies: amplifiers with limits, springs that only pull or only push, forces
+//! that are lines. Each is linear in each of its states; the conditions that lead from one to the other are linear forms.
 
 use super::{
-    AmplifierMode, Cause, Contact, Drive, Form, Guard, Limit, Mechanism, Mode, SPRINGS, Spring, SpringLaw, Switch,
+    AmplifierMode, Cause, Contact, DRIVES, Drive, Form, Guard, Limit, Mechanism, Mode, Over, SPRINGS, Spring,
+    SpringLaw, State, Switch,
 };
 use std::f64::consts::PI;
 
@@ -113,19 +114,57 @@ impl Mechanism {
     pub fn spring_force(&self, spring: usize, mode: &Mode) -> Form {
         let part = &self.springs[spring];
         let whole = || self.pull(spring);
-        match part.law {
+        match &part.law {
             SpringLaw::TwoSided => whole(),
-            SpringLaw::Tension { pretension } if mode.slack[spring] => Form::constant(-pretension),
+            SpringLaw::Tension { pretension } if mode.slack[spring] => Form::constant(-*pretension),
             SpringLaw::Tension { .. } => whole(),
             SpringLaw::Gap { low, high } => {
-                let [(_, high), (_, low)] = self.sides(spring, [high, low]);
+                let [(_, high), (_, low)] = self.sides(spring, [*high, *low]);
                 match mode.contact[spring] {
                     Contact::High => high,
                     Contact::Low => -low,
                     _ => Form::ZERO,
                 }
             }
+            // f = f_i + k_i s, or over ṡ
+            SpringLaw::Line { over, line } => {
+                let [constant, slope] = line.piece(usize::from(mode.piece[spring]));
+                let mut force = self.way_of_line(spring, *over) * slope;
+                force.constant += constant;
+                force
+            }
             SpringLaw::Bounds { .. } | SpringLaw::None => Form::ZERO,
+        }
+    }
+
+    /// What a spring's line is over.
+    fn way_of_line(&self, spring: usize, over: Over) -> Form {
+        match over {
+            Over::Length => Form::stretch(spring),
+            Over::Rate => self.stretch_rate(spring),
+        }
+    }
+
+    /// The piece of each line at `state`.
+    pub(super) fn pieces(&self, state: &State) -> [u8; SPRINGS] {
+        let mut pieces = [0; SPRINGS];
+        for (index, (piece, spring)) in pieces.iter_mut().zip(&self.springs).enumerate() {
+            if let SpringLaw::Line { over, line } = &spring.law {
+                let x = self.way_of_line(index, *over).value(self, state, &[0.0; DRIVES]);
+                *piece = line.piece_at(x) as u8;
+            }
+        }
+        pieces
+    }
+
+    /// Stiffness and damping of the piece that a spring's line is on; either is below zero where the force falls.
+    pub(crate) fn slopes_of_line(&self, spring: usize, mode: &Mode) -> (f64, f64) {
+        match &self.springs[spring].law {
+            SpringLaw::Line { over, line } => {
+                let [_, slope] = line.piece(usize::from(mode.piece[spring]));
+                if *over == Over::Length { (slope, 0.0) } else { (0.0, slope) }
+            }
+            _ => (0.0, 0.0),
         }
     }
 
@@ -157,7 +196,7 @@ impl Mechanism {
                 SpringLaw::TwoSided => true,
                 SpringLaw::Tension { .. } => !mode.slack[index],
                 SpringLaw::Gap { .. } => mode.contact[index].code() != 0,
-                SpringLaw::Bounds { .. } | SpringLaw::None => false,
+                SpringLaw::Line { .. } | SpringLaw::Bounds { .. } | SpringLaw::None => false,
             };
             stiffness[index] = if carries { spring.stiffness } else { 0.0 };
         }
@@ -174,20 +213,27 @@ impl Mechanism {
             self.watch_limits(drive, mode, &mut switch);
         }
         for (index, spring) in self.springs.iter().enumerate() {
-            match spring.law {
-                SpringLaw::Tension { pretension } => {
+            match &spring.law {
+                &SpringLaw::Tension { pretension } => {
                     // Tension T₀ + k s + c ṡ: it only pulls.
                     let mut tension = self.pull(index);
                     tension.constant += pretension;
                     let slack = mode.slack[index];
                     watch(if slack { -tension } else { tension }, Cause::Switch(Switch::Span(index, !slack)));
                 }
-                SpringLaw::Gap { low, high } => {
+                &SpringLaw::Gap { low, high } => {
                     let sides = self.sides(index, [high, low]);
                     let mut switch = |form: Form, to| watch(form, Cause::Switch(Switch::Gap(index, to)));
                     watch_contact(mode.contact[index], &sides, spring.damping > 0.0, &mut switch);
                 }
-                SpringLaw::Bounds { low, high } => {
+                SpringLaw::Line { over, line } => {
+                    let (piece, way) = (mode.piece[index], self.way_of_line(index, *over));
+                    let [begin, end] = line.ends(usize::from(piece));
+                    let mut switch = |form: Form, to| watch(form, Cause::Switch(Switch::Line(index, to)));
+                    end.iter().for_each(|end| switch(Form::constant(*end) - way, piece + 1));
+                    begin.iter().for_each(|begin| switch(way - Form::constant(*begin), piece - 1));
+                }
+                &SpringLaw::Bounds { low, high } => {
                     for (beyond, _) in self.sides(index, [high, low]) {
                         watch(-beyond, Cause::Leave(index));
                     }

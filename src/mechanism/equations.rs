@@ -23,12 +23,13 @@ pub struct Equations {
 impl Mechanism {
     /// The mode in which `state` is looked at first: each body moves as its speed says, all else is in order.
     pub fn first_mode(&self, state: &State) -> Mode {
-        Mode::of((0..self.bodies.len()).map(|body| match state.speed[self.leader(body)] {
+        let motion = (0..self.bodies.len()).map(|body| match state.speed[self.leader(body)] {
             _ if !self.has_modes(body) => Motion::Free,
             v if v > 0.0 => Motion::Forward,
             v if v < 0.0 => Motion::Backward,
             _ => Motion::Stuck,
-        }))
+        });
+        Mode { piece: self.pieces(state), ..Mode::of(motion) }
     }
 
     /// Takes a machine over from another of the same parts but other numbers: a body that did not have modes and now does,
@@ -61,7 +62,7 @@ impl Mechanism {
 
     /// Whether the torque through a compliant gear is positive.
     pub(super) fn is_gear_torque_positive(&self, drive: usize, spring: usize, mode: &Mode) -> bool {
-        match (self.springs[spring].law, mode.contact[spring]) {
+        match (&self.springs[spring].law, mode.contact[spring]) {
             (SpringLaw::Gap { .. }, Contact::Low | Contact::LowLoose) => false,
             (SpringLaw::Gap { .. }, _) => true,
             _ => mode.drive[drive].torque_positive,
@@ -140,7 +141,7 @@ impl Mechanism {
                 let own = acceleration[part.pulley] * (part.motor.rotor_inertia * part.motor.gear_ratio);
                 Some(self.current(drive, mode) * part.motor.torque_constant - own)
             }
-            Some(spring) => match self.springs[spring].law {
+            Some(spring) => match &self.springs[spring].law {
                 SpringLaw::TwoSided => Some(self.spring_force(spring, mode)),
                 _ => None,
             },

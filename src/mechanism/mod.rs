@@ -25,7 +25,8 @@ pub(crate) use layout::{Layout, Replaced};
 pub use mode::{Cause, Contact, DriveMode, Guard, Limit, Mode, Part, Status, Switch, What};
 pub use power::Power;
 
-use crate::friction::{Along, Friction};
+use crate::friction::Friction;
+use crate::polyline::Polyline;
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -59,7 +60,7 @@ pub struct Body {
     /// A constant torque or force on it, N m or N.
     pub force: f64,
     /// How its dry friction changes along its way, if it does.
-    pub along: Option<Along>,
+    pub along: Option<Polyline>,
     /// The body that it moves with, and its way per way of that one; itself and 1, unless something makes both one.
     pub leader: (usize, f64),
     /// Whether it is the rotor of a drive, which nothing but the gear holds.
@@ -114,7 +115,7 @@ pub struct Spring {
 }
 
 /// When a spring pushes and pulls.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum SpringLaw {
     /// Always.
     TwoSided,
@@ -130,6 +131,14 @@ pub enum SpringLaw {
         /// Where the positive side begins.
         high: f64,
     },
+    /// As a line says, whose x is its length or the rate of it: what pulls in either direction alike, and keeps no
+    /// energy.
+    Line {
+        /// Its x.
+        over: Over,
+        /// Force, N or N m.
+        line: Polyline,
+    },
     /// Never; a run ends where its length leaves these bounds.
     Bounds {
         /// Least length.
@@ -139,6 +148,25 @@ pub enum SpringLaw {
     },
     /// Never: its length is only looked at.
     None,
+}
+
+impl SpringLaw {
+    /// The steepest slope of its line: as a stiffness and as a damping, N/m and N s/m or the like.
+    pub(crate) fn steepest(&self) -> (f64, f64) {
+        let SpringLaw::Line { over, line } = self else { return (0.0, 0.0) };
+        let slopes = (0..=line.points().len()).map(|piece| line.piece(piece)[1].abs());
+        let most = slopes.fold(0.0, f64::max);
+        if *over == Over::Length { (most, 0.0) } else { (0.0, most) }
+    }
+}
+
+/// What a force is a line over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Over {
+    /// The length of a spring.
+    Length,
+    /// The rate of it.
+    Rate,
 }
 
 /// A span whose length, and so its stiffness, changes with the ways of bodies: k = E A/(l + Σ a_j q_j).
@@ -403,8 +431,15 @@ impl Mechanism {
         seen.origin = layout.origin(start);
         for (index, spring) in seen.springs.iter_mut().enumerate() {
             let shift = layout.shift(index, &seen.origin);
-            if let SpringLaw::Gap { low, high } | SpringLaw::Bounds { low, high } = &mut spring.law {
-                (*low, *high) = (*low - shift, *high - shift);
+            match &mut spring.law {
+                SpringLaw::Gap { low, high } | SpringLaw::Bounds { low, high } => {
+                    (*low, *high) = (*low - shift, *high - shift);
+                }
+                SpringLaw::Line { over: Over::Length, line } => *line = line.shifted(shift),
+                SpringLaw::Line { over: Over::Rate, .. }
+                | SpringLaw::TwoSided
+                | SpringLaw::Tension { .. }
+                | SpringLaw::None => {}
             }
         }
         seen

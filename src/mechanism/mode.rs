@@ -12,6 +12,8 @@ pub struct Mode {
     pub slack: [bool; SPRINGS],
     /// Which side of a spring that only pushes touches.
     pub contact: [Contact; SPRINGS],
+    /// Which piece of its line a spring is on.
+    pub piece: [u8; SPRINGS],
     /// The state of each drive.
     pub drive: [DriveMode; DRIVES],
 }
@@ -39,6 +41,7 @@ impl Mode {
             motion: [Motion::Free; BODIES],
             slack: [false; SPRINGS],
             contact: [Contact::Apart; SPRINGS],
+            piece: [0; SPRINGS],
             drive: [DriveMode::ORDINARY; DRIVES],
         };
         for (own, motion) in mode.motion.iter_mut().zip(motion) {
@@ -59,6 +62,7 @@ impl Mode {
             What::Body(body) => Status::Motion(self.motion[body]),
             What::Span(spring) => Status::Slack(self.slack[spring]),
             What::Gap(spring) => Status::Contact(self.contact[spring]),
+            What::Line(spring) => Status::Piece(self.piece[spring]),
             What::Voltage(drive) => Status::Limit(self.drive[drive].voltage),
             What::Current(drive) => Status::Limit(self.drive[drive].current),
         }
@@ -69,6 +73,7 @@ impl Mode {
         match to {
             Switch::Span(spring, slack) => self.slack[spring] = slack,
             Switch::Gap(spring, contact) => self.contact[spring] = contact,
+            Switch::Line(spring, piece) => self.piece[spring] = piece,
             Switch::Voltage(drive, limit) => self.drive[drive].voltage = limit,
             Switch::Current(drive, limit) => self.drive[drive].current = limit,
         }
@@ -135,6 +140,8 @@ pub enum What {
     Span(usize),
     /// A spring that only pushes: flanks of a gear, end stops.
     Gap(usize),
+    /// A spring whose force is a line.
+    Line(usize),
     /// A drive's voltage limit.
     Voltage(usize),
     /// A drive's current limit.
@@ -155,7 +162,7 @@ impl Part {
     pub fn of(mechanism: &Mechanism, what: What) -> Self {
         let label = match what {
             What::Body(body) => mechanism.bodies[body].label,
-            What::Span(spring) | What::Gap(spring) => mechanism.springs[spring].label,
+            What::Span(spring) | What::Gap(spring) | What::Line(spring) => mechanism.springs[spring].label,
             What::Voltage(drive) => mechanism.drives[drive].voltage,
             What::Current(drive) => mechanism.drives[drive].current,
         };
@@ -184,17 +191,20 @@ pub enum Status {
     Limit(Limit),
     /// Of gear and end stops.
     Contact(Contact),
+    /// Of a line: which piece.
+    Piece(u8),
 }
 
 impl Status {
     /// As in the result files: a body −1 backward, 0 stuck, 1 forward, 2 free; a span 1 if slack; a limit, gear or stop
-    /// the side that binds or carries, or 0.
+    /// the side that binds or carries, or 0; a line always 0, for from piece to piece its force does not jump.
     pub fn code(self) -> i8 {
         match self {
             Status::Motion(motion) => motion.code(),
             Status::Slack(slack) => i8::from(slack),
             Status::Limit(limit) => limit.sign() as i8,
             Status::Contact(contact) => contact.code(),
+            Status::Piece(_) => 0,
         }
     }
 
@@ -208,6 +218,7 @@ impl Status {
             Status::Limit(Limit::High) => "at the positive limit",
             Status::Limit(Limit::Low) => "at the negative limit",
             Status::Contact(contact) => ["negative side", "apart", "positive side"][(contact.code() + 1) as usize],
+            Status::Piece(_) => "on a piece of its line",
         }
     }
 }
@@ -273,6 +284,8 @@ impl Cause {
             Cause::Switch(Switch::Current(drive, to)) => LIMITS + 6 * drive + 3 + limit(to),
             Cause::Switch(Switch::Span(spring, _)) | Cause::Leave(spring) => SPRING + 3 * spring,
             Cause::Switch(Switch::Gap(spring, to)) => SPRING + 3 * spring + contact(to),
+            // The piece before, this one, the one behind: no two of them alike.
+            Cause::Switch(Switch::Line(spring, to)) => SPRING + 3 * spring + usize::from(to % 3),
         }
     }
 
@@ -305,6 +318,8 @@ pub enum Switch {
     Span(usize, bool),
     /// A spring that only pushes is touched, or left.
     Gap(usize, Contact),
+    /// A spring whose force is a line comes to another piece of it.
+    Line(usize, u8),
     /// The voltage limit of a drive.
     Voltage(usize, Limit),
     /// The current limit of a drive.
@@ -317,6 +332,7 @@ impl Switch {
         match self {
             Switch::Span(spring, _) => What::Span(spring),
             Switch::Gap(spring, _) => What::Gap(spring),
+            Switch::Line(spring, _) => What::Line(spring),
             Switch::Voltage(drive, _) => What::Voltage(drive),
             Switch::Current(drive, _) => What::Current(drive),
         }

@@ -7,7 +7,7 @@ use super::{AmplifierMode, BODIES, DRIVES, Limit, Mechanism, Mode, SPRINGS, Spri
 pub struct Power {
     /// Electrical power at the motors' terminals, v i.
     pub input: f64,
-    /// Power of constant forces on bodies.
+    /// Power of forces on bodies from outside: constant ones, and those that are lines.
     pub load: f64,
     /// Copper loss R i².
     pub copper: f64,
@@ -85,7 +85,7 @@ impl Mechanism {
         let part = &self.springs[spring];
         let sum = |values: &[f64; BODIES]| part.arms.iter().map(|&(body, arm)| arm * values[body]).sum::<f64>();
         let (length, rate) = (sum(&state.position), sum(&state.speed));
-        let (way, strain) = match part.law {
+        let (way, strain) = match &part.law {
             SpringLaw::TwoSided => (length, length),
             SpringLaw::Tension { pretension } => {
                 let way = length + pretension / part.stiffness;
@@ -95,7 +95,7 @@ impl Mechanism {
                 let beyond = (length - high).max(0.0) + (length - low).min(0.0);
                 (beyond, beyond)
             }
-            SpringLaw::Bounds { .. } | SpringLaw::None => (0.0, 0.0),
+            SpringLaw::Line { .. } | SpringLaw::Bounds { .. } | SpringLaw::None => (0.0, 0.0),
         };
         Strain { way, strain, rate }
     }
@@ -119,6 +119,9 @@ impl Mechanism {
             let kept = spring.stiffness * s.strain;
             let force = if stiffness[index] > 0.0 { spring.stiffness * s.way + spring.damping * s.rate } else { 0.0 };
             power.stored += kept * s.rate;
+            if let SpringLaw::Line { .. } = spring.law {
+                power.load -= self.spring_force(index, &mode).value(self, state, input) * s.rate;
+            }
             power.spring[index] = (force - kept) * s.rate;
         }
         for (index, drive) in self.drives.iter().enumerate() {

@@ -91,9 +91,16 @@ fn breakaway(stage: &Stage, side: f64) -> f64 {
     let forward = side > 0.0;
     let [drive, idler] =
         [&stage.drive_pulley, &stage.idler_pulley].map(|pulley| pulley.friction.side(forward).breakaway);
-    let along = stage.cart.along.as_ref().map_or(1.0, |along| along.factor(0.0));
+    let along = stage.cart.along.as_ref().map_or(1.0, |along| along.value(0.0));
     let cart = along * stage.cart.friction.side(forward).breakaway;
-    cart + (drive + idler) / stage.pulley_radius - side * stage.cart.constant_force()
+    cart + (drive + idler) / stage.pulley_radius - side * resting_force(stage)
+}
+
+/// Force on the cart at rest at x = 0 but friction, N.
+fn resting_force(stage: &Stage) -> f64 {
+    let cart = &stage.cart;
+    let lines = [&cart.forces.along, &cart.forces.by_speed];
+    cart.constant_force() + lines.iter().filter_map(|line| line.as_ref()).map(|line| line.value(0.0)).sum::<f64>()
 }
 
 fn inertia(stage: &Stage, masses: &Masses, notes: &mut Vec<Note>) -> Group {

@@ -133,9 +133,12 @@ impl Field {
         Self::Machine(Accessor::new(List::Numbers, |_| 3, get, set))
     }
 
-    /// A number of each point of the cart's friction along the travel: the first or the second.
-    pub(super) const fn points(get: fn(&Stage, usize) -> Option<f64>, set: fn(&mut Stage, usize, f64)) -> Self {
-        let count = |stage: &Stage| stage.cart.along.as_ref().map_or(0, |along| along.points().len());
+    /// A number of each point of a line.
+    pub(super) const fn points(
+        count: fn(&Stage) -> usize,
+        get: fn(&Stage, usize) -> Option<f64>,
+        set: fn(&mut Stage, usize, f64),
+    ) -> Self {
         Self::Machine(Accessor::new(List::Points, count, get, set))
     }
 }
@@ -541,13 +544,18 @@ pub(super) fn set_stribeck_decay(friction: &mut Friction, decay: f64) {
     set_stribeck_velocity(friction, velocity_of_decay(decay));
 }
 
-/// A number of a point of the cart's friction along the travel: 0 for the position, 1 for the factor.
-pub(super) fn of_point(stage: &Stage, point: usize, part: usize) -> Option<f64> {
-    stage.cart.along.as_ref()?.points().get(point).map(|point| point[part])
+/// A number of each point of a line of the cart: 0 for what it is over, 1 for the value.
+macro_rules! points {
+    ($part:literal, |$stage:ident| $($line:tt)*) => {
+        Place::axis(Field::points(
+            |$stage| $($line)*.as_ref().map_or(0, |line| line.points().len()),
+            |$stage, point| $($line)*.as_ref()?.points().get(point).map(|point| point[$part]),
+            |$stage, point, value| {
+                if let Some(line) = &mut $($line)* {
+                    line.set(point, $part, value);
+                }
+            },
+        ))
+    };
 }
-
-pub(super) fn set_of_point(stage: &mut Stage, point: usize, part: usize, value: f64) {
-    if let Some(along) = &mut stage.cart.along {
-        along.set(point, part, value);
-    }
-}
+pub(super) use points;

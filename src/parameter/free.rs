@@ -478,8 +478,15 @@ fn not_there(machine: &dyn Numbers, key: &str, row: &Parameter) -> Error {
         }
         _ if name.starts_with("static") => "it follows from coulomb and stribeck.force: name one of these".into(),
         _ if row.key == "motor.gear_efficiency" => "a compliant gear has none: name gear_damping".into(),
-        _ if parent.ends_with(".along") => {
+        _ if row.key.starts_with("cart.friction.along.") => {
             "give along to start from, such as along = [[\"0 m\", 1], [\"0.1 m\", 1.5]]".into()
+        }
+        _ if row.key.starts_with("cart.force_along.") => {
+            "give force_along to start from, such as force_along = [[\"0 m\", \"0 N\"], [\"0.1 m\", \"1 N\"]]".into()
+        }
+        _ if row.key.starts_with("cart.force_by_speed.") => {
+            "give force_by_speed to start from, such as force_by_speed = [[\"0 m/s\", \"0 N\"], [\"0.1 m/s\", \"1 N\"]]"
+                .into()
         }
         _ => format!("give it one to start from, such as {name} = \"{}\" in {parent}", row.example),
     })

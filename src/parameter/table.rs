@@ -1,9 +1,9 @@
 //! The rows: every number that a case file can hold.
 
 use super::field::{
-    Place, always, amplifier, breakaway, everywhere, make, motor, of_drive, of_friction, of_law, of_point, of_simple,
-    of_slide, part, set_coulomb, set_of_point, set_radius, set_simple, set_stribeck_decay, set_stribeck_force,
-    set_stribeck_velocity, simple, slide, slide_mut, stiffness, stribeck_decay, stribeck_force, stribeck_velocity,
+    Place, always, amplifier, breakaway, everywhere, make, motor, of_drive, of_friction, of_law, of_simple, of_slide,
+    part, points, set_coulomb, set_radius, set_simple, set_stribeck_decay, set_stribeck_force, set_stribeck_velocity,
+    simple, slide, slide_mut, stiffness, stribeck_decay, stribeck_force, stribeck_velocity,
 };
 use super::{Arm, Fallback, Field, INPUT, Off, Parameter, Range, Sum};
 use crate::friction::Law;
@@ -469,9 +469,21 @@ const TRAVEL: &[Parameter] = &[
 #[rustfmt::skip]
 const ALONG: &[Parameter] = &[
     row("cart.friction.along.position", "x", "m", Required, ANY, "0.1 m", "First number of each point of `along`: where along the travel, growing from point to point.")
-        .at(Place::axis(Field::points(|s, point| of_point(s, point, 0), |s, point, value| set_of_point(s, point, 0, value)))),
+        .at(points!(0, |s| s.cart.along)),
     row("cart.friction.along.factor", "", "", Required, NOT_NEGATIVE, "1.5", "Second number: what Coulomb friction, breakaway and `stribeck.force` are multiplied by there; straight lines between points.")
-        .at(Place::axis(Field::points(|s, point| of_point(s, point, 1), |s, point, value| set_of_point(s, point, 1, value)))),
+        .at(points!(1, |s| s.cart.along)),
+];
+
+#[rustfmt::skip]
+const FORCES: &[Parameter] = &[
+    row("cart.force_along.position", "x", "m", Required, ANY, "0.1 m", "First number of each point of `force_along`: where along the travel, growing from point to point.")
+        .at(points!(0, |s| s.cart.forces.along)),
+    row("cart.force_along.force", "F_x", "N", Required, ANY, "1.5 N", "Second number: force on the cart there, whichever way it goes, positive towards larger x; straight lines between points.")
+        .at(points!(1, |s| s.cart.forces.along)),
+    row("cart.force_by_speed.speed", "v", "m/s", Required, ANY, "0.1 m/s", "First number of each point of `force_by_speed`: speed of the cart, growing from point to point.")
+        .at(points!(0, |s| s.cart.forces.by_speed)),
+    row("cart.force_by_speed.force", "F_v", "N", Required, ANY, "-1.5 N", "Second number: force on the cart at that speed, positive towards larger x; straight lines between points.")
+        .at(points!(1, |s| s.cart.forces.by_speed)),
 ];
 
 #[rustfmt::skip]
@@ -780,6 +792,7 @@ pub(super) const SECTIONS: &[(&str, &[&[Parameter]])] = &[
                 "100 kN/m"
             ),
             ALONG,
+            FORCES,
         ],
     ),
     (

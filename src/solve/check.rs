@@ -8,6 +8,7 @@ use crate::error::{Error, Result};
 use crate::friction::Law;
 use crate::mechanism::{AmplifierMode, Mechanism, SpringLaw, State};
 use crate::parameter;
+use crate::polyline::MOST_POINTS;
 use crate::stage::axis::CART;
 use crate::stage::{BeltModel, Stage};
 use std::f64::consts::PI;
@@ -50,6 +51,17 @@ pub(crate) fn stage(stage: &Stage) -> Result<()> {
     }
     if stage.cart.along.as_ref().is_some_and(|along| !along.grows()) {
         return Err(Error::new("the positions of cart.friction.along do not grow").allowed("each above the one before"));
+    }
+    let lines = [("along", &stage.cart.forces.along), ("by_speed", &stage.cart.forces.by_speed)];
+    for (name, line) in lines.into_iter().filter_map(|(name, line)| Some((name, line.as_ref()?))) {
+        if !line.grows() {
+            return Err(Error::new(format!("the points of cart.force_{name} do not grow"))
+                .allowed("each first number above the one before"));
+        }
+        if line.points().len() > MOST_POINTS {
+            return Err(Error::new(format!("cart.force_{name} has {} points", line.points().len()))
+                .allowed(format!("up to {MOST_POINTS}")));
+        }
     }
     for side in laws.iter().flat_map(|law| [law.forward, law.backward]) {
         if side.breakaway < side.coulomb {
@@ -153,7 +165,8 @@ pub(super) fn fastest_rate(mechanism: &Mechanism) -> f64 {
             // Stops and flanks by themselves: they are hardly ever touched together with the rest.
             let alone = matches!(spring.law, SpringLaw::Gap { .. });
             let arm: f64 = spring.arms.iter().filter(|(b, _)| *b == index).map(|(_, arm)| arm * arm).sum();
-            let (k, c) = (spring.stiffness * arm, spring.damping * arm);
+            let (steepest, strongest) = spring.law.steepest();
+            let (k, c) = ((spring.stiffness + steepest) * arm, (spring.damping + strongest) * arm);
             if alone || body.is_rotor {
                 let two = if spring.arms.len() > 1 { 2.0 } else { 1.0 };
                 fastest = fastest.max((two * k / body.inertia).sqrt()).max(two * c / body.inertia);

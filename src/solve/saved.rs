@@ -81,6 +81,12 @@ impl Pass<'_> {
         mode.motion.iter_mut().try_for_each(|motion| self.choice(motions, motion))?;
         mode.slack.iter_mut().try_for_each(|slack| self.flag(slack))?;
         mode.contact.iter_mut().try_for_each(|contact| self.choice(contacts, contact))?;
+        mode.piece.iter_mut().try_for_each(|piece| {
+            let mut count = usize::from(*piece);
+            self.count(&mut count)?;
+            *piece = u8::try_from(count).ok()?;
+            Some(())
+        })?;
         mode.drive.iter_mut().try_for_each(|drive| {
             self.flag(&mut drive.torque_positive)?;
             self.choice(limits, &mut drive.voltage)?;

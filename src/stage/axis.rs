@@ -13,7 +13,9 @@
 
 use super::{BeltModel, EncoderPlace, Stage};
 use crate::friction::Law;
-use crate::mechanism::{Body, Drive, Follows, Heading, Kind, Label, Mechanism, Roles, Shown, Spring, SpringLaw, State};
+use crate::mechanism::{
+    Body, Drive, Follows, Heading, Kind, Label, Mechanism, Over, Roles, Shown, Spring, SpringLaw, State,
+};
 
 /// Number of the drive pulley among the bodies.
 pub const DRIVE: usize = 0;
@@ -42,11 +44,18 @@ const SPAN_LABELS: [Label; SPANS] = [
     Label { key: "span_3", name: "span 3" },
 ];
 
+/// Keys of the columns of forces that are lines, and what they are.
+const LINE_LABELS: [Label; 2] = [
+    Label { key: "force_along", name: "force along the travel" },
+    Label { key: "force_by_speed", name: "force by speed" },
+];
+
 impl Stage {
     /// Its bodies, springs and drive.
     pub fn mechanism(&self) -> Mechanism {
         let mut springs = self.spans();
         springs.extend(self.gear());
+        springs.extend(self.lines());
         springs.push(self.way());
         let shaft = if self.motor.gear_play.is_some() { ROTOR } else { DRIVE };
         let drive = Drive {
@@ -128,7 +137,7 @@ impl Stage {
                 arms: arms[index].to_vec(),
                 stiffness: if there { k[index] } else { 0.0 },
                 damping: if there { c[index] } else { 0.0 },
-                law: if there { law } else { SpringLaw::None },
+                law: if there { law.clone() } else { SpringLaw::None },
                 follows: self.follows(index),
             }
         };
@@ -171,6 +180,19 @@ impl Stage {
             // Without play the flanks never part.
             law: if half == 0.0 { SpringLaw::TwoSided } else { SpringLaw::Gap { low: -half, high: half } },
             follows: None,
+        })
+    }
+
+    /// Forces on the cart that are lines.
+    fn lines(&self) -> impl Iterator<Item = Spring> {
+        let forces = &self.cart.forces;
+        let [along, by_speed] = LINE_LABELS;
+        let lines = [(along, Over::Length, &forces.along), (by_speed, Over::Rate, &forces.by_speed)];
+        lines.into_iter().filter_map(|(label, over, line)| {
+            // A spring pulls the cart back.
+            let line = line.as_ref()?.scaled(-1.0);
+            let law = SpringLaw::Line { over, line };
+            Some(Spring { label, arms: vec![(CART, 1.0)], stiffness: 0.0, damping: 0.0, law, follows: None })
         })
     }
 
@@ -237,6 +259,11 @@ impl Stage {
         }
         if self.travel.is_some_and(|travel| travel.stop.is_some()) {
             add("stop_force", "N", Shown::Force(way, -1.0), false);
+        }
+        for (index, spring) in mechanism.springs.iter().enumerate() {
+            if let SpringLaw::Line { .. } = spring.law {
+                add(spring.label.key, "N", Shown::Force(index, -1.0), false);
+            }
         }
         if let Some(encoder) = self.encoder {
             let body = match encoder.at {

@@ -357,7 +357,7 @@ impl Gantry {
             arms: row.into_iter().enumerate().filter(|(_, arm)| *arm != 0.0).collect(),
             stiffness: self.belts.stiffness[index],
             damping: self.belts.damping[index],
-            law,
+            law: law.clone(),
             follows: self.belts.follows.as_ref().map(|(rigidity, lengths)| Follows {
                 rigidity: *rigidity,
                 length: lengths[index],

@@ -3,8 +3,11 @@
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use taut::friction::{Friction, Side};
+use taut::polyline::Polyline;
 use taut::signal::Signal;
-use taut::stage::{Amplifier, AmplifierMode, Belt, BeltModel, Cart, EndStop, GearPlay, Motor, Pulley, Stage, Travel};
+use taut::stage::{
+    Amplifier, AmplifierMode, Belt, BeltModel, Cart, CartForces, EndStop, GearPlay, Motor, Pulley, Stage, Travel,
+};
 
 /// As many random cases, the same ones in every run: of a law on sensitive machines a few in a hundred thousand miss
 /// their tolerance because an error of the last bit has grown. `PROPTEST_RNG_SEED=…` draws others, `TAUT_CASES=…` more.
@@ -106,6 +109,32 @@ fn now_and_then<T: std::fmt::Debug + Clone>(value: impl Strategy<Value = T>) -> 
     prop::option::weighted(0.4, value)
 }
 
+/// Lines over what lies between −`most` and `most`, or so, with values up to `value` either way; odd ones where a
+/// machine has to have a mirror image.
+fn line(most: f64, value: f64, dry: Dry) -> BoxedStrategy<Polyline> {
+    let points = prop::collection::vec((0.05..1.0_f64, -1.0..1.0_f64), 1..5);
+    let through = move |steps: Vec<(f64, f64)>, middle: Option<f64>| {
+        let all: f64 = steps.iter().map(|(step, _)| step).sum();
+        let mut x = 0.0;
+        let half: Vec<[f64; 2]> = steps
+            .iter()
+            .map(|(step, y)| {
+                x += step / all * most;
+                [x, y * value]
+            })
+            .collect();
+        let points = match middle {
+            None => half.iter().rev().map(|[x, y]| [-x, -y]).chain(half.iter().copied()).collect(),
+            Some(shift) => half.into_iter().map(|[x, y]| [2.0 * x - shift * most, y]).collect(),
+        };
+        Polyline::new(points).expect("x grows")
+    };
+    match dry {
+        Dry::Symmetric => points.prop_map(move |steps| through(steps, None)).boxed(),
+        Dry::Any => (points, 0.0..2.0).prop_map(move |(steps, shift)| through(steps, Some(shift))).boxed(),
+    }
+}
+
 /// Such machines with limits, backlash, slack spans, end stops, and reduced models; with `Symmetric` ones that have a
 /// mirror image.
 pub fn equipped(dry: Dry) -> impl Strategy<Value = Stage> {
@@ -149,6 +178,16 @@ pub fn equipped(dry: Dry) -> impl Strategy<Value = Stage> {
         }
         stage
     })
+}
+
+/// Such machines with forces that are lines over the cart's way and speed.
+pub fn lined(dry: Dry) -> impl Strategy<Value = Stage> {
+    (equipped(dry), now_and_then(line(0.05, 1.0, dry)), now_and_then(line(0.5, 1.0, dry))).prop_map(
+        |(mut stage, along, by_speed)| {
+            stage.cart.forces = CartForces { along, by_speed };
+            stage
+        },
+    )
 }
 
 /// Whether flanks, spans or end stops may strike again and again, so that an error grows tenfold every few strikes.

@@ -36,8 +36,8 @@ pub struct Fit {
     /// Compare friction laws and windows by the error on parts of the logs that are held out, and fit with the best
     #[arg(long, conflicts_with_all = ["posterior", "drift"])]
     pub compare: bool,
-    /// Laws to compare, separated by commas: viscous, coulomb, asymmetric, stribeck, along, lugre [default: all but
-    /// lugre]
+    /// Laws to compare, separated by commas: viscous, coulomb, asymmetric, stribeck, along, force-along, force-by-speed,
+    /// lugre [default: the first five]
     #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "compare")]
     pub laws: Vec<String>,
     /// Windows to compare, separated by commas: lengths such as 2s, and whole for whole logs

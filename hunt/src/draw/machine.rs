@@ -1,6 +1,6 @@
 //! Motor, amplifier, bodies, belt and travel of a random stage.
 
-use super::{Draw, Kind, Sizes};
+use super::{Draw, Kind, Random, Sizes};
 use std::f64::consts::PI;
 use std::fmt::Write;
 
@@ -232,6 +232,35 @@ impl Draw {
                 self.decades(1.0, 1000.0) * if self.random.chance(0.5) { -1.0 } else { 1.0 }
             }
         }
+    }
+
+    /// Forces on the cart over its way and its speed, now and then; drawn from a sequence of their own.
+    pub(super) fn lines(&mut self, sizes: &Sizes, start: f64, mut random: Random) {
+        if !random.chance(0.15) {
+            return;
+        }
+        self.kind(Kind::Lines);
+        let mut text = String::from("[cart]\n");
+        for (key, middle, reach) in [("force_along", start, sizes.way), ("force_by_speed", 0.0, sizes.way / sizes.time)]
+        {
+            if !random.chance(0.7) {
+                continue;
+            }
+            let count = 1 + random.below(5);
+            let mut x = middle - reach * random.even(0.0, 0.5);
+            let mut points = Vec::new();
+            for _ in 0..count {
+                let force = 0.3 * sizes.force * random.even(-1.0, 1.0);
+                points.push(format!("[{:e}, {:e}]", x, self.digits(force)));
+                let step = reach * random.decades(0.03, 1.0);
+                x += step.max(1e-12 * x.abs());
+                // The steepest line between two points
+                let slope = 0.6 * sizes.force / step / sizes.mass[1];
+                self.faster(if key == "force_along" { slope.sqrt() } else { slope });
+            }
+            let _ = writeln!(text, "{key} = [{}]", points.join(", "));
+        }
+        self.text = self.text.replacen("[cart]\n", &text, 1);
     }
 
     pub(super) fn travel(&mut self, sizes: &Sizes, start: f64) {

@@ -298,8 +298,8 @@ class Case:
     ) -> Comparison:
         """Friction laws and windows by the error on parts of the logs that are held out, and a fit with the best.
 
-        ``laws`` are of ``viscous``, ``coulomb``, ``asymmetric``, ``stribeck``, ``along`` and ``lugre``, by default all
-        but the last; ``windows`` are lengths, s, and None for whole logs.
+        ``laws`` are of ``viscous``, ``coulomb``, ``asymmetric``, ``stribeck``, ``along``, ``force-along``,
+        ``force-by-speed`` and ``lugre``, by default the first five; ``windows`` are lengths, s, and None for whole logs.
         """
         names = _checks.names("laws", [laws] if isinstance(laws, str) else laws)
         lengths = None if windows is None else [_checks.number("windows", window) for window in windows]

@@ -4,7 +4,7 @@ use crate::{Cell, Page, Table};
 use taut::fit::compare::Comparison;
 
 /// Headings of [`rows`].
-pub const HEADINGS: [&str; 5] = ["Law and windows", "Parameters", "Held out", "Training", "Rank by training"];
+pub const HEADINGS: [&str; 5] = ["Law and windows", "Parameters", "Held out", "Training", "By training"];
 
 /// The rows of the table: name, parameters, errors.
 pub fn rows(compared: &Comparison) -> impl Iterator<Item = [String; 5]> {

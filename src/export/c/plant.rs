@@ -276,7 +276,7 @@ impl<'t> Plant<'t> {
                     }
                 }
                 ElementKind::Voltage(_) => (2, 0),
-                ElementKind::Span(_) | ElementKind::Gap(_) => (4, 0),
+                ElementKind::Span(_) | ElementKind::Gap(_) | ElementKind::Line(_) => (4, 0),
             };
             kinds.push(kind);
             data.push(datum);

@@ -32,6 +32,7 @@ impl Maker<'_> {
                 (ElementKind::Current(drive), Does::Limits(limit)) => mode.drive[drive].current = limit,
                 (ElementKind::Span(spring), Does::Slack(slack)) => mode.slack[spring] = slack,
                 (ElementKind::Gap(spring), Does::Touches(contact)) => mode.contact[spring] = contact,
+                (ElementKind::Line(spring), Does::Follows(piece)) => mode.piece[spring] = piece,
                 (kind, does) => unreachable!("{kind:?} cannot do {does:?}"),
             }
         }

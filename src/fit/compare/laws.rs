@@ -9,8 +9,11 @@ use crate::stage::Stage;
 use std::path::Path;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Value};
 
-/// Points of friction along the travel.
+/// Points of friction and of forces along the travel.
 const POINTS: usize = 7;
+
+/// Speeds at which a force by speed has points, as shares of the greatest one.
+const SPEEDS: [f64; 7] = [-1.0, -0.5, -0.125, 0.0, 0.125, 0.5, 1.0];
 
 /// Share of the Coulomb friction that a Stribeck curve begins above it, and share of the greatest speed over which it
 /// falls.
@@ -35,14 +38,27 @@ pub enum FrictionLaw {
     Along,
     /// Bristles in place of a Stribeck curve.
     LuGre,
+    /// The better one of the straight laws, with a force that changes along the travel and is the same in both
+    /// directions.
+    ForceAlong,
+    /// The same with a force that changes with the speed.
+    ForceBySpeed,
 }
 
 impl FrictionLaw {
     /// All of them, the simplest first.
-    pub const ALL: [Self; 6] =
-        [Self::Viscous, Self::Coulomb, Self::Asymmetric, Self::Stribeck, Self::Along, Self::LuGre];
+    pub const ALL: [Self; 8] = [
+        Self::Viscous,
+        Self::Coulomb,
+        Self::Asymmetric,
+        Self::Stribeck,
+        Self::Along,
+        Self::ForceAlong,
+        Self::ForceBySpeed,
+        Self::LuGre,
+    ];
 
-    /// Those that are compared unless others are named: bristles take long.
+    /// Those that are compared unless others are named: bristles take long, and a force is no friction.
     pub const USUAL: [Self; 5] = [Self::Viscous, Self::Coulomb, Self::Asymmetric, Self::Stribeck, Self::Along];
 
     /// Its name on the command line.
@@ -54,6 +70,8 @@ impl FrictionLaw {
             Self::Stribeck => "stribeck",
             Self::Along => "along",
             Self::LuGre => "lugre",
+            Self::ForceAlong => "force-along",
+            Self::ForceBySpeed => "force-by-speed",
         }
     }
 
@@ -69,14 +87,16 @@ impl FrictionLaw {
     pub(super) fn is_above(self) -> bool {
         match self {
             Self::Viscous | Self::Coulomb | Self::Asymmetric => false,
-            Self::Stribeck | Self::Along | Self::LuGre => true,
+            Self::Stribeck | Self::Along | Self::LuGre | Self::ForceAlong | Self::ForceBySpeed => true,
         }
     }
 
     /// Whether it curves with speed: a run takes a hundred times as long then.
     pub(super) fn is_curved(self) -> bool {
         match self {
-            Self::Viscous | Self::Coulomb | Self::Asymmetric | Self::Along => false,
+            Self::Viscous | Self::Coulomb | Self::Asymmetric | Self::Along | Self::ForceAlong | Self::ForceBySpeed => {
+                false
+            }
             Self::Stribeck | Self::LuGre => true,
         }
     }
@@ -109,9 +129,19 @@ pub(super) fn with(
     let (table, keys) = table(case, law, sided, &friction, fastest, body);
     let mut free: Vec<String> = keys.iter().map(|key| format!("{body}.friction.{key}")).collect();
     put(&mut document, body, "friction", Value::InlineTable(table));
-    let is_own =
-        |key: &str| key.starts_with(&format!("{body}.friction.")) || matches!(key, "total.viscous" | "total.coulomb");
-    let offset = sided && plan.free.iter().any(|key| key == "cart.load");
+    let loaded = plan.free.iter().any(|key| key == "cart.load");
+    let line = line(case, law, sided || loaded);
+    if let Some((key, points, numbers)) = &line {
+        let point = |[x, force]: [f64; 2]| Value::Array(Array::from_iter([x, force]));
+        put(&mut document, "cart", key, Value::Array(points.iter().copied().map(point).collect()));
+        free.extend(numbers.iter().map(|number| format!("cart.{key}.{number}.force")));
+    }
+    let is_own = |key: &str| {
+        key.starts_with(&format!("{body}.friction."))
+            || matches!(key, "total.viscous" | "total.coulomb")
+            || line.as_ref().is_some_and(|(line, ..)| key.starts_with(&format!("cart.{line}.")))
+    };
+    let offset = sided && loaded;
     if offset {
         // Both directions hold it.
         put(&mut document, "cart", "load", Value::from(0.0));
@@ -127,6 +157,25 @@ pub(super) fn with(
     // The logs are those that are there already.
     let own = Case { experiments: case.experiments.clone(), ..Case::from_text(name, &document.to_string())? };
     Ok((own, Plan { free, tied, lumped, separate, bounds, priors, ..plan.clone() }))
+}
+
+/// The force that a law has beside the friction: its key, its points, and those of them whose force is searched for.
+/// `is_held` says that something else has a constant part, so that one point stays at zero.
+fn line(case: &Case, law: FrictionLaw, is_held: bool) -> Option<(&'static str, Vec<[f64; 2]>, Vec<usize>)> {
+    match law {
+        FrictionLaw::ForceAlong => {
+            let points = over_travel(case).map(|x| [x, 0.0]).collect();
+            Some(("force_along", points, (0..POINTS).filter(|k| !(is_held && *k == POINTS / 2)).collect()))
+        }
+        FrictionLaw::ForceBySpeed => {
+            // What goes with the speed is viscous friction, and what has its sign Coulomb friction.
+            let fastest = fastest(case);
+            let points = SPEEDS.iter().map(|share| [share * fastest, 0.0]).collect();
+            let is_free = |k: &usize| SPEEDS[*k] != 0.0 && SPEEDS[*k].abs() != 1.0;
+            Some(("force_by_speed", points, (0..SPEEDS.len()).filter(is_free).collect()))
+        }
+        _ => None,
+    }
 }
 
 /// The table of the friction, and the keys in it that are searched for.
@@ -158,7 +207,11 @@ fn table(
     }
     let velocity = FALL * fastest;
     match law {
-        FrictionLaw::Viscous | FrictionLaw::Coulomb | FrictionLaw::Asymmetric => {}
+        FrictionLaw::Viscous
+        | FrictionLaw::Coulomb
+        | FrictionLaw::Asymmetric
+        | FrictionLaw::ForceAlong
+        | FrictionLaw::ForceBySpeed => {}
         FrictionLaw::Stribeck => {
             let mut own = InlineTable::new();
             own.insert("force", Value::from(ABOVE * coulomb));
@@ -167,12 +220,8 @@ fn table(
             keys.extend(["stribeck.force", "stribeck.velocity"].map(String::from));
         }
         FrictionLaw::Along => {
-            let (low, high) = travel(case);
-            let point = |k: usize| {
-                let x = low + (high - low) * k as f64 / (POINTS - 1) as f64;
-                Value::Array(Array::from_iter([x, 1.0]))
-            };
-            table.insert("along", Value::Array((0..POINTS).map(point).collect()));
+            let point = |x: f64| Value::Array(Array::from_iter([x, 1.0]));
+            table.insert("along", Value::Array(over_travel(case).map(point).collect()));
             // One of them is 1: Coulomb friction is what the factors are of.
             let others = (0..POINTS).filter(|k| *k != POINTS / 2);
             keys.extend(others.map(|k| format!("along.{k}.factor")));
@@ -254,6 +303,12 @@ fn fastest(case: &Case) -> f64 {
         })
     });
     speeds.fold(1e-3, f64::max)
+}
+
+/// Places along the way that the logs show, m.
+fn over_travel(case: &Case) -> impl Iterator<Item = f64> {
+    let (low, high) = travel(case);
+    (0..POINTS).map(move |k| low + (high - low) * k as f64 / (POINTS - 1) as f64)
 }
 
 /// Where the cart is in the logs, m.

@@ -268,17 +268,22 @@ impl<const N: usize> ModeMatrices<N> {
             coupled |= exchange > 0.0 && moves != 0.0;
         }
 
-        // What a condition watches and no spring holds is bounded by a small stiffness κ that is not there: it feeds V,
-        // at a rate of ½ √(κ Σ arm²/m).
+        // What a condition watches and no spring holds is bounded by a small stiffness κ that is not there: it feeds V.
+        // So does a line by its damping c where that is below zero.
+        //
+        //   V = ½ κ s² + ½ m ṡ²,  m s̈ = −k s − c ṡ:   d√V/dt ≤ (½ |κ − k|/√(κ m) + max(−c, 0)/m) √V,  1/m = Σ arm²/m_j
         let mut stiffness = equations.stiffness;
         for (j, spring) in mechanism.springs.iter().enumerate() {
             let watched = equations.guards.iter().any(|guard| guard.form.stretch[j] != 0.0) && !at_rest[j];
+            let lightness: f64 = spring.arms.iter().map(|&(body, arm)| arm * arm / inertia[body]).sum();
+            let (slope, damping) = mechanism.slopes_of_line(j, mode);
             if stiffness[j] == 0.0 && watched {
                 let own = GROWTH.max(GROWTH_PER_INTERVAL / h);
-                let lightness: f64 = spring.arms.iter().map(|&(body, arm)| arm * arm / inertia[body]).sum();
-                stiffness[j] = 4.0 * own * own / lightness;
-                growth += own;
+                stiffness[j] = f64::max(4.0 * own * own / lightness, slope.abs());
+                // ½ √(κ/m) where nothing of it is there
+                growth += 0.5 * (stiffness[j] - slope).abs() * (lightness / stiffness[j]).sqrt();
             }
+            growth += f64::max(-damping, 0.0) * lightness;
         }
 
         // A little more, for the rounding of all that is compared with it.

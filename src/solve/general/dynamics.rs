@@ -255,6 +255,7 @@ fn kinds(mechanism: &Mechanism) -> Vec<usize> {
                 let sides = [Contact::Apart, Contact::High, Contact::Low];
                 causes.extend(sides.map(|to| Cause::Switch(Switch::Gap(index, to))));
             }
+            SpringLaw::Line { .. } => causes.extend([0, 1, 2].map(|to| Cause::Switch(Switch::Line(index, to)))),
             SpringLaw::Bounds { .. } => causes.push(Cause::Leave(index)),
             SpringLaw::TwoSided | SpringLaw::None => {}
         }

@@ -253,7 +253,7 @@ impl Model {
     #[inline(always)]
     pub(super) fn factor_at(&self, body: usize, coordinate: impl FnOnce() -> f64) -> f64 {
         match &self.mechanism.bodies[body].along {
-            Some(along) => along.factor(self.mechanism.origin[body] + coordinate()),
+            Some(along) => along.value(self.mechanism.origin[body] + coordinate()),
             None => 1.0,
         }
     }

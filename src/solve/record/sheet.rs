@@ -59,7 +59,10 @@ impl Sheets {
 
 fn same_elements(a: &Mode, b: &Mode) -> bool {
     let limits = |drive: &DriveMode| (drive.voltage, drive.current);
-    a.slack == b.slack && a.contact == b.contact && a.drive.iter().map(limits).eq(b.drive.iter().map(limits))
+    a.slack == b.slack
+        && a.contact == b.contact
+        && a.piece == b.piece
+        && a.drive.iter().map(limits).eq(b.drive.iter().map(limits))
 }
 
 impl Elements {
