@@ -76,8 +76,14 @@ const MOST_STEPS: usize = 12;
 
 /// The first fall of Σ c_k sᵏ, positive at 0, by steps that cannot pass it; none where it takes too many.
 ///
-/// With |p″| ≤ B = Σ k (k − 1) |c_k|, p(s + δ) ≥ p + p′ δ − ½ B δ² stays positive up to δ = 2p/(√(p′² + 2 B p) − p′), and
-/// near a fall these steps are those of Newton's method.
+/// With |p″| ≤ B = Σ k (k − 1) |c_k|, p(s + δ) ≥ p + p′ δ − ½ B δ² stays positive up to
+///
+/// ```text
+/// δ = 2p/(√(p′² + 2 B p) − p′) = (√(p′² + 2 B p) + p′)/B
+/// ```
+///
+/// of which the first holds its digits where p falls, the second where it rises. Near a fall these steps are those of
+/// Newton's method.
 fn by_steps(c: &[f64]) -> Option<Option<f64>> {
     let mut bends = [0.0; 4];
     for (c, weights) in c.chunks(4).zip(&BENDS) {
@@ -90,7 +96,8 @@ fn by_steps(c: &[f64]) -> Option<Option<f64>> {
         if p <= 0.0 {
             return Some(Some(s));
         }
-        let by = 2.0 * p / ((slope * slope + 2.0 * bend * p).sqrt() - slope);
+        let root = (slope * slope + 2.0 * bend * p).sqrt();
+        let by = if slope > 0.0 { (root + slope) / bend } else { 2.0 * p / (root - slope) };
         if by <= 0.5 * f64::EPSILON * s {
             return Some(Some(s));
         }
@@ -272,6 +279,15 @@ mod tests {
             }
         }
         assert!(falls > 5000 && stays > 1000 && left < 200, "{falls} {stays} {left}");
+    }
+
+    /// What begins close above zero, rises and comes back falls there: s³ − 1.5 s² + 0.5 s + ε at 0.5 + 4 ε.
+    #[test]
+    fn what_rises_from_all_but_zero_comes_back() {
+        for above in [1e-9, 1e-14, 1e-17, 1e-20, 1e-30, 1e-300] {
+            let root = first_fall(&[above, 0.5, -1.5, 1.0]).unwrap();
+            assert!((root - 0.5 - 4.0 * above).abs() < 1e-14, "{above:e}: {root}");
+        }
     }
 
     /// Wider vectors do the same operations in the same order.
