@@ -83,7 +83,7 @@ fn the_examples_of_the_reference_read() {
     let blocks = text.split("```toml\n").skip(1).map(|block| block.split("```").next().unwrap_or_default());
     let (variants, parts): (Vec<&str>, Vec<&str>) = blocks.partition(|block| block.starts_with("# instead"));
     let whole = parts.join("\n");
-    assert_eq!(variants.len(), 7);
+    assert_eq!(variants.len(), 8);
     for variant in variants {
         let table = variant.lines().find(|line| line.starts_with('[')).unwrap();
         let begin = whole.find(if table == "[drive]" { "[motor]" } else { table }).unwrap();

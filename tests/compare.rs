@@ -100,7 +100,7 @@ fn what_cannot_be_compared_is_refused() {
     assert_eq!(told(&never), "-1 s is no length of windows\n  allowed: above zero");
     assert_eq!(
         FrictionLaw::named("dry").unwrap_err().to_string(),
-        "there is no friction law \"dry\" to compare\n  allowed: viscous, coulomb, asymmetric, stribeck, along, lugre"
+        "there is no friction law \"dry\" to compare\n  allowed: viscous, coulomb, asymmetric, stribeck, along, force-along, force-by-speed, lugre"
     );
 }
 

@@ -8,9 +8,8 @@ use super::standard::observed;
 use super::state_feedback::{Law, StateFeedbackState};
 use crate::design::{Cascade, Design, Pid, Structure};
 use crate::error::{Error, Result};
-use crate::linear::{SMALL, solve_shifted};
 use crate::stage::Stage;
-use nalgebra::{Complex, DMatrix, DVector, Hessenberg};
+use nalgebra::{Complex, DMatrix, DVector, Schur};
 use std::f64::consts::PI;
 
 /// The controller of a design as D u = −(N_y y + N_x x + N_i i), with y the measured position, x the cart on a scale
@@ -174,20 +173,20 @@ fn cascade(gains: &Cascade, t: f64, z: Complex<f64>, change: Complex<f64>) -> ([
 }
 
 /// The Kalman filter and the regulator as a filter of what is measured, from [`Law`], in coordinates in which the
-/// resolvent of the estimate costs least: (Φ C)ᵀ = Q H Qᵀ, H upper Hessenberg.
+/// resolvent of the estimate costs least: (Φ C)ᵀ = U T Uᴴ, T upper triangular (Schur's form).
 #[derive(Debug, Clone)]
 struct Observed {
     law: Law,
-    /// H; of the estimate from one sample to the next, C = Π (I − L_i m_i).
-    estimate: DMatrix<f64>,
-    /// Qᵀ Cᵀ k, of the estimate before a sample to the command.
-    row: DVector<f64>,
-    /// Of encoder and scale: Qᵀ Φ G, of the measured position to the estimate, and k G, straight to the command; G_i =
+    /// T, column by column as far as its diagonal; of the estimate from one sample to the next, C = Π (I − L_i m_i).
+    estimate: Vec<Vec<Complex<f64>>>,
+    /// Uᴴ Cᵀ k, of the estimate before a sample to the command.
+    row: DVector<Complex<f64>>,
+    /// Of encoder and scale: Uᵀ Φ G, of the measured position to the estimate, and k G, straight to the command; G_i =
     /// Π_{j>i} (I − L_j m_j) L_i.
-    sensors: Vec<(DVector<f64>, f64)>,
-    /// Qᵀ Γ₀ and Qᵀ Γ₁, of commands.
-    now: DVector<f64>,
-    before: DVector<f64>,
+    sensors: Vec<(DVector<Complex<f64>>, f64)>,
+    /// Uᵀ Γ₀ and Uᵀ Γ₁, of commands.
+    now: DVector<Complex<f64>>,
+    before: DVector<Complex<f64>>,
 }
 
 impl Observed {
@@ -202,13 +201,14 @@ impl Observed {
             gains.push(sensor.kalman.clone());
             corrected = correct * corrected;
         }
-        let (q, estimate) = Hessenberg::new((&law.phi * &corrected).transpose()).unpack();
+        let complex = |v: &DVector<f64>| v.map(|v| Complex::new(v, 0.0));
+        let (u, t) = Schur::new((&law.phi * &corrected).transpose().map(|v| Complex::new(v, 0.0))).unpack();
         Self {
-            estimate,
-            row: q.tr_mul(&corrected.tr_mul(&own)),
-            sensors: gains.iter().map(|gain| (q.tr_mul(&(&law.phi * gain)), own.dot(gain))).collect(),
-            now: q.tr_mul(&law.now),
-            before: q.tr_mul(&law.before),
+            estimate: (0..n).map(|j| (0..=j).map(|i| t[(i, j)]).collect()).collect(),
+            row: u.ad_mul(&complex(&corrected.tr_mul(&own))),
+            sensors: gains.iter().map(|gain| (u.tr_mul(&complex(&(&law.phi * gain))), own.dot(gain))).collect(),
+            now: u.tr_mul(&complex(&law.now)),
+            before: u.tr_mul(&complex(&law.before)),
             law: law.clone(),
         }
     }
@@ -216,16 +216,17 @@ impl Observed {
     /// N_y and N_x, D₀ and N_u of the command before filters: v D₀ = −(N_y y + N_x x + N_u u).
     fn at(&self, z: Complex<f64>, change: Complex<f64>) -> ([Complex<f64>; 2], Complex<f64>, Complex<f64>) {
         let law = &self.law;
-        let n = self.estimate.nrows();
+        let n = self.row.len();
         let inverse = z.inv();
         // x̂⁺ = C x̂ + G y,  z x̂ = Φ x̂⁺ + Γ₀ z^{−d} u + Γ₁ z^{−d−1} u
         let lag = inverse.powi(law.lag() as i32);
         // kᵀ C (z I − Φ C)⁻¹, a row for all that it is asked of
         let row = self.resolved(z);
-        let seen = |from: &dyn Fn(usize) -> Complex<f64>| (0..n).map(|i| row[i] * from(i)).sum::<Complex<f64>>();
+        let seen =
+            |from: &DVector<Complex<f64>>| row.iter().zip(from).map(|(row, from)| row * from).sum::<Complex<f64>>();
         let mut positions = [Complex::ZERO; 2];
         for (position, (corrected, direct)) in positions.iter_mut().zip(&self.sensors) {
-            *position = seen(&|i| Complex::new(corrected[i], 0.0)) + *direct;
+            *position = seen(corrected) + *direct;
         }
         if let Some(integral) = law.integral() {
             positions[self.sensors.len().min(2) - 1] += Complex::new(integral * law.every, 0.0) / change;
@@ -234,23 +235,18 @@ impl Observed {
         for i in 0..law.pending {
             delayed += inverse.powi(i as i32 + 1) * law.gain[n + i];
         }
-        (positions, delayed, seen(&|i| lag * self.now[i] + lag * inverse * self.before[i]))
+        (positions, delayed, lag * (seen(&self.now) + inverse * seen(&self.before)))
     }
 
     /// The row kᵀ C times the resolvent of the estimate; no numbers on a pole.
     fn resolved(&self, z: Complex<f64>) -> Vec<Complex<f64>> {
-        let n = self.estimate.nrows();
-        let mut row: Vec<Complex<f64>> = self.row.iter().map(|v| Complex::new(*v, 0.0)).collect();
-        let solved = match n <= SMALL {
-            true => solve_shifted(&self.estimate, z, false, &mut row),
-            false => {
-                let mut shifted = self.estimate.map(|v| Complex::new(-v, 0.0));
-                (0..n).for_each(|i| shifted[(i, i)] += z);
-                let found = shifted.lu().solve(&DVector::from_column_slice(&row));
-                row = found.iter().flat_map(|found| found.iter().copied()).collect();
-                row.len() == n
-            }
-        };
-        if solved { row } else { vec![Complex::new(f64::NAN, f64::NAN); n] }
+        let mut row = self.row.as_slice().to_vec();
+        for (i, column) in self.estimate.iter().enumerate().rev() {
+            let (before, own) = row.split_at_mut(i);
+            let found = own[0] / (z - column[i]);
+            own[0] = found;
+            before.iter_mut().zip(column).for_each(|(row, t)| *row += t * found);
+        }
+        row
     }
 }

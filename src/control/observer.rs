@@ -56,17 +56,16 @@ impl DisturbanceState {
 
     /// Its transfer at z from a command and from a position: w = W_u u + W_y y.
     pub(super) fn at(&self, z: Complex<f64>) -> [Complex<f64>; 2] {
-        // s⁺ = (A − L c) s + b u + L y,  w = s₃
-        let c = RowVector3::new(1.0, 0.0, 0.0);
-        let mut shifted = (self.a - self.gain * c).map(|v| Complex::new(-v, 0.0));
-        for i in 0..3 {
-            shifted[(i, i)] += z;
-        }
-        let lu = shifted.lu();
-        [self.b, self.gain].map(|from| {
-            let solved = lu.solve(&from.map(|v| Complex::new(v, 0.0)));
-            solved.map_or(Complex::new(f64::NAN, f64::NAN), |s| s[2])
-        })
+        // s⁺ = (A − L c) s + b u + L y,  w = s₃: the third row of (z I − A + L c)⁻¹ by its minors
+        let own = self.a - self.gain * RowVector3::new(1.0, 0.0, 0.0);
+        let n = |i: usize, j: usize| if i == j { z - own[(i, j)] } else { Complex::new(-own[(i, j)], 0.0) };
+        let row = [
+            n(1, 0) * n(2, 1) - n(1, 1) * n(2, 0),
+            n(0, 1) * n(2, 0) - n(0, 0) * n(2, 1),
+            n(0, 0) * n(1, 1) - n(0, 1) * n(1, 0),
+        ];
+        let inverse = (n(0, 2) * row[0] + n(1, 2) * row[1] + n(2, 2) * row[2]).inv();
+        [self.b, self.gain].map(|from| (row[0] * from[0] + row[1] * from[1] + row[2] * from[2]) * inverse)
     }
 
     /// Forgets.

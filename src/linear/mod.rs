@@ -27,7 +27,7 @@ pub use discrete::{Discrete, Hold};
 pub use gantry::{GantryAnalysis, ResonanceMap};
 pub use model::{Operation, StateSpace, Variable};
 pub use natural::{ElasticMode, Natural, RigidMode};
-pub use response::{Range, Response, SMALL, Transfer, solve_shifted};
+pub use response::{Range, Response, Transfer};
 pub use travel::{Place, places, travel, undamped};
 pub use words::{assumptions, sticks};
 pub use zeros::Zeros;

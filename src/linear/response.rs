@@ -185,16 +185,16 @@ impl StateSpace {
 }
 
 /// Most states of a system that is solved without memory of its own: one is asked at some hundred thousand frequencies.
-pub const SMALL: usize = 12;
+const SMALL: usize = 12;
 
-/// Puts (s I − A)⁻¹ x in the place of x, or with the transposed matrix, by elimination with partial pivoting; false on a
-/// pole. For up to [`SMALL`] states.
-pub fn solve_shifted(a: &DMatrix<f64>, s: Complex<f64>, transposed: bool, x: &mut [Complex<f64>]) -> bool {
+/// Puts (s I − A)⁻¹ x in the place of x, by elimination with partial pivoting; false on a pole. For up to [`SMALL`]
+/// states.
+fn solve_shifted(a: &DMatrix<f64>, s: Complex<f64>, x: &mut [Complex<f64>]) -> bool {
     let n = a.nrows();
     let mut rows = [[Complex::ZERO; SMALL]; SMALL];
     for i in 0..n {
         for j in 0..n {
-            rows[i][j] = Complex::new(-if transposed { a[(j, i)] } else { a[(i, j)] }, 0.0);
+            rows[i][j] = Complex::new(-a[(i, j)], 0.0);
         }
         rows[i][i] += s;
     }
@@ -246,7 +246,7 @@ pub(super) fn solve(
     if n <= SMALL {
         let mut x = [Complex::ZERO; SMALL];
         x.iter_mut().zip(b.iter()).for_each(|(x, b)| *x = Complex::new(*b, 0.0));
-        return match solve_shifted(a, s, false, &mut x[..n]) {
+        return match solve_shifted(a, s, &mut x[..n]) {
             true => (0..d.len()).map(|i| (0..n).map(|j| x[j] * c[(i, j)]).sum::<Complex<f64>>() + d[i]).collect(),
             false => vec![Complex::new(f64::NAN, f64::NAN); d.len()],
         };

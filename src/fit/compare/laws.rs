@@ -131,15 +131,15 @@ pub(super) fn with(
     put(&mut document, body, "friction", Value::InlineTable(table));
     let loaded = plan.free.iter().any(|key| key == "cart.load");
     let line = line(case, law, sided || loaded);
-    if let Some((key, points, numbers)) = &line {
-        let point = |[x, force]: [f64; 2]| Value::Array(Array::from_iter([x, force]));
-        put(&mut document, "cart", key, Value::Array(points.iter().copied().map(point).collect()));
+    if let Some(Line { key, over, free: numbers }) = &line {
+        let point = |x: &f64| Value::Array(Array::from_iter([*x, 0.0]));
+        put(&mut document, "cart", key, Value::Array(over.iter().map(point).collect()));
         free.extend(numbers.iter().map(|number| format!("cart.{key}.{number}.force")));
     }
     let is_own = |key: &str| {
         key.starts_with(&format!("{body}.friction."))
             || matches!(key, "total.viscous" | "total.coulomb")
-            || line.as_ref().is_some_and(|(line, ..)| key.starts_with(&format!("cart.{line}.")))
+            || line.as_ref().is_some_and(|line| key.starts_with(&format!("cart.{}.", line.key)))
     };
     let offset = sided && loaded;
     if offset {
@@ -159,20 +159,30 @@ pub(super) fn with(
     Ok((own, Plan { free, tied, lumped, separate, bounds, priors, ..plan.clone() }))
 }
 
-/// The force that a law has beside the friction: its key, its points, and those of them whose force is searched for.
-/// `is_held` says that something else has a constant part, so that one point stays at zero.
-fn line(case: &Case, law: FrictionLaw, is_held: bool) -> Option<(&'static str, Vec<[f64; 2]>, Vec<usize>)> {
+/// A force beside the friction that is a line over the travel or the speed, zero to start from.
+struct Line {
+    /// Under `[cart]`.
+    key: &'static str,
+    /// m or m/s, of its points.
+    over: Vec<f64>,
+    /// The numbers of the points whose force is searched for.
+    free: Vec<usize>,
+}
+
+/// The force that a law has beside the friction. `is_held` says that something else has a constant part, so that one
+/// point stays at zero.
+fn line(case: &Case, law: FrictionLaw, is_held: bool) -> Option<Line> {
     match law {
         FrictionLaw::ForceAlong => {
-            let points = over_travel(case).map(|x| [x, 0.0]).collect();
-            Some(("force_along", points, (0..POINTS).filter(|k| !(is_held && *k == POINTS / 2)).collect()))
+            let free = (0..POINTS).filter(|k| !(is_held && *k == POINTS / 2)).collect();
+            Some(Line { key: "force_along", over: over_travel(case).collect(), free })
         }
         FrictionLaw::ForceBySpeed => {
             // What goes with the speed is viscous friction, and what has its sign Coulomb friction.
             let fastest = fastest(case);
-            let points = SPEEDS.iter().map(|share| [share * fastest, 0.0]).collect();
             let is_free = |k: &usize| SPEEDS[*k] != 0.0 && SPEEDS[*k].abs() != 1.0;
-            Some(("force_by_speed", points, (0..SPEEDS.len()).filter(is_free).collect()))
+            let free = (0..SPEEDS.len()).filter(is_free).collect();
+            Some(Line { key: "force_by_speed", over: SPEEDS.iter().map(|share| share * fastest).collect(), free })
         }
         _ => None,
     }
