@@ -295,26 +295,32 @@ fn hunting_is_found_where_there_is_stiction() {
 }
 
 /// Play in the gear was not among the causes: a loop that chatters through it was said to swing "whatever is left out".
-/// With an integral and a scale at the cart it swings evenly, without an integral from one flank to the other as it
-/// comes, which is told as irregular.
+/// With a scale at the cart and little derivative it swings evenly, by more the wider the play is, with more derivative
+/// from one flank to the other as it comes, which is told as irregular.
 #[test]
 fn a_limit_cycle_through_play_has_its_name() {
     let smooth = |body: &str, viscous: &str| format!("{body}.friction={{ viscous = {viscous}, coulomb = 0 }}");
     let [a, b, c] = [("cart", "2"), ("drive_pulley", "1e-4"), ("idler_pulley", "1e-4")].map(|(k, v)| smooth(k, v));
-    let hunt = |integral: &str, backlash: &str| {
-        let pid =
-            format!("controller.pid={{ proportional = 1000, integral = {integral}, derivative = 5, filter = 200 }}");
+    let hunt = |derivative: &str, backlash: &str| {
+        let pid = format!(
+            "controller.pid={{ proportional = 1000, integral = 1000, derivative = {derivative}, filter = 200 }}"
+        );
         let play = format!("motor.backlash=\"{backlash}\"");
         let gear =
             ["motor.rotor_inertia=1e-5", "motor.gear_stiffness=300", "encoder={ at = \"cart\", lines = 250000 }"];
         let case = case("pid.toml", &[gear[0], gear[1], &play, &a, &b, &c, &pid, gear[2]]);
         hunting(&case.stage, case.controller.as_ref().unwrap()).unwrap()
     };
-    let even = hunt("5000", "3 deg").expect("a limit cycle");
-    assert_eq!((&even.needs[..], even.irregular), (&["play in the gear"][..], false), "{even:?}");
-    let uneven = hunt("0", "3 deg").expect("a limit cycle");
-    assert_eq!((&uneven.needs[..], uneven.irregular), (&["play in the gear"][..], true), "{uneven:?}");
-    assert_eq!(hunt("5000", "0 deg"), None);
+    let even = ["1 deg", "3 deg", "10 deg"].map(|play| hunt("1", play).expect("a limit cycle"));
+    for swing in &even {
+        assert_eq!((&swing.needs[..], swing.irregular), (&["play in the gear"][..], false), "{swing:?}");
+    }
+    assert!(even[1].amplitude > 2.0 * even[0].amplitude && even[2].amplitude > 2.0 * even[1].amplitude, "{even:?}");
+    for play in ["1 deg", "3 deg", "10 deg"] {
+        let uneven = hunt("10", play).expect("a limit cycle");
+        assert_eq!((&uneven.needs[..], uneven.irregular), (&["play in the gear"][..], true), "{uneven:?}");
+    }
+    assert_eq!(hunt("1", "0 deg"), None);
 }
 
 /// With its defaults `taut tune` made the project's own machines worse (17 to 28 µm, 24 to 7 axes that settle) and said
