@@ -180,7 +180,7 @@ def test_tuning_is_the_command_lines(root, moving):
     told = program(root, "tune", f"{STAGE}/controllers/pid.toml", "--evaluate")
     tuned = moving.tune(evaluate=True)
     assert tuned.data == told
-    assert tuned.verdict == "unchanged" and tuned.forced_by is None
+    assert tuned.verdict == "unchanged" and tuned.forced_by is None and tuned.least_worse is None
     assert tuned.case["controller"] == moving["controller"]
     assert all(name in tuned._repr_html_() for name in tuned.gains)
     with pytest.raises(TypeError, match="spread: a number in SI units is wanted"):

@@ -2,7 +2,8 @@
 
 use super::number;
 use crate::case::{Case, Move, Tuning};
-use crate::tune::{AtWorst, Choice, Margins, MoveVerdict, Tuned, Verdict, gains};
+use crate::design::Design;
+use crate::tune::{AtWorst, Choice, Least, Margins, MoveVerdict, Tuned, Verdict, gains};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 
@@ -20,6 +21,7 @@ pub fn tuned(case: &Case, tuning: &Tuning, tuned: &Tuned) -> Value {
         "structure": tuned.after.design.structure.name(),
         "verdict": tuned.judgement.word(),
         "forced_by": forced,
+        "least_worse": tuned.least.as_ref().map(|least| least_worse(tuned, least)),
         "cost": tuning.cost.map_or("none", |cost| cost.word()),
         "limits": { "sensitivity": tuning.sensitivity, "complementary": tuning.complementary },
         "family": {
@@ -113,8 +115,27 @@ fn verdict(tuned: &Tuned, verdict: &Verdict) -> Value {
     })
 }
 
-fn choice(tuned: &Tuned, choice: &Choice) -> Value {
+/// The gains of a design.
+fn values(tuned: &Tuned, design: &Design) -> Vec<Value> {
     let gain = |gain: crate::tune::Gain| json!({ "key": gain.key, "unit": gain.unit, "value": gain.value });
+    gains(design, &tuned.family.stage).into_iter().map(gain).collect()
+}
+
+fn least_worse(tuned: &Tuned, least: &Least) -> Value {
+    let worse = &least.worse;
+    json!({
+        "move": tuned.moves[worse.motion].name,
+        "figure": worse.figure.word(),
+        "before": number(worse.before),
+        "after": number(worse.after),
+        "by": number(worse.by),
+        "objective": objective(least.objective),
+        "gains": values(tuned, &least.design),
+        "filters": least.design.filters.len(),
+    })
+}
+
+fn choice(tuned: &Tuned, choice: &Choice) -> Value {
     let axes = tuned.after.moves.first().map_or(0, |one| one.settled.1);
     let one = |(motion, worst): (&Move, &AtWorst)| {
         let mut object = at_worst(worst, axes);
@@ -125,7 +146,7 @@ fn choice(tuned: &Tuned, choice: &Choice) -> Value {
         "name": choice.name,
         "chosen": choice.chosen,
         "objective": objective(choice.objective),
-        "gains": gains(&choice.design, &tuned.family.stage).into_iter().map(gain).collect::<Vec<_>>(),
+        "gains": values(tuned, &choice.design),
         "filters": choice.design.filters.len(),
         "worst": tuned.moves.iter().zip(&choice.worst).map(one).collect::<Vec<_>>(),
     })

@@ -32,7 +32,7 @@ pub use objective::{AtWorst, BALANCES, Balance, MoveFigures, look, objective};
 pub use placement::{first, place};
 pub use reference::evolved;
 pub use search::{Found, minimise, minimise_below};
-pub use verdict::{Forced, Judgement, Limit, MoveVerdict, Verdict};
+pub use verdict::{Figure, Forced, Judgement, Least, Limit, MoveVerdict, Verdict, Worse};
 
 use crate::case::{Case, Cost, EFFORTS, Move, Tuning};
 use crate::control::feedback::Feedback;
@@ -71,6 +71,8 @@ pub struct Tuned {
     pub judgement: Judgement,
     /// The limit that makes it worse, where one does.
     pub forced: Option<Forced>,
+    /// Where it is worse: what comes nearest to being no worse.
+    pub least: Option<Least>,
     /// The choices between stiff and gentle, what was chosen among them.
     pub choices: Vec<Choice>,
     /// Bandwidth that the search began with, Hz; none where it began with weights, or did not search.
@@ -319,6 +321,7 @@ fn ended(
     placed: Option<f64>,
 ) -> Result<Tuned> {
     let judgement = compare(&before, &after);
+    let least = if judgement == Judgement::Worse { work.least(&before) } else { None };
     let before = work.watched(before)?;
     let after = if before.design == after.design { before.clone() } else { work.watched(after)? };
     let belt = &work.case.stage.belt;
@@ -327,6 +330,7 @@ fn ended(
     Ok(Tuned {
         judgement,
         forced,
+        least,
         choices,
         placed,
         family: work.family.clone(),

@@ -15,6 +15,9 @@ use crate::solve::{Ending, Solver};
 /// By what share a figure may differ and be the same.
 const SAME: f64 = 1e-6;
 
+/// A settling time below which a later one is counted as a share of this, s.
+const SHORT: f64 = 0.05;
+
 /// The verdict on a controller: on the axis of the file, and at worst over the family.
 #[derive(Debug, Clone)]
 pub struct Verdict {
@@ -98,6 +101,55 @@ impl Limit {
     }
 }
 
+/// A figure of a move at worst over the family.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Figure {
+    /// |x − y|, m.
+    Error,
+    /// Until the cart settles, s.
+    Settling,
+    /// Axes on which it settles.
+    Settled,
+}
+
+impl Figure {
+    /// As in `tune.json`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Error => "cart_error_m",
+            Self::Settling => "settling_s",
+            Self::Settled => "settled",
+        }
+    }
+}
+
+/// The figure of all moves that is worse by most than before.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Worse {
+    /// The place of the move in the list.
+    pub motion: usize,
+    /// Which figure.
+    pub figure: Figure,
+    /// It, m, s or axes.
+    pub before: f64,
+    /// It, m, s or axes.
+    pub after: f64,
+    /// By what share of what it was, of a settling below 50 ms of these, of the axes those on which it settles no more.
+    pub by: f64,
+}
+
+/// Of all controllers within the limits that were judged on the whole family, that one whose worst figure is worse by
+/// least than before: what the limits cost at least, as far as the search has seen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Least {
+    /// It.
+    pub design: Design,
+    /// Its worst figure.
+    pub worse: Worse,
+    /// ln J.
+    pub objective: f64,
+}
+
 /// The limit that is active at gains that are worse than those before.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Forced {
@@ -148,7 +200,7 @@ impl Verdict {
     pub(super) fn worse_on(&self, before: &Verdict, count: usize) -> Watch {
         let of_move = |(is, was): (&MoveVerdict, &MoveVerdict)| {
             let beyond = |seen: &MoveFigures| {
-                let later = (seen.settles - was.at_worst.settles.0) / was.at_worst.settles.0.max(0.05);
+                let later = (seen.settles - was.at_worst.settles.0) / was.at_worst.settles.0.max(SHORT);
                 let left = if seen.settling.is_none() && is.settled.0 < was.settled.0 { 1.0 } else { 0.0 };
                 (seen.error / was.at_worst.error.0).ln().max(later).max(left)
             };
@@ -277,18 +329,54 @@ pub(super) fn compare(before: &Verdict, after: &Verdict) -> Judgement {
     if before.design == after.design {
         return Judgement::Unchanged;
     }
-    let is_worse = |(was, is): (&MoveVerdict, &MoveVerdict)| {
-        let (was, is) = (&was.at_worst, &is.at_worst);
-        is.settled < was.settled
-            || is.error.0 > was.error.0 * (1.0 + SAME)
-            || is.settles.0 > was.settles.0 * (1.0 + SAME) + SAME
-            || !is.error.0.is_finite() && was.error.0.is_finite()
-    };
-    if before.moves.iter().zip(&after.moves).any(is_worse) {
+    if worse(before, after).is_some() {
         return Judgement::Worse;
     }
     let holds_more = after.worst.sensitivity < before.worst.sensitivity * (1.0 - SAME);
     if after.objective < before.objective - SAME || holds_more { Judgement::Better } else { Judgement::Unchanged }
+}
+
+/// The figure that is worse by most than before; none if none is.
+pub(super) fn worse(before: &Verdict, after: &Verdict) -> Option<Worse> {
+    let of_move = |(motion, (was, is)): (usize, (&MoveVerdict, &MoveVerdict))| {
+        let axes = is.settled.1 as f64;
+        let (was, is) = (&was.at_worst, &is.at_worst);
+        let lost = was.settled.saturating_sub(is.settled) as f64;
+        let finite = |share: f64| if share.is_nan() { f64::INFINITY } else { share };
+        let figures = [
+            (
+                is.error.0 > was.error.0 * (1.0 + SAME) || !is.error.0.is_finite() && was.error.0.is_finite(),
+                (Figure::Error, was.error.0, is.error.0, finite(is.error.0 / was.error.0 - 1.0)),
+            ),
+            (
+                is.settles.0 > was.settles.0 * (1.0 + SAME) + SAME,
+                (
+                    Figure::Settling,
+                    was.settles.0,
+                    is.settles.0,
+                    finite((is.settles.0 - was.settles.0) / was.settles.0.max(SHORT)),
+                ),
+            ),
+            (lost > 0.0, (Figure::Settled, was.settled as f64, is.settled as f64, lost / axes)),
+        ];
+        let told = figures.into_iter().filter(|(is_worse, _)| *is_worse);
+        told.map(move |(_, (figure, before, after, by))| Worse { motion, figure, before, after, by })
+            .collect::<Vec<_>>()
+    };
+    let all = before.moves.iter().zip(&after.moves).enumerate().flat_map(of_move);
+    all.max_by(|a, b| a.by.total_cmp(&b.by))
+}
+
+impl Work<'_> {
+    /// Of all designs within the limits that were judged on the whole family, that one whose worst figure is worse by
+    /// least.
+    pub fn least(&self, before: &Verdict) -> Option<Least> {
+        let known = self.known.borrow();
+        let within = known.iter().filter(|one| one.design != before.design && self.excess(&one.worst) <= 1.0);
+        let judged = within.filter_map(|one| Some((one, worse(before, one)?)));
+        let (one, worse) = judged.min_by(|(_, a), (_, b)| a.by.total_cmp(&b.by))?;
+        Some(Least { design: one.design.clone(), worse, objective: one.objective })
+    }
 }
 
 /// Share of a limit from which on it is active: gains are rounded, and a search on the grid keeps 2 % away.

@@ -298,6 +298,13 @@ class Tuned:
         return forced
 
     @property
+    def least_worse(self) -> dict[str, Any] | None:
+        """Where it is worse: of all gains within the limits that were judged, those whose worst figure is worse by least
+        (``move``, ``figure``, ``before``, ``after``, ``by`` as a share, ``objective``, ``gains``, ``filters``)."""
+        least: dict[str, Any] | None = self.data["least_worse"]
+        return least
+
+    @property
     def gains(self) -> dict[str, tuple[float, float, str]]:
         """Of each gain: as the file has it, as it was found, and its unit."""
         return {row["key"]: (row["before"], row["after"], row["unit"]) for row in self.data["gains"]}

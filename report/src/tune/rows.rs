@@ -4,7 +4,7 @@ use super::Work;
 use std::f64::consts::PI;
 use taut::control::Deviation;
 use taut::number::engineering;
-use taut::tune::{AtWorst, Corner, Hunt, Judgement, Margins, MoveVerdict, Source};
+use taut::tune::{AtWorst, Corner, Figure, Hunt, Judgement, Margins, MoveVerdict, Source, Worse};
 
 /// A length in µm.
 fn length(metres: f64) -> String {
@@ -135,14 +135,31 @@ pub fn verdict(work: &Work) -> String {
         (Judgement::Unchanged, _) => {
             "UNCHANGED: no gains were found that make the moves better within the limits".into()
         }
-        (Judgement::Worse, None) => format!("WORSE than the gains of the file{told}"),
+        (Judgement::Worse, None) => format!("WORSE than the gains of the file{told}{}", least(work)),
         (Judgement::Worse, Some(forced)) => format!(
-            "WORSE than the gains of the file{told}. The limit of {} forces it, by {:.1} Hz with the cart at {:.0} mm",
+            "WORSE than the gains of the file{told}. The limit of {} forces it, by {:.1} Hz with the cart at {:.0} mm{}",
             forced.limit.word(),
             forced.mode,
-            1e3 * forced.place
+            1e3 * forced.place,
+            least(work)
         ),
     }
+}
+
+/// What comes nearest to being no worse, in words, a sentence of its own.
+fn least(work: &Work) -> String {
+    let Some(least) = &work.tuned.least else { return String::new() };
+    let Worse { motion, figure, before, after, .. } = least.worse;
+    let name = &work.tuned.moves[motion].name;
+    let what = match figure {
+        Figure::Error => format!("errs {}, {} before", length(after), length(before)),
+        Figure::Settling => format!("settles after {:.0} ms, {:.0} ms before", 1e3 * after, 1e3 * before),
+        Figure::Settled => format!("settles on {after} axes, {before} before"),
+    };
+    let which = if least.design == work.tuned.after.design { "these gains" } else { "least_worse in tune.json" };
+    format!(
+        ". Of all gains within the limits that were judged, the least worse in their worst figure are {which}: {name} {what}"
+    )
 }
 
 /// The change of a move at worst, in words; none where there is none.
