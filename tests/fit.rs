@@ -152,6 +152,26 @@ fn a_minimum_on_a_kink_is_one() {
     }
 }
 
+/// A search may ask for a breakaway below Coulomb friction; the machine then breaks away at Coulomb friction, and that is
+/// told: 0.26 N beside 21 N could not be read back.
+#[test]
+fn a_breakaway_is_never_told_below_coulomb_friction() {
+    let truth = ["cart.friction.viscous=24", "cart.friction.coulomb=0.6"];
+    for seed in 1..5 {
+        let mut case = with_logs_of(recorded(&truth, seed, 2e-3));
+        case.stage.cart.friction.forward.breakaway = 0.3;
+        case.stage.cart.friction.backward.breakaway = 0.3;
+        let keys = ["cart.friction.viscous", "cart.friction.coulomb", "cart.friction.static"];
+        let found = fit(&case, &plan(&keys), None, &mut |_| Flow::Continue).unwrap();
+        let value = |key: &str| found.estimates.iter().find(|one| one.name == key).unwrap().value;
+        assert!(
+            value("cart.friction.static") >= value("cart.friction.coulomb") * (1.0 - 1e-9),
+            "{:?}",
+            found.estimates
+        );
+    }
+}
+
 /// The machine of the template with some numbers changed, and the logs of both pulses that its encoder makes of an
 /// angle that trembles with this deviation, rad.
 fn recorded(changes: &[&str], seed: u64, noise: f64) -> Case {

@@ -14,7 +14,7 @@ use taut::control::{Controller, Observation, Setup, Standard, closed_loop};
 use taut::design::{Design, Structure};
 use taut::signal::profile::Reference;
 use taut::solve::{Ending, Solver};
-use taut::tune::{Corner, Family, Judgement, Margins, Plant, evaluate, hunting, minimise, place, tune};
+use taut::tune::{Corner, Family, Figure, Judgement, Margins, Plant, evaluate, hunting, minimise, place, tune};
 
 fn case(name: &str, changes: &[&str]) -> Case {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
@@ -351,6 +351,35 @@ fn no_move_gets_worse_unless_a_limit_forces_it() {
     assert_ne!(next.judgement, Judgement::Worse);
     let judged = evaluate(&again, &Tuning::default()).unwrap();
     assert_eq!(judged.before.objective, tuned.after.objective);
+}
+
+/// What limits cost that no gains keep without a worse figure: of all that were judged, the least worse.
+#[test]
+fn what_the_limits_cost_at_least_is_told() {
+    let case = case("pid-elastic.toml", &[]);
+    let tight = Tuning { sensitivity: 1.3, complementary: 1.3, effort: 0.3, ..Tuning::default() };
+    let tuned = tune(&case, &tight, &|| false).unwrap();
+    assert!(tuned.holds && tuned.judgement == Judgement::Worse, "{:?}", tuned.judgement);
+    let least = tuned.least.as_ref().expect("what is least worse");
+    let (was, worse) = (&tuned.before.moves[least.worse.motion].at_worst, least.worse);
+    let before = match worse.figure {
+        Figure::Error => was.error.0,
+        Figure::Settling => was.settles.0,
+        Figure::Settled => was.settled as f64,
+    };
+    assert_eq!(before, worse.before);
+    assert!(worse.by > 0.0 && tuned.after.objective <= least.objective + 0.02, "{worse:?}");
+    // It is what it is said to be.
+    let again = Case { controller: Some(least.design.clone()), ..case.clone() };
+    let again = evaluate(&again, &tight).unwrap();
+    assert!(again.holds && again.before.objective == least.objective, "{:?}", again.before.worst);
+    let is = &again.before.moves[worse.motion].at_worst;
+    let after = match worse.figure {
+        Figure::Error => is.error.0,
+        Figure::Settling => is.settles.0,
+        Figure::Settled => is.settled as f64,
+    };
+    assert_eq!(after, worse.after);
 }
 
 /// K_t and K_e of a motor are one number in SI units; a family in which one is 20 % more and the other 20 % less cannot

@@ -128,7 +128,10 @@ fn laws_and_windows_that_are_none_are_refused() {
     let (status, text) = told(&["--compare", "--laws", "dry"]);
     assert_eq!(status, Some(2), "{text}");
     assert!(text.contains("there is no friction law \"dry\" to compare"), "{text}");
-    assert!(text.contains("allowed: viscous, coulomb, asymmetric, stribeck, along, lugre"), "{text}");
+    assert!(
+        text.contains("allowed: viscous, coulomb, asymmetric, stribeck, along, force-along, force-by-speed, lugre"),
+        "{text}"
+    );
     for window in ["0s", "-1s", "long", "1 m"] {
         let (status, text) = told(&["--compare", &format!("--windows={window}")]);
         assert_eq!(status, Some(2), "{window}: {text}");

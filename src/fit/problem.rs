@@ -437,6 +437,21 @@ impl<'a> Problem<'a> {
         matches!(self.units[j], Scale::Log(_))
     }
 
+    /// The same machine, with each variable as the machine has it: a breakaway that was asked for below Coulomb friction
+    /// is at it.
+    pub fn as_set(&self, x: &[f64]) -> Vec<f64> {
+        let mut own = x.to_vec();
+        for (j, (parameter, unit)) in self.parameters.iter().zip(&self.units).enumerate() {
+            let asked = unit.value(x[j]);
+            let stage = self.stage_of(self.of[j].unwrap_or(0), x);
+            match parameter.value_in(&stage) {
+                Some(set) if (set - asked).abs() > 1e-9 * set.abs() => own[j] = unit.variable(set),
+                _ => {}
+            }
+        }
+        own
+    }
+
     /// The machine with these values; of what parts of the logs have for themselves, those of the first.
     pub fn stage_at(&self, x: &[f64]) -> Stage {
         self.stage_of(0, x)

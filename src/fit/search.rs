@@ -61,6 +61,7 @@ pub(super) fn search<'a>(
     if best.ending != Ending::Interrupted {
         hold_undetermined(problem, best, &options, watch, work);
     }
+    best.x = problem.as_set(&best.x);
     work.simulations = problem.simulations;
     Ok(found)
 }

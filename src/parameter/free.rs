@@ -158,6 +158,13 @@ impl Free {
         set(machine, [(self, value)]);
     }
 
+    /// The value that it has in a machine: another than was put in where that cannot be, as a breakaway below Coulomb
+    /// friction.
+    pub fn value_in(&self, machine: &dyn Numbers) -> Option<f64> {
+        let (number, factor) = self.members.first()?;
+        Some(number.value(machine)? / factor)
+    }
+
     /// Whether both set a number of the machine.
     pub fn overlaps(&self, other: &Self) -> bool {
         self.members.iter().any(|(number, _)| other.members.iter().any(|(its, _)| its == number))

@@ -38,7 +38,7 @@ impl Work<'_> {
             return Ok((edge, None));
         }
         let limit = forced(self.family, &edge, self.tuning);
-        Ok((after, limit))
+        Ok((if edge.objective < after.objective { edge } else { after }, limit))
     }
 
     /// The last of the ends of stretches, from the file on, that keeps the limits.

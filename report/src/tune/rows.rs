@@ -156,9 +156,9 @@ fn least(work: &Work) -> String {
         Figure::Settling => format!("settles after {:.0} ms, {:.0} ms before", 1e3 * after, 1e3 * before),
         Figure::Settled => format!("settles on {after} axes, {before} before"),
     };
-    let which = if least.design == work.tuned.after.design { "these gains" } else { "least_worse in tune.json" };
+    let which = if least.design == work.tuned.after.design { "these" } else { "`least_worse` in tune.json" };
     format!(
-        ". Of all gains within the limits that were judged, the least worse in their worst figure are {which}: {name} {what}"
+        ". Of all gains within the limits that were judged {which} are the least worse in their worst figure: {name} {what}"
     )
 }
 

@@ -18,6 +18,11 @@ const SPEEDS: [f64; 7] = [-1.0, -0.5, -0.125, 0.0, 0.125, 0.5, 1.0];
 /// Share of the Coulomb friction that a Stribeck curve begins above it, and share of the greatest speed over which it
 /// falls.
 const ABOVE: f64 = 0.2;
+
+/// Breakaway at most, as a multiple of the Coulomb friction that a search begins with: where a log never rests, a
+/// breakaway that holds for ever meets it as well, and holds the next log for ever.
+const BREAKAWAY: f64 = 4.0;
+
 const FALL: f64 = 0.05;
 
 /// Way over which bristles bend, m of the cart, where a search begins.
@@ -127,6 +132,13 @@ pub(super) fn with(
     let fastest = fastest(case) / if body == "cart" { 1.0 } else { from.pulley_radius };
     let sided = sided || law == FrictionLaw::Asymmetric;
     let (table, keys) = table(case, law, sided, &friction, fastest, body);
+    let coulomb = table.get("coulomb").and_then(Value::as_float).unwrap_or_default();
+    let near = match law {
+        FrictionLaw::Stribeck => Some(("stribeck.force", [0.0, (BREAKAWAY - 1.0) * coulomb])),
+        // Below Coulomb friction it would change nothing.
+        FrictionLaw::LuGre => Some(("static", [coulomb, BREAKAWAY * coulomb])),
+        _ => None,
+    };
     let mut free: Vec<String> = keys.iter().map(|key| format!("{body}.friction.{key}")).collect();
     put(&mut document, body, "friction", Value::InlineTable(table));
     let loaded = plan.free.iter().any(|key| key == "cart.load");
@@ -151,9 +163,19 @@ pub(super) fn with(
     let tied: Vec<Vec<String>> = plan.tied.iter().filter(|keys| !keys.iter().any(|key| is_own(key))).cloned().collect();
     let lumped: Vec<String> = plan.lumped.iter().filter(|name| !is_own(name)).cloned().collect();
     let separate = plan.separate.iter().filter(|name| free.contains(name)).cloned().collect();
-    let bounds = plan.bounds.iter().filter(|(key, _)| free.contains(key) || !is_own(key)).cloned().collect();
+    let mut bounds: Vec<(String, [f64; 2])> =
+        plan.bounds.iter().filter(|(key, _)| free.contains(key) || !is_own(key)).cloned().collect();
+    let near = near.map(|(key, ends)| (format!("{body}.friction.{key}"), ends));
+    bounds.extend(near.clone());
     let priors = plan.priors.iter().filter(|(key, _)| free.contains(key) || !is_own(key)).cloned().collect();
     rewrite(&mut document, &free, &tied, &lumped, &is_own);
+    if let Some((key, ends)) = near
+        && let Some(fit) = document.get_mut("fit").and_then(Item::as_table_like_mut)
+        && let Some(bounds) =
+            fit.entry("bounds").or_insert(Item::Value(Value::InlineTable(InlineTable::new()))).as_table_like_mut()
+    {
+        bounds.entry(&key).or_insert(Item::Value(Value::Array(Array::from_iter(ends))));
+    }
     // The logs are those that are there already.
     let own = Case { experiments: case.experiments.clone(), ..Case::from_text(name, &document.to_string())? };
     Ok((own, Plan { free, tied, lumped, separate, bounds, priors, ..plan.clone() }))
@@ -334,4 +356,35 @@ fn travel(case: &Case) -> (f64, f64) {
         }
     }
     if high > low { (low, high) } else { (-1.0, 1.0) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::TEMPLATE;
+    use crate::parameter::Free;
+
+    /// On EMPS a breakaway of 11 kN beside 21 N of Coulomb friction met three quarters of the record, which never rest,
+    /// and held the fourth for ever.
+    #[test]
+    fn a_breakaway_stays_near_coulomb_friction() {
+        let text = format!("{TEMPLATE}\n[fit]\nfree = [\"cart.friction.coulomb\"]\n");
+        let case = Case::from_text("axis.toml", &text).unwrap();
+        let plan = Plan { free: vec!["cart.friction.coulomb".into()], ..Plan::default() };
+        let coulomb = case.stage.cart.friction.forward.coulomb;
+        for (law, key, ends) in [
+            (FrictionLaw::LuGre, "cart.friction.static", [1.0, 4.0]),
+            (FrictionLaw::Stribeck, "cart.friction.stribeck.force", [0.0, 3.0]),
+        ] {
+            let (own, plan) = with(&case, "axis.toml".as_ref(), &plan, law, false, &case.stage).unwrap();
+            assert_eq!(own.fit.as_ref().map(|own| own.bounds.clone()), Some(plan.bounds.clone()));
+            let free = Free::new(&own.stage, key, &[], &plan.bounds).unwrap();
+            assert_eq!([free.low, free.high], ends.map(|end| end * coulomb));
+        }
+        // Bounds that are given hold, too.
+        let key = "cart.friction.static".to_string();
+        let given = Plan { bounds: vec![(key.clone(), [0.0, 1.5 * coulomb])], ..plan };
+        let (own, plan) = with(&case, "axis.toml".as_ref(), &given, FrictionLaw::LuGre, false, &case.stage).unwrap();
+        assert_eq!(Free::new(&own.stage, &key, &[], &plan.bounds).unwrap().high, 1.5 * coulomb);
+    }
 }
