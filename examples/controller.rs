@@ -1,4 +1,4 @@
-//! A controller of one's own in closed loop, beside a PID: `cargo run --release --example controller`.
+//! A controller of one's own in closed loop, beside a PID: `cargo run --release --package taut --example controller`.
 
 use std::time::Instant;
 use taut::case::{Case, TEMPLATE};

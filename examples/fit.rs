@@ -1,4 +1,4 @@
-//! Fits a case's parameters to its logs: `cargo run --release --example fit -- CASE`.
+//! Fits a case's parameters to its logs: `cargo run --release --package taut --example fit -- CASE`.
 
 use std::time::Instant;
 use taut::case::Case;

@@ -1,4 +1,4 @@
-//! How long a fit takes: `cargo run --release --example fit_speed -- CASE [RUNS]`.
+//! How long a fit takes: `cargo run --release --package taut --example fit_speed -- CASE [RUNS]`.
 //!
 //! Prints the median of the runs and the quickest, in seconds, the number of simulated logs, how it ended, and each
 //! estimate.

@@ -1,7 +1,7 @@
 //! How far `taut frf` is off, and how often its circles and intervals hold the truth, on simulated logs with friction,
 //! counts and delay.
 //!
-//! cargo run --release --example frf -- 500
+//! cargo run --release --package taut --example frf -- 500
 
 use nalgebra::Complex;
 use rand_pcg::Pcg64;

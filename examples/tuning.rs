@@ -2,7 +2,7 @@
 //! active where it is worse, processor time; with `--evolution N` how far J is from what a differential evolution of N
 //! generations finds.
 //!
-//! cargo run --release --example tuning -- [--evolution N] [--drawn N] stages/sollmann-jouaneh/controllers/*.toml
+//! cargo run --release --package taut --example tuning -- [--evolution N] [--drawn N] stages/sollmann-jouaneh/controllers/*.toml
 //!
 //! `--drawn N` also tunes N machines that are drawn about the first case named: mass, friction, pulleys' inertia and motor
 //! off by up to a factor of two. `--only-drawn` leaves out the cases themselves.

@@ -12,6 +12,9 @@ use crate::stage::Stage;
 use nalgebra::{Complex, DMatrix, DVector, Schur};
 use std::f64::consts::PI;
 
+/// Steps of the QR algorithm that Schur's form of an estimate may take: a few for each state do.
+const TURNS: usize = 1000;
+
 /// The controller of a design as D u = −(N_y y + N_x x + N_i i), with y the measured position, x the cart on a scale
 /// beside that and i the measured current at a sample.
 #[derive(Debug, Clone)]
@@ -173,20 +176,28 @@ fn cascade(gains: &Cascade, t: f64, z: Complex<f64>, change: Complex<f64>) -> ([
 }
 
 /// The Kalman filter and the regulator as a filter of what is measured, from [`Law`], in coordinates in which the
-/// resolvent of the estimate costs least: (Φ C)ᵀ = U T Uᴴ, T upper triangular (Schur's form).
+/// resolvent of the estimate costs least: (Φ C)ᵀ = Q T Qᵀ, T upper triangular but for a pair of rows for each two complex
+/// poles (Schur's real form).
 #[derive(Debug, Clone)]
 struct Observed {
     law: Law,
-    /// T, column by column as far as its diagonal; of the estimate from one sample to the next, C = Π (I − L_i m_i).
-    estimate: Vec<Vec<Complex<f64>>>,
-    /// Uᴴ Cᵀ k, of the estimate before a sample to the command.
-    row: DVector<Complex<f64>>,
-    /// Of encoder and scale: Uᵀ Φ G, of the measured position to the estimate, and k G, straight to the command; G_i =
+    /// T, by its poles or pairs of them; of the estimate from one sample to the next, C = Π (I − L_i m_i).
+    estimate: Vec<Part>,
+    /// Qᵀ Cᵀ k, of the estimate before a sample to the command.
+    row: DVector<f64>,
+    /// Of encoder and scale: Qᵀ Φ G, of the measured position to the estimate, and k G, straight to the command; G_i =
     /// Π_{j>i} (I − L_j m_j) L_i.
-    sensors: Vec<(DVector<Complex<f64>>, f64)>,
-    /// Uᵀ Γ₀ and Uᵀ Γ₁, of commands.
-    now: DVector<Complex<f64>>,
-    before: DVector<Complex<f64>>,
+    sensors: Vec<(DVector<f64>, f64)>,
+    /// Qᵀ Γ₀ and Qᵀ Γ₁, of commands.
+    now: DVector<f64>,
+    before: DVector<f64>,
+}
+
+/// The column of T of a pole, or both columns of two complex ones, as far as above the block on the diagonal.
+#[derive(Debug, Clone)]
+enum Part {
+    One { pole: f64, above: Vec<f64> },
+    Two { block: [[f64; 2]; 2], above: Vec<[f64; 2]> },
 }
 
 impl Observed {
@@ -201,14 +212,28 @@ impl Observed {
             gains.push(sensor.kalman.clone());
             corrected = correct * corrected;
         }
-        let complex = |v: &DVector<f64>| v.map(|v| Complex::new(v, 0.0));
-        let (u, t) = Schur::new((&law.phi * &corrected).transpose().map(|v| Complex::new(v, 0.0))).unpack();
+        let turned = Schur::try_new((&law.phi * &corrected).transpose(), f64::EPSILON, TURNS);
+        // What has no numbers answers with none.
+        let none = || (DMatrix::identity(n, n), DMatrix::from_element(n, n, f64::NAN));
+        let (q, t) = turned.map_or_else(none, Schur::unpack);
+        let mut estimate = Vec::new();
+        let mut i = 0;
+        while i < n {
+            if i + 1 < n && t[(i + 1, i)] != 0.0 {
+                let block = [[t[(i, i)], t[(i, i + 1)]], [t[(i + 1, i)], t[(i + 1, i + 1)]]];
+                estimate.push(Part::Two { block, above: (0..i).map(|k| [t[(k, i)], t[(k, i + 1)]]).collect() });
+                i += 2;
+            } else {
+                estimate.push(Part::One { pole: t[(i, i)], above: (0..i).map(|k| t[(k, i)]).collect() });
+                i += 1;
+            }
+        }
         Self {
-            estimate: (0..n).map(|j| (0..=j).map(|i| t[(i, j)]).collect()).collect(),
-            row: u.ad_mul(&complex(&corrected.tr_mul(&own))),
-            sensors: gains.iter().map(|gain| (u.tr_mul(&complex(&(&law.phi * gain))), own.dot(gain))).collect(),
-            now: u.tr_mul(&complex(&law.now)),
-            before: u.tr_mul(&complex(&law.before)),
+            estimate,
+            row: q.tr_mul(&corrected.tr_mul(&own)),
+            sensors: gains.iter().map(|gain| (q.tr_mul(&(&law.phi * gain)), own.dot(gain))).collect(),
+            now: q.tr_mul(&law.now),
+            before: q.tr_mul(&law.before),
             law: law.clone(),
         }
     }
@@ -222,8 +247,7 @@ impl Observed {
         let lag = inverse.powi(law.lag() as i32);
         // kᵀ C (z I − Φ C)⁻¹, a row for all that it is asked of
         let row = self.resolved(z);
-        let seen =
-            |from: &DVector<Complex<f64>>| row.iter().zip(from).map(|(row, from)| row * from).sum::<Complex<f64>>();
+        let seen = |from: &DVector<f64>| row.iter().zip(from).map(|(row, from)| row * *from).sum::<Complex<f64>>();
         let mut positions = [Complex::ZERO; 2];
         for (position, (corrected, direct)) in positions.iter_mut().zip(&self.sensors) {
             *position = seen(corrected) + *direct;
@@ -240,12 +264,28 @@ impl Observed {
 
     /// The row kᵀ C times the resolvent of the estimate; no numbers on a pole.
     fn resolved(&self, z: Complex<f64>) -> Vec<Complex<f64>> {
-        let mut row = self.row.as_slice().to_vec();
-        for (i, column) in self.estimate.iter().enumerate().rev() {
-            let (before, own) = row.split_at_mut(i);
-            let found = own[0] / (z - column[i]);
-            own[0] = found;
-            before.iter_mut().zip(column).for_each(|(row, t)| *row += t * found);
+        let mut row: Vec<Complex<f64>> = self.row.iter().map(|v| Complex::new(*v, 0.0)).collect();
+        let mut end = row.len();
+        for part in self.estimate.iter().rev() {
+            match part {
+                Part::One { pole, above } => {
+                    let (before, own) = row[..end].split_at_mut(end - 1);
+                    let x = own[0] / (z - pole);
+                    own[0] = x;
+                    before.iter_mut().zip(above).for_each(|(row, t)| *row += x * *t);
+                    end -= 1;
+                }
+                Part::Two { block: [[a, b], [c, d]], above } => {
+                    let (before, own) = row[..end].split_at_mut(end - 2);
+                    // (z I − block)⁻¹ by its adjugate
+                    let scale = ((z - a) * (z - d) - b * c).inv();
+                    let x = ((z - d) * own[0] + own[1] * *b) * scale;
+                    let y = (own[0] * *c + (z - a) * own[1]) * scale;
+                    own.copy_from_slice(&[x, y]);
+                    before.iter_mut().zip(above).for_each(|(row, [s, t])| *row += x * *s + y * *t);
+                    end -= 2;
+                }
+            }
         }
         row
     }

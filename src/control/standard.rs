@@ -137,28 +137,29 @@ impl Standard {
 
 impl Controller for Standard {
     fn step(&mut self, seen: &Observation) -> f64 {
-        let target = self.compensation.target(&seen.reference);
+        let compensation = &self.compensation;
+        let target = || compensation.target(&seen.reference);
         // A scale that the model has and the axis has not is none.
         let scale = seen.scale.unwrap_or(seen.position);
-        let mut forward = self.compensation.command(&seen.ahead);
+        let mut forward = compensation.command(&seen.ahead);
         let own = match &mut self.core {
-            Core::Pid(core) => core.step(&target, seen.position),
+            Core::Pid(core) => core.step(&target(), seen.position),
             Core::Cascade(core) => {
                 let mut inner = 0.0;
                 if core.commands_current() {
                     // As a current into the inner loop; what the voltage needs beyond it is left outside.
-                    inner = forward_current(&self.compensation, &seen.ahead, forward);
-                    forward = back_emf(&self.compensation, &seen.ahead, forward);
+                    inner = forward_current(compensation, &seen.ahead, forward);
+                    forward = back_emf(compensation, &seen.ahead, forward);
                 }
                 // With a scale the position loop is closed at the cart, which is to be where the reference is.
                 match seen.scale {
-                    None => core.step(&target, [seen.position; 2], seen.current, inner),
+                    None => core.step(&target(), [seen.position; 2], seen.current, inner),
                     Some(scale) => core.step(&seen.reference, [seen.position, scale], seen.current, inner),
                 }
             }
-            Core::StateFeedback(core) => core.step(&seen.reference, &self.compensation, [seen.position, scale]),
-            Core::SlidingMode(core) => core.step(&target, seen.position),
-            Core::Fuzzy(core) => core.step(&target, seen.position),
+            Core::StateFeedback(core) => core.step(&seen.reference, compensation, [seen.position, scale]),
+            Core::SlidingMode(core) => core.step(&target(), seen.position),
+            Core::Fuzzy(core) => core.step(&target(), seen.position),
         };
         let own = self.filters.iter_mut().fold(own, |value, filter| filter.step(value));
         let disturbance = self.observer.as_ref().map_or(0.0, DisturbanceState::disturbance);
