@@ -10,7 +10,7 @@ use nalgebra::DVector;
 
 /// Everything that is told of a minimum.
 pub(super) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
-    let Searched { problem, best, noise, starts, work } = found;
+    let Searched { problem, best, noise, starts, work, .. } = found;
     let bounds = problem.bounds();
     let covariance = judged.map(|judged| &judged.covariance);
     let identifiability = judged.map(|judged| judged.identifiability.clone());

@@ -31,6 +31,8 @@ pub(super) struct Searched<'a> {
     pub noise: Vec<(Quantity, f64)>,
     pub starts: Vec<f64>,
     pub work: Work,
+    /// The information of the logs at the best point with no variable left out, where it is known already.
+    seen: Option<Judged>,
 }
 
 impl Searched<'_> {
@@ -38,7 +40,10 @@ impl Searched<'_> {
     /// fail.
     pub fn judged(&self, case: &Case, plan: &Plan) -> Option<Judged> {
         let Minimum { residuals, jacobian, x, at_bound, .. } = &self.best;
-        let mut judged = Judged::new(&self.problem, residuals, jacobian, x, at_bound)?;
+        let mut judged = match self.seen.as_ref().filter(|_| !at_bound.contains(&true)) {
+            Some(seen) => seen.clone(),
+            None => Judged::new(&self.problem, residuals, jacobian, x, at_bound)?,
+        };
         let disagreement = sub_records::disagreement(case, plan, self, &judged);
         let other_law = other_laws::other_law(self, &judged);
         judged.widen(disagreement, other_law);
@@ -55,13 +60,16 @@ pub(super) fn search<'a>(
 ) -> Result<Searched<'a>> {
     let whole = Options::default();
     let mut found = search_as_far(case, plan, stop, &whole, watch)?;
-    let Searched { problem, best, work, .. } = &mut found;
+    let Searched { problem, best, work, seen, .. } = &mut found;
     let huber = if plan.huber { HUBER } else { f64::INFINITY };
     let options = Options { huber, rounding: problem.rounding(), ..whole };
     if best.ending != Ending::Interrupted {
-        hold_undetermined(problem, best, &options, watch, work);
+        *seen = hold_undetermined(problem, best, &options, watch, work);
     }
-    best.x = problem.as_set(&best.x);
+    let set = problem.as_set(&best.x);
+    if set != best.x {
+        (best.x, *seen) = (set, None);
+    }
     work.simulations = problem.simulations;
     Ok(found)
 }
@@ -148,7 +156,7 @@ pub(super) fn search_as_far<'a>(
         noise = noise_of(&problem, &best, plan.huber);
     }
     work.simulations = problem.simulations;
-    Ok(Searched { problem, best, noise, starts, work })
+    Ok(Searched { problem, best, noise, starts, work, seen: None })
 }
 
 /// Where nothing is searched for.
@@ -172,19 +180,21 @@ fn as_it_is(problem: &mut Problem) -> Minimum {
 }
 
 /// Where a direction is not determined, the search ended anywhere along it: it is repeated with the parameter that
-/// moves most along it held where the case has it, and the point that this leads to is as good.
+/// moves most along it held where the case has it, and the point that this leads to is as good. The information of the
+/// logs where there is no such direction.
 fn hold_undetermined(
     problem: &mut Problem,
     best: &mut Minimum,
     options: &Options,
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
     work: &mut Work,
-) {
+) -> Option<Judged> {
     let none = vec![false; best.x.len()];
-    let lead = |best: &Minimum, problem: &Problem| {
-        Judged::new(problem, &best.residuals, &best.jacobian, &best.x, &none).map(|judged| judged.identifiability.leads)
-    };
-    let Some(leads) = lead(best, problem).filter(|leads| !leads.is_empty()) else { return };
+    let judged = Judged::new(problem, &best.residuals, &best.jacobian, &best.x, &none)?;
+    let leads = judged.identifiability.leads.clone();
+    if leads.is_empty() {
+        return Some(judged);
+    }
     let start = problem.start();
     let (open, mut bounds) = (problem.bounds(), problem.bounds());
     let mut x = best.x.clone();
@@ -207,8 +217,9 @@ fn hold_undetermined(
             leads.iter().for_each(|&j| at_bound[j] = false);
             *best = Minimum { jacobian, at_bound, ..found };
         }
-        return;
+        break;
     }
+    None
 }
 
 /// The first weight of an output that counts.

@@ -16,6 +16,7 @@ use nalgebra::{DMatrix, DVector};
 pub(super) const NORMAL: f64 = 1.959_963_985;
 
 /// Covariance of the variables that are free, in their order; none if they are not determined.
+#[derive(Debug, Clone)]
 pub struct Covariance {
     /// Variables that are free.
     pub free: Vec<usize>,
@@ -31,6 +32,7 @@ pub struct Covariance {
 }
 
 /// The information of the logs at a point: which parameters are determined, and how well.
+#[derive(Debug, Clone)]
 pub(super) struct Judged {
     pub identifiability: Identifiability,
     pub covariance: Covariance,

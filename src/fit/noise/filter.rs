@@ -23,8 +23,9 @@ pub(super) fn filter(series: &Series, slow: &[Slow]) -> (Vec<f64>, f64) {
             logs += f64::ln(product);
             product = 1.0;
         }
+        let share = 1.0 / f;
         for (i, products) in products.chunks_mut(wide).enumerate() {
-            let factor = v[i] / f;
+            let factor = v[i] * share;
             for (out, v) in products[i..].iter_mut().zip(&v[i..]) {
                 *out += factor * v;
             }
