@@ -166,6 +166,8 @@ pub(super) fn with(
     let mut bounds: Vec<(String, [f64; 2])> =
         plan.bounds.iter().filter(|(key, _)| free.contains(key) || !is_own(key)).cloned().collect();
     let near = near.map(|(key, ends)| (format!("{body}.friction.{key}"), ends));
+    // Bounds that are given stand alone.
+    let near = near.filter(|(key, _)| !bounds.iter().any(|(given, _)| given == key));
     bounds.extend(near.clone());
     let priors = plan.priors.iter().filter(|(key, _)| free.contains(key) || !is_own(key)).cloned().collect();
     rewrite(&mut document, &free, &tied, &lumped, &is_own);
@@ -381,10 +383,10 @@ mod tests {
             let free = Free::new(&own.stage, key, &[], &plan.bounds).unwrap();
             assert_eq!([free.low, free.high], ends.map(|end| end * coulomb));
         }
-        // Bounds that are given hold, too.
+        // Bounds that are given stand alone.
         let key = "cart.friction.static".to_string();
-        let given = Plan { bounds: vec![(key.clone(), [0.0, 1.5 * coulomb])], ..plan };
+        let given = Plan { bounds: vec![(key.clone(), [0.0, 9.0 * coulomb])], ..plan };
         let (own, plan) = with(&case, "axis.toml".as_ref(), &given, FrictionLaw::LuGre, false, &case.stage).unwrap();
-        assert_eq!(Free::new(&own.stage, &key, &[], &plan.bounds).unwrap().high, 1.5 * coulomb);
+        assert_eq!(Free::new(&own.stage, &key, &[], &plan.bounds).unwrap().high, 9.0 * coulomb);
     }
 }
