@@ -2,11 +2,14 @@
 
 #[path = "carry.rs"]
 mod carry;
+#[path = "wrap.rs"]
+mod wrap;
 
 use std::process::Command;
 
 fn main() {
     carry::carry();
+    wrap::wrap_hypot("bins");
     let git = |arguments: &[&str]| -> Option<String> {
         let done = Command::new("git").args(arguments).output().ok().filter(|done| done.status.success())?;
         Some(String::from_utf8(done.stdout).ok()?.trim().to_string()).filter(|text| !text.is_empty())
@@ -23,6 +26,7 @@ fn main() {
     };
     println!("cargo::rustc-env=TAUT_BUILT_FROM={from}");
     println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-changed=wrap.rs");
     for name in ["HEAD", "logs/HEAD"] {
         if let Some(path) = git(&["rev-parse", "--git-path", name]).filter(|_| own) {
             println!("cargo::rerun-if-changed={path}");

@@ -40,6 +40,7 @@ fn build(source: &Path, folder: &Path) -> PathBuf {
     let mut command = cargo("build");
     command.args(["--lib", "--profile", "fmu", "--target", &target]).arg("--manifest-path").arg(source);
     command.arg("--target-dir").arg(folder);
+    command.env("CARGO_ENCODED_RUSTFLAGS", without_paths().join("\u{1f}"));
     let done = command.output().expect("cargo can be started");
     if !done.status.success() {
         panic!("the shared object for FMUs cannot be built:\n{}", String::from_utf8_lossy(&done.stderr));
@@ -52,6 +53,19 @@ fn build(source: &Path, folder: &Path) -> PathBuf {
     let object = folder.join(&target).join("fmu").join(format!("{prefix}taut_fmu{suffix}"));
     assert!(object.is_file(), "cargo left no {}: this target has no shared objects", object.display());
     object
+}
+
+/// Flags that keep the folders of whoever builds it out of the object: places of panics name the files of packages.
+fn without_paths() -> Vec<String> {
+    let home = env::var_os(if cfg!(windows) { "USERPROFILE" } else { "HOME" }).map(PathBuf::from);
+    let cargo = env::var_os("CARGO_HOME").map(PathBuf::from).or_else(|| Some(home.as_ref()?.join(".cargo")));
+    let source = env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from);
+    let source = source.and_then(|folder| Some(folder.parent()?.to_path_buf()));
+    // Of several that fit, the last one counts.
+    let folders = [(home, "home"), (source, "taut"), (cargo.map(|cargo| cargo.join("registry/src")), "packages")];
+    let flag =
+        |(folder, name): (Option<PathBuf>, &str)| Some(format!("--remap-path-prefix={}={name}", folder?.display()));
+    folders.into_iter().filter_map(flag).collect()
 }
 
 /// Cargo as it runs this, but for what is meant for this build alone: lints, wrappers, the folder.

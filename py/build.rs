@@ -2,7 +2,10 @@
 
 #[path = "../cli/carry.rs"]
 mod carry;
+#[path = "../cli/wrap.rs"]
+mod wrap;
 
 fn main() {
     carry::carry();
+    wrap::wrap_hypot("cdylib");
 }

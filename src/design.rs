@@ -3,6 +3,8 @@
 //! A command is in units of the amplifier's input (V in voltage mode, A in current mode), a position in m along the
 //! belt: of an encoder at motor or pulley r φ, of one at the cart x. [`crate::control`] steps it in time.
 
+pub mod placement;
+
 /// A sampled controller.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Design {
@@ -183,6 +185,20 @@ pub enum FeedForwardModel {
     Rigid,
     /// The belt's stretch, too: needs a reference of fourth order for all of it.
     Elastic,
+}
+
+impl FeedForwardModel {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::None, Self::Rigid, Self::Elastic];
+
+    /// As in the case file.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Rigid => "rigid",
+            Self::Elastic => "elastic",
+        }
+    }
 }
 
 /// An observer of a disturbance at the command: one mass, its friction, and a third pole for the disturbance.

@@ -304,6 +304,7 @@ pub struct Measurement {
 
 /// Measures the responses of all logs of a case, and what follows from them.
 pub fn measure(case: &Case, cut: &Cut, known: Known) -> Result<Measurement> {
+    case.complete()?;
     let stage = &case.stage;
     let mut frfs = Vec::new();
     for log in case.experiments.iter().filter_map(|experiment| experiment.log.as_ref()) {

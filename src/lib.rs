@@ -93,8 +93,3 @@ pub mod trajectory;
 pub mod tune;
 
 pub use error::{Error, Result};
-
-/// The examples of the README are tests.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;

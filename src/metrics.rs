@@ -139,10 +139,30 @@ impl EventCount {
 }
 
 impl Peak {
-    /// Takes a value that is larger.
+    /// Takes a value that is larger, and its time where it is larger by more than [`NEWS`].
     fn take(&mut self, value: f64, time: f64) {
-        if value.abs() > self.value.abs() {
+        let (new, old) = (value.abs(), self.value.abs());
+        if new > old {
+            *self = Peak { value, time: if new > old * (1.0 + NEWS) { time } else { self.time } };
+        }
+    }
+
+    /// Takes the value that something has come to: of values that are the same to [`NEWS`], the last one counts. On the
+    /// way to a steady value only rounding tells where it is largest, and it is largest at its end.
+    fn come_to(&mut self, value: f64, time: f64) {
+        let (new, old) = (value.abs(), self.value.abs());
+        if new > old * (1.0 + NEWS) {
             *self = Peak { value, time };
+        } else if new > 0.0 && new >= old * (1.0 - NEWS) {
+            *self = Peak { value: if new > old { value } else { self.value }, time: self.time.max(time) };
+        }
+    }
+
+    /// Takes the values at both ends of an interval; `holds` says that a limit holds the value on all of it.
+    fn pass(&mut self, [from, to]: [f64; 2], (begin, end): (f64, f64), holds: bool) {
+        self.take(from, begin);
+        if !holds {
+            self.come_to(to, end);
         }
     }
 }
@@ -150,8 +170,9 @@ impl Peak {
 /// Quantities of a reading that peaks are sought of: the first ones.
 const PEAKS: usize = reading::CURRENT + 1;
 
-/// A bound that passes a peak by no more than this share of it is no reason to look closer: the peak is off by no more,
-/// and its time by the square root of that, as a share of the time in which the quantity bends.
+/// A bound that passes a peak by no more than this share of it is no reason to look closer, and values that differ by no
+/// more are one. The peak itself is the top of a polynomial that is good to 1e-9 of the largest value, the share that
+/// peaks are stated to; its time is off by the square root of that, as a share of the time in which the quantity bends.
 const NEWS: f64 = 1e-12;
 
 /// A figure, or some of them, that a [`Meter`] has to follow the motion for.
@@ -261,9 +282,10 @@ impl Observe for Meter {
         }
         self.moved |= stretch.interval > 0.0 && slides(stretch.mode);
         for (q, peak) in self.peaks.iter_mut().enumerate().filter(|(q, _)| self.sought[*q]) {
-            if stretch.most[q] > peak.value.abs() {
-                let (value, time) = stretch.largest(q);
-                *peak = Peak { value, time };
+            if stretch.most[q] > peak.value.abs() * (1.0 - NEWS) {
+                let (value, time) = stretch.largest(q, NEWS);
+                // What it begins with is what the last one ended with.
+                if time > stretch.begin { peak.come_to(value, time) } else { peak.take(value, time) }
             }
         }
         Closer::Later(match &self.plateau {
@@ -274,14 +296,13 @@ impl Observe for Meter {
 
     fn pass(&mut self, gap: &Gap) -> bool {
         let end = gap.begin + gap.length;
-        let (news, mut closer) = gap.rises_above(&self.heights(), 1.0 + NEWS);
+        let (news, mut closer) = gap.rises_above(&self.heights(), [1.0 - NEWS, 1.0 + NEWS]);
         if news {
             for (q, peak) in self.peaks.iter_mut().enumerate().filter(|(q, _)| self.sought[*q]) {
-                peak.take(gap.from[q], gap.begin);
-                peak.take(gap.to[q], end);
+                peak.pass([gap.from[q], gap.to[q]], (gap.begin, end), gap.holds(q));
             }
             // What its ends have told is no reason to look between them, where a bound says what is there.
-            closer = gap.rises_above(&self.heights(), 1.0 + NEWS).1;
+            closer = gap.rises_above(&self.heights(), [1.0, 1.0 + NEWS]).1;
         }
         if let Some(plateau) = &mut self.plateau {
             closer |= plateau.pass(gap);

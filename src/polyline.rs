@@ -60,6 +60,15 @@ impl Polyline {
         }
     }
 
+    /// The size of the terms that the value of a piece where x is 0 is a difference of, with the rounding of the points'
+    /// distance: 2 (|y₀ x₁| + |y₁ x₀|)/(x₁ − x₀).
+    pub(crate) fn size_of_constant(&self, piece: usize) -> f64 {
+        match (piece.checked_sub(1).and_then(|i| self.points.get(i)), self.points.get(piece)) {
+            (Some(&[x0, y0]), Some(&[x1, y1])) => 2.0 * ((y0 * x1).abs() + (y1 * x0).abs()) / (x1 - x0),
+            _ => self.piece(piece)[0].abs(),
+        }
+    }
+
     /// Where a piece begins and ends; the first and the last have one end.
     pub fn ends(&self, piece: usize) -> [Option<f64>; 2] {
         let x = |point: Option<&[f64; 2]>| point.map(|point| point[0]);

@@ -2,6 +2,7 @@
 
 pub mod axis;
 pub mod gantry;
+pub mod rigid;
 mod sheet;
 mod swing;
 
@@ -38,6 +39,19 @@ pub struct Stage {
 }
 
 impl Stage {
+    /// Force at the belt that moves everything from rest with the cart at `position` (m), N; the sign of `side` is the
+    /// direction.
+    pub fn breakaway(&self, side: f64, position: f64) -> f64 {
+        let (forward, cart) = (side > 0.0, &self.cart);
+        let [drive, idler] =
+            [&self.drive_pulley, &self.idler_pulley].map(|pulley| pulley.friction.side(forward).breakaway);
+        let along = cart.along.as_ref().map_or(1.0, |along| along.value(position));
+        let lines = [(&cart.forces.along, position), (&cart.forces.by_speed, 0.0)];
+        let of_lines = lines.iter().filter_map(|(line, at)| Some(line.as_ref()?.value(*at))).sum::<f64>();
+        let own = along * cart.friction.side(forward).breakaway;
+        own + (drive + idler) / self.pulley_radius - side * (cart.constant_force() + of_lines)
+    }
+
     /// Whether its equations are linear but for stick, slip and other changes of mode: what the exact solver takes.
     pub fn is_piecewise_linear(&self) -> bool {
         let laws = [self.drive_pulley.friction, self.cart.friction, self.idler_pulley.friction];

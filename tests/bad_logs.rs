@@ -1,4 +1,4 @@
-//! Every wrong log in `tests/bad/log` gives exactly the message beside it; `UPDATE_EXPECT=1` writes the messages again.
+//! Every wrong log in `tests/bad/log` gives exactly its message; `UPDATE_EXPECT=1` writes the messages anew.
 
 use crate::common::wrong;
 use std::fs;
@@ -11,7 +11,7 @@ fn message(file: &Path) -> Option<String> {
 
 #[test]
 fn wrong_logs_are_told_what_is_wrong_with_them() {
-    wrong::every_message("tests/bad/log", "csv", 30, message);
+    wrong::every_message("tests/bad/log", 30, |wrong| message(&wrong.path));
 }
 
 #[test]

@@ -6,11 +6,12 @@ use nalgebra::DMatrix;
 use proptest::prelude::*;
 use serde_json::Value;
 use taut::case::Case;
-use taut::control::compensation::{Compensation, Rigid};
+use taut::control::compensation::Compensation;
 use taut::control::{Loop, Rows, Setup, Standard, closed_loop, riccati, sliding, spread, stream};
 use taut::design::*;
 use taut::signal::profile::{Leg, Limits, Profile, Reference, Stroke};
 use taut::solve::{Ending, Flow, Solver};
+use taut::stage::rigid::Rigid;
 use taut::stage::{Encoder, EncoderPlace, Stage};
 
 fn limits() -> impl Strategy<Value = Limits> {
@@ -529,7 +530,7 @@ fn a_spread_that_is_no_share_is_refused() {
 #[test]
 fn gains_for_drives_make_the_same_command() {
     let stage = Case::read("stages/sollmann-jouaneh/table4.toml").unwrap().stage;
-    let rigid = taut::control::compensation::Rigid::of(&stage);
+    let rigid = taut::stage::rigid::Rigid::of(&stage);
     let gains = taut::control::drives::drive_gains(&stage);
     let value = |name: &str| gains.iter().find(|gain| gain.name == name).unwrap().value;
     let (speed, acceleration) = (0.3, 4.0);

@@ -303,9 +303,10 @@ fn parquet_files_that_are_no_logs() {
         let error = stored(&format!(r#"file = "{file}", time = "t", input = "u", cart_position = "{x}""#)).unwrap_err();
         error.split_once("tests/logs/").map(|(_, rest)| rest.to_string()).unwrap_or(error)
     };
+    let case = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/logs/case.toml");
     assert_eq!(
-        message("snappy.parquet", "note"),
-        "snappy.parquet: column `note` holds text or another kind of bytes\n  \
+        message("snappy.parquet", "note").replace(&*case.to_string_lossy(), "CASE"),
+        "snappy.parquet: column `note` holds text or another kind of bytes (experiment \"run\", CASE:75)\n  \
          allowed: whole or floating-point numbers, truth values, time stamps\n  \
          next: convert it to numbers before writing the file"
     );
@@ -353,11 +354,15 @@ fn a_log_that_is_not_there_says_what_fetches_it() {
         let log = format!("log = {{ file = \"no/such.csv\", {more}time = \"t\", input = \"u\", drive_angle = \"a\" }}");
         Case::from_text("case.toml", &case_text(&log)).unwrap_err().to_string()
     };
-    assert_eq!(of(""), "no/such.csv: there is no such file\n  next: check the name and the folder it is in");
-    assert_eq!(
-        of("fetch = \"cargo xtask data\", "),
-        "no/such.csv: there is no such file\n  next: `cargo xtask data` fetches it"
-    );
+    for (more, next) in [
+        ("", "check the path, which begins at the folder of the case file"),
+        ("fetch = \"cargo xtask data\", ", "`cargo xtask data` fetches it"),
+    ] {
+        let told = of(more);
+        let what = "a file of the experiment \"run\" cannot be read: no/such.csv: there is no such file";
+        assert!(told.starts_with("case.toml:") && told.contains(what), "{told}");
+        assert!(told.ends_with(&format!("next: {next}")), "{told}");
+    }
     // A file that is there is not fetched, whatever is wrong with it.
     let file = folder("fetch").join("broken.csv");
     fs::write(&file, "t,u\n").unwrap();

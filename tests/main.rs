@@ -5,6 +5,7 @@ mod authorities;
 mod bad_cases;
 mod bad_logs;
 mod bombs;
+mod breaks;
 mod case;
 mod case_documentation;
 mod case_mutations;
@@ -19,6 +20,7 @@ mod definitions_control;
 mod elements;
 mod experiment_design;
 mod fit;
+mod fitted_files;
 mod free;
 mod frf;
 mod gantry;
@@ -46,16 +48,21 @@ mod reference;
 mod rounding;
 mod rows;
 mod sensitivity;
+mod set_values;
 mod shape;
 mod sheet;
 mod stages;
+mod stated;
 mod stepping;
 mod survey;
+mod suspicions;
 mod sweep;
 mod table3;
 mod tune;
 mod two_sensors;
+mod undetermined;
 mod verdict;
+mod verdicts;
 
 /// A file that is no module here would not be run, and nobody would notice.
 #[test]

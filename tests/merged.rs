@@ -7,7 +7,7 @@
 
 use crate::common;
 
-use common::random;
+use common::{random, table4};
 use proptest::prelude::*;
 use taut::case::{Case, Experiment, Initial};
 use taut::friction::{Friction, Law, Shape, Side};
@@ -529,5 +529,20 @@ fn bristles_of_bodies_made_one_are_states_of_their_own() {
     for pole in rigid {
         let nearest = stiff.iter().map(|other| (other - pole).norm()).fold(f64::INFINITY, f64::min);
         assert!(nearest < 1e-3 * (1.0 + pole.norm()), "{pole} is {nearest} off: {stiff:?}");
+    }
+}
+
+/// r · (1/r) is 1 only but for rounding: a span between bodies that move as one must not be stretched by their motion.
+#[test]
+fn spans_between_bodies_that_move_as_one_have_no_arms() {
+    let mut stage = table4();
+    stage.belt.model = BeltModel::Rigid;
+    for k in 0..2000 {
+        stage.pulley_radius = 1e-3 * (1.0 + f64::from(k) * 0.1234567);
+        let mechanism = stage.mechanism();
+        for spring in 0..3 {
+            let arms = mechanism.leading_arms(spring);
+            assert!(arms.iter().all(|arm| *arm == 0.0), "r = {} m, span {spring}: {arms:?}", stage.pulley_radius);
+        }
     }
 }

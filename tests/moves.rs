@@ -9,7 +9,7 @@ use taut::trajectory::Trajectory;
 fn moved(case: &Case, motion: &Move, every: f64) -> (MoveRun, Trajectory) {
     let design = case.controller.as_ref().unwrap();
     let mut controller = Standard::new(design, &case.stage).unwrap();
-    let profile = motion.profile.clone().shaped(&design.shaper);
+    let profile = motion.reference(design);
     let rows = Rows { until: motion.until, every, window: motion.window };
     let mut trajectory = Trajectory::default();
     let solver = Solver::of(&case.stage);

@@ -124,6 +124,12 @@ const BAD: &[(&str, &str, &str, &str)] = &[
     ("19,4 mm", "m", "\"19,4 mm\" has a comma in its number", "the decimal sign is a point: \"19.4 mm\""),
     ("1,019.4 mm", "m", "\"1,019.4 mm\" has a comma in its number", "write it without commas: \"1019.4 mm\""),
     ("1 000 mm", "m", "\"1 000 mm\" has a space inside its number", "write the digits together"),
+    (
+        "3 x 10",
+        "",
+        "\"3 x 10\" has an unknown unit `x`",
+        "units are such as mm, kg, N s/m, kg m^2, ohm, GPa, rpm, in, lbf",
+    ),
     ("nan V", "V", "\"nan V\" is not a finite number", ""),
     ("-inf V", "V", "\"-inf V\" is not a finite number", ""),
     ("1e400 V", "V", "\"1e400 V\" is too large for a computer's number", ""),

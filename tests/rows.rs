@@ -145,3 +145,22 @@ fn a_receiver_that_wants_no_more_is_heard_at_rest() {
     );
     assert_eq!(outcome.cost.samples, 512);
 }
+
+/// A run of which no row is due is ended by whoever takes its rows all the same: it is shown that there is none yet.
+#[test]
+fn a_run_between_two_rows_is_ended_by_its_receiver() {
+    let stage = table4();
+    let signal = Signal::Square { amplitude: 5.0, frequency: 10.0, duty: 0.5 };
+    let long = Experiment { every: 1e4, ..experiment(signal, 1e4) };
+    for solver in [Solver::Exact, Solver::GENERAL] {
+        let mut shown = 0;
+        let outcome = stream(&stage, &long, solver, &mut |rows| {
+            assert!(rows.get("time").is_none_or(|times| times.len() <= 1));
+            shown += 1;
+            if shown == 3 { Flow::Stop } else { Flow::Continue }
+        })
+        .unwrap();
+        let Ending::Interrupted { time } = outcome.ending else { panic!("{solver:?}: {:?}", outcome.ending) };
+        assert!(time < 5e3, "{solver:?}: {time}");
+    }
+}

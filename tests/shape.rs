@@ -777,7 +777,7 @@ fn a_mode_that_moves_far_is_told_with_its_range() {
 
 #[test]
 fn wrong_files_are_told_what_is_wrong_with_them() {
-    wrong::every_message("tests/bad/shape", "csv", 12, |file| Some(read_accelerometer(file).err()?.to_string()));
+    wrong::every_message("tests/bad/shape", 25, |wrong| Some(read_accelerometer(&wrong.path).err()?.to_string()));
 }
 
 #[test]

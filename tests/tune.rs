@@ -7,13 +7,13 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 use std::f64::consts::PI;
 use std::path::Path;
 use taut::case::{Case, Cost, Tuning};
-use taut::control::compensation::Rigid;
 use taut::control::feedback::Feedback;
 use taut::control::filter::Biquad;
 use taut::control::{Controller, Observation, Setup, Standard, closed_loop};
 use taut::design::{Design, Structure};
 use taut::signal::profile::Reference;
 use taut::solve::{Ending, Solver};
+use taut::stage::rigid::Rigid;
 use taut::tune::{Corner, Family, Figure, Judgement, Margins, Plant, evaluate, hunting, minimise, place, tune};
 
 fn case(name: &str, changes: &[&str]) -> Case {
@@ -361,11 +361,12 @@ fn what_the_limits_cost_at_least_is_told() {
     let tuned = tune(&case, &tight, &|| false).unwrap();
     assert!(tuned.holds && tuned.judgement == Judgement::Worse, "{:?}", tuned.judgement);
     let least = tuned.least.as_ref().expect("what is least worse");
-    let (was, worse) = (&tuned.before.moves[least.worse.motion].at_worst, least.worse);
+    let (was, worse) = (&tuned.before.moves[least.worse.motion.expect("a move")].at_worst, least.worse);
     let before = match worse.figure {
         Figure::Error => was.error.0,
         Figure::Settling => was.settles.0,
         Figure::Settled => was.settled as f64,
+        Figure::Hunting => panic!("no figure of a move"),
     };
     assert_eq!(before, worse.before);
     assert!(worse.by > 0.0 && tuned.after.objective <= least.objective + 0.02, "{worse:?}");
@@ -373,11 +374,12 @@ fn what_the_limits_cost_at_least_is_told() {
     let again = Case { controller: Some(least.design.clone()), ..case.clone() };
     let again = evaluate(&again, &tight).unwrap();
     assert!(again.holds && again.before.objective == least.objective, "{:?}", again.before.worst);
-    let is = &again.before.moves[worse.motion].at_worst;
+    let is = &again.before.moves[worse.motion.expect("a move")].at_worst;
     let after = match worse.figure {
         Figure::Error => is.error.0,
         Figure::Settling => is.settles.0,
         Figure::Settled => is.settled as f64,
+        Figure::Hunting => panic!("no figure of a move"),
     };
     assert_eq!(after, worse.after);
 }

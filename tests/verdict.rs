@@ -221,12 +221,14 @@ fn ratios_are_told_where_a_gain_is_free() {
         }
         let text = found.case_text(&case, "axis.toml".as_ref()).unwrap();
         let written = Case::from_text("fitted.toml", &text).unwrap().stage;
-        assert_eq!((written.amplifier.gain, written.cart.mass), (0.2, case.stage.cart.mass));
+        // All four give way, so that their ratios are those of the logs.
+        assert!((written.cart.mass / written.amplifier.gain / (0.5 / 0.2) - 1.0).abs() < 0.05);
+        assert!(written.amplifier.gain != 0.2 && written.cart.mass != case.stage.cart.mass);
     }
 }
 
-/// Two parameters of which the sum shows are ± ∞ and keep their values; a third one keeps its interval, and so does the
-/// sum.
+/// Two parameters of which the sum shows are ± ∞; a third one keeps its interval, and so does the sum, which is that of
+/// the file.
 #[test]
 fn what_is_determined_beside_what_is_not_keeps_its_interval() {
     for start in ["drive_pulley.friction.viscous=0.001", "drive_pulley.friction.viscous=0.004"] {
@@ -253,12 +255,13 @@ fn what_is_determined_beside_what_is_not_keeps_its_interval() {
         let truth = case.stage.drive_pulley.friction.forward.viscous + factor * 24.0;
         let [low, high] = combination.interval;
         assert!(low < truth && truth < high && high - low < 0.05 * truth, "{low} {truth} {high}: {combination:?}");
-        // What is written keeps what is not determined.
+        // What is written has the sum.
         let text = found.case_text(&case, "axis.toml".as_ref()).unwrap();
         let written = Case::from_text("fitted.toml", &text).unwrap().stage;
-        let (a, b) = (written.drive_pulley.friction.forward.viscous, case.stage.drive_pulley.friction.forward.viscous);
-        assert_eq!(a, b);
-        assert_eq!(written.cart.friction.forward.viscous, case.stage.cart.friction.forward.viscous);
+        let sum = written.drive_pulley.friction.forward.viscous + factor * written.cart.friction.forward.viscous;
+        assert!((sum / combination.value - 1.0).abs() < 1e-3, "{sum} {combination:?}");
+        // Nothing ties newtons to newton metres.
+        assert!(!found.choices.concat().iter().any(|choice| choice.contains("tie")), "{:?}", found.choices);
         assert!((written.cart.friction.forward.coulomb - coulomb.value).abs() < 1e-9);
         assert!(text.contains("known = \"not determined\""), "{text}");
         let checked = check(&case, &plan(&free)).unwrap();

@@ -4,11 +4,11 @@
 
 use crate::failure::{Failure, Outcome, Status};
 use crate::folder::Folder;
-use crate::terminal;
+use crate::{interrupt, terminal};
 use rayon::prelude::*;
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use taut::case::{Case, LARGEST_FILE, Opened};
+use taut::case::{Case, Files, LARGEST_FILE, Opened};
 use taut::files::write_atomically;
 use taut::{Error, Result};
 use taut_report::{Page, Picture};
@@ -37,19 +37,33 @@ pub struct Common {
 }
 
 impl Common {
-    /// Reads the case of either kind at `path`; `-` is standard input.
+    /// Reads the case of either kind at `path` with all its files; `-` is standard input.
     pub fn open(&self, path: &Path) -> Result<Opened> {
+        let case = self.open_for(path, Files::All)?;
+        case.complete()?;
+        Ok(case)
+    }
+
+    /// The same with the files of these experiments. One that is missing is told to whoever asks for the experiment.
+    pub fn open_for(&self, path: &Path, files: Files) -> Result<Opened> {
         match is_standard_input(path) {
-            true => Opened::from_text_with(path, &standard_input()?, &self.changes()),
-            false => Opened::read_with(path, &self.changes()),
+            true => Opened::from_text_for(path, &standard_input()?, &self.changes(), files),
+            false => Opened::read_for(path, &self.changes(), files),
         }
     }
 
-    /// Reads the case of an axis at `path`; `-` is standard input.
+    /// Reads the case of an axis at `path` with all its files; `-` is standard input.
     pub fn case(&self, path: &Path) -> Result<Case> {
+        let case = self.case_for(path, Files::All)?;
+        case.complete()?;
+        Ok(case)
+    }
+
+    /// The same with the files of these experiments. One that is missing is told to whoever asks for the experiment.
+    pub fn case_for(&self, path: &Path, files: Files) -> Result<Case> {
         match is_standard_input(path) {
-            true => Case::from_text_with(path, &standard_input()?, &self.changes()),
-            false => Case::read_with(path, &self.changes()),
+            true => Case::from_text_for(path, &standard_input()?, &self.changes(), files),
+            false => Case::read_for(path, &self.changes(), files),
         }
     }
 
@@ -57,9 +71,14 @@ impl Common {
         self.changes.iter().map(String::as_str).collect()
     }
 
-    /// Whether a report is made: where there is a folder for it.
+    /// Whether a report is made: where there is a folder for it, and time to draw it.
     pub fn reports(&self) -> bool {
-        self.out.is_some() && !self.no_report
+        self.out.is_some() && self.draws()
+    }
+
+    /// Whether a report is wanted. After a signal the result itself comes first, and there may be no time for more.
+    pub fn draws(&self) -> bool {
+        !self.no_report && interrupt::came().is_none()
     }
 }
 
@@ -108,6 +127,7 @@ pub struct Report {
 pub enum Remark {
     Error(String),
     Warning(String),
+    Note(String),
 }
 
 impl Remark {
@@ -115,6 +135,7 @@ impl Remark {
         match self {
             Self::Error(told) => terminal::show_error(told),
             Self::Warning(told) => terminal::show_warning(told),
+            Self::Note(told) => terminal::show_note(told),
         }
     }
 }
@@ -142,6 +163,9 @@ impl Finished {
             let names = folder.place(self.command, common.quiet)?;
             self.written.push(listed(&folder, &names));
         }
+        if !self.written.is_empty() {
+            interrupt::written();
+        }
         if common.json {
             terminal::show(&self.json.1);
         } else if !common.quiet {
@@ -153,6 +177,13 @@ impl Finished {
             terminal::show(&terminal::wrapped(&format!("{}{end}", self.text)));
         }
         self.remarks.iter().for_each(Remark::show);
+        if matches!(self.status, Status::Interrupted(_))
+            && common.out.is_some()
+            && !common.no_report
+            && self.report.is_none()
+        {
+            terminal::show_note(&"the report was left out, for the command was interrupted");
+        }
         Ok(self.status)
     }
 

@@ -2,6 +2,7 @@
 
 use serde_json::json;
 use taut::Error;
+use taut::files::Refusal;
 
 /// The end of a command that has a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,7 +20,7 @@ pub enum Status {
 pub struct Failure {
     /// The error itself.
     pub error: Error,
-    /// 1 if the work could not be done, 2 if the input was wrong.
+    /// 1 if the work could not be done, 2 if the input was wrong, 128 and the signal's number if one ended it.
     pub status: u8,
 }
 
@@ -49,6 +50,16 @@ impl Failure {
             "text": self.error.to_string(),
         });
         taut::json::text(&json!({ "schema": taut::json::identity("error"), "status": self.status, "error": error }))
+    }
+}
+
+impl From<Refusal> for Failure {
+    /// A name that cannot be had is wrong input; one that somebody else has at the moment is not.
+    fn from(refusal: Refusal) -> Self {
+        match refusal.is_name_wrong {
+            true => Self::from(refusal.error),
+            false => Self::work(refusal.error),
+        }
     }
 }
 

@@ -9,16 +9,16 @@ use std::collections::HashMap;
 use std::ffi::OsStr;
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
-use taut::case::{self, InputFile};
-use taut::files::{Batch, Inputs, MARKER, write_atomically};
+use taut::case::{self, Case, Files, InputFile};
+use taut::files::{Batch, Claim, Inputs, MARKER, write_atomically};
 use taut::solve::Event;
-use taut::{Error, Result};
+use taut::{Error, Result, files};
 
 /// Where the results of a command go that may write one file instead of a folder.
 pub enum Target {
     Nowhere,
     /// One file: a tuned case, the rows of a sweep.
-    File(PathBuf),
+    File(PathBuf, Claim),
     /// All files, report and plots.
     Folder(Folder),
 }
@@ -27,7 +27,22 @@ pub enum Target {
 pub struct Folder {
     root: PathBuf,
     inputs: Inputs,
+    // Dropped before the claim, which removes the folder if nothing was written into it.
     batch: Batch,
+    _claim: Claim,
+}
+
+/// Claims a file that results go to, before the work for them.
+pub fn claim(path: &Path) -> std::result::Result<Claim, Failure> {
+    Ok(noted(Claim::file(path)?))
+}
+
+/// The claim, with a note if it keeps nobody out.
+pub fn noted(claim: Claim) -> Claim {
+    if let Some(note) = claim.unlocked() {
+        terminal::show_note(&note);
+    }
+    claim
 }
 
 /// The files that a command reads: the case and those that it names.
@@ -45,18 +60,16 @@ impl Folder {
         common.out.as_deref().map(|root| Self::create(root, inputs(), names)).transpose()
     }
 
-    /// Makes the folder if it is not there. `names` are files that will be written: one that is among the inputs is
-    /// told before the work; all others, before the first file gets its place.
+    /// Claims the folder, which is made if it is not there. `names` are files that will be written: one that is among
+    /// the inputs is told before the work; all others, before the first file gets its place.
     pub fn create<N: AsRef<Path>>(
         root: &Path,
         inputs: Inputs,
         names: impl IntoIterator<Item = N>,
     ) -> std::result::Result<Self, Failure> {
-        names.into_iter().try_for_each(|name| inputs.check(&root.join(name)))?;
-        std::fs::create_dir_all(root).map_err(|e| {
-            let what = if root.is_file() { "this is a file, not a folder".into() } else { told(&e) };
-            Error::new(what).in_file(root).next("name a folder that you may write to")
-        })?;
+        let names: Vec<String> = names.into_iter().map(|name| name.as_ref().to_string_lossy().into_owned()).collect();
+        names.iter().try_for_each(|name| inputs.check(&root.join(name)))?;
+        let claim = noted(Claim::folder(root, &names)?);
         let marker = root.join(MARKER);
         if marker.is_file() {
             terminal::show_note(&format!(
@@ -65,7 +78,7 @@ impl Folder {
             ));
         }
         let batch = Batch::begin(root).map_err(Failure::work)?;
-        Ok(Self { root: root.to_path_buf(), inputs, batch })
+        Ok(Self { root: root.to_path_buf(), inputs, batch, _claim: claim })
     }
 
     /// Where a file of it is written, until it gets its place.
@@ -123,13 +136,17 @@ impl Folder {
         Ok(name)
     }
 
-    /// Copies the files that a case names into `inputs/`; returns its text with their names there.
+    /// Copies the files that a case names into `inputs/`; returns its text with their names there. Of those that are
+    /// missing, and that nobody needed, the paths lead to where they should be.
     pub fn bring(&self, text: &str, files: &[InputFile]) -> Result<String> {
-        let names = brought(files);
+        let mut names = brought(files);
         for (file, name) in &names {
-            let bytes = std::fs::read(file).map_err(|e| Error::new(e.to_string()).in_file(file))?;
+            let bytes = files::read(file, usize::MAX).map_err(|e| Error::new(e.to_string()).in_file(file))?;
             self.make("inputs")?;
             write_atomically(self.path(name), bytes)?;
+        }
+        for file in files.iter().filter(|file| !file.path.is_file()) {
+            names.insert(file.path.clone(), between(&self.root, &file.path)?);
         }
         Ok(case::text_with(text, files, |file| names.get(&file.path).cloned().unwrap_or_default()))
     }
@@ -141,12 +158,17 @@ impl Folder {
     }
 }
 
-/// The files of a case, and what they are called in a folder of results: as they are, with a number where that is
-/// taken.
+/// The files that the text of a case names, read or not.
+pub fn files_of(name: &Path, text: &str) -> Result<Vec<InputFile>> {
+    Ok(Case::from_text_for(name, text, &[], Files::Nothing)?.files)
+}
+
+/// The files of a case that are there, and what they are called in a folder of results: as they are, with a number where
+/// that is taken.
 pub fn brought(files: &[InputFile]) -> HashMap<PathBuf, String> {
     let mut names: HashMap<PathBuf, String> = HashMap::new();
     for file in files {
-        if names.contains_key(&file.path) {
+        if names.contains_key(&file.path) || !file.path.is_file() {
             continue;
         }
         let own = file.path.file_name().unwrap_or_default().to_string_lossy();
@@ -167,7 +189,6 @@ pub fn leading(text: &str, files: &[InputFile], from: &Path) -> Result<String> {
 
 /// The way from a folder to a file, with `/` between the parts.
 fn between(folder: &Path, file: &Path) -> Result<String> {
-    let whole = |path: &Path| -> PathBuf { std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf()) };
     let (from, to) = (whole(folder), whole(file));
     let (from, to): (Vec<Component>, Vec<Component>) = (from.components().collect(), to.components().collect());
     let same = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
@@ -181,6 +202,18 @@ fn between(folder: &Path, file: &Path) -> Result<String> {
     let up = std::iter::repeat_n(Ok("..".to_string()), from.len() - same);
     let down = to[same..].iter().map(|part| word(part.as_os_str()));
     Ok(up.chain(down).collect::<Result<Vec<_>>>()?.join("/"))
+}
+
+/// A path from the root on, without links as far as it is there.
+fn whole(path: &Path) -> PathBuf {
+    if let Ok(path) = std::fs::canonicalize(path) {
+        return path;
+    }
+    match (path.parent(), path.file_name()) {
+        (Some(folder), Some(name)) if folder.as_os_str().is_empty() => whole(Path::new(".")).join(name),
+        (Some(folder), Some(name)) => whole(folder).join(name),
+        _ => path.to_path_buf(),
+    }
 }
 
 fn told(error: &std::io::Error) -> String {

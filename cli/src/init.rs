@@ -2,6 +2,7 @@
 
 use crate::args::{Init, KindName, TemplateName};
 use crate::failure::{Failure, Outcome, Status};
+use crate::folder;
 use crate::terminal;
 use taut::Error;
 use taut::case::{TEMPLATE, Template, gantry_template};
@@ -23,6 +24,7 @@ pub fn run(args: &Init) -> Outcome {
             .next(format!("name a file: {}", inside.display()))
             .into());
     }
+    let _claim = folder::claim(file)?;
     if file.exists() && !args.force {
         let error = Error::new("this file exists already, and nothing was written").in_file(file);
         return Err(error.next("choose another name, or replace it with --force").into());

@@ -1,5 +1,6 @@
 //! The list of what a folder of results holds, `files.json`: with it a later run removes what it does not write again.
 
+use crate::interrupt;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -13,6 +14,9 @@ pub const NAME: &str = "files.json";
 
 /// The most that is read of one: some 100,000 files.
 const MOST_BYTES: u64 = 16 << 20;
+
+/// Largest file that is read again after a signal, bytes.
+const QUICK: u64 = 32 << 20;
 
 /// The word that a list begins with.
 const SCHEMA: &str = "taut/files/1";
@@ -54,8 +58,12 @@ impl Listing {
             let parts: Vec<_> = name.components().map(|part| part.as_os_str().to_string_lossy()).collect();
             Ok(Entry { path: parts.join("/"), bytes, sha256, command: command.into() })
         };
+        // After a signal there is no time to read a large file again: it is there, but not on the list.
+        let is_listed = |name: &&PathBuf| {
+            interrupt::came().is_none() || std::fs::metadata(at.join(name)).is_ok_and(|data| data.len() <= QUICK)
+        };
         // Large files take longer to hash than to write: one on each processor.
-        let files = names.par_iter().map(entry).collect::<Result<_>>()?;
+        let files = names.par_iter().filter(is_listed).map(entry).collect::<Result<_>>()?;
         Ok(Self { schema: SCHEMA.into(), version: env!("CARGO_PKG_VERSION").into(), files })
     }
 

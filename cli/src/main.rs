@@ -9,6 +9,9 @@ mod failure;
 mod fit;
 mod folder;
 mod frf;
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+#[path = "../hypot.rs"]
+mod hypot;
 mod init;
 mod interrupt;
 mod listing;
@@ -31,11 +34,16 @@ use failure::Status;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    interrupt::outlive_file_limits();
     let args = match Args::try_parse() {
         Ok(args) => args,
-        Err(told) => return terminal::show_help_or_mistake(&told),
+        Err(told) => return terminal::show_help_or_mistake(&told, is_json_wanted()),
     };
     let json = args.command.json();
+    // The studio waits for signals by itself.
+    if !matches!(args.command, Command::Studio(_)) {
+        interrupt::watch(json);
+    }
     let done = match args.command {
         Command::Paper(args) => paper::run(&args),
         Command::Init(args) => init::run(&args),
@@ -56,11 +64,18 @@ fn main() -> ExitCode {
         Command::Completions(args) => manual::completions(&args),
         Command::Man(args) => manual::run(&args),
     };
+    if !interrupt::finish() {
+        // Another thread is ending the program.
+        loop {
+            std::thread::park();
+        }
+    }
     match done {
         Ok(Status::Done) => ExitCode::SUCCESS,
         Ok(Status::Incomplete) => ExitCode::from(1),
         Ok(Status::Interrupted(signal)) => ExitCode::from(128 + signal),
         Err(failure) => {
+            let failure = interrupt::explained(failure);
             if json {
                 terminal::show(&failure.json());
             }
@@ -68,4 +83,9 @@ fn main() -> ExitCode {
             ExitCode::from(failure.status)
         }
     }
+}
+
+/// Whether a command line that cannot be read asks for JSON.
+fn is_json_wanted() -> bool {
+    std::env::args_os().skip(1).take_while(|word| word != "--").any(|word| word == "--json")
 }

@@ -3,10 +3,10 @@
 
 use crate::args::{Args, Completions, Man, Schema};
 use crate::failure::{Failure, Outcome, Status};
+use crate::folder;
 use crate::terminal;
 use clap::CommandFactory;
-use std::path::Path;
-use taut::files::write_atomically;
+use taut::files::{Batch, Claim, write_atomically};
 use taut::{Error, Result, json};
 
 /// Prints a schema, or their names.
@@ -41,21 +41,20 @@ pub fn run(args: &Man) -> Outcome {
         terminal::show(&page(&command)?);
         return Ok(Status::Done);
     };
-    std::fs::create_dir_all(folder).map_err(|e| {
-        let error = Error::new(format!("this folder cannot be made: {e}")).in_file(folder);
-        error.next("name a folder that you may write to")
-    })?;
-    let mut names = vec![write(folder, "taut", &command).map_err(Failure::work)?];
+    let _claim = folder::noted(Claim::folder(folder, &[])?);
+    let batch = Batch::begin(folder).map_err(Failure::work)?;
+    let mut names = vec![write(&batch, "taut", &command).map_err(Failure::work)?];
     for one in command.get_subcommands().filter(|one| one.get_name() != "help") {
-        names.push(write(folder, &format!("taut-{}", one.get_name()), one).map_err(Failure::work)?);
+        names.push(write(&batch, &format!("taut-{}", one.get_name()), one).map_err(Failure::work)?);
     }
+    batch.place(&[]).map_err(Failure::work)?;
     terminal::show(&terminal::wrapped(&format!("wrote in {}:\n  {}\n", folder.display(), names.join("  "))));
     Ok(Status::Done)
 }
 
-fn write(folder: &Path, name: &str, command: &clap::Command) -> Result<String> {
+fn write(batch: &Batch, name: &str, command: &clap::Command) -> Result<String> {
     let file = format!("{name}.1");
-    write_atomically(folder.join(&file), page(command)?)?;
+    write_atomically(batch.path(&file), page(command)?)?;
     Ok(file)
 }
 

@@ -2,6 +2,7 @@
 
 use crate::args::Studio as Args;
 use crate::failure::{Failure, Outcome, Status};
+use crate::interrupt;
 use taut_studio::{Options, serve};
 
 /// Serves; being ended is its end, not an interruption.
@@ -16,6 +17,7 @@ pub fn run(args: &Args) -> Outcome {
         fragment: link.and_then(|link| Some(link[link.find('#')?..].to_string())),
         port: args.port,
         open: !args.no_open,
+        ignored: interrupt::ignored(),
     };
     // A port that is taken, a case that is not there: both are the command line's.
     serve(options).map_err(Failure::from).map(|()| Status::Done)

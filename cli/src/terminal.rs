@@ -1,9 +1,12 @@
 //! Output on the terminal: errors in one form, colour only where it is seen, and no complaint about a closed pipe.
 
+use crate::failure::Failure;
 use clap::error::ErrorKind;
 use std::fmt::Display;
 use std::io::{self, IsTerminal, Write};
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
+use taut::Error;
 
 /// Writes `error: …` to standard error.
 pub fn show_error(error: &impl Display) {
@@ -26,13 +29,30 @@ pub fn show_note(note: &impl Display) {
 /// Writes `text` to standard output. Whoever closed the pipe has read enough: that is no error. Anything else, a full
 /// disk say, ends the program with status 1.
 pub fn show(text: &str) {
+    SHOWN.store(true, Ordering::SeqCst);
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
             show_error(&format!("the results cannot be written to standard output: {e}"));
+            taut::files::abandon();
             std::process::exit(1);
         }
         _ => {}
+    }
+}
+
+/// True once anything was written to standard output.
+static SHOWN: AtomicBool = AtomicBool::new(false);
+
+/// Whether anything was written to standard output.
+pub fn has_shown() -> bool {
+    SHOWN.load(Ordering::SeqCst)
+}
+
+/// Clears the line of a progress that is on the terminal.
+pub fn clear_line() {
+    if io::stderr().is_terminal() {
+        let _ = write!(io::stderr(), "\r\u{1b}[K");
     }
 }
 
@@ -140,8 +160,8 @@ pub fn bold(text: &str) -> String {
     paint(io::stdout().is_terminal(), "\u{1b}[1m", text)
 }
 
-/// Messages of clap: help and version are answers, all else is a mistake in the input.
-pub fn show_help_or_mistake(told: &clap::Error) -> ExitCode {
+/// Messages of clap: help and version are answers, all else is a mistake in the input, as JSON too if `json` says so.
+pub fn show_help_or_mistake(told: &clap::Error, json: bool) -> ExitCode {
     match told.kind() {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
             let text = told.render();
@@ -150,10 +170,23 @@ pub fn show_help_or_mistake(told: &clap::Error) -> ExitCode {
             ExitCode::SUCCESS
         }
         _ => {
+            if json {
+                show(&Failure::from(mistake(told)).json());
+            }
             let _ = told.print();
             ExitCode::from(2)
         }
     }
+}
+
+/// A mistake on the command line as an error of ours: the first sentence is what is wrong, the rest what to do.
+fn mistake(told: &clap::Error) -> Error {
+    let text = told.render().to_string();
+    let text = text.trim().strip_prefix("error: ").unwrap_or(text.trim());
+    let (what, rest) = text.split_once("\n\n").unwrap_or((text, ""));
+    let lines = |text: &str| text.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
+    let error = Error::new(lines(what)).in_file("command line");
+    if rest.is_empty() { error } else { error.next(lines(rest)) }
 }
 
 fn paint(terminal: bool, colour: &str, text: &str) -> String {

@@ -133,6 +133,11 @@ fn the_readme_shows_what_the_program_prints() {
 }
 
 #[test]
+fn the_page_on_the_paper_shows_what_the_program_prints() {
+    check("docs/paper.md");
+}
+
+#[test]
 fn the_first_axis_goes_from_data_sheets_to_a_fitted_model() {
     check("docs/first-axis.md");
 }

@@ -1,6 +1,7 @@
 //! Runs that somebody ends: Ctrl-C, and a reader who has seen enough; and results that are not to be relied on.
 #![cfg(unix)]
 
+use crate::faults::by_default;
 use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -21,6 +22,7 @@ fn long(folder: &Path) -> PathBuf {
 fn taut(folder: &Path) -> Command {
     let mut command = Command::new(assert_cmd::cargo::cargo_bin("taut"));
     command.current_dir(folder).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    by_default(&mut command);
     command
 }
 

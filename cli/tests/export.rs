@@ -1,12 +1,12 @@
 //! `taut export`: every target in its own tool.
 #![cfg(unix)]
 
+#[path = "export/bounds.rs"]
+mod bounds;
 #[path = "export/c.rs"]
 mod c;
 #[path = "export/how_to.rs"]
 mod how_to;
-#[path = "../../tests/common/ignored.rs"]
-mod ignored;
 #[path = "export/interpreter.rs"]
 mod interpreter;
 #[path = "export/machines.rs"]

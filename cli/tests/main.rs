@@ -12,6 +12,10 @@ mod fit;
 mod fmu;
 mod frf;
 mod gantry;
+#[path = "../../tests/common/ignored.rs"]
+mod ignored;
+mod missing_logs;
+mod moves;
 mod outputs;
 mod paper;
 mod schemas;

@@ -1,7 +1,7 @@
 //! `taut schema`: what it says of results and case files is what the program writes and reads.
 
 use serde_json::{Map, Value, json};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -176,6 +176,123 @@ fn results_follow_their_schemas() {
     assert!(taut(&["modes", TABLE4, "--no-report", "--quiet", "--out", out]).status.success());
     let files = std::fs::read(folder.path().join("modes/files.json")).unwrap();
     follows("files", &serde_json::from_slice(&files).unwrap());
+}
+
+/// A command that is run on every case file of the project, in a few words; those that take long are left to another
+/// test.
+const COMMANDS: [&str; 13] = [
+    "show CASE",
+    "show CASE --set belt.model=rigid",
+    "modes CASE",
+    "modes CASE --set belt.model=rigid",
+    "simulate CASE",
+    "simulate CASE --solver general --set experiment.0.until=1ms",
+    "move CASE",
+    "move CASE --set motor.resistance=1e9",
+    "tune CASE --evaluate",
+    "sweep CASE --runs 2 --vary all=5%",
+    "frf CASE",
+    "export json CASE",
+    "export c CASE",
+];
+
+/// Those that search.
+const SEARCHES: [&str; 8] = [
+    "check CASE",
+    "fit CASE",
+    "fit CASE --drift",
+    "fit CASE --compare --laws viscous,coulomb --windows whole",
+    "design CASE",
+    "tune CASE",
+    "shape CASE",
+    "export fmu CASE",
+];
+
+/// Runs the commands on all cases, or one in so many of these calls, on all processors; each prints what follows the
+/// schema that it names, be it an error. Returns how many printed a result.
+fn follow_on_every_case(commands: &[&str], one_in: usize) -> usize {
+    use rayon::prelude::*;
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut files = Vec::new();
+    cases(&root.join("stages"), &mut files);
+    let calls: Vec<(&str, &PathBuf)> =
+        commands.iter().flat_map(|command| files.iter().map(move |file| (*command, file))).step_by(one_in).collect();
+    let schemas: BTreeMap<String, Value> = String::from_utf8(taut(&["schema"]).stdout)
+        .unwrap()
+        .lines()
+        .skip(1)
+        .filter_map(|line| line.split_whitespace().next())
+        .map(|name| (name.to_string(), json_of(&["schema", name])))
+        .collect();
+    let told: Vec<(bool, Vec<String>)> = calls
+        .par_iter()
+        .map(|(command, file)| {
+            let file = file.strip_prefix(&root).unwrap().to_str().unwrap();
+            let words: Vec<&str> = command.split(' ').map(|word| if word == "CASE" { file } else { word }).collect();
+            let value = json_of(&[&words[..], &["--json"]].concat());
+            let name = value["schema"].as_str().and_then(|word| word.split('/').nth(1)).unwrap_or_default();
+            let mut found = Vec::new();
+            match schemas.get(name) {
+                Some(schema) => faults(&value, schema, schema, name, &mut found),
+                None => found.push(format!("no schema: {:?}", value["schema"])),
+            }
+            (name != "error", found.into_iter().map(|fault| format!("{}: {fault}", words.join(" "))).collect())
+        })
+        .collect();
+    let found: Vec<&String> = told.iter().flat_map(|(_, found)| found).collect();
+    assert!(found.is_empty(), "{found:#?}");
+    told.iter().filter(|(is_result, _)| *is_result).count()
+}
+
+/// A rigid belt has no stiffness: `show`, `modes` and `simulate` printed null where their schemas had numbers.
+#[test]
+fn every_command_follows_its_schema_on_every_case() {
+    assert!(follow_on_every_case(&COMMANDS, 1) > 150);
+}
+
+/// One call in 17; with `TAUT_CASES=all` every case of the project is fitted and tuned, which takes minutes.
+#[test]
+fn searches_follow_their_schemas() {
+    let all = std::env::var("TAUT_CASES").is_ok_and(|cases| cases == "all");
+    let results = follow_on_every_case(&SEARCHES, if all { 1 } else { 17 });
+    assert!(results > if all { 50 } else { 3 }, "{results}");
+}
+
+/// An option that does not exist was told to people alone.
+#[test]
+fn wrong_options_are_json_too() {
+    for words in [
+        "simulate CASE --json --nope",
+        "simulate --json",
+        "--json",
+        "simulated CASE --json",
+        "simulate CASE --json --quiet",
+        "simulate CASE --solver best --json",
+        "sweep CASE --runs --json",
+        "sweep CASE --json --threads many",
+        "export cobol CASE --json",
+        "export c CASE --real half --json",
+        "move CASE --json --spread 300%",
+        "tune CASE --json --effort",
+        "modes CASE --png --json",
+        "init axis.toml --json",
+        "paper --json --set a=1",
+        "simulate CASE CASE --json",
+    ] {
+        let words: Vec<&str> = words.split(' ').map(|word| if word == "CASE" { TABLE4 } else { word }).collect();
+        let output = taut(&words);
+        assert_eq!(output.status.code(), Some(2), "{words:?}: {output:?}");
+        let value: Value =
+            serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{words:?}: {e}: {output:?}"));
+        follows("error", &value);
+        assert_eq!(value["status"], 2, "{words:?}");
+        assert!(!value["error"]["what"].as_str().unwrap().is_empty(), "{words:?}");
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert!(told.starts_with("error: "), "{words:?}: {told}");
+    }
+    // A word behind `--` is no option.
+    let output = taut(&["simulate", "--nope", "--", "--json"]);
+    assert!(output.status.code() == Some(2) && output.stdout.is_empty(), "{output:?}");
 }
 
 #[test]

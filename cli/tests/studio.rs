@@ -26,12 +26,20 @@ impl Studio {
     pub(crate) fn start(words: &[&str]) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_taut"));
         command.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+        #[cfg(unix)]
+        crate::faults::by_default(&mut command);
         let mut child = command.arg("studio").args(words).arg("--no-open").stdout(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
         BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
         let rest = line.strip_prefix("http://127.0.0.1:").unwrap_or_else(|| panic!("the first line is {line}"));
         let (port, token) = rest.trim().split_once("/?token=").unwrap();
         Self { child, port: port.parse().unwrap(), token: token.to_string() }
+    }
+
+    /// Kills it.
+    pub(crate) fn kill(&mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
     }
 
     pub(crate) fn connect(&self) -> TcpStream {
@@ -317,6 +325,35 @@ fn a_body_beyond_the_bound_is_refused_before_it_is_read() {
     assert_eq!(status(&studio.ask("GET /", &[&studio.host()])), 403);
 }
 
+/// Files were counted when they had come: twelve that were on their way had 741 MB in memory, of 512 promised.
+#[test]
+fn uploads_on_their_way_count_too() {
+    let studio = Studio::start(&[]);
+    let lines = [&*studio.host(), &studio.cookie(), &studio.origin()].join("\r\n");
+    let begin = |length: usize| {
+        let mut stream = studio.connect();
+        write!(stream, "POST /upload?name=a HTTP/1.1\r\n{lines}\r\nContent-Length: {length}\r\n\r\nx").unwrap();
+        stream
+    };
+    // Eight times 64 MB are all there is room for.
+    let waiting: Vec<TcpStream> = (0..8).map(|_| begin(64 << 20)).collect();
+    let small = || {
+        let mut first = [0; 12];
+        begin(1).read_exact(&mut first).unwrap();
+        status(&String::from_utf8_lossy(&first))
+    };
+    let comes = |wanted: u16| {
+        let begun = Instant::now();
+        while small() != wanted {
+            assert!(begun.elapsed() < Duration::from_secs(20), "no {wanted} comes");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    };
+    comes(413);
+    drop(waiting);
+    comes(200);
+}
+
 #[test]
 fn a_slow_client_is_given_up() {
     let studio = Studio::start(&[]);
@@ -400,6 +437,31 @@ fn a_run_has_the_json_of_the_command_and_its_columns() {
     let error = page.result("run", json!({ "text": wrong }))["error"].clone();
     assert_eq!((&error["line"], &error["column"]), (&json!(24), &json!(1)), "{error}");
     assert_eq!(error["next"], "did you mean `mass`?");
+}
+
+/// A refused value was blamed on a line of the text: the position was that within the change.
+#[test]
+fn a_refused_change_names_its_key_and_no_line() {
+    let studio = Studio::start(&[TABLE4]);
+    let mut page = studio.page();
+    for (value, what) in [
+        (json!(-1), "cart.mass: -1 kg has to be above zero"),
+        (json!("3 mm"), "cart.mass: \"3 mm\" is a length (m); a mass (kg) is wanted"),
+        (json!("heavy"), "cart.mass: \"heavy\" does not begin with a number"),
+    ] {
+        let error = page.result("run", json!({ "text": text(TABLE4), "set": [["cart.mass", value]] }))["error"].clone();
+        assert_eq!(
+            (&error["key"], &error["line"], &error["column"]),
+            (&json!("cart.mass"), &Value::Null, &Value::Null)
+        );
+        assert_eq!(error["what"], what);
+    }
+    let body = json!({ "text": text(TABLE4), "set": [["cart.mass", "400 g"]], "describe": true });
+    let head = page.result("run", body);
+    let number = |key: &str| head["parameters"].as_array().unwrap().iter().find(|one| one["key"] == key).unwrap();
+    assert_eq!((&number("cart.mass")["value"], &number("cart.mass")["written"]), (&json!(0.4), &json!("400 g")));
+    let spans = ["belt.stiffness.1", "cart.mass"].map(|key| &number(key)["span"]);
+    assert_eq!(spans, [&json!("span 2, cart to idler"), &Value::Null]);
 }
 
 #[test]

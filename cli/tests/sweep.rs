@@ -16,6 +16,7 @@ fn stage(name: &str) -> String {
 fn command(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_taut"));
     command.arg("sweep").args(arguments).current_dir(folder).stdin(Stdio::null());
+    crate::faults::by_default(&mut command);
     command
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use taut::control::Stepped;
-use taut::export::fmu::{Model, Role};
+use taut::export::fmu::{Model, REFERENCES, Role};
 use taut::mechanism::{DRIVES, Mechanism};
 use taut::signal::{DEGREE, Piece};
 use taut::solve::{Dynamics, Machine, Solver};
@@ -436,7 +436,7 @@ impl Instance {
 
 /// The place of an input among all.
 pub(crate) fn place(model: &Model, role: Role) -> Option<usize> {
-    let first = if model.design.is_some() { 3 } else { model.drives() };
+    let first = if model.design.is_some() { REFERENCES } else { model.drives() };
     match role {
         Role::Input(drive) => Some(drive),
         Role::Reference(k) => Some(k),

@@ -10,6 +10,9 @@ mod abi;
 mod both;
 pub mod fmi2;
 pub mod fmi3;
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+#[path = "../../cli/hypot.rs"]
+mod hypot;
 pub mod instance;
 mod saved;
 mod step;

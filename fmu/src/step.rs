@@ -1,6 +1,7 @@
 //! Time goes on: steps of co-simulation, and what an integrator asks of model exchange.
 
 use crate::instance::{Instance, Phase, Plant, Refusal, Status, Told};
+use taut::export::fmu::REFERENCES;
 use taut::mechanism::Shown;
 use taut::signal::profile::Reference;
 use taut::solve::{Ending, Event};
@@ -95,13 +96,9 @@ impl Instance {
     /// One decision of the controller.
     fn sample(&mut self) -> Told<()> {
         let (time, inputs) = (self.time, &self.inputs);
-        let reference = Reference {
-            position: inputs[0].at(time),
-            speed: inputs[1].at(time),
-            acceleration: inputs[2].at(time),
-            jerk: 0.0,
-            snap: 0.0,
-        };
+        let [position, speed, acceleration, jerk, snap]: [f64; REFERENCES] =
+            std::array::from_fn(|k| inputs[k].at(time));
+        let reference = Reference { position, speed, acceleration, jerk, snap };
         let quantities = self.integrated()?;
         let (state, column) = match &self.plant {
             Plant::Machine(machine) => {
@@ -186,7 +183,7 @@ impl Instance {
             }
             Err(ending) => {
                 self.phase = Phase::Broken;
-                Err(Refusal { status: Status::Error, message: format!("the machine cannot go on: {ending:?}") })
+                Err(Refusal { status: Status::Error, message: format!("the machine cannot go on: {ending}") })
             }
         }
     }
@@ -323,7 +320,7 @@ impl Instance {
             }
             Err(ending) => {
                 self.phase = Phase::Broken;
-                Err(Refusal { status: Status::Error, message: format!("the machine cannot go on: {ending:?}") })
+                Err(Refusal { status: Status::Error, message: format!("the machine cannot go on: {ending}") })
             }
         }
     }

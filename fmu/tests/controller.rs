@@ -7,9 +7,22 @@ use taut::solve::Solver;
 
 #[test]
 fn the_loop_inside_is_the_loop_of_a_move() {
-    let case = Case::read(stage("sollmann-jouaneh/controllers/pid.toml")).unwrap();
+    is_that_of_a_move("pid", 1e-12);
+}
+
+/// Jerk and snap of the reference could not be told: feed-forward inside put the cart up to 53 µm from where that of a
+/// move does. What is left comes of looking ahead across a seam of the profile, where snap jumps: less than 4 µm.
+#[test]
+fn feed_forward_inside_is_that_of_a_move() {
+    is_that_of_a_move("pid-elastic", 5e-6);
+    is_that_of_a_move("pid-rigid", 5e-6);
+}
+
+fn is_that_of_a_move(name: &str, most: f64) {
+    let name = format!("sollmann-jouaneh/controllers/{name}.toml");
+    let case = Case::read(stage(&name)).unwrap();
     let (design, shown) = (case.controller.as_ref().unwrap(), &case.moves[0]);
-    let unit = Unit::of("sollmann-jouaneh/controllers/pid.toml", true);
+    let unit = Unit::of(&name, true);
     // Into the stroke, before its end, and at rest; steps of a sample, and of a third of one.
     for (milliseconds, parts) in [(30, 1), (80, 3), (600, 1), (600, 3)] {
         let until = f64::from(milliseconds) * 1e-3;
@@ -30,6 +43,8 @@ fn the_loop_inside_is_the_loop_of_a_move() {
             assert_eq!(one.set("reference", reference.position), OK);
             assert_eq!(one.set("reference_speed", reference.speed), OK);
             assert_eq!(one.set("reference_acceleration", reference.acceleration), OK);
+            assert_eq!(one.set("reference_jerk", reference.jerk), OK);
+            assert_eq!(one.set("reference_snap", reference.snap), OK);
         };
         for k in 0..milliseconds {
             let (begin, end) = (f64::from(k) * 1e-3, f64::from(k + 1) * 1e-3);
@@ -42,6 +57,6 @@ fn the_loop_inside_is_the_loop_of_a_move() {
         }
         refer(until);
         let is = one.get("error");
-        assert!((is - wanted).abs() <= 1e-12, "{milliseconds} ms: {is} instead of {wanted}");
+        assert!((is - wanted).abs() <= most, "{name}, {milliseconds} ms: {is} instead of {wanted}");
     }
 }

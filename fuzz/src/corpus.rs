@@ -1,5 +1,9 @@
 //! Inputs to begin with: the project's own files, its wrong files, and small ones made here.
 
+#[path = "../../tests/common/wrong.rs"]
+#[allow(dead_code)]
+mod sections;
+
 use crate::Seed;
 use crate::targets::{fitted, repository};
 use std::fmt::Write;
@@ -45,6 +49,12 @@ fn wrong(folder: &str, ending: &str) -> Vec<Seed> {
     files(folder, ending).into_iter().map(|(name, bytes)| any(&name, bytes)).collect()
 }
 
+/// The wrong case files of `tests/bad/case`.
+fn wrong_cases() -> impl Iterator<Item = (String, Vec<u8>)> {
+    let all = sections::read(&repository().join("tests/bad/case")).unwrap_or_else(|what| panic!("{what}"));
+    all.into_iter().map(|wrong| (wrong.path.display().to_string(), wrong.bytes()))
+}
+
 /// Case files; those whose logs are fetched need not be read.
 pub fn cases() -> Vec<Seed> {
     let mut seeds = vec![good("the template", TEMPLATE), good("every part", EVERY_PART), good("moves", MOVES)];
@@ -52,7 +62,7 @@ pub fn cases() -> Vec<Seed> {
         let away = bytes.windows(7).any(|window| window == b"fetch =");
         seeds.push(Seed { name, bytes, good: !away });
     }
-    seeds.extend(wrong("tests/bad/case", "toml"));
+    seeds.extend(wrong_cases().map(|(name, bytes)| any(&name, bytes)));
     seeds
 }
 
@@ -176,7 +186,7 @@ pub fn quantities() -> Vec<Seed> {
     let mut seeds: Vec<Seed> = known.iter().map(|text| any(text, *text)).collect();
     // Some of them may be in no unit that is known; these are.
     seeds.iter_mut().take(9).for_each(|seed| seed.good = true);
-    for (name, bytes) in files("tests/bad/case", "toml") {
+    for (name, bytes) in wrong_cases() {
         let text = String::from_utf8_lossy(&bytes).into_owned();
         seeds.extend(text.split('"').skip(1).step_by(2).map(|quoted| any(&name, quoted)));
     }
@@ -358,7 +368,7 @@ pub fn gcode() -> Vec<Seed> {
     .enumerate()
     .map(|(k, text)| Seed { good: k < 4, ..any(text, *text) })
     .collect();
-    seeds.extend(files("tests/bad/case", "toml").into_iter().filter_map(|(name, bytes)| {
+    seeds.extend(wrong_cases().filter_map(|(name, bytes)| {
         let text = String::from_utf8_lossy(&bytes).into_owned();
         let list = text.split("gcode = \"").nth(1)?.split('"').next()?.replace("\\n", "\n");
         Some(any(&name, list))

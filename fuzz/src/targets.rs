@@ -167,7 +167,7 @@ fn drive(stage: &Stage, design: &taut::design::Design, motion: &Move, longest: f
     let until = motion.until.min(longest).min(ROWS * design.every);
     let rows = Rows { until, every: motion.every.min(until).max(until / ROWS), window: motion.window };
     let done = Standard::new(design, stage).and_then(|mut controller| {
-        let profile = motion.profile.clone().shaped(&design.shaper);
+        let profile = motion.reference(design);
         let (timing, solver) = (Loop::of(design), Solver::of(stage));
         taut::control::stream(stage, &mut controller, &timing, &profile, &rows, solver, false, &mut |_| Flow::Continue)
     });

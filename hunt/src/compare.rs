@@ -1,31 +1,20 @@
-//! One stage by taut and by the independent solver: what they differ by, and whether that means something.
+//! One case by taut and by the independent solver: what they differ by, and whether that means something.
 
+use crate::answer::{self, Answer, By, End};
 use crate::double::Double;
 use crate::draw::Random;
 use crate::events;
-use crate::law::Motion;
-use crate::machine::Taken;
-use crate::solve::{self, Ending, Event, Numbers, Run};
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use taut::case::{Case, Experiment};
-use taut::solve::{ErrorEstimate, Flow, Solution, Solver, simulate};
-use taut::stage::Stage;
-
-/// How far positions of a run may be apart, m, that states nothing of itself; and of one of the general solver at
-/// least.
-const ALLOWED: f64 = 1e-9;
-
-/// A difference that is none, whatever a run states: a hundredth of an atom's width.
-const LEAST: f64 = 1e-12;
-
-/// Tolerance that the general solver is asked for.
-const TOLERANCE: f64 = 1e-11;
+use crate::machine::{BODIES, Taken};
+use crate::solve::{Ending, Event, Run};
+use crate::subject::{Numbers, Subject};
+use std::panic::catch_unwind;
 
 /// By how much numbers of a case are perturbed, relative to them; of a sine, which taut puts together from polynomials
-/// good to
-/// 1e-14 of its peak, as much as that.
+/// good to 1e-14 of its peak, as much as that.
 const PERTURBATION: f64 = 4e-16;
 const PERTURBATION_OF_SINES: f64 = 1e-14;
+/// The same where a general solver is asked, whose errors are those of its tolerance: 1e-11 m, as much as this of 10 m.
+const PERTURBATION_OF_GENERAL: f64 = 1e-12;
 
 /// Perturbed runs.
 const PERTURBED: u64 = 8;
@@ -34,21 +23,16 @@ const PERTURBED: u64 = 8;
 const COMPARABLE: f64 = 30.0;
 
 /// How far a body may go while the solvers disagree about what it does, as a share of what positions may differ by and
-/// of the body's
-/// way in the run; and how long a stuck body may be told to slide, as a share of the run.
+/// of the body's way in the run; and how long a stuck body may be told to slide, as a share of the run.
 const AGREEMENT: [f64; 3] = [1e-3, 1e-6, 1e-6];
 /// The moments of the general solver are as good as its positions: it may have a body creep that is stuck, as long as
 /// that shows in no position.
 const AGREEMENT_OF_GENERAL: [f64; 3] = [1.0, 1e-3, f64::INFINITY];
+/// What its positions may be off by at least where events are judged, m.
+const GENERAL_EVENTS: f64 = 1e-9;
 
-/// Which of taut's solvers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum By {
-    /// The exact one.
-    Exact,
-    /// The general one.
-    General,
-}
+/// How far apart the ends of two runs may be, as a part of the run.
+const NEAR: f64 = 1e-6;
 
 /// The verdict of a comparison.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,7 +50,7 @@ pub enum Verdict {
 /// A compared run.
 #[derive(Debug, Clone)]
 pub struct Compared {
-    /// By which solver.
+    /// The way of asking.
     pub by: By,
     /// Largest difference of positions, m.
     pub difference: f64,
@@ -76,106 +60,109 @@ pub struct Compared {
     pub spread: Option<f64>,
     /// Changes of bodies that the independent solver saw.
     pub events: usize,
+    /// Whether positions are off by more than a run states that names no decision within rounding.
+    pub exceeds: bool,
     /// The verdict.
     pub verdict: Verdict,
 }
 
-/// How far positions of a run may be off, m: the bound that the run states of itself; of the general solver its own
-/// estimate.
-fn allowed(by: By, stage: &Stage, experiment: &Experiment, run: &Solution) -> f64 {
-    let stated = match by {
-        By::Exact => run.outcome.error,
-        By::General => {
-            let mut estimate = ErrorEstimate::new(stage, experiment);
-            estimate.take(&run.trajectory);
-            estimate.finish(stage, experiment, TOLERANCE, &run.outcome, &mut || Flow::Continue).ok().flatten()
-        }
-    };
-    match (by, stated) {
-        (By::Exact, stated) => stated.map_or(ALLOWED, |error| error.value.max(LEAST)),
-        (By::General, stated) => stated.map_or(ALLOWED, |error| error.value.max(ALLOWED)),
-    }
-}
-
-/// Compares the first experiment of a case by each of these solvers.
-pub fn compare(name: &str, text: &str, solvers: &[By]) -> Vec<Compared> {
+/// Compares a case by each of these ways; `every` are other intervals between rows, as multiples of the case's, at which
+/// solvers are asked again.
+pub fn compare(name: &str, text: &str, ways: &[By], every: &[f64]) -> Vec<Compared> {
     let fault = |by: By, why: String| Compared {
         by,
         difference: 0.0,
-        allowed: ALLOWED,
+        allowed: 0.0,
         spread: None,
         events: 0,
+        exceeds: false,
         verdict: Verdict::Unexplained(why),
     };
-    let case = match catch_unwind(|| Case::from_text(name, text)) {
-        Ok(Ok(case)) => case,
-        Ok(Err(error)) => return vec![fault(By::Exact, format!("the case is refused: {error}"))],
-        Err(_) => return vec![fault(By::Exact, "reading the case panics".into())],
+    let first = ways.first().copied().unwrap_or(By::Exact);
+    let subject = match catch_unwind(|| Subject::new(name, text)) {
+        Ok(Ok(subject)) => subject,
+        Ok(Err(error)) => return vec![fault(first, error)],
+        Err(_) => return vec![fault(first, "reading the case panics".into())],
     };
-    let experiment = &case.experiments[0];
-    let mut independent = None;
-    let one = |&by: &By| {
-        let solver = match by {
-            By::Exact => Solver::Exact,
-            By::General => Solver::General { tolerance: TOLERANCE },
-        };
-        let run = match catch_unwind(AssertUnwindSafe(|| simulate(&case.stage, experiment, solver))) {
-            Ok(Ok(run)) => run,
-            Ok(Err(error)) => return fault(by, format!("the stage is refused: {error}")),
-            Err(_) => return fault(by, "it panics".into()),
-        };
-        let times = run.trajectory.get("time").unwrap_or(&[]).to_vec();
-        let grid = taut::solve::Grid::new(experiment.every, experiment.until);
-        let mut all = times.clone();
-        // A run that ends early has fewer rows than there are.
-        all.extend((times.len() as u64..=grid.intervals()).map(|k| grid.time(k)));
-        let known = independent.get_or_insert_with(|| solve::run(&case.stage, experiment, &all));
-        match known {
-            Ok(known) => {
-                let allowed = allowed(by, &case.stage, experiment, &run);
-                Pair { stage: &case.stage, experiment, times: &all, by, run: &run, known, allowed }.judged()
+    let mut found = Vec::new();
+    for &by in ways {
+        let is_solver = matches!(by, By::Exact | By::General);
+        let others: Vec<f64> = if is_solver { every.to_vec() } else { Vec::new() };
+        let mut worst: Option<Compared> = None;
+        for factor in std::iter::once(1.0).chain(others) {
+            let [_, interval] = subject.times();
+            let asked = if factor == 1.0 { subject.clone() } else { subject.clone().with_every(interval * factor) };
+            let one = match answer::ask(&asked, by) {
+                Err(why) => fault(by, why),
+                Ok(answer) => {
+                    let subject = answer.subject.clone().unwrap_or(asked);
+                    match subject.known_as_is(&answer.fed, &answer.times) {
+                        Err(why) => fault(by, why),
+                        Ok(known) => Pair { subject: &subject, by, answer: &answer, known: &known }.judged(),
+                    }
+                }
+            };
+            let worse = worst.as_ref().is_none_or(|worst| one.verdict.rank() > worst.verdict.rank());
+            if worse {
+                let mut one = one;
+                if factor != 1.0 {
+                    one.verdict.add(&format!("with `every` {factor} times as long"));
+                }
+                worst = Some(one);
             }
-            Err(why) => fault(by, why.clone()),
         }
-    };
-    solvers.iter().map(one).collect()
+        found.extend(worst);
+    }
+    found
 }
 
-/// Both runs of a stage.
+impl Verdict {
+    /// The worse, the larger.
+    fn rank(&self) -> u8 {
+        match self {
+            Verdict::Agrees => 0,
+            Verdict::IllConditioned(_) => 1,
+            Verdict::Unknown(_) => 2,
+            Verdict::Unexplained(_) => 3,
+        }
+    }
+
+    fn add(&mut self, more: &str) {
+        match self {
+            Verdict::Agrees => {}
+            Verdict::IllConditioned(told) | Verdict::Unknown(told) | Verdict::Unexplained(told) => {
+                *told = format!("{told}; {more}");
+            }
+        }
+    }
+}
+
+/// Both runs of a case.
 struct Pair<'a> {
-    stage: &'a Stage,
-    experiment: &'a Experiment,
-    times: &'a [f64],
+    subject: &'a Subject,
     by: By,
-    run: &'a Solution,
+    answer: &'a Answer,
     known: &'a Run,
-    /// How far positions may be apart, m.
-    allowed: f64,
 }
-
-/// How far apart the ends of two runs may be, as a part of the run.
-const NEAR: f64 = 1e-6;
 
 impl Pair<'_> {
     fn judged(&self) -> Compared {
-        let difference = apart(&self.rows(), &self.known.rows);
+        let difference = apart(&self.answer.rows, &self.known.rows);
         let count = self.known.events.len();
-        let compared = |spread, verdict| Compared {
-            by: self.by,
-            difference,
-            allowed: self.allowed,
-            spread,
-            events: count,
-            verdict,
-        };
+        let allowed = self.answer.allowed;
+        let exceeds = self.answer.is_stated && difference > allowed && self.answer.ties == 0;
+        let compared =
+            |spread, verdict| Compared { by: self.by, difference, allowed, spread, events: count, exceeds, verdict };
         if let Ending::GaveUp(time, why) = &self.known.ending {
             return compared(None, Verdict::Unknown(format!("the independent solver gave up at {time:e} s: {why}")));
         }
         let wrong_end = self.wrong_end(self.known);
-        let far = difference > self.allowed;
-        let ours = body_events(self.run);
-        let events = events::undone(&ours, &self.known.events, self.experiment.until)
-            .or_else(|| self.disagreement(&ours, self.known));
+        let far = difference > allowed;
+        let [until, _] = self.subject.times();
+        let events = self.answer.events.as_ref().and_then(|ours| {
+            events::undone(ours, &self.known.events, until, self.subject.names())
+                .or_else(|| self.disagreement(ours, self.known))
+        });
         if wrong_end.is_none() && !far && events.is_none() {
             return compared(None, Verdict::Agrees);
         }
@@ -190,7 +177,8 @@ impl Pair<'_> {
         let explained = !too_far && (wrong_end.is_none() || other_end()) && (events.is_none() || other_events());
         let mut told: Vec<String> = wrong_end.into_iter().collect();
         if far {
-            told.push(format!("positions differ by {difference:.1e} m, {:.1e} m allowed", self.allowed));
+            let from = self.first_apart();
+            told.push(format!("positions differ by {difference:.1e} m{from}, {allowed:.1e} m allowed"));
         }
         told.extend(events);
         told.push(format!("perturbed runs differ by {spread:.1e} m"));
@@ -201,7 +189,7 @@ impl Pair<'_> {
     /// Where bodies do other things than by the independent solver, and that matters.
     fn disagreement(&self, ours: &[Event], known: &Run) -> Option<String> {
         let end = match known.ending {
-            Ending::Complete => self.times.last().copied().unwrap_or(0.0),
+            Ending::Complete => self.answer.times.last().copied().unwrap_or(0.0),
             Ending::LeftTravel(time) | Ending::GaveUp(time, _) => time * (1.0 - NEAR),
         };
         let found = events::disagreements(ours, &known.events, end);
@@ -209,48 +197,47 @@ impl Pair<'_> {
             return None;
         }
         // Where the bodies are at those moments.
-        let mut moments: Vec<f64> = found.iter().flat_map(|one| one.moments()).chain([self.experiment.until]).collect();
+        let [until, _] = self.subject.times();
+        let mut moments: Vec<f64> = found.iter().flat_map(|one| one.moments()).chain([until]).collect();
         moments.sort_by(f64::total_cmp);
         moments.dedup();
-        let at_moments = solve::run(self.stage, self.experiment, &moments).ok()?;
+        let at_moments = self.subject.known_as_is(&self.answer.fed, &moments).ok()?;
         let place = |body: usize, time: f64| {
             let index = moments.binary_search_by(|moment| moment.total_cmp(&time)).unwrap_or_else(|index| index);
             at_moments.rows.get(index).map_or(Double::ZERO, |row| row[body])
         };
         let farthest = |body: usize| known.rows.iter().map(|row| row[body].high.abs()).fold(0.0, f64::max);
         let way = |body: usize, from: f64, to: f64| (place(body, to) - place(body, from)).high.abs();
-        let [share, of_run, moment] = match self.by {
-            By::Exact => AGREEMENT,
-            By::General => AGREEMENT_OF_GENERAL,
-        };
+        let is_general = self.by.is_general(self.subject);
+        let [share, of_run, moment] = if is_general { AGREEMENT_OF_GENERAL } else { AGREEMENT };
+        let allowed = if is_general { self.answer.allowed.max(GENERAL_EVENTS) } else { self.answer.allowed };
         let matters = |one: &&events::Disagreement| {
-            let near = (share * self.allowed).min(of_run * farthest(one.body()));
-            one.matters(moment * self.experiment.until, near, way)
+            let near = (share * allowed).min(of_run * farthest(one.body()));
+            one.matters(moment * until, near, way)
         };
-        found.iter().find(matters).map(events::Disagreement::told)
+        found.iter().find(matters).map(|one| one.told(self.subject.names()))
     }
 
-    /// r φ₁, x, r φ₃ less the start of the cart.
-    fn rows(&self) -> Vec<[Double; 3]> {
-        let column = |name| self.run.trajectory.get(name).unwrap_or(&[]);
-        let (drive, cart, idler) = (column("drive_angle"), column("cart_position"), column("idler_angle"));
-        let r = Double::from(self.stage.pulley_radius);
-        let origin = Double::from(self.experiment.initial.cart_position);
-        let row = |i: usize| [r * drive[i] - origin, Double::from(cart[i]) - origin, r * idler[i] - origin];
-        (0..cart.len()).map(row).collect()
+    /// Where positions first differ by more than is allowed.
+    fn first_apart(&self) -> String {
+        let rows = self.answer.rows.iter().zip(&self.known.rows).zip(&self.answer.times);
+        let far = |(a, b): (&Double, &Double)| (*a - *b).high.abs() > self.answer.allowed;
+        let found = rows.filter_map(|((ours, known), time)| {
+            let body = ours.iter().zip(known).position(far)?;
+            Some(format!(", from the {} at {time:e} s on", self.subject.names().get(body)?))
+        });
+        found.into_iter().next().unwrap_or_default()
     }
 
     /// The mistake in how it ended.
     fn wrong_end(&self, known: &Run) -> Option<String> {
-        let told = || Some(format!("it ends {:?} instead of {:?}", self.run.outcome.ending, known.ending));
-        match (self.run.outcome.ending, &known.ending) {
-            (taut::solve::Ending::Complete, Ending::Complete) => None,
-            (taut::solve::Ending::LeftTravel { time }, Ending::LeftTravel(other))
-                if (time - other).abs() <= NEAR * self.experiment.until =>
-            {
+        let [until, _] = self.subject.times();
+        match (&self.answer.end, &known.ending) {
+            (End::Complete, Ending::Complete) => None,
+            (End::Left(time), Ending::LeftTravel(other)) if time.is_nan() || (time - other).abs() <= NEAR * until => {
                 None
             }
-            _ => told(),
+            (ours, known) => Some(format!("it ends {ours:?} instead of {known:?}")),
         }
     }
 
@@ -258,8 +245,12 @@ impl Pair<'_> {
     /// few bits, too.
     fn perturbed(&self) -> Vec<Run> {
         let mut runs = Vec::new();
+        let (own, of_input) = match (self.by.is_general(self.subject), self.subject.has_sines()) {
+            (true, _) => (PERTURBATION_OF_GENERAL, PERTURBATION_OF_GENERAL),
+            (false, true) => (PERTURBATION, PERTURBATION_OF_SINES),
+            (false, false) => (PERTURBATION, PERTURBATION),
+        };
         for number in 0..PERTURBED {
-            let sines = self.experiment.input.degree() > 1;
             let perturb = |seed: u64, size: f64| {
                 let mut random = Random::new(seed, number);
                 move |value: f64| {
@@ -267,64 +258,43 @@ impl Pair<'_> {
                     Double::from(value) * (Double::ONE + Double::from(sign * size))
                 }
             };
-            let mut machine = perturb(1, PERTURBATION);
-            let mut input = perturb(2, if sines { PERTURBATION_OF_SINES } else { PERTURBATION });
+            let mut machine = perturb(1, own);
+            let mut input = perturb(2, of_input);
             let mut kept = perturb(3, PERTURBATION);
             let kept: Option<Taken> = if number % 2 == 1 { Some(&mut kept) } else { None };
             let numbers = Numbers { machine: &mut machine, input: &mut input, kept };
-            runs.extend(solve::run_with(self.stage, self.experiment, self.times, numbers));
+            runs.extend(self.subject.known(&self.answer.fed, &self.answer.times, numbers));
         }
         runs
     }
 }
 
-/// The changes of bodies in a run of taut.
-fn body_events(run: &Solution) -> Vec<Event> {
-    let motion = |status: taut::mechanism::Status| match status.code() {
-        -1 => Motion::Backward,
-        0 => Motion::Stuck,
-        1 => Motion::Forward,
-        _ => Motion::Free,
-    };
-    let of_bodies = run.outcome.events.iter().filter_map(|event| Some((event, event.body()?)));
-    of_bodies
-        .map(|(event, body)| Event { time: event.time, body, from: motion(event.from), to: motion(event.to) })
-        .collect()
-}
-
-/// The largest difference of positions, m.
-fn apart(a: &[[Double; 3]], b: &[[Double; 3]]) -> f64 {
+/// The largest difference of positions, m; of what an answer does not say, none.
+fn apart(a: &[[Double; BODIES]], b: &[[Double; BODIES]]) -> f64 {
     let pairs = a.iter().flatten().zip(b.iter().flatten());
-    pairs.map(|(a, b)| (*a - *b).high.abs()).fold(0.0, |most, d| if d.is_nan() { f64::INFINITY } else { d.max(most) })
+    let said = pairs.filter(|(a, _)| !a.high.is_nan());
+    said.map(|(a, b)| (*a - *b).high.abs()).fold(0.0, |most, d| if d.is_nan() { f64::INFINITY } else { d.max(most) })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use taut::solve::Solver;
 
     /// A run of a machine one of whose springs is a tenth of a percent stiffer is found out.
     #[test]
     fn a_wrong_answer_is_unexplained() {
-        let case = Case::from_text("stage.toml", &crate::draw::stage(1, 0).text).unwrap();
-        let experiment = &case.experiments[0];
-        let mut wrong = case.stage.clone();
-        wrong.belt.stiffness[0] *= 1.001;
-        let judged = |stage: &Stage| {
-            let run = simulate(stage, experiment, Solver::Exact).unwrap();
-            let times = run.trajectory.get("time").unwrap().to_vec();
-            let known = solve::run(&case.stage, experiment, &times).unwrap();
-            let pair = Pair {
-                stage: &case.stage,
-                experiment,
-                times: &times,
-                by: By::Exact,
-                run: &run,
-                known: &known,
-                allowed: ALLOWED,
-            };
-            pair.judged().verdict
+        let text = crate::draw::stage(1, 0).text;
+        let subject = Subject::new("stage.toml", &text).unwrap();
+        let judged = |asked: &Subject| {
+            let answer = answer::solved(asked, Solver::Exact).unwrap();
+            let known = subject.known_as_is(&answer.fed, &answer.times).unwrap();
+            Pair { subject: &subject, by: By::Exact, answer: &answer, known: &known }.judged().verdict
         };
-        assert_eq!(judged(&case.stage), Verdict::Agrees);
+        let mut wrong = subject.clone();
+        let Subject::Axis(case) = &mut wrong else { panic!() };
+        case.stage.belt.stiffness[0] *= 1.001;
+        assert_eq!(judged(&subject), Verdict::Agrees);
         assert!(judged(&wrong).is_unexplained());
     }
 }

@@ -63,6 +63,44 @@ impl Double {
         if self.high < 0.0 { -self } else { self }
     }
 
+    /// e to the power of it.
+    pub fn exp(self) -> Self {
+        if self.high < -700.0 {
+            return Self::ZERO;
+        }
+        // e^x = (e^{r/2^9})^{2^9} 2^n, x = n ln 2 + r
+        const LN_2: Double = Double { high: std::f64::consts::LN_2, low: 2.319_046_813_846_299_6e-17 };
+        let twos = (self.high / LN_2.high).round().min(1023.0);
+        let r = (self - LN_2 * twos) * (1.0 / 512.0);
+        let (mut term, mut sum) = (Self::ONE, Self::ZERO);
+        // e^r − 1, which squaring keeps the digits of: (1 + s)² − 1 = 2 s + s²
+        for k in 1..14_u32 {
+            term = term * r / Self::from(f64::from(k));
+            sum += term;
+        }
+        for _ in 0..9 {
+            sum = sum * 2.0 + sum * sum;
+        }
+        (sum + Self::ONE) * 2.0_f64.powi(twos as i32)
+    }
+
+    /// Its hyperbolic tangent.
+    pub fn tanh(self) -> Self {
+        if self.high.abs() > 40.0 {
+            return Self::from(self.high.signum());
+        }
+        // tanh x = (e^{2x} − 1)/(e^{2x} + 1)
+        if self.high.abs() < 1e-3 {
+            // x − x³/3 + 2x⁵/15 − 17x⁷/315 + 62x⁹/2835 − 1382x¹¹/155925
+            let square = self * self;
+            let c = [(1.0, 1.0), (-1.0, 3.0), (2.0, 15.0), (-17.0, 315.0), (62.0, 2835.0), (-1382.0, 155_925.0)];
+            let sum = c.iter().rev().fold(Self::ZERO, |sum, &(a, b)| sum * square + Self::from(a) / Self::from(b));
+            return sum * self;
+        }
+        let e = (self * 2.0).exp();
+        (e - Self::ONE) / (e + Self::ONE)
+    }
+
     /// Sine and cosine.
     pub fn sin_cos(self) -> (Self, Self) {
         // θ = n π/2 + x with |x| ≤ π/4, and the series of x
@@ -192,6 +230,29 @@ mod tests {
         // sin(π/6) = 1/2
         let half = (PI / double(6.0)).sin_cos().0 - double(0.5);
         assert!(half.high.abs() < 1e-31, "{half:?}");
+    }
+
+    #[test]
+    fn powers_of_e_multiply_and_tangents_obey_their_equation() {
+        for (a, b) in [(0.3, 1.7), (-5.5, 2.25), (40.0, -39.0), (-300.0, -200.0), (1e-9, 3.0)] {
+            let rest = double(a).exp() * double(b).exp() / (double(a) + double(b)).exp() - Double::ONE;
+            assert!(rest.high.abs() < 1e-29, "{a} {b}: {rest:?}");
+            assert!((double(a).exp().high / a.exp() - 1.0).abs() < 1e-15);
+        }
+        // tanh 2x = 2 tanh x/(1 + tanh² x)
+        for x in [1e-5, 4e-4, 6e-4, 0.1, -1.3, 15.0] {
+            let (one, two) = (double(x).tanh(), double(2.0 * x).tanh());
+            let rest = two * (Double::ONE + one * one) - one * 2.0;
+            assert!(rest.high.abs() < 1e-28 * x.abs().max(1e-3), "{x}: {rest:?}");
+            assert!((one.high - x.tanh()).abs() < 1e-15);
+        }
+        // e = Σ 1/k!
+        let (mut e, mut term) = (Double::ZERO, Double::ONE);
+        for k in 1..30_u32 {
+            e += term;
+            term = term / double(f64::from(k));
+        }
+        assert!((Double::ONE.exp() - e).high.abs() < 1e-30);
     }
 
     #[test]

@@ -1,9 +1,14 @@
 //! Random stages over wide ranges, each from a seed and a number, as the text of a case file.
 
 mod experiment;
+mod feature;
+mod friction;
+mod gantry;
+mod loops;
 mod machine;
 mod random;
 
+pub use feature::{Feature, pairs, recipe};
 pub use random::Random;
 
 use std::fmt::Write;
@@ -90,8 +95,9 @@ pub struct Drawn {
     pub kinds: Vec<Kind>,
 }
 
-/// What makes the seed of lines, which are drawn by themselves.
+/// What makes the seed of lines, which are drawn by themselves, and of the cases with features.
 const LINES: u64 = 0x6c69_6e65;
+const PAIRS: u64 = 0x7477_6f73;
 
 /// The stage of this number.
 pub fn stage(seed: u64, number: u64) -> Drawn {
@@ -100,6 +106,19 @@ pub fn stage(seed: u64, number: u64) -> Drawn {
     let title = format!("seed {seed}, stage {number}");
     let sizes = draw.sizes();
     draw.machine(title, sizes, lines)
+}
+
+/// The case of this number, with the features of its recipe.
+pub fn pair(seed: u64, number: u64) -> (Drawn, Vec<Feature>) {
+    let features = recipe(seed, number);
+    let mut draw = Draw::new(seed ^ PAIRS, number);
+    draw.features = Some(features.clone());
+    let lines = Random::new(seed ^ LINES, number);
+    let title = format!("seed {seed}, pair {number}");
+    let sizes = draw.sizes();
+    draw.share_curves();
+    let is_gantry = features.iter().any(|one| matches!(one, Feature::HFrame | Feature::CoreXy));
+    (if is_gantry { draw.gantry(title, sizes) } else { draw.machine(title, sizes, lines) }, features)
 }
 
 /// Inertias as masses at the belt, stiffnesses and what follows from them.
@@ -125,13 +144,38 @@ struct Draw {
     text: String,
     /// Fastest rate so far, 1/s.
     fastest: f64,
+    /// The features that it is to have; none where chance says.
+    features: Option<Vec<Feature>>,
+    /// Laws of friction of drive pulley, cart and idler pulley; of a gantry pulleys, bridge and cart.
+    curves: [Option<Feature>; 3],
 }
 
 impl Draw {
     fn new(seed: u64, number: u64) -> Self {
         let mut random = Random::new(seed, number);
         let short = random.chance(0.5);
-        Self { random, short, kinds: Vec::new(), text: String::new(), fastest: 0.0 }
+        Self { random, short, kinds: Vec::new(), text: String::new(), fastest: 0.0, features: None, curves: [None; 3] }
+    }
+
+    /// Whether it has a feature: by this chance, or by its recipe.
+    fn has(&mut self, feature: Feature, share: f64) -> bool {
+        let drawn = self.random.chance(share);
+        self.features.as_ref().map_or(drawn, |features| features.contains(&feature))
+    }
+
+    /// Whether its recipe has a feature.
+    fn wants(&self, feature: Feature) -> bool {
+        self.features.as_ref().is_some_and(|features| features.contains(&feature))
+    }
+
+    /// Whether it has a recipe.
+    fn is_by_recipe(&self) -> bool {
+        self.features.is_some()
+    }
+
+    /// Whether it is a move in a closed loop.
+    fn is_loop(&self) -> bool {
+        self.features.as_ref().is_some_and(|features| features.iter().any(|one| one.is_controller()))
     }
 
     /// As many digits as numbers of this stage have.
@@ -169,7 +213,7 @@ impl Draw {
     }
 
     fn sizes(&mut self) -> Sizes {
-        let wide = self.random.chance(0.5);
+        let wide = self.random.chance(0.5) && !self.is_by_recipe();
         let (mass, stiffness) = match wide {
             true => {
                 self.kind(Kind::Wide);
@@ -203,6 +247,9 @@ impl Draw {
             1 => "rigid",
             _ => "elastic",
         };
+        // A rigid belt has no spans, and a gantry is elastic.
+        let has_spans = [Feature::Slack, Feature::Follows, Feature::HFrame, Feature::CoreXy];
+        let model = if has_spans.into_iter().any(|one| self.wants(one)) { "elastic" } else { model };
         if model != "elastic" {
             self.kind(Kind::Reduced);
         }
@@ -214,7 +261,8 @@ impl Draw {
         if model == "rigid" {
             self.fastest *= self.random.decades(1e-3, 1.0);
         }
-        let time = self.random.decades(100.0, 5000.0) / self.fastest;
+        let most = if self.is_by_recipe() { 600.0 } else { 5000.0 };
+        let time = self.random.decades(100.0, most) / self.fastest;
         let all: f64 = mass.iter().sum();
         let softest = stiffness.iter().copied().fold(f64::MAX, f64::min);
         let way = self.random.decades(1e-6, 0.3);
@@ -231,7 +279,10 @@ impl Draw {
         let start = self.place();
         self.lines(&sizes, start, lines);
         self.travel(&sizes, start);
-        self.experiment(&sizes, start, &scale);
+        match self.is_loop() {
+            true => self.motion(&sizes, &scale),
+            false => self.experiment(&sizes, start, &scale),
+        }
         self.kinds.sort();
         Drawn { text: self.text, kinds: self.kinds }
     }

@@ -7,10 +7,8 @@
 //! way, the body must go next to no way; and where the independent solver has it stuck, that must not last.
 
 use crate::law::Motion;
+use crate::machine::BODIES;
 use crate::solve::Event;
-
-/// The bodies.
-pub const NAMES: [&str; 3] = ["drive pulley", "cart", "idler pulley"];
 
 /// How far apart two moments are that are one, as a part of the run.
 const MOMENT: f64 = 1e-6;
@@ -27,9 +25,9 @@ pub struct Disagreement {
 
 impl Disagreement {
     /// The event in words.
-    pub fn told(&self) -> String {
+    pub fn told(&self, names: &[&str]) -> String {
         let Self { body, from, to, ours, known } = self;
-        format!("the {} is {ours:?} instead of {known:?} from {from:e} s to {to:e} s", NAMES[*body])
+        format!("the {} is {ours:?} instead of {known:?} from {from:e} s to {to:e} s", names[*body])
     }
 
     /// Whether it matters: a stuck body may be told to slide for `moment`, and `way` gives how far the independent
@@ -56,7 +54,7 @@ impl Disagreement {
 /// Where two lists of events disagree up to `end`.
 pub fn disagreements(ours: &[Event], known: &[Event], end: f64) -> Vec<Disagreement> {
     let mut found: Vec<Disagreement> = Vec::new();
-    for body in 0..3 {
+    for body in 0..BODIES {
         let of_body = |events: &[Event]| -> Vec<Event> {
             events.iter().filter(|event| event.body == body && event.time <= end).copied().collect()
         };
@@ -82,13 +80,13 @@ pub fn disagreements(ours: &[Event], known: &[Event], end: f64) -> Vec<Disagreem
 }
 
 /// An event of a body that another one undoes at the very same instant, where the independent solver has none.
-pub fn undone(ours: &[Event], known: &[Event], until: f64) -> Option<String> {
+pub fn undone(ours: &[Event], known: &[Event], until: f64, names: &[&str]) -> Option<String> {
     let pair = ours.iter().enumerate().find_map(|(i, a)| {
         let b = ours[i + 1..].iter().find(|b| b.body == a.body)?;
         let alone = || !known.iter().any(|k| k.body == a.body && (k.time - a.time).abs() <= MOMENT * until);
         (a.time == b.time && a.from == b.to && alone()).then_some(a)
     });
-    pair.map(|a| format!("the {} goes from {:?} to {:?} and back at {:e} s", NAMES[a.body], a.from, a.to, a.time))
+    pair.map(|a| format!("the {} goes from {:?} to {:?} and back at {:e} s", names[a.body], a.from, a.to, a.time))
 }
 
 #[cfg(test)]
@@ -115,7 +113,7 @@ mod tests {
     #[test]
     fn a_pair_of_events_at_one_instant_is_told() {
         let pair = [event(0.1, Motion::Stuck, Motion::Forward), event(0.1, Motion::Forward, Motion::Stuck)];
-        assert!(undone(&pair, &[], 1.0).is_some());
-        assert!(undone(&pair, &[event(0.1, Motion::Stuck, Motion::Backward)], 1.0).is_none());
+        assert!(undone(&pair, &[], 1.0, &["", "cart"]).is_some());
+        assert!(undone(&pair, &[event(0.1, Motion::Stuck, Motion::Backward)], 1.0, &["", "cart"]).is_none());
     }
 }

@@ -28,7 +28,8 @@ pub struct Wave {
 }
 
 impl Piece {
-    fn line(start: Double, value: Double, slope: Double) -> Self {
+    /// A straight line.
+    pub fn line(start: Double, value: Double, slope: Double) -> Self {
         Self { start, value, slope, waves: Vec::new() }
     }
 
@@ -72,6 +73,13 @@ pub fn chain(signal: &Signal, until: f64, taken: Taken) -> Result<Vec<Piece>, St
     }
     chain.retain(|piece| piece.start.high < until);
     Ok(chain)
+}
+
+/// The value of a chain at a time; at an edge the one after it.
+pub fn value(chain: &[Piece], time: f64) -> Double {
+    let time = Double::from(time);
+    let piece = chain.iter().rev().find(|piece| piece.start <= time);
+    piece.map_or(Double::ZERO, |piece| piece.series(time, Double::ONE)[0])
 }
 
 fn pieces(signal: &Signal, until: f64, taken: Taken) -> Result<Vec<Piece>, String> {

@@ -1,9 +1,12 @@
-//! The states of each part, the linear equations that follow from them, and the conditions under which they go on.
+//! The states of each part, the equations that follow from them, and the conditions under which they go on.
 
+use crate::curve::{self, Curved, Kind, Ramp};
 use crate::double::Double;
-use crate::machine::{CURRENT, Ends, Flanks, Machine, Play, ROTOR, SPEED, STATES, WAY};
+use crate::machine::{
+    BODIES, BRISTLE, CURRENT, Curve, DRIVES, Drive, Ends, Flanks, Line, Machine, Play, ROTOR, SPEED, STATES, State, WAY,
+};
+use crate::root::Polynomial;
 use crate::series::{Form, Rates, Row};
-use taut::stage::BeltModel;
 
 /// The motion of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -43,43 +46,45 @@ pub enum Touch {
 /// The state of every part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Mode {
-    /// Drive pulley, cart, idler pulley.
-    pub motion: [Motion; 3],
-    /// Whether the torque that the motor hands to the gear is positive.
-    pub gear_positive: bool,
+    /// Each body. One whose friction never lets it rest has a direction, too.
+    pub motion: [Motion; BODIES],
+    /// Whether the torque that each motor hands to its gear is positive.
+    pub gear_positive: [bool; DRIVES],
     /// Spans.
-    pub slack: [bool; 3],
-    /// Gear with backlash.
-    pub gear: Touch,
+    pub slack: [bool; BODIES],
+    /// Gears with backlash.
+    pub gear: [Touch; DRIVES],
     /// End stops.
-    pub stop: Touch,
-    /// Points passed of the forces over the cart's way and over its speed.
-    pub passed: [usize; 2],
-    /// Voltage limit.
-    pub voltage: Limit,
-    /// Current limit.
-    pub current: Limit,
+    pub stop: [Touch; BODIES],
+    /// Points passed of the forces over the cart's position and speed, and of its friction over its position.
+    pub passed: [usize; 3],
+    /// Voltage limits.
+    pub voltage: [Limit; DRIVES],
+    /// Current limits.
+    pub current: [Limit; DRIVES],
 }
 
 /// The change that follows where a condition fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
-    /// The voltage limit.
-    Voltage(Limit),
-    /// The current limit.
-    Current(Limit),
-    /// The torque through the gear changes its sign.
-    GearSign,
+    /// The voltage limit of a drive.
+    Voltage(usize, Limit),
+    /// The current limit of a drive.
+    Current(usize, Limit),
+    /// The torque through the gear of a drive changes its sign.
+    GearSign(usize),
     /// A span goes slack or taut.
     Span(usize, bool),
-    /// Flanks of the gear.
-    Gear(Touch),
-    /// End stops.
-    Stop(Touch),
-    /// As many points of a force are passed.
+    /// Flanks of the gear of a drive.
+    Gear(usize, Touch),
+    /// End stops of a body.
+    Stop(usize, Touch),
+    /// As many points of a line are passed.
     Passed(usize, usize),
-    /// The cart leaves its travel.
+    /// A body leaves its travel.
     Leave,
+    /// A body that friction never lets rest turns back.
+    Turn(usize),
     /// A sliding body comes to rest.
     Rest(usize),
     /// A body at rest breaks away.
@@ -104,6 +109,8 @@ pub struct Law {
     /// one instant: a
     /// body breaks away under the load that there is, not under one that a limit or a slack span takes away at once.
     pub guards: Vec<Guard>,
+    /// The current of each drive.
+    currents: Vec<Row>,
 }
 
 impl Limit {
@@ -134,16 +141,24 @@ struct Builder<'a> {
     mode: Mode,
     parts: Vec<(Form, Change)>,
     bodies: Vec<(Form, Change)>,
+    curved: Vec<Curved>,
+    currents: Vec<Row>,
 }
 
 impl Law {
     /// The equations of `machine` in `mode`.
     pub fn new(machine: &Machine, mode: Mode) -> Self {
-        let mut builder = Builder { machine, mode, parts: Vec::new(), bodies: Vec::new() };
+        let mut builder =
+            Builder { machine, mode, parts: Vec::new(), bodies: Vec::new(), curved: Vec::new(), currents: Vec::new() };
         let rates = builder.rates();
-        let Builder { parts, bodies, .. } = builder;
+        let Builder { parts, bodies, curved, currents, .. } = builder;
         let guards = parts.into_iter().chain(bodies).map(|(form, change)| Guard { row: Row::from(form), change });
-        Self { rates: Rates::new(&rates), guards: guards.collect() }
+        Self { guards: guards.collect(), rates: Rates::new(&rates, curved), currents }
+    }
+
+    /// The current of a drive in the state `z` under these terms of the inputs.
+    pub fn current(&self, drive: usize, z: &State, inputs: &[Polynomial; DRIVES]) -> Double {
+        self.currents[drive].value(z, inputs)
     }
 }
 
@@ -151,22 +166,36 @@ impl Builder<'_> {
     fn rates(&mut self) -> [Form; STATES] {
         let machine = self.machine;
         let mut rates = [Form::default(); STATES];
-        let (current, current_rate) = self.current();
-        rates[CURRENT] = current_rate;
-        // n K_t i / r
-        let motor = current * machine.grip;
-        let gear = self.gear_force();
-        if let Some(force) = gear {
-            rates[ROTOR[0]] = Form::state(ROTOR[1]);
-            rates[ROTOR[1]] = (motor - force) * (Double::ONE / machine.rotor);
+        let mut driven = [None; BODIES];
+        for (index, drive) in machine.drives.iter().enumerate() {
+            let (current, current_rate) = self.current(index, drive);
+            rates[CURRENT[index]] = current_rate;
+            self.currents.push(Row::from(current));
+            // n K_t i / r
+            let motor = current * drive.grip;
+            let gear = self.gear_force(index, drive);
+            if let Some(force) = gear {
+                let [at, turns] = ROTOR[index];
+                rates[at] = Form::state(turns);
+                rates[turns] = (motor - force) * (Double::ONE / drive.rotor);
+            }
+            driven[machine.leader(drive.body)] = Some((index, motor, gear));
         }
-        let [f1, f2, f3] = self.spans();
-        let stop = self.stop_force();
-        let lines = self.line_force(0, way(1)) + self.line_force(1, speed(1));
-        let belt = [f3 - f1, f1 - f2 + Form::constant(machine.force) + lines - stop, f2 - f3];
-        for leader in (0..3).filter(|&body| machine.leader(body) == body) {
+        // −Aᵀ f
+        let mut belt = [Form::default(); BODIES];
+        for (index, span) in machine.spans.iter().enumerate() {
+            let force = self.span(index);
+            for (body, &arm) in span.arms.iter().enumerate().filter(|(_, arm)| **arm != 0.0) {
+                belt[body] = belt[body] - force * sign(arm);
+            }
+        }
+        for (body, belt) in belt.iter_mut().enumerate() {
+            *belt = *belt - self.stop_force(body);
+        }
+        belt[1] = belt[1] + Form::constant(machine.force) + self.line_force(0, way(1)) + self.line_force(1, speed(1));
+        for leader in machine.leaders() {
             let load = machine.followers(leader).fold(Form::default(), |sum, body| sum + belt[body]);
-            let own = self.body(leader, load, motor, gear);
+            let own = self.body(leader, load, driven[leader], &mut rates);
             for body in machine.followers(leader) {
                 rates[WAY[body]] = speed(body);
                 rates[SPEED[body]] = own;
@@ -179,7 +208,7 @@ impl Builder<'_> {
         self.parts.push((form, change));
     }
 
-    fn watch_limit(&mut self, unlimited: Form, bound: Double, now: Limit, change: fn(Limit) -> Change) {
+    fn watch_limit(&mut self, unlimited: Form, bound: Double, now: Limit, change: impl Fn(Limit) -> Change) {
         let bound = Form::constant(bound);
         match now {
             Limit::Within => {
@@ -191,12 +220,13 @@ impl Builder<'_> {
         }
     }
 
-    /// The current and its rate.
-    fn current(&mut self) -> (Form, Form) {
-        let m = self.machine;
-        let Mode { voltage, current, .. } = self.mode;
-        let command = Form::input() * m.gain;
-        let shaft = if m.play.is_some() { Form::state(ROTOR[1]) } else { speed(0) };
+    /// The current of a drive and its rate.
+    fn current(&mut self, index: usize, m: &Drive) -> (Form, Form) {
+        let (voltage, current) = (self.mode.voltage[index], self.mode.current[index]);
+        let of_voltage = |limit| Change::Voltage(index, limit);
+        let of_current = |limit| Change::Current(index, limit);
+        let command = Form::input(index) * m.gain;
+        let shaft = if m.play.is_some() { Form::state(ROTOR[index][1]) } else { speed(m.body) };
         let emf = shaft * m.back_emf;
         let (per_ohm, per_henry) = (Double::ONE / m.resistance, Double::ONE / m.inductance);
         let at_limit = |side: Limit, bound: Option<Double>| match (side, bound) {
@@ -207,28 +237,28 @@ impl Builder<'_> {
             (at_limit(voltage, m.voltage_limit), at_limit(current, m.current_limit));
         if !m.current_mode {
             if let Some(bound) = m.voltage_limit {
-                self.watch_limit(command, bound, voltage, Change::Voltage);
+                self.watch_limit(command, bound, voltage, of_voltage);
             }
             let volts = highest_voltage.unwrap_or(command);
             if m.inductance > Double::ZERO {
                 // L di/dt = v − R i − K_e n φ̇; a current at its limit stands while that pushes it outward.
-                let i = Form::state(CURRENT);
+                let i = Form::state(CURRENT[index]);
                 let push = volts - i * m.resistance - emf;
                 match (current, m.current_limit) {
                     (_, None) => {}
-                    (Limit::Within, Some(bound)) => self.watch_limit(i, bound, current, Change::Current),
-                    (side, Some(_)) => self.watch(push * sign(side.sign()), Change::Current(Limit::Within)),
+                    (Limit::Within, Some(bound)) => self.watch_limit(i, bound, current, of_current),
+                    (side, Some(_)) => self.watch(push * sign(side.sign()), Change::Current(index, Limit::Within)),
                 }
                 return (i, if highest_current.is_some() { Form::default() } else { push * per_henry });
             }
             let unlimited = (volts - emf) * per_ohm;
             if let Some(bound) = m.current_limit {
-                self.watch_limit(unlimited, bound, current, Change::Current);
+                self.watch_limit(unlimited, bound, current, of_current);
             }
             return (highest_current.unwrap_or(unlimited), Form::default());
         }
         if let Some(bound) = m.current_limit {
-            self.watch_limit(command, bound, current, Change::Current);
+            self.watch_limit(command, bound, current, of_current);
         }
         let wanted = highest_current.unwrap_or(command);
         let (i, rate, volts) = match m.bandwidth {
@@ -236,13 +266,13 @@ impl Builder<'_> {
             None => (wanted, Form::default(), wanted * m.resistance + emf),
             // di/dt = 2π f_b (i_ref − i)
             Some(bandwidth) => {
-                let i = Form::state(CURRENT);
+                let i = Form::state(CURRENT[index]);
                 let rate = (wanted - i) * bandwidth;
                 (i, rate, i * m.resistance + emf + rate * m.inductance)
             }
         };
         if let Some(bound) = m.voltage_limit {
-            self.watch_limit(volts, bound, voltage, Change::Voltage);
+            self.watch_limit(volts, bound, voltage, of_voltage);
         }
         match (highest_voltage, m.bandwidth) {
             (None, _) => (i, rate),
@@ -252,7 +282,7 @@ impl Builder<'_> {
     }
 
     /// The force of flanks in the state `now`, positive where the upper one pushes.
-    fn flanks(&mut self, way: Form, rate: Form, flanks: &Flanks, now: Touch, change: fn(Touch) -> Change) -> Form {
+    fn flanks(&mut self, way: Form, rate: Form, flanks: &Flanks, now: Touch, change: impl Fn(Touch) -> Change) -> Form {
         let side = |upper: usize| if upper == 1 { 1.0 } else { -1.0 };
         let beyond = |upper: usize| (way - Form::constant(flanks.ends[upper])) * sign(side(upper));
         let push = |upper: usize| beyond(upper) * flanks.stiffness + rate * flanks.damping * sign(side(upper));
@@ -280,31 +310,37 @@ impl Builder<'_> {
     }
 
     /// The force of a compliant gear on the belt.
-    fn gear_force(&mut self) -> Option<Form> {
-        let twist = Form::state(ROTOR[0]) - way(0);
-        let rate = Form::state(ROTOR[1]) - speed(0);
-        match self.machine.play? {
+    fn gear_force(&mut self, index: usize, drive: &Drive) -> Option<Form> {
+        let twist = Form::state(ROTOR[index][0]) - way(drive.body);
+        let rate = Form::state(ROTOR[index][1]) - speed(drive.body);
+        match drive.play? {
             Play::Tight(stiffness, damping) => Some(twist * stiffness + rate * damping),
-            Play::Loose(flanks) => Some(self.flanks(twist, rate, &flanks, self.mode.gear, Change::Gear)),
+            Play::Loose(flanks) => {
+                let change = |touch| Change::Gear(index, touch);
+                Some(self.flanks(twist, rate, &flanks, self.mode.gear[index], change))
+            }
         }
     }
 
-    /// The force of an end stop on the cart.
-    fn stop_force(&mut self) -> Form {
-        match self.machine.ends {
+    /// The force of an end stop on a body.
+    fn stop_force(&mut self, body: usize) -> Form {
+        match self.machine.ends[body] {
             None => Form::default(),
             Some(Ends::Open([low, high])) => {
-                self.watch(Form::constant(high) - way(1), Change::Leave);
-                self.watch(way(1) - Form::constant(low), Change::Leave);
+                self.watch(Form::constant(high) - way(body), Change::Leave);
+                self.watch(way(body) - Form::constant(low), Change::Leave);
                 Form::default()
             }
-            Some(Ends::Stops(flanks)) => self.flanks(way(1), speed(1), &flanks, self.mode.stop, Change::Stop),
+            Some(Ends::Stops(flanks)) => {
+                let change = |touch| Change::Stop(body, touch);
+                self.flanks(way(body), speed(body), &flanks, self.mode.stop[body], change)
+            }
         }
     }
 
-    /// A force over x: between points (x₀, y₀) and (x₁, y₁) it is y₀ + (x − x₀) (y₁ − y₀)/(x₁ − x₀).
-    fn line_force(&mut self, which: usize, x: Form) -> Form {
-        let Some(line) = &self.machine.lines[which] else { return Form::default() };
+    /// A line over x: between points (x₀, y₀) and (x₁, y₁) it is y₀ + (x − x₀) (y₁ − y₀)/(x₁ − x₀). Value where x is
+    /// zero, and slope.
+    fn line(&mut self, which: usize, line: &Line, x: Form) -> (Double, Double) {
         let passed = self.mode.passed[which];
         let (before, after) = (passed.checked_sub(1).map(|k| line.points[k]), line.points.get(passed).copied());
         if let Some([end, _]) = after {
@@ -314,36 +350,47 @@ impl Builder<'_> {
             self.watch(x - Form::constant(begin), Change::Passed(which, passed - 1));
         }
         match (before, after) {
-            (Some([x0, y0]), Some([x1, y1])) => (x - Form::constant(x0)) * ((y1 - y0) / (x1 - x0)) + Form::constant(y0),
-            (Some([_, y]), None) | (None, Some([_, y])) => Form::constant(y),
-            (None, None) => Form::default(),
+            (Some([x0, y0]), Some([x1, y1])) => {
+                let slope = (y1 - y0) / (x1 - x0);
+                (y0 - x0 * slope, slope)
+            }
+            (Some([_, y]), None) | (None, Some([_, y])) => (y, Double::ZERO),
+            (None, None) => (Double::ZERO, Double::ZERO),
         }
     }
 
-    /// Forces of the spans beyond the pretension.
-    fn spans(&mut self) -> [Form; 3] {
-        let m = self.machine;
-        let [k, c] = m.belt;
-        let span = |a: usize, b: usize, k: Double, c: Double| (way(a) - way(b)) * k + (speed(a) - speed(b)) * c;
-        match m.model {
-            BeltModel::Rigid => [Form::default(); 3],
-            BeltModel::Elastic => {
-                let forces = [span(0, 1, k[0], c[0]), span(1, 2, k[1], c[1]), span(2, 0, k[2], c[2])];
-                [0, 1, 2].map(|j| self.taut_or_slack(j, forces[j]))
-            }
-            BeltModel::TwoMass => {
-                // 1/k₂₃ = 1/k₂ + 1/k₃, c₂₃ = (c₂ k₃² + c₃ k₂²)/(k₂ + k₃)²
-                let sum = k[1] + k[2];
-                let k23 = k[1] * k[2] / sum;
-                let c23 = (c[1] * k[2] * k[2] + c[2] * k[1] * k[1]) / (sum * sum);
-                let f1 = self.taut_or_slack(0, span(0, 1, k[0], c[0]));
-                let f2 = self.taut_or_slack(1, span(1, 2, k23, c23));
-                [f1, f2, f2]
-            }
-        }
+    fn line_force(&mut self, which: usize, x: Form) -> Form {
+        let machine = self.machine;
+        let Some(line) = &machine.lines[which] else { return Form::default() };
+        let (value, slope) = self.line(which, line, x);
+        Form::constant(value) + x * slope
     }
 
-    fn taut_or_slack(&mut self, j: usize, force: Form) -> Form {
+    /// Force of a span beyond the pretension.
+    fn span(&mut self, j: usize) -> Form {
+        let span = &self.machine.spans[j];
+        let arms = || span.arms.iter().enumerate().filter(|(_, arm)| **arm != 0.0);
+        let elongation = arms().fold(Form::default(), |sum, (body, &arm)| sum + way(body) * sign(arm));
+        let rate = arms().fold(Form::default(), |sum, (body, &arm)| sum + speed(body) * sign(arm));
+        let spring = match span.follows {
+            None => elongation * span.stiffness,
+            Some(follows) => {
+                let places = |of: &[f64; BODIES]| -> Vec<(usize, f64)> {
+                    let given = of.iter().enumerate().filter(|(_, c)| **c != 0.0);
+                    given.map(|(body, &c)| (WAY[body], c)).collect()
+                };
+                let place = curve::SPAN[j];
+                let kind = Kind::Span {
+                    rigidity: follows.rigidity,
+                    length: follows.length,
+                    of: places(&follows.of),
+                    arms: places(&span.arms),
+                };
+                self.curved.push(Curved { place, speed: (0, 1.0), along: None, kind });
+                Form::state(place)
+            }
+        };
+        let force = spring + rate * span.damping;
         let Some(pretension) = self.machine.pretension else { return force };
         let tension = force + Form::constant(pretension);
         let slack = self.mode.slack[j];
@@ -351,47 +398,119 @@ impl Builder<'_> {
         if slack { Form::constant(-pretension) } else { force }
     }
 
+    /// Friction of a body that slides forward (1) or backward (−1), as a force against the positive direction, and what
+    /// of it does not depend on the speed of a body at rest.
+    fn sliding(&mut self, body: usize, direction: f64, along: Option<Ramp>) -> Form {
+        let own = self.machine.friction[body];
+        let side = if direction > 0.0 { 0 } else { 1 };
+        let viscous = speed(body) * own.viscous[side];
+        let factor = |value: Double| match along {
+            None => Form::constant(value),
+            Some(ramp) => Form::constant(ramp.value * value) + Form::state(ramp.way) * (ramp.slope * value),
+        };
+        let (coulomb, above) = (own.coulomb[side], own.breakaway[side] - own.coulomb[side]);
+        let place = curve::FRICTION[body];
+        let mut curved = |kind| {
+            self.curved.push(Curved { place, speed: (SPEED[body], direction), along, kind });
+            Form::state(place)
+        };
+        viscous
+            + match own.curve {
+                Curve::None => factor(coulomb) * sign(direction),
+                Curve::Stribeck { velocity, is_gaussian } => {
+                    let beyond = curved(Kind::Stribeck { above, velocity, is_gaussian });
+                    (factor(coulomb) + beyond) * sign(direction)
+                }
+                Curve::Smooth(velocity) => curved(Kind::Smooth { above, coulomb, velocity }) * sign(direction),
+                Curve::Bristles([stiffness, damping, velocity]) => {
+                    let bristle = BRISTLE[body];
+                    let bends = curved(Kind::Bristles { above, coulomb, velocity, stiffness, bristle });
+                    Form::state(bristle) * stiffness + (speed(body) - bends) * damping
+                }
+            }
+    }
+
     /// Acceleration of a body under the `load` of belt and stops, and what the motor adds.
-    fn body(&mut self, leader: usize, load: Form, motor: Form, gear: Option<Form>) -> Form {
+    fn body(
+        &mut self,
+        leader: usize,
+        load: Form,
+        driven: Option<(usize, Form, Option<Form>)>,
+        rates: &mut [Form; STATES],
+    ) -> Form {
         let m = self.machine;
-        let friction = m.friction_of(leader);
         let mut mass = m.followers(leader).fold(Double::ZERO, |sum, body| sum + m.mass[body]);
-        let driven = leader == m.leader(0);
         let motion = self.mode.motion[leader];
         let forward = motion != Motion::Backward;
+        let direction = if forward { 1.0 } else { -1.0 };
+        let has_cart = m.followers(leader).any(|body| body == 1);
+        let along = m.along.as_ref().filter(|_| has_cart).map(|line| {
+            let (value, slope) = self.line(2, line, way(1));
+            Ramp { value, slope, way: WAY[1] }
+        });
+        let of = |body: usize| along.filter(|_| body == 1);
         // e is η where the motor drives, 1/η where it is driven.
-        let passed = |forward: bool| match forward == self.mode.gear_positive {
-            true => m.efficiency,
-            false => Double::ONE / m.efficiency,
+        let passed = |drive: usize, forward: bool| match forward == self.mode.gear_positive[drive] {
+            true => m.drives[drive].efficiency,
+            false => Double::ONE / m.drives[drive].efficiency,
         };
-        let loaded = |forward: bool| match (driven, gear) {
-            (false, _) => load,
-            (true, Some(force)) => load + force,
-            (true, None) => load + motor * passed(forward),
+        let loaded = |forward: bool| match driven {
+            None => load,
+            Some((_, _, Some(force))) => load + force,
+            Some((drive, motor, None)) => load + motor * passed(drive, forward),
         };
-        if driven && gear.is_none() {
-            mass += m.rotor * passed(forward);
+        if let Some((drive, _, None)) = driven {
+            mass += m.drives[drive].rotor * passed(drive, forward);
         }
+        let (pushed, both) = (loaded(forward), [loaded(true), loaded(false)]);
         let own = match motion {
-            Motion::Free => (loaded(true) - speed(leader) * friction.viscous[0]) * (Double::ONE / mass),
-            Motion::Forward | Motion::Backward => {
-                let (side, direction) = if forward { (0, 1.0) } else { (1, -1.0) };
-                self.bodies.push((speed(leader) * sign(direction), Change::Rest(leader)));
-                let dry = Form::constant(friction.coulomb[side] * direction);
-                (loaded(forward) - speed(leader) * friction.viscous[side] - dry) * (Double::ONE / mass)
-            }
             Motion::Stuck => {
-                let [forward, backward] = friction.breakaway.map(Form::constant);
-                self.bodies.push((forward - loaded(true), Change::Break(leader, Motion::Forward)));
-                self.bodies.push((backward + loaded(false), Change::Break(leader, Motion::Backward)));
+                // Bent bristles go on pulling.
+                let mut held = [Form::default(); 2];
+                let mut pull = Form::default();
+                for body in m.followers(leader) {
+                    let friction = m.friction[body];
+                    match friction.curve {
+                        Curve::Bristles([stiffness, ..]) => pull = pull + Form::state(BRISTLE[body]) * stiffness,
+                        Curve::Smooth(_) => {}
+                        Curve::None | Curve::Stribeck { .. } => {
+                            for (held, breakaway) in held.iter_mut().zip(friction.breakaway) {
+                                *held = *held
+                                    + match of(body) {
+                                        None => Form::constant(breakaway),
+                                        Some(ramp) => (Form::constant(ramp.value) + way(1) * ramp.slope) * breakaway,
+                                    };
+                            }
+                        }
+                    }
+                }
+                self.bodies.push((held[0] - (both[0] - pull), Change::Break(leader, Motion::Forward)));
+                self.bodies.push((held[1] + (both[1] - pull), Change::Break(leader, Motion::Backward)));
                 Form::default()
             }
+            Motion::Free | Motion::Forward | Motion::Backward => {
+                if motion != Motion::Free {
+                    let change = if m.is_dry(leader) { Change::Rest(leader) } else { Change::Turn(leader) };
+                    self.bodies.push((speed(leader) * sign(direction), change));
+                }
+                let resisted =
+                    m.followers(leader).fold(pushed, |sum, body| sum - self.sliding(body, direction, of(body)));
+                for body in m.followers(leader) {
+                    if let Curve::Bristles(_) = m.friction[body].curve {
+                        // ż = v − σ₀ abs(v) z/g(v)
+                        rates[BRISTLE[body]] = speed(body) - Form::state(curve::FRICTION[body]);
+                    }
+                }
+                resisted * (Double::ONE / mass)
+            }
         };
-        if driven && gear.is_none() && m.loses() {
+        if let Some((drive, motor, None)) = driven
+            && m.drives[drive].loses()
+        {
             // T = K_t i − J_r n φ̈, as a force at the belt before the gear's losses
-            let torque = motor - own * m.rotor;
-            let positive = if self.mode.gear_positive { 1.0 } else { -1.0 };
-            self.watch(torque * sign(positive), Change::GearSign);
+            let torque = motor - own * m.drives[drive].rotor;
+            let positive = if self.mode.gear_positive[drive] { 1.0 } else { -1.0 };
+            self.watch(torque * sign(positive), Change::GearSign(drive));
         }
         own
     }

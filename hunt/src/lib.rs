@@ -5,14 +5,23 @@
 //! friction: it takes a stage as data and writes its own equations, in numbers of about 106 bits. `docs/trust.md` says
 //! what is compared.
 
+pub mod answer;
+pub mod c;
 pub mod compare;
+pub mod curve;
 pub mod double;
 pub mod draw;
 pub mod events;
+pub mod exchange;
+pub mod gantry;
 pub mod input;
 pub mod law;
+pub mod loops;
 pub mod machine;
 pub mod root;
 pub mod series;
 pub mod solve;
 pub mod stages;
+pub mod steps;
+pub mod subject;
+pub mod swept;

@@ -1,31 +1,64 @@
-//! The numbers of a stage as the independent solver wants them: all along the belt, in numbers of 106 bits.
+//! The numbers of a machine as the independent solver wants them: all along the belt, in numbers of 106 bits.
 //!
-//! A pulley of inertia J and radius r counts as a mass J/r² that goes the way y = r φ, a torque τ as a force τ/r, an
-//! angular
-//! viscosity B as B/r². Ways are counted from where the cart starts, so that a start far from the origin costs no
-//! digits.
+//! A pulley of inertia J and radius r counts as a mass J/r² at the position r φ, a torque τ as a force τ/r, an angular
+//! viscosity B as B/r². Positions are counted from where the cart (of a gantry bridge and cart) starts, so that a start
+//! far from the origin costs no digits.
 
 use crate::double::Double;
 use taut::case::Experiment;
-use taut::stage::{AmplifierMode, BeltModel, GRAVITY, Stage};
+use taut::mechanism::{Amplifier, Motor};
+use taut::polyline::Polyline;
+use taut::stage::{AmplifierMode, BeltModel, GRAVITY, Stage, Travel};
 
-/// Places in the state: ways and speeds along the belt of drive pulley, cart and idler pulley, the current, way and
-/// speed of a
-/// rotor that turns by itself.
-pub const STATES: usize = 9;
-/// Way of body 0, 1, 2; its speed stands behind it.
-pub const WAY: [usize; 3] = [0, 2, 4];
-/// Speed of body 0, 1, 2.
-pub const SPEED: [usize; 3] = [1, 3, 5];
-/// The current.
-pub const CURRENT: usize = 6;
-/// The rotor's way and speed.
-pub const ROTOR: [usize; 2] = [7, 8];
+/// Bodies that a machine can have beside its rotors, and its drives.
+pub const BODIES: usize = 4;
+/// Drives.
+pub const DRIVES: usize = 2;
+
+/// States: positions and speeds along the belt of the bodies, currents, positions and speeds of rotors that turn by
+/// themselves, deflections of bristles.
+pub const STATES: usize = 2 * BODIES + DRIVES + 2 * DRIVES + BODIES;
+/// Position of each body; its speed stands behind it.
+pub const WAY: [usize; BODIES] = [0, 2, 4, 6];
+/// Speed of each body.
+pub const SPEED: [usize; BODIES] = [1, 3, 5, 7];
+/// Current of each drive.
+pub const CURRENT: [usize; DRIVES] = [8, 9];
+/// Each rotor's position and speed.
+pub const ROTOR: [[usize; 2]; DRIVES] = [[10, 11], [12, 13]];
+/// Deflection of each body's bristles.
+pub const BRISTLE: [usize; BODIES] = [14, 15, 16, 17];
 
 /// A state.
 pub type State = [Double; STATES];
 
-/// Dry and viscous friction of a body, forward and backward.
+/// A friction law between rest and fast sliding, in units along the belt.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub enum Curve {
+    /// Coulomb's.
+    #[default]
+    None,
+    /// F_c + (F_b − F_c) e^{−(v/v_s)²}, or e^{−v/v_s}.
+    Stribeck {
+        /// v_s.
+        velocity: Double,
+        /// Whether the exponent is a square.
+        is_gaussian: bool,
+    },
+    /// √(2e) (F_b − F_c) e^{−(v/v_St)²} v/v_St + F_c tanh(v/v_Coul), v_St = √2 v_b, v_Coul = v_b/10.
+    Smooth(Double),
+    /// Bristles: σ₀, σ₁, v_s.
+    Bristles([Double; 3]),
+}
+
+impl Curve {
+    /// Whether a body under it can be at rest.
+    pub fn sticks(self) -> bool {
+        matches!(self, Curve::None | Curve::Stribeck { .. })
+    }
+}
+
+/// Friction of a body, forward and backward.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Friction {
     /// Force per speed.
@@ -34,6 +67,8 @@ pub struct Friction {
     pub coulomb: [Double; 2],
     /// Friction that holds at rest.
     pub breakaway: [Double; 2],
+    /// The law between the two.
+    pub curve: Curve,
 }
 
 /// Two elastic flanks that only push.
@@ -65,34 +100,44 @@ pub enum Ends {
     Stops(Flanks),
 }
 
-/// A force on the cart by straight lines between points, the first and the last value held beyond them.
+/// A value by straight lines between points, the first and the last value held beyond them.
 #[derive(Debug, Clone)]
 pub struct Line {
-    /// Way from the start or speed, and force.
+    /// Position from the start or speed, and value.
     pub points: Vec<[Double; 2]>,
 }
 
-/// The machine and its start.
+/// A span whose length follows bodies: k = E A/l.
+#[derive(Debug, Clone, Copy)]
+pub struct Follows {
+    /// E A.
+    pub rigidity: Double,
+    /// Length at the start.
+    pub length: Double,
+    /// Change of the length with the position of each body.
+    pub of: [f64; BODIES],
+}
+
+/// A span of a belt: f = k s + c ṡ with the elongation s = Σ arms q.
 #[derive(Debug, Clone)]
-pub struct Machine {
-    /// The bodies that move by themselves.
-    pub model: BeltModel,
-    /// Masses of drive pulley, cart, idler pulley.
-    pub mass: [Double; 3],
+pub struct Span {
+    /// Elongation by the position of each body along the belt.
+    pub arms: [f64; BODIES],
+    /// Stiffness.
+    pub stiffness: Double,
+    /// Damping.
+    pub damping: Double,
+    /// What its stiffness follows.
+    pub follows: Option<Follows>,
+}
+
+/// A motor with its amplifier.
+#[derive(Debug, Clone)]
+pub struct Drive {
+    /// The body that it turns.
+    pub body: usize,
     /// Mass that the rotor counts as.
     pub rotor: Double,
-    /// Friction of each body by itself.
-    pub friction: [Friction; 3],
-    /// Stiffness and damping of the spans.
-    pub belt: [[Double; 3]; 2],
-    /// Pretension, if spans can go slack.
-    pub pretension: Option<Double>,
-    /// Constant force on the cart.
-    pub force: Double,
-    /// Forces on the cart over its way and over its speed.
-    pub lines: [Option<Line>; 2],
-    /// Ends of the travel.
-    pub ends: Option<Ends>,
     /// Force at the belt per ampere, before the gear's losses.
     pub grip: Double,
     /// Back-EMF per speed along the belt.
@@ -115,110 +160,140 @@ pub struct Machine {
     pub current_limit: Option<Double>,
     /// Rate of the current loop, rad/s.
     pub bandwidth: Option<Double>,
+}
+
+/// The machine and its start.
+#[derive(Debug, Clone)]
+pub struct Machine {
+    /// How many bodies there are.
+    pub bodies: usize,
+    /// The body that each one moves with.
+    pub leader: [usize; BODIES],
+    /// Masses.
+    pub mass: [Double; BODIES],
+    /// Friction of each body by itself.
+    pub friction: [Friction; BODIES],
+    /// Factor of the dry friction of body 1 over its position.
+    pub along: Option<Line>,
+    /// The belt.
+    pub spans: Vec<Span>,
+    /// Pretension, if spans can go slack.
+    pub pretension: Option<Double>,
+    /// Constant force on body 1.
+    pub force: Double,
+    /// Forces on body 1 over its position and over its speed.
+    pub lines: [Option<Line>; 2],
+    /// Ends of the travel of each body.
+    pub ends: [Option<Ends>; BODIES],
+    /// The drives.
+    pub drives: Vec<Drive>,
     /// State at time zero.
     pub start: State,
-    /// Difference between the positions given for drive pulley, cart and idler pulley and those of that state: less
-    /// than a strain.
-    pub beyond: [Double; 3],
-    /// Radius of the pulleys.
-    pub radius: Double,
-    /// Where the cart starts: ways are counted from there.
-    pub origin: Double,
+    /// Difference between the positions given and those of that state: less than a strain.
+    pub beyond: [Double; BODIES],
+    /// Position of each body where ways are counted from.
+    pub origin: [Double; BODIES],
+    /// What makes a position of taut (rad or m) one along the belt.
+    pub lever: [Double; BODIES],
+    /// The bodies that say where the machine is, each with the change of all positions with its own.
+    pub place: Vec<(usize, [f64; BODIES])>,
 }
 
 /// How a number of the case becomes one of ours: as it is, or perturbed.
 pub type Taken<'a> = &'a mut dyn FnMut(f64) -> Double;
 
 impl Machine {
-    /// The machine of `stage` at the start of `experiment`; every number passes `taken` once.
+    /// The axis `stage` at the start of `experiment`; every number passes `taken` once.
     pub fn new(stage: &Stage, experiment: &Experiment, taken: Taken) -> Self {
-        let motor = &stage.motor;
         let r = taken(stage.pulley_radius);
         let r2 = r * r;
-        let n = taken(motor.gear_ratio);
-        let friction = [
-            friction(&stage.drive_pulley.friction, taken, r),
-            friction(&stage.cart.friction, taken, Double::ONE),
-            friction(&stage.idler_pulley.friction, taken, r),
-        ];
-        let [k, c] = [stage.belt.stiffness, stage.belt.damping].map(|values| values.map(&mut *taken));
-        let mass =
-            [taken(stage.drive_pulley.inertia) / r2, taken(stage.cart.mass), taken(stage.idler_pulley.inertia) / r2];
+        let cart = friction(&stage.cart.friction, taken, Double::ONE);
+        let pulleys = [&stage.drive_pulley, &stage.idler_pulley].map(|pulley| friction(&pulley.friction, taken, r));
+        let mut mass = [Double::ZERO; BODIES];
+        mass[0] = taken(stage.drive_pulley.inertia) / r2;
+        mass[1] = taken(stage.cart.mass);
+        mass[2] = taken(stage.idler_pulley.inertia) / r2;
         // F_L − M g sin θ
         let slope = taken(stage.cart.inclination).sin_cos().0;
         let force = taken(stage.cart.load) - mass[1] * slope * GRAVITY;
-        let origin = Double::from(experiment.initial.cart_position);
-        let (play, ends) = (play(stage, taken, r), ends(stage, taken, origin));
+        let cart_start = Double::from(experiment.initial.cart_position);
         let forces = &stage.cart.forces;
-        let lines = [line(forces.along.as_ref(), taken, origin), line(forces.by_speed.as_ref(), taken, Double::ZERO)];
-        let amplifier = &stage.amplifier;
+        let mut ends = [None; BODIES];
+        ends[1] = stage.travel.map(|travel| self::ends(travel, taken, cart_start));
+        let (start, beyond) = start(stage, experiment, taken, r, cart_start);
         Self {
-            model: stage.belt.model,
+            bodies: 3,
+            leader: match stage.belt.model {
+                BeltModel::Elastic => [0, 1, 2, 3],
+                BeltModel::TwoMass => [0, 1, 0, 3],
+                BeltModel::Rigid => [1, 1, 1, 3],
+            },
             mass,
-            rotor: n * n * taken(motor.rotor_inertia) / r2,
-            friction,
-            belt: [k, c],
+            friction: [pulleys[0], cart, pulleys[1], Friction::default()],
+            along: line(stage.cart.along.as_ref(), taken, cart_start),
+            spans: spans(stage, taken, cart_start),
             pretension: stage.belt.pretension.map(&mut *taken),
             force,
-            lines,
+            lines: [
+                line(forces.along.as_ref(), taken, cart_start),
+                line(forces.by_speed.as_ref(), taken, Double::ZERO),
+            ],
             ends,
-            grip: n * taken(motor.torque_constant) / r,
-            back_emf: n * taken(motor.back_emf_constant) / r,
-            resistance: taken(motor.resistance),
-            inductance: taken(motor.inductance),
-            efficiency: if motor.gear_efficiency < 1.0 { taken(motor.gear_efficiency) } else { Double::ONE },
-            play,
-            current_mode: amplifier.mode == AmplifierMode::Current,
-            gain: taken(amplifier.gain),
-            voltage_limit: amplifier.voltage_limit.map(&mut *taken),
-            current_limit: amplifier.current_limit.map(&mut *taken),
-            // 2π f
-            bandwidth: amplifier.bandwidth.map(|f| crate::double::PI * 2.0 * taken(f)),
-            start: start(stage, experiment, taken, r, origin),
-            beyond: beyond(stage, experiment, origin),
-            radius: r,
-            origin,
+            drives: vec![drive(0, &stage.motor, &stage.amplifier, taken, r)],
+            start,
+            beyond,
+            origin: [cart_start; BODIES],
+            lever: [r, Double::ONE, r, Double::ONE],
+            place: vec![(1, [1.0; BODIES])],
         }
     }
 
     /// The body that this one moves with.
     pub fn leader(&self, body: usize) -> usize {
-        match self.model {
-            BeltModel::Elastic => body,
-            BeltModel::TwoMass => [0, 1, 0][body],
-            BeltModel::Rigid => 1,
-        }
+        self.leader[body]
+    }
+
+    /// The bodies that move by themselves.
+    pub fn leaders(&self) -> impl Iterator<Item = usize> + use<> {
+        let leader = self.leader;
+        (0..self.bodies).filter(move |&body| leader[body] == body)
     }
 
     /// The bodies that move with this one, itself included.
-    pub fn followers(&self, leader: usize) -> impl Iterator<Item = usize> {
-        (0..3).filter(move |&body| self.leader(body) == leader)
+    pub fn followers(&self, leader: usize) -> impl Iterator<Item = usize> + use<> {
+        let all = self.leader;
+        (0..self.bodies).filter(move |&body| all[body] == leader)
     }
 
-    /// Friction of a body and of all that move with it.
-    pub fn friction_of(&self, leader: usize) -> Friction {
-        let mut sum = Friction::default();
-        for body in self.followers(leader) {
+    /// The drive that turns this body.
+    pub fn drive_of(&self, leader: usize) -> Option<usize> {
+        self.drives.iter().position(|drive| self.leader(drive.body) == leader)
+    }
+
+    /// Whether a body can be at rest, or feels its direction by a law that lets it rest.
+    pub fn is_dry(&self, leader: usize) -> bool {
+        let loses = self.drive_of(leader).is_some_and(|drive| self.drives[drive].loses());
+        let mut sum = [[Double::ZERO; 2]; 2];
+        for body in self.followers(leader).filter(|&body| self.friction[body].curve.sticks()) {
             let own = &self.friction[body];
-            for side in 0..2 {
-                sum.viscous[side] += own.viscous[side];
-                sum.coulomb[side] += own.coulomb[side];
-                sum.breakaway[side] += own.breakaway[side];
+            for (side, [dry, viscous]) in sum.iter_mut().enumerate() {
+                *dry += own.coulomb[side] + own.breakaway[side];
+                *viscous += own.viscous[side];
             }
         }
-        sum
+        sum.iter().any(|side| side[0] != Double::ZERO) || sum[0][1] != sum[1][1] || loses
     }
 
+    /// Whether it feels its direction by a law that never lets it rest.
+    pub fn is_curved(&self, leader: usize) -> bool {
+        self.followers(leader).any(|body| !self.friction[body].curve.sticks())
+    }
+}
+
+impl Drive {
     /// Whether the gear loses power.
     pub fn loses(&self) -> bool {
         self.efficiency < Double::ONE
-    }
-
-    /// Whether a body can be at rest, or feels its direction.
-    pub fn is_dry(&self, leader: usize) -> bool {
-        let friction = self.friction_of(leader);
-        let dry = friction.coulomb.iter().chain(&friction.breakaway).any(|&force| force != Double::ZERO);
-        dry || friction.viscous[0] != friction.viscous[1] || (self.loses() && self.leader(0) == leader)
     }
 
     /// Whether the current is a state.
@@ -227,15 +302,36 @@ impl Machine {
     }
 }
 
+/// A motor and its amplifier.
+pub fn drive(body: usize, motor: &Motor, amplifier: &Amplifier, taken: Taken, r: Double) -> Drive {
+    let n = taken(motor.gear_ratio);
+    Drive {
+        body,
+        rotor: n * n * taken(motor.rotor_inertia) / (r * r),
+        grip: n * taken(motor.torque_constant) / r,
+        back_emf: n * taken(motor.back_emf_constant) / r,
+        resistance: taken(motor.resistance),
+        inductance: taken(motor.inductance),
+        efficiency: if motor.gear_efficiency < 1.0 { taken(motor.gear_efficiency) } else { Double::ONE },
+        play: play(motor, taken, r),
+        current_mode: amplifier.mode == AmplifierMode::Current,
+        gain: taken(amplifier.gain),
+        voltage_limit: amplifier.voltage_limit.map(&mut *taken),
+        current_limit: amplifier.current_limit.map(&mut *taken),
+        // 2π f
+        bandwidth: amplifier.bandwidth.map(|f| crate::double::PI * 2.0 * taken(f)),
+    }
+}
+
 /// A line, over what is left of x without `origin`.
-fn line(line: Option<&taut::polyline::Polyline>, taken: Taken, origin: Double) -> Option<Line> {
+fn line(line: Option<&Polyline>, taken: Taken, origin: Double) -> Option<Line> {
     let point = |&[x, force]: &[f64; 2]| [(Double::from(x) - origin) * taken(1.0), taken(force)];
     Some(Line { points: line?.points().iter().map(point).collect() })
 }
 
 /// The gear, where it is compliant.
-fn play(stage: &Stage, taken: Taken, r: Double) -> Option<Play> {
-    let play = stage.motor.gear_play?;
+fn play(motor: &Motor, taken: Taken, r: Double) -> Option<Play> {
+    let play = motor.gear_play?;
     let r2 = r * r;
     let (half, k, c) = (taken(play.backlash) * 0.5 * r, taken(play.stiffness) / r2, taken(play.damping) / r2);
     Some(match play.backlash > 0.0 {
@@ -244,17 +340,17 @@ fn play(stage: &Stage, taken: Taken, r: Double) -> Option<Play> {
     })
 }
 
-/// The ends of the travel, from where the cart starts.
-fn ends(stage: &Stage, taken: Taken, origin: Double) -> Option<Ends> {
-    let travel = stage.travel?;
+/// The ends of a travel, from where its body starts.
+pub fn ends(travel: Travel, taken: Taken, origin: Double) -> Ends {
     let ends = [travel.min, travel.max].map(|end| (Double::from(end) - origin) * taken(1.0));
-    Some(match travel.stop {
+    match travel.stop {
         None => Ends::Open(ends),
         Some(stop) => Ends::Stops(Flanks { ends, stiffness: taken(stop.stiffness), damping: taken(stop.damping) }),
-    })
+    }
 }
 
-fn friction(law: &taut::friction::Friction, taken: Taken, r: Double) -> Friction {
+/// Friction of a body whose speed times `r` is that along the belt.
+pub fn friction(law: &taut::friction::Friction, taken: Taken, r: Double) -> Friction {
     let sides = [law.forward, law.backward];
     // Values that are equal stay so.
     let mut both = |value: fn(&taut::friction::Side) -> f64| {
@@ -269,26 +365,64 @@ fn friction(law: &taut::friction::Friction, taken: Taken, r: Double) -> Friction
             *breakaway = coulomb;
         }
     }
+    let curve = match law.law {
+        taut::friction::Law::Coulomb => Curve::None,
+        taut::friction::Law::Stribeck { velocity, shape } => {
+            Curve::Stribeck { velocity: taken(velocity) * r, is_gaussian: shape == taut::friction::Shape::Gaussian }
+        }
+        taut::friction::Law::Smooth { breakaway_velocity } => Curve::Smooth(taken(breakaway_velocity) * r),
+        taut::friction::Law::LuGre { stiffness, damping, velocity } => {
+            Curve::Bristles([taken(stiffness) / (r * r), taken(damping) / (r * r), taken(velocity) * r])
+        }
+    };
     Friction {
         viscous: viscous.map(|b| b / (r * r)),
         coulomb: coulomb.map(|force| force / r),
         breakaway: breakaway.map(|force| force / r),
+        curve,
     }
 }
 
-/// Ways of the pulleys at the start, from that of the cart, as the case gives them.
-fn strains(stage: &Stage, experiment: &Experiment, origin: Double) -> [Double; 2] {
-    let initial = &experiment.initial;
-    [initial.drive_angle, initial.idler_angle].map(|angle| Double::from(stage.pulley_radius) * angle - origin)
+/// Spans 1 (drive pulley to cart), 2 (cart to idler pulley) and 3 (back), or 1 and the other two in series.
+fn spans(stage: &Stage, taken: Taken, cart_start: Double) -> Vec<Span> {
+    let [k, c] = [stage.belt.stiffness, stage.belt.damping].map(|values| values.map(&mut *taken));
+    let make = stage.belt.make.filter(|_| stage.belt.follows_cart);
+    // l₁ − x, l₂ + x; the third span keeps its length.
+    let follows = make.map(|make| {
+        let rigidity = taken(make.modulus) * taken(make.section);
+        let [l1, l2, l3] = make.spans.map(&mut *taken);
+        (rigidity, l1 - cart_start, l2 + cart_start, l3)
+    });
+    let follows = |which: usize, more: bool| {
+        let (rigidity, l1, l2, l3) = follows?;
+        match which {
+            0 => Some(Follows { rigidity, length: l1, of: [0.0, -1.0, 0.0, 0.0] }),
+            1 if more => Some(Follows { rigidity, length: l2 + l3, of: [0.0, 1.0, 0.0, 0.0] }),
+            1 => Some(Follows { rigidity, length: l2, of: [0.0, 1.0, 0.0, 0.0] }),
+            _ => None,
+        }
+    };
+    let first = [1.0, -1.0, 0.0, 0.0];
+    match stage.belt.model {
+        BeltModel::Rigid => Vec::new(),
+        BeltModel::Elastic => [first, [0.0, 1.0, -1.0, 0.0], [-1.0, 0.0, 1.0, 0.0]]
+            .into_iter()
+            .enumerate()
+            .map(|(j, arms)| Span { arms, stiffness: k[j], damping: c[j], follows: follows(j, false) })
+            .collect(),
+        BeltModel::TwoMass => {
+            // 1/k₂₃ = 1/k₂ + 1/k₃, c₂₃ = (c₂ k₃² + c₃ k₂²)/(k₂ + k₃)²
+            let sum = k[1] + k[2];
+            let k23 = k[1] * k[2] / sum;
+            let c23 = (c[1] * k[2] * k[2] + c[2] * k[1] * k[1]) / (sum * sum);
+            let second = Span { arms: [0.0, 1.0, -1.0, 0.0], stiffness: k23, damping: c23, follows: follows(1, true) };
+            vec![Span { arms: first, stiffness: k[0], damping: c[0], follows: follows(0, false) }, second]
+        }
+    }
 }
 
-fn beyond(stage: &Stage, experiment: &Experiment, origin: Double) -> [Double; 3] {
-    let [drive, idler] =
-        strains(stage, experiment, origin).map(|strain| if is_strain(strain, origin) { Double::ZERO } else { strain });
-    [drive, Double::ZERO, idler]
-}
-
-fn is_strain(strain: Double, origin: Double) -> bool {
+/// Whether a difference of two positions is more than their rounding.
+pub fn is_strain(strain: Double, origin: Double) -> bool {
     let way = (strain + origin).high.abs();
     strain.high.abs() > LAST_PLACES * f64::EPSILON * way.max(origin.high.abs())
 }
@@ -297,13 +431,18 @@ fn is_strain(strain: Double, origin: Double) -> bool {
 /// number, too.
 const LAST_PLACES: f64 = 4.0;
 
-fn start(stage: &Stage, experiment: &Experiment, taken: Taken, r: Double, origin: Double) -> State {
+fn start(stage: &Stage, experiment: &Experiment, taken: Taken, r: Double, origin: Double) -> (State, [Double; BODIES]) {
     let initial = &experiment.initial;
     let mut z = [Double::ZERO; STATES];
-    // Strains, not positions: a number of 64 bits holds the first to their own last place.
-    let [drive, idler] = strains(stage, experiment, origin)
-        .map(|strain| if is_strain(strain, origin) { strain * taken(1.0) } else { Double::ZERO });
-    (z[WAY[0]], z[WAY[2]]) = (drive, idler);
+    let mut beyond = [Double::ZERO; BODIES];
+    for (body, angle) in [(0, initial.drive_angle), (2, initial.idler_angle)] {
+        // Strains, not positions: a number of 64 bits holds the first to their own last place.
+        let strain = Double::from(stage.pulley_radius) * angle - origin;
+        match is_strain(strain, origin) {
+            true => z[WAY[body]] = strain * taken(1.0),
+            false => beyond[body] = strain,
+        }
+    }
     z[SPEED[0]] = taken(initial.drive_speed) * r;
     z[SPEED[1]] = taken(initial.cart_speed);
     z[SPEED[2]] = taken(initial.idler_speed) * r;
@@ -312,8 +451,8 @@ fn start(stage: &Stage, experiment: &Experiment, taken: Taken, r: Double, origin
         BeltModel::TwoMass => (z[WAY[2]], z[SPEED[2]]) = (z[WAY[0]], z[SPEED[0]]),
         BeltModel::Rigid => (z[SPEED[0]], z[SPEED[2]]) = (z[SPEED[1]], z[SPEED[1]]),
     }
-    z[CURRENT] = taken(initial.motor_current);
+    z[CURRENT[0]] = taken(initial.motor_current);
     // The rotor begins in the middle of its play.
-    (z[ROTOR[0]], z[ROTOR[1]]) = (z[WAY[0]], z[SPEED[0]]);
-    z
+    (z[ROTOR[0][0]], z[ROTOR[0][1]]) = (z[WAY[0]], z[SPEED[0]]);
+    (z, beyond)
 }

@@ -6,8 +6,10 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
-use taut_hunt::compare::{By, compare};
-use taut_hunt::stages::{self, Hunt};
+use taut_hunt::answer::By;
+use taut_hunt::compare::compare;
+use taut_hunt::draw;
+use taut_hunt::stages::{self, Drawing, Hunt};
 
 /// Hunts for wrong answers of taut.
 #[derive(Parser)]
@@ -21,6 +23,8 @@ struct Arguments {
 enum Part {
     /// Random stages against an independent solver.
     Stages(Stages),
+    /// Cases in which each pair of features occurs, curved ones, gantries, loops and exports among them.
+    Pairs(Stages),
 }
 
 #[derive(clap::Args)]
@@ -46,24 +50,39 @@ struct Stages {
     /// Print the case of a stage, `--first`, and no more.
     #[arg(long)]
     show: bool,
-    /// Compare the first experiment of this case file by both solvers, instead of random ones.
+    /// Of pairs: count how often each occurs, and compare nothing.
+    #[arg(long)]
+    count: bool,
+    /// Compare the first experiment of this case file by these ways, instead of random ones.
     #[arg(long, value_name = "FILE")]
     case: Option<PathBuf>,
+    /// With `--case`: exact, general, cs, me, c or sweep; both solvers unless said. Several with commas.
+    #[arg(long, value_delimiter = ',')]
+    by: Vec<String>,
 }
 
 fn main() -> ExitCode {
     match Arguments::parse().part {
-        Part::Stages(arguments) => arguments.run(),
+        Part::Stages(arguments) => arguments.run(Drawing::Stages),
+        Part::Pairs(arguments) => arguments.run(Drawing::Pairs),
     }
 }
 
 impl Stages {
-    fn run(&self) -> ExitCode {
+    fn run(&self, drawing: Drawing) -> ExitCode {
         if let Some(path) = &self.case {
-            return one_case(path);
+            return one_case(path, &self.by);
         }
         if self.show {
-            print!("{}", taut_hunt::draw::stage(self.seed, self.first).text);
+            match drawing {
+                Drawing::Stages => print!("{}", draw::stage(self.seed, self.first).text),
+                Drawing::Pairs => print!("{}", draw::pair(self.seed, self.first).0.text),
+            }
+            return ExitCode::SUCCESS;
+        }
+        if self.count {
+            let cases: Vec<_> = (0..self.stages).map(|k| draw::recipe(self.seed, self.first + k)).collect();
+            told_pairs(cases.iter().map(Vec::as_slice));
             return ExitCode::SUCCESS;
         }
         let stop = Arc::new(AtomicBool::new(false));
@@ -78,6 +97,7 @@ impl Stages {
             threads,
             progress: true,
             stop: Arc::clone(&stop),
+            drawing,
         };
         let begin = Instant::now();
         let outcomes = hunt.run();
@@ -95,6 +115,10 @@ impl Stages {
                 begin.elapsed().as_secs_f64()
             );
             print!("{}", stages::table(&outcomes));
+            if drawing == Drawing::Pairs {
+                println!();
+                told_pairs(outcomes.iter().map(|outcome| outcome.features.as_slice()));
+            }
         }
         match (unexplained, stop.load(Ordering::Relaxed)) {
             (1.., _) => ExitCode::FAILURE,
@@ -104,8 +128,28 @@ impl Stages {
     }
 }
 
+/// How often each pair of features occurs.
+fn told_pairs<'a>(cases: impl Iterator<Item = &'a [draw::Feature]> + Clone) {
+    print!("{}", stages::pairs_table(cases.clone()));
+    let ([a, b], count) = stages::rarest_pair(cases);
+    println!("\nRarest pair: {} and {}, {count} times.", a.names()[0], b.names()[0]);
+}
+
 /// Compares the case of a file.
-fn one_case(path: &std::path::Path) -> ExitCode {
+fn one_case(path: &std::path::Path, words: &[String]) -> ExitCode {
+    let mut ways = Vec::new();
+    for word in words {
+        let known = [("exact", By::Exact), ("general", By::General), ("cs", By::CoSimulation)];
+        let more = [("me", By::ModelExchange), ("c", By::C), ("sweep", By::Sweep)];
+        let Some((_, by)) = known.into_iter().chain(more).find(|(name, _)| name == word) else {
+            eprintln!("error: --by cannot be {word}; allowed: exact, general, cs, me, c, sweep");
+            return ExitCode::from(2);
+        };
+        ways.push(by);
+    }
+    if ways.is_empty() {
+        ways = vec![By::Exact, By::General];
+    }
     let text = match std::fs::read_to_string(path) {
         Ok(text) => text,
         Err(error) => {
@@ -114,7 +158,7 @@ fn one_case(path: &std::path::Path) -> ExitCode {
         }
     };
     let mut status = ExitCode::SUCCESS;
-    for compared in compare(&path.display().to_string(), &text, &[By::Exact, By::General]) {
+    for compared in compare(&path.display().to_string(), &text, &ways, &[3.1]) {
         println!(
             "{:?}: {}, positions within {:.1e} m, {} body events; {}",
             compared.by,

@@ -7,15 +7,13 @@
 //! the first term of its series that is not, and what fails changes, one after the other, until all hold.
 
 use crate::double::Double;
-use crate::input::{self, Piece};
+use crate::input::Piece;
 use crate::law::{Change, Guard, Law, Limit, Mode, Motion, Touch};
-use crate::machine::{CURRENT, Machine, ROTOR, SPEED, State, Taken, WAY};
+use crate::machine::{BODIES, BRISTLE, CURRENT, DRIVES, Machine, ROTOR, SPEED, STATES, State, Taken, WAY};
 use crate::root::{self, Polynomial};
-use crate::series::{Noise, ORDER, Series, Size};
+use crate::series::{Noise, ORDER, PLACES, Series, Size};
 use std::collections::HashMap;
 use std::rc::Rc;
-use taut::case::Experiment;
-use taut::stage::Stage;
 
 /// Changes at one instant, and instants with changes in a run, after which it gives up.
 const MOST_AT_ONCE: usize = 200;
@@ -29,7 +27,7 @@ const MOST_STEPS: usize = 400_000;
 pub struct Event {
     /// When, s.
     pub time: f64,
-    /// 0, 1, 2.
+    /// Its number.
     pub body: usize,
     /// The motion before.
     pub from: Motion,
@@ -51,8 +49,8 @@ pub enum Ending {
 /// A run.
 #[derive(Debug, Clone)]
 pub struct Run {
-    /// r φ₁, x, r φ₃ less the start of the cart, m, at the times asked for, as far as it went.
-    pub rows: Vec<[Double; 3]>,
+    /// Positions along the belt less those of the start, m, at the times asked for, as far as it went.
+    pub rows: Vec<[Double; BODIES]>,
     /// Changes of bodies.
     pub events: Vec<Event>,
     /// How it ended.
@@ -61,38 +59,29 @@ pub struct Run {
     pub steps: usize,
 }
 
-/// How the numbers of a case become ours.
-pub struct Numbers<'a> {
-    /// Those of the machine and its start.
-    pub machine: Taken<'a>,
-    /// Those of the input.
-    pub input: Taken<'a>,
-    /// The rounding of a state after each step, as if it were kept in fewer bits.
-    pub kept: Option<Taken<'a>>,
-}
+/// The inputs of the drives from one moment on.
+pub type Pieces = [Piece; DRIVES];
 
-/// Runs `experiment` on `stage` with its numbers as they are and gives the ways at `times`, which grow.
-pub fn run(stage: &Stage, experiment: &Experiment, times: &[f64]) -> Result<Run, String> {
-    let numbers = Numbers { machine: &mut Double::from, input: &mut Double::from, kept: None };
-    run_with(stage, experiment, times, numbers)
-}
-
-/// The same with other numbers.
-pub fn run_with(stage: &Stage, experiment: &Experiment, times: &[f64], numbers: Numbers) -> Result<Run, String> {
+/// Runs a machine under these chains of inputs, a chain for each drive, and gives the positions at `times`, which grow.
+/// `kept` rounds the state after each step, as if it were kept in fewer bits.
+pub fn run(machine: &Machine, chains: &[Vec<Piece>], times: &[f64], kept: Option<Taken>) -> Run {
     let end = times.last().copied().unwrap_or(0.0);
-    let machine = Machine::new(stage, experiment, numbers.machine);
-    let chain = input::chain(&experiment.input, end, numbers.input)?;
-    let mut solver = Solver::new(&machine, times, numbers.kept);
-    for (i, piece) in chain.iter().enumerate() {
-        let until = chain.get(i + 1).map_or(Double::from(end), |next| next.start);
-        solver.settle(piece);
-        solver.advance(piece, until);
+    let mut solver = Solver::new(machine, times, kept);
+    let mut starts: Vec<Double> = chains.iter().flatten().map(|piece| piece.start).collect();
+    starts.sort_by(|a, b| a.partial_cmp(b).expect("times are numbers"));
+    starts.dedup();
+    for (i, &start) in starts.iter().enumerate() {
+        let until = starts.get(i + 1).copied().unwrap_or(Double::from(end));
+        let pieces = std::array::from_fn(|drive| {
+            let chain = chains.get(drive).map_or(&[][..], |chain| chain);
+            chain.iter().rev().find(|piece| piece.start <= start).cloned().unwrap_or_default()
+        });
+        solver.go(&pieces, until);
         if solver.ending != Ending::Complete {
             break;
         }
     }
-    solver.record_up_to(solver.time, None);
-    Ok(Run { rows: solver.rows, events: solver.events, ending: solver.ending, steps: solver.steps })
+    solver.finish()
 }
 
 /// A law and the length of step that suits it.
@@ -101,7 +90,8 @@ struct Prepared {
     step: std::cell::Cell<f64>,
 }
 
-struct Solver<'a, 'b> {
+/// A machine under way.
+pub struct Solver<'a, 'b> {
     machine: &'a Machine,
     times: &'a [f64],
     kept: Option<Taken<'b>>,
@@ -111,7 +101,7 @@ struct Solver<'a, 'b> {
     time: Double,
     mode: Mode,
     laws: HashMap<Mode, Rc<Prepared>>,
-    rows: Vec<[Double; 3]>,
+    rows: Vec<[Double; BODIES]>,
     events: Vec<Event>,
     instants: usize,
     /// Where the last change was, and how many there have been there.
@@ -121,33 +111,38 @@ struct Solver<'a, 'b> {
 }
 
 impl<'a, 'b> Solver<'a, 'b> {
-    fn new(machine: &'a Machine, times: &'a [f64], kept: Option<Taken<'b>>) -> Self {
+    /// At its start.
+    pub fn new(machine: &'a Machine, times: &'a [f64], kept: Option<Taken<'b>>) -> Self {
         let z = machine.start;
-        let motion = [0, 1, 2].map(|body| {
+        let mut motion = [Motion::Free; BODIES];
+        for (body, motion) in motion.iter_mut().enumerate().take(machine.bodies) {
             let leader = machine.leader(body);
-            match z[SPEED[leader]] {
-                _ if !machine.is_dry(leader) => Motion::Free,
+            *motion = match z[SPEED[leader]] {
+                _ if !machine.is_dry(leader) && !machine.is_curved(leader) => Motion::Free,
                 v if v > Double::ZERO => Motion::Forward,
                 v if v < Double::ZERO => Motion::Backward,
+                _ if !machine.is_dry(leader) => Motion::Forward,
                 _ => Motion::Stuck,
-            }
-        });
+            };
+        }
         let mode = Mode {
             motion,
-            gear_positive: true,
-            slack: [false; 3],
-            gear: Touch::Apart,
-            stop: Touch::Apart,
-            passed: [0; 2],
-            voltage: Limit::Within,
-            current: Limit::Within,
+            gear_positive: [true; DRIVES],
+            slack: [false; BODIES],
+            gear: [Touch::Apart; DRIVES],
+            stop: [Touch::Apart; BODIES],
+            passed: [0; 3],
+            voltage: [Limit::Within; DRIVES],
+            current: [Limit::Within; DRIVES],
         };
+        let mut states = [0.0; PLACES];
+        states[..STATES].copy_from_slice(&z.map(|z| z.high.abs()));
         Self {
             machine,
             times,
             kept,
             z,
-            size: Size { states: z.map(|z| z.high.abs()), input: 0.0 },
+            size: Size { states, input: [0.0; DRIVES] },
             time: Double::ZERO,
             mode,
             laws: HashMap::new(),
@@ -160,11 +155,43 @@ impl<'a, 'b> Solver<'a, 'b> {
         }
     }
 
+    /// Takes up these inputs and goes on until then.
+    pub fn go(&mut self, pieces: &Pieces, until: Double) {
+        self.settle(pieces);
+        self.advance(pieces, until);
+    }
+
+    /// The state now.
+    pub fn state(&self) -> &State {
+        &self.z
+    }
+
+    /// How it ended so far.
+    pub fn ending(&self) -> &Ending {
+        &self.ending
+    }
+
+    /// The current of a drive now, under inputs that act already.
+    pub fn current(&mut self, drive: usize, pieces: &Pieces) -> Double {
+        let prepared = self.prepared();
+        let inputs = std::array::from_fn(|drive| pieces[drive].series(self.time, Double::ONE));
+        prepared.law.current(drive, &self.z, &inputs)
+    }
+
+    /// The run so far.
+    pub fn finish(mut self) -> Run {
+        self.record_up_to(self.time, None);
+        Run { rows: self.rows, events: self.events, ending: self.ending, steps: self.steps }
+    }
+
     fn prepared(&mut self) -> Rc<Prepared> {
-        let machine = self.machine;
-        let prepare = |mode: Mode| {
+        let (machine, size) = (self.machine, &mut self.size);
+        let mut prepare = |mode: Mode| {
             let law = Law::new(machine, mode);
             let step = 1.7 / law.rates.fastest();
+            for (place, scale) in law.rates.scales() {
+                size.states[place] = size.states[place].max(scale);
+            }
             Rc::new(Prepared { law, step: std::cell::Cell::new(step) })
         };
         Rc::clone(self.laws.entry(self.mode).or_insert_with_key(|&mode| prepare(mode)))
@@ -177,7 +204,7 @@ impl<'a, 'b> Solver<'a, 'b> {
     }
 
     /// Goes on to the end of a piece of the input.
-    fn advance(&mut self, piece: &Piece, until: Double) {
+    fn advance(&mut self, pieces: &Pieces, until: Double) {
         while self.time < until && self.ending == Ending::Complete {
             self.steps += 1;
             if self.steps > MOST_STEPS {
@@ -186,10 +213,10 @@ impl<'a, 'b> Solver<'a, 'b> {
             let prepared = self.prepared();
             let law = &prepared.law;
             let rest = until - self.time;
-            let mut step = prepared.step.get().min(piece.reach());
+            let mut step = prepared.step.get().min(reach_of(pieces));
             let (series, h, reach) = loop {
                 let h = if step >= rest.high { rest } else { Double::from(step) };
-                let series = Series::new(&law.rates, &self.z, piece.series(self.time, h), h);
+                let series = Series::new(&law.rates, &self.z, inputs(pieces, self.time, h), h);
                 let reach = series.reach(&self.size);
                 // What is a small part of the step says little about where its series ends.
                 if reach.is_nan() || reach > 0.3 {
@@ -204,7 +231,9 @@ impl<'a, 'b> Solver<'a, 'b> {
             let whole = h == rest;
             let next = h.high * (0.95 * reach).clamp(0.2, 2.0);
             prepared.step.set(if whole { next.max(step) } else { next });
-            self.size.input = self.size.input.max(series.input_size());
+            for (size, input) in self.size.input.iter_mut().zip(series.input_size()) {
+                *size = size.max(input);
+            }
             let part = reach.min(1.0);
             let fall = self.first_fall(law, &series, part, h);
             let s = fall.as_ref().map_or(Double::from(part), |(s, _)| *s);
@@ -213,29 +242,35 @@ impl<'a, 'b> Solver<'a, 'b> {
             self.z = series.at(s);
             self.time = after;
             self.keep();
-            for (size, z) in self.size.states.iter_mut().zip(&self.z) {
+            for (size, z) in self.size.states.iter_mut().zip(self.z.iter().chain(&series.terms[0][STATES..])) {
                 *size = size.max(z.high.abs());
             }
             if let Some((_, change)) = fall {
-                self.fire(change, piece);
+                self.fire(change, pieces);
             }
         }
     }
 
-    /// Rounds what moves as if it were kept in fewer bits: stretches, the cart's way, speeds, the current.
+    /// Rounds what moves as if it were kept in fewer bits: positions of the machine, strains, speeds, currents, bristles.
     fn keep(&mut self) {
         let Some(kept) = &mut self.kept else { return };
         let mut change = |value: Double| kept(value.high) - Double::from(value.high);
-        let moves = self.mode.motion.map(|motion| motion != Motion::Stuck);
-        let common = change(self.z[WAY[1]]);
-        let [drive, cart, idler] = WAY.map(|way| self.z[way]);
-        let strain = [change(drive - cart), Double::ZERO, change(idler - cart)];
-        for body in (0..3).filter(|&body| moves[body]) {
-            self.z[WAY[body]] += common + strain[body];
+        let ways = WAY.map(|way| self.z[way]);
+        let place = &self.machine.place;
+        let common: Vec<Double> = place.iter().map(|(body, _)| change(ways[*body])).collect();
+        for body in (0..self.machine.bodies).filter(|&body| self.mode.motion[body] != Motion::Stuck) {
+            let mut strain = ways[body];
+            for ((at, of), common) in place.iter().zip(&common) {
+                strain = strain - ways[*at] * of[body];
+                self.z[WAY[body]] += *common * of[body];
+            }
+            if place.iter().all(|(at, _)| *at != body) {
+                self.z[WAY[body]] += change(strain);
+            }
             let speed = self.z[SPEED[body]];
             self.z[SPEED[body]] += change(speed);
         }
-        for place in [CURRENT, ROTOR[1]] {
+        for place in CURRENT.into_iter().chain(ROTOR.map(|rotor| rotor[1])).chain(BRISTLE) {
             let value = self.z[place];
             self.z[place] += change(value);
         }
@@ -252,7 +287,7 @@ impl<'a, 'b> Solver<'a, 'b> {
                 Some((series, h)) => series.at((row - self.time) / h),
                 None => self.z,
             };
-            self.rows.push([0, 1, 2].map(|body| z[WAY[body]] + self.machine.beyond[body]));
+            self.rows.push(std::array::from_fn(|body| z[WAY[body]] + self.machine.beyond[body]));
         }
     }
 
@@ -296,23 +331,23 @@ impl<'a, 'b> Solver<'a, 'b> {
     }
 
     /// Makes a change, and what follows at the same instant.
-    fn fire(&mut self, change: Change, piece: &Piece) {
+    fn fire(&mut self, change: Change, pieces: &Pieces) {
         let before = self.mode.motion;
         self.make(change);
-        self.settle_from(before, piece);
+        self.settle_from(before, pieces);
     }
 
     /// Changes, without time passing, until every condition holds.
-    fn settle(&mut self, piece: &Piece) {
-        self.settle_from(self.mode.motion, piece);
+    fn settle(&mut self, pieces: &Pieces) {
+        self.settle_from(self.mode.motion, pieces);
     }
 
-    fn settle_from(&mut self, before: [Motion; 3], piece: &Piece) {
+    fn settle_from(&mut self, before: [Motion; BODIES], pieces: &Pieces) {
         while self.ending == Ending::Complete {
-            let Some(change) = self.first_broken(piece) else { break };
+            let Some(change) = self.first_broken(pieces) else { break };
             self.make(change);
         }
-        for body in (0..3).filter(|&body| self.machine.leader(body) == body) {
+        for body in self.machine.leaders().filter(|&body| self.machine.is_dry(body)) {
             let (from, to) = (before[body], self.mode.motion[body]);
             if from != to {
                 self.events.push(Event { time: self.time.high, body, from, to });
@@ -321,12 +356,12 @@ impl<'a, 'b> Solver<'a, 'b> {
     }
 
     /// The first condition that does not hold at this instant and just after.
-    fn first_broken(&mut self, piece: &Piece) -> Option<Change> {
+    fn first_broken(&mut self, pieces: &Pieces) -> Option<Change> {
         let prepared = self.prepared();
         let law = &prepared.law;
-        let step = prepared.step.get().min(piece.reach());
+        let step = prepared.step.get().min(reach_of(pieces));
         let h = Double::from(if step.is_finite() { step } else { 1.0 });
-        let series = Series::new(&law.rates, &self.z, piece.series(self.time, h), h);
+        let series = Series::new(&law.rates, &self.z, inputs(pieces, self.time, h), h);
         let mut noise = None;
         let broken = |guard: &&Guard| {
             let now = series.value(&guard.row).high;
@@ -357,24 +392,33 @@ impl<'a, 'b> Solver<'a, 'b> {
         }
         let mode = &mut self.mode;
         match change {
-            Change::Voltage(limit) => mode.voltage = limit,
-            Change::Current(limit) => {
-                mode.current = limit;
-                let stands = self.machine.current_moves() && !self.machine.current_mode;
-                if let (true, Some(bound)) = (stands, self.machine.current_limit) {
+            Change::Voltage(drive, limit) => mode.voltage[drive] = limit,
+            Change::Current(drive, limit) => {
+                mode.current[drive] = limit;
+                let of = &self.machine.drives[drive];
+                if let (true, Some(bound)) = (of.current_moves() && !of.current_mode, of.current_limit) {
                     match limit {
-                        Limit::High => self.z[CURRENT] = bound,
-                        Limit::Low => self.z[CURRENT] = -bound,
+                        Limit::High => self.z[CURRENT[drive]] = bound,
+                        Limit::Low => self.z[CURRENT[drive]] = -bound,
                         Limit::Within => {}
                     }
                 }
             }
-            Change::GearSign => mode.gear_positive = !mode.gear_positive,
+            Change::GearSign(drive) => mode.gear_positive[drive] = !mode.gear_positive[drive],
             Change::Span(j, slack) => mode.slack[j] = slack,
-            Change::Gear(touch) => mode.gear = touch,
-            Change::Stop(touch) => mode.stop = touch,
+            Change::Gear(drive, touch) => mode.gear[drive] = touch,
+            Change::Stop(body, touch) => mode.stop[body] = touch,
             Change::Passed(which, points) => mode.passed[which] = points,
             Change::Leave => self.ending = Ending::LeftTravel(self.time.high),
+            Change::Turn(leader) => {
+                let turned = match mode.motion[leader] {
+                    Motion::Forward => Motion::Backward,
+                    _ => Motion::Forward,
+                };
+                for body in self.machine.followers(leader) {
+                    mode.motion[body] = turned;
+                }
+            }
             Change::Rest(leader) => {
                 for body in self.machine.followers(leader) {
                     mode.motion[body] = Motion::Stuck;
@@ -388,4 +432,14 @@ impl<'a, 'b> Solver<'a, 'b> {
             }
         }
     }
+}
+
+/// Terms of the inputs from a time on.
+fn inputs(pieces: &Pieces, time: Double, h: Double) -> [Polynomial; DRIVES] {
+    std::array::from_fn(|drive| pieces[drive].series(time, h))
+}
+
+/// How far a Taylor series of the inputs serves.
+fn reach_of(pieces: &Pieces) -> f64 {
+    pieces.iter().map(Piece::reach).fold(f64::INFINITY, f64::min)
 }

@@ -1,7 +1,8 @@
 //! The hunt over random stages: many of them on several threads, and the table of what came out.
 
-use crate::compare::{By, Compared, Verdict, compare};
-use crate::draw::{self, Kind};
+use crate::answer::By;
+use crate::compare::{Compared, Verdict, compare};
+use crate::draw::{self, Feature, Kind};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -29,6 +30,17 @@ pub struct Hunt {
     pub progress: bool,
     /// Ends it early.
     pub stop: Arc<AtomicBool>,
+    /// What is drawn.
+    pub drawing: Drawing,
+}
+
+/// What is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Drawing {
+    /// Stages linear piece by piece, over wide ranges.
+    Stages,
+    /// Cases in which each pair of features occurs.
+    Pairs,
 }
 
 /// A stage that was compared.
@@ -40,6 +52,8 @@ pub struct Outcome {
     pub text: String,
     /// The kinds that it belongs to.
     pub kinds: Vec<Kind>,
+    /// The features of its recipe.
+    pub features: Vec<Feature>,
     /// The answers of the solvers.
     pub compared: Vec<Compared>,
 }
@@ -48,8 +62,19 @@ pub struct Outcome {
 pub fn one(seed: u64, number: u64) -> Outcome {
     let drawn = draw::stage(seed, number);
     let solvers: &[By] = if number.is_multiple_of(GENERAL_EVERY) { &[By::Exact, By::General] } else { &[By::Exact] };
-    let compared = compare(&format!("stage-{number}.toml"), &drawn.text, solvers);
-    Outcome { number, text: drawn.text, kinds: drawn.kinds, compared }
+    let compared = compare(&format!("stage-{number}.toml"), &drawn.text, solvers, &[]);
+    Outcome { number, text: drawn.text, kinds: drawn.kinds, features: Vec::new(), compared }
+}
+
+/// Compares the case of this number that is drawn by features.
+pub fn pair(seed: u64, number: u64) -> Outcome {
+    let (drawn, features) = draw::pair(seed, number);
+    let asked = features.iter().find_map(|feature| if let Feature::Asked(by) = feature { Some(*by) } else { None });
+    // Rows farther apart or nearer together change no position.
+    let every = if number.is_multiple_of(2) { 3.1 } else { 0.17 };
+    let ways: Vec<By> = asked.into_iter().collect();
+    let compared = compare(&format!("pair-{number}.toml"), &drawn.text, &ways, &[every]);
+    Outcome { number, text: drawn.text, kinds: drawn.kinds, features, compared }
 }
 
 impl Hunt {
@@ -74,7 +99,10 @@ impl Hunt {
                             }
                             let number = self.first + index;
                             *lock(busy) = Some((number, Instant::now()));
-                            let outcome = one(self.seed, number);
+                            let outcome = match self.drawing {
+                                Drawing::Stages => one(self.seed, number),
+                                Drawing::Pairs => pair(self.seed, number),
+                            };
                             *lock(busy) = None;
                             done.fetch_add(1, Ordering::Relaxed);
                             let faults = outcome.compared.iter().filter(|c| c.verdict.is_unexplained()).count();
@@ -165,6 +193,8 @@ struct Line {
     ill_conditioned: usize,
     unknown: usize,
     unexplained: usize,
+    /// Runs that are off by more than they state.
+    exceeds: usize,
     /// The largest difference among those that agree, m.
     worst: f64,
     /// Changes of bodies.
@@ -177,6 +207,7 @@ impl Line {
         for compared in compared {
             line.stages += 1;
             line.events += compared.events;
+            line.exceeds += usize::from(compared.exceeds);
             match compared.verdict {
                 Verdict::Agrees => {
                     line.agrees += 1;
@@ -198,6 +229,7 @@ impl Line {
             "ill_conditioned": self.ill_conditioned,
             "unknown": self.unknown,
             "unexplained": self.unexplained,
+            "beyond_stated": self.exceeds,
             "worst_agreeing_m": self.worst,
             "events": self.events,
         })
@@ -210,23 +242,70 @@ fn lines(outcomes: &[Outcome]) -> Vec<Line> {
         let of_kind = outcomes.iter().filter(|outcome| kind.is_none_or(|kind| outcome.kinds.contains(&kind)));
         of_kind.filter_map(by(solver)).collect()
     };
+    if outcomes.iter().any(|outcome| !outcome.features.is_empty()) {
+        let of_feature = |feature: Feature| {
+            let having = outcomes.iter().filter(move |outcome| outcome.features.contains(&feature));
+            Line::of(feature.names()[0], having.flat_map(|outcome| &outcome.compared))
+        };
+        let whole = Line::of("all", outcomes.iter().flat_map(|outcome| &outcome.compared));
+        return std::iter::once(whole).chain(Feature::ALL.map(of_feature)).collect();
+    }
     let mut lines = vec![Line::of("all", all(By::Exact, None).iter())];
     lines.extend(Kind::ALL.map(|kind| Line::of(kind.name(), all(By::Exact, Some(kind)).iter())));
     lines.push(Line::of("all, by the general solver", all(By::General, None).iter()));
     lines
 }
 
+/// How often each pair of features occurs among cases with these, in Markdown; `–` where it cannot.
+pub fn pairs_table<'a>(cases: impl Iterator<Item = &'a [Feature]>) -> String {
+    let place = |feature: Feature| Feature::ALL.iter().position(|one| *one == feature).unwrap_or(0);
+    let mut counts = vec![vec![0_u64; Feature::ALL.len()]; Feature::ALL.len()];
+    for features in cases {
+        for &a in features {
+            for &b in features {
+                counts[place(a)][place(b)] += 1;
+            }
+        }
+    }
+    let columns = &Feature::ALL[..Feature::ALL.len()];
+    let mut text = String::from("| | |");
+    columns.iter().for_each(|feature| text += &format!(" {} |", feature.names()[1]));
+    text += "\n|---|---|";
+    columns.iter().for_each(|_| text += "---|");
+    text += "\n";
+    for (i, a) in Feature::ALL.iter().enumerate() {
+        let _ = write!(text, "| {} | {} |", a.names()[0], a.names()[1]);
+        for (j, b) in columns.iter().enumerate() {
+            let _ = match () {
+                () if j > i => write!(text, " |"),
+                () if j == i => write!(text, " **{}** |", counts[i][j]),
+                () if a.goes_with(*b) || counts[i][j] > 0 => write!(text, " {} |", counts[i][j]),
+                () => write!(text, " – |"),
+            };
+        }
+        text += "\n";
+    }
+    text
+}
+
+/// The pair that occurs least often among those that can.
+pub fn rarest_pair<'a>(cases: impl Iterator<Item = &'a [Feature]> + Clone) -> ([Feature; 2], usize) {
+    let count = |[a, b]: [Feature; 2]| cases.clone().filter(|case| case.contains(&a) && case.contains(&b)).count();
+    let counted = draw::pairs().into_iter().map(|pair| (pair, count(pair)));
+    counted.min_by_key(|(_, count)| *count).unwrap_or(([Feature::Open; 2], 0))
+}
+
 /// The table of a hunt, in Markdown.
 pub fn table(outcomes: &[Outcome]) -> String {
     let mut text = String::from(
-        "| stages | compared | agreeing | ill-conditioned | unknown | unexplained | worst agreeing | body events |\n\
-         |---|---|---|---|---|---|---|---|\n",
+        "| stages | compared | agreeing | ill-conditioned | unknown | unexplained | beyond stated | worst agreeing | body events |\n\
+         |---|---|---|---|---|---|---|---|---|\n",
     );
     for line in lines(outcomes) {
-        let Line { name, stages, agrees, ill_conditioned, unknown, unexplained, worst, events } = line;
+        let Line { name, stages, agrees, ill_conditioned, unknown, unexplained, exceeds, worst, events } = line;
         let _ = writeln!(
             text,
-            "| {name} | {stages} | {agrees} | {ill_conditioned} | {unknown} | {unexplained} | {worst:.1e} m | {events} |"
+            "| {name} | {stages} | {agrees} | {ill_conditioned} | {unknown} | {unexplained} | {exceeds} | {worst:.1e} m | {events} |"
         );
     }
     text
@@ -238,13 +317,9 @@ pub fn told(seed: u64, outcomes: &[Outcome], all: bool) -> String {
     for outcome in outcomes {
         for compared in &outcome.compared {
             if compared.verdict.is_unexplained() || (all && compared.verdict != Verdict::Agrees) {
-                let solver = match compared.by {
-                    By::Exact => "exact",
-                    By::General => "general",
-                };
+                let way = compared.by.name();
                 let (number, word, why) = (outcome.number, compared.verdict.word(), compared.verdict.told());
-                let _ =
-                    writeln!(text, "# seed {seed}, stage {number}, {solver} solver, {word}: {why}\n{}", outcome.text);
+                let _ = writeln!(text, "# seed {seed}, stage {number}, {way}, {word}: {why}\n{}", outcome.text);
             }
         }
     }
@@ -257,7 +332,7 @@ pub fn json(hunt: &Hunt, outcomes: &[Outcome]) -> Value {
     let apart = apart.filter(|(_, compared)| compared.verdict != Verdict::Agrees).map(|(outcome, compared)| {
         json!({
             "number": outcome.number,
-            "solver": match compared.by { By::Exact => "exact", By::General => "general" },
+            "by": compared.by.name(),
             "verdict": compared.verdict.word(),
             "told": compared.verdict.told(),
             "difference_m": compared.difference,

@@ -1,12 +1,20 @@
-//! A small hunt, as part of every test run; `cargo xtask hunt` has the large one.
+//! A small hunt, as part of every test run; `cargo xtask hunt` has the large one. Cases in C are compared where gcc is
+//! installed.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use taut_hunt::draw::{self, Kind};
-use taut_hunt::stages::{self, Hunt};
+use taut_hunt::answer::{self, By};
+use taut_hunt::compare::Verdict;
+use taut_hunt::draw::{self, Feature, Kind};
+use taut_hunt::stages::{self, Drawing, Hunt};
+use taut_hunt::subject::Subject;
+
+/// Cases of the small hunt over pairs.
+const PAIRS: u64 = 120;
 
 fn hunt(count: u64, threads: usize) -> Hunt {
-    Hunt { seed: 1, first: 0, count, threads, progress: false, stop: Arc::new(AtomicBool::new(false)) }
+    let stop = Arc::new(AtomicBool::new(false));
+    Hunt { seed: 1, first: 0, count, threads, progress: false, stop, drawing: Drawing::Stages }
 }
 
 /// Two hundred stages of seed 1: what taut says is what the independent solver says.
@@ -53,4 +61,75 @@ fn threads_change_nothing() {
         stages::json(&hunt, &hunt.run()).to_string()
     };
     assert_eq!(told(1), told(3));
+}
+
+/// What each pair of features needs: at least 30 of 10,000 cases.
+#[test]
+fn every_pair_that_can_occur_occurs_often() {
+    for seed in [1, 2, 3] {
+        let cases: Vec<_> = (0..10_000).map(|number| draw::recipe(seed, number)).collect();
+        let ([a, b], count) = stages::rarest_pair(cases.iter().map(Vec::as_slice));
+        assert!(count >= 30, "{} and {}: {count} of 10000 with seed {seed}", a.names()[0], b.names()[0]);
+    }
+}
+
+/// Curves, gantries, loops, exports and sweeps, the first cases of seed 1.
+#[test]
+fn nothing_is_unexplained_among_pairs_of_features() {
+    let with_c = taut_hunt::c::has_compiler();
+    let mut outcomes = Vec::new();
+    for number in (0..PAIRS).filter(|&number| with_c || !draw::recipe(1, number).contains(&Feature::Asked(By::C))) {
+        outcomes.push(stages::pair(1, number));
+    }
+    println!("{}", stages::table(&outcomes));
+    let compared = || outcomes.iter().flat_map(|outcome| &outcome.compared);
+    let unexplained = compared().filter(|one| one.verdict.is_unexplained()).count();
+    assert_eq!(unexplained, 0, "{}", stages::told(1, &outcomes, false));
+    let agree = compared().filter(|one| one.verdict == Verdict::Agrees).count();
+    assert!(agree * 100 >= 95 * compared().count(), "{agree} of {} agree", compared().count());
+    for by in By::ALL.into_iter().filter(|by| with_c || *by != By::C) {
+        assert!(compared().any(|one| one.by == by), "nothing was asked by {}", by.name());
+    }
+}
+
+/// A machine that is off by a thousandth, or a gain by a hundredth, is found out whatever is asked.
+#[test]
+fn a_wrong_answer_of_any_kind_is_unexplained() {
+    let with_c = taut_hunt::c::has_compiler();
+    let mut seen = Vec::new();
+    for number in 0..400 {
+        let (drawn, features) = draw::pair(1, number);
+        let asked =
+            features.iter().find_map(|one| if let Feature::Asked(by) = one { Some(*by) } else { None }).unwrap();
+        let kinds = [Feature::HFrame, Feature::CoreXy, Feature::LuGre, Feature::Stribeck, Feature::Pid, Feature::Fuzzy];
+        let kind = kinds.into_iter().find(|kind| features.contains(kind));
+        if seen.contains(&(asked, kind)) || (asked == By::C && !with_c) || seen.len() > 16 {
+            continue;
+        }
+        let right = Subject::new("right.toml", &drawn.text).unwrap();
+        let Ok(answer) = answer::ask(&right, asked) else { continue };
+        let right = answer.subject.clone().unwrap_or(right);
+        let mut wrong = right.clone();
+        match &mut wrong {
+            Subject::Axis(case) => case.stage.cart.mass *= 1.001,
+            Subject::Gantry(case) => case.gantry.cart.mass *= 1.001,
+            Subject::Loop(case) => case.stage.motor.torque_constant *= 1.01,
+        }
+        let known = |subject: &Subject| subject.known_as_is(&answer.fed, &answer.times).unwrap().rows;
+        let apart = |rows: &[[taut_hunt::double::Double; 4]]| {
+            let pairs = answer.rows.iter().flatten().zip(rows.iter().flatten()).filter(|(a, _)| !a.high.is_nan());
+            pairs.map(|(a, b)| (*a - *b).high.abs()).fold(0.0, f64::max)
+        };
+        // Where nothing moves, nothing shows.
+        let moved = answer.rows.iter().flatten().map(|way| way.high.abs()).fold(0.0, f64::max);
+        if moved < 1e-6 || apart(&known(&right)) > answer.allowed {
+            continue;
+        }
+        if apart(&known(&wrong)) > answer.allowed {
+            seen.push((asked, kind));
+        }
+    }
+    for by in By::ALL.into_iter().filter(|by| with_c || *by != By::C) {
+        assert!(seen.iter().any(|(asked, _)| *asked == by), "a wrong machine goes unnoticed by {}", by.name());
+    }
 }

@@ -15,7 +15,7 @@ use taut::export::{Exported, Options, Part, Place, Real, Target, export};
 use taut::files::{Inputs, write_atomically};
 use taut::fit::compare::{FrictionLaw, Setting, compare};
 use taut::fit::experiment_design::{Criterion, Kind, Request, design, verify};
-use taut::fit::{Posterior, Profile, check, drift, fit, posterior, profiles};
+use taut::fit::{Posterior, Profile, check_watched, drift, fit, posterior, profiles};
 use taut::frf::{Cut, Known, measure};
 use taut::json;
 use taut::linear::{Analysis, GantryAnalysis};
@@ -202,7 +202,11 @@ impl Case {
     fn check<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let case = self.axis(py)?;
         let plan = case.fit_plan(&self.path).told(py)?;
-        let found = unlocked(py, || check(case, &plan))?.told(py)?;
+        let interrupt = Interrupt::listen();
+        let watch = &mut |_: &[f64], _: f64| if interrupt.stop() { Flow::Stop } else { Flow::Continue };
+        let found = unlocked(py, || check_watched(case, &plan, Some(&|| interrupt.stop()), watch));
+        interrupt.finish()?;
+        let found = found?.told(py)?;
         value::json(py, &guarded(|| json::check(case, &found))?)
     }
 
@@ -426,8 +430,9 @@ impl Case {
             let inputs = inputs(opened.files());
             let text = |target: Target| {
                 let place = Place::of(&out, target.ending(), &own);
+                let mut claim = place.claim(target.ending())?;
                 let exported = export(&opened, target, &place.stem, &options)?;
-                Ok((place.write(&exported, &inputs)?, exported.notes))
+                Ok((place.write(&exported, &inputs, &mut claim)?, exported.notes))
             };
             match target {
                 "c" => text(Target::C),
@@ -436,15 +441,17 @@ impl Case {
                 "python" => text(Target::Python),
                 "fmu" => {
                     let place = Place::of(&out, "fmu", &own);
+                    let mut claim = place.claim("fmu")?;
                     let exported = fmu::export(&opened, options.part, fmi, &place.stem)?;
-                    Ok((place.write(&exported, &inputs)?, exported.notes))
+                    Ok((place.write(&exported, &inputs, &mut claim)?, exported.notes))
                 }
                 "json" => {
                     let place = Place::of(&out, "json", &own);
+                    let mut claim = place.claim("json")?;
                     let content = json::text(&json::export(&opened)?).into_bytes();
                     let files = vec![(format!("{}.json", place.stem), content)];
                     let exported = Exported { files, ..Exported::default() };
-                    Ok((place.write(&exported, &inputs)?, Vec::new()))
+                    Ok((place.write(&exported, &inputs, &mut claim)?, Vec::new()))
                 }
                 other => Err(taut::Error::new(format!("there is no target \"{other}\" here"))
                     .allowed("fmu, c, st, matlab, python or json")),

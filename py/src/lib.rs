@@ -8,6 +8,9 @@ mod columns;
 mod controller;
 mod error;
 mod fmu;
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+#[path = "../../cli/hypot.rs"]
+mod hypot;
 mod interrupt;
 mod logs;
 mod modes;

@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 use taut::case::{Case, Experiment, GantryCase, GantryExperiment};
+use taut::control::feasible::{Shortfall, shortfalls};
 use taut::control::{Loop, MoveRun, Rows, Standard, Worst, stream, worst};
 use taut::files::Inputs;
 use taut::json::{self, GantrySimulated, GantrySimulation, Moved, Simulated, Simulation};
@@ -100,10 +101,17 @@ impl Run {
         json::ending(self.outcome().ending, end)
     }
 
-    /// By how much positions may be off, m, where it is known.
+    /// By how much positions may be off, m, where it is known: not in closed loop, where a controller answers to it.
     #[getter]
     fn position_error(&self) -> Option<f64> {
-        self.outcome().error.map(|error| error.value)
+        let is_closed = matches!(self.what, What::Move { .. });
+        self.outcome().error.filter(|_| !is_closed).map(|error| error.value)
+    }
+
+    /// When what a body does was decided within rounding, s, and which body.
+    #[getter]
+    fn decided_within_rounding(&self) -> Vec<(f64, &'static str)> {
+        self.outcome().ties.iter().map(|tie| (tie.time, tie.part.key())).collect()
     }
 
     /// The key figures.
@@ -115,8 +123,14 @@ impl Run {
             What::Experiment { case, metrics, .. } => of_axis(metrics, case),
             What::Gantry { case, metrics, .. } => json::gantry_metrics(metrics, case.gantry.routing),
             What::Move { case, index, run, worst, .. } => {
-                let moved =
-                    Moved { motion: &case.moves[*index], run, worst: worst.as_ref(), trouble: None, files: &[] };
+                let moved = Moved {
+                    motion: &case.moves[*index],
+                    run,
+                    worst: worst.as_ref(),
+                    trouble: None,
+                    shortfalls: &[],
+                    files: &[],
+                };
                 in_closed_loop(of_axis(&run.metrics, case), json::motion(&moved))
             }
         });
@@ -165,7 +179,7 @@ pub fn write(
 /// Key figures of a move: those of any run, and those of the loop. What both have is the loop's.
 fn in_closed_loop(mut figures: Value, told: Value) -> Value {
     if let (Value::Object(figures), Value::Object(told)) = (&mut figures, told) {
-        let about = ["name", "files", "ending", "events", "trouble"];
+        let about = ["name", "files", "ending", "events", "trouble", "shortfalls"];
         figures.extend(told.into_iter().filter(|(key, _)| !about.contains(&key.as_str())));
     }
     figures
@@ -317,7 +331,7 @@ pub fn motion(
     };
     let mut runs = Vec::new();
     for motion in moves {
-        let profile = motion.profile.clone().shaped(&design.shaper);
+        let profile = motion.reference(design);
         let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
         columns::fit(py, rows.until / rows.every, COLUMNS, FEWER)?;
         let interrupt = Interrupt::listen();
@@ -439,25 +453,28 @@ pub fn simulation<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<
 /// The JSON that `taut move --json` prints of these runs.
 #[pyfunction]
 pub fn moves<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound<'py, PyAny>> {
-    let troubles: Vec<Option<Trouble>> = runs
+    let judged: Vec<(Option<Trouble>, Vec<Shortfall>)> = runs
         .iter()
         .map(|run| match &run.what {
-            What::Move { case, index, run: moved, .. } => {
-                let design = case.controller.as_ref()?;
-                trouble(&case.stage, design, moved, case.moves[*index].profile.target())
+            What::Move { case, index, run: moved, timing, .. } => {
+                let (design, profile) = (case.controller.as_ref(), &case.moves[*index].profile);
+                let trouble = design.and_then(|design| trouble(&case.stage, design, moved, profile.target()));
+                let profile = profile.clone().shaped(design.map_or(&[], |design| &design.shaper));
+                (trouble, shortfalls(&case.stage, timing.limit, &profile))
             }
-            What::Experiment { .. } | What::Gantry { .. } => None,
+            What::Experiment { .. } | What::Gantry { .. } => (None, Vec::new()),
         })
         .collect();
     let told: Vec<Moved> = runs
         .iter()
-        .zip(&troubles)
-        .filter_map(|(run, trouble)| match &run.what {
+        .zip(&judged)
+        .filter_map(|(run, (trouble, shortfalls))| match &run.what {
             What::Move { case, index, run: moved, worst, .. } => Some(Moved {
                 motion: &case.moves[*index],
                 run: moved,
                 worst: worst.as_ref(),
                 trouble: trouble.as_ref(),
+                shortfalls,
                 files: &[],
             }),
             What::Experiment { .. } | What::Gantry { .. } => None,

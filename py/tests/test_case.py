@@ -1,7 +1,9 @@
 """Cases: read, edited, saved, and mistakes told."""
 
+import os
 import pickle
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -79,10 +81,11 @@ def test_mistakes_are_told_as_on_the_command_line(case):
     assert (str(again), again.line, again.next) == (str(error), error.line, error.next)
 
 
+@pytest.mark.skipif("TAUT_BAD" not in os.environ, reason="TAUT_BAD names no folder that `cargo xtask bad` wrote")
 @pytest.mark.parametrize("folder", ["case", "mapping"])
-def test_wrong_files_give_their_messages(root, folder):
+def test_wrong_files_give_their_messages(folder):
     """Every wrong case under tests/bad, with the message that the command line must give."""
-    folder = root / "tests" / "bad" / folder
+    folder = Path(os.environ["TAUT_BAD"]) / folder
     wrong = sorted(folder.glob("*.toml"))
     assert len(wrong) >= 60
     for path in wrong:
@@ -121,7 +124,7 @@ def test_a_case_is_exported_as_the_program_does(case, tmp_path):
         assert b'fmiVersion="2.0"' in archive.read("modelDescription.xml")
     with pytest.raises(ValueError, match="fmi: 1 cannot be; allowed: 2 to 3"):
         taut.export(case, "fmu", tmp_path / "axis.fmu", fmi=1)
-    with pytest.raises(taut.Error, match="no controller that could be put inside"):
+    with pytest.raises(taut.Error, match="this case has no controller"):
         taut.export(case, "fmu", tmp_path / "axis.fmu", part="both")
     with pytest.raises(taut.Error, match="there is no target"):
         taut.export(case, "fortran", tmp_path)

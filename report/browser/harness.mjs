@@ -70,3 +70,9 @@ export const settled = page => page.evaluate(() => new Promise(done => requestAn
 
 /** When the page shows what was asked for last. */
 export const quiet = page => page.waitForFunction(() => !window.studio.wire.isBusy, null, {timeout: 30_000}).then(() => settled(page));
+
+/** A parameter's value in the run that is shown, in SI. */
+export const value = (page, key) => page.evaluate(key => window.studio.parameters.find(one => one.key === key).value, key);
+
+/** A parameter with its field and its slider. */
+export const row = (page, key) => page.locator(`.row[data-key="${key}"]`);

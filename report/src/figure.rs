@@ -234,9 +234,4 @@ impl Figure {
         self.view = Some((from, to)).filter(|_| from < to);
         self
     }
-
-    /// The figure as an SVG file with its title, light and dark.
-    pub fn svg(&self) -> String {
-        super::plot::svg(self, true)
-    }
 }

@@ -9,6 +9,13 @@ use std::fmt::Write;
 
 const WIDTH: f64 = 760.0;
 
+impl Figure {
+    /// The figure as an SVG file with its title, light and dark.
+    pub fn svg(&self) -> String {
+        svg(self, true)
+    }
+}
+
 /// The whole picture, with the title in it or without.
 pub(crate) fn svg(figure: &Figure, with_title: bool) -> String {
     let (x, ys) = scales(figure);

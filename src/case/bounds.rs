@@ -1,6 +1,6 @@
 //! How much a case file holds, before it is read: its reader makes hundreds of bytes of a value, a thousand of a table.
 
-use super::tree::Source;
+use super::source::Source;
 use crate::error::{Error, Result};
 
 /// Largest case file, in bytes; what is longer than that belongs into a CSV file.

@@ -1,6 +1,7 @@
 //! The controller's table.
 
 use super::reader::{Field, Table};
+use super::suggestion;
 use crate::design::*;
 use crate::error::Result;
 use crate::stage::{AmplifierMode, EncoderPlace, Stage};
@@ -26,7 +27,7 @@ pub(super) fn controller(root: &Table, stage: &Stage) -> Result<Option<Design>> 
             .fail(format!("a delay of {} samples", (delay / every).round()))
             .allowed(format!("up to {MOST_DELAY} samples")));
     }
-    let structure = structure(&table, stage)?;
+    let structure = structure(&table, stage, (every, delay))?;
     Ok(Some(Design {
         every,
         delay,
@@ -46,7 +47,7 @@ pub(super) fn controller(root: &Table, stage: &Stage) -> Result<Option<Design>> 
     }))
 }
 
-fn structure(table: &Table, stage: &Stage) -> Result<Structure> {
+fn structure(table: &Table, stage: &Stage, (every, delay): (f64, f64)) -> Result<Structure> {
     let given: Vec<Field> = STRUCTURES.iter().filter_map(|key| table.optional(key)).collect();
     let field = match &given[..] {
         [field] => field.clone(),
@@ -55,7 +56,7 @@ fn structure(table: &Table, stage: &Stage) -> Result<Structure> {
                 .field
                 .fail("the structure is not said")
                 .allowed(STRUCTURES.join(", "))
-                .next("add for example pid = { proportional = \"2 V/mm\", derivative = \"25 V s/m\" }"));
+                .next(format!("add for example {}", suggestion::pid(stage, every, delay))));
         }
         [first, second, ..] => {
             return Err(second
@@ -68,7 +69,13 @@ fn structure(table: &Table, stage: &Stage) -> Result<Structure> {
     own.check_keys(others, &[])?;
     Ok(match field.key() {
         "pid" => Structure::Pid(Pid {
-            proportional: own.number("proportional")?,
+            proportional: match own.number_if_given("proportional")? {
+                Some(value) => value,
+                None => {
+                    let such_as = || format!("add for example {}", suggestion::proportional(stage, every, delay));
+                    own.number("proportional").map_err(|error| error.next(such_as()))?
+                }
+            },
             integral: own.number("integral")?,
             derivative: own.number("derivative")?,
             filter: own.number("filter")?,
@@ -178,8 +185,7 @@ fn feed_forward(table: &Table, structure: &Structure, stage: &Stage) -> Result<F
     };
     let table = field.table()?;
     table.check_keys(&["model", "compensate_stretch"], &[])?;
-    let models =
-        [("none", FeedForwardModel::None), ("rigid", FeedForwardModel::Rigid), ("elastic", FeedForwardModel::Elastic)];
+    let models = FeedForwardModel::ALL.map(|model| (model.word(), model));
     let model = table.required("model", "model = \"rigid\" or \"elastic\"")?.choice(&models)?;
     let compensate = table.optional("compensate_stretch");
     let compensate_stretch = compensate.as_ref().map_or(Ok(false), Field::truth)?;

@@ -169,7 +169,9 @@ pub enum Scope {
     Shared,
 }
 
-pub(super) fn plan(root: &Table, stage: &Stage, experiments: &[Experiment]) -> Result<Option<Plan>> {
+/// The plan of a fit; `whole` is false where not all files were read: which experiments have a log is
+/// not known then.
+pub(super) fn plan(root: &Table, stage: &Stage, experiments: &[Experiment], whole: bool) -> Result<Option<Plan>> {
     let Some(field) = root.optional("fit") else { return Ok(None) };
     let table = field.table()?;
     let known =
@@ -207,7 +209,7 @@ pub(super) fn plan(root: &Table, stage: &Stage, experiments: &[Experiment]) -> R
         }
     }
     let held_out = table.optional("held_out").map_or(Ok(Vec::new()), |field| words(&field))?;
-    for name in &held_out {
+    for name in held_out.iter().filter(|_| whole) {
         let of_file = |experiment: &&Experiment| experiment.log.is_some() && matches(&experiment.name, name);
         if let (None, Some(field)) = (experiments.iter().find(of_file), table.optional("held_out")) {
             let names: Vec<String> =

@@ -1,9 +1,10 @@
 //! The case file of a gantry: two drives, a bridge, a cart on it.
 
+use super::files::{Experiments, Folder};
 use super::friction::friction;
 use super::reader::{Field, Table};
 use super::{
-    Case, Folder, InputFile, Sweeping, check_name, input, listed, set, sheet, stage, sweep, times, title, unique,
+    Case, Files, InputFile, Sweeping, Unread, input, listed, named, set, sheet, stage, sweep, times, title, unique,
 };
 use crate::error::{Error, Result};
 use crate::mechanism::{Amplifier, DRIVES, Motor, State};
@@ -23,6 +24,8 @@ pub struct GantryCase {
     pub gantry: Gantry,
     /// The experiments, in the file's order.
     pub experiments: Vec<GantryExperiment>,
+    /// The experiments whose files were not read; none but where [`Opened::read_for`] left them out.
+    pub unread: Vec<Unread<State>>,
     /// The sweep, where the file has one.
     pub sweep: Option<Sweeping>,
     /// The text it was read from, with `--set` applied: read again, it gives the same case.
@@ -62,14 +65,28 @@ impl Opened {
         Self::from_text_with(path, &super::read_text(path)?, changes)
     }
 
+    /// The same with the files of these experiments only. An experiment whose files are not read, or cannot be, is none
+    /// of the case's experiments; whoever asks for it is told why.
+    pub fn read_for(path: impl AsRef<Path>, changes: &[&str], files: Files) -> Result<Self> {
+        let path = path.as_ref();
+        Self::from_text_for(path, &super::read_text(path)?, changes, files)
+    }
+
     /// The same from text; `name` stands in messages, and paths in the text are relative to its folder.
     pub fn from_text_with(name: impl AsRef<Path>, text: &str, changes: &[&str]) -> Result<Self> {
+        let case = Self::from_text_for(name, text, changes, Files::All)?;
+        case.complete()?;
+        Ok(case)
+    }
+
+    /// The same with the files of these experiments only, as [`Opened::read_for`] has it.
+    pub fn from_text_for(name: impl AsRef<Path>, text: &str, changes: &[&str], files: Files) -> Result<Self> {
         let name = name.as_ref();
         let source = set::apply(name, text.strip_prefix('\u{feff}').unwrap_or(text), changes)?;
         let tree = source.tree()?;
         match kind(&Field::root(&source, &tree).table()?)? {
-            Some(_) => GantryCase::from_text_with(name, text, changes).map(|case| Self::Gantry(Box::new(case))),
-            None => Case::from_text_with(name, text, changes).map(|case| Self::Axis(Box::new(case))),
+            Some(_) => GantryCase::from_text_for(name, text, changes, files).map(|case| Self::Gantry(Box::new(case))),
+            None => Case::from_text_for(name, text, changes, files).map(|case| Self::Axis(Box::new(case))),
         }
     }
 
@@ -144,6 +161,13 @@ impl GantryCase {
     /// # Ok::<(), taut::Error>(())
     /// ```
     pub fn from_text_with(name: impl AsRef<Path>, text: &str, changes: &[&str]) -> Result<Self> {
+        let case = Self::from_text_for(name, text, changes, Files::All)?;
+        case.complete()?;
+        Ok(case)
+    }
+
+    /// The same with the files of these experiments only, as [`Opened::read_for`] has it.
+    pub fn from_text_for(name: impl AsRef<Path>, text: &str, changes: &[&str], files: Files) -> Result<Self> {
         let name = name.as_ref();
         let source = set::apply(name, text.strip_prefix('\u{feff}').unwrap_or(text), changes)?;
         let tree = source.tree()?;
@@ -183,10 +207,10 @@ impl GantryCase {
             "sweep",
         ];
         root.check_keys(&tables, &[])?;
-        let folder = Folder::of(name);
+        let folder = Folder::of(name, files);
         let gantry = gantry(&root, routing)?;
         gantry.check().map_err(|error| if error.place.is_none() { error.in_file(name) } else { error })?;
-        let experiments = experiments(&root, &gantry, &folder)?;
+        let (experiments, unread) = experiments(&root, &gantry, &folder)?;
         let title = title(&root, name)?;
         let context = sweep::Context {
             machine: &gantry,
@@ -196,7 +220,7 @@ impl GantryCase {
             folder: &folder,
         };
         let sweep = sweep::sweeping(&root, &context)?;
-        Ok(Self { title, gantry, experiments, sweep, text: source.text.clone(), files: folder.files() })
+        Ok(Self { title, gantry, experiments, unread, sweep, text: source.text.clone(), files: folder.files() })
     }
 
     /// Reads a gantry from a file with changes.
@@ -348,22 +372,29 @@ fn encoder(table: &Table) -> Result<Encoder> {
     Ok(Encoder { at, lines: sheet::lines(table)? })
 }
 
-fn experiments(root: &Table, gantry: &Gantry, folder: &Folder) -> Result<Vec<GantryExperiment>> {
-    let (mut experiments, mut files) = (Vec::new(), HashMap::new());
-    for field in listed(root)? {
+fn experiments(root: &Table, gantry: &Gantry, folder: &Folder) -> Result<Experiments<GantryExperiment, State>> {
+    let (mut experiments, mut unread, mut files) = (Vec::new(), Vec::new(), HashMap::new());
+    for (place, field) in listed(root)?.into_iter().enumerate() {
         let field = field.named("experiment");
-        let experiment = experiment(&field, gantry, folder)?;
-        unique(&field, &experiment.name, &mut files)?;
-        experiments.push(experiment);
+        let table = field.table()?;
+        let name = named(&table)?;
+        unique(&field, &name, &mut files)?;
+        let initial = || match table.optional("initial") {
+            Some(field) => initial(&field.named("gantry.initial").table()?, gantry),
+            None => Ok(State::default()),
+        };
+        match folder.experiment((place, &name), &table, || experiment(&field, gantry, folder), initial)? {
+            Ok(experiment) => experiments.push(experiment),
+            Err(left) => unread.push(left),
+        }
     }
-    Ok(experiments)
+    Ok((experiments, unread))
 }
 
 fn experiment(field: &Field, gantry: &Gantry, folder: &Folder) -> Result<GantryExperiment> {
     let table = field.table()?;
     table.check_keys(&["name", "input"], &["log"])?;
-    let name = table.required("name", "for example name = \"5 V pulse\"")?;
-    check_name(&name)?;
+    let name = named(&table)?;
     let (until, every) = times(&table, None)?;
     let such_as = "for example input = { left = { pulse = \"5 V\", for = \"0.25 s\" }, right = { step = \"0 V\" } }";
     let inputs = table.required("input", such_as)?.table()?;
@@ -389,7 +420,7 @@ fn experiment(field: &Field, gantry: &Gantry, folder: &Folder) -> Result<GantryE
         Some(field) => initial(&field.named("gantry.initial").table()?, gantry)?,
         None => State::default(),
     };
-    Ok(GantryExperiment { name: name.text()?.to_string(), inputs: [signal(0)?, signal(1)?], until, every, initial })
+    Ok(GantryExperiment { name, inputs: [signal(0)?, signal(1)?], until, every, initial })
 }
 
 /// Where bridge and cart are; the pulleys where the belt is without strain, unless they are given.

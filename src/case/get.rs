@@ -1,6 +1,7 @@
 //! The value of a case under a key: the other direction of `--set`.
 
-use super::tree::{Kind, Node, Source};
+use super::source::Source;
+use super::tree::{Kind, Node};
 use super::{Case, GantryCase, Opened, set};
 use crate::error::{Error, Result};
 use crate::parameter::{self, Fallback, Parameter};

@@ -1,7 +1,7 @@
 //! The inputs: `{ pulse = "5 V", for = "0.25 s" }` and its kind.
 
+use super::files::Folder;
 use super::reader::{Field, Table, nearest};
-use super::{Folder, InputFile};
 use crate::error::{Error, Result};
 use crate::quantity;
 use crate::signal::{Hold, Signal, Slot, Tone};
@@ -212,7 +212,7 @@ fn points(field: &Field) -> Result<Signal> {
 
 /// A column of a file.
 fn sampled(main: &Field, table: &Table, context: &Context) -> Result<Signal> {
-    let file = main.text()?;
+    let path = context.folder.name(main)?;
     let time = table.required("time", "time = \"...\" with the name of the time's column")?.text()?;
     let column = table.required("column", "column = \"...\" with the name of the input's column")?.text()?;
     let holds = [("zero", Hold::Zero), ("linear", Hold::Linear)];
@@ -228,15 +228,16 @@ fn sampled(main: &Field, table: &Table, context: &Context) -> Result<Signal> {
         }
         None => 1.0,
     };
-    let path = context.folder.path.join(file);
-    let (times, values) = crate::log::read_samples(&path, time, column)?;
-    if let Some(first) = times.first().filter(|&&t| t < 0.0) {
-        return Err(Error::new(format!("column `{time}` begins at {first} s"))
-            .in_file(&path)
-            .allowed("times from 0 s on")
-            .next("subtract the first time from all of them"));
-    }
-    context.folder.read.borrow_mut().push(InputFile { path, place: main.node.span.clone() });
+    let (times, values) = context.folder.read(main, &path, || {
+        let (times, values) = crate::log::read_samples(&path, time, column)?;
+        if let Some(first) = times.first().filter(|&&t| t < 0.0) {
+            return Err(Error::new(format!("column `{time}` begins at {first} s"))
+                .in_file(&path)
+                .allowed("times from 0 s on")
+                .next("subtract the first time from all of them"));
+        }
+        Ok((times, values))
+    })?;
     Ok(Signal::Sampled { times, values: values.into_iter().map(|v| v * unit).collect(), hold })
 }
 

@@ -1,9 +1,9 @@
 //! The log of an experiment:
 //! `log = { file = "pulse5.csv", time = "time_s", input = "voltage_V", drive_angle = "angle_rad" }`.
 
+use super::files::Folder;
 use super::reader::{Field, Table};
 use super::tree::Kind;
-use super::{Folder, InputFile};
 use crate::error::{Error, Result};
 use crate::log::{Clock, ColumnId, Dialect, Filter, In, Log, Mapping, PRESETS, Preset, Quantity, Source, Unit};
 use crate::parameter::Parameter;
@@ -38,7 +38,7 @@ pub(super) fn logs(field: &Field, stage: &Stage, folder: &Folder, driven: bool) 
     let keys: Vec<&str> = KEYS.iter().copied().chain(Quantity::ALL.map(Quantity::name)).collect();
     table.check_keys(&keys, &[])?;
     let file = table.required("file", "file = \"...\" with the path of the log")?;
-    let path = folder.path.join(file.text()?);
+    let path = folder.name(&file)?;
     let fetch = table.optional("fetch").map(|field| field.text()).transpose()?;
     let missing = |error: Error| match &fetch {
         Some(line) if !path.exists() => error.next(format!("`{line}` fetches it")),
@@ -46,7 +46,10 @@ pub(super) fn logs(field: &Field, stage: &Stage, folder: &Folder, driven: bool) 
     };
     let known: Vec<(&str, &Preset)> = PRESETS.iter().map(|preset| (preset.name, preset)).collect();
     let preset = table.optional("preset").map(|field| field.choice(&known)).transpose()?;
-    let mut columns = preset.map_or(Ok(Vec::new()), |preset| preset.columns_of(&path)).map_err(missing)?;
+    let mut columns = match preset {
+        Some(preset) => folder.read(&file, &path, || preset.columns_of(&path)).map_err(missing)?,
+        None => Vec::new(),
+    };
     // What was meant goes before what was logged, unless the table names a column itself.
     columns.retain(|(key, ..)| *key != "input" || !driven);
     let sources = Sources::new(&table, columns, stage)?;
@@ -91,9 +94,7 @@ pub(super) fn logs(field: &Field, stage: &Stage, folder: &Folder, driven: bool) 
         dialect,
         preset,
     };
-    let runs = mapping.read().map_err(missing)?;
-    folder.read.borrow_mut().push(InputFile { path, place: file.node.span.clone() });
-    Ok(runs)
+    folder.read(&file, &path, || mapping.read()).map_err(missing)
 }
 
 /// The column of the input, unless the experiment has one of its own.

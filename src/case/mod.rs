@@ -3,6 +3,7 @@
 mod bounds;
 mod chosen;
 mod controller;
+mod files;
 mod fit;
 mod friction;
 mod gantry;
@@ -14,13 +15,16 @@ mod motion;
 mod reader;
 mod set;
 mod sheet;
+mod source;
 mod stage;
+mod suggestion;
 mod sweep;
 mod template;
 mod tree;
 mod tune;
 
 pub use bounds::LARGEST_FILE;
+pub use files::{Files, InputFile, Unread};
 pub use fit::{Nuisances, Per, Plan, Prior, Scope, matches};
 pub use gantry::{GantryCase, GantryExperiment, Opened};
 pub use get::{Given, Number};
@@ -37,12 +41,10 @@ use crate::mechanism::{Mechanism, State};
 use crate::signal::Signal;
 use crate::stage::{AmplifierMode, Measurement, Stage};
 use crate::trajectory::Grid;
+use files::{Experiments, Folder};
 use reader::{Field, Table};
-use std::cell::RefCell;
 use std::collections::HashMap;
-use std::io::Read;
-use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 /// Most rows of a result.
@@ -66,6 +68,8 @@ pub struct Case {
     pub measurement: Option<Measurement>,
     /// The experiments, in the file's order.
     pub experiments: Vec<Experiment>,
+    /// The experiments whose files were not read; none but where [`Case::read_for`] left them out.
+    pub unread: Vec<Unread<Initial>>,
     /// The controller, where the file has one.
     pub controller: Option<Design>,
     /// Where it should be, in the file's order.
@@ -82,15 +86,6 @@ pub struct Case {
     pub text: String,
     /// The files that its inputs and logs name, in the text's order.
     pub files: Vec<InputFile>,
-}
-
-/// A file that an input or a log is read from.
-#[derive(Debug, Clone, PartialEq)]
-pub struct InputFile {
-    /// Where it is: the path in the text, from the case's folder on.
-    pub path: PathBuf,
-    /// Where the text names it, quotes included.
-    pub place: Range<usize>,
 }
 
 /// One run of the stage.
@@ -159,6 +154,13 @@ impl Case {
         Self::from_text_with(path, &read_text(path)?, changes)
     }
 
+    /// The same with the files of these experiments only. An experiment whose files are not read, or cannot be, is none
+    /// of the case's experiments; [`Case::unread`] says why, and whoever asks for it is told.
+    pub fn read_for(path: impl AsRef<Path>, changes: &[&str], files: Files) -> Result<Self> {
+        let path = path.as_ref();
+        Self::from_text_for(path, &read_text(path)?, changes, files)
+    }
+
     /// Reads a case from text; `name` stands in messages, and paths in the text are relative to its folder.
     ///
     /// ```
@@ -185,6 +187,13 @@ impl Case {
     /// # Ok::<(), taut::Error>(())
     /// ```
     pub fn from_text_with(name: impl AsRef<Path>, text: &str, changes: &[&str]) -> Result<Self> {
+        let case = Self::from_text_for(name, text, changes, Files::All)?;
+        case.complete()?;
+        Ok(case)
+    }
+
+    /// The same with the files of these experiments only, as [`Case::read_for`] has it.
+    pub fn from_text_for(name: impl AsRef<Path>, text: &str, changes: &[&str], files: Files) -> Result<Self> {
         let name = name.as_ref();
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let source = set::apply(name, text, changes)?;
@@ -225,17 +234,17 @@ impl Case {
 
         let title = title(&root, name)?;
         let stage = stage::stage(&root)?;
-        let folder = Folder::of(name);
+        let folder = Folder::of(name, files);
         let controller = controller::controller(&root, &stage)?;
         let moves = motion::moves(&root, &stage, controller.as_ref())?;
         // A case of moves needs no experiments, nor does one of a controller that is to be tuned.
-        let experiments = match root.optional("experiment") {
-            None if !moves.is_empty() || controller.is_some() => Vec::new(),
+        let (experiments, unread) = match root.optional("experiment") {
+            None if !moves.is_empty() || controller.is_some() => (Vec::new(), Vec::new()),
             _ => experiments(&root, &stage, &folder)?,
         };
         let measurement = measurement::measurement(&root, &stage, &experiments)?;
-        let fit = fit::plan(&root, &stage, &experiments)?;
-        let tune = tune::tuning(&root, controller.as_ref(), &moves)?;
+        let fit = fit::plan(&root, &stage, &experiments, unread.is_empty())?;
+        let tune = tune::tuning(&root, &stage, controller.as_ref(), &moves)?;
         let known = tune::known(&root)?;
         let context = sweep::Context {
             machine: &stage,
@@ -247,7 +256,21 @@ impl Case {
         let sweep = sweep::sweeping(&root, &context)?;
         let files = folder.files();
         let text = source.text.clone();
-        Ok(Self { title, stage, measurement, experiments, controller, moves, fit, tune, known, sweep, text, files })
+        Ok(Self {
+            title,
+            stage,
+            measurement,
+            experiments,
+            unread,
+            controller,
+            moves,
+            fit,
+            tune,
+            known,
+            sweep,
+            text,
+            files,
+        })
     }
 }
 
@@ -274,10 +297,12 @@ fn title(root: &Table, name: &Path) -> Result<String> {
 /// The text of a case file.
 fn read_text(path: &Path) -> Result<String> {
     let fail = |what: String| Error::new(what).in_file(path);
-    let bytes = read_bytes(path).map_err(|e| {
+    // A little more than a case may have: what is too long is told with the rest.
+    let bytes = crate::files::read(path, bounds::LARGEST_FILE + 1).map_err(|e| {
         let error = fail(format!("this case file cannot be read: {}", told(&e)));
         match e.kind() {
             std::io::ErrorKind::NotFound => error.next("check the path, or write a new case with `taut init`"),
+            std::io::ErrorKind::TimedOut => error.next("write the case to a file, or to standard input: -"),
             _ => error,
         }
     })?;
@@ -285,13 +310,6 @@ fn read_text(path: &Path) -> Result<String> {
         fail(format!("this is not a text file: byte {} is not UTF-8", e.utf8_error().valid_up_to() + 1))
             .next("give the path of a case file in TOML, saved as UTF-8")
     })
-}
-
-/// The content of a file, up to a little more than a case may have: what is too long is told with the rest.
-fn read_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    std::fs::File::open(path)?.take(bounds::LARGEST_FILE as u64 + 1).read_to_end(&mut bytes)?;
-    Ok(bytes)
 }
 
 /// The system's error on a file, in our words.
@@ -327,26 +345,6 @@ pub fn file_name(name: &str) -> String {
     format!("{}{hash}", &plain[..plain.floor_char_boundary(LONGEST_FILE_NAME - hash.len())])
 }
 
-/// Where the paths of a case begin, and what was read from there.
-struct Folder<'a> {
-    path: &'a Path,
-    read: RefCell<Vec<InputFile>>,
-}
-
-impl<'a> Folder<'a> {
-    /// That of the case file `name`.
-    fn of(name: &'a Path) -> Self {
-        Self { path: name.parent().unwrap_or(Path::new("")), read: RefCell::default() }
-    }
-
-    /// The files that were read, in the text's order.
-    fn files(self) -> Vec<InputFile> {
-        let mut files = self.read.into_inner();
-        files.sort_by_key(|file| file.place.start);
-        files
-    }
-}
-
 /// The tables of the experiments.
 fn listed<'a>(root: &Table<'a>) -> Result<Vec<Field<'a>>> {
     let such_as = "[[experiment]] with name, input, until and every";
@@ -363,17 +361,38 @@ fn listed<'a>(root: &Table<'a>) -> Result<Vec<Field<'a>>> {
     Ok(list)
 }
 
-fn experiments(root: &Table, stage: &Stage, folder: &Folder) -> Result<Vec<Experiment>> {
-    let list = listed(root)?;
-    let mut experiments: Vec<Experiment> = Vec::new();
+fn experiments(root: &Table, stage: &Stage, folder: &Folder) -> Result<Experiments<Experiment, Initial>> {
+    let (mut experiments, mut unread) = (Vec::new(), Vec::new());
     let mut files = HashMap::new();
-    for field in list {
-        for experiment in experiment(&field.clone().named("experiment"), stage, folder)? {
-            unique(&field, &experiment.name, &mut files)?;
-            experiments.push(experiment);
+    for (place, field) in listed(root)?.into_iter().enumerate() {
+        let own = field.clone().named("experiment");
+        let table = own.table()?;
+        let name = named(&table)?;
+        let initial = || match table.optional("initial") {
+            Some(field) => initial(&field.table()?, stage),
+            None => Ok(Initial::default()),
+        };
+        match folder.experiment((place, &name), &table, || experiment(&own, stage, folder), initial)? {
+            Ok(runs) => {
+                for run in runs {
+                    unique(&field, &run.name, &mut files)?;
+                    experiments.push(run);
+                }
+            }
+            Err(left) => {
+                unique(&field, &name, &mut files)?;
+                unread.push(left);
+            }
         }
     }
-    Ok(experiments)
+    Ok((experiments, unread))
+}
+
+/// The name of an experiment.
+fn named(table: &Table) -> Result<String> {
+    let name = table.required("name", "for example name = \"5 V pulse\"")?;
+    check_name(&name)?;
+    Ok(name.text()?.to_string())
 }
 
 /// Refuses a name that another experiment has, or that leads to the same files; `files` are those so far and whose they
@@ -400,9 +419,7 @@ fn experiment(field: &Field, stage: &Stage, folder: &Folder) -> Result<Vec<Exper
     };
     let table = field.table()?;
     table.check_keys(&["name", "input", "log", "campaign"], &[])?;
-    let name = table.required("name", "for example name = \"5 V pulse\"")?;
-    check_name(&name)?;
-    let name = name.text()?.to_string();
+    let name = named(&table)?;
     let initial = match table.optional("initial") {
         Some(field) => initial(&field.table()?, stage)?,
         None => Initial::default(),

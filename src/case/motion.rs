@@ -1,6 +1,7 @@
 //! The moves: to a place, through points, or as a list in the manner of G-code.
 
 use super::reader::{Field, Table};
+use super::suggestion;
 use super::{MOST_SAMPLES, check_name, file_name};
 use crate::design::Design;
 use crate::error::Result;
@@ -29,6 +30,11 @@ impl Move {
     pub fn file_name(&self) -> String {
         file_name(&self.name)
     }
+
+    /// The cart's reference, through the shaper of this controller.
+    pub fn reference(&self, design: &Design) -> Profile {
+        self.profile.clone().shaped(&design.shaper)
+    }
 }
 
 pub(super) fn moves(root: &Table, stage: &Stage, design: Option<&Design>) -> Result<Vec<Move>> {
@@ -41,7 +47,7 @@ pub(super) fn moves(root: &Table, stage: &Stage, design: Option<&Design>) -> Res
     let Some(design) = design else {
         return Err(field
             .fail("there is no controller that could follow it")
-            .next("add [controller] with for example every = \"1 ms\" and pid = { proportional = \"2 V/mm\" }"));
+            .next(format!("add [controller] with for example {}", suggestion::controller(stage))));
     };
     let mut moves: Vec<Move> = Vec::new();
     for field in field.filled_list()? {

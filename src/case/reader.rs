@@ -1,6 +1,7 @@
 //! From places in a text to meanings: fields and tables, each checked against the table of parameters.
 
-use super::tree::{Entry, Kind, Node, Source};
+use super::source::Source;
+use super::tree::{Entry, Kind, Node};
 use crate::error::{Error, Place, Result};
 use crate::parameter::{self, Fallback, Parameter};
 use crate::quantity::{self, rounded};

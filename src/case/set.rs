@@ -1,6 +1,7 @@
 //! `--set KEY=VALUE`: changes the text of a case and leaves its comments alone.
 
-use super::tree::{Entry, Kind, Node, Override, Source, equals};
+use super::source::{Override, Source, equals};
+use super::tree::{Entry, Kind, Node};
 use crate::error::{Error, Place, Result};
 use crate::parameter;
 use std::path::Path;

@@ -3,7 +3,7 @@
 use super::fit::{free, pair, plain, prior_of};
 use super::reader::{Field, Table};
 use super::tree::{Entry, Kind, Node};
-use super::{Folder, InputFile, Known, Plan, Prior};
+use super::{Folder, Known, Plan, Prior};
 use crate::error::Result;
 use crate::parameter::{Numbers, Parameter, Range};
 use std::path::PathBuf;
@@ -201,14 +201,13 @@ fn origin(field: &Field, context: &Context) -> Result<Origin> {
                 .fail("draws of a posterior belong to the parameters of a table [fit], which is missing")
                 .next("sweep the fitted.toml that lies beside the draws"));
         }
-        let path = context.folder.path.join(text);
+        let path = context.folder.join(text);
         if !path.is_file() {
             return Err(field
                 .fail(format!("there is no file {}", path.display()))
                 .allowed("\"uncertainty\", or the file posterior.csv that `taut fit --posterior --out DIR` writes"));
         }
-        context.folder.read.borrow_mut().push(InputFile { path: path.clone(), place: field.node.span.clone() });
-        return Ok(Origin::Posterior(path));
+        return context.folder.name(field).map(Origin::Posterior);
     }
     match context.known {
         [] => Err(field

@@ -1,24 +1,10 @@
 //! TOML with places: every value knows where it stands, so that every mistake can be told with its line.
 
 use super::bounds;
-use crate::error::{Error, Place, Result};
+use super::source::Source;
+use crate::error::{Error, Result};
 use std::ops::Range;
-use std::path::{Path, PathBuf};
 use toml_edit::{Document, Item, Value};
-
-/// The text of a case and where it came from.
-pub(super) struct Source {
-    pub name: PathBuf,
-    pub text: String,
-    /// Changes of the text by `--set`.
-    pub overrides: Vec<Override>,
-}
-
-/// One `--set`, and the stretch of the text that it made.
-pub(super) struct Override {
-    pub argument: String,
-    pub range: Range<usize>,
-}
 
 /// A value with its place.
 #[derive(Debug, Clone)]
@@ -48,19 +34,6 @@ pub(super) struct Entry {
 }
 
 impl Source {
-    pub fn new(name: &Path, text: String) -> Self {
-        Self { name: name.to_path_buf(), text, overrides: Vec::new() }
-    }
-
-    pub fn place(&self, range: Range<usize>) -> Place {
-        let set = self.overrides.iter().find(|o| o.range.start <= range.start && range.end <= o.range.end);
-        if let Some(set) = set {
-            let value = equals(&set.argument).map_or(0, |i| i + 1);
-            return Place::in_text("--set", &set.argument, value..set.argument.len());
-        }
-        Place::in_text(&self.name, &self.text, range)
-    }
-
     /// The root table, or where the text is no TOML.
     pub fn tree(&self) -> Result<Node> {
         let text = self.text.as_str();
@@ -73,20 +46,6 @@ impl Source {
         let document = Document::parse(text).map_err(|e| syntax(self, &e))?;
         Ok(Node { span: 0..0, kind: Kind::Table(entries(document.as_table(), 0..0)) })
     }
-}
-
-/// Where `=` stands between key and value: the first that is not within quotes.
-pub(super) fn equals(argument: &str) -> Option<usize> {
-    let mut quote = None;
-    argument.char_indices().find_map(|(place, c)| {
-        match (quote, c) {
-            (None, '"' | '\'') => quote = Some(c),
-            (Some(open), _) if open == c => quote = None,
-            (None, '=') => return Some(place),
-            _ => {}
-        }
-        None
-    })
 }
 
 /// A TOML mistake in our words where we have better ones.

@@ -3,9 +3,11 @@
 
 use super::Move;
 use super::reader::{Field, Table};
+use super::suggestion;
 use super::tree::Kind;
 use crate::design::{Design, Structure};
 use crate::error::Result;
+use crate::stage::Stage;
 use std::path::PathBuf;
 
 /// The goal of `taut tune`.
@@ -93,14 +95,14 @@ pub struct Known {
     pub error: Option<f64>,
 }
 
-pub(super) fn tuning(root: &Table, design: Option<&Design>, moves: &[Move]) -> Result<Option<Tuning>> {
+pub(super) fn tuning(root: &Table, stage: &Stage, design: Option<&Design>, moves: &[Move]) -> Result<Option<Tuning>> {
     let Some(field) = root.optional("tune") else { return Ok(None) };
     let table = field.table()?;
     table.check_keys(&["cost"], &[])?;
     let Some(design) = design else {
         return Err(field
             .fail("there is no controller to tune")
-            .next("add [controller] with for example every = \"1 ms\" and pid = { proportional = \"2 V/mm\" }"));
+            .next(format!("add [controller] with for example {}", suggestion::controller(stage))));
     };
     let placed = matches!(design.structure, Structure::Pid(_) | Structure::Cascade(_));
     if !placed && !matches!(design.structure, Structure::StateFeedback(_)) {

@@ -2,100 +2,14 @@
 
 use crate::design::{FeedForward, FeedForwardModel};
 use crate::signal::profile::Reference;
-use crate::stage::{AmplifierMode, BeltModel, EncoderPlace, Stage};
+use crate::stage::rigid::{REST_ACCELERATION, REST_SPEED, Rigid};
+use crate::stage::{BeltModel, EncoderPlace, Stage};
 
-/// The axis as one mass along the belt (Li & Rehani 1996), and its motor.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rigid {
-    /// M + (J₁ + n² J_r + J₂)/r², kg.
-    pub mass: f64,
-    /// Of that (J₁ + n² J_r)/r², what moves before the belt, kg.
-    pub driving: f64,
-    /// b + (B₁ + B₂)/r², N s/m, forward and backward.
-    pub viscous: [f64; 2],
-    /// F_c + (τ_c1 + τ_c2)/r, N, forward and backward.
-    pub coulomb: [f64; 2],
-    /// Constant force on the cart, N.
-    pub constant: f64,
-    /// n K_t/r, N/A, without the gear's loss.
-    pub force_per_ampere: f64,
-    efficiency: f64,
-    /// n K_e/r, V s/m.
-    pub brake: f64,
-    resistance: f64,
-    inductance: f64,
-    gain: f64,
-    mode: AmplifierMode,
-}
-
-impl Rigid {
-    /// That of `stage`.
-    pub fn of(stage: &Stage) -> Self {
-        let (r, motor) = (stage.pulley_radius, &stage.motor);
-        let n = motor.gear_ratio;
-        let pulleys = stage.drive_pulley.inertia + n * n * motor.rotor_inertia + stage.idler_pulley.inertia;
-        let [drive, cart, idler] = [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction];
-        Self {
-            mass: stage.cart.mass + pulleys / (r * r),
-            driving: (stage.drive_pulley.inertia + n * n * motor.rotor_inertia) / (r * r),
-            viscous: [true, false].map(|forward| {
-                cart.side(forward).viscous + (drive.side(forward).viscous + idler.side(forward).viscous) / (r * r)
-            }),
-            coulomb: [true, false].map(|forward| {
-                cart.side(forward).coulomb + (drive.side(forward).coulomb + idler.side(forward).coulomb) / r
-            }),
-            constant: stage.cart.constant_force(),
-            force_per_ampere: n * motor.torque_constant / r,
-            efficiency: motor.gear_efficiency,
-            brake: n * motor.back_emf_constant / r,
-            resistance: motor.resistance,
-            inductance: motor.inductance,
-            gain: stage.amplifier.gain,
-            mode: stage.amplifier.mode,
-        }
-    }
-
-    /// The command that makes the motor push with `force` (N, changing at `rate`, N/s) at `speed`, V or A.
-    pub fn command(&self, force: f64, rate: f64, speed: f64) -> f64 {
-        // What drives through the gear loses, what is driven holds more.
-        let efficiency = if force * speed >= 0.0 { self.efficiency } else { 1.0 / self.efficiency };
-        let per_ampere = self.force_per_ampere * efficiency;
-        let current = force / per_ampere;
-        match self.mode {
-            AmplifierMode::Current => current / self.gain,
-            // v = R i + L di/dt + K_e n φ̇                                        (4) with an inductance
-            AmplifierMode::Voltage => {
-                (self.resistance * current + self.inductance * rate / per_ampere + self.brake * speed) / self.gain
-            }
-        }
-    }
-
-    /// Force per command at rest, N/V or N/A.
-    pub fn force_per_command(&self) -> f64 {
-        1.0 / self.command(1.0, 0.0, 0.0)
-    }
-
-    /// Resistance to speed of axis and motor together, N s/m: b, and of a commanded voltage also n² K_t K_e/(R r²).
-    pub fn drag(&self) -> f64 {
-        self.viscous[0]
-            + match self.mode {
-                AmplifierMode::Current => 0.0,
-                AmplifierMode::Voltage => self.force_per_ampere * self.brake / self.resistance,
-            }
-    }
-
-    /// Friction of the axis at this speed, N; its viscous part and its dry part, which goes the way of `sign`.
-    pub fn friction(&self, speed: f64, sign: f64) -> (f64, f64) {
-        let side = usize::from(sign < 0.0);
-        (self.viscous[side] * speed, self.coulomb[side] * sign)
-    }
-}
-
-/// The way in which the axis goes, or is about to go: 1, −1 or 0.
+/// Direction in which the axis moves, or is about to move: 1, −1 or 0.
 pub fn direction(reference: &Reference) -> f64 {
-    let sign = |value: f64| if value == 0.0 { 0.0 } else { value.signum() };
-    match sign(reference.speed) {
-        0.0 => sign(reference.acceleration),
+    let sign = |value: f64, rest: f64| if value.abs() > rest { value.signum() } else { 0.0 };
+    match sign(reference.speed, REST_SPEED) {
+        0.0 => sign(reference.acceleration, REST_ACCELERATION),
         sign => sign,
     }
 }
@@ -123,6 +37,8 @@ pub struct Needed {
     pub idler: [f64; 2],
     /// N; and its rate, N/s.
     pub force: [f64; 2],
+    /// Forces in the three spans of an elastic belt, counted from the pretension, N; zero for other belts.
+    pub spans: [f64; 3],
 }
 
 impl Compensation {
@@ -188,7 +104,12 @@ impl Compensation {
         let viscous = side.viscous / (r * r);
         let force = own * drive.acceleration + viscous * drive.speed + side.coulomb * sign / r + load[0] + pull[0];
         let rate = own * jerk + viscous * drive.acceleration + load[1] + pull[1];
-        Needed { drive, idler: [position + behind[0], speed + behind[1]], force: [force, rate] }
+        // f₁ = k₁ (y₁ − y),  f₂ = k₂ (y − y₃),  f₃ = k₃ (y₃ − y₁)
+        let spans = match stage.belt.model {
+            BeltModel::Elastic => [k1 * stretch[0], -k2 * behind[0], k3 * (behind[0] - stretch[0])],
+            BeltModel::TwoMass | BeltModel::Rigid => [0.0; 3],
+        };
+        Needed { drive, idler: [position + behind[0], speed + behind[1]], force: [force, rate], spans }
     }
 
     /// Where the encoder's side should be, so that the cart is where it should.
@@ -241,5 +162,56 @@ impl Compensation {
     pub fn dry(&self, y: &Reference) -> f64 {
         let (_, dry) = self.rigid.friction(0.0, direction(y));
         (dry - self.rigid.constant) / self.rigid.force_per_command()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Case;
+    use std::path::Path;
+
+    /// A generator that left a speed of 1.9e-16 m/s at the end of its move commanded the whole dry friction for ever.
+    #[test]
+    fn what_rounding_leaves_of_a_reference_at_rest_commands_no_friction() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
+        let case = Case::read(folder.join("pid-elastic.toml")).unwrap();
+        let mut stage = case.stage.clone();
+        (stage.motor.gear_efficiency, stage.cart.load) = (0.8, 3.0);
+        let mut number = 1_u64;
+        let mut noise = |size: f64| {
+            number = number.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            size * ((number >> 11) as f64 / (1_u64 << 52) as f64 - 1.0)
+        };
+        for model in [FeedForwardModel::Rigid, FeedForwardModel::Elastic] {
+            let settings =
+                FeedForward { model, compensate_stretch: true, ..case.controller.as_ref().unwrap().feed_forward };
+            let compensation = Compensation::new(&stage, &settings);
+            let still = Reference { position: 0.1, ..Reference::default() };
+            let [command, dry] = [compensation.command(&still), compensation.dry(&still)];
+            let target = compensation.target(&still).position;
+            // The pulley is quicker than the cart by the rate of the stretch, some 1e-8 m/s here.
+            for size in [1.9e-16, 1e-12, 1e-9, 0.9] {
+                for _ in 0..100 {
+                    let speed = noise(size * REST_SPEED);
+                    let acceleration = noise(size * REST_ACCELERATION);
+                    let y = Reference { speed, acceleration, ..still };
+                    assert_eq!(direction(&y), 0.0);
+                    assert_eq!(compensation.dry(&y), dry);
+                    // The noise itself goes through inertia and viscous friction, a few grams and N s/m.
+                    let most = size * 1e-2 * compensation.rigid.command(1.0, 0.0, 0.0);
+                    assert!((compensation.command(&y) - command).abs() <= most + 1e-12, "{y:?}");
+                    assert!((compensation.target(&y).position - target).abs() <= size * 1e-6 + 1e-15, "{y:?}");
+                }
+            }
+            // Ten times as much is a direction.
+            for sign in [1.0, -1.0] {
+                let moving = Reference { speed: 10.0 * sign * REST_SPEED, acceleration: -sign, ..still };
+                assert_eq!(direction(&moving), sign);
+                let leaving = Reference { acceleration: 10.0 * sign * REST_ACCELERATION, ..still };
+                assert_eq!(direction(&leaving), sign);
+                assert!((compensation.dry(&leaving) - dry).abs() > 0.01);
+            }
+        }
     }
 }

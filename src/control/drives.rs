@@ -16,7 +16,7 @@
 //! the controller: the torque is `inertia` times the change of the speed in turn/s per second, in N m. Beckhoff Information System, AX8xxx object 3140:07 "Load
 //! inertia/mass", TF5200 P-AXIS-00391 "Load inertia": the total at the motor shaft.
 
-use super::compensation::Rigid;
+use crate::stage::rigid::Rigid;
 use crate::stage::{AmplifierMode, Stage};
 use std::f64::consts::PI;
 

@@ -1,7 +1,6 @@
 //! A controller as a linear filter of what it measures, for margins and stability: within its limit, without reference
 //! and counts.
 
-use super::compensation::Rigid;
 use super::filter::Biquad;
 use super::observer::DisturbanceState;
 use super::standard::observed;
@@ -9,6 +8,7 @@ use super::state_feedback::{Law, StateFeedbackState};
 use crate::design::{Cascade, Design, Pid, Structure};
 use crate::error::{Error, Result};
 use crate::stage::Stage;
+use crate::stage::rigid::Rigid;
 use nalgebra::{Complex, DMatrix, DVector, Schur};
 use std::f64::consts::PI;
 
@@ -46,13 +46,6 @@ pub struct Terms {
     pub current: Complex<f64>,
     /// D.
     pub own: Complex<f64>,
-}
-
-impl Terms {
-    /// Whether the loop is the same wherever it is broken.
-    pub fn has_one_loop(&self) -> bool {
-        self.current == Complex::ZERO && self.scale == Complex::ZERO
-    }
 }
 
 /// A frequency as a sampled loop sees it.
@@ -138,6 +131,16 @@ impl Feedback {
             current: filter * current,
             own: delayed * (one + on_command) + filter * input,
         }
+    }
+
+    /// True if it uses the scale beside the encoder: N_x is not zero.
+    pub fn uses_scale(&self) -> bool {
+        self.has_scale && (!matches!(self.core, Core::Pid(_)) || self.observer.is_some())
+    }
+
+    /// True if it closes a current loop: N_i is not zero.
+    pub fn uses_current(&self) -> bool {
+        matches!(&self.core, Core::Cascade(Cascade { current: Some(_), .. }))
     }
 
     /// Frequencies at which it changes quickly, rad/s.

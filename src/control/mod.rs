@@ -12,6 +12,7 @@ pub mod compare;
 pub mod compensation;
 pub mod damping;
 pub mod drives;
+pub mod feasible;
 pub mod feedback;
 pub mod filter;
 pub mod fuzzy;

@@ -117,7 +117,7 @@ impl CascadeState {
         if inner.integral != 0.0 {
             self.current_integral += share;
         }
-        if inner.proportional > 0.0 {
+        if inner.proportional != 0.0 {
             self.push_speed(share / inner.proportional);
         }
     }

@@ -52,7 +52,7 @@ pub fn worst(
             .next("write 0.2 for 20 %"));
     }
     let mut worst = Worst::default();
-    let profile = motion.profile.clone().shaped(&design.shaper);
+    let profile = motion.reference(design);
     let timing = Loop::of(design);
     let rows = Rows { until: motion.until, every: timing.every.min(motion.until), window: motion.window };
     for (axis, other) in spread(stage, share) {

@@ -1,6 +1,6 @@
 //! A controller from its design: structure, feed-forward, observer and filters put together.
 
-use super::compensation::{Compensation, Rigid};
+use super::compensation::Compensation;
 use super::filter::Biquad;
 use super::fuzzy::FuzzyState;
 use super::memory::{Memory, all};
@@ -12,6 +12,7 @@ use super::state_feedback::StateFeedbackState;
 use crate::design::{Design, Structure};
 use crate::error::{Error, Result};
 use crate::signal::profile::Reference;
+use crate::stage::rigid::Rigid;
 use crate::stage::{AmplifierMode, Stage};
 
 /// A controller that a [`Design`] describes, made with a model of the axis: the stage itself, or what one takes it for.

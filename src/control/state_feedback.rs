@@ -1,6 +1,6 @@
 //! State feedback with a Kalman filter: LQG, and with an integral LQI.
 
-use super::compensation::{Compensation, Rigid};
+use super::compensation::Compensation;
 use super::memory::{Memory, all, flag};
 use super::model::Linear;
 use super::model::Quantity;
@@ -11,6 +11,7 @@ use crate::error::Result;
 use crate::signal::profile::Reference;
 use crate::stage::Stage;
 use crate::stage::axis::{CART, IDLER};
+use crate::stage::rigid::Rigid;
 use nalgebra::{DMatrix, DVector};
 
 /// A linear-quadratic regulator on the states that a Kalman filter estimates, both for the sampled axis with its delay.

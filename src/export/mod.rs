@@ -122,17 +122,23 @@ pub fn identifier(name: &str) -> String {
     }
 }
 
-/// The controller of a case, or what to do where there is none.
+/// The controller of a case. Errors: a case without one; what to do about it is the caller's to say.
 pub fn controller(case: &Opened) -> Result<(&Case, &crate::design::Design)> {
     match case {
-        Opened::Gantry(_) => Err(Error::new("a gantry has no controller that could be exported")
-            .next("leave --part out, or say --part plant")),
+        Opened::Gantry(_) => Err(Error::new("a gantry has no controller")),
         Opened::Axis(case) => match &case.controller {
             Some(design) => Ok((case, design)),
-            None => Err(Error::new("this case has no controller that could be exported")
-                .next("add a [controller], as in docs/control.md, or say --part plant")),
+            None => Err(Error::new("this case has no controller")),
         },
     }
+}
+
+/// The next step where a controller is missing: to add one, where the case can have one, or `instead`.
+fn without_controller(case: &Opened, error: Error, instead: &str) -> Error {
+    error.next(match case {
+        Opened::Axis(_) => format!("add a [controller], as in docs/control.md, or {instead}"),
+        Opened::Gantry(_) => instead.to_string(),
+    })
 }
 
 /// The part that is asked for, or else what there is: a controller that is asked for must be there.
@@ -142,9 +148,28 @@ pub fn part(case: &Opened, asked: Option<Part>) -> Result<Part> {
         Err(_) => Part::Plant,
     });
     if part.has_controller() {
-        controller(case)?;
+        // C takes no curves.
+        let instead = match mechanism(case).is_piecewise_linear() {
+            true => "leave --part out for the machine alone",
+            false => "take the machine with `taut export fmu`",
+        };
+        controller(case).map_err(|error| without_controller(case, error, instead))?;
     }
     Ok(part)
+}
+
+/// Note that a controller is exported without its input shaper: how many impulses, and what to do.
+fn shaper_note(design: &crate::design::Design) -> Option<String> {
+    let impulses = &design.shaper;
+    (!impulses.is_empty())
+        .then(|| format!("the input shaper of {} impulses is not in it: shape the reference before it", impulses.len()))
+}
+
+/// The same as lines of a comment, with the impulses.
+fn shaper_remark(design: &crate::design::Design) -> Vec<String> {
+    let Some(note) = shaper_note(design) else { return Vec::new() };
+    let of = |[time, amplitude]: &[f64; 2]| format!("  {amplitude:?} of the reference {time:?} s ago");
+    std::iter::once(format!("{note}, to the sum of")).chain(design.shaper.iter().map(of)).collect()
 }
 
 /// The files of a target, called `stem`. Errors: what the target cannot do, and what can be done instead.
@@ -168,10 +193,12 @@ pub fn mechanism(case: &Opened) -> crate::mechanism::Mechanism {
 /// Refuses a controller where only the plant is exported.
 fn plant_of(case: &Opened, asked: Option<Part>) -> Result<&Opened> {
     if asked.is_some_and(Part::has_controller) {
-        controller(case)?;
-        return Err(Error::new("only the machine is exported to this")
-            .in_file("--part")
-            .next("leave --part out; `taut export c` and `taut export st` have the controller"));
+        let error = Error::new("only the machine is exported to this").in_file("--part");
+        return Err(error.next(match controller(case) {
+            _ if !mechanism(case).is_piecewise_linear() => "take the machine with `taut export fmu`",
+            Ok(_) => "leave --part out; `taut export c` and `taut export st` have the controller",
+            Err(_) => "leave --part out",
+        }));
     }
     Ok(case)
 }

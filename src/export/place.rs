@@ -1,8 +1,8 @@
 //! Where exported files go: beside a file that was named, or into a folder.
 
 use super::Exported;
-use crate::error::{Error, Result};
-use crate::files::{Batch, Inputs, write_atomically};
+use crate::error::Result;
+use crate::files::{Batch, Claim, Inputs, Refusal, write_atomically};
 use std::path::{Path, PathBuf};
 
 /// Where the files of a target go, and what they are called.
@@ -29,15 +29,22 @@ impl Place {
         }
     }
 
+    /// Claims the main file, or the folder, which is made if it is not there: of two programs that would write the same
+    /// files, the second is refused.
+    pub fn claim(&self, ending: &str) -> std::result::Result<Claim, Refusal> {
+        let main = format!("{}.{ending}", self.stem);
+        match self.is_file {
+            true => Claim::file(self.folder.join(main)),
+            false => Claim::folder(&self.folder, &[main]),
+        }
+    }
+
     /// Writes the files, all of them or none, over none of `inputs`, and returns where they are.
-    pub fn write(&self, exported: &Exported, inputs: &Inputs) -> Result<Vec<PathBuf>> {
+    pub fn write(&self, exported: &Exported, inputs: &Inputs, claim: &mut Claim) -> Result<Vec<PathBuf>> {
         let paths: Vec<PathBuf> = exported.files.iter().map(|(name, _)| self.folder.join(name)).collect();
         paths.iter().try_for_each(|path| inputs.check(path))?;
-        if !self.is_file {
-            std::fs::create_dir_all(&self.folder).map_err(|e| {
-                let error = Error::new(format!("this folder cannot be made: {e}")).in_file(&self.folder);
-                error.next("name a folder that you may write to")
-            })?;
+        if self.is_file {
+            paths.iter().try_for_each(|path| claim.add(path))?;
         }
         let batch = Batch::begin(&self.folder)?;
         for (name, content) in &exported.files {

@@ -306,7 +306,7 @@ fn curved(mechanism: &Mechanism) -> Error {
     };
     Error::new(format!("{what}, and what is exported here is linear between its events"))
         .allowed("Coulomb friction with or without a breakaway (`coulomb`, `static`), and spans of constant stiffness")
-        .next("`taut export fmu` takes it as it is; --part controller leaves the machine out; or export a case without it")
+        .next("`taut export fmu` takes it as it is")
 }
 
 impl ElementKind {

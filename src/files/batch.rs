@@ -1,6 +1,6 @@
 //! Files that belong together: written in a hidden folder, and given their places one right after the other.
 
-use super::{Draft, cannot_write, temporary, write_atomically};
+use super::{Draft, cannot_write, replacing, target, temporary, unfinished, write_atomically};
 use crate::error::{Error, Result};
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -52,6 +52,7 @@ impl Batch {
     /// Gives all files their places, and removes `stale` ones that stand in the folder, with a marker beside them
     /// meanwhile.
     pub fn place(&self, stale: &[PathBuf]) -> Result<()> {
+        let _placing = unfinished::placing();
         let names = self.names()?;
         let places: Vec<PathBuf> = names.iter().map(|name| self.root.join(name)).collect();
         if let Some(taken) = places.iter().find(|place| place.is_dir()) {
@@ -66,7 +67,7 @@ impl Batch {
                     error.next("remove what has its name")
                 })?;
             }
-            put(&self.hidden.join(name), to).map_err(|e| cannot_write(to, &e))?;
+            put(&self.hidden.join(name), to, &target(to)?).map_err(|e| cannot_write(to, &e))?;
         }
         for path in stale.iter().map(|name| self.root.join(name)) {
             match fs::remove_file(&path) {
@@ -82,7 +83,7 @@ impl Batch {
 
 impl Drop for Batch {
     fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.hidden);
+        let _ = unfinished::complete(&self.hidden, || fs::remove_dir_all(&self.hidden));
     }
 }
 
@@ -123,9 +124,10 @@ fn list(folder: &Path, below: &Path, names: &mut Vec<PathBuf>) -> io::Result<()>
     Ok(())
 }
 
-/// Renames; where the place is on another disk, behind a link, copies.
-fn put(from: &Path, to: &Path) -> io::Result<()> {
-    match fs::rename(from, to) {
+/// Renames to the file `target` that `to` leads to; where that is on another disk, behind a link, copies.
+fn put(from: &Path, to: &Path, target: &Path) -> io::Result<()> {
+    replacing::adopt(target, from)?;
+    match fs::rename(from, target) {
         Err(e) if e.kind() == ErrorKind::CrossesDevices => copy(from, to),
         renamed => renamed,
     }

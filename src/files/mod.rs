@@ -1,35 +1,49 @@
 //! Writing results so that nobody ever sees half of one, and none takes the place of what it was made from.
 
 mod batch;
+mod claim;
 mod inputs;
+mod reading;
+mod replacing;
 mod temporary;
+mod unfinished;
 
 pub use batch::{Batch, MARKER, shown};
+pub use claim::{Claim, Refusal};
 pub use inputs::Inputs;
+pub use reading::{open, read};
 pub use temporary::remove_abandoned;
+pub use unfinished::abandon;
+
+use replacing::{like, target};
 
 use crate::error::{Error, Result};
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// Writes `bytes` to `path`, whose folder exists: first under a temporary name beside it, then renamed.
 ///
-/// A reader sees the old content or the new, and a failed write leaves the old in place. It does not
-/// wait for the disk: after a power cut the newest files may be missing, as with any ordinary write.
+/// A reader sees the old content or the new, and a failed write leaves the old in place. A symbolic link stays, and the
+/// file that it leads to is replaced; a file that is replaced keeps its permissions, and its owner and group where this
+/// process may give them. It does not wait for the disk: after a power cut the newest files may be missing, as with any
+/// ordinary write.
 pub fn write_atomically(path: impl AsRef<Path>, bytes: impl AsRef<[u8]>) -> Result<()> {
     let mut draft = Draft::create(path)?;
     draft.write(bytes.as_ref())?;
     draft.finish()
 }
 
-/// A file that is being written under a temporary name beside its own; dropped unfinished, it is removed.
+/// A file that is being written under a temporary name beside its own; dropped unfinished, it is removed. Of a symbolic
+/// link, that is beside the file that it leads to.
 ///
 /// The temporary name is `.NAME.K.taut.tmp`, with K from 0. It is locked as long as its program runs: the next draft of
 /// the same file removes those that a killed program left, and no others.
 #[derive(Debug)]
 pub struct Draft {
     path: PathBuf,
+    /// The file itself, where `path` is a link.
+    target: PathBuf,
     temporary: PathBuf,
     file: Option<File>,
 }
@@ -38,11 +52,12 @@ impl Draft {
     /// Begins a file that will be called `path`; its folder exists.
     pub fn create(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let name = path.file_name().ok_or_else(|| cannot_write(path, &ErrorKind::IsADirectory.into()))?;
-        let create = |candidate: &Path| OpenOptions::new().write(true).create_new(true).open(candidate);
-        let (temporary, file) = temporary::claim(|k| path.with_file_name(temporary::name(name, k)), create)
+        let target = target(path)?;
+        let name = target.file_name().ok_or_else(|| cannot_write(path, &ErrorKind::IsADirectory.into()))?;
+        let create = |candidate: &Path| like(&target, candidate);
+        let (temporary, file) = temporary::claim(|k| target.with_file_name(temporary::name(name, k)), create)
             .map_err(|e| cannot_write(path, &e))?;
-        Ok(Self { path: path.to_path_buf(), temporary, file: Some(file) })
+        Ok(Self { path: path.to_path_buf(), target, temporary, file: Some(file) })
     }
 
     /// The name that the file will have.
@@ -62,13 +77,16 @@ impl Draft {
         // Closed later, so that it is locked until it has its name; but some systems do not rename an open file.
         #[cfg(not(unix))]
         let file = drop(file);
-        let renamed = fs::rename(&self.temporary, &self.path);
+        let renamed = unfinished::complete(&self.temporary, || {
+            let renamed = fs::rename(&self.temporary, &self.target);
+            if renamed.is_err() {
+                let _ = fs::remove_file(&self.temporary);
+            }
+            renamed
+        });
         #[allow(clippy::drop_non_drop)]
         drop(file);
-        renamed.map_err(|e| {
-            let _ = fs::remove_file(&self.temporary);
-            cannot_write(&self.path, &e)
-        })
+        renamed.map_err(|e| cannot_write(&self.path, &e))
     }
 
     /// The open file, for writers that want to own one; [`Draft::finish`] is still to be called.
@@ -82,7 +100,7 @@ impl Draft {
 impl Drop for Draft {
     fn drop(&mut self) {
         if let Some(file) = self.file.take() {
-            let _ = fs::remove_file(&self.temporary);
+            let _ = unfinished::complete(&self.temporary, || fs::remove_file(&self.temporary));
             drop(file);
         }
     }
@@ -93,6 +111,7 @@ fn cannot_write(path: &Path, e: &std::io::Error) -> Error {
         ErrorKind::NotFound => "create the folder first, or name another",
         ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => "choose a folder that you may write to",
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "free some space, or choose another folder",
+        ErrorKind::FileTooLarge => "raise the limit on the size of files (`ulimit -f`), or write fewer rows",
         _ => "free the name or the space, or choose another folder",
     };
     Error::new(format!("cannot write this file: {e}")).in_file(shown(path)).next(next)

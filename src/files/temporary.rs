@@ -1,5 +1,6 @@
 //! Temporary files and folders: locked while their program runs, so that those of a killed one can be told and removed.
 
+use super::unfinished;
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind};
@@ -17,15 +18,21 @@ const LOOK: usize = 4;
 /// Most writers of one file at the same time.
 const MOST: usize = 1000;
 
-/// The k-th temporary name of a file: `.NAME.K.taut.tmp`, with a hash in place of a name that is too long for that.
+/// The k-th temporary name of a file: `.NAME.K.taut.tmp`.
 pub(super) fn name(of: &OsStr, k: usize) -> OsString {
+    hidden(of, &format!(".{k}{ENDING}"))
+}
+
+/// The hidden name of something that belongs to a file: `.NAME` and `ending`, with a hash in place of a name that is too
+/// long for that.
+pub(super) fn hidden(of: &OsStr, ending: &str) -> OsString {
     let mut name = OsString::from(".");
     if of.as_encoded_bytes().len() + ENDING.len() + 6 <= LONGEST {
         name.push(of);
     } else {
         name.push(format!("{:016x}", crate::chance::hash(of.as_encoded_bytes().iter().copied())));
     }
-    name.push(format!(".{k}{ENDING}"));
+    name.push(ending);
     name
 }
 
@@ -44,6 +51,7 @@ pub(super) fn claim(
         };
         match created {
             Ok(file) if keeps(&candidate, &file) => {
+                unfinished::add(&candidate);
                 (k + 1..=k + LOOK).for_each(|k| {
                     remove_abandoned(&name(k));
                 });
@@ -85,7 +93,7 @@ pub fn remove_abandoned(path: &Path) -> bool {
 
 /// Whether `path` is the name of this open file.
 #[cfg(unix)]
-fn stands_at(path: &Path, file: &File) -> bool {
+pub(super) fn stands_at(path: &Path, file: &File) -> bool {
     use std::os::unix::fs::MetadataExt;
     match (fs::symlink_metadata(path), file.metadata()) {
         (Ok(there), Ok(here)) => (there.dev(), there.ino()) == (here.dev(), here.ino()),
@@ -94,6 +102,6 @@ fn stands_at(path: &Path, file: &File) -> bool {
 }
 
 #[cfg(not(unix))]
-fn stands_at(path: &Path, _: &File) -> bool {
+pub(super) fn stands_at(path: &Path, _: &File) -> bool {
     path.exists()
 }

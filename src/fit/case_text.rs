@@ -1,7 +1,7 @@
 //! The case file with the estimates in it.
 
 use super::{Estimate, Fit};
-use crate::case::{Case, Given};
+use crate::case::{Case, Files, Given};
 use crate::error::{Error, Result};
 use crate::parameter::{self, Field, Parameter, named, values};
 use crate::stage::Stage;
@@ -9,7 +9,8 @@ use std::path::Path;
 
 impl Fit {
     /// The text of the case with the estimates in place of what they were, and a table of how well they are known.
-    /// Paths in it are those of `case`; `name` stands in messages.
+    /// Paths in it are those of `case`; `name` stands in messages. Read again, it is the machine of the fit: where
+    /// estimates are not determined, the one of all that meet the logs alike that is nearest to that of the case.
     ///
     /// Of what campaigns have for themselves, the values of the first; [`Fit::case_text_of`] has those of the others.
     pub fn case_text(&self, case: &Case, name: &Path) -> Result<String> {
@@ -23,17 +24,20 @@ impl Fit {
 
     fn text(&self, case: &Case, name: &Path, part: usize) -> Result<String> {
         let stage = self.parts.get(part).map_or(&self.stage, |(_, stage)| stage);
-        let known = |estimate: &&Estimate| estimate.is_determined() && estimate.part.is_none_or(|own| own == part);
-        let sets = || self.estimates.iter().filter(known).flat_map(|estimate| &estimate.sets);
+        let is_own = |estimate: &&Estimate| estimate.part.is_none_or(|own| own == part);
+        let sets = || self.estimates.iter().filter(is_own).flat_map(|estimate| &estimate.sets);
         let text = without_other_forms(&case.text, sets().map(|(key, _)| key.as_str()));
         let mut changes: Vec<String> = sets().flat_map(|(key, value)| changes_of(stage, case, key, *value)).collect();
         let read = |changes: &[String]| {
             let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-            Case::from_text_with(name, &text, &changes)
+            Case::from_text_for(name, &text, &changes, Files::Nothing)
         };
-        let same = |read: &Result<Case>| read.as_ref().is_ok_and(|read| alike(&read.stage, stage));
         let mut fitted = read(&changes);
-        if !same(&fitted) {
+        if let Some(change) = fitted.as_ref().ok().and_then(|fitted| damping_share(case, &fitted.stage, stage)) {
+            changes.push(change);
+            fitted = read(&changes);
+        }
+        if fitted.as_ref().map_or(true, |fitted| differs(&fitted.stage, stage).is_some()) {
             // The other direction, or the breakaway, stands in the text and went with what was fitted.
             let is_fitted = |body: &str| sets().any(|(key, _)| key.starts_with(&format!("{body}.friction.")));
             for (key, value) in values(stage) {
@@ -44,7 +48,14 @@ impl Fit {
             }
             fitted = read(&changes);
         }
-        let text = fitted?.text;
+        let fitted = fitted?;
+        // A file that is another machine than the fit has other errors than those that are told of it.
+        if let Some((key, is, read)) = differs(stage, &fitted.stage) {
+            return Err(Error::new(format!("the fit cannot be written: `{key}` would be read as {read}, and is {is}"))
+                .in_file(name)
+                .next("give the case file a value of its own for it, or leave it out of [fit]"));
+        }
+        let text = fitted.text;
         let mut document: toml_edit::DocumentMut =
             text.parse().map_err(|_| Error::new("this is not TOML").in_file(name))?;
         let mut table = toml_edit::Table::new();
@@ -58,7 +69,7 @@ impl Fit {
             let mut put = |key: &str, value: f64| {
                 row.insert(key, toml_edit::Value::from(value));
             };
-            put("value", if estimate.is_determined() { estimate.value } else { estimate.start });
+            put("value", estimate.value);
             match (estimate.error, estimate.interval) {
                 (Some(error), Some([low, high])) if error.is_finite() => {
                     put("error", error);
@@ -89,6 +100,20 @@ impl Fit {
         document.insert("uncertainty", toml_edit::Item::Table(table));
         Ok(document.to_string())
     }
+}
+
+/// The damping ratio or loss factor that gives the belt of `stage` its damping: it belongs to the slowest swing, which a
+/// fitted mass or stiffness changes. None where the text gives neither, or `read` has that damping.
+///
+/// c = 2 ζ k / ω₀
+fn damping_share(case: &Case, read: &Stage, stage: &Stage) -> Option<String> {
+    let (is, read) = (stage.belt.damping[0], read.belt.damping[0]);
+    let mut keys = ["belt.damping_ratio", "belt.loss_factor"].into_iter();
+    let (key, given) = keys.find_map(|key| match case.value(key) {
+        Ok(Given::Number(given)) => Some((key, given)),
+        _ => None,
+    })?;
+    (is != read && read > 0.0).then(|| format!("{key}={}", given * is / read))
 }
 
 /// The changes of the text with which `key` is `value`.
@@ -135,9 +160,12 @@ fn without_other_forms<'a>(text: &str, keys: impl Iterator<Item = &'a str>) -> S
     if changed { document.to_string() } else { text.to_string() }
 }
 
-/// Whether two machines are the same but for rounding in text.
-fn alike(a: &Stage, b: &Stage) -> bool {
+/// A number that two machines do not share but for rounding in text, and what it is in each; NaN where it is not there.
+fn differs(a: &Stage, b: &Stage) -> Option<(String, f64, f64)> {
     let near = |a: f64, b: f64| a == b || (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
     let (a, b) = (values(a), values(b));
-    a.len() == b.len() && a.iter().zip(&b).all(|((key, a), (other, b))| key == other && near(*a, *b))
+    let of = |all: &[(String, f64)], key: &str| all.iter().find(|(own, _)| own == key).map_or(f64::NAN, |own| own.1);
+    let mut keys = a.iter().chain(&b).map(|(key, _)| key);
+    let key = keys.find(|key| !near(of(&a, key), of(&b, key)))?;
+    Some((key.clone(), of(&a, key), of(&b, key)))
 }

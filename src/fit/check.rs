@@ -3,7 +3,7 @@
 use super::identify::{Group, Identifiability};
 use super::proposals::{Proposal, proposals};
 use super::regression::{Balance, regression};
-use super::{Fit, Stop, search, told};
+use super::{Fit, Stop, search, told, trials};
 use crate::case::{Case, Plan};
 use crate::error::Result;
 use crate::log::Survey;
@@ -64,7 +64,7 @@ pub fn check_watched(
     let fit = told(case, plan, &found, judged.as_ref());
     Ok(Check {
         balance,
-        logs: case.experiments.iter().filter_map(|e| Some(Survey::new(e.log.as_ref()?, &case.stage))).collect(),
+        logs: trials::surveys(case, plan, &found),
         identifiability: judged.map(|judged| judged.identifiability),
         choices: fit.choices.clone(),
         noise_words,

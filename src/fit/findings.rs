@@ -6,9 +6,10 @@ use super::problem::Problem;
 use super::regression::{Balance, balance, smoothed};
 use super::run::is_position;
 use super::search::Searched;
+use super::trials::{self, is_borne_out};
 use super::{Fit, Wave};
 use crate::case::{Case, Plan, Scope};
-use crate::log::{Note, Severity, Survey};
+use crate::log::{Note, Remedy, Severity};
 use crate::number::engineering;
 use crate::solve::Bench;
 use crate::stage::AmplifierMode;
@@ -25,9 +26,11 @@ const MOTOR: f64 = 1.5;
 /// Correlation of what the model does and what was seen, below which it goes the other way.
 const OPPOSITE: f64 = -0.5;
 
-/// Most rows by which an input may be late and be found so, and the fewest that are told.
+/// Most rows by which an input may be late and be found so, the fewest that are looked into, and the part of the torque
+/// that is unexplained, relative to that without a delay, from which on they are.
 const LATEST: usize = 40;
-const LATE: usize = 3;
+const LATE: usize = 2;
+const SUSPECT: f64 = 0.95;
 
 /// Share of the logged input that the controller of a case has to make of a log, %.
 const REPRODUCED: f64 = 90.0;
@@ -73,9 +76,9 @@ impl std::fmt::Display for Finding {
 
 /// All there is to say, warnings first.
 pub(super) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit) -> Vec<Finding> {
-    let mut all = of_logs(case, plan, &found.problem);
+    let mut all = of_logs(case, plan, found);
     all.extend(of_controller(case, plan));
-    all.extend(of_delay(plan, &found.problem));
+    all.extend(of_delay(case, plan, found));
     all.extend(of_search(fit));
     all.extend(of_motor(case, fit));
     all.extend(of_residuals(fit));
@@ -87,31 +90,22 @@ fn finding(grade: Grade, code: &'static str, text: String) -> Finding {
     Finding { grade, code, log: None, text }
 }
 
-/// The findings of the survey of each log.
-fn of_logs(case: &Case, plan: &Plan, problem: &Problem) -> Vec<Finding> {
+/// The findings of the survey of each log, as far as simulation bears them out.
+fn of_logs(case: &Case, plan: &Plan, found: &Searched) -> Vec<Finding> {
     let mut all = Vec::new();
-    for experiment in &case.experiments {
-        let Some(log) = &experiment.log else { continue };
-        let opposite = opposite(problem, &experiment.name);
-        for note in Survey::new(log, &case.stage).notes {
-            if note.severity == Severity::Fact {
-                continue;
-            }
-            let mut grade = grade(&note, case, plan);
-            // Above a resonance a cart goes against its motor, and so does the model.
-            if note.code == "sign" && note.text.contains("against its input") && opposite == Some(false) {
-                grade = Grade::Note;
-            }
+    for survey in trials::surveys(case, plan, found) {
+        let name = &survey.log;
+        for note in survey.notes.iter().filter(|note| note.severity != Severity::Fact) {
+            let grade = grade(note, case, plan);
             let column = note.column.map(|column| format!("{column}: ")).unwrap_or_default();
             let text = format!("{column}{}", note.text);
-            all.push(Finding { grade, code: note.code, log: Some(experiment.name.clone()), text });
+            all.push(Finding { grade, code: note.code, log: Some(name.clone()), text });
         }
-        let told = all.iter().any(|one: &Finding| one.code == "sign" && one.log.as_ref() == Some(&experiment.name));
-        if opposite == Some(true) && !told {
+        let told = all.iter().any(|one: &Finding| one.code == "sign" && one.log.as_ref() == Some(name));
+        if !told && is_opposite(&found.problem, name) && is_borne_out(case, plan, found, name, &Remedy::Reverse) {
             let text = "it moves against what the model does with the values of the case: swapped wires, or a sign; \
                         say scale = { input = -1 }, or -1 for the outputs";
-            let log = Some(experiment.name.clone());
-            all.push(Finding { grade: Grade::Warning, code: "sign", log, text: text.into() });
+            all.push(Finding { grade: Grade::Warning, code: "sign", log: Some(name.clone()), text: text.into() });
         }
     }
     all
@@ -126,8 +120,8 @@ fn grade(note: &Note, case: &Case, plan: &Plan) -> Grade {
     }
 }
 
-/// Whether a log moves against what the model does at the start; none where neither can be said.
-fn opposite(problem: &Problem, name: &str) -> Option<bool> {
+/// Whether a log moves against what the model does at the start.
+fn is_opposite(problem: &Problem, name: &str) -> bool {
     let (x, mut worst) = (problem.start(), None);
     for (index, run) in problem.runs.iter().enumerate().filter(|(_, run)| run.name == name) {
         let Some(seen) = run.seen.iter().find(|seen| is_position(seen.quantity) && !seen.absolute) else { continue };
@@ -149,11 +143,7 @@ fn opposite(problem: &Problem, name: &str) -> Option<bool> {
             worst = Some(worst.map_or(correlation, |worst: f64| worst.min(correlation)));
         }
     }
-    match worst {
-        Some(correlation) if correlation < OPPOSITE => Some(true),
-        Some(correlation) if correlation > -OPPOSITE => Some(false),
-        _ => None,
-    }
+    worst.is_some_and(|correlation| correlation < OPPOSITE)
 }
 
 /// Whether the controller of the case is the one that made the logs.
@@ -175,25 +165,30 @@ fn of_controller(case: &Case, plan: &Plan) -> Vec<Finding> {
     told.collect()
 }
 
-/// Whether the logs answer their inputs late.
-fn of_delay(plan: &Plan, problem: &Problem) -> Option<Finding> {
+/// Whether the logs answer their inputs late: a regression that suspects it, and a fit that finds it.
+fn of_delay(case: &Case, plan: &Plan, found: &Searched) -> Option<Finding> {
     if plan.nuisance.delay != Scope::Off || plan.closed_loop {
         return None;
     }
-    let logs = smoothed(problem);
+    let logs = smoothed(&found.problem);
     let left: Vec<f64> = (0..=LATEST).map_while(|late| Some(balance(&logs, late)?.unexplained)).collect();
     let late = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]))?;
-    if late < LATE || left[late] > 0.75 * left[0] || left[0] - left[late] < 0.03 {
+    if late < LATE || left[late] > SUSPECT * left[0] {
         return None;
     }
-    let time = plain(late as f64 * problem.runs[0].interval(), "s");
+    let late = trials::late(case, plan, found, late as f64 * found.problem.runs[0].interval())?;
     let text = format!(
-        "the logs answer their input about {time} late: with that, {:.0} % of the torque is unexplained instead of {:.0} %; \
+        "the logs answer their input about {} late: a fit with that delay leaves errors of {:.0} % of those without; \
          say nuisance = {{ delay = \"shared\" }} in [fit]",
-        100.0 * left[late],
-        100.0 * left[0]
+        rounded_time(late.delay),
+        100.0 * late.left
     );
     Some(finding(Grade::Warning, "delay", text))
+}
+
+/// A time in two digits.
+fn rounded_time(value: f64) -> String {
+    engineering(value, "s", 2).replace('\u{a0}', " ")
 }
 
 /// How the search ended.

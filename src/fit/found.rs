@@ -8,7 +8,7 @@ use crate::stage::Stage;
 /// The result of a fit.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// The machine with the estimates; what is not determined is what the case says.
+    /// The machine with the estimates. Of the machines that meet the logs alike, it is the nearest to that of the case.
     pub stage: Stage,
     /// The machine of each campaign, or log, that has parameters for itself: `stage` is the first. Empty where nothing
     /// is separate.

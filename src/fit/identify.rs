@@ -45,8 +45,9 @@ pub struct Identifiability {
     pub error: Vec<f64>,
     /// Groups of parameters of which only fewer combinations are determined.
     pub groups: Vec<Group>,
-    /// One parameter for each direction that is not determined: the one that moves most along it.
-    pub leads: Vec<usize>,
+    /// The directions that are not determined, a column each: orthonormal, in relative changes of what concerns all
+    /// runs.
+    pub lost: DMatrix<f64>,
 }
 
 /// Parameters that the logs do not tell apart.
@@ -107,7 +108,8 @@ impl Identifiability {
             })
             .collect();
         let singular = singular.iter().map(|s| s / deviation).collect();
-        let mut result = Self { names, sensitivity, singular, error, groups: Vec::new(), leads: leads(v, &lost) };
+        let hidden = v.select_columns(&lost);
+        let mut result = Self { names, sensitivity, singular, error, groups: Vec::new(), lost: hidden };
         result.groups = result.grouped(problem, directions, (&lost, off), x, of);
         result
     }
@@ -255,8 +257,7 @@ impl Identifiability {
             _ => format!("fix {spare}: leave {spare} of {} out of [fit]", listed(&names)),
         });
         if group.determined == 1 && names.len() > 1 {
-            let quoted: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
-            choices.push(format!("tie them: tied = [[{}]]", quoted.join(", ")));
+            choices.extend(tie(problem, &group.members));
             let members = || group.members.iter().map(|&j| problem.parameters.get(j));
             for sum in [Sum::Viscous, Sum::Coulomb, Sum::Inertia] {
                 let fits = |free: Option<&Free>| {
@@ -269,6 +270,21 @@ impl Identifiability {
         }
         choices
     }
+}
+
+/// The tie of these parameters; none where they cannot be tied: values of different units, sums, and what campaigns have
+/// for themselves.
+fn tie(problem: &Problem, members: &[usize]) -> Option<String> {
+    let mut keys = Vec::new();
+    let unit = problem.parameters.get(*members.first()?)?.unit;
+    for &j in members {
+        let free = problem.parameters.get(j)?;
+        if free.unit != unit || free.name.starts_with("total.") || problem.of[j].is_some() {
+            return None;
+        }
+        keys.extend(free.name.split(" = ").map(|key| format!("\"{key}\"")));
+    }
+    Some(format!("tie them: tied = [[{}]]", keys.join(", ")))
 }
 
 /// The directions in which the parameters move, by how much they show.
@@ -335,36 +351,6 @@ impl Directions {
         let strongest = own.iter().map(|&i| self.singular[i]).fold(0.0, f64::max);
         (!own.is_empty() && own.iter().all(is_told)).then(|| strongest / self.rows.sqrt())
     }
-}
-
-/// For each of the lost directions a parameter of its own that moves much along it: by elimination with the greatest
-/// pivots.
-fn leads(v: &DMatrix<f64>, lost: &[usize]) -> Vec<usize> {
-    let mut hidden = v.select_columns(lost);
-    let mut leads = Vec::new();
-    for column in 0..hidden.ncols() {
-        let size = |j: usize| hidden.view((j, column), (1, hidden.ncols() - column)).norm();
-        let Some(lead) = (0..hidden.nrows())
-            .filter(|j| !leads.contains(j))
-            .max_by(|&a, &b| size(a).total_cmp(&size(b)))
-            .filter(|&j| size(j) > 1e-6)
-        else {
-            break;
-        };
-        leads.push(lead);
-        // Turn the rest so that the lead moves along this column alone.
-        let best =
-            (column..hidden.ncols()).max_by(|&a, &b| hidden[(lead, a)].abs().total_cmp(&hidden[(lead, b)].abs()));
-        hidden.swap_columns(column, best.unwrap_or(column));
-        for other in column + 1..hidden.ncols() {
-            let factor = hidden[(lead, other)] / hidden[(lead, column)];
-            for j in 0..hidden.nrows() {
-                let away = factor * hidden[(j, column)];
-                hidden[(j, other)] -= away;
-            }
-        }
-    }
-    leads
 }
 
 /// What a change of a value has to come to, so that a machine shows it, and how far the values range: in their weights.

@@ -22,6 +22,7 @@ mod held_out;
 mod identify;
 pub mod least_squares;
 mod marginal;
+mod nearest;
 mod noise;
 mod other_laws;
 mod posterior;
@@ -36,6 +37,7 @@ mod scores;
 mod search;
 mod sensitivity;
 mod sub_records;
+mod trials;
 mod triangle;
 mod uncertainty;
 

@@ -98,6 +98,7 @@ impl Scale {
 impl<'a> Problem<'a> {
     /// The problem that `plan` poses with the logs of `case`.
     pub fn new(case: &Case, plan: &Plan) -> Result<Self> {
+        case.complete()?;
         let stage = case.stage.clone();
         let (parameters, of, parts) = separated(case, plan, parameters(&stage, plan, &[])?)?;
         let mut runs = Vec::new();
@@ -161,6 +162,11 @@ impl<'a> Problem<'a> {
     pub fn stopped_by(mut self, stop: Option<Stop<'a>>) -> Self {
         self.stop = stop;
         self
+    }
+
+    /// What is asked.
+    pub(super) fn stop(&self) -> Option<Stop<'a>> {
+        self.stop
     }
 
     /// Whether it is asked to end.
@@ -381,6 +387,17 @@ impl<'a> Problem<'a> {
         let mut x: Vec<f64> =
             self.parameters.iter().zip(&self.units).map(|(parameter, unit)| unit.variable(parameter.start)).collect();
         x.resize(self.variables(), 0.0);
+        x
+    }
+
+    /// The same with the parameters of a machine, as far as it has them within their bounds.
+    pub(super) fn point_of(&self, stage: &Stage) -> Vec<f64> {
+        let mut x = self.start();
+        let bounds = self.bounds();
+        for (j, parameter) in self.parameters.iter().enumerate() {
+            let own = parameter.value_in(stage).map(|value| self.variable(j, value));
+            x[j] = own.filter(|own| own.is_finite()).map_or(x[j], |own| own.clamp(bounds.low[j], bounds.high[j]));
+        }
         x
     }
 

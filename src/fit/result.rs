@@ -91,13 +91,6 @@ pub(super) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         .map(|i| (0..n).map(|j| covariance.and_then(|c| c.correlation(i, j)).unwrap_or(f64::NAN)).collect())
         .collect();
     let stages = problem.stages(&best.x);
-    // What is not determined stays what the case says.
-    let start = problem.start();
-    let undetermined = |j: usize| identifiability.as_ref().is_some_and(|found| found.error[j].is_infinite());
-    let kept: Vec<f64> = (0..best.x.len())
-        .map(|j| if j < problem.globals() && undetermined(j) { start[j] } else { best.x[j] })
-        .collect();
-    let written = problem.stages(&kept);
     let mut logs = Vec::new();
     for (index, run) in problem.runs.iter().enumerate() {
         let extras = problem.extras_of(index, &best.x);
@@ -115,8 +108,8 @@ pub(super) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
     let known = known(found);
     logs.extend(problem.held_out.iter().map(|run| met(run, &stages[run.part], &known, 1.0)));
     Fit {
-        parts: problem.parts.iter().cloned().zip(written.iter().cloned()).collect(),
-        stage: written[0].clone(),
+        parts: problem.parts.iter().cloned().zip(stages.iter().cloned()).collect(),
+        stage: stages[0].clone(),
         estimates,
         correlation,
         noise: noise.clone(),

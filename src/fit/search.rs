@@ -1,6 +1,7 @@
 //! The search: starts, weights from what the residuals are, and what is done where a direction is not determined.
 
-use super::least_squares::{Differences, Ending, Minimum, Options, Residuals, minimise};
+use super::least_squares::{Ending, Minimum, Options, Residuals, minimise};
+use super::nearest::nearest;
 use super::problem::{Problem, ROUNDING, Stop, extent};
 use super::regression::regression;
 use super::uncertainty::Judged;
@@ -10,6 +11,7 @@ use crate::chance;
 use crate::error::{Error, Result};
 use crate::log::Quantity;
 use crate::solve::Flow;
+use crate::stage::Stage;
 use nalgebra::DMatrix;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
@@ -58,13 +60,25 @@ pub(super) fn search<'a>(
     stop: Option<Stop<'a>>,
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
 ) -> Result<Searched<'a>> {
+    search_near(case, &case.stage, plan, stop, watch)
+}
+
+/// The same; what is not determined comes as near to the values of `given` as the logs allow.
+pub(super) fn search_near<'a>(
+    case: &Case,
+    given: &Stage,
+    plan: &Plan,
+    stop: Option<Stop<'a>>,
+    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
+) -> Result<Searched<'a>> {
     let whole = Options::default();
     let mut found = search_as_far(case, plan, stop, &whole, watch)?;
     let Searched { problem, best, work, seen, .. } = &mut found;
     let huber = if plan.huber { HUBER } else { f64::INFINITY };
     let options = Options { huber, rounding: problem.rounding(), ..whole };
     if best.ending != Ending::Interrupted {
-        *seen = hold_undetermined(problem, best, &options, watch, work);
+        let given = problem.point_of(given);
+        *seen = nearest(problem, best, &given, &options, watch, work);
     }
     let set = problem.as_set(&best.x);
     if set != best.x {
@@ -177,49 +191,6 @@ fn as_it_is(problem: &mut Problem) -> Minimum {
         iterations: 0,
         evaluations: 1,
     }
-}
-
-/// Where a direction is not determined, the search ended anywhere along it: it is repeated with the parameter that
-/// moves most along it held where the case has it, and the point that this leads to is as good. The information of the
-/// logs where there is no such direction.
-fn hold_undetermined(
-    problem: &mut Problem,
-    best: &mut Minimum,
-    options: &Options,
-    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
-    work: &mut Work,
-) -> Option<Judged> {
-    let none = vec![false; best.x.len()];
-    let judged = Judged::new(problem, &best.residuals, &best.jacobian, &best.x, &none)?;
-    let leads = judged.identifiability.leads.clone();
-    if leads.is_empty() {
-        return Some(judged);
-    }
-    let start = problem.start();
-    let (open, mut bounds) = (problem.bounds(), problem.bounds());
-    let mut x = best.x.clone();
-    for &j in &leads {
-        (bounds.low[j], bounds.high[j]) = (start[j], start[j]);
-        x[j] = start[j];
-    }
-    // Where the others begin does not matter, as long as the held ones are far from where they were.
-    let from = [x, start];
-    for from in from {
-        let found = minimise(problem, &from, &bounds, options, watch);
-        work.iterations += found.iterations;
-        work.evaluations += found.evaluations;
-        if matches!(found.ending, Ending::Failed | Ending::Interrupted) || found.cost > best.cost * 1.01 + 1e-300 {
-            continue;
-        }
-        let whole = problem.jacobian(&found.x, &found.residuals, &open, &Differences::Central);
-        if let Some(jacobian) = whole {
-            let mut at_bound = found.at_bound.clone();
-            leads.iter().for_each(|&j| at_bound[j] = false);
-            *best = Minimum { jacobian, at_bound, ..found };
-        }
-        break;
-    }
-    None
 }
 
 /// The first weight of an output that counts.

@@ -3,6 +3,7 @@
 //! It says what a reader refuses by its form: keys that are none, a text for a table. What depends on other values (a
 //! breakaway below the Coulomb friction) only reading says.
 
+use crate::design::FeedForwardModel;
 use crate::log::PRESETS;
 use crate::parameter::{self, Fallback, Parameter};
 use crate::stage::{BELTS, Quantity};
@@ -280,8 +281,10 @@ fn log() -> Value {
 
 fn controller() -> Value {
     let rule = json!({ "type": "number" });
-    let feed_forward =
-        [("model", words(["none", "rigid", "elastic"])), ("compensate_stretch", json!({ "type": "boolean" }))];
+    let feed_forward = [
+        ("model", words(FeedForwardModel::ALL.map(FeedForwardModel::word))),
+        ("compensate_stretch", json!({ "type": "boolean" })),
+    ];
     table(
         "controller",
         &[

@@ -1,6 +1,8 @@
 //! A simulation of a gantry: `taut simulate --json`, `summary.json`.
 
-use super::simulation::{CostTold, CountTold, EndingTold, Event, MOST_EVENTS, PeakTold, SolverUsed, error_basis};
+use super::simulation::{
+    CostTold, CountTold, EndingTold, Event, MOST_EVENTS, PeakTold, SolverUsed, TieTold, error_basis, is_determined,
+};
 use crate::case::{GantryCase, GantryExperiment};
 use crate::mechanism::{DRIVES, Mechanism};
 use crate::metrics::{GantryMetrics, Peak};
@@ -57,6 +59,8 @@ struct ExperimentFigures {
     /// By how much positions at the belt may be off.
     position_error_m: Option<f64>,
     position_error_basis: Option<&'static str>,
+    is_determined: Option<bool>,
+    decided_within_rounding: Vec<TieTold>,
     events: Vec<Event>,
     events_not_listed: usize,
     cost: CostTold,
@@ -140,6 +144,8 @@ impl ExperimentFigures {
             metrics: MetricsTold::of(run.metrics, routing),
             position_error_m: outcome.error.map(|error| error.value),
             position_error_basis: error_basis(outcome, solver),
+            is_determined: is_determined(outcome),
+            decided_within_rounding: TieTold::of(outcome),
             events: outcome.events.iter().take(MOST_EVENTS).map(|event| Event::on(mechanism, event)).collect(),
             events_not_listed: outcome.events.len().saturating_sub(MOST_EVENTS),
             cost: CostTold::of(outcome),

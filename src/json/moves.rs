@@ -3,6 +3,7 @@
 use super::{ending, peak};
 use crate::case::Move;
 use crate::control::drives::{DriveGain, drive_gains};
+use crate::control::feasible::Shortfall;
 use crate::control::{Deviation, Loop, MoveRun, Worst};
 use crate::stage::Stage;
 use crate::tune::trouble::Trouble;
@@ -19,6 +20,8 @@ pub struct Moved<'a> {
     pub worst: Option<&'a Worst>,
     /// The trouble of its loop, where it has one.
     pub trouble: Option<&'a Trouble>,
+    /// The limits that its reference exceeds.
+    pub shortfalls: &'a [Shortfall],
     /// Its files.
     pub files: &'a [String],
 }
@@ -41,6 +44,14 @@ pub fn moves(title: &str, structure: &str, timing: &Loop, stage: &Stage, moved: 
 
 fn deviation(deviation: Deviation) -> Value {
     json!({ "peak_m": deviation.peak.value, "time_s": deviation.peak.time, "rms_m": deviation.rms, "last_m": deviation.last })
+}
+
+/// A limit that a reference exceeds.
+pub(super) fn shortfall(short: &Shortfall) -> Value {
+    json!({
+        "limit": short.limit, "time_s": short.time, "position_m": short.position, "needed": short.needed,
+        "allowed": short.allowed, "unit": short.unit, "words": short.words,
+    })
 }
 
 /// One of them.
@@ -75,6 +86,7 @@ pub fn motion(done: &Moved) -> Value {
         "trouble": done.trouble.map(|trouble| json!({
             "kind": trouble.kind.word(), "frequency_Hz": trouble.frequency, "cause": trouble.cause, "words": trouble.words,
         })),
+        "shortfalls": done.shortfalls.iter().map(shortfall).collect::<Vec<_>>(),
     });
     if let (Some(worst), Value::Object(object)) = (done.worst, &mut value) {
         object.insert(

@@ -86,6 +86,9 @@ struct ExperimentFigures {
     /// By how much r φ₁, x and r φ₃ may be off.
     position_error_m: Option<f64>,
     position_error_basis: Option<&'static str>,
+    /// Whether numbers of 64 bits determine the motion to a thousandth of itself.
+    is_determined: Option<bool>,
+    decided_within_rounding: Vec<TieTold>,
     events: Vec<Event>,
     events_not_listed: usize,
     cost: CostTold,
@@ -272,6 +275,8 @@ impl ExperimentFigures {
             log: run.log.map(beside),
             position_error_m: run.outcome.error.map(|error| error.value),
             position_error_basis: error_basis(outcome, solver),
+            is_determined: is_determined(outcome),
+            decided_within_rounding: TieTold::of(outcome),
             events: outcome.events.iter().take(MOST_EVENTS).map(Event::of).collect(),
             events_not_listed: outcome.events.len().saturating_sub(MOST_EVENTS),
             cost: CostTold::of(outcome),
@@ -285,6 +290,24 @@ impl EndingTold {
         let (word, time_s) = super::ending(outcome.ending, end);
         Self { word, time_s }
     }
+}
+
+/// A decision within rounding.
+#[derive(Debug, Serialize)]
+pub(super) struct TieTold {
+    time_s: f64,
+    part: &'static str,
+}
+
+impl TieTold {
+    pub(super) fn of(outcome: &Outcome) -> Vec<Self> {
+        outcome.ties.iter().map(|tie| Self { time_s: tie.time, part: tie.part.key() }).collect()
+    }
+}
+
+/// Whether errors leave the motion determined, where they are known.
+pub(super) fn is_determined(outcome: &Outcome) -> Option<bool> {
+    outcome.error.map(|error| !error.hides_motion())
 }
 
 /// The basis of the error of a run's positions.

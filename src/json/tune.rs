@@ -1,9 +1,11 @@
 //! A tuned controller: `taut tune --json`, `tune.json`.
 
+use super::moves::shortfall;
 use super::number;
 use crate::case::{Case, Move, Tuning};
+use crate::control::feasible::of_moves;
 use crate::design::Design;
-use crate::tune::{AtWorst, Choice, Least, Margins, MoveVerdict, Tuned, Verdict, gains};
+use crate::tune::{Ahead, AtWorst, Choice, Least, Margins, MoveVerdict, Tuned, Unknown, Verdict, gains};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 
@@ -11,9 +13,12 @@ use std::f64::consts::PI;
 pub fn tuned(case: &Case, tuning: &Tuning, tuned: &Tuned) -> Value {
     let change = |(gain, after): (crate::tune::Gain, f64)| json!({ "key": gain.key, "unit": gain.unit, "before": gain.value, "after": after });
     let filters = tuned.filters().map(|[before, after]| json!({ "before": before, "after": after }));
-    let forced = tuned
-        .forced
-        .map(|forced| json!({ "limit": forced.limit.word(), "mode_Hz": number(forced.mode), "place_m": forced.place }));
+    let forced = tuned.forced.map(|forced| {
+        json!({
+            "limit": forced.limit.word(), "standing": forced.standing.word(), "break": forced.at.word(),
+            "mode_Hz": number(forced.mode), "place_m": forced.place,
+        })
+    });
     json!({
         "schema": super::identity("tune"),
         "title": case.title,
@@ -21,6 +26,8 @@ pub fn tuned(case: &Case, tuning: &Tuning, tuned: &Tuned) -> Value {
         "structure": tuned.after.design.structure.name(),
         "verdict": tuned.judgement.word(),
         "forced_by": forced,
+        "advice": tuned.advice,
+        "feed_forward": tuned.ahead.as_ref().map(feed_forward),
         "least_worse": tuned.least.as_ref().map(|least| least_worse(tuned, least)),
         "cost": tuning.cost.map_or("none", |cost| cost.word()),
         "limits": { "sensitivity": tuning.sensitivity, "complementary": tuning.complementary },
@@ -28,7 +35,11 @@ pub fn tuned(case: &Case, tuning: &Tuning, tuned: &Tuned) -> Value {
             "machines": tuned.family.machines.len(),
             "corners": tuned.family.corners,
             "left_out": tuned.family.left_out(tuned.family.machines.len()),
+            "varies": tuned.family.unknowns.iter().map(varies).collect::<Vec<_>>(),
         },
+        "shortfalls": of_moves(case).iter().map(|(name, limits)| {
+            json!({ "move": name, "limits": limits.iter().map(shortfall).collect::<Vec<_>>() })
+        }).collect::<Vec<_>>(),
         "standard_moves": case.moves.is_empty(),
         "undamped_mode_Hz": tuned.undamped,
         "began_with_Hz": tuned.placed,
@@ -44,15 +55,45 @@ pub fn tuned(case: &Case, tuning: &Tuning, tuned: &Tuned) -> Value {
     })
 }
 
+/// Feed-forward that pays; its moves without it are those of `after`.
+fn feed_forward(ahead: &Ahead) -> Value {
+    let motion = |one: &MoveVerdict| {
+        json!({
+            "name": one.name, "cart_error_m": number(one.cart.peak.value.abs()), "worst_m": number(one.worst.0),
+            "settled": one.settled.0,
+        })
+    };
+    json!({
+        "setting": ahead.text(),
+        "objective": number(ahead.verdict.objective.exp()),
+        "moves": ahead.verdict.moves.iter().map(motion).collect::<Vec<_>>(),
+    })
+}
+
+/// A parameter that is not known exactly; a factor without a unit where it was never fitted.
+fn varies(unknown: &Unknown) -> Value {
+    json!({
+        "name": unknown.name,
+        "low": number(unknown.low),
+        "high": number(unknown.high),
+        "unit": unknown.unit(),
+        "fitted": unknown.is_fitted,
+    })
+}
+
 fn margins(m: &Margins) -> Value {
     json!({
         "stable": m.stable,
         "sensitivity": number(m.sensitivity),
         "sensitivity_at_Hz": number(m.at / (2.0 * PI)),
+        "sensitivity_break": m.breaks.sensitivity.word(),
         "complementary": number(m.complementary),
         "complementary_at_Hz": number(m.complementary_at / (2.0 * PI)),
+        "complementary_break": m.breaks.complementary.word(),
         "gain_margin": number(m.gain),
+        "gain_margin_break": m.breaks.gain.word(),
         "phase_margin_rad": number(m.phase),
+        "phase_margin_break": m.breaks.phase.word(),
         "crossover_Hz": number(m.crossover / (2.0 * PI)),
         "bandwidth_Hz": number(m.bandwidth / (2.0 * PI)),
         "tracking_bandwidth_Hz": number(m.tracking / (2.0 * PI)),
@@ -110,7 +151,8 @@ fn verdict(tuned: &Tuned, verdict: &Verdict) -> Value {
         "unstable": { "axes": verdict.unstable.0, "of": verdict.unstable.1 },
         "moves": verdict.moves.iter().map(motion).collect::<Vec<_>>(),
         "hunting": verdict.hunt.as_ref().map(|hunt| json!({
-            "amplitude_m": hunt.amplitude, "period_s": hunt.period, "irregular": hunt.irregular, "needs": hunt.needs, "watched_s": hunt.watched,
+            "amplitude_m": number(hunt.amplitude), "period_s": number(hunt.period),
+            "slips_every_s": number(hunt.slips_every), "irregular": hunt.irregular, "needs": hunt.needs, "watched_s": hunt.watched,
         })),
     })
 }
@@ -124,7 +166,7 @@ fn values(tuned: &Tuned, design: &Design) -> Vec<Value> {
 fn least_worse(tuned: &Tuned, least: &Least) -> Value {
     let worse = &least.worse;
     json!({
-        "move": tuned.moves[worse.motion].name,
+        "move": worse.motion.map(|motion| &tuned.moves[motion].name),
         "figure": worse.figure.word(),
         "before": number(worse.before),
         "after": number(worse.after),

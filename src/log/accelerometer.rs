@@ -1,5 +1,6 @@
 //! Files of an accelerometer, in the forms that Klipper writes: spectra and raw samples.
 
+use super::formats;
 use super::lines::{Lines, open};
 use super::sheet::{ColumnId, Request, Sheet};
 use crate::error::{Error, Place, Result};
@@ -114,7 +115,7 @@ impl Heading {
 
 fn sheet(file: &Path, names: &[&str]) -> Result<Sheet> {
     let ids: Vec<ColumnId> = names.iter().map(|name| ColumnId::from(*name)).collect();
-    Sheet::read(file, &Request::complete(&ids))
+    formats::read(file, &Request::complete(&ids))
 }
 
 fn read_spectrum(file: &Path, per_frequency: bool) -> Result<Accelerometer> {

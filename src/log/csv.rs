@@ -5,8 +5,10 @@
 //! memory, a line not longer than 1 MiB.
 
 use super::lines::{Fields, Lines, open};
+use super::locator::Locator;
 use super::sheet::{ColumnId, Dialect, Request, Sheet, check_numbers};
-use crate::error::{Error, Place, Result};
+use super::words::{count, near, shown};
+use crate::error::{Error, Result};
 use std::io::BufRead;
 use std::path::Path;
 
@@ -133,32 +135,6 @@ pub(super) fn names(file: &Path) -> Result<Vec<ColumnId>> {
     }
     let error = Error::new("no line of this file has numbers in columns").in_file(file);
     Err(error.allowed("a row that names the columns, then rows of numbers").next("check that the recording was saved"))
-}
-
-/// The place of a field in a file.
-#[derive(Debug, Clone)]
-pub(super) struct Locator {
-    separator: u8,
-    /// The line that names the columns, if one does.
-    heading: Option<usize>,
-    wanted: Vec<usize>,
-}
-
-impl Locator {
-    /// The field of the i-th wanted column in a line.
-    pub fn place(&self, file: &Path, line: usize, i: usize) -> Option<Place> {
-        let mut lines = Lines::new(file, open(file).ok()?);
-        while lines.number < line {
-            lines.advance().ok().filter(|there| *there)?;
-        }
-        let range = Fields::new(self.separator).extent(&lines.text, self.wanted[i]);
-        Some(lines.place(range))
-    }
-
-    /// The name of the i-th wanted column.
-    pub fn heading(&self, file: &Path, i: usize) -> Option<Place> {
-        self.place(file, self.heading?, i)
-    }
 }
 
 /// One row, and what is needed to complain about it.
@@ -584,26 +560,6 @@ impl Candidate {
     fn is_numbers(&self) -> bool {
         self.names.iter().all(|name| numeric(name) || is_missing(name))
     }
-}
-
-/// The one of `names` that differs from `name` in case only, or in at most one letter of three.
-pub(super) fn near<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    let distance = |n: &str| strsim::damerau_levenshtein(&n.to_lowercase(), &name.to_lowercase());
-    names
-        .map(|n| (distance(n), n))
-        .min_by_key(|(d, _)| *d)
-        .filter(|(d, _)| 3 * d <= name.chars().count())
-        .map(|(_, n)| n)
-}
-
-/// `text` between backquotes, at most 40 characters of it.
-pub(super) fn shown(text: &str) -> String {
-    let cut: String = text.chars().take(40).map(|c| if c.is_control() { '·' } else { c }).collect();
-    if cut.len() < text.len() && text.chars().count() > 40 { format!("`{cut}…`") } else { format!("`{cut}`") }
-}
-
-pub(super) fn count(n: usize, what: &str) -> String {
-    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
 }
 
 #[cfg(test)]

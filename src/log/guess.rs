@@ -4,8 +4,8 @@
 
 use super::mapping::suspected;
 use super::presets::{In, PRESETS, Preset};
-use super::sheet::{ColumnId, Request, Sheet};
-use super::{Quantity, csv, lines, matlab};
+use super::sheet::{ColumnId, Request};
+use super::{Quantity, formats};
 use crate::error::{Error, Result};
 use crate::quantity::conversion;
 use std::path::Path;
@@ -69,7 +69,7 @@ const CLOCKS: &[&str] = &["time", "timestamp", "t", "clock", "seconds", "millis"
 
 /// Reads all columns of a file, and guesses what they are.
 pub fn look(file: &Path) -> Result<Looked> {
-    let mut ids = names(file)?;
+    let mut ids = formats::names(file)?;
     ids.truncate(MOST);
     if ids.is_empty() {
         return Err(Error::new("this file has no columns of numbers").in_file(file));
@@ -93,26 +93,10 @@ pub fn look(file: &Path) -> Result<Looked> {
     Ok(Looked { columns, guess })
 }
 
-fn names(file: &Path) -> Result<Vec<ColumnId>> {
-    let beginning = lines::beginning(file)?;
-    if matlab::is_matlab(file, &beginning) {
-        return matlab::names(file, &beginning);
-    }
-    #[cfg(feature = "parquet")]
-    if beginning.starts_with(b"PAR1") {
-        return super::parquet::names(file);
-    }
-    #[cfg(feature = "json")]
-    if beginning.starts_with(&[0x1f, 0x8b]) {
-        return Ok(super::klipper::names(file)?.into_iter().map(ColumnId::Name).collect());
-    }
-    csv::names(file)
-}
-
 fn read(file: &Path, ids: &[ColumnId]) -> Result<Vec<Seen>> {
     let preset = PRESETS.iter().find(|preset| preset.is_messages);
     let request = Request { complete: 0, units_row: true, preset, ..Request::complete(ids) };
-    let mut sheet = Sheet::read(file, &request)?;
+    let mut sheet = formats::read(file, &request)?;
     let columns = std::mem::take(&mut sheet.columns);
     let all = ids.iter().zip(sheet.units).zip(columns);
     Ok(all.map(|((id, unit), values)| Seen { id: id.clone(), unit, values }).collect())

@@ -110,7 +110,7 @@ fn unit(name: &str) -> &'static str {
 
 impl Recording {
     fn read(file: &Path) -> Result<Self> {
-        let opened = std::fs::File::open(file).map_err(|error| super::lines::unreadable(file, &error))?;
+        let opened = crate::files::open(file).map_err(|error| super::lines::unreadable(file, &error))?;
         let mut input = BufReader::new(MultiGzDecoder::new(opened).take(MOST_BYTES));
         let mut recording = Self::default();
         let (mut message, mut count, mut bytes) = (Vec::new(), 0, 0);

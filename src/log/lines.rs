@@ -247,7 +247,7 @@ fn too_many_columns<R: BufRead>(lines: &Lines<'_, R>) -> Error {
 }
 
 pub(super) fn open(file: &Path) -> Result<BufReader<File>> {
-    Ok(BufReader::with_capacity(1 << 16, File::open(file).map_err(|error| unreadable(file, &error))?))
+    Ok(BufReader::with_capacity(1 << 16, crate::files::open(file).map_err(|error| unreadable(file, &error))?))
 }
 
 /// The first bytes of a file, enough to tell what kind it is.
@@ -262,6 +262,7 @@ pub(super) fn unreadable(file: &Path, error: &io::Error) -> Error {
         io::ErrorKind::NotFound => ("there is no such file".into(), "check the name and the folder it is in"),
         io::ErrorKind::PermissionDenied => ("you may not read this file".into(), "check its permissions"),
         io::ErrorKind::IsADirectory => ("this is a folder, not a file".into(), "name a file in it"),
+        io::ErrorKind::InvalidInput => (error.to_string(), "write what it holds to a file, and name that"),
         _ => (format!("the file cannot be read: {error}"), "check the disk or the connection to it"),
     };
     Error::new(what).in_file(file).next(next)

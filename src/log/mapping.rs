@@ -1,9 +1,9 @@
 //! From a file's columns to logs: what each column is, in which unit, and which rows belong to which run.
 
-use super::csv::{count, shown};
 use super::presets::Preset;
 use super::sheet::{ColumnId, Dialect, Filter, Request, Run, Sheet};
-use super::{Log, Output, Quantity};
+use super::words::{count, shown};
+use super::{Log, Output, Quantity, formats};
 use crate::error::{Error, Result};
 use crate::quantity::{self, show};
 use crate::signal::Hold;
@@ -193,7 +193,7 @@ impl Mapping {
             split: self.split.as_ref(),
             preset: self.preset,
         };
-        let mut sheet = Sheet::read(&self.file, &request)?;
+        let mut sheet = formats::read(&self.file, &request)?;
         let mut values = Vec::new();
         for (i, &(role, source)) in sources.iter().enumerate() {
             let factor = source.scale * factor(&sheet, i, role, source)?;

@@ -6,9 +6,9 @@
 //!
 //! After "MAT-File Format" (MathWorks, R2019b): a header of 128 bytes, then elements, each of type, size and data.
 
-use super::csv::{near, shown};
 use super::lines::unreadable;
 use super::sheet::{ColumnId, Request, Sheet};
+use super::words::{near, shown};
 use crate::error::{Error, Result};
 use flate2::read::ZlibDecoder;
 use std::fs::File;
@@ -288,7 +288,7 @@ struct Input {
 impl Input {
     fn open(file: &Path) -> Result<Self> {
         let open = || {
-            let mut input = BufReader::new(File::open(file)?);
+            let mut input = BufReader::new(crate::files::open(file)?);
             let length = input.get_ref().metadata()?.len();
             input.seek(SeekFrom::Start(126))?;
             let mut order = [0; 2];

@@ -2,10 +2,12 @@
 
 mod accelerometer;
 mod csv;
+mod formats;
 mod guess;
 #[cfg(feature = "json")]
 mod klipper;
 mod lines;
+mod locator;
 mod mapping;
 mod matlab;
 #[cfg(feature = "parquet")]
@@ -13,6 +15,7 @@ mod parquet;
 mod presets;
 mod sheet;
 mod survey;
+mod words;
 
 pub use crate::stage::Quantity;
 pub use accelerometer::{Accelerometer, read_accelerometer};
@@ -20,11 +23,11 @@ pub use guess::{Guess, Looked, Seen, look};
 pub use mapping::{Clock, Mapping, Source, Unit};
 pub use presets::{End, In, PRESETS, Pick, Preset};
 pub use sheet::{ColumnId, Dialect, Filter};
-pub use survey::{Channel, Clipped, Gap, Motion, Note, Outlier, Severity, Steady, Survey, Timing};
+pub use survey::{Channel, Clipped, Gap, Motion, Note, Outlier, Remedy, Severity, Steady, Survey, Timing};
 
 use crate::error::Result;
 use crate::signal::{Hold, Signal};
-use sheet::{Request, Sheet};
+use sheet::Request;
 use std::path::{Path, PathBuf};
 
 /// A measured run: what went in and what was seen, at its own times.
@@ -96,13 +99,13 @@ impl Log {
 /// The columns called `names` of a file, in that order; numbers as they stand, in whatever unit the file has.
 pub fn read_columns(file: &Path, names: &[&str]) -> Result<Vec<Vec<f64>>> {
     let ids: Vec<ColumnId> = names.iter().map(|name| ColumnId::from(*name)).collect();
-    Ok(Sheet::read(file, &Request::complete(&ids))?.columns)
+    Ok(formats::read(file, &Request::complete(&ids))?.columns)
 }
 
 /// The columns called `time` and `column` of a file; the times must increase from row to row.
 pub fn read_samples(file: &Path, time: &str, column: &str) -> Result<(Vec<f64>, Vec<f64>)> {
     let ids = [time, column].map(ColumnId::from);
-    let mut sheet = Sheet::read(file, &Request { ordered: true, ..Request::complete(&ids) })?;
+    let mut sheet = formats::read(file, &Request { ordered: true, ..Request::complete(&ids) })?;
     let times = &sheet.columns[0];
     for (before, row) in (1..times.len()).enumerate() {
         let (t, last) = (times[row], times[before]);

@@ -2,11 +2,6 @@
 //!
 //! Every row is from a public definition, named beside it. What a log's table says by itself counts before a preset.
 
-use super::sheet::ColumnId;
-use super::{csv, lines};
-use crate::error::{Error, Result};
-use std::path::Path;
-
 /// A recorder whose files are known.
 #[derive(Debug, PartialEq)]
 pub struct Preset {
@@ -155,58 +150,11 @@ impl Preset {
     pub(super) fn end(&self, line: &str) -> Option<End> {
         self.ends.iter().find(|end| end.line == line.trim()).copied()
     }
-
-    /// Whether a file that begins like this is one of messages.
-    pub(super) fn is_packed(&self, beginning: &[u8]) -> bool {
-        self.is_messages && beginning.starts_with(&[0x1f, 0x8b])
-    }
-
-    /// The columns that a file has of those that are known: key of the log's table, column, and what it is in.
-    pub fn columns_of(&self, file: &Path) -> Result<Vec<(&'static str, ColumnId, In)>> {
-        let (names, unit) = match self.time {
-            (Pick::Number(number), unit) => return Ok(vec![("time", ColumnId::Number(number), In::Unit(unit))]),
-            (Pick::Name(names), unit) => (names, unit),
-        };
-        let there = match self.is_packed(&lines::beginning(file)?) {
-            true => names_of_messages(file)?,
-            false => csv::heading(file, names)?.unwrap_or_default(),
-        };
-        let Some(time) = found(names, &there) else {
-            let names: Vec<String> = names.iter().map(|name| csv::shown(name)).collect();
-            let what = format!("no line names the column {}, as those of {} do", names.join(" or "), self.title);
-            let next = "check that the file is what this recorder wrote, or name its columns without `preset`";
-            return Err(Error::new(what).in_file(file).next(next));
-        };
-        let mut columns = vec![("time", ColumnId::Name(time), In::Unit(unit))];
-        for (key, names, of) in self.columns {
-            columns.extend(found(names, &there).map(|name| (*key, ColumnId::Name(name), *of)));
-        }
-        Ok(columns)
-    }
 }
 
 /// The first of the names that a file has.
-fn found(names: &[&str], there: &[String]) -> Option<String> {
+pub(super) fn found(names: &[&str], there: &[String]) -> Option<String> {
     names.iter().find_map(|name| there.iter().find(|there| matches(name, there))).cloned()
-}
-
-#[cfg(feature = "json")]
-fn names_of_messages(file: &Path) -> Result<Vec<String>> {
-    super::klipper::names(file)
-}
-
-#[cfg(not(feature = "json"))]
-fn names_of_messages(file: &Path) -> Result<Vec<String>> {
-    Err(no_messages(file))
-}
-
-/// Where no reader of messages is built in.
-#[cfg(not(feature = "json"))]
-pub(super) fn no_messages(file: &Path) -> Error {
-    Error::new("this is a file of packed messages, and this build of the program does not read them")
-        .in_file(file)
-        .allowed("CSV, Parquet and MATLAB files")
-        .next("use a build with the feature `json`")
 }
 
 /// Whether a name is as a pattern says, with at most one `*` in it.

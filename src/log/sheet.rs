@@ -1,7 +1,8 @@
 //! The wanted columns of a file, whatever its kind, and where each of their values stands.
 
+use super::locator::Locator;
 use super::presets::Preset;
-use super::{csv, lines, matlab};
+use super::words::shown;
 use crate::error::{Error, Result};
 use crate::quantity::shortest;
 use std::path::{Path, PathBuf};
@@ -133,7 +134,7 @@ pub(super) struct Sheet {
     /// The runs, in the file's order.
     pub runs: Vec<Run>,
     /// In a text file, what it takes to find a field again.
-    pub fields: Option<csv::Locator>,
+    pub fields: Option<Locator>,
     /// The values seen in the column of the filter, a few of them.
     pub filtered: Vec<String>,
     /// The words with which the recorder ended the file early.
@@ -149,24 +150,6 @@ pub(super) struct Run {
 }
 
 impl Sheet {
-    /// Reads a file of any kind that there is a reader for.
-    pub fn read(file: &Path, request: &Request<'_>) -> Result<Self> {
-        let beginning = lines::beginning(file)?;
-        let mut sheet = match () {
-            () if matlab::is_matlab(file, &beginning) => matlab::read(file, &beginning, request)?,
-            () if beginning.starts_with(b"PAR1") => read_parquet(file, request)?,
-            () if request.preset.is_some_and(|preset| preset.is_packed(&beginning)) => read_packed(file, request)?,
-            () => csv::read(file, request)?,
-        };
-        sheet.file = file.to_path_buf();
-        if sheet.rows.is_empty()
-            && let Some(filter) = request.filter
-        {
-            return Err(sheet.nothing_left(filter));
-        }
-        Ok(sheet)
-    }
-
     /// From whole columns: the wanted ones, then that of the filter, then that of the split.
     pub fn from_columns(
         file: &Path,
@@ -230,15 +213,15 @@ impl Sheet {
         }
     }
 
-    fn nothing_left(&self, filter: &Filter) -> Error {
+    pub fn nothing_left(&self, filter: &Filter) -> Error {
         let column = filter.column.shown();
-        let list: Vec<String> = filter.values.iter().map(|value| csv::shown(value)).collect();
+        let list: Vec<String> = filter.values.iter().map(|value| shown(value)).collect();
         let list = list.join(", ");
         let what = match filter.keep {
             true => format!("no row has {list} in column {column}"),
             false => format!("every row has {list} in column {column}"),
         };
-        let mut seen: Vec<String> = self.filtered.iter().take(LISTED).map(|value| csv::shown(value)).collect();
+        let mut seen: Vec<String> = self.filtered.iter().take(LISTED).map(|value| shown(value)).collect();
         if self.filtered.len() > LISTED {
             seen.push("and more".into());
         }
@@ -289,30 +272,8 @@ impl ColumnId {
     /// As messages show it.
     pub(super) fn shown(&self) -> String {
         match self {
-            Self::Name(name) => csv::shown(name),
+            Self::Name(name) => shown(name),
             Self::Number(number) => number.to_string(),
         }
     }
-}
-
-#[cfg(feature = "parquet")]
-fn read_parquet(file: &Path, request: &Request<'_>) -> Result<Sheet> {
-    super::parquet::read(file, request)
-}
-
-#[cfg(not(feature = "parquet"))]
-fn read_parquet(file: &Path, _: &Request<'_>) -> Result<Sheet> {
-    Err(Error::new("this is a Parquet file, and this build of the program does not read them")
-        .in_file(file)
-        .next("build it with the feature `parquet`, or export the data as CSV"))
-}
-
-#[cfg(feature = "json")]
-fn read_packed(file: &Path, request: &Request<'_>) -> Result<Sheet> {
-    super::klipper::read(file, request)
-}
-
-#[cfg(not(feature = "json"))]
-fn read_packed(file: &Path, _: &Request<'_>) -> Result<Sheet> {
-    Err(super::presets::no_messages(file))
 }

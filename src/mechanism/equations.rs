@@ -116,6 +116,40 @@ impl Mechanism {
         load
     }
 
+    /// The sizes of the constant forces on each body that moves by itself, and on those that move with it, before they
+    /// are added up, N or N m: what their sum is rounded by, however little of it is left.
+    pub(crate) fn sizes_of_forces(&self, mode: &Mode) -> [f64; BODIES] {
+        let mut sizes = [0.0; BODIES];
+        for body in 0..self.bodies.len() {
+            let (leader, ratio) = (self.leader(body), self.ratio(body).abs());
+            sizes[leader] += ratio * self.bodies[body].force.abs();
+        }
+        for (leader, size) in sizes.iter_mut().enumerate().take(self.bodies.len()) {
+            let law = self.friction(leader);
+            *size += law.forward.coulomb.max(law.backward.coulomb);
+        }
+        for (index, drive) in self.drives.iter().enumerate() {
+            let (leader, ratio) = (self.leader(drive.shaft), self.ratio(drive.shaft).abs());
+            let torque = drive.motor.torque_constant * drive.motor.gear_ratio / drive.motor.gear_efficiency;
+            sizes[leader] += ratio * (torque * self.current(index, mode).constant).abs();
+        }
+        for (index, spring) in self.springs.iter().enumerate() {
+            let size = self.size_of_constant(index, mode);
+            for &(body, arm) in &spring.arms {
+                sizes[self.leader(body)] += (self.ratio(body) * arm).abs() * size;
+            }
+        }
+        sizes
+    }
+
+    /// The size of what the constant part of a spring's force is a difference of.
+    fn size_of_constant(&self, spring: usize, mode: &Mode) -> f64 {
+        match &self.springs[spring].law {
+            SpringLaw::Line { line, .. } => line.size_of_constant(usize::from(mode.piece[spring])),
+            _ => self.spring_force(spring, mode).constant.abs(),
+        }
+    }
+
     /// By what the torque of a spring on a body is multiplied: 1, but 1/e for a rotor behind a compliant gear and loses
     /// power.
     fn gear_share(&self, body: usize, spring: usize, forward: bool, mode: &Mode) -> f64 {

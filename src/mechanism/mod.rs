@@ -15,6 +15,7 @@ mod equations;
 mod form;
 mod layout;
 mod mode;
+mod nudge;
 mod power;
 
 pub use drive::{Amplifier, AmplifierMode, GearPlay, Motor};

@@ -113,10 +113,14 @@ impl Observe for Watch {
         self.moved |= stretch.interval > 0.0 && self.slides(stretch.mode);
         let mut wanted = Gaps::NONE;
         for (sum, peak) in self.sums.iter().zip(&mut self.peaks) {
-            for (row, reading) in stretch.readings.iter().enumerate() {
-                peak.take(weighed(sum, reading), stretch.time(row));
-            }
             let bow = sum.iter().map(|&(q, weight)| weight.abs() * stretch.bow[q]).sum::<f64>();
+            if let [only] = stretch.readings {
+                peak.take(weighed(sum, only), stretch.begin);
+            }
+            for (row, [from, to]) in stretch.readings.array_windows().enumerate() {
+                let ends = [weighed(sum, from), weighed(sum, to)];
+                peak.pass(ends, (stretch.time(row), stretch.time(row + 1)), bow == 0.0 && ends[0] == ends[1]);
+            }
             for (gap, [from, to]) in stretch.readings.array_windows().enumerate() {
                 let bound = Gap::bound_of(weighed(sum, from), weighed(sum, to), bow);
                 wanted.set(gap, bound > peak.value.abs() * (1.0 + NEWS));
@@ -130,9 +134,8 @@ impl Observe for Watch {
         let mut closer = false;
         for (sum, peak) in self.sums.iter().zip(&mut self.peaks) {
             let (from, to) = (weighed(sum, gap.from), weighed(sum, gap.to));
-            peak.take(from, gap.begin);
-            peak.take(to, end);
             let bow = sum.iter().map(|&(q, weight)| weight.abs() * gap.bow[q]).sum::<f64>();
+            peak.pass([from, to], (gap.begin, end), bow == 0.0 && from == to);
             closer |= Gap::bound_of(from, to, bow) > peak.value.abs() * (1.0 + NEWS);
         }
         for (_, rotor) in &mut self.rotors {

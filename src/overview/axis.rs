@@ -3,6 +3,7 @@
 use super::limits::{Most, Power, most, safety};
 use super::{Group, Note, Overview, Place, belt_mass, drive_at_belt, motor_rows, of_belt, of_constants, told};
 use crate::case::Case;
+use crate::control::feasible::{of_moves, sentence};
 use crate::error::Result;
 use crate::linear::{Operation, Root, places, travel};
 use crate::stage::{AmplifierMode, BeltModel, Stage};
@@ -28,6 +29,9 @@ pub(super) fn overview(case: &Case) -> Result<Overview> {
     if stage.belt.model != BeltModel::Rigid {
         of_belt(&stage.belt.sheet, &stage.belt.damping, stage.pulley_radius, &mut notes);
     }
+    notes.extend(
+        of_moves(case).iter().map(|(name, short)| Note { code: "move-out-of-reach", text: sentence(name, short) }),
+    );
     groups.retain(|group| !group.rows.is_empty());
     let (title, kind, depends_on_place) = (case.title.clone(), "axis", along.is_some());
     Ok(Overview { title, kind, groups, places, depends_on_place, notes })
@@ -68,7 +72,7 @@ fn drive(stage: &Stage, notes: &mut Vec<Note>) -> Group {
     }
     group.add("travel_per_turn", "travel per turn of the motor", 2.0 * PI * r / stage.motor.gear_ratio, "m");
     if force > 0.0 {
-        let [forward, backward] = [1.0, -1.0].map(|side| breakaway(stage, side) / force);
+        let [forward, backward] = [1.0, -1.0].map(|side| stage.breakaway(side, 0.0) / force);
         let row = group.add("breakaway_input", breakaway_name(input), forward, input);
         row.how("that friction holds against, the belt pulling all bodies along");
         if (backward - forward).abs() > 1e-3 * forward.abs() {
@@ -84,23 +88,6 @@ fn drive(stage: &Stage, notes: &mut Vec<Note>) -> Group {
 
 fn breakaway_name(input: &str) -> &'static str {
     if input == "V" { "breakaway voltage" } else { "breakaway current" }
-}
-
-/// Force at the belt that moves everything from rest, N, in that direction.
-fn breakaway(stage: &Stage, side: f64) -> f64 {
-    let forward = side > 0.0;
-    let [drive, idler] =
-        [&stage.drive_pulley, &stage.idler_pulley].map(|pulley| pulley.friction.side(forward).breakaway);
-    let along = stage.cart.along.as_ref().map_or(1.0, |along| along.value(0.0));
-    let cart = along * stage.cart.friction.side(forward).breakaway;
-    cart + (drive + idler) / stage.pulley_radius - side * resting_force(stage)
-}
-
-/// Force on the cart at rest at x = 0 but friction, N.
-fn resting_force(stage: &Stage) -> f64 {
-    let cart = &stage.cart;
-    let lines = [&cart.forces.along, &cart.forces.by_speed];
-    cart.constant_force() + lines.iter().filter_map(|line| line.as_ref()).map(|line| line.value(0.0)).sum::<f64>()
 }
 
 fn inertia(stage: &Stage, masses: &Masses, notes: &mut Vec<Note>) -> Group {

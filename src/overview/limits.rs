@@ -3,7 +3,6 @@
 use super::{Group, Note, told};
 use crate::signal::Signal;
 use crate::stage::{Amplifier, AmplifierMode, BeltSheet, Motor};
-use std::f64::consts::PI;
 
 /// The power of a drive: at the belt, per direction alike.
 #[derive(Debug, Clone, Copy)]
@@ -121,12 +120,9 @@ pub(super) fn safety(
     r: f64,
     force: f64,
 ) {
-    if let (Some(kind), Some(width)) = (sheet.kind, sheet.width) {
-        let teeth = 2.0 * PI * r / kind.pitch;
-        // The belt lies on half of the pulley.
-        let in_mesh = (0.5 * teeth).floor();
+    if let Some((in_mesh, carried)) = sheet.mesh(r) {
         group.add("teeth_in_mesh", "teeth in mesh at the drive pulley", in_mesh, "");
-        if let Some(carried) = kind.teeth(width, in_mesh) {
+        if let Some(carried) = carried {
             group.add("tooth_force", "force that they carry at rest", carried, "N");
             group
                 .add("tooth_safety", "safety of the teeth", carried / force, "")

@@ -269,6 +269,22 @@ pub fn kinds(machine: &dyn Numbers) -> Vec<Free> {
     kinds
 }
 
+/// The same without the numbers that others set; what is left of a kind has the keys of that as its name.
+pub fn kinds_without(machine: &dyn Numbers, others: &[&Free]) -> Vec<Free> {
+    let is_set = |number: &Number| others.iter().any(|other| other.members.iter().any(|(set, _)| set == number));
+    let mut kinds = kinds(machine);
+    for kind in &mut kinds {
+        let all = kind.members.len();
+        kind.members.retain(|(number, _)| !is_set(number));
+        if kind.members.len() < all {
+            let keys: Vec<String> = kind.members.iter().map(|(number, _)| number.key(machine)).collect();
+            kind.name = keys.join(" = ");
+        }
+    }
+    kinds.retain(|kind| !kind.members.is_empty());
+    kinds
+}
+
 /// The numbers of a row that a machine has, with their finite values.
 fn present<'a>(machine: &'a dyn Numbers, row: &'static Parameter) -> impl Iterator<Item = (Number, f64)> + 'a {
     let count = machine.sits(row).listed().map_or(0, |(_, count)| count);

@@ -11,7 +11,7 @@ mod markdown;
 mod table;
 
 pub use field::{Accessor, Field, List};
-pub use free::{Free, GivenBounds, every, kinds, own, set, value, values};
+pub use free::{Free, GivenBounds, every, kinds, kinds_without, own, set, value, values};
 pub use machine::{Numbers, Sits};
 pub use markdown::{free_markdown, markdown};
 

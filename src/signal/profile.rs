@@ -396,6 +396,11 @@ impl Profile {
         self.end
     }
 
+    /// When the reference rests for good, s: its end, and behind it what a shaper adds.
+    pub fn rest(&self) -> f64 {
+        self.end + self.shaper.iter().fold(0.0, |late, impulse| f64::max(late, impulse[0]))
+    }
+
     /// Where it begins, m.
     pub fn start(&self) -> f64 {
         self.start

@@ -352,32 +352,6 @@ fn durations() {
     assert_eq!(Signal::sequence(slots(f64::INFINITY)).duration(), Some(2.75));
 }
 
-/// Run with `--ignored --nocapture` in release: the cost of a call, in nanoseconds.
-#[test]
-#[ignore = "a measurement"]
-fn cost_of_a_call() {
-    let n = 1_000_000;
-    let times: Vec<f64> = (0..n).map(|i| f64::from(i) * 1e-3).collect();
-    let values = times.iter().map(|t| t.sin()).collect();
-    for signal in [
-        Signal::Sampled { times, values, hold: Hold::Linear },
-        Signal::Sine { amplitude: 1.0, frequency: 40.0, phase: 0.0, offset: 0.0 },
-        Signal::Chirp { amplitude: 1.0, from: 1.0, to: 100.0, over: 1000.0 },
-        Signal::Triangle { amplitude: 1.0, frequency: 500.0 },
-        Signal::Prbs { amplitude: 1.0, bit: 1e-3, seed: 0 },
-    ] {
-        signal.piece(0.0);
-        let begin = std::time::Instant::now();
-        let (mut t, mut calls) = (0.0, 0);
-        while t < 990.0 && calls < n {
-            t = signal.piece(t).end;
-            calls += 1;
-        }
-        let name: String = format!("{signal:?}").chars().take(12).collect();
-        println!("{name}: {:.0} ns", begin.elapsed().as_secs_f64() / f64::from(calls) * 1e9);
-    }
-}
-
 #[test]
 fn equal_samples_are_one_piece() {
     let sampled =

@@ -34,9 +34,11 @@ pub(crate) use check::stage as check_stage;
 
 use crate::case::Experiment;
 use crate::error::{Error, Result};
+use crate::friction::Motion;
 use crate::mechanism::{Mechanism, Part, Status, What};
 use crate::stage::Stage;
 use crate::trajectory::Trajectory;
+use std::fmt;
 use std::sync::Arc;
 
 /// How the equations are solved.
@@ -114,12 +116,17 @@ impl Event {
     /// Adds it to `events`, unless nothing that shows has changed. A part other than a body that passes through a state
     /// without staying there goes straight.
     fn note(mut self, events: &mut Vec<Event>) {
-        // A body that is at once what it was before has done nothing.
+        // A body that is at once what it was before has done nothing, and one that stops and goes on at once, turned.
         let at_once = |e: &Event| self.time - e.time <= 4.0 * f64::EPSILON * self.time;
         let last = events.iter().rposition(|e| e.part == self.part).filter(|&last| at_once(&events[last]));
         if let Some(last) = last.filter(|&last| self.body().is_some() && events[last].from.code() == self.to.code()) {
             events.remove(last);
             return;
+        }
+        if let Some(last) = last.filter(|&last| self.body().is_some() && events[last].to.code() == self.from.code())
+            && events[last].to == Motion::Stuck
+        {
+            self.from = events.remove(last).from;
         }
         let passed = |e: &Event| e.part == self.part && e.body().is_none();
         let now = events.iter().rev().take_while(|e| e.time == self.time);
@@ -128,6 +135,32 @@ impl Event {
         }
         if self.from.code() != self.to.code() {
             events.push(self);
+        }
+    }
+}
+
+/// A decision that lies within rounding: whether a body at rest breaks away whose load is its breakaway, or one that
+/// rounding turns back again and again rests. Numbers that differ in their last bit may have it go on otherwise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tie {
+    /// When, s.
+    pub time: f64,
+    /// Which body.
+    pub part: Part,
+}
+
+impl Tie {
+    /// Ties that are kept.
+    const MOST: usize = 1000;
+
+    /// Adds it to `ties`, unless the same body lies there since an earlier one.
+    fn note(self, ties: &mut Vec<Tie>, events: &[Event]) {
+        let is_new = match ties.iter().rfind(|tie| tie.part == self.part) {
+            Some(tie) => events.iter().rev().any(|e| e.part == self.part && e.time > tie.time && e.time <= self.time),
+            None => true,
+        };
+        if is_new && ties.len() < Self::MOST {
+            ties.push(self);
         }
     }
 }
@@ -180,6 +213,26 @@ impl Ending {
     }
 }
 
+impl fmt::Display for Ending {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Ending::Complete => write!(f, "the run is complete"),
+            Ending::TooManyEvents { time } => write!(f, "too many events at {time} s: they accumulate there"),
+            Ending::LeftTravel { time } => write!(f, "the cart left its travel at {time} s"),
+            Ending::Diverged { time } => write!(f, "a state became infinite, or no number, at {time} s"),
+            Ending::TooStiff { time, steps } => write!(
+                f,
+                "too stiff at {time} s: the run would need some {steps:.0e} steps, and {:.0e} are allowed",
+                pace::MOST_STEPS
+            ),
+            Ending::Interrupted { time } => write!(f, "the run was interrupted at {time} s"),
+        }
+    }
+}
+
+/// What [`Machine::advance`] and [`Dynamics::settle`] end with where they cannot go on.
+impl std::error::Error for Ending {}
+
 /// The cost of a run, in pieces of work rather than seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Cost {
@@ -206,13 +259,19 @@ pub struct Cost {
 pub struct Outcome {
     /// Every stick, slip and reversal, in order.
     pub events: Vec<Event>,
+    /// Decisions within rounding, as far as the exact solver knows of them; of many the first ones.
+    pub ties: Vec<Tie>,
     /// How it ended.
     pub ending: Ending,
     /// Its cost.
     pub cost: Cost,
-    /// By how much positions may be off: of the exact solver a bound of what rounding does; the general solver's is
-    /// estimated by [`ErrorEstimate`], Table 3 with a fixed step has none.
+    /// By how much positions may be off: of the exact solver a bound of what rounding does under the inputs that were
+    /// given, whoever gave them; the general solver's is estimated by [`ErrorEstimate`]. Table 3 with
+    /// a fixed step has none, nor has a run without rows of a machine in which errors can grow.
     pub error: Option<PositionError>,
+    /// Events of the general solver whose own condition (a speed of zero, a load at its breakaway, a limit at its level)
+    /// does not hold at their time: found too late to be located. A run that has any is not to be relied on.
+    pub unmet: u64,
 }
 
 /// By how much positions at the belt (r φ₁, x, r φ₃) may be off.
@@ -236,6 +295,11 @@ impl PositionError {
     /// Whether it is more than a thousandth of the motion, so that the result is not to be relied on.
     pub fn hides_motion(self) -> bool {
         !self.is_exact() && self.value > 1e-3 * self.way
+    }
+
+    /// Whether it is as large as the motion: nothing of it is determined by numbers of 64 bits.
+    pub fn is_undetermined(self) -> bool {
+        self.hides_motion() && self.value >= self.way
     }
 }
 
@@ -438,6 +502,6 @@ fn go(
 
 impl Experiment {
     fn start(&self, mechanism: &Mechanism) -> run::Start {
-        run::Start { state: self.initial.state(mechanism), until: self.until, every: self.every }
+        run::Start { state: self.initial.state(mechanism), until: self.until, every: self.every, noise: 0.0 }
     }
 }

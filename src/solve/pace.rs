@@ -7,7 +7,18 @@ pub(super) const STEPS_BETWEEN_QUESTIONS: u64 = 4096;
 
 /// Steps before a forecast is made, and the most that a run may need: some minutes to an hour.
 const STEPS_BEFORE_FORECAST: u64 = 1 << 20;
-const MOST_STEPS: f64 = 1e10;
+pub(super) const MOST_STEPS: f64 = 1e10;
+
+/// Events allowed at once, per simulated second, and in all: more is an accumulation, not a machine, or fills the
+/// memory.
+const EVENTS_AT_LEAST: f64 = 1e5;
+const EVENTS_PER_SECOND: f64 = 1e7;
+const EVENTS_AT_MOST: f64 = 2e7;
+
+/// Most events of a run up to `time`, s.
+pub(super) fn most_events(time: f64) -> f64 {
+    f64::min(EVENTS_AT_LEAST + EVENTS_PER_SECOND * time, EVENTS_AT_MOST)
+}
 
 /// Where a run stood when it was looked at last.
 #[derive(Debug, Clone, Copy, Default)]

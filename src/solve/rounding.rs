@@ -70,10 +70,11 @@ impl Rounding {
         self.since = time;
     }
 
-    /// The bound after so many steps.
-    pub(super) fn bound(&self, steps: u64, time: f64, origin: f64) -> PositionError {
+    /// The bound after so many steps, of a machine in which errors have grown to no more than `grown`, m.
+    pub(super) fn bound(&self, steps: u64, time: f64, (origin, grown): (f64, f64)) -> PositionError {
         let units = UNITS * (steps as f64 + self.phase);
-        let value = f64::EPSILON * (units * (self.speed * time + self.way) + 2.0 * (origin.abs() + self.way));
-        PositionError { value, way: self.way }
+        let steady = f64::EPSILON * units * (self.speed * time + self.way);
+        let value = steady.max(grown) + 2.0 * f64::EPSILON * (origin.abs() + self.way);
+        PositionError { value: value.min(f64::MAX), way: self.way }
     }
 }

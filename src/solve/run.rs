@@ -18,6 +18,9 @@ pub(super) struct Start {
     pub(super) state: State,
     pub(super) until: f64,
     pub(super) every: f64,
+    /// Relative changes of speeds after each step of the general solver, at random; zero in any run but the second one
+    /// of an [`super::ErrorEstimate`].
+    pub(super) noise: f64,
 }
 
 /// The course of one run of a mechanism.
@@ -175,7 +178,7 @@ impl<'a> Run<'a> {
         sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
     ) -> Result<Self> {
         check::course(mechanism, course)?;
-        let start = Start { state: course.start, until: course.until, every: course.every };
+        let start = Start { state: course.start, until: course.until, every: course.every, noise: 0.0 };
         let degree = course.inputs.iter().map(Signal::degree).max().unwrap_or(0);
         let output = Output { detail, sink, observer };
         Self::of(&Arc::new(mechanism.clone()), &start, (solver, degree), Known::default(), output)

@@ -107,7 +107,7 @@ pub(crate) fn run(
     }
     recorder.finish();
     cost.samples = recorder.rows;
-    Ok(Outcome { events: Vec::new(), ending, cost, error: None })
+    Ok(Outcome { events: Vec::new(), ties: Vec::new(), ending, cost, error: None, unmet: 0 })
 }
 
 /// A state with lengths in the places of angles, as readings are made from.

@@ -4,6 +4,7 @@
 //! Facts that none of these gives are left out.
 
 use super::Motor;
+use std::f64::consts::PI;
 
 /// Peripheral teeth that carry at most, however many are in mesh (z_e max of the catalogue).
 const MOST_TEETH: f64 = 12.0;
@@ -171,6 +172,18 @@ const ELATECH_AT5: &str =
     "Elatech polyurethane belts with steel cords, catalogue of Goodyear Rubber Products 2012, p. 14";
 const ELATECH_ATL5: &str =
     "Elatech polyurethane belts with steel cords, catalogue of Goodyear Rubber Products 2012, p. 20";
+
+impl BeltSheet {
+    /// Teeth in mesh at a pulley of this radius, m, and the force that they carry at rest, N; of a belt of known type and
+    /// width.
+    pub fn mesh(&self, radius: f64) -> Option<(f64, Option<f64>)> {
+        let (kind, width) = (self.kind?, self.width?);
+        let teeth = 2.0 * PI * radius / kind.pitch;
+        // The belt lies on half of the pulley.
+        let in_mesh = (0.5 * teeth).floor();
+        Some((in_mesh, kind.teeth(width, in_mesh)))
+    }
+}
 
 impl BeltType {
     /// The type of this name, however it is written: `HTD 5M` is `HTD-5M`.

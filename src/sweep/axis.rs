@@ -1,7 +1,7 @@
 //! Sweeps of an axis: its experiments and its moves in closed loop.
 
 use super::measures::{Figure, Measure, OF_EXPERIMENT, OF_MOVE};
-use super::{Group, put_figures};
+use super::{Group, put_figures, status};
 use crate::case::{Case, Experiment, Move, Sweeping};
 use crate::control::{self, MoveRun, Setup};
 use crate::design::Design;
@@ -122,11 +122,11 @@ impl<'a> Worker<'a> {
         for (experiment, held) in axis.experiments.iter().zip(held) {
             let mut meter = Meter::with(stage, *held).seeking(&axis.sought);
             let outcome = machine.clone().and_then(|()| bench.observe(experiment, &mut meter));
-            let told = outcome.map(|outcome| (outcome.ending, meter.finish(&outcome.events)));
+            let told = outcome.map(|outcome| (status(&outcome), meter.finish(&outcome.events)));
             put_figures(told, &axis.of_experiment, |measure, metrics| (measure.of)(metrics), values);
         }
         for motion in &axis.moves {
-            let told = machine.clone().and_then(|()| axis.close(stage, motion)).map(|run| (run.outcome.ending, run));
+            let told = machine.clone().and_then(|()| axis.close(stage, motion)).map(|run| (status(&run.outcome), run));
             put_figures(told, &axis.of_move, |measure, run| (measure.of)(run), values);
         }
     }

@@ -1,12 +1,12 @@
 //! Sweeps of a gantry: its experiments.
 
 use super::measures::{OfPart, of_gantry};
-use super::{Group, put_figures};
+use super::{Group, Status, put_figures, status};
 use crate::case::{GantryCase, GantryExperiment, Sweeping};
 use crate::error::{Error, Result};
 use crate::metrics::{GantryMeter, GantryMetrics};
 use crate::parameter;
-use crate::solve::{Course, Detail, Ending, Flow, Outcome, Solver, stream_mechanism};
+use crate::solve::{Course, Detail, Flow, Outcome, Solver, stream_mechanism};
 use crate::stage::gantry::Gantry;
 use crate::trajectory::Trajectory;
 
@@ -66,12 +66,12 @@ impl Swept {
     pub fn run(&self, gantry: &Gantry, values: &mut Vec<f64>) {
         let machine = check(gantry).map(|()| gantry.mechanism());
         for experiment in &self.experiments {
-            let run = |mechanism: &_| -> Result<(Ending, GantryMetrics)> {
+            let run = |mechanism: &_| -> Result<(Status, GantryMetrics)> {
                 let mut meter = GantryMeter::of(gantry, mechanism);
                 let (course, solver) = (Course::of(experiment), Solver::of_mechanism(mechanism));
                 let observed = (Detail::None, Some(&mut meter as _));
                 let outcome = stream_mechanism(mechanism, &course, solver, observed, &mut |_| Flow::Continue)?;
-                Ok((outcome.ending, meter.finish(&outcome.events)))
+                Ok((status(&outcome), meter.finish(&outcome.events)))
             };
             let told = machine.as_ref().map_err(Error::clone).and_then(run);
             put_figures(told, &self.figures, OfPart::value, values);

@@ -41,7 +41,7 @@ pub use summary::{Drawn, Measured, Shown, Summary};
 use crate::case::Sampling;
 use crate::error::Result;
 use crate::parameter::{self, Free, Numbers};
-use crate::solve::{Ending, Flow, Outcome};
+use crate::solve::{Ending, Flow, Outcome, PositionError};
 use crate::stage::Stage;
 use crate::stage::gantry::Gantry;
 use crate::trajectory::{Column, Trajectory};
@@ -63,17 +63,20 @@ pub enum Status {
     Refused,
     /// Something changes so fast that the run would not have ended in time.
     TooStiff,
+    /// Errors of rounding grow to as much as the motion: numbers of 64 bits do not determine the run.
+    NotDetermined,
 }
 
 impl Status {
     /// All of them, by number.
-    pub const ALL: [Status; 6] = [
+    pub const ALL: [Status; 7] = [
         Status::Complete,
         Status::LeftTravel,
         Status::TooManyEvents,
         Status::Diverged,
         Status::Refused,
         Status::TooStiff,
+        Status::NotDetermined,
     ];
 
     /// Its number.
@@ -90,6 +93,7 @@ impl Status {
             Status::Diverged => "diverged",
             Status::Refused => "no machine",
             Status::TooStiff => "too stiff",
+            Status::NotDetermined => "not determined",
         }
     }
 }
@@ -354,9 +358,9 @@ impl Sweep {
     }
 }
 
-/// Adds how a run ended, and its figures by these; NaN where it has not reached its end.
-fn put_figures<T, M>(told: Result<(Ending, T)>, measures: &[M], of: impl Fn(&M, &T) -> f64, values: &mut Vec<f64>) {
-    let status = told.as_ref().map_or(Status::Refused, |(ending, _)| status(*ending));
+/// Adds how a run ended, and its figures by these; NaN where it has not reached its end, or is not determined.
+fn put_figures<T, M>(told: Result<(Status, T)>, measures: &[M], of: impl Fn(&M, &T) -> f64, values: &mut Vec<f64>) {
+    let status = told.as_ref().map_or(Status::Refused, |(status, _)| *status);
     values.push(status.code());
     match told {
         Ok((_, run)) if status == Status::Complete => values.extend(measures.iter().map(|measure| of(measure, &run))),
@@ -370,8 +374,9 @@ fn push(table: &mut Trajectory, values: &[f64]) {
     }
 }
 
-fn status(ending: Ending) -> Status {
-    match ending {
+fn status(outcome: &Outcome) -> Status {
+    match outcome.ending {
+        Ending::Complete if outcome.error.is_some_and(PositionError::hides_motion) => Status::NotDetermined,
         Ending::Complete | Ending::Interrupted { .. } => Status::Complete,
         Ending::LeftTravel { .. } => Status::LeftTravel,
         Ending::TooManyEvents { .. } => Status::TooManyEvents,

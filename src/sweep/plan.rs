@@ -17,6 +17,7 @@ impl Sweep {
     /// The sweep that `[sweep]` of an axis's case describes. Errors: nothing to vary, parameters that exclude each
     /// other, more of them than Sobol' points have dimensions, a machine that cannot be run.
     pub fn new(case: &Case) -> Result<Self> {
+        case.complete()?;
         let plan = planned(case.sweep.as_ref())?;
         let draws = match &plan.from {
             Some(Origin::Posterior(file)) => Some(Arc::new(draws(case, plan, file)?)),
@@ -38,6 +39,7 @@ impl Sweep {
     /// # Ok::<(), taut::Error>(())
     /// ```
     pub fn of_gantry(case: &GantryCase) -> Result<Self> {
+        case.complete()?;
         let plan = planned(case.sweep.as_ref())?;
         Self::planned(Subject::Gantry(gantry::Swept::of(case, plan)), plan, None, &[])
     }

@@ -2,8 +2,9 @@
 //! them.
 
 use super::margins::{Margins, Plant};
+use super::unknown::{Unknown, tie, with_the_rest};
 use crate::case::{Case, Tuning};
-use crate::chance::{normal_quantile, quantile, uniform};
+use crate::chance::{quantile, uniform};
 use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::{Error, Result};
@@ -33,45 +34,6 @@ const DRAWS: usize = 16;
 
 /// A change of a corner.
 type Step<'a> = Box<dyn Fn(&Corner) -> Corner + 'a>;
-
-/// A parameter that is not known exactly.
-#[derive(Debug, Clone)]
-pub struct Unknown {
-    /// Its name.
-    pub name: String,
-    /// The least and the most: factors of a spread, values in SI units of a fit.
-    pub low: f64,
-    /// The most.
-    pub high: f64,
-    free: Free,
-    /// The first of those that it varies with: the two constants of one motor, both pulleys.
-    with: usize,
-}
-
-impl Unknown {
-    /// Its value: `low` for −1, `high` for 1, what it is taken for at 0.
-    fn value(&self, off: f64) -> f64 {
-        let end = if off < 0.0 { self.low } else { self.high };
-        let value = self.free.start + off.abs() * (end - self.free.start);
-        // Draws of a fit go beyond the ends of its interval, but never through zero.
-        if self.free.start > 0.0 { value.max(1e-3 * self.free.start) } else { value }
-    }
-}
-
-impl Unknown {
-    /// How far off it is with this value: what [`Unknown::value`] takes.
-    fn off(&self, value: f64) -> f64 {
-        let from = value - self.free.start;
-        if from < 0.0 { from / (self.free.start - self.low) } else { from / (self.high - self.free.start) }
-    }
-}
-
-/// The name of what a parameter varies with: K_t and K_e of one motor are one number in SI units, and pulleys of one
-/// make are alike.
-fn kin(name: &str) -> String {
-    let first = name.split(" = ").next().unwrap_or(name);
-    first.replace("back_emf_constant", "torque_constant").replace("idler_pulley.", "drive_pulley.")
-}
 
 /// One of the axes.
 #[derive(Debug, Clone, PartialEq)]
@@ -116,7 +78,7 @@ pub enum Source {
 
 impl Family {
     /// That of a case. Its machines are a Latin hypercube: within a spread all values are as likely, within the
-    /// interval of a fit they are normal. With `tuning.corners` the worst corner of all intervals joins them.
+    /// interval of a fit they are normal; what was never fitted is off by the default spread. With `tuning.corners` the worst corner of all intervals joins them.
     pub fn of(case: &Case, tuning: &Tuning) -> Result<Self> {
         if let Some(file) = &tuning.draws {
             return Self::of_draws(case, tuning, file);
@@ -129,26 +91,22 @@ impl Family {
                 // What is fitted along with a log has no key.
                 for known in case.known.iter().filter(|known| known.name.contains('.')) {
                     let free = Free::new(&stage, &known.name, &keys, &[])?;
-                    // What the fit knows nothing of is off by a share.
-                    let [low, high] = known
-                        .interval
-                        .unwrap_or([free.start * (1.0 - SPREAD), free.start * (1.0 + SPREAD)])
-                        .map(|end| if free.start > 0.0 { end.max(1e-3 * free.start) } else { end });
-                    unknowns.push(Unknown { name: known.name.clone(), low, high, free, with: 0 });
+                    let least = if free.start > 0.0 { 1e-3 * free.start } else { f64::NEG_INFINITY };
+                    unknowns.push(match known.interval {
+                        Some(interval) => Unknown::fitted(free, interval.map(|end| end.max(least))),
+                        // What the fit knows nothing of is off by a share.
+                        None => Unknown::spread(free, SPREAD),
+                    });
                 }
-                (unknowns, Source::Fit)
+                (with_the_rest(unknowns, &stage), Source::Fit)
             }
             given => {
                 let share = given.unwrap_or(SPREAD);
-                let (low, high) = (1.0 - share, 1.0 + share);
-                let unknown = |free: Free| Unknown { name: free.name.clone(), low, high, free, with: 0 };
+                let unknown = |free: Free| Unknown::spread(free, share);
                 (kinds(&stage).into_iter().map(unknown).collect(), Source::Spread(share))
             }
         };
-        let names: Vec<String> = unknowns.iter().map(|unknown| kin(&unknown.name)).collect();
-        for (unknown, name) in unknowns.iter_mut().zip(&names) {
-            unknown.with = names.iter().position(|other| other == name).unwrap_or_default();
-        }
+        tie(&mut unknowns);
         let (places, loads) = (along(case, tuning.places), tuning.loads.clone());
         let mut family = Self { places, loads, stage, unknowns, source, machines: Vec::new(), corners: tuning.corners };
         family.machines = family.drawn(MACHINES);
@@ -165,16 +123,21 @@ impl Family {
         })?;
         let (frees, columns) = drawn(case, plan, &[], file)?;
         let rows = columns.first().map_or(0, Vec::len);
-        let unknown = |(place, (free, column)): (usize, (Free, &Vec<f64>))| {
+        let unknown = |(free, column): (Free, &Vec<f64>)| {
             let mut sorted = column.clone();
             sorted.sort_by(f64::total_cmp);
             // The machine of the file lies between, if only just.
             let least = 1e-6 * free.start.abs().max(f64::MIN_POSITIVE);
             let low = quantile(&sorted, 0.025).min(free.start - least);
             let high = quantile(&sorted, 0.975).max(free.start + least);
-            Unknown { name: free.name.clone(), low, high, free, with: place }
+            Unknown::fitted(free, [low, high])
         };
-        let unknowns: Vec<Unknown> = frees.into_iter().zip(&columns).enumerate().map(unknown).collect();
+        let drawn: Vec<Unknown> = frees.into_iter().zip(&columns).map(unknown).collect();
+        let count = drawn.len();
+        let mut unknowns = with_the_rest(drawn, &case.stage);
+        tie(&mut unknowns);
+        // What the draws have they have together.
+        unknowns.iter_mut().take(count).enumerate().for_each(|(place, unknown)| unknown.with = place);
         let (places, loads) = (along(case, tuning.places), tuning.loads.clone());
         let (stage, source) = (case.stage.clone(), Source::Posterior(rows));
         let mut family = Self { places, loads, stage, unknowns, source, machines: Vec::new(), corners: tuning.corners };
@@ -183,8 +146,10 @@ impl Family {
         let first = family.machines.len() - count;
         for k in 0..count {
             let row = k * rows / count;
-            for (j, column) in columns.iter().enumerate() {
-                family.machines[first + k].off[j] = family.unknowns[j].off(column[row]);
+            let offs: Vec<f64> =
+                columns.iter().zip(&family.unknowns).map(|(column, unknown)| unknown.off(column[row])).collect();
+            for (unknown, own) in family.unknowns.iter().zip(&mut family.machines[first + k].off) {
+                *own = offs.get(unknown.with).copied().unwrap_or(*own);
             }
         }
         Ok(family)
@@ -205,16 +170,12 @@ impl Family {
         };
         let (at, load) = (column(), column());
         let off: Vec<Vec<f64>> = self.unknowns.iter().map(|_| column()).collect();
-        let share = |u: f64| match self.source {
-            Source::Spread(_) => 2.0 * u - 1.0,
-            Source::Fit | Source::Posterior(_) => normal_quantile(u) / normal_quantile(0.975),
-        };
         let (first, last) = (self.places.first().copied(), self.places.last().copied());
         let (from, to) = (first.unwrap_or_default(), last.unwrap_or_default());
         all.extend((0..count).map(|draw| Corner {
             place: from + at[draw] * (to - from),
             load: self.loads.get((load[draw] * self.loads.len() as f64) as usize).copied().unwrap_or_default(),
-            off: self.unknowns.iter().map(|unknown| share(off[unknown.with][draw])).collect(),
+            off: self.unknowns.iter().map(|unknown| unknown.quantile(off[unknown.with][draw])).collect(),
         }));
         all
     }
@@ -272,13 +233,7 @@ impl Family {
 
     /// The corner in words: what is off, the load, the place.
     pub fn words(&self, corner: &Corner) -> String {
-        let words = |unknown: &Unknown, off: f64| match self.source {
-            Source::Fit | Source::Posterior(_) => {
-                format!("{} {}", unknown.name, engineering(unknown.value(off), unknown.free.unit, 4))
-            }
-            Source::Spread(_) => format!("{} {:+.0} %", unknown.name, 100.0 * (unknown.value(off) - 1.0)),
-        };
-        let off = |(unknown, &off): (&Unknown, &f64)| (off != 0.0).then(|| words(unknown, off));
+        let off = |(unknown, &off): (&Unknown, &f64)| (off != 0.0).then(|| unknown.words(off));
         let mut words: Vec<String> = self.unknowns.iter().zip(&corner.off).filter_map(off).collect();
         if self.loads.len() > 1 {
             words.push(format!("load {}", engineering(corner.load, "kg", 4)));

@@ -1,6 +1,6 @@
 //! The gains of a design as numbers with names, for a search and for the case file.
 
-use super::placement::commands_current;
+use crate::design::placement::commands_current;
 use crate::design::{Design, Filter, Structure};
 use crate::parameter::{find, unit_for};
 use crate::stage::{AmplifierMode, Stage};
@@ -10,6 +10,10 @@ const DIGITS: usize = 3;
 
 /// Highest frequency of a filter that is searched for, in samples per second.
 const HIGHEST: f64 = 0.45;
+
+/// The damping of a notch that is searched for, where its depth allows.
+const NARROWEST: f64 = 0.05;
+const WIDEST: f64 = 2.0;
 
 /// A gain.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,12 +43,15 @@ pub fn gains(design: &Design, stage: &Stage) -> Vec<Gain> {
     fields(&mut copy).into_iter().map(gain).filter(|gain| gain.value != 0.0).collect()
 }
 
-/// The design with its searched gains multiplied, in the order of [`gains`], by e to these powers.
+/// The design with its searched gains multiplied, in the order of [`gains`], by e to these powers. A corner that is
+/// changed ends below half the sampling rate.
 pub fn scaled(design: &Design, powers: &[f64]) -> Design {
     let mut other = design.clone();
+    let highest = HIGHEST / design.every;
     let searched = fields(&mut other).into_iter().filter(|(_, value, searched)| **value != 0.0 && *searched);
-    for ((_, value, _), power) in searched.zip(powers) {
-        *value *= power.exp();
+    for ((key, value, _), power) in searched.zip(powers) {
+        let most = if key.ends_with(".filter") && *power != 0.0 { highest } else { f64::INFINITY };
+        *value = (*value * power.exp()).min(most);
     }
     other
 }
@@ -62,9 +69,10 @@ pub fn shaped(design: &Design, own: usize, powers: &[f64]) -> Design {
             *value = (*value * powers.next().copied().unwrap_or_default().exp()).clamp(low, high);
         };
         match filter {
-            Filter::Notch { frequency, damping, .. } => {
+            Filter::Notch { frequency, depth, damping } => {
                 times(frequency, f64::MIN_POSITIVE, most);
-                times(damping, 0.05, 2.0);
+                // Its gain there is depth/damping: above 1 it would amplify.
+                times(damping, NARROWEST.max(*depth), WIDEST.max(*depth));
             }
             Filter::LowPass { frequency, .. } => times(frequency, f64::MIN_POSITIVE, most),
         }
@@ -152,5 +160,38 @@ fn fields(design: &mut Design) -> Vec<(&'static str, &mut f64, bool)> {
             all
         }
         _ => Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Case;
+    use std::path::Path;
+
+    /// A search ended with a notch of damping 0.05 and depth 0.1, which amplifies by 6 dB, and with a corner of 15 kHz at
+    /// 4 kHz.
+    #[test]
+    fn a_searched_filter_neither_amplifies_nor_passes_half_the_sampling_rate() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
+        let mut design = Case::read(folder.join("pid.toml")).unwrap().controller.unwrap();
+        design.filters = vec![
+            Filter::Notch { frequency: 100.0, depth: 0.1, damping: 0.7 },
+            Filter::LowPass { frequency: 100.0, damping: 0.7 },
+        ];
+        let half = 0.5 / design.every;
+        for power in [-9.0, -3.0, -0.1, 0.1, 3.0, 9.0] {
+            let other = rounded(&shaped(&design, 0, &[power; 7]));
+            let Structure::Pid(pid) = &other.structure else { panic!("not a PID") };
+            assert!(pid.filter < half, "{pid:?}");
+            for filter in &other.filters {
+                match *filter {
+                    Filter::Notch { frequency, depth, damping } => {
+                        assert!(depth <= damping && frequency < half, "{filter:?}");
+                    }
+                    Filter::LowPass { frequency, .. } => assert!(frequency < half, "{filter:?}"),
+                }
+            }
+        }
     }
 }

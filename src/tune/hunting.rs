@@ -1,12 +1,17 @@
-//! Limit cycles at rest: an integral against sticking friction and counts, found by simulation.
+//! Limit cycles at rest: an integral against sticking friction and counts.
+//!
+//! They are found by simulation. Between two slips of a stuck axis the command is a ramp, the integral of an error that
+//! stays, and the next slip is known in closed form: with the slope u̇ of the command and its force g per command it comes
+//! where g u reaches the breakaway of cart and pulleys. That says how long to watch where slips are rare, and when the
+//! next one comes where no watch is long enough.
 
-use crate::control::compensation::Rigid;
 use crate::control::{Loop, Rows, Standard, stream};
 use crate::design::{Design, Structure};
 use crate::error::Result;
 use crate::friction::Side;
 use crate::signal::profile::{Leg, Limits, Profile};
 use crate::solve::{Flow, Solver};
+use crate::stage::rigid::Rigid;
 use crate::stage::{Encoder, Stage};
 
 /// Way out before the slow reversal, m, half of which it goes back; enough to break away. Less on a short travel.
@@ -18,16 +23,36 @@ const SPEED: f64 = 20e-3;
 /// Standard deviation of the intervals between swings, as a share of their mean, from which on they are irregular.
 const IRREGULAR: f64 = 0.25;
 
-/// Longest watch, s.
+/// Longest watch of an axis of which nothing is known yet, s.
 const LONGEST: f64 = 60.0;
+
+/// Slips that a longer watch waits for, its most samples, and how far ahead a slip is foreseen, s.
+const SLIPS: f64 = 4.0;
+const MOST: f64 = 1e6;
+const FORESEEN: f64 = 3600.0;
+
+/// Factor by which the slopes of both halves of a ramp may differ.
+const STEADY: f64 = 3.0;
+
+/// Share of the samples at which a cart stands that slips now and then, share of its whole way that it moves less by
+/// from one sample to the next, and s without motion between two slips.
+const STANDS: f64 = 0.7;
+const STILL: f64 = 1e-4;
+const APART: f64 = 0.05;
+
+/// Share by which a cart has to swing wider to hunt more.
+const WIDER: f64 = 0.1;
 
 /// An axis that does not come to rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hunt {
-    /// Half of what the cart goes to and fro, m.
+    /// Half of what the cart goes to and fro, m; not a number where no slip was waited for.
     pub amplitude: f64,
-    /// s.
+    /// s; not a number where no slip was waited for.
     pub period: f64,
+    /// Time from one slip, or burst of slips, to the next of an axis that is stuck between them, s: half of the time it
+    /// stands in spells of at least that length. Infinite where it swings all the time.
+    pub slips_every: f64,
     /// Whether intervals from one swing to the next differ by more than a quarter of their mean.
     pub irregular: bool,
     /// Without each of these it comes to rest.
@@ -39,16 +64,17 @@ pub struct Hunt {
 /// Watches the closed loop after a slow reversal; none if the cart comes to rest. A loop that is not stable hunts as
 /// well, and needs nothing of what is listed.
 pub fn hunting(stage: &Stage, design: &Design) -> Result<Option<Hunt>> {
+    let Some(hunt) = hunts(stage, design)? else { return Ok(None) };
     let watched = watch(stage, design);
-    let Some(Swing { amplitude, period, irregular }) = swing(stage, design, stage, watched)? else { return Ok(None) };
     let mut needs = Vec::new();
     let mut without = |word: &'static str, stage_without: &Stage, design: &Design| -> Result<()> {
-        if swing(stage_without, design, stage, watched)?.is_none() {
+        let seen = seen(stage_without, design, stage, (watched, 0.25 * watched))?;
+        if seen.swing.is_none() && seen.next(stage_without).is_none() {
             needs.push(word);
         }
         Ok(())
     };
-    if let Some(other) = without_integral(design) {
+    if let Some(other) = integral_times(design, 0.0) {
         without("integral action", stage, &other)?;
     }
     let other = friction(stage, |side| (side.coulomb, side.breakaway) = (0.0, 0.0));
@@ -69,7 +95,48 @@ pub fn hunting(stage: &Stage, design: &Design) -> Result<Option<Hunt>> {
         let finer = Stage { encoder: finer(stage.encoder), scale: finer(stage.scale), ..stage.clone() };
         without("encoder counts", &finer, design)?;
     }
-    Ok(Some(Hunt { amplitude, period, irregular, needs, watched }))
+    Ok(Some(Hunt { needs, ..hunt }))
+}
+
+/// The limit cycle alone, without what it needs.
+pub(super) fn hunts(stage: &Stage, design: &Design) -> Result<Option<Hunt>> {
+    let short = watch(stage, design);
+    let first = seen(stage, design, stage, (short, 0.25 * short))?;
+    let hunt = |Swing { amplitude, period, irregular, slips_every }: Swing, watched: f64| Hunt {
+        amplitude,
+        period,
+        irregular,
+        slips_every,
+        needs: Vec::new(),
+        watched,
+    };
+    if let Some(swing) = first.swing {
+        return Ok(Some(hunt(swing, short)));
+    }
+    let Some((next, most)) = first.next(stage) else { return Ok(None) };
+    let unseen = |next: f64, watched: f64| {
+        let swing = Swing { amplitude: f64::NAN, period: f64::NAN, irregular: false, slips_every: next };
+        hunt(swing, watched)
+    };
+    let bound = (MOST * design.every).min(FORESEEN);
+    if short + 2.0 * next > bound {
+        return Ok(Some(unseen(next, short)));
+    }
+    let watched = (short + SLIPS * most).min(bound);
+    let second = seen(stage, design, stage, (watched, 0.25 * short))?;
+    Ok(match (second.swing.or_else(|| rare(&second.cart)), second.next(stage)) {
+        (Some(swing), _) => Some(hunt(swing, watched)),
+        // It slips, though not often enough for a swing to be seen.
+        (None, Some((next, _))) => Some(unseen(next, watched)),
+        (None, None) => None,
+    })
+}
+
+impl Hunt {
+    /// True if it hunts more than the other: where that one rests, or wider.
+    pub(super) fn is_more_than(&self, other: Option<&Hunt>) -> bool {
+        other.is_none_or(|other| self.amplitude > (1.0 + WIDER) * other.amplitude)
+    }
 }
 
 fn friction(stage: &Stage, change: fn(&mut Side)) -> Stage {
@@ -81,12 +148,16 @@ fn friction(stage: &Stage, change: fn(&mut Side)) -> Stage {
     other
 }
 
-fn without_integral(design: &Design) -> Option<Design> {
+/// The design with its integral action times `factor`, none with 0; none without integral action.
+pub(super) fn integral_times(design: &Design, factor: f64) -> Option<Design> {
     let mut other = design.clone();
     match &mut other.structure {
-        Structure::Pid(pid) if pid.integral != 0.0 => pid.integral = 0.0,
-        Structure::Cascade(cascade) if cascade.speed_integral != 0.0 => cascade.speed_integral = 0.0,
-        Structure::StateFeedback(weights) if weights.integral.is_some() => weights.integral = None,
+        Structure::Pid(pid) if pid.integral != 0.0 => pid.integral *= factor,
+        Structure::Cascade(cascade) if cascade.speed_integral != 0.0 => cascade.speed_integral *= factor,
+        // The gain is about the inverse of the weight.
+        Structure::StateFeedback(weights) if weights.integral.is_some() => {
+            weights.integral = weights.integral.map(|weight| weight / factor).filter(|weight| weight.is_finite());
+        }
         _ => return None,
     }
     Some(other)
@@ -113,15 +184,52 @@ fn watch(stage: &Stage, design: &Design) -> f64 {
     if ramp.is_finite() { (20.0 * ramp).clamp(4.0, LONGEST) } else { 10.0 }
 }
 
-/// A swing at rest: half of what the cart goes to and fro, m, how long that takes, s, and whether not always as long.
+/// A swing at rest: half of what the cart goes to and fro, m, how long that takes, s, and whether not always as long; and
+/// the time between slips of a cart that stands between them, s.
+#[derive(Clone, Copy)]
 struct Swing {
     amplitude: f64,
     period: f64,
     irregular: bool,
+    slips_every: f64,
 }
 
-/// The swing of the cart at rest; none if it rests or dies out.
-fn swing(stage: &Stage, design: &Design, model: &Stage, watched: f64) -> Result<Option<Swing>> {
+/// What a watch has seen: a swing of the cart, its place (m) over time (s), and the command where it ended, with its slope where it is a ramp.
+struct Seen {
+    swing: Option<Swing>,
+    cart: Vec<(f64, f64)>,
+    command: f64,
+    slope: Option<f64>,
+}
+
+impl Seen {
+    /// How long it is until the command of a stuck axis has reached its breakaway, and how long it is from one breakaway
+    /// to the other, s; none where the command does not go there.
+    fn next(&self, stage: &Stage) -> Option<(f64, f64)> {
+        let (rigid, r) = (Rigid::of(stage), stage.pulley_radius);
+        let most = |side: &Side| side.coulomb.max(side.breakaway);
+        let of = |friction: &crate::friction::Friction| most(&friction.forward).max(most(&friction.backward));
+        let pulleys = (of(&stage.drive_pulley.friction) + of(&stage.idler_pulley.friction)) / r;
+        let breakaway = pulleys + of(&stage.cart.friction);
+        let (force, slope) = (rigid.force_per_command(), self.slope?);
+        // g u + f = ±b
+        let ends = [1.0, -1.0].map(|sign| (sign * breakaway - rigid.constant) / force);
+        let until = ends.map(|end| (end - self.command) / slope).into_iter().fold(0.0, f64::max);
+        let whole = 2.0 * breakaway / (force * slope).abs();
+        (breakaway > 0.0 && until <= FORESEEN && whole.is_finite()).then_some((until, whole))
+    }
+}
+
+/// The slope of a command over time where it is a ramp: about the same in both halves.
+fn slope(command: &[(f64, f64)]) -> Option<f64> {
+    let [(t0, u0), (t1, u1), (t2, u2)] = [*command.first()?, *command.get(command.len() / 2)?, *command.last()?];
+    let (early, late) = ((u1 - u0) / (t1 - t0), (u2 - u1) / (t2 - t1));
+    let ratio = early / late;
+    ((1.0 / STEADY..=STEADY).contains(&ratio) && late.is_finite()).then_some(late)
+}
+
+/// What the cart does at rest, watched so long and from so long after the reversal on, s.
+fn seen(stage: &Stage, design: &Design, model: &Stage, (watched, skipped): (f64, f64)) -> Result<Seen> {
     let limits = Limits { speed: SPEED, acceleration: 0.2, jerk: None, snap: None };
     // From 0, to the side that has more room.
     let way = stage.travel.map_or(WAY, |travel| match travel.max >= -travel.min {
@@ -135,13 +243,17 @@ fn swing(stage: &Stage, design: &Design, model: &Stage, watched: f64) -> Result<
     let rows = Rows { until, every: design.every.min(until), window: 1e-4 };
     let mut cart: Vec<(f64, f64)> = Vec::new();
     let solver = Solver::of(stage);
-    stream(stage, &mut controller, &Loop::of(design), &profile, &rows, solver, false, &mut |block| {
+    let run = stream(stage, &mut controller, &Loop::of(design), &profile, &rows, solver, true, &mut |block| {
         let (time, x) = (block.get("time").unwrap_or(&[]), block.get("cart_position").unwrap_or(&[]));
-        let late = time.iter().zip(x).filter(|(t, _)| **t > from + 0.25 * watched);
+        let late = time.iter().zip(x).filter(|(t, _)| **t > from + skipped);
         cart.extend(late.map(|(t, x)| (*t, *x)));
         Flow::Continue
     })?;
-    Ok(swung(&cart))
+    // The last eighth of the watch.
+    let late = run.kept.iter().filter(|sample| sample.time >= until - 0.125 * watched);
+    let command: Vec<(f64, f64)> = late.map(|sample| (sample.time, sample.given)).collect();
+    let command_now = command.last().map_or(0.0, |(_, given)| *given);
+    Ok(Seen { swing: swung(&cart), cart, command: command_now, slope: slope(&command) })
 }
 
 /// The swing of a cart of which place (m) over time (s) is known from a time on at which it should rest.
@@ -173,10 +285,44 @@ fn swung(cart: &[(f64, f64)]) -> Option<Swing> {
             let period = (last - first) / (upward.len() - 1) as f64;
             let off = upward.windows(2).map(|pair| (pair[1] - pair[0] - period).powi(2)).sum::<f64>();
             let irregular = (off / (upward.len() - 1) as f64).sqrt() > IRREGULAR * period;
-            Some(Swing { amplitude: 0.5 * size, period, irregular })
+            Some(Swing { amplitude: 0.5 * size, period, irregular, slips_every: slips(cart, size) })
         }
         _ => None,
     }
+}
+
+/// The slips of a cart that now and then does not stay where it is, however long it stands between; none of one that
+/// moves twice at most, for that may be its way to rest.
+fn rare(cart: &[(f64, f64)]) -> Option<Swing> {
+    let (low, high) =
+        cart.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, x)| (low.min(*x), high.max(*x)));
+    let slips_every = if high - low > 1e-9 { slips(cart, high - low) } else { f64::INFINITY };
+    let swing = Swing { amplitude: 0.5 * (high - low), period: 2.0 * slips_every, irregular: true, slips_every };
+    slips_every.is_finite().then_some(swing)
+}
+
+/// Time between the slips of a cart that stands most of the time, s: the median over the moments of the watch, so that
+/// slips which come in bursts are as far apart as the bursts. Infinite for a cart that does not stand.
+fn slips(cart: &[(f64, f64)], size: f64) -> f64 {
+    let moves = |pair: &&[(f64, f64)]| (pair[1].1 - pair[0].1).abs() > STILL * size;
+    let moving: Vec<f64> = cart.windows(2).filter(moves).map(|pair| pair[1].0).collect();
+    if moving.len() as f64 > (1.0 - STANDS) * cart.len() as f64 {
+        return f64::INFINITY;
+    }
+    let begins = moving.windows(2).filter(|pair| pair[1] - pair[0] > APART).map(|pair| pair[1]);
+    let begins: Vec<f64> = moving.first().copied().into_iter().chain(begins).collect();
+    if begins.len() < 3 {
+        return f64::INFINITY;
+    }
+    let mut apart: Vec<f64> = begins.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    apart.sort_by(f64::total_cmp);
+    let whole: f64 = apart.iter().sum();
+    let mut passed = 0.0;
+    let is_half = |time: &f64| {
+        passed += time;
+        passed >= 0.5 * whole
+    };
+    apart.iter().copied().find(is_half).unwrap_or(f64::INFINITY)
 }
 
 #[cfg(test)]
@@ -208,6 +354,33 @@ mod tests {
         assert!((regular.amplitude / 1e-5 - 1.0).abs() < 1e-3, "{}", regular.amplitude);
         let unequal = swung(&cart(|k| if k % 3 == 0 { 3.0 } else { 0.5 }, |_| 1e-5)).unwrap();
         assert!(unequal.irregular, "{}", unequal.period);
+    }
+
+    /// An axis that stood for a minute and more between bursts of slips was said to rest.
+    #[test]
+    fn slips_far_apart_are_seen() {
+        let place = |t: f64| if ((t / 25.0) as u64).is_multiple_of(2) { 4e-4 } else { -4e-4 };
+        let cart: Vec<(f64, f64)> = (0..20_000).map(|k| 1e-2 * f64::from(k)).map(|t| (t, place(t))).collect();
+        let swing = rare(&cart).unwrap();
+        assert!(
+            (swing.slips_every - 25.0).abs() < 0.1 && (swing.amplitude - 4e-4).abs() < 1e-9,
+            "{}",
+            swing.slips_every
+        );
+        // In bursts of five slips, 0.3 s apart, the bursts count.
+        let step = |t: f64| (t / 25.0).floor() + 0.2 * ((t % 25.0) / 0.3).floor().min(5.0);
+        let bursts: Vec<(f64, f64)> = cart.iter().map(|(t, _)| (*t, 4e-4 * (step(*t) % 2.0))).collect();
+        let every = slips(&bursts, 8e-4);
+        assert!((every - 23.5).abs() < 0.4, "{every}");
+        // Two slips may be the way to rest.
+        assert!(rare(&cart[..7400]).is_none() && rare(&cart[..2000]).is_none());
+        // A ramp goes on, what levels off or chatters does not.
+        let ramp =
+            |of: &dyn Fn(f64) -> f64| slope(&(0..100).map(|k| (f64::from(k), of(f64::from(k)))).collect::<Vec<_>>());
+        assert!(ramp(&|t| 0.5 - 1e-3 * t).is_some_and(|slope| (slope + 1e-3).abs() < 1e-12));
+        assert!(
+            ramp(&|t| (-0.1 * t).exp()).is_none() && ramp(&|t| (t - 50.0).abs()).is_none() && ramp(&|_| 0.3).is_none()
+        );
     }
 
     #[test]

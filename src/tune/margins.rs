@@ -1,14 +1,17 @@
 //! Margins of a sampled loop: what its sensitivity is over all frequencies, and whether it is stable.
 //!
-//! The loop is broken at the measured position, a current loop being closed, and with a scale beside the encoder at the
-//! scale; with either the loop broken at the command counts as well. Held commands, delay and filters are in it exactly.
+//! The loop is broken where the command enters the axis and, where the controller uses more than one measurement, at
+//! each of them, the others being closed (`loops.rs`); of every figure the worst break counts. Held commands, delay and
+//! filters are in it exactly.
 //!
 //! The peaks of |S| and |T| stand at poles of the closed loop, which no grid knows beforehand. So a grid that is dense
-//! about the poles of the axis is first divided wherever L or 1 + L turns by much from one point to the next, which it
-//! does about every lightly damped pole of the closed loop; then every local maximum is followed to its top, and every
+//! about the poles of the axis is first divided wherever one L or 1 + L turns by much from one point to the next, which
+//! it does about every lightly damped pole of the closed loop; then every local maximum is followed to its top, and every
 //! crossing to where it is.
 
-use crate::control::feedback::{Feedback, Terms, Turn};
+use super::loops::{Break, Open, breaks, loops};
+use super::winding::Winding;
+use crate::control::feedback::{Feedback, Turn};
 use crate::control::measures_cart;
 use crate::design::Design;
 use crate::error::Result;
@@ -36,6 +39,11 @@ const SLOWEST: f64 = 0.1;
 
 /// Steps of a search for a top or a crossing.
 const STEPS: usize = 60;
+
+/// Imaginary part of an L that counts as real, relative, and how far |L| may differ between the lowest two frequencies
+/// and be level towards zero, relative.
+const REAL: f64 = 1e-6;
+const LEVEL: f64 = 1e-6;
 
 /// Local maxima below this share of the highest one are left as the grid has them.
 const HIGH: f64 = 0.7;
@@ -66,7 +74,7 @@ pub struct Plant {
     length: f64,
     every: f64,
     /// Poles outside the unit circle.
-    unstable: usize,
+    pub(super) unstable: usize,
 }
 
 impl Plant {
@@ -90,6 +98,12 @@ impl Plant {
         let mut plant = Self { frequency, answers: Vec::new(), turns, model, outputs, length, every: t, unstable };
         plant.answers = plant.frequency.iter().map(|&omega| plant.at(omega)).collect();
         Ok(plant)
+    }
+
+    /// Frequencies, the answers to a command there, and the frequencies as a sampled loop sees them.
+    pub(super) fn seen(&self) -> impl Iterator<Item = (f64, &Answer, &Turn)> {
+        let all = self.frequency.iter().zip(&self.answers).zip(&self.turns);
+        all.map(|((&omega, answer), turn)| (omega, answer, turn))
     }
 
     /// The answer to a command at ω, rad/s.
@@ -127,7 +141,20 @@ fn grid(model: &Discrete, t: f64, corners: &[f64]) -> Vec<f64> {
     frequency
 }
 
-/// The margins of a loop's frequency response.
+/// The break at which each margin is worst.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Breaks {
+    /// Of M_s.
+    pub sensitivity: Break,
+    /// Of M_t.
+    pub complementary: Break,
+    /// Of the gain margin.
+    pub gain: Break,
+    /// Of the phase margin.
+    pub phase: Break,
+}
+
+/// The margins of a sampled loop, each at the break at which it is worst.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Margins {
     /// Whether every pole of the closed loop lies within the unit circle, by Nyquist's criterion.
@@ -142,11 +169,15 @@ pub struct Margins {
     pub complementary_at: f64,
     /// Factor by which the gain can grow until the loop swings.
     pub gain: f64,
-    /// Phase at the crossover above −π, rad.
+    /// Angle between L and −1 where |L| = 1, rad.
     pub phase: f64,
-    /// Where |L| falls below 1, the first time, rad/s.
+    /// Where these are worst.
+    pub breaks: Breaks,
+    /// Whether the loop is the same wherever it is broken: the controller uses a single measurement.
+    pub has_one_loop: bool,
+    /// Where |L| of the loop that follows the reference falls below 1, the first time, rad/s.
     pub crossover: f64,
-    /// Where |S| rises above 1/√2, the first time, rad/s.
+    /// Where |S| of that loop rises above 1/√2, the first time, rad/s.
     pub bandwidth: f64,
     /// Where the way from the reference to the cart, T x/y without feed-forward, falls below 1/√2, the first time,
     /// rad/s.
@@ -203,7 +234,7 @@ impl Peaks {
     pub fn of(plant: &Plant, feedback: &Feedback) -> Self {
         let mut curve = Curve::on_grid(plant, feedback);
         curve.divide();
-        let peaks = [curve.highest(&Open::sensitivity).0, curve.highest(&Open::complementary).0];
+        let peaks = [curve.highest(Open::sensitivity).value, curve.highest(Open::complementary).value];
         let is_stable = curve.is_stable() && peaks[0].is_finite();
         Self { peaks: if is_stable { peaks } else { [f64::INFINITY; 2] } }
     }
@@ -237,18 +268,14 @@ impl Rough {
         let mut sums = [0.0; 2];
         let mut winding = Winding::new(plant);
         let mut before: Option<(f64, [f64; 2])> = None;
-        for ((&omega, answer), turn) in plant.frequency.iter().zip(&plant.answers).zip(&plant.turns) {
-            let terms = feedback.at_turn(turn);
-            let (inner, outer) = parted(&terms, answer);
-            let difference = inner + outer;
-            winding.go_on(omega, difference, turn);
-            // |S|², |T|² and |x/v|², in which 1 + L = difference/inner
-            let least = difference.norm_sqr().recip();
-            let followed = inner.norm_sqr() * least;
-            let own = terms.own.norm_sqr() * least;
-            let both = if terms.has_one_loop() { followed } else { followed.max(own) };
-            most = [most[0].max(both), most[1].max(outer.norm_sqr() * least)];
-            let parts = [answer.cart.norm_sqr() * own / omega, followed / omega];
+        let breaks = breaks(feedback);
+        for (omega, answer, turn) in plant.seen() {
+            let open = Open::of(answer, feedback, turn);
+            winding.go_on(omega, open.difference, turn);
+            // |S|² and |T|², |x/v|² and |S|² of what follows the reference
+            let squares = open.squares(breaks);
+            most = [most[0].max(squares[0]), most[1].max(squares[1])];
+            let parts = [open.pushed.norm_sqr() / omega, open.following().powi(2) / omega];
             if let Some((last, was)) = before.filter(|(last, _)| *last >= 2.0 * PI * SLOWEST) {
                 let way = 0.5 * (omega / last).ln();
                 for (sum, (a, b)) in sums.iter_mut().zip(was.iter().zip(parts)) {
@@ -266,93 +293,42 @@ impl Rough {
     }
 }
 
-/// D and what is closed inside the loop that is looked at, and that loop: D u = −(N_y y + N_x x + N_i i) is broken at
-/// the measured position, L = N_y G_y/(D + N_i G_i), and with a scale there: L = N_x G_x/(D + N_y G_y + N_i G_i).
-fn parted(terms: &Terms, answer: &Answer) -> (Complex<f64>, Complex<f64>) {
-    let inner = terms.own + terms.current * answer.current;
-    let outer = terms.position * answer.position;
-    match terms.scale == Complex::ZERO {
-        true => (inner, outer),
-        false => (inner + outer, terms.scale * answer.cart),
-    }
-}
-
-/// The loops at one frequency.
-#[derive(Debug, Clone, Copy)]
-pub struct Open {
-    /// L broken at the measured position; with a scale there.
-    pub position: Complex<f64>,
-    /// |S| of the loop broken at the command; 0 where it is the same.
-    command: f64,
-    /// 1 + L, times what has stable poles.
-    difference: Complex<f64>,
-    /// The cart's position per measured position, and per command.
-    cart: Complex<f64>,
-    pushed: Complex<f64>,
-}
-
-impl Open {
-    fn of(answer: &Answer, feedback: &Feedback, turn: &Turn) -> Self {
-        let terms = feedback.at_turn(turn);
-        let (inner, outer) = parted(&terms, answer);
-        let difference = inner + outer;
-        let command = if terms.has_one_loop() { 0.0 } else { (terms.own / difference).norm() };
-        // x = G_x D/(D + N_y G_y + N_x G_x + N_i G_i) v for a step v beside the command
-        let pushed = answer.cart * terms.own / difference;
-        // What follows the reference is the cart itself where it is measured.
-        let follows = if terms.scale == Complex::ZERO { answer.position } else { answer.cart };
-        Self { position: outer / inner, command, difference, cart: answer.cart / follows, pushed }
-    }
-
-    /// |S|, of the worse of both loops.
-    fn sensitivity(&self) -> f64 {
-        (self.position + 1.0).inv().norm().max(self.command)
-    }
-
-    /// |T|.
-    fn complementary(&self) -> f64 {
-        (self.position / (self.position + 1.0)).norm()
-    }
-
-    /// T x/y: from the reference to the cart, without feed-forward.
-    pub fn reference_to_cart(&self) -> Complex<f64> {
-        self.position / (self.position + 1.0) * self.cart
-    }
-
-    /// |T x/y|.
-    fn tracking(&self) -> f64 {
-        self.reference_to_cart().norm()
-    }
-}
-
-/// The loops at all frequencies of the axis.
-pub fn loops(plant: &Plant, feedback: &Feedback) -> Vec<Open> {
-    let one = |(turn, answer): (&Turn, &Answer)| Open::of(answer, feedback, turn);
-    plant.turns.iter().zip(&plant.answers).map(one).collect()
-}
-
 /// The loops along the frequencies.
 struct Curve<'a> {
     plant: &'a Plant,
     feedback: &'a Feedback,
+    breaks: &'static [Break],
     points: Vec<(f64, Open)>,
 }
+
+/// A top of |S| or |T|.
+#[derive(Clone, Copy)]
+struct Top {
+    value: f64,
+    /// rad/s
+    omega: f64,
+    at: Break,
+}
+
+/// Value of a loop broken at one place.
+type Of = fn(&Open, Break) -> f64;
 
 impl<'a> Curve<'a> {
     fn on_grid(plant: &'a Plant, feedback: &'a Feedback) -> Self {
         let points = plant.frequency.iter().copied().zip(loops(plant, feedback)).collect();
-        Self { plant, feedback, points }
+        Self { plant, feedback, breaks: breaks(feedback), points }
     }
 
     fn at(&self, omega: f64) -> Open {
         Open::of(&self.plant.at(omega), self.feedback, &Turn::of(omega, self.plant.every))
     }
 
-    /// Puts points between those from one of which to the next L or 1 + L turns by more than [`TURN`].
+    /// Puts points between those from one of which to the next one L or 1 + L turns by more than [`TURN`].
     fn divide(&mut self) {
+        let breaks = self.breaks;
         let turns = |a: &Open, b: &Open| {
-            let turn = |a: Complex<f64>, b: Complex<f64>| (b / a).arg().abs();
-            turn(a.difference, b.difference).max(turn(a.position, b.position)) > TURN
+            let turn = |a: Complex<f64>, b: Complex<f64>| (b / a).arg().abs() > TURN;
+            turn(a.difference, b.difference) || breaks.iter().any(|&at| turn(a.broken_at(at), b.broken_at(at)))
         };
         let mut done: Vec<(f64, Open)> = Vec::with_capacity(2 * self.points.len());
         let mut waiting: Vec<(f64, Open)> = self.points.iter().rev().copied().collect();
@@ -382,70 +358,104 @@ impl<'a> Curve<'a> {
     /// The margins of the curve, with every top and crossing followed to where it is.
     fn margins(&self) -> Margins {
         let stable = self.is_stable();
-        let (sensitivity, at) = self.highest(&Open::sensitivity);
-        let (complementary, complementary_at) = self.highest(&Open::complementary);
+        let (top, complementary) = (self.highest(Open::sensitivity), self.highest(Open::complementary));
+        let first = self.breaks[0];
         let mut margins = Margins {
-            stable: stable && sensitivity.is_finite(),
-            sensitivity,
-            at,
-            complementary,
-            complementary_at,
+            stable: stable && top.value.is_finite(),
+            sensitivity: top.value,
+            at: top.omega,
+            complementary: complementary.value,
+            complementary_at: complementary.omega,
             gain: f64::INFINITY,
             phase: f64::INFINITY,
+            breaks: Breaks { sensitivity: top.at, complementary: complementary.at, gain: first, phase: first },
+            has_one_loop: self.breaks.len() == 1,
             crossover: f64::NAN,
             bandwidth: f64::NAN,
             tracking: f64::NAN,
             disturbance: self.squared(&|open| open.pushed.norm_sqr()),
-            following: self.squared(&|open| (open.position + 1.0).inv().norm_sqr()),
+            following: self.squared(&|open| open.following().powi(2)),
         };
+        for &at in self.breaks {
+            self.cross(at, &mut margins);
+        }
         for pair in self.points.windows(2) {
             let [(_, was), (_, is)] = [pair[0], pair[1]];
-            let (a, b) = (was.position, is.position);
-            if (a.norm() - 1.0) * (b.norm() - 1.0) <= 0.0 && a.norm() != 1.0 {
-                let (omega, open) = self.crossing(pair, &|open| open.position.norm().ln());
-                // The angle from the negative axis; the nearest of all crossings counts.
-                margins.phase = margins.phase.min((-open.position).arg().abs());
-                if margins.crossover.is_nan() && a.norm() > 1.0 {
-                    margins.crossover = omega;
-                }
-            }
-            if a.im * b.im < 0.0 && a.re < 0.0 && b.re < 0.0 {
-                margins.cross(-self.crossing(pair, &|open| open.position.im).1.position.re);
-            }
+            let falls = |of: &dyn Fn(&Open) -> f64| of(&was) >= 0.0 && of(&is) < 0.0;
             let level = |value: f64| value.ln() - FRAC_1_SQRT_2.ln();
-            let of_s = |open: &Open| level((open.position + 1.0).inv().norm());
-            if margins.bandwidth.is_nan() && of_s(&was) < 0.0 && of_s(&is) >= 0.0 {
+            let of_l = |open: &Open| open.broken_at(open.outer()).norm().ln();
+            if margins.crossover.is_nan() && falls(&of_l) {
+                margins.crossover = self.crossing(pair, &of_l).0;
+            }
+            let of_s = |open: &Open| -level(open.following());
+            if margins.bandwidth.is_nan() && falls(&of_s) {
                 margins.bandwidth = self.crossing(pair, &of_s).0;
             }
-            let of_t = |open: &Open| level(open.tracking());
-            if margins.tracking.is_nan() && of_t(&was) >= 0.0 && of_t(&is) < 0.0 {
+            let of_t = |open: &Open| level(open.reference_to_cart().norm());
+            if margins.tracking.is_nan() && falls(&of_t) {
                 margins.tracking = self.crossing(pair, &of_t).0;
             }
-        }
-        // At half the sampling rate L is real.
-        if let Some((_, last)) = self.points.last()
-            && last.position.im.abs() <= 1e-6 * last.position.norm()
-        {
-            margins.cross(-last.position.re);
         }
         margins
     }
 
-    /// The highest value over all frequencies, and where.
-    fn highest(&self, value: &dyn Fn(&Open) -> f64) -> (f64, f64) {
-        let values: Vec<f64> = self.points.iter().map(|(_, open)| value(open)).collect();
-        let mut best = (0.0, 0.0);
-        for (&v, &(omega, _)) in values.iter().zip(&self.points) {
-            if v > best.0 || v.is_nan() {
-                best = (if v.is_nan() { f64::INFINITY } else { v }, omega);
+    /// Gain and phase margin of the loop broken there, where they are less than those of other breaks.
+    fn cross(&self, at: Break, margins: &mut Margins) {
+        let of = |open: &Open| open.broken_at(at);
+        // −L on the positive real axis
+        let mut grow = |size: f64| {
+            if size > 0.0 && size < 1.0 && 1.0 / size < margins.gain {
+                (margins.gain, margins.breaks.gain) = (1.0 / size, at);
+            }
+        };
+        for pair in self.points.windows(2) {
+            let (a, b) = (of(&pair[0].1), of(&pair[1].1));
+            if a.im * b.im < 0.0 && a.re < 0.0 && b.re < 0.0 {
+                grow(-of(&self.crossing(pair, &|open| of(open).im).1).re);
+            }
+            if (a.norm() - 1.0) * (b.norm() - 1.0) <= 0.0 && a.norm() != 1.0 {
+                let open = self.crossing(pair, &|open| of(open).norm().ln()).1;
+                // The angle from the negative axis; the nearest of all crossings counts.
+                let angle = (-of(&open)).arg().abs();
+                if angle < margins.phase {
+                    (margins.phase, margins.breaks.phase) = (angle, at);
+                }
             }
         }
-        let level = HIGH * best.0;
-        for k in (1..values.len().saturating_sub(1)).filter(|_| level.is_finite()) {
-            if values[k] >= level && values[k] >= values[k - 1] && values[k] >= values[k + 1] {
-                let (top, omega) = self.top(self.points[k - 1].0, self.points[k + 1].0, value);
-                if top > best.0 {
-                    best = (top, omega);
+        // At half the sampling rate L is real; so it is at zero frequency where it neither grows nor falls towards it.
+        let is_real = |l: Complex<f64>| l.im.abs() <= REAL * l.norm();
+        if let Some(last) = self.points.last().map(|(_, open)| of(open)).filter(|l| is_real(*l)) {
+            grow(-last.re);
+        }
+        if let [(_, first), (_, second), ..] = &self.points[..]
+            && is_real(of(first))
+            && (of(second).norm() / of(first).norm() - 1.0).abs() < LEVEL
+        {
+            grow(-of(first).re);
+        }
+    }
+
+    /// The highest value over all frequencies and breaks.
+    fn highest(&self, value: Of) -> Top {
+        let of = |at: Break| -> Vec<f64> { self.points.iter().map(|(_, open)| value(open, at)).collect() };
+        let values: Vec<(Break, Vec<f64>)> = self.breaks.iter().map(|&at| (at, of(at))).collect();
+        let mut best = Top { value: 0.0, omega: 0.0, at: self.breaks[0] };
+        for (at, values) in &values {
+            for (&v, &(omega, _)) in values.iter().zip(&self.points) {
+                if v > best.value || v.is_nan() {
+                    best = Top { value: if v.is_nan() { f64::INFINITY } else { v }, omega, at: *at };
+                }
+            }
+        }
+        let level = HIGH * best.value;
+        for (at, values) in values.iter().filter(|_| level.is_finite()) {
+            for k in 1..values.len().saturating_sub(1) {
+                if values[k] >= level && values[k] >= values[k - 1] && values[k] >= values[k + 1] {
+                    let of = |open: &Open| value(open, *at);
+                    let (top, omega) = self.top(self.points[k - 1].0, self.points[k + 1].0, &of);
+                    if top > best.value {
+                        best = Top { value: top, omega, at: *at };
+                    }
                 }
             }
         }
@@ -501,71 +511,5 @@ impl<'a> Curve<'a> {
             .map(|pair| 0.5 * (part(&pair[0]) + part(&pair[1])) * (pair[1].0 / pair[0].0).ln())
             .sum();
         (sum / PI).sqrt()
-    }
-}
-
-impl Margins {
-    /// L passes the negative real axis at −`size`.
-    fn cross(&mut self, size: f64) {
-        if size > 0.0 && size < 1.0 {
-            self.gain = self.gain.min(1.0 / size);
-        }
-    }
-}
-
-/// Nyquist's criterion: F(z) = (1 + L)(1 − 1/z)^m, with m poles at z = 1, turns by π (P − Z) from θ = 0 to π, P poles
-/// of the axis and Z of the closed loop being outside.
-struct Winding {
-    unstable: f64,
-    /// The first two of ω and 1 + L, of which m is known.
-    first: Option<(f64, Complex<f64>, Turn)>,
-    poles: i32,
-    /// F where it begins and where it is, whole turns between, and whether all were numbers.
-    start: Complex<f64>,
-    now: Complex<f64>,
-    turns: f64,
-    is_number: bool,
-}
-
-impl Winding {
-    fn new(plant: &Plant) -> Self {
-        let zero = Complex::ZERO;
-        let unstable = plant.unstable as f64;
-        Self { unstable, first: None, poles: 0, start: zero, now: zero, turns: 0.0, is_number: true }
-    }
-
-    /// On to the next frequency.
-    fn go_on(&mut self, omega: f64, difference: Complex<f64>, turn: &Turn) {
-        self.is_number &= difference.re.is_finite() && difference.im.is_finite() && difference != Complex::ZERO;
-        let Some((w0, begin, at)) = self.first else {
-            self.first = Some((omega, difference, *turn));
-            return;
-        };
-        if self.start == Complex::ZERO {
-            // |F| ~ ω^−m
-            self.poles = -((difference.norm() / begin.norm()).ln() / (omega / w0).ln()).round() as i32;
-            self.start = begin * at.lag().powi(self.poles);
-            self.now = self.start;
-        }
-        let (was, is) = (self.now, difference * turn.lag().powi(self.poles));
-        // The way from one to the next crosses the negative real axis where both are on other sides of the axis and
-        // their cross product tells that zero is to the right.
-        let cross = was.re * is.im - is.re * was.im;
-        match (was.im < 0.0, is.im < 0.0) {
-            (false, true) if cross > 0.0 => self.turns += 1.0,
-            (true, false) if cross < 0.0 => self.turns -= 1.0,
-            _ => {}
-        }
-        self.now = is;
-    }
-
-    /// Whether no pole of the closed loop is outside.
-    fn is_stable(&self) -> bool {
-        let arg = |v: Complex<f64>| (v.im + 0.0).atan2(v.re);
-        // It begins on the real axis.
-        let start = arg(if self.start.re < 0.0 { -self.start } else { self.start });
-        let sum = start + arg(self.now) - arg(self.start) + 2.0 * PI * self.turns;
-        let outside = self.unstable - (sum / PI).round();
-        self.is_number && self.first.is_some() && start.abs() < 0.5 && outside == 0.0
     }
 }

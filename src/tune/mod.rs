@@ -4,44 +4,50 @@
 //! The recipe is [`tune`]; [`evaluate`] judges without a search. What is found is rounded to four digits, and
 //! everything that is said holds for the rounded gains.
 
+mod ahead;
 mod by_moves;
 mod edge;
 mod evolution;
 mod family;
 mod gains;
 mod hunting;
+mod loops;
 mod margins;
 mod moves;
 mod objective;
-mod placement;
 mod reference;
 mod rules;
 mod search;
 pub mod trouble;
+mod unknown;
 mod verdict;
 mod watch;
 mod way_back;
+mod winding;
 mod work;
 
+pub use crate::design::placement::{first, place};
+pub use ahead::Ahead;
 pub use evolution::evolve;
-pub use family::{Corner, Family, MACHINES, SPREAD, Source, Unknown};
+pub use family::{Corner, Family, MACHINES, SPREAD, Source};
 pub use gains::{Gain, gains};
 pub use hunting::{Hunt, hunting};
-pub use margins::{Answer, Margins, Open, Peaks, Plant, Rough, loops};
+pub use loops::{Break, Open, breaks, loops};
+pub use margins::{Answer, Breaks, Margins, Peaks, Plant, Rough};
 pub use objective::{AtWorst, BALANCES, Balance, MoveFigures, look, objective};
-pub use placement::{first, place};
 pub use reference::evolved;
 pub use search::{Found, minimise, minimise_below};
-pub use verdict::{Figure, Forced, Judgement, Least, Limit, MoveVerdict, Verdict, Worse};
+pub use unknown::Unknown;
+pub use verdict::{Figure, Forced, Judgement, Least, Limit, MoveVerdict, Standing, Verdict, Worse};
 
-use crate::case::{Case, Cost, EFFORTS, Move, Tuning};
+use crate::case::{Case, Cost, EFFORTS, Files, Move, Tuning};
 use crate::control::feedback::Feedback;
-use crate::design::Design;
+use crate::design::{Design, Pid, Structure};
 use crate::error::{Error, Result};
 use crate::stage::BeltModel;
 use by_moves::{Bars, Tried, WIDE, Weighed};
 use std::path::Path;
-use verdict::compare;
+use verdict::{compare, forced_by_file, worse};
 use watch::Watch;
 use work::{Finalist, Work};
 
@@ -57,6 +63,10 @@ const NEARBY: usize = 2;
 const SOFT: f64 = 3.0;
 const HARD: f64 = 30.0;
 
+/// Factor by which integral action is made less where a loop hunts more than before, and least of it.
+const CALMER: f64 = 0.4;
+const CALMEST: f64 = 0.01;
+
 /// The name of what was taken where no balance chose it.
 const CHOSEN: &str = "chosen";
 
@@ -69,7 +79,11 @@ pub struct Tuned {
     pub after: Verdict,
     /// The judgement.
     pub judgement: Judgement,
-    /// The limit that makes it worse, where one does.
+    /// What to do where it is worse, if something is known.
+    pub advice: Option<String>,
+    /// The feed-forward that makes the moves better than the gains alone, if one does.
+    pub ahead: Option<Ahead>,
+    /// The limit that makes it worse; some wherever it is worse.
     pub forced: Option<Forced>,
     /// Where it is worse: what comes nearest to being no worse.
     pub least: Option<Least>,
@@ -85,7 +99,7 @@ pub struct Tuned {
     pub holds: bool,
     /// Rounds, and designs that were tried; none of an evaluation.
     pub work: (usize, usize),
-    /// Samples of moves that were simulated.
+    /// Samples of moves that the search simulated.
     pub samples: u64,
     /// The first mode of a belt that has no damping at all, Hz.
     pub undamped: Option<f64>,
@@ -148,9 +162,13 @@ pub fn tune(case: &Case, tuning: &Tuning, stop: &dyn Fn() -> bool) -> Result<Tun
             "no gains of this structure that were tried keep Ms within {} and Mt within {} over the family",
             tuning.sensitivity, tuning.complementary
         ))
-        .next(
-            "allow a larger tune.sensitivity and tune.complementary, a smaller spread, or give it another structure",
-        ));
+        .next(match without_derivative(case, design) {
+            Some(advice) => advice,
+            None => {
+                "allow a larger tune.sensitivity and tune.complementary, a smaller spread, or give it another structure"
+                    .to_string()
+            }
+        }));
     };
     let (after, forced, choices) = match cost {
         Cost::Disturbance => {
@@ -170,19 +188,21 @@ pub fn tune(case: &Case, tuning: &Tuning, stop: &dyn Fn() -> bool) -> Result<Tun
                 Judgement::Better | Judgement::Unchanged => (after, choices),
             };
             let (after, forced) = work.way_back(&before, after)?;
+            let after = work.calmer(&before, after)?;
             (after.clone(), forced, marked(choices, &after))
         }
     };
     // What is no better stays as it was.
     let after = if is_good && compare(&before, &after) != Judgement::Better { before.clone() } else { after };
-    ended(&work, before, (after, forced), choices, placed)
+    let tuned = ended(&work, before, (after, forced), choices, placed)?;
+    Ok(Tuned { ahead: work.ahead(&tuned.after)?, ..tuned })
 }
 
 /// The controller, the family and the moves of a case.
 fn beginning<'a>(case: &'a Case, tuning: &Tuning) -> Result<(&'a Design, Family, Vec<Move>)> {
     let design = case.controller.as_ref().ok_or_else(|| {
         Error::new("this case has no controller to tune")
-            .next("add [controller] with every and for example pid = { proportional = \"2 V/mm\" }")
+            .next(format!("add [controller] with for example {}", case.suggested_controller()))
     })?;
     Feedback::new(design, &case.stage)?;
     if !EFFORTS.contains(&tuning.effort) {
@@ -299,6 +319,33 @@ impl Work<'_> {
     }
 }
 
+/// What to add to a PID controller without a derivative, where gains of it do not do.
+fn without_derivative(case: &Case, design: &Design) -> Option<String> {
+    let Structure::Pid(Pid { derivative: 0.0, .. }) = design.structure else { return None };
+    let such_as = case.suggested_derivative(design);
+    Some(format!("add a derivative to controller.pid, for example {such_as}: nothing else damps this loop"))
+}
+
+impl Work<'_> {
+    /// Where gains are worse by hunting alone, the same with less integral action, if no figure is worse with that.
+    fn calmer(&mut self, before: &Verdict, after: Verdict) -> Result<Verdict> {
+        let is_calm = worse(before, &after).is_none_or(|worse| worse.figure != Figure::Hunting);
+        let mut factor = CALMER;
+        while !is_calm && factor >= CALMEST && !(self.stop)() {
+            let Some(design) = hunting::integral_times(&after.design, factor) else { break };
+            let design = gains::rounded(&design);
+            if !self.passes(&design)? {
+                let verdict = self.verdict(&design)?;
+                if compare(before, &verdict) != Judgement::Worse {
+                    return Ok(verdict);
+                }
+            }
+            factor *= CALMER;
+        }
+        Ok(after)
+    }
+}
+
 /// The choices with that one marked which was taken, and with a row of its own if it is none of them.
 fn marked(mut choices: Vec<Choice>, after: &Verdict) -> Vec<Choice> {
     for choice in &mut choices {
@@ -321,14 +368,19 @@ fn ended(
     placed: Option<f64>,
 ) -> Result<Tuned> {
     let judgement = compare(&before, &after);
+    let reason = || forced_by_file(work.family, &before, work.tuning, placed);
+    let forced = forced.or_else(|| (judgement == Judgement::Worse).then(reason));
     let least = if judgement == Judgement::Worse { work.least(&before) } else { None };
     let before = work.watched(before)?;
     let after = if before.design == after.design { before.clone() } else { work.watched(after)? };
     let belt = &work.case.stage.belt;
     let modes = work.modes().map(|(modes, _)| modes).unwrap_or_default();
     let is_undamped = belt.model != BeltModel::Rigid && belt.damping.iter().all(|damping| *damping == 0.0);
+    let advice = (judgement == Judgement::Worse).then(|| without_derivative(work.case, &before.design)).flatten();
     Ok(Tuned {
         judgement,
+        advice,
+        ahead: None,
         forced,
         least,
         choices,
@@ -368,7 +420,7 @@ impl Tuned {
             changes.push(format!("controller.filters={after}"));
         }
         let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-        let read = Case::from_text_with(name, &case.text, &changes)?;
+        let read = Case::from_text_for(name, &case.text, &changes, Files::Nothing)?;
         match read.controller.as_ref() == Some(&self.after.design) {
             true => Ok(read.text),
             false => Err(Error::new("the gains that were found do not read back as what they are").in_file(name)),

@@ -1,11 +1,12 @@
 //! The moves that a controller is judged by, and the current that they ask for.
 
 use crate::case::{Case, Move};
-use crate::control::compensation::{Compensation, Rigid};
+use crate::control::compensation::Compensation;
 use crate::control::measures_cart;
 use crate::design::{Design, FeedForward};
 use crate::error::Result;
 use crate::signal::profile::{Leg, Limits, Profile};
+use crate::stage::rigid::Rigid;
 use crate::stage::{AmplifierMode, Stage};
 
 /// Share of what the command's limit allows of speed and of force that a standard move takes.

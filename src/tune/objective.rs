@@ -57,7 +57,7 @@ pub struct MoveFigures {
 
 /// A move on one axis.
 pub fn look(stage: &Stage, model: &Stage, design: &Design, motion: &Move) -> Result<MoveFigures> {
-    Runner::new(model, design)?.look(stage, motion, &motion.profile.clone().shaped(&design.shaper))
+    Runner::new(model, design)?.look(stage, motion, &motion.reference(design))
 }
 
 /// A controller that is made once and run through many moves.
@@ -191,7 +191,7 @@ mod tests {
             let design = case.controller.as_ref().unwrap();
             let mut runner = Runner::new(&case.stage, design).unwrap();
             for motion in &case.moves {
-                let shaped = motion.profile.clone().shaped(&design.shaper);
+                let shaped = motion.reference(design);
                 let whole = runner.look(&case.stage, motion, &shaped).unwrap();
                 let glance = runner.glance(&case.stage, motion, &shaped).unwrap();
                 let told = format!("{name}: {}: {whole:?} {glance:?}", motion.name);

@@ -1,8 +1,8 @@
 //! Gains to begin a search with, by several rules, and filters that may pay.
 
-use super::placement::{first, place};
-use crate::control::compensation::Rigid;
+use crate::design::placement::{first, place};
 use crate::design::{Design, Filter, Pid, StateFeedback, Structure};
+use crate::stage::rigid::Rigid;
 use crate::stage::{AmplifierMode, Stage};
 use std::f64::consts::PI;
 

@@ -1,7 +1,8 @@
 //! The verdict on a controller over the family, and whether one is better than another.
 
 use super::family::{Corner, Family, modes_along};
-use super::hunting::{Hunt, hunting};
+use super::hunting::{Hunt, hunting, hunts};
+use super::loops::Break;
 use super::margins::Margins;
 use super::objective::{AtWorst, BALANCES, MoveFigures, Runner, objective};
 use super::watch::Watch;
@@ -36,7 +37,7 @@ pub struct Verdict {
     pub objective: f64,
     /// Its moves.
     pub moves: Vec<MoveVerdict>,
-    /// Its limit cycle at rest, if there is one; looked for of the gains of the file and of those that were chosen.
+    /// Its limit cycle at rest, if there is one.
     pub hunt: Option<Hunt>,
 }
 
@@ -89,6 +90,8 @@ pub enum Limit {
     Sensitivity,
     /// M_t.
     Complementary,
+    /// The bandwidth that gains are placed for, without a search.
+    Bandwidth,
 }
 
 impl Limit {
@@ -97,6 +100,7 @@ impl Limit {
         match self {
             Self::Sensitivity => "sensitivity",
             Self::Complementary => "complementary",
+            Self::Bandwidth => "bandwidth",
         }
     }
 }
@@ -110,6 +114,8 @@ pub enum Figure {
     Settling,
     /// Axes on which it settles.
     Settled,
+    /// Half of what the cart goes to and fro at rest, m; no figure of a move.
+    Hunting,
 }
 
 impl Figure {
@@ -119,6 +125,7 @@ impl Figure {
             Self::Error => "cart_error_m",
             Self::Settling => "settling_s",
             Self::Settled => "settled",
+            Self::Hunting => "hunting_m",
         }
     }
 }
@@ -126,15 +133,16 @@ impl Figure {
 /// The figure of all moves that is worse by most than before.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Worse {
-    /// The place of the move in the list.
-    pub motion: usize,
+    /// The place of the move in the list; none of hunting.
+    pub motion: Option<usize>,
     /// Which figure.
     pub figure: Figure,
-    /// It, m, s or axes.
+    /// It, m, s or axes; 0 of an axis that rests.
     pub before: f64,
-    /// It, m, s or axes.
+    /// It, m, s or axes; not a number of a slip that was not waited for.
     pub after: f64,
-    /// By what share of what it was, of a settling below 50 ms of these, of the axes those on which it settles no more.
+    /// By what share of what it was, of a settling below 50 ms of these, of the axes those on which it settles no more;
+    /// infinite of hunting where it rested.
     pub by: f64,
 }
 
@@ -150,11 +158,34 @@ pub struct Least {
     pub objective: f64,
 }
 
-/// The limit that is active at gains that are worse than those before.
+/// At which gains a limit stands that makes others worse than those of the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Standing {
+    /// Where the way from what was found back to the file ends.
+    WayBack,
+    /// At the gains of the file themselves, which break it.
+    File,
+}
+
+impl Standing {
+    /// As in `tune.json`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::WayBack => "way_back",
+            Self::File => "file",
+        }
+    }
+}
+
+/// The limit that forces gains that are worse than those before.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Forced {
-    /// The limit that is active there.
+    /// The limit.
     pub limit: Limit,
+    /// Where it stands.
+    pub standing: Standing,
+    /// Where the loop is broken for it.
+    pub at: Break,
     /// Where, Hz: the mode of the axis that stands there, or the top itself.
     pub mode: f64,
     /// Cart position, m.
@@ -215,7 +246,7 @@ impl Verdict {
 }
 
 impl Work<'_> {
-    /// A verdict with its limit cycle at rest.
+    /// A verdict with its limit cycle at rest, and with what that needs.
     pub fn watched(&self, verdict: Verdict) -> Result<Verdict> {
         let hunt =
             if verdict.nominal.stable && !(self.stop)() { hunting(&self.case.stage, &verdict.design)? } else { None };
@@ -229,7 +260,7 @@ impl Work<'_> {
         }
         let all: Vec<usize> = (0..=self.family.machines.len()).collect();
         let verdict = self.judged(design, (f64::INFINITY, &all))?;
-        let verdict = verdict.expect("without a bar there is a verdict");
+        let verdict = self.hunted(verdict.expect("without a bar there is a verdict"))?;
         self.known.borrow_mut().push(verdict.clone());
         Ok(verdict)
     }
@@ -240,9 +271,18 @@ impl Work<'_> {
         if let Some(known) = self.known.borrow().iter().find(|known| known.design == *design) {
             return Ok(Some(known.clone()).filter(|known| known.objective <= bar));
         }
-        let verdict = self.judged(design, (bar, order))?;
+        let verdict = self.judged(design, (bar, order))?.map(|verdict| self.hunted(verdict)).transpose()?;
         self.known.borrow_mut().extend(verdict.clone());
         Ok(verdict)
+    }
+
+    /// A verdict with its limit cycle at rest, which is looked for where no figure is worse than of the first one.
+    fn hunted(&self, verdict: Verdict) -> Result<Verdict> {
+        let is_worse = self.known.borrow().first().is_some_and(|first| worse(first, &verdict).is_some());
+        if is_worse || !verdict.nominal.stable || (self.stop)() {
+            return Ok(verdict);
+        }
+        Ok(Verdict { hunt: hunts(&self.case.stage, &verdict.design)?, ..verdict })
     }
 
     fn judged(&self, design: &Design, (bar, order): (f64, &[usize])) -> Result<Option<Verdict>> {
@@ -332,7 +372,8 @@ pub(super) fn compare(before: &Verdict, after: &Verdict) -> Judgement {
     if worse(before, after).is_some() {
         return Judgement::Worse;
     }
-    let holds_more = after.worst.sensitivity < before.worst.sensitivity * (1.0 - SAME);
+    let rests = before.hunt.is_some() && after.hunt.is_none();
+    let holds_more = rests || after.worst.sensitivity < before.worst.sensitivity * (1.0 - SAME);
     if after.objective < before.objective - SAME || holds_more { Judgement::Better } else { Judgement::Unchanged }
 }
 
@@ -360,11 +401,17 @@ pub(super) fn worse(before: &Verdict, after: &Verdict) -> Option<Worse> {
             (lost > 0.0, (Figure::Settled, was.settled as f64, is.settled as f64, lost / axes)),
         ];
         let told = figures.into_iter().filter(|(is_worse, _)| *is_worse);
-        told.map(move |(_, (figure, before, after, by))| Worse { motion, figure, before, after, by })
+        told.map(move |(_, (figure, before, after, by))| Worse { motion: Some(motion), figure, before, after, by })
             .collect::<Vec<_>>()
     };
     let all = before.moves.iter().zip(&after.moves).enumerate().flat_map(of_move);
-    all.max_by(|a, b| a.by.total_cmp(&b.by))
+    let hunts = after.hunt.as_ref().filter(|hunt| hunt.is_more_than(before.hunt.as_ref()));
+    let hunts = hunts.map(|hunt| {
+        let was = before.hunt.as_ref().map_or(0.0, |hunt| hunt.amplitude);
+        let by = if was > 0.0 { hunt.amplitude / was - 1.0 } else { f64::INFINITY };
+        Worse { motion: None, figure: Figure::Hunting, before: was, after: hunt.amplitude, by }
+    });
+    all.chain(hunts).max_by(|a, b| a.by.total_cmp(&b.by))
 }
 
 impl Work<'_> {
@@ -384,16 +431,29 @@ const ACTIVE: f64 = 0.96;
 
 /// The limit that is active at a design, if one is: a search that only failed to find better gains proves nothing.
 pub(super) fn forced(family: &Family, after: &Verdict, tuning: &Tuning) -> Option<Forced> {
-    let worst = &after.worst;
-    if worst.excess(tuning.sensitivity, tuning.complementary) < ACTIVE {
-        return None;
+    let is_active = after.worst.excess(tuning.sensitivity, tuning.complementary) >= ACTIVE;
+    is_active.then(|| limiting(family, after, tuning, Standing::WayBack))
+}
+
+/// The limit that forces gains to be worse where no other is active: the one that the gains of the file break, and the
+/// bandwidth that was asked for where they break none.
+pub(super) fn forced_by_file(family: &Family, before: &Verdict, tuning: &Tuning, placed: Option<f64>) -> Forced {
+    let own = limiting(family, before, tuning, Standing::File);
+    match before.worst.excess(tuning.sensitivity, tuning.complementary) <= 1.0 {
+        true => Forced { limit: Limit::Bandwidth, mode: placed.unwrap_or(own.mode), ..own },
+        false => own,
     }
+}
+
+/// The limit that is nearest at a design.
+fn limiting(family: &Family, after: &Verdict, tuning: &Tuning, standing: Standing) -> Forced {
+    let worst = &after.worst;
     let is_sensitivity = worst.sensitivity / tuning.sensitivity >= worst.complementary / tuning.complementary;
-    let (limit, omega) = match is_sensitivity {
-        true => (Limit::Sensitivity, worst.at),
-        false => (Limit::Complementary, worst.complementary_at),
+    let (limit, omega, at) = match is_sensitivity || !worst.stable {
+        true => (Limit::Sensitivity, worst.at, worst.breaks.sensitivity),
+        false => (Limit::Complementary, worst.complementary_at, worst.breaks.complementary),
     };
     let there = modes_along(&family.stage_at(&after.corner), &[after.corner.place]).unwrap_or_default();
     let modes: Vec<f64> = there.iter().flat_map(|place| place.undamped_resonances.iter().copied()).collect();
-    Some(Forced { limit, mode: mode_at(omega, &modes), place: after.corner.place })
+    Forced { limit, standing, at, mode: mode_at(omega, &modes), place: after.corner.place }
 }

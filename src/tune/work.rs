@@ -107,7 +107,7 @@ impl<'a> Work<'a> {
             tuning,
             moves,
             asked,
-            shaped: moves.iter().map(|motion| motion.profile.clone().shaped(&design.shaper)).collect(),
+            shaped: moves.iter().map(|motion| motion.reference(design)).collect(),
             stages: family.machines.iter().map(|machine| family.stage_at(machine)).collect(),
             plants,
             set: vec![0],

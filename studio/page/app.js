@@ -5,10 +5,25 @@ import {Wire, Mistake} from "./wire.js";
 
 /** @typedef {import("./wire.js").Answer} Answer */
 /** The case as it was: a text, and the changes that were not in it yet.
- * @typedef {{text: string, set: [string, number][]}} State */
-/** @typedef {"run"|"text"|"mistake"|"cursor"|"window"|"compare"|"play"|"opened"|"view"|"theme"} What */
+ * @typedef {{text: string, set: [string, number | string][]}} State */
+/** A case that can be returned to: its state, where it is from, and what was done with it.
+ * @typedef {Object} Case
+ * @property {string} name
+ * @property {string} path
+ * @property {number} experiment
+ * @property {string} original
+ * @property {string} safe
+ * @property {string} base
+ * @property {[string, number | string][]} set
+ * @property {State[]} past
+ * @property {State[]} future
+ * @property {boolean} isTouched
+ * @property {boolean} isBuiltIn
+ * @property {boolean} isUnsaved
+ * @property {string} at when it was left */
+/** @typedef {"run"|"text"|"mistake"|"cursor"|"window"|"compare"|"play"|"leave"|"opened"|"view"|"theme"} What */
 
-const MOST_UNDO = 200, MOST_PINS = 6;
+const MOST_UNDO = 200, MOST_PINS = 6, MOST_MOVED = 4;
 
 export class App {
   constructor() {
@@ -19,16 +34,24 @@ export class App {
     this.name = "studio.toml";
     /** The text that was opened. */
     this.original = "";
+    /** The text as it stands elsewhere too: as it was opened, saved or downloaded. */
+    this.safe = "";
+    /** Whether somebody changed the case. */
+    this.isTouched = false;
+    /** Whether it came with the program. */
+    this.isBuiltIn = false;
     /** The text that changes start from. */
     this.base = "";
     /** The text as it is shown. */
     this.text = "";
-    /** Changes of a drag under way, keys to SI values. @type {Map<string, number>} */
+    /** Changes that are not in the text yet: keys to values in SI, or with a unit. @type {Map<string, number | string>} */
     this.pending = new Map();
     /** @type {State[]} */
     this.past = [];
     /** @type {State[]} */
     this.future = [];
+    /** Keys of the parameters that were changed last, the newest first. @type {string[]} */
+    this.moved = [];
     this.experiment = 0;
     /** @type {Answer | null} */
     this.run = null;
@@ -54,8 +77,10 @@ export class App {
     this.view = "motion";
     this.gesture = false;
     this.sent = 0;
+    /** Whether the run is that of the case as it is now. */
+    this.isCurrent = false;
     this.needsDescription = true;
-    this.lastEdit = 0;
+    this.lastEdit = -Infinity;
     /** The run that is on the screen. @type {Answer | null} */
     this.drawn = null;
     /** Tells those who do not see the page; `main.js` says how. @type {(text: string) => void} */
@@ -96,16 +121,27 @@ export class App {
 
   // ---- The text and its history
 
-  /** Opens a case. @param {string} text @param {{name?: string, path?: string, experiment?: number}} [of] */
-  open(text, {name = "studio.toml", path = "", experiment = 0} = {}) {
+  /** Opens a case. @param {string} text @param {Partial<Case>} [of] */
+  open(text, {name = "studio.toml", path = "", experiment = 0, original = text, safe = text, set = [], past = [], future = [], isTouched = false, isBuiltIn = false} = {}) {
+    this.tell("leave");
     Object.assign(this, {
-      name, path, experiment, original: text, base: text, text, past: [], future: [], before: null, pins: [], window: null,
-      section: null, cursor: 0, isPlaying: false, needsDescription: true, run: null, mistake: null,
+      name, path, experiment, original, safe, base: text, text, past, future, isTouched, isBuiltIn, before: null, pins: [], window: null,
+      section: null, cursor: 0, isPlaying: false, needsDescription: true, run: null, mistake: null, gesture: false, lastEdit: -Infinity, moved: [],
     });
-    this.pending.clear();
+    this.pending = new Map(set);
     this.tell("text", "window", "compare", "play", "cursor");
     this.ask(() => this.tell("opened"));
   }
+
+  /** The case as it can be opened again. @returns {Case} */
+  get case() {
+    const {name, path, experiment, original, safe, base, past, future, isTouched, isBuiltIn, isUnsaved} = this;
+    const at = new Date().toTimeString().slice(0, 5);
+    return {name, path, experiment, original, safe, base, set: [...this.pending], past, future, isTouched, isBuiltIn, isUnsaved, at};
+  }
+
+  /** Whether there is work that stands nowhere else. */
+  get isUnsaved() { return this.isTouched && (this.text !== this.safe || this.pending.size > 0); }
 
   /** The case, as it is remembered. @returns {State} */
   get present() { return {text: this.base, set: [...this.pending]}; }
@@ -116,16 +152,17 @@ export class App {
     if (JSON.stringify(present) !== JSON.stringify(this.past[this.past.length - 1])) this.past.push(present);
     if (this.past.length > MOST_UNDO) this.past.shift();
     this.future = [];
+    this.isTouched = true;
     this.before = this.run;
   }
 
   /** A new text, typed or from elsewhere. @param {string} text @param {boolean} [typed] */
   edit(text, typed = false) {
-    if (text === this.text) return;
+    if (text === this.text && !this.pending.size) return;
     const now = performance.now();
     // What is typed in one go is undone in one go.
     if (!typed || now - this.lastEdit > 1500) this.remember();
-    this.lastEdit = typed ? now : 0;
+    this.lastEdit = typed ? now : -Infinity;
     this.base = this.text = text;
     this.pending.clear();
     this.needsDescription = true;
@@ -133,19 +170,37 @@ export class App {
     this.ask();
   }
 
-  /** A parameter under a slider. @param {string} key @param {number} value in SI */
+  /** A parameter under a slider, or typed. @param {string} key @param {number | string} value in SI, or with a unit */
   drag(key, value) {
-    if (!this.gesture) { this.gesture = true; this.remember(); }
+    const isFirst = !this.gesture;
+    if (isFirst) { this.gesture = true; this.remember(); }
+    if (!this.moved.includes(key)) this.moved = [key, ...this.moved].slice(0, MOST_MOVED);
     this.pending.set(key, value);
     this.ask();
+    // It can be undone, even where it is refused.
+    if (isFirst) this.tell("text");
   }
 
+  /** Takes a change back that was refused. @param {string} key */
+  withdraw(key) { if (this.mistake && this.pending.delete(key)) this.ask(); }
+
   /** The end of a drag. */
-  drop() { this.gesture = false; }
+  drop() {
+    if (!this.gesture) return;
+    this.gesture = false;
+    // Otherwise the answer that is under way does it.
+    if (this.isCurrent) { this.settle(); this.tell("text"); }
+  }
+
+  /** What was dragged is part of the text now. */
+  settle() {
+    this.base = this.text;
+    this.pending.clear();
+  }
 
   undo() { this.turn(this.past, this.future); }
   redo() { this.turn(this.future, this.past); }
-  reset() { if (this.text !== this.original) this.edit(this.original); }
+  reset() { this.edit(this.original); }
 
   /** @param {State[]} from @param {State[]} to */
   turn(from, to) {
@@ -168,6 +223,7 @@ export class App {
   /** Asks for the run of the case as it is now. @param {() => void} [then] */
   ask(then) {
     this.sent++;
+    this.isCurrent = false;
     let asked = this.sent, describes = false;
     this.wire.newest("run", () => {
       asked = this.sent;
@@ -204,9 +260,9 @@ export class App {
       }
     }
     if (isLast) {
-      // What was dragged is part of the text now.
+      this.isCurrent = true;
       this.text = answer.head.text;
-      if (!this.gesture) { this.base = this.text; this.pending.clear(); }
+      if (!this.gesture) this.settle();
       this.tell("text");
     }
     if (this.cursor > this.until) this.cursor = this.until;

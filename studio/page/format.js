@@ -38,7 +38,14 @@ export function element(tag, attributes = {}, ...children) {
   return made;
 }
 
-/** The same for a drawing.
+/** Details behind a summary, as a group with a name: browsers give it none.
+ * @param {Object<string, any>} attributes @param {string} words of the summary @param {string} name
+ * @param {...(Node|string|null|undefined)} children @returns {any} */
+export function fold(attributes, words, name, ...children) {
+  return element("details", {...attributes, "aria-label": name}, element("summary", {"aria-label": name === words ? null : name}, words), ...children);
+}
+
+/** An element of a drawing.
  * @param {string} tag @param {Object<string, any>} [attributes] @param {...(Node|string)} children
  * @returns {any} */
 export function svg(tag, attributes = {}, ...children) {

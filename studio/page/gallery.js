@@ -10,7 +10,7 @@ export const key = "gallery", name = "Gallery";
 /** @param {HTMLElement} root @param {App} app */
 export function mount(root, app) {
   const list = element("ul", {class: "gallery"});
-  root.append(element("h2", {}, "Machines to start from"), element("p", {class: "quiet"}, "Each opens as a case of its own; nothing is saved."), list);
+  root.append(element("h2", {}, "Machines to start from"), element("p", {class: "quiet"}, "Each opens as a case of its own. The menu “Case” leads back to the case that you leave."), list);
   let isThere = false;
   app.on("view", async () => {
     if (app.view !== key || isThere) return;
@@ -20,7 +20,7 @@ export function mount(root, app) {
     list.replaceChildren(...head.stages.map((stage, k) => {
       pictures[k].root.setAttribute("aria-hidden", "true");
       return element("li", {}, element("button", {type: "button", onclick: () => {
-        app.open(stage.text, {name: stage.path.split("/").pop()});
+        app.open(stage.text, {name: stage.path.split("/").pop(), isBuiltIn: true});
         app.show("motion");
       }}, pictures[k].root, element("strong", {}, stage.title), element("span", {class: "quiet"}, stage.path)));
     }));

@@ -1,6 +1,6 @@
 // @ts-check
 // From a log to a model: drop files, say what their columns are, see what they determine, fit, keep.
-import {element, svg, number, download, fileName} from "./format.js";
+import {download, element, fileName, fold, number, svg} from "./format.js";
 import {Picture} from "./picture.js";
 import {dropPlace, wordsOf} from "./drop.js";
 import {showReport} from "./modes.js";
@@ -107,7 +107,7 @@ class Logs {
     const box = one => element("label", {class: "choice", title: one.sentence}, element("input", {type: "checkbox", value: one.key, checked: isUsual(one)}), " ", one.key, element("span", {class: "quiet"}, ` ${one.shown || ""}`));
     const written = machine.filter(one => one.written !== null), others = machine.filter(one => one.written === null);
     this.free = element("div", {class: "choices", role: "group", "aria-label": "Free parameters"}, ...written.map(box));
-    const more = others.length ? element("details", {class: "more"}, element("summary", {}, `${others.length} more that stand at their default`), element("div", {class: "choices"}, ...others.map(box))) : null;
+    const more = others.length ? fold({class: "more"}, `${others.length} more that stand at their default`, `Free parameters, ${others.length} more that stand at their default`, element("div", {class: "choices"}, ...others.map(box))) : null;
     this.delay = element("select", {id: "delay"}, ...DELAYS.map(([value, words]) => element("option", {value, selected: value === "shared"}, words)));
     this.along = element("div", {class: "choices"}, ...ALONG.map(([value, words]) => element("label", {class: "choice"}, element("input", {type: "checkbox", value}), " ", words)));
     this.heldOut = element("input", {type: "text", id: "held-out", placeholder: "none; names, * for anything", size: 28});
@@ -115,7 +115,7 @@ class Logs {
     const own = hasOwn ? element("label", {class: "choice"}, this.ownPlan, " as [fit] of the case says") : null;
     this.plan.replaceChildren(...[own, this.free, more,
       element("div", {class: "fields"}, element("label", {for: "delay"}, "Fitted along: ", this.delay), element("label", {for: "held-out"}, "Held out: ", this.heldOut), element("label", {for: "starts"}, "Starts: ", this.starts)),
-      element("details", {class: "more"}, element("summary", {}, "More that is fitted along with each log"), this.along)].filter(Boolean));
+      fold({class: "more"}, "More that is fitted along with each log", "More that is fitted along with each log", this.along)].filter(Boolean));
   }
 
   /** The request of check and fit. */
@@ -281,7 +281,7 @@ class LogFile {
       element("h4", {}, file.name, element("span", {class: "quiet"}, ` ${head.rows} rows, ${head.found.length} columns `), element("button", {type: "button", onclick: remove, "aria-label": `Remove ${file.name}`}, "Remove")),
       element("div", {class: "scroll"}, table(keys.filter(isShown))),
       element("div", {class: "fields"}, element("label", {}, `${WORDS.split}: `, this.split), element("label", {}, "Recorder: ", this.preset)),
-      element("details", {class: "more"}, element("summary", {}, "More quantities"), element("div", {class: "scroll"}, table(others))),
+      fold({class: "more"}, "More quantities", "More quantities", element("div", {class: "scroll"}, table(others))),
       this.preview.figure);
     this.look();
   }

@@ -1,6 +1,7 @@
 // @ts-check
 // Puts the page together: views, the case's menu, keys, themes, links.
 import {App} from "./app.js";
+import {Cases} from "./cases.js";
 import {element, download, fileName, tell} from "./format.js";
 import {fragment, stateOf} from "./link.js";
 import {Mistake} from "./wire.js";
@@ -59,6 +60,14 @@ app.show = key => {
   }
   app.tell("view");
 };
+// Past the views, and past all parameters. The address stays: it may hold a state.
+/** @type {HTMLElement} */ (document.querySelector(".skip")).onclick = event => {
+  event.preventDefault();
+  const target = app.view === "motion" ? find("centre") : main;
+  target.focus();
+  target.scrollIntoView({block: "start"});
+};
+
 // ---- The case
 
 app.on("run", () => {
@@ -68,7 +77,7 @@ app.on("run", () => {
   if (document.title !== named) document.title = named;
 });
 app.on("text", () => {
-  for (const [id, isIdle] of [["undo", !app.past.length], ["redo", !app.future.length], ["reset", app.text === app.original]])
+  for (const [id, isIdle] of [["undo", !app.past.length], ["redo", !app.future.length], ["reset", app.text === app.original && !app.pending.size]])
     if (find(id).disabled !== isIdle) find(id).disabled = isIdle;
   find("save").hidden = !app.path;
 });
@@ -89,11 +98,15 @@ const act = (id, work) => {
 };
 act("save", async () => {
   await app.wire.ask("save", {text: app.text});
-  app.original = app.text;
+  app.original = app.safe = app.text;
   app.tell("text");
   app.notify(`Saved to ${app.path}`);
 });
-act("download", () => download(app.name, app.text, "application/toml"));
+act("download", () => {
+  download(app.name, app.text, "application/toml");
+  app.safe = app.text;
+  app.tell("text");
+});
 act("report", async () => {
   const {head} = await app.wire.ask("report", {text: app.text});
   download(`${fileName(app.name.replace(/\.toml$/, ""))}-report.html`, head.html, "text/html");
@@ -112,7 +125,8 @@ act("link", async () => {
   try { await navigator.clipboard.writeText(location.href); } catch { /* it stands in the address bar */ }
   app.notify("The address of this page holds this state now. Open it elsewhere with: taut studio LINK");
 });
-act("tab", async () => { window.open("/" + (await fragment(app.snapshot())), "_blank"); });
+// A page that knows its opener would have the cases that were left here as its own.
+act("tab", async () => { window.open("/" + (await fragment(app.snapshot())), "_blank", "noopener"); });
 find("file").addEventListener("change", async () => {
   const [file] = find("file").files;
   if (!file) return;
@@ -129,9 +143,12 @@ document.addEventListener("click", event => {
 // ---- Keys
 
 document.addEventListener("keydown", event => {
-  const target = /** @type {HTMLElement} */ (event.target), isText = target.matches("textarea, input[type=text], input[type=search]");
+  const target = /** @type {HTMLElement} */ (event.target), isText = target.matches("textarea, input:not([type=range], [type=file], [type=checkbox])");
+  // What is being typed into a field is undone by the browser; what is part of the case, by the page.
+  const isItsOwn = isText && !target.matches("#text, .row input:not([data-typed])");
   if ((event.ctrlKey || event.metaKey) && !event.altKey) {
     const key = event.key.toLowerCase();
+    if (isItsOwn && "zy".includes(key)) return;
     if (key === "z" && !event.shiftKey) app.undo();
     else if (key === "y" || (key === "z" && event.shiftKey)) app.redo();
     else if (key === "s") { if (app.path) find("save").click(); else find("download").click(); }
@@ -143,7 +160,7 @@ document.addEventListener("keydown", event => {
   if (event.key === " " && !isText && !target.closest("button, summary, select, a, label, [role=application], details")) { app.play(); event.preventDefault(); }
 });
 
-// ---- Themes: the one thing that is remembered
+// ---- Themes
 
 const theme = find("theme");
 const setTheme = value => {
@@ -159,25 +176,40 @@ try { setTheme(localStorage.getItem("theme") || ""); } catch { setTheme(""); }
 
 // ---- The beginning
 
+const cases = new Cases(find("left"), app);
+
+/** Opens the state that the address holds. @returns {Promise<boolean>} whether it holds one */
+async function follow() {
+  let state = null;
+  try { state = await stateOf(location.hash); } catch (error) { app.notify(/** @type {Error} */ (error).message, true); }
+  if (!state) return false;
+  find("notice").hidden = true;
+  app.open(state.text, {name: String(state.name || "linked.toml"), experiment: Number(state.experiment) || 0});
+  if (Number.isFinite(state.factor)) app.factor = state.factor;
+  if (Number.isFinite(state.rate)) app.rate = state.rate;
+  app.show(state.view);
+  let isFirst = true;
+  app.on("opened", () => {
+    if (!isFirst) return;
+    isFirst = false;
+    if (Array.isArray(state.window) && state.window.length === 2) app.look(state.window.map(Number));
+    if (Number.isFinite(state.cursor)) app.seek(state.cursor);
+  });
+  return true;
+}
+
 async function begin() {
-  const state = await stateOf(location.hash);
   const {head} = await app.wire.ask("open");
-  if (state && typeof state.text === "string") {
-    app.open(state.text, {name: String(state.name || "linked.toml"), experiment: Number(state.experiment) || 0});
-    if (Number.isFinite(state.factor)) app.factor = state.factor;
-    if (Number.isFinite(state.rate)) app.rate = state.rate;
-    app.show(state.view);
-    let isFirst = true;
-    app.on("opened", () => {
-      if (!isFirst) return;
-      isFirst = false;
-      if (Array.isArray(state.window) && state.window.length === 2) app.look(state.window.map(Number));
-      if (Number.isFinite(state.cursor)) app.seek(state.cursor);
-    });
-  } else {
-    app.open(head.text, {name: head.name, path: head.path || ""});
+  const own = {name: head.name, path: head.path || "", isBuiltIn: !head.path}, kept = cases.restore(own.path);
+  if (kept) {
+    if (own.path && kept.path !== own.path) app.open(head.text, own);
+    app.open(kept.base, kept);
+    app.show("motion");
+    app.notify(`Your changes to ${kept.name} are back. “Reset” returns to the case as it was opened.`);
+  } else if (!await follow()) {
+    app.open(head.text, own);
     app.show("motion");
   }
 }
-addEventListener("hashchange", () => { if (location.hash.includes("state=")) begin(); });
+addEventListener("hashchange", () => { follow(); });
 begin().catch(error => app.notify(String(error.message || error), true));

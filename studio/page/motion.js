@@ -20,7 +20,8 @@ export function mount(root, app) {
   const stage = element("section", {class: "stage-box", "aria-label": "The machine"});
   const plots = element("div", {class: "plots", id: "plots"});
   const glance = element("section", {class: "glance", "aria-labelledby": "glance-title"}, element("h2", {id: "glance-title"}, "At a glance"));
-  root.append(side, element("div", {class: "centre"}, stage, bar(app), element("section", {"aria-label": "Plots"}, plots), glance));
+  const plotted = element("section", {"aria-labelledby": "plots-title"}, element("h2", {id: "plots-title", class: "unseen"}, "Plots"), plots);
+  root.append(side, element("div", {class: "centre", id: "centre", tabindex: "-1"}, stage, bar(app), plotted, glance));
   sides(side, app);
   new Stage(stage, app);
   new Plots(plots, app);
@@ -36,6 +37,7 @@ function sides(root, app) {
   /** Those that are kept up to date only in sight. @type {Map<string, {show: () => void}>} */
   const drawn = new Map();
   const choose = chosen => panels.forEach(({key, panel}, k) => {
+    if (k === chosen && root.classList.contains("low")) sheet.click();
     panel.hidden = k !== chosen;
     if (k === chosen) drawn.get(key)?.show();
     tabs[k].setAttribute("aria-selected", String(k === chosen));
@@ -48,14 +50,24 @@ function sides(root, app) {
     choose(k);
     tabs[k].focus();
   }}, ...tabs);
-  const problem = element("button", {type: "button", class: "problem", hidden: true, onclick: () => { choose(1); }});
-  root.append(list, problem, ...panels.map(({panel}) => panel));
-  new Parameters(panels[0].panel, app);
+  const problem = element("button", {type: "button", class: "problem", hidden: true, onclick: () => {
+    const isField = app.mistake && parameters.has(app.mistake.key);
+    choose(isField ? 0 : 1);
+    if (isField) parameters.go(app.mistake.key);
+  }});
+  // On a narrow screen the panels are a sheet that can be put down.
+  const sheet = element("button", {type: "button", class: "sheet", onclick: () => {
+    const isLow = root.classList.toggle("low");
+    put(sheet, {"aria-expanded": !isLow});
+    tell(sheet, isLow ? "Show" : "Hide");
+  }, "aria-expanded": "true"}, "Hide");
+  root.append(element("div", {class: "side-head"}, list, sheet), problem, ...panels.map(({panel}) => panel));
+  const parameters = new Parameters(panels[0].panel, app);
   drawn.set("case", new Editor(panels[1].panel, app)).set("results", new Results(panels[2].panel, app));
   choose(0);
   app.on("mistake", () => {
     if (problem.hidden === Boolean(app.mistake)) problem.hidden = !app.mistake;
-    if (app.mistake) problem.textContent = `${app.mistake.line ? `Line ${app.mistake.line}: ` : ""}${app.mistake.what}`;
+    if (app.mistake) problem.textContent = `${app.mistake.line ? `Line ${app.mistake.line}: ` : ""}${parameters.named(app.mistake)}`;
   });
 }
 
@@ -64,14 +76,14 @@ function bar(app) {
   const play = element("button", {type: "button", id: "play", class: "play", onclick: () => app.play()});
   const scrub = element("input", {type: "range", id: "scrub", min: 0, max: 10000, step: 1, "aria-label": "Time",
     oninput: () => { app.isPlaying = false; app.tell("play"); app.seek(from() + (Number(scrub.value) / 10000) * span()); }});
-  const clock = element("output", {class: "clock", id: "clock"});
+  const clock = element("span", {class: "clock", id: "clock"});
   const rate = element("select", {id: "rate", "aria-label": "Slow motion", onchange: () => { app.rate = Number(rate.value); app.tell("play"); }},
     ...RATES.map(value => element("option", {value}, value === 1 ? "as it is" : `${number(1 / value)} × slower`)));
   const factor = element("input", {type: "range", id: "factor", min: 0, max: 40, step: 1, "aria-label": "Magnification of stretch and error", oninput: () => {
     app.factor = Number((10 ** (Number(factor.value) / 10)).toPrecision(2));
     app.tell("cursor");
   }});
-  const factorTold = element("output", {});
+  const factorTold = element("span", {class: "factor-value"});
   const experiment = element("select", {id: "experiment", "aria-label": "Experiment", onchange: () => app.choose(Number(experiment.value))});
   const before = element("button", {type: "button", "aria-pressed": "true", id: "before", onclick: () => {
     app.showsBefore = !app.showsBefore;

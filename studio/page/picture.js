@@ -1,6 +1,6 @@
 // @ts-check
 // Figures of results: lines, points and bars on a canvas, with a cursor for keys, values as a table, and brushing.
-import {element, number} from "./format.js";
+import {element, fold, number} from "./format.js";
 import {COLOURS, sized, step} from "./pen.js";
 
 const LEFT = 70, RIGHT = 14, TOP = 10, BOTTOM = 40, ROWS = 60;
@@ -36,7 +36,7 @@ export class Picture {
     const help = brushed ? "Drag to choose. Shift and arrow keys choose by keys, Escape clears." : "Arrow keys tell the values.";
     this.area = element("div", {class: "area picture-area", tabindex: "0", role: "application", "aria-roledescription": "figure",
       "aria-label": `${title}. ${axes.words || ""} ${help}`, onkeydown: event => this.key(event)}, this.canvas);
-    this.table = element("details", {class: "data", ontoggle: () => this.fill()}, element("summary", {"aria-label": `Values of ${title}`}, "Values"), element("div", {class: "scroll", tabindex: "0", role: "group", "aria-label": `Values of ${title}`}));
+    this.table = fold({class: "data", ontoggle: () => this.fill()}, "Values", `Values of ${title}`, element("div", {class: "scroll", tabindex: "0", role: "group", "aria-label": `Values of ${title}`}));
     this.head = element("h3", {}, title);
     this.unit = element("span", {class: "quiet"});
     this.figure = element("figure", {class: "picture", "data-picture": title}, element("figcaption", {}, element("span", {class: "picture-head"}, this.head, this.unit), this.legend), this.area, this.said, this.table);

@@ -1,7 +1,7 @@
 // @ts-check
 // The plots of a run on canvases: all share the part of time that is seen, and the cursor. Each can be used by keys, and
 // has its values as a table.
-import {element, number, time as timeText, download, fileName, tell} from "./format.js";
+import {element, fold, number, time as timeText, download, fileName, tell} from "./format.js";
 import {lowerBound} from "./app.js";
 import {COLOURS, Path, density, line, sized, step, ticks} from "./pen.js";
 
@@ -9,6 +9,8 @@ import {COLOURS, Path, density, line, sized, step, ticks} from "./pen.js";
 /** @typedef {import("./wire.js").Answer} Answer */
 
 const LEFT = 66, RIGHT = 12, TOP = 8, BOTTOM = 24, HEIGHT = 170, TABLE_ROWS = 50;
+/** Time without a change, ms, after which values in legends out of sight catch up. */
+const REST = 200;
 const DASHES = [[], [], [7, 4], [2, 3]];
 /** States of a body: stuck, forward, backward, and sliding without dry friction. */
 const STATES = new Map([[0, ["stuck", "grey"]], [1, ["forward", "blue"]], [-1, ["backward", "verm"]], [2, ["sliding", "green"]]]);
@@ -38,6 +40,7 @@ export class Plots {
     addEventListener("beforeprint", () => this.plots.forEach(plot => { plot.isSeen = true; plot.catchUp(); }));
     this.readColours();
     this.frame = 0;
+    this.rest = 0;
     this.onlyCursor = true;
   }
 
@@ -64,6 +67,8 @@ export class Plots {
   /** Draws with the next picture. @param {boolean} [onlyCursor] */
   later(onlyCursor = false) {
     if (!onlyCursor) this.onlyCursor = false;
+    clearTimeout(this.rest);
+    this.rest = setTimeout(() => { for (const plot of this.plots) plot.tellValues(); }, REST);
     if (this.frame) return;
     this.frame = requestAnimationFrame(() => {
       this.frame = 0;
@@ -113,21 +118,22 @@ class Plot {
     this.legend = element("div", {class: "legend"});
     this.values = [];
     panel.curves.forEach((curve, k) => this.addEntry(curve, k));
-    const table = element("details", {class: "data", ontoggle: () => this.fill(table)}, element("summary", {}, "Values"));
+    const table = fold({class: "data", ontoggle: () => this.fill(table)}, "Values", `Values of ${panel.title}`);
     this.table = table;
-    const keep = element("details", {class: "menu keep"}, element("summary", {"aria-label": `Keep ${panel.title}`}, "Keep"),
+    const keep = fold({class: "menu keep"}, "Keep", `Keep ${panel.title}`,
       element("div", {},
         element("button", {type: "button", onclick: () => this.png()}, "PNG"),
         element("button", {type: "button", onclick: () => download(this.fileName("svg"), this.svg(), "image/svg+xml")}, "SVG"),
         element("button", {type: "button", onclick: () => download(this.fileName("csv"), this.csv(), "text/csv")}, "CSV")));
-    this.figure = element("figure", {class: "live-plot", "data-panel": panel.key},
+    this.figure = element("figure", {class: "live-plot", "data-panel": panel.key, "aria-label": panel.title},
       element("figcaption", {}, element("h3", {}, panel.title, panel.unit ? element("span", {class: "quiet"}, " " + panel.unit) : ""), this.legend, keep),
       this.area, table);
     this.listen();
   }
 
   addEntry(curve, k) {
-    const value = element("output", {class: "value"});
+    // No live region: while the machine plays, each picture would be read out.
+    const value = element("span", {class: "value"});
     this.values.push(value);
     const colour = this.isStates ? "ink" : COLOURS[k % COLOURS.length];
     const entry = element("button", {
@@ -388,9 +394,8 @@ class Plot {
     const isInside = x >= LEFT && x <= width - RIGHT;
     /** @type {[string, number][]} */
     const dots = [];
+    this.tellValues();
     this.panel.curves.forEach(({key}, k) => {
-      const text = this.words(key, k);
-      tell(this.values[k], text);
       if (this.isStates || this.hidden.has(key) || !isInside) return;
       dots.push([colours[COLOURS[k % COLOURS.length]], this.up(app.value(key, app.cursor) * this.panel.scale)]);
     });
@@ -419,8 +424,13 @@ class Plot {
     }
   }
 
+  /** Puts the values at the cursor into the legend: those who hear the page read it out of sight too. */
+  tellValues() {
+    this.panel.curves.forEach(({key}, k) => tell(this.values[k], this.words(key)));
+  }
+
   /** The value of a curve at the cursor. */
-  words(key, _k) {
+  words(key) {
     const {app} = this.plots;
     if (this.isStates) return (STATES.get(app.state(key, app.cursor)) || [""])[0];
     return number(app.value(key, app.cursor) * this.panel.scale, 5);
@@ -499,7 +509,7 @@ class Plot {
   /** Tells the values at the cursor to those who do not see them. */
   say() {
     const {app} = this.plots, [from, to] = this.plots.seen;
-    const values = this.panel.curves.filter(({key}) => !this.hidden.has(key)).map(({key, name}, k) => `${name} ${this.words(key, k)}${this.panel.unit ? " " + this.panel.unit : ""}`);
+    const values = this.panel.curves.filter(({key}) => !this.hidden.has(key)).map(({key, name}) => `${name} ${this.words(key)}${this.panel.unit ? " " + this.panel.unit : ""}`);
     app.say(`${timeText(app.cursor, (to - from) / 100)}: ${values.join(", ")}`);
   }
 

@@ -112,12 +112,14 @@ export function mount(root, app) {
   /** @param {Stop} stop @param {Try} [one] */
   function open(stop, one = {words: ""}) {
     const text = stages.get(RIG + stop.stage) || "";
-    app.open(stop.change ? text.replace(...stop.change) : text, {name: stop.stage, experiment: one.experiment || 0});
+    app.open(stop.change ? text.replace(...stop.change) : text, {name: stop.stage, experiment: one.experiment || 0, isBuiltIn: true});
     app.factor = stop.factor || 100;
     app.show(stop.view || "motion");
     waitFor(app, () => {
       for (const [key, value] of one.set || []) app.drag(key, value);
       app.drop();
+      // What the tour changes is nobody's work.
+      app.isTouched = false;
       if (stop.window) app.look(stop.window);
       if (stop.at !== undefined && app.cursor === 0) app.seek(stop.at);
       if (stop.view) { heading(stop.panel, 100); return; }

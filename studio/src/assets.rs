@@ -23,6 +23,7 @@ const ASSETS: &[Asset] = page![
     "style.css": CSS,
     "icon.svg": "image/svg+xml",
     "app.js": SCRIPT,
+    "cases.js": SCRIPT,
     "drop.js": SCRIPT,
     "editor.js": SCRIPT,
     "format.js": SCRIPT,

@@ -6,7 +6,9 @@
 mod address;
 mod assets;
 mod guard;
+mod keys;
 mod message;
+mod pool;
 mod server;
 mod socket;
 mod state;

@@ -1,6 +1,7 @@
 //! Messages of a socket: requests as JSON, answers as frames of a JSON head and columns of numbers.
 
 use serde_json::{Map, Value, json};
+use std::path::Path;
 use taut::error::{Error, Result};
 
 /// A request of a page.
@@ -68,16 +69,20 @@ impl Reply {
         }
     }
 
-    /// A mistake, with its place.
+    /// A mistake, with its place: a line of the text, or the key of a change to it.
     pub fn error(error: &Error) -> Self {
         let place = error.place.as_ref();
         let span = place.and_then(|place| place.span.as_ref());
+        // Columns of a change are those of `KEY=VALUE`, which stands nowhere in the text.
+        let is_change = place.is_some_and(|place| place.file == Path::new("--set"));
+        let (span, change) = if is_change { (None, span) } else { (span, None) };
         Self::of(json!({ "error": {
             "what": error.what,
             "file": place.map(|place| place.file.display().to_string()),
             "line": span.map(|span| span.line),
             "column": span.map(|span| span.column),
             "width": span.map(|span| span.width),
+            "key": change.and_then(|span| span.text.split_once('=')).map(|(key, _)| key),
             "allowed": error.allowed,
             "next": error.next,
             "text": error.to_string(),

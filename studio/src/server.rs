@@ -37,6 +37,8 @@ pub struct Options {
     pub port: Option<u16>,
     /// Whether a browser is opened.
     pub open: bool,
+    /// Numbers of signals that do not end the server: those that were ignored when the program started.
+    pub ignored: Vec<i32>,
 }
 
 /// Serves until Ctrl-C, or until it is asked to end.
@@ -64,7 +66,7 @@ async fn run(options: Options) -> Result<()> {
     if options.open {
         address::open(&address);
     }
-    let ended = ended();
+    let ended = ended(options.ignored);
     tokio::pin!(ended);
     let places = Arc::new(Semaphore::new(CONNECTIONS));
     let service = TowerToHyperService::new(router(&state));
@@ -123,21 +125,28 @@ fn tell(address: &str, state: &State) {
     let _ = out.flush();
 }
 
-/// Waits for Ctrl-C or a request to terminate.
-async fn ended() {
-    #[cfg(unix)]
-    {
-        use tokio::signal::unix::{SignalKind, signal};
-        let (term, hup) = (signal(SignalKind::terminate()), signal(SignalKind::hangup()));
-        if let (Ok(mut term), Ok(mut hup)) = (term, hup) {
-            tokio::select! {
-                _ = tokio::signal::ctrl_c() => {}
-                _ = term.recv() => {}
-                _ = hup.recv() => {}
-            }
+/// Waits for Ctrl-C or a request to terminate, but for signals that are ignored.
+#[cfg(unix)]
+async fn ended(ignored: Vec<i32>) {
+    use tokio::signal::unix::{SignalKind, signal};
+    let one = async |kind: SignalKind| {
+        if !ignored.contains(&kind.as_raw_value())
+            && let Ok(mut signal) = signal(kind)
+        {
+            signal.recv().await;
             return;
         }
+        std::future::pending::<()>().await;
+    };
+    tokio::select! {
+        () = one(SignalKind::interrupt()) => {}
+        () = one(SignalKind::terminate()) => {}
+        () = one(SignalKind::hangup()) => {}
     }
+}
+
+#[cfg(not(unix))]
+async fn ended(_: Vec<i32>) {
     let _ = tokio::signal::ctrl_c().await;
 }
 

@@ -1,9 +1,10 @@
 //! The state that all connections of a server share.
 
-use crate::guard::Keys;
+use crate::keys::Keys;
+use crate::pool::{Pool, lock};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use taut::case::Opened;
 use taut::error::{Error, Result};
 use tokio::sync::{Semaphore, watch};
@@ -18,15 +19,15 @@ pub struct State {
     /// The case of the command line.
     pub case: Option<CaseFile>,
     /// The threads that answer drags.
-    pub pool: crate::work::pool::Pool,
+    pub pool: Pool,
     /// Long works at a time.
     pub long: Arc<AtomicUsize>,
     /// Room for pages.
     pub sockets: Arc<Semaphore>,
     /// Files that pages sent, removed in the end.
     uploads: Mutex<Option<PathBuf>>,
-    /// Bytes of them.
-    pub uploaded: AtomicUsize,
+    /// Bytes of them, and of those that are on their way.
+    uploaded: AtomicUsize,
     ending: watch::Sender<bool>,
 }
 
@@ -44,7 +45,7 @@ impl State {
         Ok(Self {
             keys: Keys::new(port)?,
             case: case.map(CaseFile::read).transpose()?,
-            pool: crate::work::pool::Pool::new(),
+            pool: Pool::new(),
             long: Arc::default(),
             sockets: Arc::new(Semaphore::new(SOCKETS)),
             uploads: Mutex::default(),
@@ -94,11 +95,38 @@ impl State {
         }
     }
 
+    /// Takes room for a file of so many bytes before they are received; none where all files together would have more
+    /// than `most`.
+    pub fn room(self: &Arc<Self>, bytes: usize, most: usize) -> Option<Room> {
+        let add = |n: usize| n.checked_add(bytes).filter(|sum| *sum <= most);
+        let taken = self.uploaded.fetch_update(Ordering::Relaxed, Ordering::Relaxed, add);
+        taken.ok().map(|_| Room { state: Arc::clone(self), bytes })
+    }
+
     /// Takes a place for long work, of which there are as many as processors; none where all are taken.
     pub fn begin_long(&self) -> Option<Place> {
         let most = std::thread::available_parallelism().map_or(2, usize::from).max(2);
         let taken = self.long.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| (n < most).then_some(n + 1));
         taken.ok().map(|_| Place(Arc::clone(&self.long)))
+    }
+}
+
+/// Room for a file that is on its way; dropped, it is free again.
+pub struct Room {
+    state: Arc<State>,
+    bytes: usize,
+}
+
+impl Room {
+    /// Takes it for good, for a file that turned out to have so many bytes.
+    pub fn keep(mut self, bytes: usize) {
+        self.bytes -= bytes.min(self.bytes);
+    }
+}
+
+impl Drop for Room {
+    fn drop(&mut self) {
+        self.state.uploaded.fetch_sub(self.bytes, Ordering::Relaxed);
     }
 }
 
@@ -111,11 +139,6 @@ impl Drop for Place {
     }
 }
 
-/// A value is as whole after a panic of another thread as before: each lock guards one.
-pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 impl CaseFile {
     fn read(path: PathBuf) -> Result<Self> {
         // Mistakes in it are shown at their line on the page; a file that is no text at all is told now.
@@ -123,7 +146,8 @@ impl CaseFile {
             Err(error) if error.place.as_ref().is_none_or(|place| place.span.is_none()) => return Err(error),
             _ => {}
         }
-        let bytes = std::fs::read(&path).map_err(|e| Error::new(format!("it cannot be read: {e}")).in_file(&path))?;
+        let bytes = taut::files::read(&path, taut::case::LARGEST_FILE)
+            .map_err(|e| Error::new(format!("it cannot be read: {e}")).in_file(&path))?;
         Ok(Self { path, known: Mutex::new(bytes) })
     }
 
@@ -135,7 +159,9 @@ impl CaseFile {
     /// Writes it whole, unless somebody else changed it meanwhile.
     pub fn save(&self, text: &str) -> Result<()> {
         let mut known = lock(&self.known);
-        let now = std::fs::read(&self.path).ok();
+        // Nobody else saves between the look and the writing, nor tunes this file in place.
+        let _claim = taut::files::Claim::file(&self.path)?;
+        let now = taut::files::read(&self.path, usize::MAX).ok();
         if now.as_ref() != Some(&*known) {
             let what = match now {
                 Some(_) => "this file was changed by something else since it was opened, and nothing was written",

@@ -6,6 +6,7 @@ pub mod data;
 pub mod document;
 pub mod ignored;
 pub mod logged;
+pub mod loops;
 pub mod random;
 pub mod stability;
 pub mod wrong;

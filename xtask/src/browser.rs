@@ -1,5 +1,5 @@
 //! Reports in a browser: made with the program, opened and used in headless Chromium by `report/browser/check.mjs`; and
-//! the studio, by `report/browser/studio.mjs`.
+//! the studio, by the scripts `studio*.mjs` beside it.
 
 use crate::Counts;
 use std::fs;
@@ -84,12 +84,13 @@ pub fn test(counts: &mut Counts) -> Result<bool, String> {
 fn studio(taut: &Path, browser: &Path, shots: &Path, counts: &mut Counts) -> Result<bool, String> {
     let mut types = Command::new("node");
     types.arg(Path::new(FOLDER).join("node_modules/typescript/bin/tsc")).args(["-p", "studio/page/tsconfig.json"]);
-    let mut used = Command::new("node");
-    used.arg(Path::new(FOLDER).join("studio.mjs")).arg(browser).arg(taut).arg(shots);
-    let mut worked = Command::new("node");
-    worked.arg(Path::new(FOLDER).join("studio-work.mjs")).arg(browser).arg(taut).arg(shots);
-    let (types, used, worked) = (crate::run(types, counts)?, crate::run(used, counts)?, crate::run(worked, counts)?);
-    Ok(types && used && worked)
+    let mut passed = crate::run(types, counts)?;
+    for script in ["studio.mjs", "studio-edits.mjs", "studio-work.mjs"] {
+        let mut node = Command::new("node");
+        node.arg(Path::new(FOLDER).join(script)).arg(browser).arg(taut).arg(shots);
+        passed &= crate::run(node, counts)?;
+    }
+    Ok(passed)
 }
 
 /// A spectrum with a peak there, and a smaller one above it, as Klipper writes them.

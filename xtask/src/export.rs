@@ -7,8 +7,9 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// Programs, and the packages of Debian that have them.
-const PROGRAMS: [(&str, &str); 7] = [
+const PROGRAMS: [(&str, &str); 8] = [
     ("gcc", "gcc"),
+    ("g++", "g++"),
     ("clang", "clang"),
     ("cppcheck", "cppcheck"),
     ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),

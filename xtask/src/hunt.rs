@@ -11,6 +11,8 @@ pub struct Hunt {
     parts: Vec<Part>,
     /// Random stages.
     stages: u64,
+    /// Cases in which each pair of features occurs.
+    pairs: u64,
     seed: u64,
     /// For each reader, s.
     seconds: u64,
@@ -18,8 +20,12 @@ pub struct Hunt {
     kills: u64,
     /// Changes of the source.
     mutants: usize,
-    /// Only this one of them.
-    only: Option<usize>,
+    /// Folders that are changed; all areas where none is named.
+    areas: Vec<String>,
+    /// Programs of tests that are run; all where none is named.
+    tests: Vec<String>,
+    /// Only these of the changes.
+    only: Vec<usize>,
     /// Whether they are shown, and not run.
     list: bool,
     /// Threads of the stages, all processors unless said.
@@ -32,16 +38,23 @@ pub struct Hunt {
 #[derive(Clone, Copy, PartialEq)]
 enum Part {
     Stages,
+    Pairs,
     Readers,
     Faults,
     Mutants,
 }
 
-const PARTS: [(&str, Part); 4] =
-    [("stages", Part::Stages), ("readers", Part::Readers), ("faults", Part::Faults), ("mutants", Part::Mutants)];
+const PARTS: [(&str, Part); 5] = [
+    ("stages", Part::Stages),
+    ("pairs", Part::Pairs),
+    ("readers", Part::Readers),
+    ("faults", Part::Faults),
+    ("mutants", Part::Mutants),
+];
 
-pub const USAGE: &str = "cargo xtask hunt [--part stages|readers|faults|mutants]... [--seed S]
-                       [--stages N [--threads N] [--json]] [--seconds B] [--kills N] [--mutants N [--list | --only K]]";
+pub const USAGE: &str = "cargo xtask hunt [--part stages|pairs|readers|faults|mutants]... [--seed S]
+                       [--stages N [--threads N] [--json]] [--pairs N] [--seconds B] [--kills N]
+                       [--mutants N [--area FOLDER]... [--tests NAME]... [--list | --only K...]]";
 
 impl Hunt {
     /// From the words behind `hunt`. The size of a part names it, too; without any all parts but the mutants, which
@@ -50,11 +63,14 @@ impl Hunt {
         let mut hunt = Self {
             parts: Vec::new(),
             stages: 10_000,
+            pairs: 2_000,
+            areas: Vec::new(),
+            tests: Vec::new(),
             seed: 1,
             seconds: 300,
             kills: 200,
             mutants: 100,
-            only: None,
+            only: Vec::new(),
             list: false,
             threads: None,
             json: false,
@@ -71,6 +87,14 @@ impl Hunt {
                 continue;
             }
             let value = *words.next().ok_or_else(|| format!("{word} wants a value"))?;
+            if let Some(names) = match word {
+                "--area" => Some(&mut hunt.areas),
+                "--tests" => Some(&mut hunt.tests),
+                _ => None,
+            } {
+                names.push(value.to_string());
+                continue;
+            }
             let number = || value.parse::<u64>().map_err(|_| format!("{word} wants a whole number, not {value}"));
             match word {
                 "--part" => {
@@ -78,16 +102,18 @@ impl Hunt {
                     hunt.parts.push(known.ok_or_else(|| format!("there is no part {value}"))?.1);
                 }
                 "--stages" => hunt.stages = number()?,
+                "--pairs" => hunt.pairs = number()?,
                 "--seed" => hunt.seed = number()?,
                 "--seconds" => hunt.seconds = number()?,
                 "--kills" => hunt.kills = number()?,
                 "--mutants" => hunt.mutants = number()? as usize,
-                "--only" => hunt.only = Some(number()? as usize),
+                "--only" => hunt.only.push(number()? as usize),
                 "--threads" => hunt.threads = Some(number()?),
                 _ => return Err(format!("{word} is not known")),
             }
             match word {
                 "--stages" => sized.push(Part::Stages),
+                "--pairs" => sized.push(Part::Pairs),
                 "--seconds" => sized.push(Part::Readers),
                 "--kills" => sized.push(Part::Faults),
                 "--mutants" | "--only" => sized.push(Part::Mutants),
@@ -98,7 +124,7 @@ impl Hunt {
             hunt.parts = sized;
         }
         if hunt.parts.is_empty() {
-            hunt.parts = vec![Part::Stages, Part::Readers, Part::Faults];
+            hunt.parts = vec![Part::Stages, Part::Pairs, Part::Readers, Part::Faults];
         }
         Ok(hunt)
     }
@@ -108,10 +134,13 @@ impl Hunt {
         let mut found = Vec::new();
         for part in &self.parts {
             let done = match part {
-                Part::Stages => stages::run(self.stages, self.seed, self.threads, self.json),
+                Part::Stages => stages::run("stages", self.stages, self.seed, self.threads, self.json),
+                Part::Pairs => stages::run("pairs", self.pairs, self.seed, self.threads, self.json),
                 Part::Readers => readers::run(self.seconds, self.seed),
                 Part::Faults => faults::run(self.kills, self.seed),
-                Part::Mutants => mutants::run(self.mutants, self.seed, self.only, self.list),
+                Part::Mutants => {
+                    mutants::run(self.mutants, self.seed, (&self.areas, &self.tests), &self.only, self.list)
+                }
             };
             found.extend(done.err());
         }
@@ -134,7 +163,8 @@ mod tests {
         let hunt = Hunt::new(&["--part", "faults", "--seed", "7", "--part", "readers"]).unwrap();
         assert!(hunt.parts == [Part::Faults, Part::Readers] && hunt.seed == 7);
         assert!(Hunt::new(&["--stages", "5", "--seed", "3"]).unwrap().parts == [Part::Stages]);
-        assert_eq!(Hunt::new(&[]).unwrap().parts.len(), 3);
+        assert_eq!(Hunt::new(&[]).unwrap().parts.len(), 4);
+        assert!(Hunt::new(&["--pairs", "5"]).unwrap().parts == [Part::Pairs]);
         assert_eq!(Hunt::new(&["--part", "others"]).err().unwrap(), "there is no part others");
         assert_eq!(Hunt::new(&["--stages", "many"]).err().unwrap(), "--stages wants a whole number, not many");
         assert_eq!(Hunt::new(&["--seed"]).err().unwrap(), "--seed wants a value");

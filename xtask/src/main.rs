@@ -1,14 +1,17 @@
 //! The project's own chores: `cargo xtask test` checks all that can be checked, `cargo xtask python` the Python package
 //! alone, `cargo xtask browser` the reports alone, `cargo xtask export` exported machines in their tools alone,
-//! `cargo xtask data` fetches other people's measurements,
+//! `cargo xtask data` fetches other people's measurements, `cargo xtask bad` writes the wrong inputs of `tests/bad` as
+//! whole files, `cargo xtask dist` builds the program that is handed out,
 //! `cargo xtask hunt` looks for what is wrong with larger means, `cargo xtask coverage` and `cargo xtask faults` make
 //! the tables of docs/fit.md, `cargo xtask counts` counts the instructions of standard works, `cargo xtask fmu` calls the
 //! functions of FMI at random under address sanitizer, `cargo xtask drag`, `cargo xtask load` and `cargo xtask first-fit`
 //! measure the studio.
 
+mod bad;
 mod browser;
 mod counts;
 mod data;
+mod dist;
 mod export;
 mod fmu;
 mod hunt;
@@ -80,7 +83,9 @@ fn main() -> ExitCode {
         ["python"] => test(&[PYTHON]),
         ["browser"] => test(&[BROWSER]),
         ["export"] => test(&[TOOLS, EXPORTS]),
+        ["bad"] => bad::run(),
         ["data", ref words @ ..] => data::run(words),
+        ["dist", ref words @ ..] => dist::run(words),
         ["counts", ref words @ ..] => counts::run(words),
         ["fmu", ref words @ ..] => fmu::run(words),
         ["drag", ref words @ ..] => studio::drag(words),
@@ -97,8 +102,10 @@ fn main() -> ExitCode {
         },
         _ => {
             eprintln!(
-                "usage: cargo xtask test | cargo xtask browser | cargo xtask export | cargo xtask python | \
-                 cargo xtask coverage [...] | cargo xtask faults [...] | {} | {} | {} | {} | {} | {} | {}",
+                "usage: cargo xtask test | cargo xtask bad | cargo xtask browser | cargo xtask export | \
+                 cargo xtask python | cargo xtask coverage [...] | cargo xtask faults [...] | \
+                 {} | {} | {} | {} | {} | {} | {} | {}",
+                dist::USAGE,
                 counts::USAGE,
                 studio::FIRST_FIT,
                 studio::DRAG,

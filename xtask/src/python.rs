@@ -36,6 +36,7 @@ pub fn test(counts: &mut Counts) -> Result<bool, String> {
     // Results are compared with those of the program.
     let Some(taut) = crate::build_program(counts)? else { return Ok(false) };
     tests.env("TAUT_PROGRAM", taut);
+    tests.env("TAUT_BAD", crate::bad::write()?);
     tests.env("MPLBACKEND", "agg").env("PYTHONDONTWRITEBYTECODE", "1");
     for command in [install, types, tests] {
         if !crate::run(command, counts)? {

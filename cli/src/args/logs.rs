@@ -69,7 +69,7 @@ Examples:
   taut simulate fitted/fitted.toml --draws fitted/posterior.csv --out band
 
 Lines that begin with `warning:` say what makes a result not to be relied on: the exit status is 1, and nothing is written without --anyway.
-What is not determined is ± ∞ and keeps its value in fitted.toml; the exit status is 1, too.
+What is not determined is ± ∞: of the machines that meet the logs alike, fitted.toml is the nearest to the case. The exit status is 1, too.
 Ctrl-C ends a fit early: the best so far is written and said not to be converged, with exit status 130.";
 
 /// Measure a frequency response: from the logs of a case, without a model, with coherence and intervals.

@@ -1,14 +1,14 @@
 //! Vibrations and controllers: `modes`, `tune`, `shape`.
 
 use super::values::{
-    corner_speed, damping, delay, effort, hertz, metres, metres_per_second, seconds, shapers, share, smoothing,
-    uncertainty, vibrations,
+    Shapers, corner_speed, damping, delay, effort, hertz, metres, metres_per_second, seconds, shapers, share,
+    smoothing, uncertainty, vibrations,
 };
 use crate::command::Common;
 use clap::ValueEnum;
 use std::path::PathBuf;
 use taut::control::recommendation::Damping;
-use taut::control::shaper::{Firmware, Form};
+use taut::control::shaper::Firmware;
 
 /// Find gains and filters for the controller in a case, good for the machines that it may meet
 ///
@@ -160,10 +160,6 @@ Examples:
   taut shape --together raw_data_x_left.csv raw_data_x_middle.csv raw_data_x_right.csv
   taut shape raw_data_x.csv --shapers \"mzv(n=4,t=0.9),ei(v_tol=0.02)\" --max-vibrations 2
   taut shape axis.toml --set cart.mass=\"0.5 kg\" --json | jq .recommended";
-
-/// Shapers with their parameters.
-#[derive(Debug, Clone)]
-pub struct Shapers(pub Vec<Form>);
 
 /// Whose shapers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]

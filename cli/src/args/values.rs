@@ -1,6 +1,5 @@
 //! Values of options: numbers with units, and words.
 
-use super::loops::Shapers;
 use taut::case::EFFORTS;
 use taut::control::recommendation::Damping;
 use taut::control::shaper::Form;
@@ -115,6 +114,10 @@ pub fn corner_speed(text: &str) -> Result<f64, String> {
         Err("a speed from 0 to 10 m/s is needed, such as \"5 mm/s\"".into())
     }
 }
+
+/// Shapers with their parameters.
+#[derive(Debug, Clone)]
+pub struct Shapers(pub Vec<Form>);
 
 pub fn shapers(text: &str) -> Result<Shapers, String> {
     // A comma within parentheses parts parameters.

@@ -2,13 +2,16 @@
 
 use crate::args::Check as Args;
 use crate::command::{Finished, Report};
-use crate::failure::Outcome;
+use crate::failure::{Failure, Outcome};
 use crate::folder::{self, Folder};
+use crate::interrupt::{Interrupt, interrupted};
+use crate::progress::Progress;
 use crate::terminal::bold;
 use std::fmt::Write;
-use taut::case::Case;
-use taut::fit::{Check, check};
+use taut::case::{Case, Plan};
+use taut::fit::{Check, check_watched};
 use taut::json;
+use taut::solve::Flow;
 use taut_report::check::{page, regression, shares, shown};
 use taut_report::fit::value;
 
@@ -21,7 +24,7 @@ pub fn run(args: &Args) -> Outcome {
     let case = common.case(&args.case)?;
     let plan = case.fit_plan(&args.case)?;
     let folder = Folder::wanted(common, || folder::inputs(&args.case, &case.files), ["check.json", "report.html"])?;
-    let found = check(&case, &plan)?;
+    let found = watched(&case, &plan, common.quiet)?;
     let text = text(&case, &found);
     let json = ("check.json", json::text(&json::check(&case, &found)));
     let mut finished = Finished::new("check", json, text, "add --out DIR for check.json and a report");
@@ -29,6 +32,23 @@ pub fn run(args: &Args) -> Outcome {
         finished.report = Some(Report { page: page(&case, &found), pictures: Vec::new() });
     }
     finished.finish(common, folder)
+}
+
+/// The check, with progress; what it has come to when a signal comes is no verdict.
+fn watched(case: &Case, plan: &Plan, quiet: bool) -> Result<Check, Failure> {
+    let interrupt = Interrupt::listen();
+    let is_stopped = || interrupt.signal().is_some();
+    let (progress, mut steps) = (Progress::of_whole("simulating the logs", quiet), 0);
+    let found = check_watched(case, plan, Some(&is_stopped), &mut |_, cost| {
+        steps += 1;
+        progress.tell(|| format!("step {steps}, cost {cost:.6e}"));
+        if is_stopped() { Flow::Stop } else { Flow::Continue }
+    });
+    progress.clear();
+    match interrupt.signal() {
+        Some(signal) => Err(interrupted(signal, "interrupted before the check was done; nothing was written")),
+        None => Ok(found?),
+    }
 }
 
 fn text(case: &Case, found: &Check) -> String {

@@ -43,7 +43,7 @@ pub fn run(args: &Args) -> Outcome {
     let text = table::text(&case.title, &found, &verified);
     let mut finished = Finished::new("design", ("design.json", data), text, advice);
     if let Some(folder) = &folder {
-        let text = folder::leading(&whole, &Case::from_text(&args.case, &whole)?.files, folder.root())?;
+        let text = folder::leading(&whole, &folder::files_of(&args.case, &whole)?, folder.root())?;
         if common.reports() {
             let figure = figure(&case, &found)?;
             let page = page(&case, &found, &verified, &figure, &text);

@@ -9,9 +9,9 @@ use crate::folder::{self, Folder};
 use crate::terminal;
 use clap::ValueEnum;
 use std::fmt::Write;
-use taut::case::Opened;
+use taut::case::{Files, Opened};
 use taut::export::{self, Exported, Options, Part, Place, Real, Target};
-use taut::files::write_atomically;
+use taut::files::{Claim, Inputs, write_atomically};
 use taut::json;
 use taut::{Error, Result};
 
@@ -44,32 +44,50 @@ pub fn run(args: &Args) -> Outcome {
     };
     let common = &args.common;
     check(args, target)?;
-    let case = common.open(path)?;
+    let case = common.open_for(path, Files::All)?;
     let own = match command::is_standard_input(path) {
         true => "axis".to_string(),
         false => path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
     };
     let place = common.out.as_deref().map(|out| Place::of(out, target.ending(), &own));
     let stem = place.as_ref().map_or(&own, |place| &place.stem);
-    let exported = make(args, target, &case, stem).map_err(|error| error.in_file(path))?;
     let inputs = folder::inputs(path, case.files());
+    let target_at = place.as_ref().map(|place| claimed(place, target, &inputs)).transpose()?;
+    let exported = make(args, target, &case, stem).map_err(|error| error.in_file(path))?;
     let mut finished = finished(case.title(), target, &exported);
-    match &place {
-        None => finished.finish(common, None),
-        Some(place) if place.is_file => {
+    match (&place, target_at) {
+        (Some(place), Some(At::File(mut claim))) => {
             let names = exported.files.iter().map(|(name, _)| place.folder.join(name));
             names.into_iter().try_for_each(|name| inputs.check(&name))?;
-            let written = place.write(&exported, &inputs).map_err(Failure::work)?;
+            let written = place.write(&exported, &inputs, &mut claim).map_err(Failure::work)?;
             finished.written = written.iter().map(|path| path.display().to_string()).collect();
             finished.finish(common, None)
         }
-        Some(place) => {
-            let folder = Folder::create(&place.folder, inputs, exported.files.iter().map(|(name, _)| name))?;
+        (Some(_), Some(At::Folder(folder))) => {
             // The model as data is the result as data.
             for (name, content) in exported.files.iter().filter(|_| target != TargetName::Json) {
                 write_atomically(folder.path(name), content).map_err(Failure::work)?;
             }
             finished.finish(common, Some(folder))
+        }
+        _ => finished.finish(common, None),
+    }
+}
+
+/// Where the files go, claimed.
+enum At {
+    File(Claim),
+    Folder(Folder),
+}
+
+/// Claims the place before the work.
+fn claimed(place: &Place, target: TargetName, inputs: &Inputs) -> std::result::Result<At, Failure> {
+    let ending = target.ending();
+    match place.is_file {
+        true => Ok(At::File(folder::noted(place.claim(ending)?))),
+        false => {
+            let main = format!("{}.{ending}", place.stem);
+            Folder::create(&place.folder, inputs.clone(), [main]).map(At::Folder)
         }
     }
 }
@@ -88,7 +106,7 @@ fn listing() -> String {
 fn check(args: &Args, target: TargetName) -> Result<()> {
     let not_of = |option: &str, of: &str| {
         let (name, _) = target.words();
-        Error::new(format!("{option} means nothing to {name}")).in_file(option).allowed(format!("with {of}"))
+        Error::new(format!("{option} means nothing to {name}")).allowed(format!("with {of}"))
     };
     if args.real.is_some() && target != TargetName::C {
         return Err(not_of("--real", "c"));

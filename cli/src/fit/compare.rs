@@ -3,9 +3,9 @@
 use super::{is_held_back, led, status, table};
 use crate::args::Fit as Args;
 use crate::command::{Finished, Report};
-use crate::failure::{Outcome, Status};
+use crate::failure::Outcome;
 use crate::folder::{self, Folder};
-use crate::interrupt::Interrupt;
+use crate::interrupt::{Interrupt, interrupted};
 use crate::progress::Progress;
 use crate::terminal::bold;
 use std::fmt::Write;
@@ -35,9 +35,8 @@ pub fn run(args: &Args, case: &Case, plan: &Plan) -> Outcome {
     });
     progress.clear();
     let compared = match (found, interrupt.signal()) {
-        (Err(error), Some(signal)) => {
-            crate::terminal::show_error(&error);
-            return Ok(Status::Interrupted(signal));
+        (Err(_), Some(signal)) => {
+            return Err(interrupted(signal, "interrupted before all laws were fitted; nothing was written"));
         }
         (found, _) => found?,
     };
@@ -53,7 +52,7 @@ pub fn run(args: &Args, case: &Case, plan: &Plan) -> Outcome {
     let mut finished = Finished::new("fit", ("compare.json", json::text(&json)), text, advice);
     if let Some(folder) = &folder {
         let text = led(&found.fit.case_text(own, &args.case)?, args, folder)?;
-        if !common.no_report {
+        if common.draws() {
             let page = page_with(own, &found, &text, |page| section(page, &compared));
             finished.report = Some(Report { page, pictures: Vec::new() });
         }

@@ -9,9 +9,8 @@ use crate::args::Fit as Args;
 use crate::command::{Finished, Remark, Report};
 use crate::failure::{Failure, Outcome, Status};
 use crate::folder::{self, Folder};
-use crate::interrupt::Interrupt;
+use crate::interrupt::{Interrupt, interrupted};
 use crate::progress::Progress;
-use crate::terminal;
 use std::time::Instant;
 use taut::Result;
 use taut::case::{Case, Plan};
@@ -39,8 +38,8 @@ pub fn run(args: &Args) -> Outcome {
     let interrupt = Interrupt::listen();
     let begin = Instant::now();
     let Some(found) = find(args, &case, &plan, &interrupt)? else {
-        terminal::show_error(&"interrupted before the search began; nothing was written");
-        return Ok(Status::Interrupted(interrupt.signal().unwrap_or_default()));
+        let told = "interrupted before the search began; nothing was written";
+        return Err(interrupted(interrupt.signal().unwrap_or_default(), told));
     };
     let took = begin.elapsed();
     let fit = &found.fit;
@@ -57,7 +56,7 @@ pub fn run(args: &Args) -> Outcome {
         if let Some(drawn) = &found.drawn {
             write_draws(folder, drawn).map_err(Failure::work)?;
         }
-        if !common.no_report {
+        if common.draws() {
             finished.report = Some(Report { page: page(&case, &found, &text), pictures: Vec::new() });
         }
         finished.files.push(("fitted.toml".into(), text));
@@ -82,7 +81,7 @@ fn is_held_back(fit: &Fit, args: &Args) -> bool {
 
 /// The text of a case with estimates for a folder of results: its paths lead from there to the same files.
 fn led(text: &str, args: &Args, folder: &Folder) -> Result<String> {
-    folder::leading(text, &Case::from_text(&args.case, text)?.files, folder.root())
+    folder::leading(text, &folder::files_of(&args.case, text)?, folder.root())
 }
 
 /// How it ended.

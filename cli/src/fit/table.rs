@@ -38,7 +38,8 @@ pub fn text(case: &Case, found: &Found, took: Duration) -> String {
                 let _ = writeln!(text, "  - {choice}");
             }
         }
-        let _ = writeln!(text, "  what is not determined keeps its value of the case file in fitted.toml");
+        let _ =
+            writeln!(text, "  of the machines that meet the logs alike, fitted.toml is the nearest to the case file");
     }
     let names = crooked(&found.profiles);
     if !names.is_empty() {

@@ -9,14 +9,14 @@ use crate::failure::Outcome;
 use crate::folder::{self, Folder};
 use std::f64::consts::PI;
 use std::fmt::Write;
-use taut::case::{Case, Opened};
+use taut::case::{Case, Files, Opened};
 use taut::json;
 use taut::linear::{Analysis, Hold, Question};
 use taut_report::modes::{figures, page};
 
 /// Reads the case, linearises, writes, tells.
 pub fn run(args: &Args) -> Outcome {
-    match args.common.open(&args.case)? {
+    match args.common.open_for(&args.case, Files::Nothing)? {
         Opened::Axis(case) => axis(args, &case),
         Opened::Gantry(case) => gantry::run(args, &case),
     }
@@ -24,9 +24,9 @@ pub fn run(args: &Args) -> Outcome {
 
 fn axis(args: &Args, case: &Case) -> Outcome {
     let common = &args.common;
-    let analysis = Analysis::of(case, &question(args))?;
     let names = ["modes.json", "frequency-response.csv", "report.html"];
     let folder = Folder::wanted(common, || folder::inputs(&args.case, &case.files), names)?;
+    let analysis = Analysis::of(case, &question(args))?;
     let advice = "add --out DIR for matrices, frequency response and a report";
     let json = ("modes.json", json::text(&json::modes(&analysis)));
     let mut finished = Finished::new("modes", json, table::text(&analysis), advice);

@@ -9,7 +9,8 @@ use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
 use std::fmt::Write;
 use std::path::Path;
-use taut::case::{Case, Move};
+use taut::case::{Case, Files, Move};
+use taut::control::feasible::{sentence, shortfalls};
 use taut::control::{Loop, MoveRun, Rows, Standard, stream, worst};
 use taut::design::Design;
 use taut::files::write_atomically;
@@ -19,12 +20,12 @@ use taut::trajectory::{CsvWriter, Trajectory};
 use taut::tune::trouble;
 use taut::{Error, Result};
 use taut_report::motion::{Curves, Done, Tried, figures, page};
-use taut_report::simulate::{early_end, named};
+use taut_report::simulate::{early_end, named, time};
 
 /// Reads the cases, runs their moves, reports.
 pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
-    let cases: Vec<Case> = args.case.iter().map(|path| common.case(path)).collect::<Result<_>>()?;
+    let cases: Vec<Case> = args.case.iter().map(|path| common.case_for(path, Files::Nothing)).collect::<Result<_>>()?;
     if cases.len() > 1 && common.out.is_some() {
         return Err(Error::new("--out takes the results of one case")
             .in_file("--out")
@@ -61,7 +62,7 @@ pub fn run(args: &Args) -> Outcome {
     let mut finished = Finished::new("move", ("summary.json", json), text, advice);
     if let (Some(folder), [tried]) = (&folder, &tried[..]) {
         let text = folder.bring(&tried.case.text, &tried.case.files).map_err(Failure::work)?;
-        if !common.no_report {
+        if common.draws() {
             let figures: Vec<_> = tried.done.iter().map(figures).collect();
             let page = page(tried, &text, &figures);
             let names = tried.done.iter().map(|done| done.motion.file_name());
@@ -101,7 +102,7 @@ fn one<'a>(
 ) -> std::result::Result<Done<'a>, Failure> {
     let stage = &case.stage;
     let mut controller = Standard::new(design, stage)?;
-    let profile = motion.profile.clone().shaped(&design.shaper);
+    let profile = motion.reference(design);
     let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
     let name = motion.file_name();
     let writer = folder.map(|folder| CsvWriter::create(folder.path(format!("{name}.csv")))).transpose();
@@ -133,7 +134,8 @@ fn one<'a>(
         None => None,
     };
     let trouble = trouble::trouble(stage, design, &run, motion.profile.target());
-    Ok(Done { motion, run, curves, worst, trouble, files })
+    let shortfalls = shortfalls(stage, design.limit, &profile);
+    Ok(Done { motion, run, curves, worst, trouble, shortfalls, files })
 }
 
 /// The controller's samples as CSV.
@@ -159,12 +161,30 @@ fn status(tried: &[Tried], interrupt: &Interrupt) -> (Status, Vec<Remark>) {
         let words = &done.trouble.as_ref()?.words;
         Some(Remark::Warning(format!("the move \"{}\" is not to be relied on: {words}", done.motion.name)))
     };
+    let beyond = |done: &Done| {
+        let name = &done.motion.name;
+        if !done.shortfalls.is_empty() {
+            return Some(Remark::Warning(sentence(name, &done.shortfalls)));
+        }
+        let saturated = saturated(done).filter(|_| done.trouble.is_none())?;
+        Some(Remark::Warning(format!("the move \"{name}\" saturates, though its reference needs less: {saturated}")))
+    };
     let all = || tried.iter().flat_map(|tried| &tried.done);
-    let remarks: Vec<Remark> = all().filter_map(early).chain(all().filter_map(unwell)).collect();
+    let remarks: Vec<Remark> =
+        all().filter_map(early).chain(all().filter_map(beyond)).chain(all().filter_map(unwell)).collect();
     let status = match interrupt.signal() {
         Some(signal) => Status::Interrupted(signal),
         None if remarks.is_empty() => Status::Done,
         None => Status::Incomplete,
     };
     (status, remarks)
+}
+
+/// How long the command or the amplifier stood at its limit, in words; none if neither did.
+fn saturated(done: &Done) -> Option<String> {
+    let ((samples, limited), amplifier) = (done.run.samples, done.run.figures.amplifier_limited);
+    if limited > 0 {
+        return Some(format!("{limited} of {samples} samples are at the controller's limit"));
+    }
+    (amplifier > 0.0).then(|| format!("the amplifier is at its limit for {}", time(amplifier)))
 }

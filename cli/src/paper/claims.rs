@@ -2,6 +2,11 @@
 
 use serde::Serialize;
 
+/// Less than a tenth.
+pub const MINOR: f64 = 0.1;
+/// Less than a hundredth.
+pub const NOT_APPRECIABLE: f64 = 0.01;
+
 /// One statement with what this run makes of it.
 #[derive(Debug, Clone)]
 pub struct Claim {

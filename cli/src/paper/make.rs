@@ -1,8 +1,7 @@
 //! The paper's sentences and numbers about what the stage is made of (sections 2.2 and 2.3).
 
-use super::claims::{Claim, Kind::Statement, Rule};
+use super::claims::{Claim, Kind::Statement, MINOR, NOT_APPRECIABLE, Rule};
 use super::findings::Findings;
-use super::statements::{MINOR, NOT_APPRECIABLE};
 use super::words::{percent, share, si};
 
 /// All of them, in the paper's order.

@@ -49,7 +49,7 @@ pub fn run(args: &Paper) -> Outcome {
     let plots = plots(&findings);
     let mut finished = Finished::new("paper", ("claims.json", claims::json(&claims)), table(&claims), "");
     write(&folder, common, &findings, &plots).map_err(Failure::work)?;
-    if !common.no_report {
+    if common.draws() {
         finished.report = Some(Report { page: report::page(&findings, &claims, &plots), pictures: Vec::new() });
     }
     finished.finish(common, Some(folder))

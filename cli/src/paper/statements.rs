@@ -3,17 +3,13 @@
 //! The meaning of the paper's words, once for all: "by far" is five times, "minor" and "marginal" less than a tenth,
 //! "not appreciable" less than a hundredth, "the same" less than a thousandth.
 
-use super::claims::{Claim, Kind::Statement, Rule};
+use super::claims::{Claim, Kind::Statement, MINOR, NOT_APPRECIABLE, Rule};
 use super::findings::Findings;
 use super::model::{Change, VOLTS};
 use super::studies::{Effect, FACTORS, From, largest, smallest};
 use super::words::{mm, percent, share, si, um};
 
 const BY_FAR: f64 = 5.0;
-/// Less than a tenth.
-pub const MINOR: f64 = 0.1;
-/// Less than a hundredth.
-pub const NOT_APPRECIABLE: f64 = 0.01;
 const THE_SAME: f64 = 1e-3;
 
 const INERTIA: [Change; 2] = [Change::PulleyInertia, Change::AllInertia];

@@ -15,7 +15,8 @@ use crate::terminal;
 use run::Setting;
 use std::ffi::OsString;
 use std::path::Path;
-use taut::case::{Case, Opened};
+use taut::case::{Case, Files, Opened};
+use taut::files::Claim;
 use taut::json::{self, Simulation};
 use taut::solve::{self, Ending, Solver};
 use taut::stage::Stage;
@@ -32,7 +33,8 @@ pub fn run(args: &Simulate) -> Outcome {
 }
 
 fn one(args: &Simulate, path: &Path) -> Outcome {
-    match args.common.open(path)? {
+    let files = if args.experiments.is_empty() { Files::All } else { Files::Of(&args.experiments) };
+    match args.common.open_for(path, files)? {
         Opened::Axis(case) => axis(args, path, &case),
         Opened::Gantry(case) => gantry::run(args, path, &case),
     }
@@ -59,6 +61,8 @@ fn several(args: &Simulate) -> Outcome {
         let error = Error::new("another case has the same name, and would be written into the same folder");
         return Err(error.in_file(&args.cases[k]).next("simulate it by itself, with an --out of its own").into());
     }
+    // The folder that has those of all cases, before any of them is run.
+    let _claim = args.common.out.as_ref().map(|out| Claim::folder(out, &[])).transpose()?.map(folder::noted);
     let mut all = Status::Done;
     for (k, (path, name)) in args.cases.iter().zip(names).enumerate() {
         if k > 0 && !args.common.quiet {
@@ -105,7 +109,7 @@ fn axis(args: &Simulate, path: &Path, case: &Case) -> Outcome {
     let mut finished = Finished::new("simulate", json, table::text(case, solver, &runs), ADVICE);
     if let Some(folder) = &folder {
         let text = folder.bring(&case.text, &case.files).map_err(Failure::work)?;
-        if !common.no_report {
+        if common.draws() {
             let figures: Vec<_> = runs.iter().map(|run| figures(case, run)).collect();
             let page = page(case, &text, solver, &runs, &figures);
             let names = runs.iter().map(|run| run.experiment.file_name());

@@ -88,8 +88,11 @@ impl<'a> Setting<'a> {
         }
         let metrics = meter.finish(&outcome.events);
         let took = begin.elapsed();
-        let reduction = Reduction::of(stage, experiment, self.solver)?;
-        let log = if self.interrupt.signal().is_some() { None } else { beside_log(stage, experiment) };
+        let (mut reduction, mut log) = (None, None);
+        if self.interrupt.signal().is_none() {
+            reduction = Reduction::of(stage, experiment, self.solver)?;
+            log = beside_log(stage, experiment);
+        }
         let model = stage.belt.model;
         Ok(Run { experiment, outcome, metrics, curves, samples, band, log, model, reduction, files, took })
     }

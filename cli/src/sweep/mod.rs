@@ -10,9 +10,9 @@ mod trajectories;
 
 use crate::args::Sweep as Args;
 use crate::command::{Finished, Report};
-use crate::failure::{Failure, Outcome, Status};
+use crate::failure::{Failure, Outcome};
 use crate::folder::Target;
-use crate::interrupt::Interrupt;
+use crate::interrupt::{Interrupt, interrupted};
 use crate::progress::Progress;
 use crate::terminal;
 use rayon::prelude::*;
@@ -66,23 +66,21 @@ pub fn run(args: &Args) -> Outcome {
     pool.install(|| rows(&work, &store)).map_err(Failure::work)?;
     let took = begin.elapsed();
     if let Some(signal) = interrupt.signal() {
-        told_interrupted(&work, &store);
-        return Ok(Status::Interrupted(signal));
+        return Err(left_at(&work, &store, signal));
     }
     let summary = pool.install(|| summary(&work, &store)).map_err(Failure::work)?;
     let json = ("sweep.json", json::text(&json::sweep(&case, &sweep, &summary)));
     let text = table::text(&work, &summary, took, sweep.runs() - before);
     let mut finished = Finished::new("sweep", json, text, "add --out FILE.parquet or --out DIR");
     let Some(written) = output::write(&work, &target, &store)? else {
-        told_interrupted(&work, &store);
-        return Ok(Status::Interrupted(interrupt.signal().unwrap_or(2)));
+        return Err(left_at(&work, &store, interrupt.signal().unwrap_or(2)));
     };
     finished.written = written;
     let folder = match target {
-        Target::Nowhere | Target::File(_) => None,
+        Target::Nowhere | Target::File(..) => None,
         Target::Folder(folder) => {
             let text = folder.bring(case.text(), case.files()).map_err(Failure::work)?;
-            if !common.no_report {
+            if common.draws() {
                 let figures = figures(&sweep, &summary);
                 let page = page(case.title(), &sweep, &summary, &text, &figures);
                 let pictures = figures.into_iter().map(|(name, figure)| (name, figure.into())).collect();
@@ -116,7 +114,7 @@ fn rows(work: &Work, store: &Store) -> Result<()> {
     pending.into_par_iter().try_for_each(|chunk| {
         let (first, count) = store.range(chunk);
         // None where it was interrupted.
-        let Some(table) = work.sweep.rows(first, count, &stop) else { return Ok(()) };
+        let Some(table) = work.sweep.rows(first, count, &stop) else { return Ok::<(), Error>(()) };
         store.put(chunk, table)?;
         progress.add(count as u64);
         Ok(())
@@ -125,7 +123,8 @@ fn rows(work: &Work, store: &Store) -> Result<()> {
     Ok(())
 }
 
-fn told_interrupted(work: &Work, store: &Store) {
+/// The end of a sweep that a signal ended.
+fn left_at(work: &Work, store: &Store, signal: u8) -> Failure {
     let done = store.done();
     let what = match store.folder() {
         Some(folder) => format!(
@@ -135,7 +134,7 @@ fn told_interrupted(work: &Work, store: &Store) {
         ),
         None => format!("interrupted after {done} of {} runs; with --out they would be kept", work.sweep.runs()),
     };
-    terminal::show_error(&what);
+    interrupted(signal, &what)
 }
 
 /// A time for people.

@@ -78,7 +78,11 @@ fn named(args: &Args, case: &Opened, inputs: &Inputs) -> std::result::Result<Tar
                 let error = Error::new("this program was built without Parquet").in_file(out);
                 return Err(error.allowed("FILE.csv").into());
             }
-            Ok(Target::File(out.clone()))
+            let mut claim = folder::claim(out)?;
+            if args.trajectories {
+                claim.add(trajectories(out))?;
+            }
+            Ok(Target::File(out.clone(), claim))
         }
         Some(other) if !out.is_dir() => Err(Error::new(format!("rows are not written as .{other}"))
             .in_file("--out")
@@ -87,7 +91,8 @@ fn named(args: &Args, case: &Opened, inputs: &Inputs) -> std::result::Result<Tar
         _ => {
             let report = (!args.common.no_report).then(|| "report.html".to_string());
             let names = [ROWS, "sweep.json", "case.toml"].map(str::to_string).into_iter().chain(report);
-            let names = names.chain(folder::brought(case.files()).into_values());
+            let trajectories = args.trajectories.then(|| trajectories(Path::new(ROWS)).display().to_string());
+            let names = names.chain(folder::brought(case.files()).into_values()).chain(trajectories);
             Folder::create(out, inputs.clone(), names).map(Target::Folder)
         }
     }
@@ -97,7 +102,7 @@ fn named(args: &Args, case: &Opened, inputs: &Inputs) -> std::result::Result<Tar
 pub fn rows(target: &Target) -> Option<PathBuf> {
     match target {
         Target::Nowhere => None,
-        Target::File(path) => Some(path.clone()),
+        Target::File(path, _) => Some(path.clone()),
         Target::Folder(folder) => Some(folder.root().join(ROWS)),
     }
 }

@@ -20,7 +20,7 @@ pub fn write(work: &Work, target: &Target, store: &Store) -> std::result::Result
     // In a folder all files get their places together.
     let begun = |file: &PathBuf| match target {
         Target::Folder(folder) => folder.path(file.file_name().unwrap_or_default()),
-        Target::File(_) | Target::Nowhere => file.clone(),
+        Target::File(..) | Target::Nowhere => file.clone(),
     };
     let Some(tables) = tables(work, store, &files.iter().map(begun).collect::<Vec<_>>()).map_err(Failure::work)? else {
         return Ok(None);
@@ -28,7 +28,7 @@ pub fn write(work: &Work, target: &Target, store: &Store) -> std::result::Result
     tables.into_iter().try_for_each(Writer::finish).map_err(Failure::work)?;
     Ok(Some(match target {
         Target::Folder(_) => Vec::new(),
-        Target::File(_) | Target::Nowhere => files.iter().map(|file| file.display().to_string()).collect(),
+        Target::File(..) | Target::Nowhere => files.iter().map(|file| file.display().to_string()).collect(),
     }))
 }
 

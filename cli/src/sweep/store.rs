@@ -227,7 +227,7 @@ fn chunk(work: &Work, threads: usize) -> u64 {
 fn fingerprint(work: &Work) -> Result<String> {
     let mut bytes = work.case.text().as_bytes().to_vec();
     for path in work.case.files().iter().map(|file| &file.path) {
-        bytes.extend(fs::read(path).map_err(|e| Error::new(e.to_string()).in_file(path))?);
+        bytes.extend(taut::files::read(path, usize::MAX).map_err(|e| Error::new(e.to_string()).in_file(path))?);
     }
     work.sweep.columns().iter().for_each(|column| bytes.extend(column.heading().into_bytes()));
     Ok(format!("{:016x}", taut::chance::hash(bytes)))

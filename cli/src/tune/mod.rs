@@ -5,12 +5,12 @@ mod table;
 use crate::args::Tune as Args;
 use crate::command::{self, Finished, Remark, Report};
 use crate::failure::{Failure, Outcome, Status};
-use crate::folder::{self, Folder, Target};
-use crate::interrupt::Interrupt;
+use crate::folder::{self, Folder, Target, files_of};
+use crate::interrupt::{Interrupt, interrupted};
 use crate::progress::Progress;
-use crate::terminal;
 use std::path::Path;
-use taut::case::{Case, Tuning};
+use taut::case::{Case, Files, Tuning};
+use taut::control::feasible::{of_moves, sentence};
 use taut::files::{Inputs, write_atomically};
 use taut::json;
 use taut::tune::{Judgement, evaluate, tune};
@@ -20,34 +20,40 @@ use taut_report::tune::{Work, figures, hertz, page};
 /// Reads the case, tunes, writes, tells.
 pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
-    let case = common.case(&args.case)?;
+    let case = common.case_for(&args.case, Files::Nothing)?;
     let tuning = tuning(args, &case);
     let target = target(args, &case)?;
-    let interrupt = Interrupt::listen();
-    let progress = Progress::new("designs are tried", None, common.quiet);
-    let stop = || {
-        progress.tick();
-        interrupt.signal().is_some()
+    let (found, signal) = match args.evaluate {
+        // One run of each move says nothing before its end: a signal ends it at once.
+        true => {
+            let progress = Progress::of_whole("the moves are run", common.quiet);
+            let found = evaluate(&case, &tuning);
+            progress.clear();
+            (found, None)
+        }
+        false => {
+            let interrupt = Interrupt::listen();
+            let progress = Progress::new("designs are tried", None, common.quiet);
+            let found = tune(&case, &tuning, &|| interrupt.signal().is_some());
+            progress.clear();
+            (found, interrupt.signal())
+        }
     };
-    let found = if args.evaluate { evaluate(&case, &tuning) } else { tune(&case, &tuning, &stop) };
-    let tuned = match (found, interrupt.signal()) {
+    let tuned = match (found, signal) {
         (Ok(tuned), _) => tuned,
         // What was looked at so far says nothing about the rest.
         (Err(_), Some(signal)) => {
-            progress.clear();
-            terminal::show_error(&"interrupted before any gains were found; nothing was written");
-            return Ok(Status::Interrupted(signal));
+            return Err(interrupted(signal, "interrupted before any gains were found; nothing was written"));
         }
         (Err(error), None) => return Err(error.in_file(&args.case).into()),
     };
-    progress.clear();
     let work = Work { case: &case, tuning: &tuning, tuned: &tuned };
     let text = tuned.case_text(&case, &args.case)?;
     let advice = if args.evaluate { "" } else { "add --out FILE.toml, --out DIR or --in-place" };
     let data = json::text(&json::tuned(&case, &tuning, &tuned));
     let mut finished = Finished::new("tune", ("tune.json", data), table::text(&work), advice);
     finished.remarks = remarks(&work);
-    finished.status = match interrupt.signal() {
+    finished.status = match signal {
         Some(signal) => Status::Interrupted(signal),
         None if tuned.holds && tuned.judgement != Judgement::Worse => Status::Done,
         None => Status::Incomplete,
@@ -59,14 +65,14 @@ pub fn run(args: &Args) -> Outcome {
     }
     let folder = match target {
         Target::Nowhere => None,
-        Target::File(path) => {
+        Target::File(path, _claim) => {
             write_atomically(&path, moved(&text, args, &path)?).map_err(Failure::work)?;
             finished.written.push(path.display().to_string());
             None
         }
         Target::Folder(folder) => {
-            let text = folder.bring(&text, &Case::from_text(&args.case, &text)?.files).map_err(Failure::work)?;
-            if !common.no_report {
+            let text = folder.bring(&text, &files_of(&args.case, &text)?).map_err(Failure::work)?;
+            if common.draws() {
                 let figures = figures(&work).map_err(Failure::work)?;
                 let page = page(&work, &text, &figures);
                 let pictures = figures.into_iter().map(|(name, figure)| (name.to_string(), figure.into()));
@@ -87,6 +93,8 @@ fn remarks(work: &Work) -> Vec<Remark> {
         let told = "the loop is not stable on the axis as the file has it";
         remarks.push(Remark::Warning(format!("{told}: it swings at {}", hertz(tuned.after.nominal.at))));
     }
+    let short = of_moves(work.case);
+    remarks.extend(short.iter().map(|(name, short)| Remark::Warning(sentence(name, short))));
     remarks
 }
 
@@ -107,7 +115,7 @@ fn target(args: &Args, case: &Case) -> std::result::Result<Target, Failure> {
             let error = Error::new("standard input cannot be written to").in_file("--in-place");
             return Err(error.next("name a file: --out FILE.toml").into());
         }
-        return Ok(Target::File(args.case.clone()));
+        return Ok(Target::File(args.case.clone(), folder::claim(&args.case)?));
     }
     let Some(out) = &args.common.out else { return Ok(Target::Nowhere) };
     let inputs = folder::inputs(&args.case, &case.files);
@@ -120,6 +128,7 @@ fn target(args: &Args, case: &Case) -> std::result::Result<Target, Failure> {
     let own = Inputs::new([&args.case]);
     own.check(out).map_err(|error| error.next("name another --out, or say --in-place"))?;
     inputs.check(out)?;
+    let claim = folder::claim(out)?;
     if out.exists() {
         return Err(Error::new(format!("{} is there already", out.display()))
             .in_file("--out")
@@ -127,7 +136,7 @@ fn target(args: &Args, case: &Case) -> std::result::Result<Target, Failure> {
             .into());
     }
     folder::leading(&case.text, &case.files, parent(out))?;
-    Ok(Target::File(out.clone()))
+    Ok(Target::File(out.clone(), claim))
 }
 
 /// The folder that a file is in.
@@ -140,5 +149,5 @@ fn moved(text: &str, args: &Args, path: &Path) -> Result<String> {
     if args.in_place {
         return Ok(text.to_string());
     }
-    folder::leading(text, &Case::from_text(&args.case, text)?.files, parent(path))
+    folder::leading(text, &files_of(&args.case, text)?, parent(path))
 }

@@ -4,7 +4,7 @@ use crate::terminal::bold;
 use std::fmt::Write;
 use taut::tune::Verdict;
 use taut_report::tune::{
-    CHOICES, Row, Work, axes, choices, family, gains, given, goal, hunt, limiting, margins, moves, verdict,
+    CHOICES, Row, Work, ahead, axes, choices, family, gains, given, goal, hunt, limiting, margins, moves, verdict,
 };
 
 fn rows(text: &mut String, title: &str, rows: &[Row]) {
@@ -34,6 +34,9 @@ pub fn text(work: &Work) -> String {
     let mut text = String::new();
     if tuned.searched {
         let _ = writeln!(text, "{}", bold(&verdict(work)));
+    }
+    if let Some(told) = ahead(work) {
+        let _ = writeln!(text, "{told}");
     }
     if let Some(told) = given(work) {
         let _ = writeln!(text, "{told}");

@@ -5,6 +5,7 @@ use taut::control::{Controller, Loop, Observation, Standard, close};
 use taut::export::mechanism;
 use taut::mechanism::State;
 use taut::signal::Signal;
+use taut::signal::profile::Reference;
 use taut::solve::{Machine, Solver};
 
 /// Steps of a run, and how long each is, s.
@@ -80,6 +81,36 @@ impl Ways {
     }
 }
 
+/// Largest errors of a reference that is made from rounded numbers: of its position and of its four derivatives.
+const NOISE: [f64; 5] = [1e-9, 0.9e-6, 0.9e-3, 0.0, 0.0];
+
+/// The same as [`observed`] with references that never stand quite still.
+pub fn noisy(case: &Case, which: usize, seed: u64) -> Vec<([f64; 12], f64)> {
+    let design = case.controller.as_ref().unwrap();
+    let mut own = Standard::new(design, &case.stage).unwrap();
+    let mut number = seed;
+    let mut next = || {
+        number = number.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (number >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    };
+    let mut step = |(mut all, _): ([f64; 12], f64)| {
+        all.iter_mut().take(10).zip(NOISE.iter().cycle()).for_each(|(value, noise)| *value += noise * next());
+        let five = |k: usize| Reference {
+            position: all[k],
+            speed: all[k + 1],
+            acceleration: all[k + 2],
+            jerk: all[k + 3],
+            snap: all[k + 4],
+        };
+        let (reference, ahead, position, current) = (five(0), five(5), all[10], all[11]);
+        let asked = own.step(&Observation { time: 0.0, reference, ahead, position, scale: None, current });
+        let given = design.limit.map_or(asked, |limit| asked.clamp(-limit, limit));
+        own.limited(given);
+        (all, given)
+    };
+    observed(case, which).into_iter().map(&mut step).collect()
+}
+
 /// A controller that is watched: what it saw, and what its limit left.
 struct Watched {
     own: Standard,
@@ -107,11 +138,11 @@ pub fn observed(case: &Case, which: usize) -> Vec<([f64; 12], f64)> {
     let design = case.controller.as_ref().unwrap();
     let one = &case.moves[which];
     let mut watched = Watched { own: Standard::new(design, &case.stage).unwrap(), seen: Vec::new() };
-    let profile = one.profile.clone().shaped(&design.shaper);
+    let profile = one.reference(design);
     let timing = Loop::of(design);
     close(&case.stage, &mut watched, &timing, &profile, one.until, one.window, Solver::of(&case.stage)).unwrap();
     let flat = |seen: &Observation| {
-        let five = |r: taut::signal::profile::Reference| [r.position, r.speed, r.acceleration, r.jerk, r.snap];
+        let five = |r: Reference| [r.position, r.speed, r.acceleration, r.jerk, r.snap];
         let mut all = [0.0; 12];
         all[..5].copy_from_slice(&five(seen.reference));
         all[5..10].copy_from_slice(&five(seen.ahead));

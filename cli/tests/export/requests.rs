@@ -30,17 +30,16 @@ fn wrong_requests_are_refused_with_what_can_be_done_instead() {
     words.extend(curved);
     let (code, _, error) = told(&words);
     assert_eq!(code, Some(2), "{error}");
-    assert!(
-        error.contains("the friction of the cart is a curve")
-            && error.contains("taut export fmu")
-            && error.contains("--part controller"),
-        "{error}"
-    );
+    assert!(error.contains("the friction of the cart is a curve") && error.contains("taut export fmu"), "{error}");
+    assert!(!error.contains("--part controller"), "there is none: {error}");
+    words[2] = &pid;
+    let (_, _, error) = told(&words);
+    assert!(error.contains("taut export fmu") && error.contains("--part controller"), "{error}");
     let cases: [(&[&str], &[&str]); 8] = [
-        (&["export", "c", &table4, "--part", "controller"], &["no controller", "[controller]", "--part plant"]),
-        (&["export", "st", &table4], &["no controller", "[controller]"]),
-        (&["export", "c", &core, "--part", "both"], &["a gantry has no controller", "--part plant"]),
-        (&["export", "st", &pid, "--part", "plant"], &["only a controller", "export c"]),
+        (&["export", "c", &table4, "--part", "controller"], &["no controller", "[controller]", "leave --part out"]),
+        (&["export", "st", &table4], &["no controller", "[controller]", "export fmu"]),
+        (&["export", "c", &core, "--part", "both"], &["a gantry has no controller", "leave --part out"]),
+        (&["export", "st", &pid, "--part", "plant"], &["only a controller", "export fmu"]),
         (&["export", "st", &pid, "--real", "float"], &["--real means nothing to st", "with c"]),
         (&["export", "c", &table4, "--fmi", "2"], &["--fmi means nothing to c", "with fmu"]),
         (&["export", "json", &table4, "--step", "1 ms"], &["--step means nothing to json", "c, matlab and python"]),
@@ -56,6 +55,76 @@ fn wrong_requests_are_refused_with_what_can_be_done_instead() {
     let (code, _, error) = told(&["export", "c"]);
     assert_eq!(code, Some(2));
     assert!(error.contains("CASE"), "{error}");
+}
+
+/// Advice was given that the next call refused: `--part plant` for Structured Text, a controller for MATLAB, which
+/// takes none. Every request that is refused for its part is followed by one with --part as the message has it, or
+/// without.
+#[test]
+fn advice_about_parts_is_taken_by_the_next_call() {
+    let pid = file("stages/sollmann-jouaneh/controllers/pid.toml");
+    let machines = ["sollmann-jouaneh/table4", "core-xy/core-xy", "core-xy/follows"]
+        .map(|name| file(&format!("stages/{name}.toml")));
+    let cases = machines.into_iter().chain([pid]).collect::<Vec<_>>();
+    let mut refused = 0;
+    for case in &cases {
+        for target in ["c", "st", "matlab", "python", "fmu"] {
+            for part in ["plant", "controller", "both"] {
+                let (code, _, error) = told(&["export", target, case, "--part", part]);
+                if code == Some(0) {
+                    continue;
+                }
+                refused += 1;
+                let next = error.split_once("next: ").unwrap_or_else(|| panic!("no advice: {error}")).1;
+                assert!(!next.contains(&format!("--part {part}")), "{error}");
+                if next.contains("leave --part out") {
+                    assert_eq!(told(&["export", target, case]).0, Some(0), "{target} {case} {part}: {error}");
+                }
+                for other in ["plant", "controller", "both"] {
+                    if next.contains(&format!("--part {other}")) {
+                        let words = ["export", target, case, "--part", other];
+                        assert_eq!(told(&words).0, Some(0), "{target} {case} {part}: {error}");
+                    }
+                }
+                for other in ["c", "fmu", "st"] {
+                    if next.contains(&format!("`taut export {other}`")) {
+                        assert_eq!(told(&["export", other, case]).0, Some(0), "{target} {case} {part}: {error}");
+                    }
+                }
+                // A controller is only asked for where it would be taken.
+                assert!(!(next.contains("[controller]") && ["matlab", "python"].contains(&target)), "{error}");
+            }
+        }
+    }
+    assert!(refused > 15, "{refused}");
+}
+
+#[test]
+fn options_of_another_target_are_named_once() {
+    let (_, _, error) =
+        told(&["export", "st", &file("stages/sollmann-jouaneh/controllers/pid.toml"), "--real", "float"]);
+    assert_eq!(error.matches("--real").count(), 1, "{error}");
+}
+
+/// The commands of a case with an input shaper are those of the controller behind it, and nothing said so.
+#[test]
+fn a_shaper_that_is_left_out_is_told() {
+    let shaped = file("stages/sollmann-jouaneh/controllers/pid-shaped.toml");
+    for (target, path) in [("c", "x.h"), ("st", "x.st")] {
+        let folder = tempfile::tempdir().unwrap();
+        let out = format!("x.{target}");
+        let output = taut(folder.path(), &["export", target, &shaped, "--out", &out]);
+        let shown = String::from_utf8(output.stdout).unwrap();
+        assert!(shown.contains("the input shaper of 2 impulses is not in it"), "{shown}");
+        let text = std::fs::read_to_string(folder.path().join(path)).unwrap();
+        assert!(
+            text.contains("the input shaper of 2 impulses") && text.contains("of the reference 0.0 s ago"),
+            "{text}"
+        );
+        let pid = file("stages/sollmann-jouaneh/controllers/pid.toml");
+        let output = taut(folder.path(), &["export", target, &pid, "--out", &out]);
+        assert!(!String::from_utf8(output.stdout).unwrap().contains("shaper"));
+    }
 }
 
 #[test]

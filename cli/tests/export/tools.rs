@@ -1,7 +1,7 @@
 //! Tools that are not part of the project: a test that lacks one does nothing, and is counted as ignored by
 //! `cargo xtask test`, which installs them where it may; with `TAUT_REQUIRE=all` it fails instead.
 
-use super::ignored::ignored;
+use crate::ignored::ignored;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

@@ -1,7 +1,7 @@
 //! Inputs and starts of a random stage.
 
 use super::machine::Scale;
-use super::{Draw, Sizes};
+use super::{Draw, Feature, Sizes};
 use std::fmt::Write;
 
 impl Draw {
@@ -10,10 +10,64 @@ impl Draw {
         let until = self.digits(sizes.time.min(0.99 * most));
         let rows = 20.0 + self.random.below(30) as f64;
         let every = self.digits(until / rows).min(until);
-        let input = self.input(until, scale.input, 0);
+        let input = match self.is_by_recipe() {
+            true => self.input_by_recipe(until, scale.input, 0),
+            false => self.input(until, scale.input, 0),
+        };
         let initial = self.initial(sizes, start, until, scale);
         self.text.push_str("\n[[experiment]]\nname = \"run\"\n");
         let _ = writeln!(self.text, "input = {input}\nuntil = {until:e}\nevery = {every:e}\ninitial = {{ {initial} }}");
+    }
+
+    /// An input of the shapes of the recipe, the one of this number if there are several.
+    pub(super) fn input_by_recipe(&mut self, until: f64, peak: f64, number: usize) -> String {
+        let features = self.features.clone().unwrap_or_default();
+        let shapes: Vec<Feature> = features.into_iter().filter(|one| one.is_input()).collect();
+        let late = if self.wants(Feature::Late) { self.even(0.03, 0.3) * until } else { 0.0 };
+        let mut part = |shape: Feature| {
+            let size = peak * self.random.decades(0.2, 5.0);
+            let size = self.digits(size);
+            let size = if self.random.chance(0.4) { -size } else { size };
+            let frequency = {
+                let value = self.random.decades(0.7, 12.0) / until;
+                self.digits(value)
+            }
+            .max(1e-8);
+            match shape {
+                Feature::Ramp => format!("ramp = {size:e}, over = {:e}", self.even(0.1, 0.9) * until),
+                Feature::Sine => {
+                    let phase = if self.random.chance(0.5) { 0.0 } else { self.even(-3.0, 3.0) };
+                    format!("sine = {size:e}, frequency = {frequency:e}, phase = {phase:e}")
+                }
+                Feature::Table => {
+                    let (mut time, mut points) = (0.0, Vec::new());
+                    for _ in 0..3 + self.random.below(6) {
+                        points.push(format!("[{:e}, {:e}]", self.digits(time), self.even(-1.0, 1.0) * size));
+                        time += until * self.random.even(0.03, 0.25);
+                    }
+                    format!("table = [{}]", points.join(", "))
+                }
+                Feature::Triangle => format!("triangle = {size:e}, frequency = {frequency:e}"),
+                _ if self.random.chance(0.5) => format!("step = {size:e}"),
+                _ => format!("pulse = {size:e}, for = {:e}", self.even(0.1, 0.7) * until),
+            }
+        };
+        let parts: Vec<String> = match (shapes.len(), number) {
+            // Each drive of a gantry has its own, as long as there are several.
+            (2.., 1..) => shapes[1..].iter().map(|&shape| part(shape)).collect(),
+            _ => shapes.iter().map(|&shape| part(shape)).collect(),
+        };
+        let whole = match &parts[..] {
+            [one] => one.clone(),
+            several => {
+                let several: Vec<String> = several.iter().map(|one| format!("{{ {one} }}")).collect();
+                format!("sum = [{}]", several.join(", "))
+            }
+        };
+        match late > 0.0 {
+            true => format!("{{ sequence = [{{ step = 0, lasts = {late:e} }}, {{ {whole} }}] }}"),
+            false => format!("{{ {whole} }}"),
+        }
     }
 
     fn input(&mut self, until: f64, peak: f64, depth: u32) -> String {

@@ -1,6 +1,7 @@
 //! Motor, amplifier, bodies, belt and travel of a random stage.
 
-use super::{Draw, Kind, Random, Sizes};
+use super::{Draw, Feature, Kind, Random, Sizes};
+use crate::answer::By;
 use std::f64::consts::PI;
 use std::fmt::Write;
 
@@ -10,6 +11,8 @@ pub(super) struct Scale {
     pub(super) input: f64,
     /// Amperes of the current at the start, where it is a state.
     pub(super) current: Option<f64>,
+    /// Force at the belt per unit of the input, at rest.
+    pub(super) push: f64,
 }
 
 /// Motor and amplifier as far as they depend on each other.
@@ -41,17 +44,23 @@ impl Draw {
             false => self.random.decades(0.1, 10.0),
         };
         let resistance = self.digits(resistance);
-        let current_mode = self.random.chance(0.25);
+        let current_mode = self.has(Feature::Current, 0.25);
         let bandwidth = (current_mode && self.random.chance(0.6)).then(|| self.decades(1.0, 2000.0) / sizes.time);
-        let mut inductance = match self.random.chance(0.35) {
+        let mut inductance = match self.has(Feature::Inductance, 0.35) {
             true => resistance * sizes.time / self.random.decades(1.0, 2000.0),
             false => 0.0,
         };
         let [mut voltage_limit, mut current_limit] = [(); 2].map(|()| self.random.chance(0.35));
-        if current_mode && voltage_limit && bandwidth.is_some() != (inductance > 0.0) {
+        if self.is_by_recipe() {
+            let limits = self.wants(Feature::Limit);
+            // A voltage limit in current mode wants both, a bandwidth and an inductance, or none.
+            let may = !current_mode || bandwidth.is_some() == (inductance > 0.0);
+            (voltage_limit, current_limit) = (limits && voltage_limit && may, limits && current_limit);
+            current_limit |= limits && !voltage_limit;
+        } else if current_mode && voltage_limit && bandwidth.is_some() != (inductance > 0.0) {
             (voltage_limit, inductance) = (bandwidth.is_none(), 0.0);
         }
-        if !voltage_limit && !current_limit && self.random.chance(0.1) {
+        if !voltage_limit && !current_limit && self.random.chance(0.1) && !self.is_by_recipe() {
             current_limit = true;
         }
         inductance = self.digits(inductance);
@@ -75,10 +84,10 @@ impl Draw {
         } else if !current_mode {
             self.faster(exchange / resistance);
         }
-        self.amplifier(&drive, amperes)
+        self.amplifier(&drive, amperes, n * kt / r)
     }
 
-    fn amplifier(&mut self, drive: &Drive, amperes: f64) -> Scale {
+    fn amplifier(&mut self, drive: &Drive, amperes: f64, grip: f64) -> Scale {
         let volts = amperes * drive.resistance;
         self.table("amplifier");
         if drive.current_mode {
@@ -109,12 +118,13 @@ impl Draw {
         }
         let moves = if drive.current_mode { drive.bandwidth.is_some() } else { drive.inductance > 0.0 };
         let current = moves.then(|| (amperes * self.random.even(-1.0, 1.0)).clamp(-0.99 * bound, 0.99 * bound));
-        Scale { input: if drive.current_mode { amperes } else { volts } / gain.abs(), current }
+        let push = grip * gain / if drive.current_mode { 1.0 } else { drive.resistance };
+        Scale { input: if drive.current_mode { amperes } else { volts } / gain.abs(), current, push }
     }
 
     fn gear(&mut self, sizes: &Sizes, n: f64) {
         let r = sizes.radius;
-        let play = self.random.chance(0.2);
+        let play = self.has(Feature::Gear, 0.2);
         let mut rotor = 0.0;
         if play || self.random.chance(0.5) {
             rotor = sizes.mass[0] * self.random.decades(0.01, 10.0);
@@ -131,63 +141,22 @@ impl Draw {
             self.line("gear_damping", c * r * r);
             self.line("backlash", backlash.min(6.0));
             self.faster((2.0 * k / light).sqrt().max(2.0 * c / light));
-        } else if self.random.chance(0.35) {
+        } else if self.has(Feature::Losses, 0.35) {
             self.kind(Kind::Losses);
             let efficiency = if self.random.chance(0.2) { self.even(0.1, 0.5) } else { self.even(0.5, 0.999) };
             self.line("gear_efficiency", efficiency);
         }
     }
 
-    /// `friction = { … }` of a body that counts as `mass` at the belt; `arm` makes a force a torque.
-    fn friction(&mut self, sizes: &Sizes, mass: f64, arm: f64) -> String {
-        let side = |draw: &mut Self| {
-            let slow = mass * draw.random.decades(1e-3, 30.0) / sizes.time;
-            let viscous = match draw.random.below(12) {
-                0..3 => 0.0,
-                3 => mass * draw.fastest * draw.random.decades(0.05, 3.0),
-                _ => slow,
-            };
-            let common = sizes.force * draw.random.decades(1e-3, 3.0);
-            let coulomb = match draw.random.below(20) {
-                0..4 => 0.0,
-                4 => common * draw.random.decades(1e3, 1e6),
-                _ => common,
-            };
-            let over = match draw.random.below(10) {
-                0..4 => 1.0,
-                4..8 => draw.random.even(1.0, 2.0),
-                _ => draw.random.decades(2.0, 10.0),
-            };
-            // Breakaway alone, too.
-            let coulomb_or_less = if draw.random.chance(0.05) { 0.0 } else { coulomb };
-            [viscous * arm * arm, coulomb_or_less * arm, coulomb * over * arm].map(|value| draw.digits(value))
-        };
-        let forward = side(self);
-        let backward = if self.random.chance(0.25) { side(self) } else { forward };
-        self.faster(2.0 * forward[0].max(backward[0]) / (arm * arm * mass));
-        if forward[2] > forward[1] || backward[2] > backward[1] {
-            self.kind(Kind::Static);
-        }
-        let [viscous, coulomb, at_rest] = forward;
-        let mut text = format!("viscous = {viscous:e}, coulomb = {coulomb:e}, static = {:e}", at_rest.max(coulomb));
-        if backward != forward {
-            self.kind(Kind::Asymmetric);
-            let [viscous, coulomb, at_rest] = backward;
-            let _ = write!(
-                text,
-                ", viscous_backward = {viscous:e}, coulomb_backward = {coulomb:e}, static_backward = {:e}",
-                at_rest.max(coulomb)
-            );
-        }
-        format!("friction = {{ {text} }}\n")
-    }
-
     pub(super) fn bodies(&mut self, sizes: &Sizes) {
         let r = sizes.radius;
         let [m1, m2, m3] = sizes.mass;
-        let drive = self.friction(sizes, m1, r);
-        let idler = if sizes.symmetric { drive.clone() } else { self.friction(sizes, m3, r) };
-        let cart = self.friction(sizes, m2, 1.0);
+        let curves = self.curves;
+        let drive = self.friction(sizes, m1, r, curves[0], false);
+        let alike = sizes.symmetric && curves[0] == curves[2];
+        let idler = if alike { drive.clone() } else { self.friction(sizes, m3, r, curves[2], false) };
+        let along = self.wants(Feature::Along);
+        let cart = self.friction(sizes, m2, 1.0, curves[1], along);
         self.table("drive_pulley");
         self.line("radius", r);
         self.line("inertia", m1 * r * r);
@@ -198,7 +167,7 @@ impl Draw {
         self.table("cart");
         self.line("mass", m2);
         self.text.push_str(&cart);
-        if self.random.chance(0.2) {
+        if self.random.chance(0.2) && !self.is_loop() {
             let load = sizes.force * self.random.even(-1.0, 1.0);
             self.line("load", load);
         }
@@ -213,17 +182,35 @@ impl Draw {
         let [k1, k2, k3] = sizes.stiffness;
         let [c1, c2, c3] = sizes.damping;
         self.table("belt");
-        let _ = writeln!(self.text, "stiffness = [{k1:e}, {k2:e}, {k3:e}]\ndamping = [{c1:e}, {c2:e}, {c3:e}]");
+        if self.wants(Feature::Follows) {
+            let rigidity = self.rigidity(sizes, &sizes.stiffness);
+            let [l1, l2, l3] = sizes.stiffness.map(|k| self.digits(rigidity / k));
+            let _ = writeln!(self.text, "modulus = {rigidity:e}\nsection = 1\nspans = [{l1:e}, {l2:e}, {l3:e}]");
+            let _ = writeln!(self.text, "follows_cart = true\ndamping = [{c1:e}, {c2:e}, {c3:e}]");
+        } else {
+            let _ = writeln!(self.text, "stiffness = [{k1:e}, {k2:e}, {k3:e}]\ndamping = [{c1:e}, {c2:e}, {c3:e}]");
+        }
         let _ = writeln!(self.text, "model = \"{}\"", sizes.model);
-        if sizes.model != "rigid" && self.random.chance(0.25) {
+        if sizes.model != "rigid" && self.has(Feature::Slack, 0.25) {
             self.kind(Kind::Slack);
             let pretension = sizes.force * self.random.decades(0.01, 10.0);
             self.line("pretension", pretension.max(1e-14));
         }
     }
 
+    /// E A that makes every span longer than what the cart may take of it.
+    pub(super) fn rigidity(&self, sizes: &Sizes, stiffness: &[f64]) -> f64 {
+        let stiffest = stiffness.iter().copied().fold(0.0, f64::max);
+        self.digits(stiffest * 9.0 * sizes.way)
+    }
+
     /// Where the cart starts.
     pub(super) fn place(&mut self) -> f64 {
+        // Spans are as long as they are about the origin; a varied radius would strain a belt far from there.
+        let near = [Feature::Follows, Feature::Along, Feature::Asked(By::Sweep)];
+        if self.is_loop() || near.into_iter().any(|one| self.wants(one)) {
+            return 0.0;
+        }
         match self.random.below(20) {
             0..11 => 0.0,
             11..16 => self.even(-1.0, 1.0),
@@ -236,14 +223,16 @@ impl Draw {
 
     /// Forces on the cart over its way and its speed, now and then; drawn from a sequence of their own.
     pub(super) fn lines(&mut self, sizes: &Sizes, start: f64, mut random: Random) {
-        if !random.chance(0.15) {
+        let drawn = random.chance(0.15);
+        let by_recipe = self.is_by_recipe();
+        if (by_recipe && !self.wants(Feature::Line)) || (!by_recipe && !drawn) {
             return;
         }
         self.kind(Kind::Lines);
         let mut text = String::from("[cart]\n");
         for (key, middle, reach) in [("force_along", start, sizes.way), ("force_by_speed", 0.0, sizes.way / sizes.time)]
         {
-            if !random.chance(0.7) {
+            if !(random.chance(0.7) || by_recipe && key == "force_along") {
                 continue;
             }
             let count = 1 + random.below(5);
@@ -264,16 +253,23 @@ impl Draw {
     }
 
     pub(super) fn travel(&mut self, sizes: &Sizes, start: f64) {
-        if !self.random.chance(0.25) {
+        let stops = self.has(Feature::Stop, 0.25);
+        if !stops && !self.wants(Feature::Follows) {
             return;
         }
         self.kind(Kind::Travel);
-        let [low, high] = [(); 2].map(|()| sizes.way * self.random.decades(0.01, 2.0));
+        let shortest = if stops { 0.01 } else { 2.0 };
+        let [low, high] = [(); 2].map(|()| sizes.way * self.random.decades(shortest, if stops { 2.0 } else { 4.0 }));
         let (low, high) = (self.digits(start - low), self.digits(start + high));
+        // A move wants both of its ends within the travel, and may go a little farther.
+        let (low, high) = match self.is_loop() {
+            true => [-1.0, 1.0].map(|side| side * sizes.way * (1.0 + 0.1 * self.random.share())).into(),
+            false => (low, high),
+        };
         let margin = 1e-9 * start.abs().max(1e-6);
         self.table("travel");
         let _ = writeln!(self.text, "min = {:e}\nmax = {:e}", low.min(start - margin), high.max(start + margin));
-        if self.random.chance(0.85) {
+        if self.random.chance(0.85) && !self.is_by_recipe() || self.wants(Feature::Stop) {
             let k = sizes.stiffness[self.random.below(3)] * self.random.decades(0.1, 10.0);
             let m = sizes.mass[1];
             let c = if self.random.chance(0.5) { 0.0 } else { 2.0 * self.random.decades(1e-3, 1.0) * (k * m).sqrt() };

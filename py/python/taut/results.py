@@ -298,6 +298,13 @@ class Tuned:
         return forced
 
     @property
+    def feed_forward(self) -> dict[str, Any] | None:
+        """The feed-forward that makes the moves better than the gains alone: ``setting``, the value of
+        ``controller.feed_forward``, ``objective``, and ``moves`` (``name``, ``cart_error_m``, ``worst_m``, ``settled``)."""
+        ahead: dict[str, Any] | None = self.data["feed_forward"]
+        return ahead
+
+    @property
     def least_worse(self) -> dict[str, Any] | None:
         """Where it is worse: of all gains within the limits that were judged, those whose worst figure is worse by least
         (``move``, ``figure``, ``before``, ``after``, ``by`` as a share, ``objective``, ``gains``, ``filters``)."""

@@ -31,6 +31,7 @@ class _Kept:
         self.ending: tuple[str, float] = tuple(kept["ending"])
         self.took: float = kept["took"]
         self.position_error: float | None = kept["position_error"]
+        self.decided_within_rounding: list[tuple[float, str]] = [tuple(tie) for tie in kept["decided_within_rounding"]]
         self.inputs: list[str] = kept["inputs"]
         self.data = data
         self._figures, self._events = figures, events
@@ -76,8 +77,14 @@ class Run(Table):
     @property
     def position_error(self) -> float | None:
         """By how much positions at the belt may be off, m: the exact solver's bound of rounding; ``None`` for the
-        others."""
+        others, and in closed loop."""
         return self._native.position_error
+
+    @property
+    def decided_within_rounding(self) -> list[tuple[float, str]]:
+        """When, s, and for which part numbers that differ in their last bit may have the motion go on otherwise: its
+        load at rest was its breakaway. What the exact solver knows of it."""
+        return list(self._native.decided_within_rounding)
 
     @property
     def metrics(self) -> dict[str, Any]:
@@ -129,7 +136,7 @@ class Run(Table):
         return figure
 
     def __reduce__(self) -> tuple[Any, ...]:
-        kept = {name: getattr(self._native, name) for name in ("names", "name", "ending", "took", "position_error", "inputs")}
+        kept = {name: getattr(self._native, name) for name in ("names", "name", "ending", "took", "position_error", "decided_within_rounding", "inputs")}
         kept["arrays"] = dict(self._native.arrays)
         return (_restored, (kept, self.metrics, self.events, self._data()))
 

@@ -9,6 +9,7 @@ pub use plots::{Curves, figures};
 pub use rows::{controller, length, lines};
 
 use taut::case::{Case, Move};
+use taut::control::feasible::Shortfall;
 use taut::control::{MoveRun, Worst};
 use taut::design::Design;
 use taut::json::Moved;
@@ -26,6 +27,8 @@ pub struct Done<'a> {
     pub worst: Option<Worst>,
     /// The trouble of its loop, where it has one.
     pub trouble: Option<Trouble>,
+    /// The limits that its reference exceeds.
+    pub shortfalls: Vec<Shortfall>,
     /// Its files, as paths within the folder.
     pub files: Vec<String>,
 }
@@ -38,6 +41,7 @@ impl Done<'_> {
             run: &self.run,
             worst: self.worst.as_ref(),
             trouble: self.trouble.as_ref(),
+            shortfalls: &self.shortfalls,
             files: &self.files,
         }
     }

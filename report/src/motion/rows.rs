@@ -1,12 +1,13 @@
 //! A move in words.
 
 use super::{Done, Tried};
+use crate::simulate::rows::ties;
 use crate::simulate::{plain, time, value};
 use std::fmt::Write;
-use taut::control::compensation::Rigid;
 use taut::control::sliding;
 use taut::design::{Design, FeedForwardModel, Structure};
 use taut::metrics::largest;
+use taut::stage::rigid::Rigid;
 use taut::stage::{EncoderPlace, Stage};
 
 /// A length in µm, in mm from 10 mm on.
@@ -87,6 +88,8 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
         ("voltage", format!("at most {}, {} rms", value(figures.voltage.0.value, "V"), value(figures.voltage.1, "V"))),
         ("saturated", held),
         ("energy", format!("{} in, {} back", value(figures.energy.0, "J"), value(figures.energy.1, "J"))),
+        // The bound of a run holds without a controller, which answers to what rounding does.
+        ("accuracy", format!("not stated in closed loop{}", ties(&run.outcome.ties))),
     ];
     if let Structure::SlidingMode(gains) = &tried.design.structure {
         let (speed, acceleration) = peaks(done);
@@ -100,6 +103,7 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
             ),
         ));
     }
+    lines.extend(done.shortfalls.iter().map(|short| ("out of reach", short.words.clone())));
     if let Some(trouble) = &done.trouble {
         lines.push((trouble.kind.word(), trouble.words.clone()));
     }

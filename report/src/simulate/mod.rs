@@ -6,7 +6,7 @@ pub mod gantry;
 mod marks;
 mod page;
 mod plots;
-mod rows;
+pub(crate) mod rows;
 
 pub use band::Band;
 pub use curves::{Curves, Samples, Way, decimator};

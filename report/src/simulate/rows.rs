@@ -7,7 +7,7 @@ use taut::mechanism::Part;
 use taut::metrics::{Balance, Metrics, largest};
 use taut::number;
 use taut::reduction::Reduction;
-use taut::solve::{Cost, Ending, Event, Method, Outcome, PositionError, Solver};
+use taut::solve::{Cost, Ending, Event, Method, Outcome, PositionError, Solver, Tie};
 use taut::stage::BeltModel;
 
 /// A value with its unit for people, spaces and signs as a terminal and `grep` like them.
@@ -94,7 +94,7 @@ pub fn lines(run: &Run, solver: Solver) -> Vec<(&'static str, String)> {
             "r φ₁ - x",
             format!("at most {} at {}, {} at the end", value(error.value, "m"), time(error.time), value(left, "m")),
         ),
-        ("accuracy", accuracy(run.outcome.error, solver)),
+        ("accuracy", accuracy(&run.outcome, solver)),
         ("cost", cost(run.outcome.cost)),
     ];
     if matches!(solver, Solver::Table3 { .. }) {
@@ -117,23 +117,49 @@ pub fn lines(run: &Run, solver: Solver) -> Vec<(&'static str, String)> {
 }
 
 /// By how much positions may be off.
-pub fn accuracy(error: Option<PositionError>, solver: Solver) -> String {
-    let Some(error) = error else { return "not estimated".into() };
+pub fn accuracy(outcome: &Outcome, solver: Solver) -> String {
+    let Some(error) = outcome.error else { return "not estimated".into() };
     let rounded = number::engineering_typed(error.value, "m", 2);
-    match solver {
+    let positions = match solver {
+        _ if error.is_undetermined() => "not determined: errors of rounding grow to more than the motion".into(),
         Solver::Exact => format!("positions within {rounded}, by a bound of rounding"),
         _ => format!("positions within some {rounded}, by a second run with a hundred times the tolerance"),
+    };
+    positions + &ties(&outcome.ties)
+}
+
+/// Ties that are named on the terminal.
+const TIES: usize = 3;
+
+/// When what a body does was decided within rounding.
+pub(crate) fn ties(ties: &[Tie]) -> String {
+    if ties.is_empty() {
+        return String::new();
     }
+    let each = ties.iter().take(TIES).map(|tie| format!("{} ({})", time(tie.time), tie.part.name()));
+    let more = match ties.len().saturating_sub(TIES) {
+        0 => String::new(),
+        n => format!(" and {n} more times"),
+    };
+    format!("; decided within rounding at {}{more}", each.collect::<Vec<_>>().join(", "))
 }
 
 /// The word for a result that its error hides.
 pub fn hidden(name: &str, outcome: &Outcome) -> Option<String> {
     let error = outcome.error.filter(|error| error.hides_motion())?;
+    // Errors that have grown beyond the motion itself are no lengths any more.
+    let off = match error.is_undetermined() {
+        true => format!(
+            "numbers of 64 bits do not determine the positions of the run \"{name}\", which moves by {}",
+            value(error.way, "m")
+        ),
+        false => {
+            let [off, way] = [error.value, error.way].map(|length| value(length, "m"));
+            format!("positions of the run \"{name}\" may be off by {off}, and it moves by no more than {way}")
+        }
+    };
     Some(format!(
-        "positions of the run \"{name}\" may be off by {}, and it moves by no more than {}: this result is not to be relied on; \
-         shorten the run, or leave out what is so stiff",
-        value(error.value, "m"),
-        value(error.way, "m"),
+        "{off}: this result is not to be relied on; shorten the run, or leave out what is so stiff or feeds the motion"
     ))
 }
 

@@ -7,7 +7,8 @@ mod rows;
 pub use page::page;
 pub use plots::figures;
 pub use rows::{
-    CHOICES, Row, axes, choices, family, gains, given, goal, hertz, hunt, limiting, margins, moves, verdict,
+    CHOICES, Row, ahead, axes, choices, family, gains, given, goal, hertz, hunt, limiting, margins, moves, summary,
+    verdict,
 };
 
 use taut::case::{Case, Tuning};

@@ -19,7 +19,7 @@ pub fn page(work: &Work, text: &str, figures: &[(String, Figure)]) -> Page {
         (true, Judgement::Better) => (Callout::Holds, "The moves are better, and the limits hold"),
         (true, Judgement::Unchanged) => (Callout::Holds, "The gains of the file stay; the limits hold"),
     };
-    page.callout(kind, head, format!("{}. Over {}.", told::verdict(work), told::family(work)));
+    page.callout(kind, head, format!("{}. Over {}.", told::summary(work), told::family(work)));
     if let Some(told) = told::given(work) {
         page.prose(told);
     }

@@ -1,6 +1,7 @@
 //! Nyquist's curve, sensitivity, and the moves before and after.
 
 use super::Work;
+use super::rows::told;
 use crate::simulate::{Named, decimator};
 use crate::{Axis, Colour, Figure, Panel, Series, Style};
 use nalgebra::Complex;
@@ -10,7 +11,7 @@ use taut::case::Move;
 use taut::control::feedback::Feedback;
 use taut::control::{Loop, Rows, Standard, stream};
 use taut::solve::{Flow, Solver};
-use taut::tune::{Corner, Open, Verdict, loops};
+use taut::tune::{Break, Corner, Open, Verdict, breaks, loops};
 
 /// The largest |L| that is drawn: more of it would hide the point −1.
 const FAR: f64 = 3.0;
@@ -48,13 +49,22 @@ fn frequency(work: &Work) -> Result<Vec<Named>> {
         let feedback = Feedback::new(&verdict.design, &work.case.stage)?;
         let plant = tuned.family.plant(corner, &verdict.design, &feedback.corners())?;
         let open = loops(&plant, &feedback);
+        let breaks = breaks(&feedback);
         let hertz: Vec<f64> = plant.frequency.iter().map(|omega| omega / (2.0 * PI)).collect();
-        let near = |value: f64, size: f64| if size < FAR { value } else { f64::NAN };
-        let re: Vec<f64> = open.iter().map(|l| near(l.position.re, l.position.norm())).collect();
-        let im: Vec<f64> = open.iter().map(|l| near(l.position.im, l.position.norm())).collect();
-        nyquist = nyquist.series(Series::new(name, re, im).colour(colour).style(style));
-        let s: Vec<f64> = open.iter().map(|l| (l.position + 1.0).inv().norm().max(1e-4)).collect();
-        let t: Vec<f64> = open.iter().map(|l| (l.position / (l.position + 1.0)).norm().max(1e-4)).collect();
+        // The loop whose sensitivity is the highest.
+        let margins = if corner == &nominal { &verdict.nominal } else { &verdict.worst };
+        let at = margins.breaks.sensitivity;
+        let name = if margins.has_one_loop { name.to_string() } else { format!("{name}, {}", told(at)) };
+        let curve = open.iter().map(|open| open.broken_at(at));
+        // Beyond, there is no line.
+        let near: Vec<Complex<f64>> =
+            curve.map(|l| if l.norm() < FAR { l } else { Complex::new(f64::NAN, f64::NAN) }).collect();
+        let (re, im): (Vec<f64>, Vec<f64>) = near.iter().map(|l| (l.re, l.im)).unzip();
+        nyquist = nyquist.series(Series::new(name.clone(), re, im).colour(colour).style(style));
+        let highest = |of: fn(&Open, Break) -> f64| -> Vec<f64> {
+            open.iter().map(|open| breaks.iter().map(|&at| of(open, at)).fold(1e-4, f64::max)).collect()
+        };
+        let (s, t) = (highest(Open::sensitivity), highest(Open::complementary));
         peak = hertz.iter().zip(&s).max_by(|a, b| a.1.total_cmp(b.1)).map_or(peak, |(hertz, _)| peak.min(*hertz));
         last = hertz.last().map_or(last, |hertz| hertz.max(last));
         sensitivity = sensitivity.series(Series::new(name, hertz.clone(), s).colour(colour).style(style));
@@ -73,7 +83,7 @@ fn frequency(work: &Work) -> Result<Vec<Named>> {
         (
             "nyquist",
             Figure::new("Nyquist's curve of the sampled loop", Axis::new("Re L", "")).panel(nyquist).equal().caption(
-                "L broken at the measured position, up to half the sampling rate. No curve may enter the circle around −1.",
+                "L where its sensitivity is the highest, up to half the sampling rate. No curve may enter the circle around −1.",
             ),
         ),
         (
@@ -82,7 +92,9 @@ fn frequency(work: &Work) -> Result<Vec<Named>> {
                 .panel(sensitivity)
                 .panel(complementary)
                 .view(peak / BELOW_PEAK, last)
-                .caption("S = 1/(1 + L) and T = L/(1 + L), on the axis as the file has it and on the worst."),
+                .caption(
+                    "S = 1/(1 + L) and T = L/(1 + L) at the worst break, on the axis as the file has it and on the worst.",
+                ),
         ),
     ])
 }
@@ -101,17 +113,20 @@ fn bode(work: &Work) -> Result<Figure> {
         let open = loops(&plant, &feedback);
         let hertz: Vec<f64> = plant.frequency.iter().map(|omega| omega / (2.0 * PI)).collect();
         last = hertz.last().copied().unwrap_or(last).max(last);
-        let decibels: Vec<f64> = open.iter().map(|l| 20.0 * l.position.norm().max(1e-12).log10()).collect();
+        let curve: Vec<Complex<f64>> = open.iter().map(|open| open.broken_at(verdict.nominal.breaks.phase)).collect();
+        let decibels: Vec<f64> = curve.iter().map(|l| 20.0 * l.norm().max(1e-12).log10()).collect();
         // From 0 down to −360°: −180° is what margins are counted from.
         let turned = |angle: f64| if angle > 0.0 { angle - 360.0 } else { angle };
-        let degrees: Vec<f64> = open.iter().map(|l| turned(l.position.arg().to_degrees())).collect();
+        let degrees: Vec<f64> = curve.iter().map(|l| turned(l.arg().to_degrees())).collect();
         magnitude = magnitude.series(Series::new(name, hertz.clone(), decibels).colour(colour));
         phase = phase.series(Series::new("", hertz, degrees).colour(colour));
     }
     let after = &tuned.after.nominal;
+    let which =
+        if after.has_one_loop { "The open loop" } else { "The open loop, broken where its phase margin is least," };
     let told = format!(
-        "The open loop on the axis as the file has it. After: phase margin {:.1}° at the crossover, gain margin {:.2}; vertical lines are the \
-         crossover and the axis' own modes in the middle of its travel.",
+        "{which} on the axis as the file has it. After: phase margin {:.1}°, gain margin {:.2}; vertical lines are the \
+         crossover of the position loop and the axis' own modes in the middle of its travel.",
         after.phase.to_degrees(),
         after.gain
     );
@@ -225,7 +240,7 @@ fn moved(work: &Work, motion: &Move) -> Result<Figure> {
     {
         let design = &verdict.design;
         let mut controller = Standard::new(design, stage)?;
-        let profile = motion.profile.clone().shaped(&design.shaper);
+        let profile = motion.reference(design);
         let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
         let (mut x, mut u) = (decimator(), decimator());
         stream(stage, &mut controller, &Loop::of(design), &profile, &rows, Solver::of(stage), false, &mut |block| {

@@ -2,9 +2,13 @@
 
 use super::Work;
 use std::f64::consts::PI;
+use std::fmt::Write;
 use taut::control::Deviation;
 use taut::number::engineering;
-use taut::tune::{AtWorst, Corner, Figure, Hunt, Judgement, Margins, MoveVerdict, Source, Worse};
+use taut::tune::{
+    AtWorst, Break, Corner, Family, Figure, Forced, Hunt, Judgement, Limit, Margins, MoveVerdict, SPREAD, Source,
+    Standing, Worse,
+};
 
 /// A length in µm.
 fn length(metres: f64) -> String {
@@ -37,25 +41,44 @@ pub fn hertz(omega: f64) -> String {
     if omega.is_finite() { format!("{:.2} Hz", omega / (2.0 * PI)) } else { "none".into() }
 }
 
+/// Where the loop is broken for a margin; nothing where it is the same loop everywhere, and where it is not stable.
+fn broken(margins: &Margins, at: Break) -> String {
+    match margins.has_one_loop || !margins.stable {
+        true => String::new(),
+        false => format!(", {}", told(at)),
+    }
+}
+
+/// A break in words.
+pub fn told(at: Break) -> &'static str {
+    match at {
+        Break::Command => "at the command",
+        Break::Position => "at the encoder",
+        Break::Scale => "at the scale",
+        Break::Current => "at the measured current",
+    }
+}
+
 /// Margins before and after, one row each.
 pub fn margins(before: &Margins, after: &Margins) -> Vec<Row> {
     let factor = |m: &Margins| match m.gain {
         _ if !m.stable => "none".into(),
         gain if gain.is_infinite() => "any".into(),
-        gain => format!("{gain:.2} ({:.1} dB)", 20.0 * gain.log10()),
+        gain => format!("{gain:.2} ({:.1} dB){}", 20.0 * gain.log10(), broken(m, m.breaks.gain)),
+    };
+    let angle = |m: &Margins| match m.phase.is_finite() {
+        true => format!("{:.1}°{}", m.phase.to_degrees(), broken(m, m.breaks.phase)),
+        false => "any".into(),
     };
     type Shown<'a> = Box<dyn Fn(&Margins) -> String + 'a>;
     let peak = |value: f64| if value.is_finite() { format!("{value:.3}") } else { "not stable".into() };
     let top =
         |m: &Margins| if m.stable { format!(" at {}", hertz(m.at)) } else { format!(", swings at {}", hertz(m.at)) };
     let rows: [(&str, Shown); 7] = [
-        ("Ms", Box::new(move |m| format!("{}{}", peak(m.sensitivity), top(m)))),
-        ("Mt", Box::new(move |m| peak(m.complementary))),
+        ("Ms", Box::new(move |m| format!("{}{}{}", peak(m.sensitivity), top(m), broken(m, m.breaks.sensitivity)))),
+        ("Mt", Box::new(move |m| format!("{}{}", peak(m.complementary), broken(m, m.breaks.complementary)))),
         ("gain margin", Box::new(factor)),
-        (
-            "phase margin",
-            Box::new(|m| if m.phase.is_finite() { format!("{:.1}°", m.phase.to_degrees()) } else { "any".into() }),
-        ),
+        ("phase margin", Box::new(angle)),
         ("crossover", Box::new(|m| hertz(m.crossover))),
         ("bandwidth", Box::new(|m| hertz(m.bandwidth))),
         ("reference to cart, -3 dB", Box::new(|m| hertz(m.tracking))),
@@ -128,7 +151,12 @@ fn slowest(worst: &AtWorst) -> Option<f64> {
 pub fn verdict(work: &Work) -> String {
     let tuned = work.tuned;
     let (before, after) = (&tuned.before, &tuned.after);
-    let told: Vec<String> = before.moves.iter().zip(&after.moves).filter_map(|(was, is)| change(was, is)).collect();
+    let mut told: Vec<String> = before.moves.iter().zip(&after.moves).filter_map(|(was, is)| change(was, is)).collect();
+    let hunts = |hunt: &Option<Hunt>| hunt.as_ref().map_or(0.0, |hunt| hunt.amplitude);
+    let (was, is) = (hunts(&before.hunt), hunts(&after.hunt));
+    if before.hunt.is_some() != after.hunt.is_some() || is > 1.1 * was {
+        told.push(format!("at rest the cart hunts by {}, {} before", swing(is), swing(was)));
+    }
     let told = if told.is_empty() { String::new() } else { format!(": {}", told.join("; ")) };
     match (tuned.judgement, &tuned.forced) {
         (Judgement::Better, _) => format!("BETTER{told}"),
@@ -136,13 +164,47 @@ pub fn verdict(work: &Work) -> String {
             "UNCHANGED: no gains were found that make the moves better within the limits".into()
         }
         (Judgement::Worse, None) => format!("WORSE than the gains of the file{told}{}", least(work)),
-        (Judgement::Worse, Some(forced)) => format!(
-            "WORSE than the gains of the file{told}. The limit of {} forces it, by {:.1} Hz with the cart at {:.0} mm{}",
-            forced.limit.word(),
-            forced.mode,
-            1e3 * forced.place,
-            least(work)
-        ),
+        (Judgement::Worse, Some(forced)) => {
+            let advice = tuned.advice.as_ref().map_or(String::new(), |advice| format!(". What helps: {advice}"));
+            format!("WORSE than the gains of the file{told}. {}{}{advice}", reason(forced), least(work))
+        }
+    }
+}
+
+/// The first lines in one: the verdict, and the feed-forward that pays.
+pub fn summary(work: &Work) -> String {
+    [Some(verdict(work)), ahead(work)].into_iter().flatten().collect::<Vec<_>>().join(". ")
+}
+
+/// The gain by feed-forward, and how to have it, a sentence of its own; none where it does not pay.
+pub fn ahead(work: &Work) -> Option<String> {
+    let tuned = work.tuned;
+    let ahead = tuned.ahead.as_ref()?;
+    let moves = tuned.after.moves.iter().zip(&ahead.verdict.moves).map(|(without, with)| {
+        let error =
+            |one: &MoveVerdict| format!("{} ({} at worst)", length(one.cart.peak.value.abs()), length(one.worst.0));
+        let mut words = format!("{} errs {}, {} without", with.name, error(with), error(without));
+        if with.settled.0 < without.settled.0 {
+            let _ = write!(words, ", and settles on {} axes, {} without", with.settled.0, without.settled.0);
+        }
+        words
+    });
+    let moves: Vec<String> = moves.collect();
+    Some(format!("Feed-forward pays: {}. Write `feed_forward = {}` in [controller]", moves.join("; "), ahead.text()))
+}
+
+/// Why gains are worse than those of the file.
+fn reason(forced: &Forced) -> String {
+    let place = format!("by {:.1} Hz with the cart at {:.0} mm", forced.mode, 1e3 * forced.place);
+    match (forced.limit, forced.standing) {
+        (Limit::Bandwidth, _) => format!("They are placed for {:.1} Hz, not searched for", forced.mode),
+        (limit, Standing::WayBack) => format!("The limit of {} forces it, {place}", limit.word()),
+        (limit, Standing::File) => {
+            format!(
+                "The gains of the file break the limit of {} {place}, and no gains were found that keep it without a worse figure",
+                limit.word()
+            )
+        }
     }
 }
 
@@ -150,8 +212,9 @@ pub fn verdict(work: &Work) -> String {
 fn least(work: &Work) -> String {
     let Some(least) = &work.tuned.least else { return String::new() };
     let Worse { motion, figure, before, after, .. } = least.worse;
-    let name = &work.tuned.moves[motion].name;
+    let name = motion.map_or("at rest the cart", |motion| &work.tuned.moves[motion].name);
     let what = match figure {
+        Figure::Hunting => format!("hunts by {}, {} before", swing(after), swing(before)),
         Figure::Error => format!("errs {}, {} before", length(after), length(before)),
         Figure::Settling => format!("settles after {:.0} ms, {:.0} ms before", 1e3 * after, 1e3 * before),
         Figure::Settled => format!("settles on {after} axes, {before} before"),
@@ -180,15 +243,33 @@ pub fn given(work: &Work) -> Option<String> {
     if before.worst.excess(tuning.sensitivity, tuning.complementary) <= 1.0 {
         return None;
     }
-    let nominal = &before.nominal;
-    let own = match nominal.stable {
-        true => {
-            format!("Ms {:.3}, gain margin {:.2} on the axis as it is taken for", nominal.sensitivity, nominal.gain)
+    let (nominal, worst) = (&before.nominal, &before.worst);
+    let mut told = Vec::new();
+    if !nominal.stable {
+        told.push(format!("not stable on the axis as it is taken for, swinging at {}", hertz(nominal.at)));
+    } else if nominal.excess(tuning.sensitivity, tuning.complementary) > 1.0 {
+        let (ms, gain) = (nominal.sensitivity, nominal.gain);
+        let peak = match nominal.complementary > tuning.complementary && ms <= tuning.sensitivity {
+            true => format!("Mt {:.3}", nominal.complementary),
+            false => format!("Ms {ms:.3}"),
+        };
+        told.push(format!("{peak}, gain margin {gain:.2} on the axis as it is taken for"));
+    }
+    if worst.stable {
+        let axis = numbered(work, place(work, &before.corner));
+        let peaks = [
+            ("Ms", worst.sensitivity, tuning.sensitivity, worst.at),
+            ("Mt", worst.complementary, tuning.complementary, worst.complementary_at),
+        ];
+        for (name, peak, limit, at) in peaks.into_iter().filter(|(_, peak, limit, _)| peak > limit) {
+            told.push(format!("{name} {peak:.3} instead of {limit} at {} on {axis}", hertz(at)));
         }
-        false => format!("not stable on the axis as it is taken for, swinging at {}", hertz(nominal.at)),
-    };
+    }
     let (unstable, all) = before.unstable;
-    Some(format!("The gains of the file break the limits: {own}; not stable on {unstable} of {all} axes."))
+    if unstable > 0 {
+        told.push(format!("not stable on {unstable} of {all} axes"));
+    }
+    Some(format!("The gains of the file break the limits: {}.", told.join("; ")))
 }
 
 /// The choices between stiff and gentle: name, whether chosen, and of each move error, settling and current at worst.
@@ -209,20 +290,52 @@ pub fn choices(work: &Work) -> Vec<Vec<String>> {
 /// Headings of [`choices`].
 pub const CHOICES: [&str; 6] = ["choice", "J", "move", "cart error", "settles", "current, rms"];
 
+/// The swing of a hunting axis.
+fn swing(amplitude: f64) -> String {
+    match amplitude {
+        0.0 => "not".into(),
+        _ if amplitude.is_nan() => "a slip that was not waited for".into(),
+        _ => format!("± {}", length(amplitude)),
+    }
+}
+
 /// A limit cycle in words.
 pub fn hunt(hunt: &Option<Hunt>) -> String {
-    match hunt {
-        None => "none after a slow reversal".into(),
-        Some(hunt) => format!(
-            "cart ± {} {} {} s; {}",
+    let Some(hunt) = hunt else { return "none after a slow reversal".into() };
+    let slips = match hunt.slips_every.is_finite() {
+        true => format!("slips again every {} s", number(hunt.slips_every, "")),
+        false => String::new(),
+    };
+    let how = match hunt.amplitude.is_nan() {
+        true => {
+            format!("the cart sticks, and the integral makes it slip again after {} s", number(hunt.slips_every, ""))
+        }
+        false => format!(
+            "cart ± {} {} {} s{}{slips}",
             length(hunt.amplitude),
             if hunt.irregular { "irregularly, on average every" } else { "every" },
             number(hunt.period, ""),
-            match &hunt.needs[..] {
-                [] => "whatever is left out".into(),
-                needs => format!("not without {}", needs.join(", nor without ")),
-            }
+            if slips.is_empty() { "" } else { ", " },
         ),
+    };
+    let needs = match &hunt.needs[..] {
+        [] => "whatever is left out".into(),
+        needs => format!("not without {}", needs.join(", nor without ")),
+    };
+    format!("{how}; {needs}")
+}
+
+/// What varies by its name, after a fit: what was fitted, and what was not.
+fn varied(family: &Family, fitted: &str) -> String {
+    let names = |is_fitted: bool| -> String {
+        let own = family.unknowns.iter().filter(|unknown| unknown.is_fitted == is_fitted);
+        own.map(|unknown| unknown.name.clone()).collect::<Vec<_>>().join(", ")
+    };
+    let spread = format!("± {} %", number(100.0 * SPREAD, ""));
+    match [names(true), names(false)] {
+        [own, rest] if rest.is_empty() => format!("{own} {fitted}"),
+        [own, rest] if own.is_empty() => format!("{rest} {spread}"),
+        [own, rest] => format!("{own} {fitted}; never fitted: {rest} {spread}"),
     }
 }
 
@@ -230,10 +343,8 @@ pub fn hunt(hunt: &Option<Hunt>) -> String {
 pub fn family(work: &Work) -> String {
     let family = &work.tuned.family;
     let off = match family.source {
-        Source::Fit => format!("{} parameters within the 95 % intervals of the fit", family.unknowns.len()),
-        Source::Posterior(draws) => {
-            format!("{} parameters as drawn from the posterior, {draws} draws", family.unknowns.len())
-        }
+        Source::Fit => varied(family, "within the 95 % intervals of the fit"),
+        Source::Posterior(draws) => varied(family, &format!("as drawn from the posterior, {draws} draws")),
         Source::Spread(share) => format!("{} parameters ± {} %", family.unknowns.len(), number(100.0 * share, "")),
     };
     let places = match &family.places[..] {

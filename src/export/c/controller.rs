@@ -5,6 +5,7 @@ use crate::design::Design;
 use crate::error::Result;
 use crate::export::controller::{DERIVATIVES, program};
 use crate::export::program::{Expr, Node, Operator, Program, Statement, Test};
+use crate::export::shaper_remark;
 use crate::stage::Stage;
 use std::fmt::Write;
 
@@ -36,7 +37,8 @@ impl Controller {
     pub(super) fn header(&self, writer: &Writer) -> String {
         let fields = DERIVATIVES.map(|(name, unit)| format!("    @name@_real {name}; /* {unit} */"));
         let lead = self.design.feed_forward.lead.unwrap_or(self.design.delay + 0.5 * self.design.every);
-        let text = HEADER.replace("@fields@", &fields.join("\n"));
+        let shaper: String = shaper_remark(&self.design).iter().map(|line| format!(" * {line}\n")).collect();
+        let text = HEADER.replace("@fields@", &fields.join("\n")).replace("@shaper@", &shaper);
         writer.fill(
             &text,
             &[

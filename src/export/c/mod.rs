@@ -16,9 +16,12 @@ pub(super) fn export(case: &Opened, part: Part, stem: &str, options: &Options) -
 pub(super) fn named(case: &Opened, part: Part, (stem, name): (&str, &str), options: &Options) -> Result<Exported> {
     let writer = Writer { name: name.to_string(), real: options.real, local: "" };
     let (mut header, mut source) = (String::new(), String::new());
-    let (mut facts, notes) = (Vec::new(), Vec::new());
+    let (mut facts, mut notes) = (Vec::new(), Vec::new());
     if part.has_plant() {
-        let tables = Tables::new(&super::mechanism(case))?;
+        let tables = Tables::new(&super::mechanism(case)).map_err(|error| match super::controller(case) {
+            Ok(_) => error.next("`taut export fmu` takes it as it is, and --part controller leaves the machine out"),
+            Err(_) => error,
+        })?;
         let plant = plant::Plant::new(&tables, options.step.unwrap_or(STEP), options.real)?;
         header += &plant.header(&writer, case.title());
         source += &plant.source(&writer);
@@ -30,6 +33,7 @@ pub(super) fn named(case: &Opened, part: Part, (stem, name): (&str, &str), optio
         header += &controller.header(&writer);
         source += &controller.source(&writer);
         facts.extend(controller.facts());
+        notes.extend(super::shaper_note(design));
     }
     let (header, source) = (writer.header(case.title(), &header), writer.source(stem, &source));
     let files = vec![(format!("{stem}.c"), source.into_bytes()), (format!("{stem}.h"), header.into_bytes())];

@@ -17,11 +17,14 @@
 #define CURRENT_STATE 3U
 #define SPRING 4U
 
-/* Mode changes allowed at one instant, and turns of a body after which it rests. */
-#define CHANGES_AT_ONCE 100U
-#define TURNS_AT_ONCE 20U
-/* Halvings of a series within which a guard's first fall is told. */
-#define HALVINGS 40U
+/* Changes at one instant after which a body that stops rests. */
+#define TURNS_AT_ONCE 8U
+/* Halvings of a series, and of all series of a step, within which a guard's first fall is told. */
+#define HALVINGS 20U
+#define HALVINGS_OF_STEP @halvings@U
+/* Turns of Newton's method for a root, and all turns: after Newton's, bisections to the last bit. */
+#define NEWTON @newton@U
+#define ROOT (NEWTON + BITS)
 
 static @local@struct {
     @name@_real z[SIZE];
@@ -31,6 +34,8 @@ static @local@struct {
     const @name@_real *rate[STATES];
     const @name@_real *row[ROOM_GUARDS];
     uint32_t events;
+    uint32_t begin;    /* events before this step */
+    uint32_t halvings; /* that this step may still have */
     uint32_t changes;
     uint32_t active_count;
     uint8_t active[ROOM_GUARDS];
@@ -46,6 +51,12 @@ static @local@@name@_real term[ORDER + 1][SIZE];
 static @local@@name@_real coefficient[ORDER + 1];
 static @local@@name@_real bernstein[ORDER + 1];
 static @local@@name@_real guard_value[ROOM_GUARDS];
+/* Sizes of the terms of the series, by which rounding is told, and whether they are those of the series under way. */
+static @local@@name@_real term_size[ORDER + 1][SIZE];
+static @local@int has_sizes;
+/* First term of each guard that counts, and whether the guard may fall. */
+static @local@uint8_t first_order[ROOM_GUARDS];
+static @local@uint8_t may_fall[ROOM_GUARDS];
 
 static @name@_real size_of(@name@_real x) { return (x < R(0.0)) ? -x : x; }
 
@@ -148,6 +159,7 @@ static void expand(@name@_real distance)
     uint32_t i;
     uint32_t j;
     uint32_t k;
+    has_sizes = 0;
     for (j = 0U; j < SIZE; j++) {
         term[0][j] = plant.z[j];
     }
@@ -204,39 +216,48 @@ static void along(const @name@_real row[], @name@_real part)
     }
 }
 
-/* The first coefficient from `first` on that is more than rounding; those before it count as zero. */
-static uint32_t first_term(const @name@_real row[], @name@_real distance, uint32_t first)
+/* The sizes of the terms of the series over a distance. */
+static void expand_sizes(@name@_real distance)
 {
-    static @local@@name@_real sizes[SIZE];
-    static @local@@name@_real next[STATES];
-    uint32_t found = ORDER + 1U;
     uint32_t i;
     uint32_t j;
     uint32_t k;
     for (j = 0U; j < SIZE; j++) {
-        sizes[j] = size_of(plant.z[j]);
+        term_size[0][j] = size_of(plant.z[j]);
     }
-    for (k = 0U; (k <= ORDER) && (found > ORDER); k++) {
-        if (k > 0U) {
-            for (i = 0U; i < STATES; i++) {
-                next[i] = R(0.0);
-                for (j = 0U; j < SIZE; j++) {
-                    next[i] += size_of(plant.rate[i][j]) * sizes[j];
-                }
-                next[i] *= distance * RECIPROCAL[k];
-            }
+    for (k = 1U; k <= ORDER; k++) {
+        const @name@_real factor = distance * RECIPROCAL[k];
+        for (i = 0U; i < STATES; i++) {
+            @name@_real sum = R(0.0);
             for (j = 0U; j < SIZE; j++) {
-                sizes[j] = (j < STATES) ? next[j] : R(0.0);
+                sum += size_of(plant.rate[i][j]) * term_size[k - 1U][j];
             }
+            term_size[k][i] = sum * factor;
         }
-        if (k >= first) {
-            @name@_real noise = R(0.0);
-            for (j = 0U; j < SIZE; j++) {
-                noise += size_of(row[j]) * sizes[j];
-            }
-            if (size_of(coefficient[k]) > (R(2.0) * ROUNDING * noise)) {
-                found = k;
-            }
+        for (i = STATES; i < SIZE; i++) {
+            term_size[k][i] = R(0.0);
+        }
+    }
+    has_sizes = 1;
+}
+
+/* The first coefficient of the whole series over a distance, from `first` on, that is more than rounding; those before
+   it count as zero. */
+static uint32_t first_term(const @name@_real row[], @name@_real distance, uint32_t first)
+{
+    uint32_t found = ORDER + 1U;
+    uint32_t j;
+    uint32_t k;
+    if (has_sizes == 0) {
+        expand_sizes(distance);
+    }
+    for (k = first; (k <= ORDER) && (found > ORDER); k++) {
+        @name@_real noise = R(0.0);
+        for (j = 0U; j < SIZE; j++) {
+            noise += size_of(row[j]) * term_size[k][j];
+        }
+        if (size_of(coefficient[k]) > (R(2.0) * ROUNDING * noise)) {
+            found = k;
         }
     }
     return found;
@@ -253,7 +274,7 @@ static @name@_real polish(const @name@_real c[], uint32_t count, @name@_real end
     if (!((s > low) && (s < high))) {
         s = R(0.5);
     }
-    while (turn < 100U) {
+    while (turn < ROOT) {
         @name@_real p = R(0.0);
         @name@_real slope = R(0.0);
         @name@_real newton;
@@ -270,9 +291,9 @@ static @name@_real polish(const @name@_real c[], uint32_t count, @name@_real end
         turn++;
         if (size_of(newton - s) <= (EPSILON * s)) {
             s = newton;
-            turn = 100U;
+            turn = ROOT;
         } else {
-            s = ((newton > low) && (newton < high)) ? newton : (R(0.5) * (low + high));
+            s = ((turn < NEWTON) && (newton > low) && (newton < high)) ? newton : (R(0.5) * (low + high));
         }
     }
     return (s < R(0.0)) ? R(0.0) : ((s > R(1.0)) ? R(1.0) : s);
@@ -282,8 +303,8 @@ static @name@_real polish(const @name@_real c[], uint32_t count, @name@_real end
 #define FALLS 1U
 #define UNDECIDED 2U
 
-/* Whether a polynomial, not negative at 0, falls below zero within (0, 1], and where it does first. */
-static uint32_t first_fall(const @name@_real c[], uint32_t count, int is_last, @name@_real *s)
+/* Whether a polynomial, not negative at 0, falls below zero within (0, 1], and its value at 1 if it does. */
+static uint32_t first_fall(const @name@_real c[], uint32_t count, int is_last, @name@_real *end_value)
 {
     @name@_real least;
     @name@_real end;
@@ -296,7 +317,7 @@ static uint32_t first_fall(const @name@_real c[], uint32_t count, int is_last, @
     if (count == 0U) {
         return STAYS;
     }
-    *s = R(0.0);
+    *end_value = c[0];
     if (c[0] < R(0.0)) {
         return FALLS;
     }
@@ -317,7 +338,7 @@ static uint32_t first_fall(const @name@_real c[], uint32_t count, int is_last, @
     if ((c[0] > R(0.0)) && (changes == 1U)) {
         /* One change of sign: one root above zero (Descartes). */
         if (end < R(0.0)) {
-            *s = polish(c, count, end);
+            *end_value = end;
             result = FALLS;
         }
         return result;
@@ -351,7 +372,7 @@ static uint32_t first_fall(const @name@_real c[], uint32_t count, int is_last, @
     if ((changes > 1U) && (!is_last)) {
         result = UNDECIDED;
     } else if (bernstein[count - 1U] < R(0.0)) {
-        *s = polish(c, count, bernstein[count - 1U]);
+        *end_value = bernstein[count - 1U];
         result = FALLS;
     } else {
         result = STAYS;
@@ -374,45 +395,57 @@ static void look(void)
     }
 }
 
+/* Whether a guard, the k-th active one, falls along the first part of the series, and its value at the end of it. */
+static uint32_t fall_along(uint32_t k, @name@_real part, int is_last, @name@_real *end)
+{
+    const uint32_t order = first_order[k];
+    along(plant.row[k], part);
+    coefficient[0] = guard_value[k];
+    return first_fall(&coefficient[order], (ORDER + 1U) - order, is_last, end);
+}
+
 /* Advances by a distance, or to the first guard that falls: its place among the active ones, or NONE. */
 static uint32_t advance(@name@_real distance, @name@_real *used)
 {
     @name@_real part = R(1.0);
     @name@_real earliest = R(1.0);
+    @name@_real end = R(0.0);
     uint32_t fallen = NONE;
-    uint32_t halving;
+    uint32_t halvings = (plant.halvings < HALVINGS) ? plant.halvings : HALVINGS;
     uint32_t k;
-    int decided = 0;
     look();
     expand(distance);
-    for (halving = 0U; (halving <= HALVINGS) && (!decided); halving++) {
-        decided = 1;
-        fallen = NONE;
-        earliest = R(1.0);
-        for (k = 0U; (k < plant.active_count) && decided; k++) {
-            const uint32_t guard = plant.active[k];
-            uint32_t order = fresh_order(guard);
-            @name@_real s = R(1.0);
-            uint32_t told;
-            along(plant.row[k], part);
+    /* Which guards may fall, along a part of the series that tells of all of them. */
+    for (k = 0U; k < plant.active_count; k++) {
+        uint32_t order = fresh_order(plant.active[k]);
+        uint32_t told;
+        if ((order > 0U) || ((guard_value[k] <= R(0.0)) && (guard_value[k] >= R(0.0)))) {
+            along(plant.row[k], R(1.0));
             coefficient[0] = guard_value[k];
-            if ((order > 0U) || ((guard_value[k] <= R(0.0)) && (guard_value[k] >= R(0.0)))) {
-                order = first_term(plant.row[k], distance * part, (order > 1U) ? order : 1U);
-            }
-            told = first_fall(&coefficient[order], (ORDER + 1U) - order, halving == HALVINGS, &s);
-            if (told == UNDECIDED) {
-                decided = 0;
-            } else if ((told == FALLS) &&
-                       ((fallen == NONE) || (s < earliest) ||
-                        ((s <= earliest) && (GUARD[guard].rank < GUARD[plant.active[fallen]].rank)))) {
+            order = first_term(plant.row[k], distance, (order > 1U) ? order : 1U);
+        }
+        first_order[k] = (uint8_t)order;
+        told = fall_along(k, part, halvings == 0U, &end);
+        while (told == UNDECIDED) {
+            part *= R(0.5);
+            halvings--;
+            plant.halvings--;
+            told = fall_along(k, part, halvings == 0U, &end);
+        }
+        may_fall[k] = (uint8_t)told;
+    }
+    /* Where each of them falls along that part. */
+    for (k = 0U; k < plant.active_count; k++) {
+        if ((may_fall[k] == FALLS) && (fall_along(k, part, 1, &end) == FALLS)) {
+            const uint32_t order = first_order[k];
+            const @name@_real s = (coefficient[order] < R(0.0))
+                                      ? R(0.0)
+                                      : polish(&coefficient[order], (ORDER + 1U) - order, end);
+            if ((fallen == NONE) || (s < earliest) ||
+                ((s <= earliest) && (GUARD[plant.active[k]].rank < GUARD[plant.active[fallen]].rank))) {
                 earliest = s;
                 fallen = k;
-            } else {
-                /* it stays, or falls later */
             }
-        }
-        if (!decided) {
-            part *= R(0.5);
         }
     }
     *used = part * earliest * distance;
@@ -514,10 +547,11 @@ static void change(uint32_t k)
     const int gently = size_of(value_of(plant.row[k])) <= (R(20.0) * noise_of(plant.row[k]));
     plant.changes = (plant.since_change <= MOMENT) ? (plant.changes + 1U) : 0U;
     plant.since_change = R(0.0);
-    plant.events++;
-    if (plant.changes > CHANGES_AT_ONCE) {
+    if ((plant.events - plant.begin) >= @NAME@_EVENTS) {
         plant.status = @NAME@_TOO_MANY_EVENTS;
+        return;
     }
+    plant.events++;
     if (GUARD[guard].then == LEAVE) {
         plant.status = @NAME@_LEFT_TRAVEL;
     } else if (ELEMENT_KIND[element] == BODY) {
@@ -549,7 +583,6 @@ static void change(uint32_t k)
 static int falls_from_zero(uint32_t k)
 {
     uint32_t first;
-    expand(REACH);
     along(plant.row[k], R(1.0));
     first = first_term(plant.row[k], REACH, 1U);
     return (first <= ORDER) && (coefficient[first] < R(0.0));
@@ -560,12 +593,17 @@ static uint32_t fallen_guard(void)
 {
     uint32_t fallen = NONE;
     uint32_t k;
+    int is_expanded = 0;
     look();
     for (k = 0U; k < plant.active_count; k++) {
         const @name@_real value = guard_value[k];
         const uint32_t guard = plant.active[k];
         int falls = value < R(0.0);
         if ((value <= R(0.0)) && (value >= R(0.0)) && (fresh_order(guard) == 0U)) {
+            if (is_expanded == 0) {
+                expand(REACH);
+                is_expanded = 1;
+            }
             falls = falls_from_zero(k);
         }
         if (falls && ((fallen == NONE) || (GUARD[guard].rank < GUARD[plant.active[fallen]].rank))) {
@@ -581,7 +619,8 @@ static void settle(void)
     uint32_t turn;
     uint32_t k;
     int settled = 0;
-    for (turn = 0U; (turn < CHANGES_AT_ONCE) && (!settled) && (plant.status == @NAME@_DONE); turn++) {
+    /* A turn changes a mode, or is the one at the edge, or the last. */
+    for (turn = 0U; (turn < (@NAME@_EVENTS + 3U)) && (!settled) && (plant.status == @NAME@_DONE); turn++) {
         const uint32_t fallen = fallen_guard();
         const int is_last = (fallen == NONE) || (GUARD[plant.active[fallen]].rank == 3U);
         if ((plant.at_edge != 0U) && is_last) {
@@ -617,6 +656,13 @@ static void settle(void)
     } else {
         /* told already */
     }
+}
+
+/* A step begins: what it may do. */
+static void begin(void)
+{
+    plant.begin = plant.events;
+    plant.halvings = HALVINGS_OF_STEP;
 }
 
 void @name@_start(const @name@_real position[@NAME@_BODIES], const @name@_real speed[@NAME@_BODIES])
@@ -662,6 +708,7 @@ void @name@_start(const @name@_real position[@NAME@_BODIES], const @name@_real s
     plant.since_change = R(1.0);
     plant.changes = 0U;
     plant.events = 0U;
+    begin();
     plant.status = @NAME@_DONE;
     take_up_mode();
     settle();
@@ -697,8 +744,8 @@ static int take_input(const @name@_real input[])
     return 1;
 }
 
-/* Goes on by what is left, s, until there have been too many events since `begin` of them; says what is left then. */
-static @name@_status go_on(@name@_real *left, uint32_t begin)
+/* Goes on by what is left, s, until there have been too many events in this step; says what is left then. */
+static @name@_status go_on(@name@_real *left)
 {
     @name@_real sum = R(0.0);
     uint32_t series = 0U;
@@ -716,7 +763,7 @@ static @name@_status go_on(@name@_real *left, uint32_t begin)
             }
         }
         if ((*left > R(0.0)) && (plant.status == @NAME@_DONE) &&
-            ((series >= @NAME@_SERIES) || ((plant.events - begin) >= @NAME@_EVENTS))) {
+            (series >= @NAME@_SERIES)) {
             plant.status = @NAME@_TOO_MANY_EVENTS;
         }
     }
@@ -732,15 +779,15 @@ static @name@_status go_on(@name@_real *left, uint32_t begin)
 @name@_status @name@_step(const @name@_real input[@NAME@_DRIVES])
 {
     @name@_real left = @NAME@_STEP;
-    const uint32_t begin = plant.events;
     if (plant.status == @NAME@_LEFT_TRAVEL) {
         return plant.status;
     }
     plant.status = @NAME@_DONE;
+    begin();
     if (!take_input(input)) {
         return @NAME@_NO_NUMBER;
     }
-    return go_on(&left, begin);
+    return go_on(&left);
 }
 
 void @name@_read(@name@_output *out)

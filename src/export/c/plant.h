@@ -22,8 +22,11 @@ typedef enum {
 } @name@_status;
 
 /* Events that one step may have, and Taylor series. */
-#define @NAME@_EVENTS @events@
-#define @NAME@_SERIES @series@
+#define @NAME@_EVENTS @events@U
+#define @NAME@_SERIES @series@U
+/* Bounds of what @name@_step computes, from the limits of its loops: products and quotients, sums and differences. */
+#define @NAME@_PRODUCTS @products@UL
+#define @NAME@_SUMS @sums@UL
 /* Step, s. */
 #define @NAME@_STEP @step@
 

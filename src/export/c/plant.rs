@@ -2,7 +2,7 @@
 
 use super::{Writer, number, plain};
 use crate::error::{Error, Result};
-use crate::export::tables::{ElementKind, Row, Tables, Then};
+use crate::export::tables::{Element, ElementKind, Row, Tables, Then};
 use crate::export::{Does, Real};
 use crate::friction::Motion;
 use crate::mechanism::AmplifierMode;
@@ -20,6 +20,12 @@ const FLOAT: [(f64, usize); 4] = [(0.25, 7), (0.55, 9), (1.15, 12), (2.0, 16)];
 /// Series that the step of a plant may be made of.
 const MOST_SERIES: f64 = 1000.0;
 
+/// Turns of Newton's method for a root, after which bisections follow.
+const NEWTON: usize = 8;
+
+/// Halvings that all series of a step may have.
+const HALVINGS_OF_STEP: usize = 64;
+
 /// The type of its numbers, before the name is filled in.
 const REAL: &str = "@name@_real";
 
@@ -34,6 +40,26 @@ pub(super) struct Plant<'t> {
     /// Series of a step without an event, and their order.
     parts: usize,
     order: usize,
+}
+
+/// Products and quotients; sums and differences.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Work(usize, usize);
+
+impl std::ops::Add for Work {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self(self.0 + other.0, self.1 + other.1)
+    }
+}
+
+impl std::ops::Mul<usize> for Work {
+    type Output = Self;
+
+    fn mul(self, times: usize) -> Self {
+        Self(self.0 * times, self.1 * times)
+    }
 }
 
 /// The rows of weights of all tables, each once.
@@ -73,7 +99,8 @@ impl<'t> Plant<'t> {
         };
         let parts = (tables.fastest * step / 2.0).ceil().max(1.0);
         if parts > MOST_SERIES || !(step > 0.0 && step.is_finite()) {
-            let fits = crate::quantity::rounded(Self::longest_step(tables));
+            // Rounded to six digits, and still short enough.
+            let fits = crate::quantity::rounded((1.0 - 1e-5) * Self::longest_step(tables));
             return Err(Error::new(format!("a step of {step:?} s takes {parts} series of this machine"))
                 .in_file("--step")
                 .allowed(format!("steps of up to {fits} s"))
@@ -93,21 +120,65 @@ impl<'t> Plant<'t> {
         number(self.real, value)
     }
 
-    /// Most series of a step.
+    /// Most series of a step: those of a step without an event, and two more for each event.
     fn series(&self) -> usize {
-        self.parts + 4 * EVENTS
+        self.parts + 2 * EVENTS
     }
 
-    /// Products and sums of one series at most: the series itself, and all conditions of a mode along it.
-    fn work(&self) -> usize {
-        let states = self.tables.rates.len();
-        let active = self.tables.guards.len();
-        let (order, size) = (self.order, self.tables.size());
-        order * states * states + states * size + active * (order * states + size + order * order / 2)
+    /// Bits of a number's mantissa.
+    fn bits(&self) -> usize {
+        match self.real {
+            Real::Float => 24,
+            Real::Double => 53,
+        }
+    }
+
+    /// Conditions that are watched at once, at most.
+    fn active(&self) -> usize {
+        let guards = &self.tables.guards;
+        let of = |place: Option<(usize, usize)>| guards.iter().filter(|guard| guard.of == place).count();
+        let element = |(index, element): (usize, &Element)| {
+            (0..element.states.len()).map(|state| of(Some((index, state)))).max().unwrap_or(0)
+        };
+        of(None) + self.tables.elements.iter().enumerate().map(element).sum::<usize>()
+    }
+
+    /// Products and quotients, and sums and differences, of one step at most, from the bounds of the loops in `plant.c`.
+    fn work(&self) -> Work {
+        let (n, z, o, g) = (self.tables.rates.len(), self.tables.size(), self.order, self.active());
+        let gears = self.tables.resting_torque.iter().flatten().count();
+        let events = EVENTS;
+        let (series, terms) = (self.series(), o + 1);
+        // A row's value, and its rounding.
+        let value = Work(z, z);
+        let noise = Work(z + 1, z);
+        let look = (value + noise + Work(1, 1)) * g;
+        let expand = Work(o + n * (z + 1) + (o - 1) * n * (n + 1), n * z + (o - 1) * n * n);
+        let sizes = Work(o * (1 + n * (z + 1)), o * n * z);
+        let along = Work(z + o * n + 2 * terms, z + o * n);
+        let first_term = Work(terms * (z + 2), terms * z);
+        let hull = Work(4 * terms, 2 * terms + terms * terms);
+        let fall = along + hull;
+        let root = Work(1, 1) + Work(2 * terms + 3, 2 * terms + 3) * (NEWTON + self.bits());
+        let add = Work(n * o, n * (o + 4));
+        // Of each series: twice along each guard, and once more where it begins at zero.
+        let advance = look + expand + sizes + (fall * 2 + along + first_term + Work(1, 0)) * g + add + Work(5, 4);
+        // A series in which a guard falls ends with an event, or with the one that is too many.
+        let roots = root * (g * (events + 1));
+        let halvings = (fall + Work(1, 0)) * HALVINGS_OF_STEP;
+        let resting = value * gears;
+        let of_body = (resting + value + noise) * 3 + Work(3, 3);
+        let of_element = (value + noise + Work(2, 1)) * g;
+        let change = value + noise + Work(1, 0) + of_body + of_element;
+        let fallen = look + expand + sizes + (along + first_term) * g;
+        // Settled at the input and after each event: a turn for each event, one at the edge, and the last of each time.
+        let settle =
+            fallen * (2 * events + 3) + (noise + Work(1, 0)) * g + (value + noise + Work(1, 0)) * (g * (events + 1));
+        advance * series + roots + halvings + change * (events + 1) + settle + Work(0, n + z)
     }
 
     pub(super) fn facts(&self) -> Vec<(String, String)> {
-        let (series, work) = (self.series(), self.work());
+        let (series, Work(products, sums)) = (self.series(), self.work());
         vec![
             ("step".into(), format!("{:?} s", self.step)),
             ("states".into(), self.tables.rates.len().to_string()),
@@ -116,7 +187,8 @@ impl<'t> Plant<'t> {
             ("order of a Taylor series".into(), self.order.to_string()),
             ("series in a step without an event".into(), self.parts.to_string()),
             ("series in a step at most".into(), series.to_string()),
-            ("products in a series at most, about".into(), work.to_string()),
+            ("products and quotients in a step at most".into(), products.to_string()),
+            ("sums and differences in a step at most".into(), sums.to_string()),
         ]
     }
 
@@ -139,21 +211,24 @@ impl<'t> Plant<'t> {
         list("DRIVES", mechanism.drives.iter().map(|drive| drive.label.key).collect());
         list("SPRINGS", mechanism.springs.iter().map(|spring| spring.label.key).collect());
         let numbers = numbers.replace("_BOD_", "_BODY_");
-        let bound = format!("{} /* about {} products and as many sums each, at most */", self.series(), self.work());
+        let Work(products, sums) = self.work();
         writer.fill(
             HEADER,
             &[
                 ("@title@", &plain(title)),
                 ("@numbers@", numbers.trim_end()),
                 ("@events@", &EVENTS.to_string()),
-                ("@series@", &bound),
+                ("@series@", &self.series().to_string()),
+                ("@products@", &products.to_string()),
+                ("@sums@", &sums.to_string()),
                 ("@step@", &self.number(self.step)),
             ],
         )
     }
 
     pub(super) fn source(&self, writer: &Writer) -> String {
-        writer.fill(&SOURCE.replace("@tables@", self.tables().trim_end()), &[])
+        let limits = [("@halvings@", &*HALVINGS_OF_STEP.to_string()), ("@newton@", &*NEWTON.to_string())];
+        writer.fill(&SOURCE.replace("@tables@", self.tables().trim_end()), &limits)
     }
 
     /// All tables.
@@ -212,6 +287,7 @@ impl<'t> Plant<'t> {
         let reach = self.step / self.parts as f64;
         define("EPSILON", self.number(epsilon));
         define("ROUNDING", self.number(rounding));
+        define("BITS", format!("{}U", self.bits()));
         define("REACH", self.number(reach));
         define("SOON", self.number(1e-6 * 0.125 * reach));
         define("MOMENT", self.number(1e-12 * 0.125 * reach));

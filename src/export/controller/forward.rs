@@ -1,9 +1,9 @@
 //! Feed-forward as a program: [`crate::control::compensation`], operation by operation.
 
 use super::Target;
-use crate::control::compensation::Rigid;
 use crate::design::{Design, FeedForward, FeedForwardModel};
 use crate::export::program::{Expr, Program, Relation, Test, number, variable};
+use crate::stage::rigid::{REST_ACCELERATION, REST_SPEED, Rigid};
 use crate::stage::{AmplifierMode, BeltModel, EncoderPlace, Stage};
 
 /// Feed-forward of a model of the axis.
@@ -34,19 +34,21 @@ impl<'s> Forward<'s> {
         }
     }
 
-    /// The way in which the axis goes, or is about to go: 1, −1 or 0.
+    /// Direction in which the axis moves, or is about to move: 1, −1 or 0.
     fn direction(&self, p: &mut Program, name: &str, y: &Target) -> Expr {
         let name = format!("{name}_way");
         let way = p.declare(&name);
-        let sign = |p: &mut Program, of: &Expr, or: &mut dyn FnMut(&mut Program)| {
+        let sign = |p: &mut Program, of: &Expr, rest: f64, or: &mut dyn FnMut(&mut Program)| {
             let (own, of) = (name.clone(), of.clone());
             p.when(
-                Test(Relation::More, of.clone(), number(0.0)),
+                Test(Relation::More, of.clone(), number(rest)),
                 |p| p.set(&own, number(1.0)),
-                |p| p.when(Test(Relation::Less, of, number(0.0)), |p| p.set(&own, number(-1.0)), |p| or(p)),
+                |p| p.when(Test(Relation::Less, of, number(-rest)), |p| p.set(&own, number(-1.0)), |p| or(p)),
             );
         };
-        sign(p, &y.speed, &mut |p| sign(p, &y.acceleration, &mut |p| p.set(&name, number(0.0))));
+        sign(p, &y.speed, REST_SPEED, &mut |p| {
+            sign(p, &y.acceleration, REST_ACCELERATION, &mut |p| p.set(&name, number(0.0)));
+        });
         way
     }
 
@@ -68,8 +70,7 @@ impl<'s> Forward<'s> {
         let motor = &self.stage.motor;
         let force = p.local(&format!("{name}_force"), force);
         let both = [motor.gear_efficiency, 1.0 / motor.gear_efficiency].map(|e| self.rigid.force_per_ampere * e);
-        let drives = Test(Relation::AtLeast, force.clone() * speed.clone(), number(0.0));
-        let per_ampere = p.choose(&format!("{name}_per_ampere"), drives, number(both[0]), number(both[1]));
+        let per_ampere = self.per_ampere(p, name, &force, &speed, both);
         let current = p.local(&format!("{name}_current"), force / per_ampere.clone());
         let gain = self.stage.amplifier.gain;
         match self.stage.amplifier.mode {
@@ -84,6 +85,24 @@ impl<'s> Forward<'s> {
                 (sum + self.rigid.brake * speed) / gain
             }
         }
+    }
+
+    /// Force per ampere of a gear that drives, or, where the force acts against a motion, is driven; at rest it drives.
+    fn per_ampere(&self, p: &mut Program, name: &str, force: &Expr, speed: &Expr, [drives, driven]: [f64; 2]) -> Expr {
+        if drives.to_bits() == driven.to_bits() {
+            return number(drives);
+        }
+        let name = format!("{name}_per_ampere");
+        let set = |p: &mut Program, value: f64| p.set(&name, number(value));
+        let moving = |p: &mut Program| {
+            let with = Test(Relation::AtLeast, force.clone() * speed.clone(), number(0.0));
+            p.when(with, |p| set(p, drives), |p| set(p, driven));
+        };
+        let per_ampere = p.declare(&name);
+        let [forward, backward] = [(Relation::More, REST_SPEED), (Relation::Less, -REST_SPEED)]
+            .map(|(relation, rest)| Test(relation, speed.clone(), number(rest)));
+        p.when(forward, moving, |p| p.when(backward, moving, |p| set(p, drives)));
+        per_ampere
     }
 
     /// The motion of the pulleys with which the cart follows the reference `y`.

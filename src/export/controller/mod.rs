@@ -5,13 +5,13 @@ mod forward;
 mod structure;
 
 use super::program::{Expr, Program, Relation, Test, number, variable};
-use crate::control::compensation::Rigid;
 use crate::control::filter::Biquad;
 use crate::control::observer::DisturbanceState;
 use crate::control::{Standard, reads_scale};
 use crate::design::{Design, Filter};
 use crate::error::{Error, Result};
 use crate::stage::Stage;
+use crate::stage::rigid::Rigid;
 use forward::Forward;
 use structure::Core;
 

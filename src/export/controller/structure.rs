@@ -46,7 +46,7 @@ impl<'d> Core<'d> {
                 Core::StateFeedback(Box::new(law), Linear::of(model).states, model.pulley_radius)
             }
             Structure::SlidingMode(gains) => {
-                let rigid = crate::control::compensation::Rigid::of(model);
+                let rigid = crate::stage::rigid::Rigid::of(model);
                 let mass = Mass { mass: rigid.mass, force_per_command: rigid.force_per_command() };
                 Core::SlidingMode(gains, every, mass)
             }
@@ -111,7 +111,7 @@ impl<'d> Core<'d> {
                 if inner.integral != 0.0 {
                     p.set("current_integral", variable("current_integral") + share.clone());
                 }
-                if inner.proportional > 0.0 {
+                if inner.proportional != 0.0 {
                     push(p, share / inner.proportional);
                 }
             }

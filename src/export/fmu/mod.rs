@@ -22,6 +22,9 @@ pub use variable::{Causality, Kind, Role, Variability, Variable};
 /// Where the machine stands in the archive.
 pub const MACHINE: &str = "resources/machine.toml";
 
+/// Inputs that a controller inside has for the cart's reference: position and its first four derivatives.
+pub const REFERENCES: usize = 5;
+
 /// How the shared object is called in the archive, without its ending.
 pub const BINARY: &str = "taut_fmu";
 

@@ -1,11 +1,12 @@
 //! The variables of a machine: the one list that its description is written from and its shared object works by.
 
-use super::resource;
 use super::variable::{Kind, Role, Variable, named, plain, rate_unit, typed, typical, words};
+use super::{REFERENCES, resource};
 use crate::case::Opened;
 use crate::chance::hash;
 use crate::design::Design;
 use crate::error::{Error, Result};
+use crate::export::{controller, without_controller};
 use crate::mechanism::{Amplifier, AmplifierMode, DRIVES, Drive, Heading, Label, Mechanism, Motor, Shown, State};
 use crate::parameter::{self, Free, Numbers, Parameter, unit_for};
 use crate::solve::{Dynamics, Quantity, check_stage};
@@ -72,8 +73,8 @@ impl Model {
             Opened::Gantry(case) => (Machine::Gantry(Box::new(case.gantry.clone())), None),
         };
         if with_controller && design.is_none() {
-            return Err(Error::new("this case has no controller that could be put inside")
-                .next("add a [controller], as in docs/control.md, or say --part plant"));
+            let missing = controller(&case).map(|_| ());
+            missing.map_err(|error| without_controller(&case, error, "leave --part out for the machine alone"))?;
         }
         let design = design.filter(|_| with_controller);
         let mut model = Self {
@@ -93,8 +94,10 @@ impl Model {
         };
         let mechanism = model.mechanism(&model.defaults())?;
         model.start = match &case {
-            Opened::Axis(case) => case.experiments.first().map(|first| first.initial.state(&mechanism)),
-            Opened::Gantry(case) => case.experiments.first().map(|first| first.initial),
+            Opened::Axis(case) => {
+                case.first(|one| one.initial, |left| Some(left.initial)).map(|own| own.state(&mechanism))
+            }
+            Opened::Gantry(case) => case.first(|one| one.initial, |left| Some(left.initial)),
         }
         .unwrap_or_default();
         let dynamics = Dynamics::new(&mechanism, &model.start)?;
@@ -271,11 +274,18 @@ impl Model {
             list.push(Variable { start, shown, ..plain(reference, &name, &words, unit, role) });
         };
         if self.design.is_some() {
-            let what = ["Reference of the cart: where it should be.", "Its speed.", "Its acceleration."];
-            let names = ["reference", "reference_speed", "reference_acceleration"];
-            let units = [("m", "mm"), ("m/s", "mm/s"), ("m/s^2", "")];
+            let what = [
+                "Reference of the cart: where it should be.",
+                "Its speed.",
+                "Its acceleration.",
+                "Its jerk.",
+                "Its snap.",
+            ];
+            let names: [String; REFERENCES] =
+                ["", "_speed", "_acceleration", "_jerk", "_snap"].map(|end| format!("reference{end}"));
+            let units = [("m", "mm"), ("m/s", "mm/s"), ("m/s^2", ""), ("m/s^3", ""), ("m/s^4", "")];
             for (k, ((name, words), (unit, shown))) in names.into_iter().zip(what).zip(units).enumerate() {
-                add(name.into(), words.into(), unit, shown, Role::Reference(k));
+                add(name, words.into(), unit, shown, Role::Reference(k));
             }
         } else {
             for (index, drive) in mechanism.drives.iter().take(self.drives()).enumerate() {

@@ -4,7 +4,7 @@ use super::{Archive, BINARY, Causality, Kind, MACHINE, Model, Variability, Versi
 use super::{description, platform, sources};
 use crate::case::Opened;
 use crate::error::{Error, Result};
-use crate::export::{Exported, Part};
+use crate::export::{Exported, Part, controller, shaper_note};
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -43,8 +43,11 @@ pub fn pack(case: &Opened, part: Option<Part>, version: Version, stem: &str, car
         None | Some(Part::Plant) => false,
         Some(Part::Both) => true,
         Some(Part::Controller) => {
-            return Err(Error::new("a controller by itself is no FMU that could be simulated")
-                .next("say --part both for the machine with its controller inside, or export st or c"));
+            let error = Error::new("a controller by itself is no FMU that could be simulated").in_file("--part");
+            return Err(error.next(match controller(case) {
+                Ok(_) => "say --part both for the machine with its controller inside, or export st or c",
+                Err(_) => "leave --part out for the machine",
+            }));
         }
     };
     let model = Model::new(case, with_controller)?;
@@ -78,9 +81,7 @@ pub fn pack(case: &Opened, part: Option<Part>, version: Version, stem: &str, car
         Err(error) => format!("it runs on {own} alone, there are no sources in it: {}", error.what),
     };
     let mut notes = vec![platforms];
-    if let Some(design) = model.design.as_ref().filter(|design| !design.shaper.is_empty()) {
-        notes.push(format!("the shaper of {} impulses is not inside: shape the reference", design.shaper.len()));
-    }
+    notes.extend(model.design.as_ref().and_then(shaper_note));
     let facts = facts(&model, version, sources.is_ok(), &format!("{folder}, {} bytes", carried.object.len()));
     Ok(Exported { files: vec![(format!("{stem}.fmu"), archive.finish()?)], facts, notes })
 }

@@ -1,6 +1,6 @@
 //! The machine of a case alone, as a case file: what the shared object reads.
 
-use crate::case::Opened;
+use crate::case::{Opened, Unread};
 use crate::error::{Error, Result};
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, value};
 
@@ -42,8 +42,8 @@ pub fn resource(case: &Opened) -> Result<String> {
 /// End and interval of the first experiment, or of a second in milliseconds.
 pub(super) fn times(case: &Opened) -> [f64; 2] {
     let first = match case {
-        Opened::Axis(case) => case.experiments.first().map(|first| [first.until, first.every]),
-        Opened::Gantry(case) => case.experiments.first().map(|first| [first.until, first.every]),
+        Opened::Axis(case) => case.first(|one| [one.until, one.every], Unread::span),
+        Opened::Gantry(case) => case.first(|one| [one.until, one.every], Unread::span),
     };
     first.unwrap_or([1.0, 1e-3])
 }

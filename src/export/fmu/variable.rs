@@ -46,7 +46,7 @@ pub enum Role {
     Input(usize),
     /// A force on a body that the machine is there to move, by its place among these.
     Force(usize),
-    /// Where the controller's cart should be: position, speed, acceleration.
+    /// Where the controller's cart should be: position, speed, acceleration, jerk, snap.
     Reference(usize),
     /// A number of the machine, by its place among these, and whether it may change under way.
     Parameter(usize, bool),

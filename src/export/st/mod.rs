@@ -2,7 +2,7 @@
 
 use super::controller::program;
 use super::program::{Expr, Node, Statement, Test};
-use super::{Exported, Part, controller, identifier};
+use super::{Exported, Part, controller, identifier, shaper_note, shaper_remark, without_controller};
 use crate::case::Opened;
 use crate::error::{Error, Result};
 use std::fmt::Write;
@@ -11,12 +11,13 @@ const BLOCK: &str = include_str!("block.st");
 
 /// The file `STEM.st`.
 pub(super) fn export(case: &Opened, part: Option<Part>, stem: &str) -> Result<Exported> {
+    let (case, design) =
+        controller(case).map_err(|error| without_controller(case, error, "take the machine with `taut export fmu`"))?;
     if part.is_some_and(Part::has_plant) {
         return Err(Error::new("Structured Text is only a controller here")
             .in_file("--part")
-            .next("leave --part out; `taut export c` has the plant"));
+            .next("leave --part out; `taut export fmu` has the machine"));
     }
-    let (case, design) = controller(case)?;
     let program = program(design, &case.stage)?;
     let unit = case.stage.amplifier.mode.unit();
     let lead = design.feed_forward.lead.unwrap_or(design.delay + 0.5 * design.every);
@@ -38,6 +39,7 @@ pub(super) fn export(case: &Opened, part: Option<Part>, stem: &str) -> Result<Ex
     let mut text = BLOCK.to_string();
     for (place, part) in [
         ("@title@", plain(&case.title)),
+        ("@shaper@", shaper_remark(design).iter().map(|line| format!("(* {line} *)\n")).collect()),
         ("@structure@", plain(design.structure.name())),
         ("@version@", env!("CARGO_PKG_VERSION").into()),
         ("@name@", name.clone()),
@@ -59,7 +61,9 @@ pub(super) fn export(case: &Opened, part: Option<Part>, stem: &str) -> Result<Ex
         ("sample time".into(), format!("{:?} s", design.every)),
         ("numbers that it keeps".into(), program.states.len().to_string()),
     ];
-    let notes = vec!["untried on a real controller: its grammar is checked, and it is run by an interpreter".into()];
+    let mut notes =
+        vec!["untried on a real controller: its grammar is checked, and it is run by an interpreter".into()];
+    notes.extend(shaper_note(design));
     Ok(Exported { files: vec![(format!("{stem}.st"), text.into_bytes())], facts, notes })
 }
 

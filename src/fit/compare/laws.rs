@@ -1,6 +1,6 @@
 //! The friction laws that are compared: what each makes of the text of a case, and what is searched for then.
 
-use crate::case::{Case, Plan};
+use crate::case::{Case, Files, Plan};
 use crate::error::{Error, Result};
 use crate::fit::run::is_position;
 use crate::friction::Friction;
@@ -179,7 +179,8 @@ pub(super) fn with(
         bounds.entry(&key).or_insert(Item::Value(Value::Array(Array::from_iter(ends))));
     }
     // The logs are those that are there already.
-    let own = Case { experiments: case.experiments.clone(), ..Case::from_text(name, &document.to_string())? };
+    let read = Case::from_text_for(name, &document.to_string(), &[], Files::Nothing)?;
+    let own = Case { experiments: case.experiments.clone(), unread: Vec::new(), ..read };
     Ok((own, Plan { free, tied, lumped, separate, bounds, priors, ..plan.clone() }))
 }
 

@@ -18,9 +18,9 @@ use super::least_squares::Options;
 use super::problem::{Problem, Stop};
 use super::result::known;
 use super::scores::together;
-use super::search::{search, search_as_far};
+use super::search::{search_as_far, search_near};
 use super::told;
-use crate::case::{Case, Plan};
+use crate::case::{Case, Files, Plan};
 use crate::error::{Error, Result};
 use crate::log::Quantity;
 use crate::solve::Flow;
@@ -208,6 +208,8 @@ struct Tried {
     errors: Vec<Vec<(Quantity, f64, usize)>>,
     training: Vec<(Quantity, f64)>,
     case: Case,
+    /// The machine of the case's text, where its search did not begin.
+    given: Stage,
     plan: Plan,
 }
 
@@ -222,7 +224,7 @@ impl Course<'_> {
     /// Fits a candidate to all logs and to all but a part; the machine of the fit to all.
     fn try_one(&mut self, case: &Case, plan: &Plan, mut candidate: Candidate, start: &Stage) -> Option<Stage> {
         let plan = Plan { windows: candidate.window, starts: 1, ..plan.clone() };
-        let case = Case { stage: start.clone(), ..case.clone() };
+        let (given, case) = (case.stage.clone(), Case { stage: start.clone(), ..case.clone() });
         let (mut errors, mut training, mut stage) = (Vec::new(), Vec::new(), None);
         match self.whole(&case, &plan) {
             Ok((own, met)) => (stage, training) = (Some(own), met),
@@ -240,7 +242,7 @@ impl Course<'_> {
                 }
             }
         }
-        self.tried.push(Tried { candidate, errors, training, case, plan });
+        self.tried.push(Tried { candidate, errors, training, case, given, plan });
         stage
     }
 
@@ -363,10 +365,10 @@ impl Course<'_> {
             let change = plan.windows.map(|window| format!("fit.windows={window}"));
             let changes: Vec<&str> = change.iter().map(String::as_str).collect();
             let text = without_windows(&case.text);
-            let read = Case::from_text_with(self.name, &text, &changes)?;
-            case = Case { experiments: self.case.experiments.clone(), stage: case.stage, ..read };
+            let read = Case::from_text_for(self.name, &text, &changes, Files::Nothing)?;
+            case = Case { experiments: self.case.experiments.clone(), unread: Vec::new(), stage: case.stage, ..read };
         }
-        let found = search(&case, &plan, self.stop, &mut |_, _| Flow::Continue)?;
+        let found = search_near(&case, &own.given, &plan, self.stop, &mut |_, _| Flow::Continue)?;
         self.work.add(&found.work);
         let judged = found.judged(&case, &plan);
         let fit = told(&case, &plan, &found, judged.as_ref());

@@ -182,6 +182,7 @@ impl<'a> Task<'a> {
             .allowed(format!("10 to {MOST_ROWS}"))
             .next("choose another --duration or --every"));
         }
+        case.complete()?;
         let plan = plan_of(case, request)?;
         let all: Vec<String> = parameters(&case.stage, &plan, &[])?.into_iter().map(|free| free.name).collect();
         let named = request.names.iter().map(|name| {

@@ -2,9 +2,9 @@
 
 mod pages;
 
-use super::csv::{near, shown};
 use super::lines::unreadable;
 use super::sheet::{ColumnId, Request, Sheet, check_numbers};
+use super::words::{near, shown};
 use crate::error::{Error, Result};
 use ::parquet::basic::{LogicalType, TimeUnit, Type};
 use ::parquet::column::reader::{ColumnReader, ColumnReaderImpl};
@@ -21,7 +21,7 @@ const BLOCK: usize = 8192;
 
 /// The names of all columns.
 pub(super) fn names(file: &Path) -> Result<Vec<ColumnId>> {
-    let input = File::open(file).map_err(|error| unreadable(file, &error))?;
+    let input = crate::files::open(file).map_err(|error| unreadable(file, &error))?;
     let reader = SerializedFileReader::new(input).map_err(|error| damaged(file, &error))?;
     let schema = reader.metadata().file_metadata().schema_descr();
     Ok(schema.columns().iter().map(|column| ColumnId::Name(column.path().string())).collect())
@@ -29,7 +29,7 @@ pub(super) fn names(file: &Path) -> Result<Vec<ColumnId>> {
 
 /// Reads the wanted columns.
 pub(super) fn read(file: &Path, request: &Request<'_>) -> Result<Sheet> {
-    let input = File::open(file).map_err(|error| unreadable(file, &error))?;
+    let input = crate::files::open(file).map_err(|error| unreadable(file, &error))?;
     let reader = SerializedFileReader::new(input).map_err(|error| damaged(file, &error))?;
     let metadata = reader.metadata().file_metadata();
     let schema = metadata.schema_descr();

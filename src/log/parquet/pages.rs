@@ -9,7 +9,6 @@ use crate::error::{Error, Result};
 use crate::log::lines::unreadable;
 use ::parquet::errors::ParquetError;
 use ::parquet::file::metadata::ParquetMetaData;
-use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -21,7 +20,7 @@ const HEADER: u64 = 4096;
 
 /// Refuses a column with a page that is too large, or with something else in the place of a page.
 pub(super) fn check(file: &Path, metadata: &ParquetMetaData, column: usize) -> Result<()> {
-    let mut input = File::open(file).map_err(|error| unreadable(file, &error))?;
+    let mut input = crate::files::open(file).map_err(|error| unreadable(file, &error))?;
     for group in metadata.row_groups() {
         let chunk = group.column(column);
         let starts = [Some(chunk.data_page_offset()), chunk.dictionary_page_offset()];

@@ -2,7 +2,7 @@
 
 use super::super::Output;
 use super::timing::Timing;
-use super::{Note, Severity, is_position, median, percent, quantile, shown};
+use super::{Note, Remedy, Severity, is_position, median, percent, quantile, shown};
 
 /// Unit of an acceleration, which jumps by its nature.
 const ACCELERATION: &str = "m/s^2";
@@ -118,12 +118,7 @@ impl Channel {
     }
 
     fn count_wraps(&self, values: &[f64]) -> usize {
-        let turn = match (self.unit, self.step) {
-            (ACCELERATION, _) => return 0,
-            ("rad", _) => std::f64::consts::TAU,
-            (_, Some(q)) => 65536.0 * q,
-            _ => return 0,
-        };
+        let Some(turn) = self.turn() else { return 0 };
         let jumps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
         let usual = quantile(&jumps.clone().collect::<Vec<_>>(), 0.95);
         jumps.filter(|jump| (jump - turn).abs() < 0.1 * turn && *jump > 5.0 * usual).count()
@@ -307,7 +302,31 @@ impl Channel {
                 ),
             );
         }
+        if let Some(output) = output {
+            notes.iter_mut().for_each(|note| note.remedy = self.remedy(note.code, output));
+        }
         notes
+    }
+
+    /// What would mend a note on an output, as far as samples show it.
+    fn remedy(&self, code: &str, output: &Output) -> Option<Remedy> {
+        match code {
+            "wraps" => self.turn().map(|turn| Remedy::Unwrap(output.quantity, turn)),
+            "outliers" => {
+                let samples = self.outliers.iter().map(|outlier| outlier.sample).collect();
+                Some(Remedy::Leave(output.quantity, samples))
+            }
+            _ => None,
+        }
+    }
+
+    /// The size of the jumps that a counter makes where it wraps.
+    fn turn(&self) -> Option<f64> {
+        match (self.unit, self.step) {
+            (ACCELERATION, _) => None,
+            ("rad", _) => Some(std::f64::consts::TAU),
+            (_, step) => step.map(|step| 65536.0 * step),
+        }
     }
 }
 

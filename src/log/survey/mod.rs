@@ -5,11 +5,13 @@
 
 mod channel;
 mod motion;
+mod remedy;
 mod timing;
 mod units;
 
 pub use channel::{Channel, Clipped, Outlier};
 pub use motion::{Motion, Steady};
+pub use remedy::Remedy;
 pub use timing::{Gap, Timing};
 
 use super::{Log, Quantity};
@@ -43,6 +45,8 @@ pub struct Note {
     pub column: Option<&'static str>,
     /// The finding, in a sentence with numbers, and what to do.
     pub text: String,
+    /// What would mend the log, where a model can tell whether that is so.
+    pub remedy: Option<Remedy>,
 }
 
 /// How much something matters.
@@ -129,11 +133,15 @@ impl Survey {
 
 impl Note {
     fn new(code: &'static str, severity: Severity, text: impl Into<String>) -> Self {
-        Self { code, severity, column: None, text: text.into() }
+        Self { code, severity, column: None, text: text.into(), remedy: None }
     }
 
     fn on(self, column: &'static str) -> Self {
         Self { column: Some(column), ..self }
+    }
+
+    fn mended_by(self, remedy: impl Into<Option<Remedy>>) -> Self {
+        Self { remedy: remedy.into(), ..self }
     }
 }
 

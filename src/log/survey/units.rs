@@ -3,8 +3,8 @@
 use super::super::{Log, Output, Quantity};
 use super::channel::Channel;
 use super::motion::Motion;
-use super::{Note, Severity, quantile, shown};
-use crate::quantity::rounded;
+use super::{Note, Remedy, Severity, quantile, shown};
+use crate::quantity::{self, rounded};
 use crate::stage::{AmplifierMode, EncoderPlace, Stage};
 
 /// Measured and expected may differ by this factor without a suspicion: the machine's parameters may be rough.
@@ -176,7 +176,7 @@ fn consistency(log: &Log, stage: &Stage, channels: &[Channel]) -> Vec<Note> {
         if let Some(kind) = kind(ratio) {
             let (p, s) = (position.quantity.name(), speed.quantity.name());
             let code = if matches!(kind, Kind::Sign) { "sign" } else { "unit" };
-            let text = match kind {
+            let text = match &kind {
                 Kind::Sign => format!(
                     "it goes the other way than {s} says: one of the two has the wrong sign; say scale = {{ {s} = -1 }}, or so for {p}"
                 ),
@@ -184,7 +184,10 @@ fn consistency(log: &Log, stage: &Stage, channels: &[Channel]) -> Vec<Note> {
                     format!("it goes {factor} what {s} adds up to: is the unit of {p}, of {s} or of the time wrong?")
                 }
             };
-            notes.push(Note::new(code, Severity::Suspicion, text).on(p));
+            // Of a factor the times may be the reason, too.
+            let sign = || Remedy::Ratio(position.quantity, speed.quantity, -1.0);
+            let remedy = matches!(kind, Kind::Sign).then(sign);
+            notes.push(Note::new(code, Severity::Suspicion, text).on(p).mended_by(remedy));
         }
     }
     notes
@@ -231,13 +234,16 @@ fn ratio_note(ratio: f64, base: &Output, other: &Output, stage: &Stage, what: &s
     let levers = lever(o, stage) / lever(b, stage);
     let swapped = ratio.abs() * levers * levers;
     let (name, other) = (b.name(), o.name());
-    let note = |code, text: String| Some(Note::new(code, Severity::Suspicion, text).on(name));
+    let note = |code, text: String, remedy: Remedy| {
+        Some(Note::new(code, Severity::Suspicion, text).on(name).mended_by(remedy))
+    };
     match kind(ratio)? {
         Kind::Sign => note(
             "sign",
             format!(
                 "it goes the other way than {other}: one of the two has the wrong sign; say scale = {{ {other} = -1 }}, or so for {name}"
             ),
+            Remedy::Ratio(b, o, -1.0),
         ),
         Kind::Factor(_) if levers != 1.0 && (0.8..1.25).contains(&(1.0 / swapped)) => note(
             "swapped",
@@ -245,6 +251,7 @@ fn ratio_note(ratio: f64, base: &Output, other: &Output, stage: &Stage, what: &s
                 "it and {other} look swapped: exchanged they agree with the pulley's radius of {}",
                 shown(stage.pulley_radius, "m")
             ),
+            Remedy::Exchange(b, o),
         ),
         Kind::Factor(factor) => note(
             "unit",
@@ -252,6 +259,7 @@ fn ratio_note(ratio: f64, base: &Output, other: &Output, stage: &Stage, what: &s
                 "it goes {factor} what {other} says of the same {what}, with a pulley of {}: is one of their units wrong?",
                 shown(stage.pulley_radius, "m")
             ),
+            Remedy::Ratio(b, o, ratio),
         ),
     }
 }
@@ -281,7 +289,12 @@ fn magnitude(log: &Log, stage: &Stage, motion: &Motion) -> Option<Note> {
     }
     let (is, would) = (shown(motion.peak_speed, unit), shown(expected.speed / lever, unit));
     let times = if ratio > 1.0 { format!("{ratio:.0} times") } else { format!("1/{:.0} of", 1.0 / ratio) };
-    let next = match confused(motion.quantity, ratio) {
+    let unit_meant = confused(motion.quantity, ratio);
+    let remedy = unit_meant.map(|meant| {
+        let factor = quantity::read(&format!("1 {meant}"), motion.quantity.unit()).unwrap_or(1.0 / ratio);
+        Remedy::Unit(motion.quantity, factor)
+    });
+    let next = match unit_meant {
         Some(unit) => format!("is the column in {unit}? then say units = {{ {name} = \"{unit}\" }}"),
         None if ratio < 1.0 => "are the times in ms or us, or the input in a larger unit? then say so in units".into(),
         None => "check the units of the time, the input and this column".into(),
@@ -289,7 +302,7 @@ fn magnitude(log: &Log, stage: &Stage, motion: &Motion) -> Option<Note> {
     let text = format!(
         "it moves at up to {is}, {times} the {would} that the machine of the case would do with this input: {next}"
     );
-    Some(Note::new("unit", Severity::Suspicion, text).on(name))
+    Some(Note::new("unit", Severity::Suspicion, text).on(name).mended_by(remedy))
 }
 
 /// A log that moves with an input that would not move the machine of the case.
@@ -431,7 +444,7 @@ fn direction(log: &Log, stage: &Stage, motion: &Motion) -> Option<Note> {
     let text = format!(
         "it moves against its input (correlation of input and speed {correlation:.2}): swapped wires, or a sign; say scale = {{ {name} = -1 }}, or a negative amplifier.gain"
     );
-    Some(Note::new("sign", Severity::Suspicion, text).on(name))
+    Some(Note::new("sign", Severity::Suspicion, text).on(name).mended_by(Remedy::Reverse))
 }
 
 /// A current that this motor cannot draw from this voltage.

@@ -3,15 +3,10 @@
 use super::matrices::{Room, Watch};
 use super::{Core, ModeMatrices};
 use crate::friction::Motion;
-use crate::mechanism::{AmplifierMode, Cause, Limit, Mode, Part, Status, Switch, What};
-use crate::solve::{Ending, Event};
+use crate::mechanism::{AmplifierMode, Cause, Limit, Mode, Part, ROUNDING, Status, Switch, What};
+use crate::solve::pace::most_events;
+use crate::solve::{Ending, Event, Tie};
 use std::sync::Arc;
-
-/// Events allowed at once, per simulated second, and in all: more is an accumulation, not a machine, or fills the
-/// memory.
-const EVENTS_AT_LEAST: f64 = 1e5;
-const EVENTS_PER_SECOND: f64 = 1e7;
-const EVENTS_AT_MOST: f64 = 2e7;
 
 /// The rank of conditions on bodies.
 const BODIES: u8 = 3;
@@ -90,7 +85,11 @@ impl<const N: usize> Core<N> {
                     self.z[self.common.space.layout.speed[follower]] = 0.0;
                 }
                 // Where rounding turns a body back again and again without a moment passing, it rests.
-                (body, if self.common.changes > TURNS_AT_ONCE { Motion::Stuck } else { self.decide(body) })
+                let turns = self.common.changes > TURNS_AT_ONCE;
+                if turns {
+                    self.note_tie(body);
+                }
+                (body, if turns { Motion::Stuck } else { self.decide(body) })
             }
             Cause::BreakForward(body) => (body, Motion::Forward),
             Cause::BreakBackward(body) => (body, Motion::Backward),
@@ -175,11 +174,38 @@ impl<const N: usize> Core<N> {
         event.note(&mut self.common.events);
     }
 
+    /// Notes that rounding decides what a body does.
+    fn note_tie(&mut self, body: usize) {
+        let tie = Tie { time: self.time(), part: Part::of(&self.common.mechanism, What::Body(body)) };
+        tie.note(&mut self.common.ties, &self.common.events);
+    }
+
+    /// Notes bodies at rest whose load is their breakaway but for rounding, where that holds more than they have once
+    /// they slide: what sets in gently makes no difference.
+    pub(super) fn note_ties(&mut self) {
+        let law = Arc::clone(&self.matrices);
+        for guard in &law.guards {
+            let (body, forward) = match guard.cause {
+                Cause::BreakForward(body) => (body, true),
+                Cause::BreakBackward(body) => (body, false),
+                _ => continue,
+            };
+            let side = self.common.mechanism.friction(body).side(forward);
+            if side.breakaway > side.coulomb && guard.is_zero(&self.z) {
+                self.note_tie(body);
+            }
+        }
+    }
+
     /// Takes what has just become a condition on a part for zero where it is that but for rounding.
     fn tolerate(&mut self, cause: Cause) {
         let law = Arc::clone(&self.matrices);
+        let rate = law.rate(&self.z);
         for guard in law.guards.iter().filter(|guard| guard.cause.is_of_same_part(cause)) {
-            let (now, noise) = (guard.value(&self.z), guard.noise(&self.z));
+            // The moment at which it fell is known to the rounding of the way there: of a line whose point is at zero
+            // the value itself says nothing of it.
+            let on_the_way = ROUNDING * law.far() * guard.value(&rate).abs();
+            let (now, noise) = (guard.value(&self.z), guard.noise(&self.z).max(on_the_way));
             let zero = now.abs() <= 20.0 * noise;
             let index = guard.cause.kind();
             (self.common.tolerance[index], self.common.fresh[index]) = match zero {
@@ -198,6 +224,7 @@ impl<const N: usize> Core<N> {
 
     /// Takes up the equations of the present mode.
     pub(super) fn take_up_mode(&mut self) {
+        self.carry_errors();
         self.common.rounding.swing(self.matrices.swing, self.time());
         let (mechanism, space) = (&self.common.mechanism, &self.common.space);
         let (matrices, is_new) = ModeMatrices::of(&mut self.known, mechanism, space, &self.common.mode, self.common.h);
@@ -276,9 +303,7 @@ impl<const N: usize> Core<N> {
                         self.common.fresh[torque.cause.kind()] = 1;
                         self.common.is_fresh = true;
                     }
-                    if (self.common.handed_on + self.common.events.len()) as f64
-                        > f64::min(EVENTS_AT_LEAST + EVENTS_PER_SECOND * self.time(), EVENTS_AT_MOST)
-                    {
+                    if (self.common.handed_on + self.common.events.len()) as f64 > most_events(self.time()) {
                         self.common.trouble = Some(Ending::TooManyEvents { time: self.time() });
                     }
                     return;

@@ -3,6 +3,7 @@
 mod guards;
 mod shown;
 
+use super::ellipsoid::can_grow;
 use crate::friction::Motion;
 use crate::mechanism::{BODIES, Cause, DRIVES, Equations, Form, Layout, Mechanism, Mode, ROUNDING, SPRINGS, State};
 use crate::signal::DEGREE;
@@ -170,6 +171,20 @@ pub(super) fn straight<const N: usize>(mechanism: &Mechanism, space: &Space, mod
     (equations, rate)
 }
 
+/// The size of what the constant parts of accelerations are added up from, where errors can grow.
+fn crude<const N: usize>(mechanism: &Mechanism, layout: &Layout, mode: &Mode, inertia: &[f64; BODIES]) -> [f64; N] {
+    let mut crude = [0.0; N];
+    if !can_grow(mechanism) {
+        return crude;
+    }
+    let sizes = mechanism.sizes_of_forces(mode);
+    for body in (0..layout.bodies()).filter(|&body| mode.motion[body] != Motion::Stuck) {
+        let leader = mechanism.leader(body);
+        crude[layout.speed[body]] = mechanism.ratio(body).abs() * sizes[leader] / mechanism.mass(leader, inertia);
+    }
+    crude
+}
+
 /// The equations of one mode, ż = A z, and what follows from them.
 pub(in crate::solve) struct ModeMatrices<const N: usize> {
     pub(super) mode: Mode,
@@ -190,6 +205,8 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     h: f64,
     /// A bound of the fastest undamped swing, rad/s.
     pub(super) swing: f64,
+    /// The size of what the constant part of ż is added up from; nothing where errors do not grow.
+    pub(super) crude: [f64; N],
     /// Where ways are counted from.
     origin: [f64; BODIES],
     rate: Matrix<N, N>,
@@ -379,6 +396,7 @@ impl<const N: usize> ModeMatrices<N> {
             finest,
             h,
             swing,
+            crude: crude::<N>(mechanism, layout, mode, &equations.inertia),
             origin: mechanism.origin,
             rate,
             steps: (0..=finest).map(|_| OnceLock::new()).collect(),

@@ -11,6 +11,7 @@
 //! with ẏ.
 
 mod change;
+mod ellipsoid;
 mod kernel;
 mod matrices;
 mod run;
@@ -26,8 +27,9 @@ use super::record::Extra;
 use super::roots;
 use super::rounding::Rounding;
 use super::saved::{Pass, Passed};
-use super::{Cost, Ending, Event, PositionError};
+use super::{Cost, Ending, Event, PositionError, Tie};
 use crate::mechanism::{Cause, DRIVES, Form, Layout, Mechanism, Mode, State};
+use ellipsoid::Ellipsoid;
 use kernel::Modes;
 pub(super) use kernel::{Known, Make, in_kernel};
 pub(super) use matrices::Space;
@@ -54,6 +56,8 @@ pub(super) struct Core<const N: usize> {
     /// Matrices that were there before.
     shared: u64,
     room: Box<Room<N>>,
+    /// What rounding has done to the state, of a machine in which that can grow.
+    errors: Option<Box<Ellipsoid<N>>>,
     pub(super) common: Common,
 }
 
@@ -85,6 +89,7 @@ pub(super) struct Common {
     base: f64,
     offset: f64,
     pub(super) events: Vec<Event>,
+    pub(super) ties: Vec<Tie>,
     /// How many events were handed on before those.
     handed_on: usize,
     /// How many modes have been taken up.
@@ -171,6 +176,7 @@ impl<const N: usize> Core<N> {
             base: 0.0,
             offset: 0.0,
             events: Vec::new(),
+            ties: Vec::new(),
             handed_on: 0,
             taken: 0,
             since_change: f64::INFINITY,
@@ -183,7 +189,9 @@ impl<const N: usize> Core<N> {
             asks: false,
             trouble: None,
         };
-        Self { z, largest: [0.0; N], matrices, known, shared, room: Box::new(Room::new()), common }
+        let errors =
+            ellipsoid::can_grow(&common.mechanism).then(|| Box::new(Ellipsoid::new(common.space.layout.states)));
+        Self { z, largest: [0.0; N], matrices, known, shared, room: Box::new(Room::new()), errors, common }
     }
 
     pub(super) fn time(&self) -> f64 {
@@ -196,7 +204,9 @@ impl<const N: usize> Core<N> {
         self.common.rounding.swing(self.matrices.swing, self.time());
         let steps = self.common.cost.steps + self.common.cost.series;
         let origin = self.common.coordinates.origin().iter().fold(0.0, |most: f64, origin| most.max(origin.abs()));
-        self.common.rounding.bound(steps, self.time(), origin)
+        self.carry_errors();
+        let grown = self.errors.as_ref().map_or(0.0, |errors| errors.largest());
+        self.common.rounding.bound(steps, self.time(), (origin, grown))
     }
 
     /// Goes on to `until` and adds the events on the way to `events`.
@@ -227,8 +237,7 @@ impl<const N: usize> Core<N> {
                 continue;
             }
             if let Some(cause) = self.advance(left.min(self.common.h), looked) {
-                self.change(cause);
-                self.resolve();
+                self.go_through(cause);
             } else if left <= self.common.h && !self.common.asks && self.common.trouble.is_none() {
                 break;
             }
@@ -569,18 +578,19 @@ impl<const N: usize> Core<N> {
 }
 
 /// Makes what goes on where another one stands, with room for inputs that bend.
-struct Smoothed {
+struct Smoothed<const M: usize> {
     /// Of another kernel: states and inputs, as [`Space::inner`] and [`Space::chain`] find them there.
     z: Vec<f64>,
     derivatives: Vec<Vec<f64>>,
+    errors: Option<Box<Ellipsoid<M>>>,
     common: Common,
 }
 
-impl Make for Smoothed {
+impl<const M: usize> Make for Smoothed<M> {
     type Made = Box<dyn Engine>;
 
     fn make<const N: usize>(self) -> Self::Made {
-        let Self { z: states, derivatives, common } = self;
+        let Self { z: states, derivatives, errors, common } = self;
         let mut z = [0.0; N];
         z[..states.len()].copy_from_slice(&states);
         for (drive, derivatives) in derivatives.iter().enumerate() {
@@ -592,7 +602,8 @@ impl Make for Smoothed {
         let mut known = Vec::new();
         let (matrices, _) = ModeMatrices::of(&mut known, &common.mechanism, &common.space, &common.mode, common.h);
         let room = Box::new(Room::new());
-        Box::new(Core::<N> { z, largest: [0.0; N], matrices, known, shared: 0, room, common })
+        let errors = errors.map(|errors| Box::new(errors.resized()));
+        Box::new(Core::<N> { z, largest: [0.0; N], matrices, known, shared: 0, room, errors, common })
     }
 }
 
@@ -621,7 +632,10 @@ impl<const N: usize> Engine for Core<N> {
         let derivatives = (0..old.layout.inputs).map(|drive| derivative(drive).collect()).collect();
         let space = Arc::new(Space::new(&self.common.mechanism, degree));
         common.space = Arc::clone(&space);
-        in_kernel(space.size(), Smoothed { z: self.z[..old.layout.states].to_vec(), derivatives, common })
+        in_kernel(
+            space.size(),
+            Smoothed { z: self.z[..old.layout.states].to_vec(), derivatives, errors: self.errors.clone(), common },
+        )
     }
 
     fn take_input(&mut self, pieces: &Pieces) {

@@ -1,8 +1,9 @@
 //! A run: a machine, and a recorder of its rows.
 
+use super::ellipsoid::can_grow;
 use super::shown::{ROWS, Watching};
 use super::{Core, Known, ModeMatrices, Space};
-use crate::mechanism::{Mechanism, State};
+use crate::mechanism::{Mechanism, SpringLaw, State};
 use crate::solve::inputs::Pieces;
 use crate::solve::observe::Output;
 use crate::solve::record::Recorder;
@@ -35,7 +36,13 @@ impl<'a, const N: usize> Run<'a, N> {
         let list = std::mem::take(known.list::<Arc<ModeMatrices<N>>>());
         let inputs = |drive| space.chain(drive, 0);
         let recorder = Recorder::new(&seen, &space.layout, (N, &inputs), grid, output);
-        let core = Core::new(seen, Arc::new(space), &start.state, (grid.interval(), grid.end()), list);
+        let mut core = Core::new(seen, Arc::new(space), &start.state, (grid.interval(), grid.end()), list);
+        // Where no rows are made, nobody asks how far they are off, but whether they are determined, which only a line
+        // that feeds the motion can spoil.
+        let feeds = |law: &SpringLaw| matches!(law, SpringLaw::Line { .. });
+        if recorder.detail == Detail::None && !core.common.mechanism.springs.iter().any(|spring| feeds(&spring.law)) {
+            core.errors = None;
+        }
         let watching = Watching::new(recorder.observer.as_deref());
         Self { core, grid, row: 0, recorder, watching, known }
     }
@@ -57,8 +64,7 @@ impl<'a, const N: usize> Run<'a, N> {
             let ahead = if self.row < row { self.grid.interval() } else { offset };
             match self.advance_shown(ahead - self.core.common.offset, looked) {
                 Some(cause) => {
-                    self.core.change(cause);
-                    self.core.resolve();
+                    self.core.go_through(cause);
                     self.jumped();
                 }
                 // Paused in the midst of an interval: it is taken up where it was left.
@@ -201,8 +207,10 @@ impl<'a, const N: usize> Run<'a, N> {
 
 impl<const N: usize> Running for Run<'_, N> {
     fn set_input(&mut self, pieces: &Pieces) {
+        self.core.note_ties();
         self.core.set_input(pieces);
         self.core.resolve();
+        self.core.note_ties();
         self.jumped();
     }
 
@@ -225,6 +233,7 @@ impl<const N: usize> Running for Run<'_, N> {
     }
 
     fn finish(&mut self, is_at_end: bool) -> Outcome {
+        self.core.note_ties();
         if self.core.common.trouble.is_none() {
             if is_at_end {
                 // Behind a last, shorter interval it stands at the last row, too.
@@ -244,12 +253,15 @@ impl<const N: usize> Running for Run<'_, N> {
         };
         let core = &mut self.core;
         core.common.cost.propagators = super::propagators(&core.known) - core.shared;
-        let error = Some(core.bound_of_rounding());
+        let is_followed = core.errors.is_some() || !can_grow(&core.common.mechanism);
+        let error = is_followed.then(|| core.bound_of_rounding());
         Outcome {
             events: std::mem::take(&mut core.common.events),
+            ties: std::mem::take(&mut core.common.ties),
             ending,
             cost: std::mem::take(&mut core.common.cost),
             error,
+            unmet: 0,
         }
     }
 

@@ -35,6 +35,9 @@ impl<const N: usize> Core<N> {
         pass.bits(&mut common.cost.steps)?;
         pass.bits(&mut common.cost.series)?;
         common.rounding.pass(pass)?;
+        if let Some(errors) = &mut self.errors {
+            errors.pass(pass)?;
+        }
         if *common.coordinates.start() != start || common.tolerance[Cause::KINDS] != 0.0 {
             return None;
         }

@@ -12,6 +12,10 @@ use std::sync::Arc;
 /// Allowance for rounding and for a stranger's integrator, as a share of a quantity.
 const TOLERANCE: f64 = 1e-9;
 
+/// Every condition is shown as larger by this, in its SI unit. FMI counts a condition of zero as fallen: one that is zero
+/// where a mode begins, as the speed of a body that breaks away, has to be above zero.
+const SHIFT: f64 = 1.0 / (1_u64 << 40) as f64;
+
 /// Changes of mode at one instant.
 const CHANGES: usize = 100;
 
@@ -132,14 +136,14 @@ impl Dynamics {
                 Quantity::Position(body) => core.y[model.speed(body)],
                 Quantity::Speed(body) => rate[model.speed(body)],
                 Quantity::Current(drive) => model.current[drive].map_or(0.0, |place| rate[place]),
-                Quantity::Bristle(body) => model.bristle[body].map_or(0.0, |place| rate[place]),
+                Quantity::Bristle(body) => model.bristle_rate(body, &core.mode, &core.y),
             } + 0.0;
         }
     }
 
     /// The conditions as residuals: of a body that slides its speed in the direction of motion, of one at rest what is
-    /// left to its breakaway on either side, of any other part what is left to its limit. One that the mode does not
-    /// watch is 1.
+    /// left to its breakaway on either side, of any other part what is left to its limit; each larger by a tolerance, so
+    /// that all are above zero after [`Dynamics::settle`]. One that the mode does not watch is 1.
     pub fn residuals(&self, into: &mut [f64]) {
         into.fill(1.0);
         let mut seen = [false; Cause::KINDS];
@@ -151,38 +155,45 @@ impl Dynamics {
         }
     }
 
-    /// The conditions of the mode, and by how much each holds: what rounding may do is forgiven.
+    /// The conditions of the mode, and by how much each holds, beyond what rounding and the integrator may do: it has
+    /// fallen where that is zero or less.
     fn watched(&self) -> impl Iterator<Item = (Cause, f64)> + '_ {
         let core = &self.core;
         let field = core.field();
         let values = field.guards(&core.input(), &core.y);
         let watches: Vec<Cause> = field.watches.to_vec();
         watches.into_iter().zip(values).map(|(cause, value)| {
-            let slack = match cause {
-                Cause::Stop(_) => 0.0,
+            let tolerance = match cause {
+                Cause::Stop(body) => core.absolute[core.model.speed(body)],
                 Cause::GearTorque(drive) => core.torque_slack[drive],
                 cause => core.slack[cause.kind()],
             };
-            // A torque that nothing tells from zero is watched by nobody.
-            (cause, if slack.is_finite() { value + slack } else { 1.0 })
+            // A torque that nothing tells from zero is not watched.
+            (cause, if tolerance.is_finite() { value + tolerance + SHIFT } else { 1.0 })
         })
     }
 
     /// Whether a condition has fallen.
     pub fn is_over(&self) -> bool {
-        self.watched().any(|(_, value)| value < 0.0)
+        self.watched().any(|(_, value)| value <= 0.0)
     }
 
-    /// Changes modes, without time passing, until every condition holds, and adds the events to `events`. Says whether
-    /// it put quantities elsewhere: a body that stops has no speed.
+    /// Changes modes, without time passing, until every condition is above zero, and adds the events to `events`. True
+    /// if it put quantities elsewhere: a body that stops has no speed.
     pub fn settle(&mut self, events: &mut Vec<Event>) -> std::result::Result<bool, Ending> {
         let before = self.core.y;
+        self.core.forgive_loads();
         for _ in 0..CHANGES {
-            let stopped = self.watched().find(|(cause, value)| matches!(cause, Cause::Stop(_)) && *value < 0.0);
-            let Some((cause, _)) = stopped else { break };
+            let fallen = self.watched().filter(|(_, value)| *value <= 0.0).min_by_key(|(cause, _)| cause.rank());
+            let Some((cause, _)) = fallen else { break };
             self.core.change(cause);
+            if self.core.trouble.is_some() {
+                break;
+            }
         }
-        self.core.resolve();
+        if self.core.trouble.is_none() && self.is_over() {
+            self.core.trouble = Some(Ending::TooManyEvents { time: self.core.time() });
+        }
         events.append(&mut self.core.events);
         self.core.trouble.map_or(Ok(self.core.y != before), Err)
     }

@@ -259,6 +259,13 @@ impl Field {
         form.noise(&self.model.layout, &self.model.inner(y), input) / ROUNDING
     }
 
+    /// What rounding may do to a guard where states are as large as `usual`: of a guard of one speed, its size at the
+    /// event says nothing.
+    pub(super) fn rounding(&self, index: usize, usual: &Vector) -> f64 {
+        let on_state = self.guards[index].row.iter().zip(usual).map(|(weight, usual)| (weight * usual).abs());
+        ROUNDING * on_state.sum::<f64>()
+    }
+
     /// How much more a guard is than its output says: what friction along the travel and bent bristles hold at rest.
     pub(super) fn shift(&self, cause: Cause, y: &[f64]) -> f64 {
         let (body, forward) = match cause {

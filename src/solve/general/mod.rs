@@ -25,7 +25,7 @@ mod stretch;
 use super::coordinates::Coordinates;
 use super::inputs::Pieces;
 use super::machine::Engine;
-use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
+use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS, most_events};
 use super::record::Extra;
 use super::saved::{Pass, Passed};
 use super::{Cost, Ending, Event, PositionError};
@@ -44,10 +44,6 @@ pub(super) use run::Run;
 use std::sync::Arc;
 use step::Room;
 use stretch::Stretch;
-
-/// Events allowed at once, and per simulated second: more is an accumulation, not a machine.
-const EVENTS_AT_LEAST: f64 = 1e5;
-const EVENTS_PER_SECOND: f64 = 1e7;
 
 /// Mode changes allowed at one instant.
 const CHANGES_AT_ONCE: usize = 100;
@@ -122,8 +118,27 @@ pub(super) struct Core {
     handed_on: usize,
     /// How many modes have been taken up.
     taken: u64,
+    /// Number of events whose own condition does not hold at their time.
+    unmet: u64,
+    noise: Noise,
     pub(super) cost: Cost,
     pub(super) trouble: Option<Ending>,
+}
+
+/// Random numbers between −`size` and `size`, the same in every run.
+#[derive(Clone, Copy, Default)]
+struct Noise {
+    size: f64,
+    state: u64,
+}
+
+impl Noise {
+    /// Knuth's linear congruential generator.
+    fn next(&mut self) -> f64 {
+        self.state = self.state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        let share = (self.state >> 11) as f64 / (1_u64 << 53) as f64;
+        self.size * (2.0 * share - 1.0)
+    }
 }
 
 /// A step that was taken, as far as it counts: to its end, or to the first event in it.
@@ -231,6 +246,8 @@ impl Core {
             events: Vec::new(),
             handed_on: 0,
             taken: 0,
+            unmet: 0,
+            noise: Noise::default(),
             cost: Cost { modes: 1, ..Cost::default() },
             trouble: None,
         }
@@ -363,7 +380,8 @@ impl Core {
         let guards = field.guards(&input, &self.y);
         for (index, cause) in field.watches.iter().enumerate() {
             if cause.is_of_same_part(Cause::Switch(switch)) {
-                let error = self.relative * field.size(index, &input, &self.y);
+                let rounding = field.rounding(index, &self.absolute.map(|absolute| absolute / self.relative));
+                let error = (self.relative * field.size(index, &input, &self.y)).max(rounding);
                 let error = if self.changes > TURNS_AT_ONCE { 10.0 * error } else { error };
                 let zero = guards[index].abs() <= 4.0 * error;
                 self.slack[cause.kind()] = if zero { f64::max(-guards[index], 0.0) + error } else { 0.0 };
@@ -388,18 +406,22 @@ impl Core {
         });
     }
 
+    /// After an edge of the input too, a load that passes a breakaway by rounding alone does not break it.
+    fn forgive_loads(&mut self) {
+        let (model, input) = (Arc::clone(&self.model), self.input());
+        for body in model.mechanism.leaders().filter(|body| self.mode.motion[*body] == Motion::Stuck) {
+            for (cause, tolerance) in self.tolerances_at_rest(body, &input) {
+                let own = &mut self.slack[cause.kind()];
+                *own = own.max(tolerance);
+            }
+        }
+    }
+
     /// Changes modes, without time passing, until every load that is held can be.
     fn resolve(&mut self) {
         let time = self.time();
         if self.tau == 0.0 {
-            // After an edge of the input too, a load that passes a breakaway by rounding alone does not break it.
-            let (model, input) = (Arc::clone(&self.model), self.input());
-            for body in model.mechanism.leaders().filter(|body| self.mode.motion[*body] == Motion::Stuck) {
-                for (cause, tolerance) in self.tolerances_at_rest(body, &input) {
-                    let own = &mut self.slack[cause.kind()];
-                    *own = own.max(tolerance);
-                }
-            }
+            self.forgive_loads();
         }
         for _ in 0..CHANGES_AT_ONCE {
             let field = self.field();
@@ -419,7 +441,7 @@ impl Core {
                     }
                 }
                 None => {
-                    if (self.handed_on + self.events.len()) as f64 > EVENTS_AT_LEAST + EVENTS_PER_SECOND * time {
+                    if (self.handed_on + self.events.len()) as f64 > most_events(time) {
                         self.trouble = Some(Ending::TooManyEvents { time });
                     }
                     return;

@@ -81,6 +81,12 @@ impl Curved {
         std::array::from_fn(|i| Sliding { slip: stiffness * speed[i] / dry[i], ..Sliding::default() })
     }
 
+    /// ż = v − σ₀ |v| z / g(v) of the bristles at this place of the integrated quantities.
+    #[inline(always)]
+    fn bristle_rate(&self, sliding: &Sliding, place: usize, y: &[f64]) -> f64 {
+        y[self.speed] - sliding.slip * y[place]
+    }
+
     /// The law at `v`, dry friction being multiplied by `factor`. The speed is counted in the direction of motion:
     /// where a trial step overshoots, the law goes on smoothly.
     #[inline(always)]
@@ -336,16 +342,23 @@ impl Model {
         if let (None, Some(forward)) = (&self.mechanism.bodies[curved.body].along, curved.direction(motion)) {
             return curved.beyond_coulomb(forward, [y[curved.speed]])[0];
         }
-        let (v, factor) = (y[curved.speed], self.factor(curved.body, y));
-        let sliding = curved.sliding(motion, v, factor, false);
+        let sliding = curved.sliding(motion, y[curved.speed], self.factor(curved.body, y), false);
         match (curved.friction.law, curved.bristle) {
             (Law::LuGre { stiffness, damping, .. }, Some(place)) if motion != Motion::Stuck => {
-                // ż = v − σ₀ |v| z / g(v), and σ₀ z + σ₁ ż
-                let rate = v - sliding.slip * y[place];
-                sliding.beyond + stiffness * y[place] + damping * rate
+                // σ₀ z + σ₁ ż
+                sliding.beyond + stiffness * y[place] + damping * curved.bristle_rate(&sliding, place, y)
             }
             _ => sliding.beyond,
         }
+    }
+
+    /// Rate of deflection of a body's bristles, rad/s or m/s; zero of a body that is held, or has none.
+    pub(super) fn bristle_rate(&self, body: usize, mode: &Mode, y: &[f64]) -> f64 {
+        let motion = mode.motion[body];
+        let curved = self.curved.iter().find(|curved| curved.body == body && motion != Motion::Stuck);
+        let Some((curved, place)) = curved.and_then(|curved| Some((curved, curved.bristle?))) else { return 0.0 };
+        let sliding = curved.sliding(motion, y[curved.speed], self.factor(body, y), false);
+        curved.bristle_rate(&sliding, place, y)
     }
 
     /// The same as a row shows it.

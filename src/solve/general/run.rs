@@ -35,7 +35,8 @@ impl<'a> Run<'a> {
     ) -> Self {
         let grid = Grid::new(start.every, start.until);
         let (layout, steps) = (Layout::new(mechanism), (grid.interval(), grid.end()));
-        let core = Core::new(mechanism, layout, &start.state, (tolerance, fastest), steps);
+        let mut core = Core::new(mechanism, layout, &start.state, (tolerance, fastest), steps);
+        core.noise.size = start.noise;
         let layout = &core.model.layout;
         let input = |drive| layout.states + drive;
         let recorder = Recorder::new(&core.model.mechanism, layout, (STATE, &input), grid, output);
@@ -92,7 +93,8 @@ impl Running for Run<'_> {
             (None, Flow::Stop) => Ending::Interrupted { time: core.time() },
             (None, Flow::Continue) => Ending::Complete,
         };
-        Outcome { events: std::mem::take(&mut core.events), ending, cost: core.cost, error: None }
+        let events = std::mem::take(&mut core.events);
+        Outcome { events, ties: Vec::new(), ending, cost: core.cost, error: None, unmet: core.unmet }
     }
 }
 

@@ -66,7 +66,7 @@ impl Rows<'_> {
                 *values = read(readout, model, mode, &y, &way.stretch.input(tau));
             }
             let (begin, length) = (way.stretch.begin + from, until - from);
-            let bow = [f64::INFINITY; QUANTITIES];
+            let bow = readout.unknown_bow();
             let gap = Gap { begin, length, from: &nodes[0], to: &nodes[PLACES - 1], bow: &bow, mode };
             let Some(observer) = &mut self.recorder.observer else { return };
             if observer.pass(&gap) && length > 0.0 {

@@ -60,10 +60,12 @@ pub(super) type Inputs = [[f64; DEGREE + 1]; DRIVES];
 /// A thing for each argument.
 pub(super) type Lanes<T> = [T; ARGUMENTS];
 
-/// The state and the inputs that a step begins with.
+/// The state that a step begins with, and the inputs along it.
+#[derive(Clone, Copy)]
 pub(super) struct Begin<'a> {
     pub(super) y: &'a Vector,
-    pub(super) input: &'a Inputs,
+    /// By powers of the share of the step: they belong to its length.
+    pub(super) input: Inputs,
     pub(super) degree: usize,
     /// One over what each argument may be off by.
     pub(super) strict: &'a Lanes<f64>,

@@ -26,6 +26,12 @@ const GROW: f64 = 4.0;
 /// Steps of one length after which columns for it are worth making.
 const WORTH: u32 = 6;
 
+/// The first step of the second run of an estimate on a piece of the input that one step could cover, as a share of it.
+const PART_OF_PIECE: f64 = 0.6;
+
+/// Halvings of a step in which an event is located again.
+const HALVINGS: usize = 60;
+
 /// Lengths of steps of one mode that are kept.
 const KEPT: usize = 48;
 
@@ -34,6 +40,13 @@ struct Fall {
     share: f64,
     index: usize,
     slack: f64,
+}
+
+/// The check of an event: which guard, its slack, and how far its value may be off because the event's time is rounded.
+struct Check {
+    index: usize,
+    slack: f64,
+    change: f64,
 }
 
 /// A length that a step may have, and where it ends; whether it is one of those that are met again.
@@ -93,7 +106,7 @@ impl Core {
             let length = self.length(field, stretch);
             let (set, whole) = self.set(field, &length);
             let input = stretch.inputs(from, set.h);
-            let start = Begin { y: &begin, input: &input, degree: stretch.degree, strict: &strict };
+            let start = Begin { y: &begin, input, degree: stretch.degree, strict: &strict };
             let number = self.present as u64;
             let step = Step { field, number, set: &set, begin: &start, whole };
             let error = room.solve(&step, guess.of(set.h));
@@ -147,6 +160,11 @@ impl Core {
             (to, h) = (to + regular, h + regular);
         }
         if h >= left - near {
+            if self.noise.size > 0.0 && self.tau == 0.0 {
+                // Inputs of short pieces would give both runs the same steps.
+                let part = PART_OF_PIECE * left;
+                return Length { h: part, to: part, regular: false };
+            }
             let is_whole = (left - regular).abs() <= near.min(1e-12 * regular + 8.0 * f64::EPSILON * time);
             return Length { h: if is_whole { regular } else { left }, to: stretch.length(), regular: is_whole };
         }
@@ -187,7 +205,7 @@ impl Core {
         witness: &mut dyn Witness,
     ) -> Option<Hit> {
         self.cost.steps += 1;
-        let (field, start) = (step.field, step.begin);
+        let (field, start) = (step.field, *step.begin);
         let time = stretch.begin + to;
         if self.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS) {
             self.trouble = self.pace.too_stiff(self.cost.steps, time, self.end);
@@ -195,10 +213,7 @@ impl Core {
         let mut dense =
             Dense { field, start, set: step.set, h: step.set.h, whole: step.whole, is_expanded: !step.whole };
         let fall = self.first_fall(room, &mut dense);
-        let mut hit = fall.map(|fall| self.up_to(room, &mut dense, from, &fall));
-        if let Some(hit) = &mut hit {
-            hit.tau = hit.tau.min(to);
-        }
+        let hit = fall.map(|fall| self.up_to(room, &mut dense, (from, to), &fall));
         let until = hit.as_ref().map_or(to, |hit| hit.tau);
         let rests = end == *start.y
             && stretch.degree == 0
@@ -207,7 +222,8 @@ impl Core {
             let inside = RefCell::new((&mut *room, dense));
             let at = |tau: f64| {
                 let (room, dense) = &mut *inside.borrow_mut();
-                dense.at(room, (tau - from) / dense.h)
+                let share = (tau - from) / dense.h;
+                dense.at(room, share)
             };
             witness.see(self, &Way { stretch, from, until, to, begin: start.y, rests, dense: &at });
         }
@@ -216,7 +232,19 @@ impl Core {
             self.trouble = Some(Ending::Interrupted { time });
         }
         (self.y, self.tau) = (end, to);
+        self.shake();
         hit
+    }
+
+    /// Changes speeds at random, as coarser rounding would: those of bodies that move together by the same factor.
+    fn shake(&mut self) {
+        if self.noise.size > 0.0 {
+            let model = &*self.model;
+            for leader in model.mechanism.leaders() {
+                let factor = 1.0 + self.noise.next();
+                model.mechanism.followers(leader).for_each(|body| self.y[model.speed(body)] *= factor);
+            }
+        }
     }
 
     /// The first guard to fall in a step.
@@ -226,7 +254,7 @@ impl Core {
         let mut coefficients = [0.0; TERMS];
         let is_told = dense.whole;
         if is_told {
-            room.tell_guards(field, dense.set, start);
+            room.tell_guards(field, dense.set, &start);
         }
         for (index, &cause) in field.watches.iter().enumerate() {
             let shift = if field.shifted { field.shift(cause, start.y) } else { 0.0 };
@@ -271,42 +299,96 @@ impl Core {
     }
 
     /// The state at a fall: the step is taken again up to there, until it ends at the fall.
-    fn up_to(&mut self, room: &mut Room, dense: &mut Dense, from: f64, fall: &Fall) -> Hit {
-        let (field, cause) = (dense.field, dense.field.watches[fall.index]);
-        let begin = dense.start.y;
+    fn up_to(&mut self, room: &mut Room, dense: &mut Dense, (from, to): (f64, f64), fall: &Fall) -> Hit {
+        let (field, stretch, cause) = (dense.field, self.stretch, dense.field.watches[fall.index]);
+        let (begin, length) = (dense.start.y, to - from);
         let shift = if field.shifted { field.shift(cause, begin) } else { 0.0 };
         // A speed that has fallen through is looked for where it was zero.
         let slack = if matches!(cause, Cause::Stop(_)) { 0.0 } else { fall.slack };
         let mut coefficients = [0.0; TERMS];
-        let mut place = |room: &mut Room, dense: &mut Dense, share: f64| {
-            dense.guard(room, fall.index, shift + slack, &mut coefficients);
-            fall::zero_near(&coefficients, room.series.order, share)
-        };
-        let mut share = place(room, dense, fall.share);
-        let is_linear = |room: &Room| room.forces[..field.sources.len()].iter().flatten().all(|force| *force == 0.0);
+        dense.guard(room, fall.index, shift + slack, &mut coefficients);
+        let order = room.series.order;
+        // The change of the guard over the step, and by it what it may be off by because its time is.
+        let change: f64 = coefficients[1..=order].iter().map(|c| c.abs()).sum();
+        let change = change * (self.relative + 8.0 * f64::EPSILON * (stretch.begin + to) / length);
+        let mut share = fall::zero_near(&coefficients, order, fall.share);
         for _ in 0..4 {
             let h = share * dense.h;
-            if is_linear(room) || (share - 1.0).abs() < 1e-4 || h <= 64.0 * f64::EPSILON * from.max(self.moment) {
+            let is_linear = room.forces[..field.sources.len()].iter().flatten().all(|force| *force == 0.0);
+            if is_linear || (share - 1.0).abs() < 1e-4 || h <= 64.0 * f64::EPSILON * from.max(self.moment) {
                 break;
             }
-            let before = room.clone();
-            let set = Set::new(&field.linear, h, self.stretch.degree);
-            let input = self.stretch.inputs(from, h);
-            let start = Begin { input: &input, ..*dense.start };
-            let step = Step { field, number: self.present as u64, set: &set, begin: &start, whole: false };
-            if room.solve(&step, Guess::Within(dense.h).of(h)).is_none() {
-                // The longer step was good enough.
-                *room = before;
+            // Where that fails the longer step was good enough.
+            if !dense.shorten(room, &stretch, self.present as u64, (from, h)) {
                 break;
             }
-            room.expand(field, h, &start);
-            dense.h = h;
-            dense.is_expanded = true;
-            share = place(room, dense, 1.0);
+            dense.guard(room, fall.index, shift + slack, &mut coefficients);
+            share = fall::zero_near(&coefficients, room.series.order, 1.0);
         }
-        let states = room.series.at(field.linear.size, share);
-        let y = room.with_bristles(field, begin, &states, share);
-        Hit { tau: from + share * dense.h, y, cause }
+        let span = (share * dense.h).min(length);
+        let hit = Hit { tau: from + span, y: dense.at(room, span / dense.h), cause };
+        let check = Check { index: fall.index, slack, change };
+        if self.off(field, &check, &hit).abs() <= 1.0 {
+            hit
+        } else {
+            self.locate(room, dense, (from, length), &check, hit)
+        }
+    }
+
+    /// Locates an event again whose condition is not at its limit there: by halving, between a time of the step at which
+    /// the condition holds and one at which it does not.
+    fn locate(
+        &mut self,
+        room: &mut Room,
+        dense: &mut Dense,
+        (from, length): (f64, f64),
+        check: &Check,
+        first: Hit,
+    ) -> Hit {
+        let (field, stretch, number) = (dense.field, self.stretch, self.present as u64);
+        let (mut low, mut high, mut best) = (0.0, length, first);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if !dense.shorten(room, &stretch, number, (from, middle)) {
+                break;
+            }
+            let there = Hit { tau: from + middle, y: dense.at(room, 1.0), cause: best.cause };
+            let off = self.off(field, check, &there);
+            if off.abs() < self.off(field, check, &best).abs() {
+                best = there;
+            }
+            if off.abs() <= 1.0 {
+                break;
+            }
+            (low, high) = if off < 0.0 { (low, middle) } else { (middle, high) };
+        }
+        let is_between = low > 0.0 && high < length;
+        if !is_between && self.off(field, check, &best).abs() > 1.0 {
+            // It was due before this step, or does not happen in it.
+            self.unmet += 1;
+        }
+        if best.tau > from {
+            // Rows up to the event are of a step that ends there.
+            dense.shorten(room, &stretch, number, (from, best.tau - from));
+        }
+        best
+    }
+
+    /// By how much the condition of an event is off its limit at this state and under the inputs of this moment, as a
+    /// multiple of what tolerance and rounding explain.
+    fn off(&self, field: &Field, check: &Check, hit: &Hit) -> f64 {
+        let input = self.stretch.input(hit.tau);
+        let value = field.guards(&input, &hit.y)[check.index] + check.slack;
+        let allowed = self.relative * field.size(check.index, &input, &hit.y) + check.change;
+        let allowed = match hit.cause {
+            Cause::Stop(body) => allowed.max(self.absolute[self.model.speed(body)]),
+            Cause::BreakForward(_)
+            | Cause::BreakBackward(_)
+            | Cause::GearTorque(_)
+            | Cause::Switch(_)
+            | Cause::Leave(_) => allowed,
+        };
+        value / allowed.max(f64::MIN_POSITIVE)
     }
 }
 
@@ -318,7 +400,7 @@ fn power_of_two_below(ratio: f64) -> f64 {
 /// A step that was solved, at any place.
 struct Dense<'a> {
     field: &'a Field,
-    start: &'a Begin<'a>,
+    start: Begin<'a>,
     set: &'a Set,
     h: f64,
     /// Whether it was taken by the columns of the whole step.
@@ -328,9 +410,26 @@ struct Dense<'a> {
 }
 
 impl Dense<'_> {
+    /// Solves it again from the same beginning over `h` alone, and its series with the inputs of that length; false, and
+    /// nothing has changed, where that fails.
+    fn shorten(&mut self, room: &mut Room, stretch: &Stretch, number: u64, (from, h): (f64, f64)) -> bool {
+        let field = self.field;
+        let before = room.clone();
+        let set = Set::new(&field.linear, h, stretch.degree);
+        let start = Begin { input: stretch.inputs(from, h), ..self.start };
+        let step = Step { field, number, set: &set, begin: &start, whole: false };
+        if room.solve(&step, Guess::Within(self.h).of(h)).is_none() {
+            *room = before;
+            return false;
+        }
+        room.expand(field, h, &start);
+        (self.start, self.h, self.is_expanded) = (start, h, true);
+        true
+    }
+
     fn expand(&mut self, room: &mut Room) {
         if !self.is_expanded {
-            room.expand(self.field, self.h, self.start);
+            room.expand(self.field, self.h, &self.start);
             self.is_expanded = true;
         }
     }
@@ -340,7 +439,7 @@ impl Dense<'_> {
         let eighths = s * EIGHTHS as f64;
         let is_eighth = (eighths - eighths.round()).abs() < 1e-9 && (0.5..EIGHTHS as f64 - 0.5).contains(&eighths);
         if self.whole && self.h == self.set.h && is_eighth {
-            return room.at_eighth(self.field, self.set, self.start, eighths.round() as usize);
+            return room.at_eighth(self.field, self.set, &self.start, eighths.round() as usize);
         }
         self.expand(room);
         let states = room.series.at(self.field.linear.size, s);
@@ -350,7 +449,7 @@ impl Dense<'_> {
     /// A guard along the step, by powers of its share.
     fn guard(&mut self, room: &mut Room, index: usize, shift: f64, coefficients: &mut [f64; TERMS]) {
         self.expand(room);
-        room.guard_along(self.field, self.start, index, coefficients);
+        room.guard_along(self.field, &self.start, index, coefficients);
         coefficients[0] += shift;
     }
 }

@@ -1,13 +1,14 @@
 //! The case of a request, with its changes.
 
 use super::Context;
+use super::curves::spans;
 use crate::message::Request;
 use serde_json::{Value, json};
 use taut::case::{Number, Opened};
 use taut::error::{Error, Result};
 use taut::parameter::{Fallback, Free, Numbers};
 
-/// The case: `text`, changed by `set`, a list of keys and SI values, and by `changes`, a list of `KEY=VALUE`.
+/// The case: `text`, changed by `set`, a list of keys and values, and by `changes`, a list of `KEY=VALUE`.
 pub fn opened(request: &Request, context: &Context) -> Result<Opened> {
     let (name, text) = (context.state.name(), request.text("text")?);
     let mut changes: Vec<String> =
@@ -22,14 +23,27 @@ pub fn opened(request: &Request, context: &Context) -> Result<Opened> {
     Opened::from_text_with(name, text, &changes)
 }
 
-/// The change that `[key, value]` means, the value in SI.
+/// The change that `[key, value]` means: the value is a number in SI, or a text with a unit.
 fn change(numbers: &[Number], pair: &Value) -> Result<String> {
-    let wrong = || Error::new("an element of `set` is a key and a number, such as [\"cart.mass\", 0.5]");
-    let (key, value) = (pair[0].as_str().ok_or_else(wrong)?, pair[1].as_f64().ok_or_else(wrong)?);
-    match numbers.iter().find(|number| number.key == key) {
-        Some(number) => Ok(number.change(value)),
-        None => Err(Error::new(format!("this case has no number `{key}`"))),
+    let wrong = || {
+        Error::new(
+            "an element of `set` is a key and a value, such as [\"cart.mass\", 0.5] or [\"cart.mass\", \"500 g\"]",
+        )
+    };
+    let key = pair[0].as_str().ok_or_else(wrong)?;
+    let Some(number) = numbers.iter().find(|number| number.key == key) else {
+        return Err(Error::new(format!("this case has no number `{key}`")));
+    };
+    match &pair[1] {
+        Value::String(text) => Ok(format!("{key}={text}")),
+        value => value.as_f64().map(|value| number.change(value)).ok_or_else(wrong),
     }
+}
+
+/// The span that an element of a list of the belt belongs to.
+fn span(case: &Opened, key: &str) -> Option<&'static str> {
+    let (_, place) = key.strip_prefix("belt.")?.split_once('.')?;
+    spans(case).get(place.parse::<usize>().ok()?).copied()
 }
 
 /// The numbers of a case with what the table of parameters says of them.
@@ -47,6 +61,7 @@ pub fn parameters(case: &Opened, numbers: &[Number]) -> Value {
         let limit = |value: f64| if value.abs() >= 1e15 { Value::Null } else { json!(value) };
         json!({
             "key": key,
+            "span": span(case, key),
             "symbol": row.symbol,
             "unit": taut::number::pretty_unit(unit),
             "value": value,

@@ -2,20 +2,21 @@
 
 use super::Context;
 use super::case::{opened, parameters};
-use super::run::interval;
+use super::rows::interval;
 use crate::message::{Reply, Request};
 use serde_json::{Value, json};
 use std::cell::Cell;
 use std::f64::consts::PI;
 use std::time::{Duration, Instant};
 use taut::case::{Case, Given, Move, Opened, Tuning};
+use taut::control::feasible::shortfalls;
 use taut::control::feedback::Feedback;
 use taut::control::{Loop, Rows, Standard, stream};
 use taut::design::Design;
 use taut::error::{Error, Result};
 use taut::solve::Solver;
 use taut::trajectory::Trajectory;
-use taut::tune::{Family, Margins, Verdict, loops, trouble, tune};
+use taut::tune::{Break, Family, Margins, Open, Verdict, breaks, loops, trouble, tune};
 use taut_report::motion::{Done, Tried};
 use taut_report::tune::{Work, figures, page};
 
@@ -102,7 +103,7 @@ pub fn closed(request: &Request, context: &Context) -> Result<Reply> {
         "controller": taut_report::motion::controller(design, &case.stage),
         "rows": lines.iter().map(|(name, value)| json!([name, value.replace('-', "−")])).collect::<Vec<_>>(),
         "ending": taut_report::simulate::early_end(&done.run.outcome.ending),
-        "trouble": done.trouble.as_ref().map(|trouble| &trouble.words),
+        "trouble": warnings(done),
         "result": told,
         "parameters": parameters(&opened, &opened.numbers()?),
     }));
@@ -136,7 +137,7 @@ pub fn moved<'a>(
 ) -> Result<Done<'a>> {
     let stage = &case.stage;
     let mut controller = Standard::new(design, stage)?;
-    let profile = motion.profile.clone().shaped(&design.shaper);
+    let profile = motion.reference(design);
     let count = (motion.until / motion.every).ceil().max(1.0) as u64;
     let rows =
         Rows { until: motion.until, every: interval(motion.every, count).min(motion.until), window: motion.window };
@@ -146,10 +147,19 @@ pub fn moved<'a>(
     };
     let run = stream(stage, &mut controller, &Loop::of(design), &profile, &rows, Solver::of(stage), false, &mut take)?;
     let trouble = trouble::trouble(stage, design, &run, motion.profile.target());
-    Ok(Done { motion, run, curves: None, worst: None, trouble, files: Vec::new() })
+    let shortfalls = shortfalls(stage, design.limit, &profile);
+    Ok(Done { motion, run, curves: None, worst: None, trouble, shortfalls, files: Vec::new() })
 }
 
-/// The margins on the axis as the file has it, the limit of Ms, and frequency, Re L, Im L, |S| and |T|.
+/// The limits that the move exceeds, and the trouble of its loop, in words; nothing for a move that is followed.
+fn warnings(done: &Done) -> Option<String> {
+    let short = done.shortfalls.iter().map(|short| &*short.words);
+    let words: Vec<&str> = short.chain(done.trouble.as_ref().map(|trouble| &*trouble.words)).collect();
+    (!words.is_empty()).then(|| words.join("; "))
+}
+
+/// The margins on the axis as the file has it, the limit of Ms, and frequency, Re L, Im L where Ms stands, |S| and |T|
+/// at the worst break.
 fn nyquist(case: &Case, design: &Design) -> Result<(Margins, f64, [Vec<f64>; 5])> {
     let tuning = case.tune.clone().unwrap_or_default();
     let feedback = Feedback::new(design, &case.stage)?;
@@ -157,13 +167,16 @@ fn nyquist(case: &Case, design: &Design) -> Result<(Margins, f64, [Vec<f64>; 5])
     let plant = family.plant(&family.nominal(), design, &feedback.corners())?;
     let margins = Margins::of(&plant, &feedback);
     let open = loops(&plant, &feedback);
-    let of = |value: &dyn Fn(&taut::tune::Open) -> f64| open.iter().map(value).collect::<Vec<f64>>();
+    let of = |value: &dyn Fn(&Open) -> f64| open.iter().map(value).collect::<Vec<f64>>();
+    let (at, breaks) = (margins.breaks.sensitivity, breaks(&feedback));
+    let highest =
+        |value: fn(&Open, Break) -> f64| of(&|open| breaks.iter().map(|&at| value(open, at)).fold(0.0, f64::max));
     let curves = [
         plant.frequency.iter().map(|omega| omega / (2.0 * PI)).collect(),
-        of(&|l| l.position.re),
-        of(&|l| l.position.im),
-        of(&|l| (l.position + 1.0).inv().norm()),
-        of(&|l| (l.position / (l.position + 1.0)).norm()),
+        of(&|open| open.broken_at(at).re),
+        of(&|open| open.broken_at(at).im),
+        highest(Open::sensitivity),
+        highest(Open::complementary),
     ];
     Ok((margins, tuning.sensitivity, curves))
 }
@@ -228,7 +241,7 @@ pub fn tuned(request: &Request, context: &Context) -> Result<Reply> {
         "html": page.body(),
         "result": taut::json::tuned(&case, &tuning, &tuned),
         "text": text,
-        "verdict": taut_report::tune::verdict(&work),
+        "verdict": taut_report::tune::summary(&work),
         "moves": tuned.moves.iter().map(|one| &one.name).collect::<Vec<_>>(),
         "before": worst(&tuned.before),
         "after": worst(&tuned.after),

@@ -37,6 +37,8 @@ const MM: (&str, f64) = ("mm", 1e3);
 const UM: (&str, f64) = ("µm", 1e6);
 const MM_S: (&str, f64) = ("mm/s", 1e3);
 
+const AXIS_SPANS: [&str; 3] = ["span 1, drive to cart", "span 2, cart to idler", "span 3, idler to drive"];
+
 fn panel(key: &'static str, title: &'static str, words: &'static str, (unit, scale): (&'static str, f64)) -> Panel {
     Panel { key, title, words, unit, scale, curves: Vec::new() }
 }
@@ -88,9 +90,9 @@ fn of_axis(stage: &Stage) -> Vec<Panel> {
             &[("cart_position", 1.0), ("drive_angle", -r)],
         ),
         panel("force", "Span forces", "Force of each span beyond its pretension; positive pulls", ("N", 1.0))
-            .column("span1_force", "span 1, drive to cart")
-            .column("span2_force", "span 2, cart to idler")
-            .column("span3_force", "span 3, idler to drive"),
+            .column("span1_force", AXIS_SPANS[0])
+            .column("span2_force", AXIS_SPANS[1])
+            .column("span3_force", AXIS_SPANS[2]),
         panel("voltage", "Voltage", "Voltage at the motor, and the input of the amplifier", ("V", 1.0))
             .column("voltage", "motor voltage"),
         panel("current", "Current", "Current of the motor", ("A", 1.0)).column("motor_current", "motor current"),
@@ -224,6 +226,14 @@ impl Kept {
     pub fn told(&self) -> Value {
         let names = std::iter::once("time").chain(self.curves.iter().map(|curve| curve.key.as_str()));
         names.zip(&self.columns).map(|(name, values)| json!({ "name": name, "rows": values.len() })).collect()
+    }
+}
+
+/// The names of the spans of a machine, in the order of its case.
+pub fn spans(case: &Opened) -> Vec<&'static str> {
+    match case {
+        Opened::Axis(_) => AXIS_SPANS.to_vec(),
+        Opened::Gantry(case) => case.gantry.routing.spans().iter().map(|label| label.name).collect(),
     }
 }
 

@@ -3,6 +3,7 @@
 use super::Context;
 use super::case::{chosen, opened, parameters};
 use super::curves::{Kept, bodies, panels, told};
+use super::rows::interval;
 use super::scene::scene;
 use crate::message::{Reply, Request};
 use serde_json::{Value, json};
@@ -17,9 +18,6 @@ use taut::reduction::Reduction;
 use taut::solve::{self, Course, Detail, Outcome, Solver, stream_mechanism, stream_observed};
 use taut_report::motion::Tried;
 use taut_report::simulate::{self, Curves};
-
-/// Rows of a picture: of a longer run every second one is computed, every third, …
-const ROWS: u64 = 4000;
 
 /// Events that are told.
 const EVENTS: usize = 2000;
@@ -81,11 +79,6 @@ fn axis<E>(
     run: impl FnOnce(usize) -> Result<(Simulated, Kept)>,
 ) -> Result<(Simulated, Kept)> {
     run(chosen(request, experiments.len())?)
-}
-
-/// The interval of a picture's rows, s.
-pub fn interval(every: f64, rows: u64) -> f64 {
-    every * rows.div_ceil(ROWS).max(1) as f64
 }
 
 fn axis_run(case: &Case, place: usize, context: &Context) -> Result<(Simulated, Kept)> {

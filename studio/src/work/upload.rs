@@ -6,7 +6,6 @@ use axum::extract::{Request, State as Shared};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// Bytes of a file.
@@ -24,16 +23,14 @@ pub async fn take(Shared(state): Shared<Arc<State>>, request: Request) -> Respon
     if length.is_some_and(|length: usize| length > FILE) {
         return too_large();
     }
+    // What is on its way counts as well: it is in memory until it is written.
+    let Some(room) = state.room(length.unwrap_or(FILE), ALL) else { return too_large() };
     let name = name(request.uri().query().unwrap_or_default());
     let body = match tokio::time::timeout(PATIENCE, to_bytes(request.into_body(), FILE)).await {
         Err(_) => return (StatusCode::REQUEST_TIMEOUT, "the file came too slowly\n").into_response(),
         Ok(Err(_)) => return too_large(),
         Ok(Ok(body)) => body,
     };
-    if state.uploaded.fetch_add(body.len(), Ordering::Relaxed) + body.len() > ALL {
-        state.uploaded.fetch_sub(body.len(), Ordering::Relaxed);
-        return too_large();
-    }
     let write = || {
         let folder = state.uploads()?;
         // Each in a folder of its own, so that two of the same name do not meet.
@@ -42,7 +39,10 @@ pub async fn take(Shared(state): Shared<Arc<State>>, request: Request) -> Respon
         std::fs::write(&path, &body).map(|()| path)
     };
     match write() {
-        Ok(path) => axum_json(&serde_json::json!({ "path": path.display().to_string() })),
+        Ok(path) => {
+            room.keep(body.len());
+            axum_json(&serde_json::json!({ "path": path.display().to_string() }))
+        }
         Err(e) => (StatusCode::INSUFFICIENT_STORAGE, format!("the file cannot be kept: {e}\n")).into_response(),
     }
 }

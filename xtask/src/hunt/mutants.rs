@@ -1,48 +1,37 @@
 //! The tests themselves: 100 small changes of the source, drawn by seed, each of which a test should notice.
 //!
-//! All of them are built into one copy of the library, each behind a switch that a variable of the environment turns;
-//! so the copy is built once, and the tests that concern a change are run with it alone. A change that does not compile
-//! is drawn again.
+//! All of them are built into one copy of the repository, each behind a switch that a variable of the environment turns,
+//! so the tests are built once. Each test then runs by itself and lists the changes that it reaches. A change is tried
+//! with the tests that reach it, the quickest first, until one fails. A change that does not compile is drawn again.
 
 mod change;
 mod copy;
 
 use change::Change;
-use copy::{Ended, Program, Tree};
+use copy::{Ended, Test, Tree};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// The places that are changed, and the programs of tests that concern them, the quickest to fail first. `lib` are the
-/// tests within the library.
-const AREAS: [(&str, &[&str]); 4] = [
-    ("src/solve", SOLVER),
-    ("src/friction", SOLVER),
-    ("src/fit", &["lib", "fit", "posterior"]),
-    ("src/quantity", &["lib", "quantity", "case", "bad_cases", "logs"]),
-];
+/// The places that are changed.
+const AREAS: [&str; 8] =
+    ["src/solve", "src/mechanism", "src/friction", "src/quantity", "src/fit", "src/tune", "src/control", "src/export"];
 
-const SOLVER: &[&str] = &[
-    "lib",
-    "cost",
-    "table3",
-    "elements",
-    "instant",
-    "rounding",
-    "reference",
-    "published",
-    "metrics",
-    "lugre",
-    "general",
-    "stages",
-    "laws",
-    "hard",
-    "authorities",
-    "control",
-    "sweep",
-];
+/// Changes and tests tried side by side.
+const WORKERS: usize = 2;
 
-pub fn run(count: usize, seed: u64, only: Option<usize>, list: bool) -> Result<(), String> {
+pub fn run(
+    count: usize,
+    seed: u64,
+    (areas, programs): (&[String], &[String]),
+    only: &[usize],
+    list: bool,
+) -> Result<(), String> {
     let mut drawn = Vec::new();
-    for (folder, _) in AREAS {
+    if let Some(unknown) = areas.iter().find(|area| AREAS.iter().all(|folder| folder != *area)) {
+        return Err(format!("{unknown} is not an area of changes; allowed: {}", AREAS.join(", ")));
+    }
+    for folder in AREAS.iter().filter(|folder| areas.is_empty() || areas.iter().any(|area| area == *folder)) {
         change::all(folder, &mut drawn)?;
     }
     println!("{} changes are possible; {count} are drawn with seed {seed}", drawn.len());
@@ -53,52 +42,76 @@ pub fn run(count: usize, seed: u64, only: Option<usize>, list: bool) -> Result<(
         chosen.iter().enumerate().for_each(|(k, change)| println!("{:3}  {change}", k + 1));
         return Ok(());
     }
-    let programs = copy.programs(AREAS.iter().flat_map(|(_, tests)| *tests).copied())?;
-    let mut score = Score::default();
+    let tests = copy.tests(programs)?;
     let begin = Instant::now();
-    for (k, change) in chosen.iter().enumerate().map(|(k, change)| (k + 1, change)) {
-        if only.is_none_or(|only| only == k) {
-            score.take(k, change, &programs);
-        }
+    let changes: Vec<(usize, &Change)> =
+        (1..).zip(&chosen).filter(|(k, _)| only.is_empty() || only.contains(k)).collect();
+    let fates = Mutex::new(Vec::new());
+    side_by_side(&changes, |(k, change)| {
+        let fate = fate(*k, &tests);
+        println!("{k:3}  {change}\n     {}", fate.text());
+        fates.lock().unwrap().push((*k, *change, fate));
+    });
+    let mut fates = fates.into_inner().unwrap();
+    fates.sort_by_key(|(k, ..)| *k);
+    let count = |of: fn(&Fate) -> bool| fates.iter().filter(|(.., fate)| of(fate)).count();
+    let noticed = count(|fate| !matches!(fate, Fate::Survived(_)));
+    println!(
+        "\n{noticed} of {} changes are noticed ({:.0} %), {} of them by a run that does not end, in {:.0} min",
+        fates.len(),
+        100.0 * noticed as f64 / fates.len().max(1) as f64,
+        count(|fate| matches!(fate, Fate::Endless(_))),
+        begin.elapsed().as_secs_f64() / 60.0
+    );
+    for (k, change, fate) in fates.iter().filter(|(.., fate)| matches!(fate, Fate::Survived(_))) {
+        println!("{k:3}  {change}: {}", fate.text());
     }
-    println!("\n{} in {:.0} min", score.told(), begin.elapsed().as_secs_f64() / 60.0);
-    score.survivors.iter().for_each(|line| println!("{line}"));
     Ok(())
 }
 
-/// The score of the tests.
-#[derive(Default)]
-struct Score {
-    failed: usize,
-    endless: usize,
-    survivors: Vec<String>,
+/// Does `work` for each of them, two at a time.
+fn side_by_side<T: Sync>(all: &[T], work: impl Fn(&T) + Sync) {
+    let next = AtomicUsize::new(0);
+    std::thread::scope(|scope| {
+        for _ in 0..WORKERS {
+            scope.spawn(|| {
+                while let Some(one) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    work(one);
+                }
+            });
+        }
+    });
 }
 
-impl Score {
-    fn take(&mut self, k: usize, change: &Change, programs: &[Program]) {
-        let concerned = AREAS.iter().find(|(folder, _)| change.file.starts_with(folder)).map_or(&[][..], |area| area.1);
-        let named = |name: &&str| programs.iter().find(|program| program.name == **name);
-        for program in concerned.iter().filter_map(named) {
-            let (noticed, count) = match program.run(k) {
-                Ended::Well => continue,
-                Ended::Badly => ("fails", &mut self.failed),
-                Ended::Not => ("does not end", &mut self.endless),
-            };
-            *count += 1;
-            println!("{k:3}  {change}\n     {} {noticed}", program.name);
-            return;
-        }
-        println!("{k:3}  {change}\n     SURVIVES");
-        self.survivors.push(format!("{k:3}  {change}"));
-    }
+/// The fate of a change.
+enum Fate {
+    /// The first test that failed.
+    Failed(String),
+    /// The first test that did not end.
+    Endless(String),
+    /// No test of those that reach it failed; how many do.
+    Survived(usize),
+}
 
-    fn told(&self) -> String {
-        let noticed = self.failed + self.endless;
-        let all = noticed + self.survivors.len();
-        let share = 100.0 * noticed as f64 / all.max(1) as f64;
-        format!(
-            "{noticed} of {all} changes are noticed ({share:.0} %), {} of them by a run that does not end",
-            self.endless
-        )
+/// Tries a change with the tests that reach it, the quickest first.
+fn fate(k: usize, tests: &[Test]) -> Fate {
+    let reaching: Vec<&Test> = tests.iter().filter(|test| test.reached.contains(&k)).collect();
+    for test in &reaching {
+        match test.run(k) {
+            Ended::Well => {}
+            Ended::Badly => return Fate::Failed(test.to_string()),
+            Ended::Not => return Fate::Endless(test.to_string()),
+        }
+    }
+    Fate::Survived(reaching.len())
+}
+
+impl Fate {
+    fn text(&self) -> String {
+        match self {
+            Fate::Failed(test) => format!("{test} fails"),
+            Fate::Endless(test) => format!("{test} does not end"),
+            Fate::Survived(count) => format!("SURVIVES {count} tests that reach it"),
+        }
     }
 }

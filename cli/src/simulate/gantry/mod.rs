@@ -43,7 +43,7 @@ pub fn run(args: &Simulate, path: &Path, case: &GantryCase) -> Outcome {
     let mut finished = Finished::new("simulate", json, table::text(case, solver, &runs), ADVICE);
     if let Some(folder) = &folder {
         let text = folder.bring(&case.text, &case.files).map_err(Failure::work)?;
-        if !common.no_report {
+        if common.draws() {
             finished.report = Some(report(&setting, &text, &runs));
         }
         finished.files.push(("case.toml".into(), text));

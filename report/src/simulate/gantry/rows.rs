@@ -74,13 +74,7 @@ pub fn lines(run: &Run, gantry: &Gantry, solver: Solver) -> Vec<(&'static str, S
         ("drives' error", format!("bridge at most {}; cart at most {}", error(0), error(1))),
         ("stop time", stop(metrics)),
         ("events", events(&run.outcome.events, solver)),
-        (
-            "accuracy",
-            match run.outcome.error {
-                None if matches!(solver, Solver::General { .. }) => "not estimated".into(),
-                error => accuracy(error, solver),
-            },
-        ),
+        ("accuracy", accuracy(&run.outcome, solver)),
         ("cost", cost(run.outcome.cost)),
     ]
 }

@@ -236,6 +236,7 @@ static void take_inputs(const unit *own)
     if (is_new != 0) {
         refreshed();
         plant.at_edge = 1U;
+        begin();
         settle();
     }
 }
@@ -270,6 +271,7 @@ static void prepare(unit *own)
         }
         if (has_current != 0) {
             plant.at_edge = 1U;
+            begin();
             settle();
         }
         own->now.is_made = 1U;
@@ -300,7 +302,9 @@ static int go(unit *own, double end)
     while ((left > 0.0) && (status == OK) && (own->now.is_over == 0U)) {
         const double part = (left < MACHINE_STEP) ? left : MACHINE_STEP;
         double rest = part;
-        machine_status ended = go_on(&rest, plant.events);
+        machine_status ended;
+        begin();
+        ended = go_on(&rest);
         left -= part - rest;
         if (ended == MACHINE_LEFT_TRAVEL) {
             own->now.is_over = 1U;

@@ -36,7 +36,19 @@ impl<const N: usize> Row<N> {
 
     /// The rounding error of its value, the parts of z being of these sizes.
     pub(in crate::solve::exact) fn noise(&self, sizes: &[f64; N]) -> f64 {
-        ROUNDING * self.terms().fold(0.0, |sum, (place, weight)| sum + (weight * sizes[place]).abs())
+        ROUNDING * self.size(sizes)
+    }
+
+    /// Σ |w_j| |z_j|.
+    fn size(&self, sizes: &[f64; N]) -> f64 {
+        self.terms().fold(0.0, |sum, (place, weight)| sum + (weight * sizes[place]).abs())
+    }
+
+    /// All of its weights.
+    pub(in crate::solve::exact) fn whole(&self) -> [f64; N] {
+        let mut row = [0.0; N];
+        self.terms().for_each(|(place, weight)| row[place] = weight);
+        row
     }
 
     /// Its coefficients along a series, as many as it has terms.
@@ -82,6 +94,11 @@ impl<const N: usize> Watch<N> {
     /// The rounding error of its value.
     pub(in crate::solve::exact) fn noise(&self, z: &[f64; N]) -> f64 {
         self.row.noise(z)
+    }
+
+    /// The size of its terms, the parts of z being of these sizes.
+    pub(in crate::solve::exact) fn size(&self, sizes: &[f64; N]) -> f64 {
+        self.row.size(sizes)
     }
 }
 

@@ -6,6 +6,9 @@ use crate::mechanism::{BODIES, DRIVES, Mechanism};
 use crate::solve::observe::{QUANTITIES, Reading, Readout};
 use crate::solve::propagator::Matrix;
 
+/// The least size of a rate: nothing next to any other.
+const STILL: f64 = 1e-250;
+
 /// Readings of one mode, and the norms of their forms.
 pub(in crate::solve) struct Shown<const N: usize> {
     pub(in crate::solve) readout: Readout,
@@ -132,7 +135,8 @@ impl<const N: usize> ModeMatrices<N> {
         let (first, second) = (self.size(y), self.size(&self.rate(y)));
         let (first, push) = (first.whole() + self.push(rate) * length, self.push(curvature) * length);
         let (mechanical, magnetic) = self.parted(second, push);
-        let (mechanical, magnetic, first) = (grow * mechanical, grow * magnetic, grow * first);
+        // What can change is never told to stand still, though rounding may have stopped it.
+        let [mechanical, magnetic, first] = [mechanical, magnetic, first].map(|size| (grow * size).max(STILL));
         let mut change: Reading = std::array::from_fn(|q| {
             shown.mechanical[q] * mechanical + shown.magnetic[q] * magnetic + shown.unsprung[q] * first
         });

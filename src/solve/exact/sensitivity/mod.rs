@@ -90,7 +90,8 @@ impl<'t, const N: usize> Follower<'t, N> {
         let start = experiment.initial.state(mechanism);
         let seen = Seen::new(mechanism, &start, task.space(mechanism));
         let ends = (grid.interval(), grid.end());
-        let core = Core::new(Arc::clone(&seen.mechanism), Arc::new(task.space(mechanism)), &start, ends, known);
+        let mut core = Core::new(Arc::clone(&seen.mechanism), Arc::new(task.space(mechanism)), &start, ends, known);
+        core.errors = None;
         let of = |begun: &Begun| Seen::new(&begun.mechanism, &begun.start, task.space(&begun.mechanism));
         let mut varied = Vec::new();
         for variable in variables {

@@ -1,26 +1,53 @@
-//! A copy of the repository with changes built into it, and its programs of tests.
+//! A copy of the repository with changes built into it, and its tests.
 
 use super::change::Change;
 use crate::cargo;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
+use std::{fmt, fs};
 
-/// The switch of the changes.
-const SWITCH: &str = "//! Which change is turned on.
+/// The switch of the changes, and the list of those that were reached.
+const SWITCH: &str = r#"//! Which change is turned on, and which ones a test reaches.
+use std::io::Write;
+use std::sync::LazyLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+static ON: LazyLock<usize> =
+    LazyLock::new(|| std::env::var("TAUT_MUTANT").ok().and_then(|k| k.parse().ok()).unwrap_or(0));
+static REACHED: LazyLock<Option<(std::ffi::OsString, Vec<AtomicBool>)>> =
+    LazyLock::new(|| Some((std::env::var_os("TAUT_REACHED")?, (0..100_000).map(|_| AtomicBool::new(false)).collect())));
+
 /// Whether it is this one.
 pub fn on(k: usize) -> bool {
-    static ON: std::sync::LazyLock<usize> =
-        std::sync::LazyLock::new(|| std::env::var(\"TAUT_MUTANT\").ok().and_then(|k| k.parse().ok()).unwrap_or(0));
+    if let Some((path, reached)) = &*REACHED
+        && !reached[k].load(Ordering::Relaxed)
+        && !reached[k].swap(true, Ordering::Relaxed)
+    {
+        let mut file = std::fs::OpenOptions::new().append(true).create(true).open(path).unwrap();
+        file.write_all(format!("{k}\n").as_bytes()).unwrap();
+    }
     *ON == k
 }
-";
+"#;
 
 /// The features that the library is built with.
 const FEATURES: &str = "json,parquet";
+
+/// The programs of tests: name, arguments of cargo. `lib` are the tests within the library, `all` those beside it, `hunt`
+/// those of the small hunt, `fmu` those of the shared object.
+const PROGRAMS: [(&str, &[&str]); 4] = [
+    ("lib", &["--package", "taut", "--features", FEATURES, "--lib"]),
+    ("all", &["--package", "taut", "--features", FEATURES, "--test", "all"]),
+    ("hunt", &["--package", "taut-hunt", "--test", "small"]),
+    ("fmu", &["--package", "taut-fmu", "--test", "all"]),
+];
+
+/// A test takes at most so long without a change; a longer one is left out.
+const LONGEST: Duration = Duration::from_secs(120);
 
 /// Memory that a program of tests may take, KiB: a change may make a loop that collects for ever.
 const MEMORY: u64 = 12 << 20;
@@ -30,20 +57,20 @@ pub struct Tree {
     root: PathBuf,
 }
 
-/// A program of tests, or one module of it.
-pub struct Program {
-    pub name: String,
+/// A test of a program.
+#[derive(Clone)]
+pub struct Test {
+    program: &'static str,
     path: PathBuf,
-    /// The tests whose names contain this.
-    filter: String,
+    name: String,
     root: PathBuf,
     /// How long it takes without a change.
     took: Duration,
-    /// Tests that fail without a change, and say nothing about one.
-    failing: Vec<String>,
+    /// The changes that it reaches.
+    pub reached: BTreeSet<usize>,
 }
 
-/// How a program of tests ended.
+/// How a test ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Ended {
     Well,
@@ -141,15 +168,17 @@ impl Tree {
     fn cargo(&self, words: &[&str]) -> Command {
         let mut command = cargo(words);
         // A folder of its own: cargo would take what it builds here for the repository's.
-        command.args(["--package", "taut", "--features", FEATURES, "--message-format=json"]).current_dir(&self.root);
+        command.arg("--message-format=json").current_dir(&self.root);
         command.env("CARGO_TARGET_DIR", "../target").stderr(Stdio::null());
         command
     }
 
     /// Where the compiler finds errors.
     fn errors(&self) -> Result<Vec<(String, Range<usize>)>, String> {
-        let output =
-            self.cargo(&["check", "--lib"]).output().map_err(|error| format!("cargo cannot be started: {error}"))?;
+        let output = self
+            .cargo(&["check", "--package", "taut", "--features", FEATURES, "--lib"])
+            .output()
+            .map_err(|error| format!("cargo cannot be started: {error}"))?;
         let mut errors = Vec::new();
         for line in String::from_utf8_lossy(&output.stdout).lines() {
             let Ok(message) = serde_json::from_str::<serde_json::Value>(line) else { continue };
@@ -168,72 +197,95 @@ impl Tree {
         }
     }
 
-    /// Builds the programs of tests of these names, and runs each without a change.
-    pub fn programs<'a>(&self, names: impl Iterator<Item = &'a str>) -> Result<Vec<Program>, String> {
-        let names: BTreeSet<&str> = names.collect();
-        let words = ["test", "--no-run", "--lib", "--test", "all"];
+    /// Builds a program of tests; where it is.
+    fn program(&self, arguments: &[&str]) -> Result<PathBuf, String> {
+        let words: Vec<&str> = ["test", "--no-run"].iter().chain(arguments).copied().collect();
         let output = self.cargo(&words).output().map_err(|error| format!("cargo cannot be started: {error}"))?;
-        let (mut library, mut all) = (None, None);
-        for line in String::from_utf8_lossy(&output.stdout).lines() {
-            let Ok(message) = serde_json::from_str::<serde_json::Value>(line) else { continue };
-            let Some(path) = message["executable"].as_str() else { continue };
-            let is_library = message["target"]["kind"][0] == "lib";
-            *if is_library { &mut library } else { &mut all } = Some(PathBuf::from(path));
+        let text = String::from_utf8_lossy(&output.stdout);
+        let messages = text.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
+        let mut built = messages.filter_map(|message| Some(PathBuf::from(message["executable"].as_str()?)));
+        built.next_back().ok_or_else(|| format!("the tests of the copy in {} cannot be built", self.root.display()))
+    }
+
+    /// Builds the programs of these names (none: all), and runs each of their tests without a change. The quickest
+    /// tests come first.
+    pub fn tests(&self, names: &[String]) -> Result<Vec<Test>, String> {
+        if let Some(unknown) = names.iter().find(|name| PROGRAMS.iter().all(|(known, _)| known != *name)) {
+            return Err(format!(
+                "{unknown} is not a program of tests; allowed: {}",
+                PROGRAMS.map(|(name, _)| name).join(", ")
+            ));
         }
-        let (Some(library), Some(all)) = (library, all) else {
-            return Err(format!("the tests of the copy in {} cannot be built", self.root.display()));
-        };
-        let mut programs = Vec::new();
-        for name in names {
-            let (path, filter) =
-                if name == "lib" { (library.clone(), String::new()) } else { (all.clone(), format!("{name}::")) };
-            let took = Duration::from_secs(600);
-            let (root, failing) = (self.root.clone(), Vec::new());
-            let mut program = Program { name: name.into(), path, filter, root, took, failing };
-            program.leave_out_failing();
-            let begin = Instant::now();
-            if program.run(0) != Ended::Well {
-                return Err(format!("{name} fails without any change; repeat it by cargo test"));
+        let mut tests = Vec::new();
+        for (program, arguments) in PROGRAMS {
+            if names.is_empty() || names.iter().any(|name| name == program) {
+                let path = self.program(arguments)?;
+                let listed = Command::new(&path).args(["--list", "--format", "terse"]).current_dir(&self.root).output();
+                let listed = listed.map_err(|error| format!("{}: {error}", path.display()))?;
+                let listed = String::from_utf8_lossy(&listed.stdout).into_owned();
+                tests.extend(listed.lines().filter_map(|line| line.strip_suffix(": test")).map(|name| Test {
+                    program,
+                    path: path.clone(),
+                    name: name.into(),
+                    root: self.root.clone(),
+                    took: LONGEST,
+                    reached: BTreeSet::new(),
+                }));
             }
-            program.took = begin.elapsed();
-            println!("{name}: {:.1} s", program.took.as_secs_f64());
-            for test in &program.failing {
-                println!("  {test} fails without any change, and is left out");
-            }
-            programs.push(program);
         }
-        Ok(programs)
+        let begin = Instant::now();
+        let well = Mutex::new(Vec::new());
+        let numbered: Vec<(usize, Test)> = tests.into_iter().enumerate().collect();
+        super::side_by_side(&numbered, |(i, test)| {
+            let (ended, tried) = test.reach(&self.root.join(format!("reached-{i}")));
+            match ended {
+                Ended::Well => well.lock().unwrap().push(tried),
+                Ended::Badly => println!("{test} fails without any change, and is left out"),
+                Ended::Not => println!("{test} takes longer than {} s, and is left out", LONGEST.as_secs()),
+            }
+        });
+        let mut tests = well.into_inner().unwrap();
+        tests.sort_by_key(|test| test.took);
+        println!("{} tests, run one by one in {:.0} min", tests.len(), begin.elapsed().as_secs_f64() / 60.0);
+        Ok(tests)
     }
 }
 
-impl Program {
+impl Test {
     /// Runs it with one change turned on.
     pub fn run(&self, k: usize) -> Ended {
-        let child = self.command(k).arg("--quiet").stdout(Stdio::null()).stderr(Stdio::null()).spawn();
-        child.map_or(Ended::Badly, |child| wait(child, 10 * self.took + Duration::from_secs(20)))
+        let mut command = self.command();
+        command.env("TAUT_MUTANT", k.to_string());
+        wait(&mut command, 10 * self.took + Duration::from_secs(20))
     }
 
-    /// Looks which of its tests fail as it is.
-    fn leave_out_failing(&mut self) {
-        let output = self.command(0).output().map(|output| output.stdout).unwrap_or_default();
-        let text = String::from_utf8_lossy(&output).into_owned();
-        let failed = text.lines().filter_map(|line| line.strip_prefix("test ")?.strip_suffix(" ... FAILED"));
-        self.failing = failed.map(str::to_string).collect();
+    /// Runs it without a change; itself with its time and with what it reaches.
+    fn reach(&self, list: &Path) -> (Ended, Self) {
+        let begin = Instant::now();
+        let ended = wait(self.command().env("TAUT_REACHED", list), LONGEST);
+        let text = fs::read_to_string(list).unwrap_or_default();
+        let reached = text.lines().filter_map(|line| line.parse().ok()).collect();
+        (ended, Self { took: begin.elapsed(), reached, ..self.clone() })
     }
 
-    fn command(&self, k: usize) -> Command {
+    fn command(&self) -> Command {
         let mut command = Command::new("sh");
         let limited = format!("ulimit -v {MEMORY} 2>/dev/null; exec \"$0\" \"$@\"");
-        command.args(["-c", &limited]).arg(&self.path).args(["--test-threads", "2"]).current_dir(&self.root);
-        command.args(Some(&self.filter).filter(|filter| !filter.is_empty()));
-        command.args(self.failing.iter().flat_map(|name| ["--skip", name]));
-        command.env("TAUT_MUTANT", k.to_string()).env("RUST_BACKTRACE", "0").env("CARGO_MANIFEST_DIR", &self.root);
-        command.stdin(Stdio::null());
+        command.args(["-c", &limited]).arg(&self.path).args(["--exact", &self.name, "--test-threads", "1", "--quiet"]);
+        command.current_dir(&self.root).env("RUST_BACKTRACE", "0").env("CARGO_MANIFEST_DIR", &self.root);
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
         command
     }
 }
 
-fn wait(mut child: Child, longest: Duration) -> Ended {
+impl fmt::Display for Test {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.program, self.name)
+    }
+}
+
+fn wait(command: &mut Command, longest: Duration) -> Ended {
+    let Ok(mut child) = command.spawn() else { return Ended::Badly };
     let begin = Instant::now();
     loop {
         match child.try_wait() {

@@ -1,0 +1,239 @@
+//! What taut says about a case, by each way of asking it.
+
+use crate::c;
+use crate::double::Double;
+use crate::exchange;
+use crate::law::Motion;
+use crate::machine::{BODIES, Machine};
+use crate::solve::Event;
+use crate::steps;
+use crate::subject::{Fed, Subject};
+use crate::swept;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use taut::control::{self, Loop, Rows, Standard};
+use taut::mechanism::Mechanism;
+use taut::solve::{Course, Detail, Ending, ErrorEstimate, Flow, Outcome, Solver, stream, stream_mechanism};
+use taut::trajectory::Trajectory;
+
+/// Tolerance that the general solver is asked for.
+pub const TOLERANCE: f64 = 1e-11;
+
+/// A difference that is none, whatever a run states: a hundredth of an atom's width.
+pub const LEAST: f64 = 1e-12;
+
+/// A way of asking taut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum By {
+    /// The exact solver.
+    Exact,
+    /// The general one.
+    General,
+    /// An FMU for co-simulation.
+    CoSimulation,
+    /// An FMU for model exchange, with an integrator of the hunt.
+    ModelExchange,
+    /// Exported C, compiled by gcc.
+    C,
+    /// A row of a sweep.
+    Sweep,
+}
+
+impl By {
+    /// All of them.
+    pub const ALL: [By; 6] = [By::Exact, By::General, By::CoSimulation, By::ModelExchange, By::C, By::Sweep];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            By::Exact => "exact solver",
+            By::General => "general solver",
+            By::CoSimulation => "FMU, co-simulation",
+            By::ModelExchange => "FMU, model exchange",
+            By::C => "C",
+            By::Sweep => "row of a sweep",
+        }
+    }
+
+    /// Whether it is the general solver or answers by it where a machine has curves.
+    pub fn is_general(self, subject: &Subject) -> bool {
+        self == By::General || (self != By::Exact && self != By::C && !is_piecewise_linear(subject))
+    }
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum End {
+    /// At its end.
+    Complete,
+    /// A body left its travel.
+    Left(f64),
+    /// Otherwise.
+    Other(String),
+}
+
+/// An answer.
+#[derive(Debug, Clone)]
+pub struct Answer {
+    /// What was run, where it is not the case itself.
+    pub subject: Option<Subject>,
+    /// How its inputs came.
+    pub fed: Fed,
+    /// s.
+    pub times: Vec<f64>,
+    /// Positions along the belt from the start at these times, as far as it went; where there are none, NaN.
+    pub rows: Vec<[Double; BODIES]>,
+    /// What bodies did, where that is told.
+    pub events: Option<Vec<Event>>,
+    /// How it ended.
+    pub end: End,
+    /// How far positions may be off, m.
+    pub allowed: f64,
+    /// Whether that is what the run states of itself.
+    pub is_stated: bool,
+    /// Decisions within rounding that it names.
+    pub ties: usize,
+}
+
+/// The answer to a subject. Errors: a refusal or a panic, in words.
+pub fn ask(subject: &Subject, by: By) -> Result<Answer, String> {
+    let asked = catch_unwind(AssertUnwindSafe(|| match by {
+        By::Exact => solved(subject, Solver::Exact),
+        By::General => solved(subject, Solver::General { tolerance: TOLERANCE }),
+        By::CoSimulation => steps::run(subject),
+        By::ModelExchange => exchange::run(subject),
+        By::C => c::run(subject),
+        By::Sweep => swept::run(subject),
+    }));
+    asked.unwrap_or_else(|_| Err("it panics".into()))
+}
+
+/// Whether the machine of a subject is linear piece by piece.
+pub fn is_piecewise_linear(subject: &Subject) -> bool {
+    match subject {
+        Subject::Axis(case) | Subject::Loop(case) => case.stage.is_piecewise_linear(),
+        Subject::Gantry(case) => case.gantry.mechanism().is_piecewise_linear(),
+    }
+}
+
+/// The mechanism of a subject.
+pub fn mechanism(subject: &Subject) -> Mechanism {
+    match subject {
+        Subject::Axis(case) | Subject::Loop(case) => case.stage.mechanism(),
+        Subject::Gantry(case) => case.gantry.mechanism(),
+    }
+}
+
+/// By one of taut's solvers.
+pub(crate) fn solved(subject: &Subject, solver: Solver) -> Result<Answer, String> {
+    let told = |error: taut::Error| format!("the stage is refused: {error}");
+    let mut trajectory = Trajectory::default();
+    let mut keep = |block: &Trajectory| {
+        if trajectory.is_empty() {
+            trajectory = Trajectory::with_capacity(&block.columns, 64);
+        }
+        trajectory.append(block);
+        Flow::Continue
+    };
+    let (outcome, stated): (Outcome, Option<f64>) = match subject {
+        Subject::Axis(case) => {
+            let (stage, experiment) = (&case.stage, &case.experiments[0]);
+            let outcome = stream(stage, experiment, solver, &mut keep).map_err(told)?;
+            let stated = estimated(solver, &outcome, &trajectory, ErrorEstimate::new(stage, experiment), |estimate| {
+                estimate.finish(stage, experiment, TOLERANCE, &outcome, &mut || Flow::Continue)
+            });
+            (outcome, stated)
+        }
+        Subject::Gantry(case) => {
+            let (mechanism, course) = (case.gantry.mechanism(), Course::of(&case.experiments[0]));
+            let outcome =
+                stream_mechanism(&mechanism, &course, solver, (Detail::Full, None), &mut keep).map_err(told)?;
+            let estimate = ErrorEstimate::of_mechanism(&mechanism, &course);
+            let stated = estimated(solver, &outcome, &trajectory, estimate, |estimate| {
+                estimate.finish_mechanism(&mechanism, &course, TOLERANCE, &outcome, &mut || Flow::Continue)
+            });
+            (outcome, stated)
+        }
+        Subject::Loop(case) => {
+            let design = case.controller.as_ref().ok_or("the case has no controller")?;
+            let motion = &case.moves[0];
+            let mut controller = Standard::new(design, &case.stage).map_err(told)?;
+            let lead = design.feed_forward.lead.unwrap_or(design.delay + 0.5 * design.every);
+            let timing = Loop { every: design.every, delay: design.delay, limit: design.limit, lead };
+            let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
+            let profile = motion.reference(design);
+            let run = control::stream(&case.stage, &mut controller, &timing, &profile, &rows, solver, false, &mut keep)
+                .map_err(told)?;
+            let stated = run.outcome.error.map(|error| error.value);
+            (run.outcome, stated)
+        }
+    };
+    let machine = subject.machine(&mut Double::from);
+    let columns: Vec<&[f64]> = subject.columns().iter().map(|name| trajectory.get(name).unwrap_or(&[])).collect();
+    let count = columns.first().map_or(0, |column| column.len());
+    let row = |k: usize| {
+        let positions: Vec<f64> = columns.iter().map(|column| column[k]).collect();
+        subject.along_the_belt(&machine, &positions)
+    };
+    let [until, every] = subject.times();
+    let mut times = trajectory.get("time").unwrap_or(&[]).to_vec();
+    let grid = taut::solve::Grid::new(every, until);
+    // A run that ends early has fewer rows than there are.
+    times.extend((times.len() as u64..=grid.intervals()).map(|k| grid.time(k)));
+    let floor = match (subject, solver) {
+        // Nothing is stated of a move by the general solver.
+        (Subject::Loop(_), Solver::General { .. }) => 1e-8,
+        _ => LEAST,
+    };
+    Ok(Answer {
+        subject: None,
+        fed: Fed::AsGiven,
+        times,
+        rows: (0..count).map(row).collect(),
+        events: Some(body_events(&outcome)),
+        end: end_of(outcome.ending),
+        allowed: stated.unwrap_or(floor).max(floor),
+        is_stated: stated.is_some(),
+        ties: outcome.ties.len(),
+    })
+}
+
+/// What a run states of itself: the exact solver its bound, the general one its estimate.
+fn estimated(
+    solver: Solver,
+    outcome: &Outcome,
+    trajectory: &Trajectory,
+    mut estimate: ErrorEstimate,
+    finish: impl FnOnce(ErrorEstimate) -> taut::Result<Option<taut::solve::PositionError>>,
+) -> Option<f64> {
+    let Solver::General { .. } = solver else { return outcome.error.map(|error| error.value) };
+    estimate.take(trajectory);
+    finish(estimate).ok().flatten().map(|error| error.value)
+}
+
+fn end_of(ending: Ending) -> End {
+    match ending {
+        Ending::Complete => End::Complete,
+        Ending::LeftTravel { time } => End::Left(time),
+        other => End::Other(format!("{other:?}")),
+    }
+}
+
+/// The changes of bodies in a run of taut.
+fn body_events(outcome: &Outcome) -> Vec<Event> {
+    let motion = |status: taut::mechanism::Status| match status.code() {
+        -1 => Motion::Backward,
+        0 => Motion::Stuck,
+        1 => Motion::Forward,
+        _ => Motion::Free,
+    };
+    let of_bodies = outcome.events.iter().filter_map(|event| Some((event, event.body()?)));
+    let of_bodies = of_bodies.filter(|(_, body)| *body < BODIES);
+    of_bodies
+        .map(|(event, body)| Event { time: event.time, body, from: motion(event.from), to: motion(event.to) })
+        .collect()
+}
+
+/// Rows of positions in taut's units along a subject's bodies.
+pub fn rows(subject: &Subject, machine: &Machine, positions: &[Vec<f64>]) -> Vec<[Double; BODIES]> {
+    positions.iter().map(|positions| subject.along_the_belt(machine, positions)).collect()
+}

@@ -1,0 +1,263 @@
+//! An FMU for model exchange under an integrator of the hunt: extrapolation of the midpoint rule (Gragg, Bulirsch,
+//! Stoer), events by bisection of a step, an indicator that is zero counted with the negative ones, as FMI has it.
+
+use crate::answer::{Answer, End, rows};
+use crate::double::Double;
+use crate::input::{self, Piece};
+use crate::steps::{Opened, references, told};
+use crate::subject::{Fed, Subject};
+use std::sync::Arc;
+use taut_fmu::instance::{Instance, Phase, Use};
+
+/// How far positions may be off, m.
+const ALLOWED: f64 = 1e-6;
+
+/// Relative to nominal values or values, whichever is larger.
+const TOLERANCE: f64 = 1e-11;
+
+/// Columns of the extrapolation.
+const COLUMNS: usize = 8;
+
+/// Steps and events after which it gives up.
+const MOST: usize = 300_000;
+
+struct Importer<'a> {
+    instance: Instance,
+    opened: &'a Opened,
+    chains: Vec<Vec<Piece>>,
+    subject: &'a Subject,
+    nominals: Vec<f64>,
+    time: f64,
+    states: Vec<f64>,
+    /// The length of step that suits it.
+    step: f64,
+    /// The longest step: a condition that falls and rises again within one goes unseen.
+    longest: f64,
+    work: usize,
+    next_event: Option<f64>,
+}
+
+impl Importer<'_> {
+    /// The inputs at a time, those before an edge where `before` says so.
+    fn inputs(&self, time: f64) -> Vec<f64> {
+        match self.subject {
+            Subject::Loop(case) => references(&case.moves[0].profile, time).to_vec(),
+            Subject::Axis(_) | Subject::Gantry(_) => {
+                self.chains.iter().map(|chain| input::value(chain, time).high).collect()
+            }
+        }
+    }
+
+    /// Inputs as they were from `from` on, so that a step up to an edge does not see what comes after it.
+    fn put(&mut self, from: f64, time: f64, states: &[f64]) -> Result<(), String> {
+        self.instance.set_time(time).map_err(told)?;
+        self.instance.set_states(states).map_err(told)?;
+        let values = match self.subject {
+            Subject::Loop(_) => self.inputs(time),
+            Subject::Axis(_) | Subject::Gantry(_) => self
+                .chains
+                .iter()
+                .map(|chain| {
+                    // An edge lies between two numbers of 64 bits.
+                    let at = Double::from(from + 4.0 * f64::EPSILON * from);
+                    let piece = chain.iter().rev().find(|piece| piece.start <= at);
+                    piece.map_or(0.0, |piece| piece.series(Double::from(time), Double::ONE)[0].high)
+                })
+                .collect(),
+        };
+        self.instance.set_reals(&self.opened.inputs[..values.len()], &values).map_err(told)
+    }
+
+    fn rates(&mut self, from: f64, time: f64, states: &[f64]) -> Result<Vec<f64>, String> {
+        self.put(from, time, states)?;
+        let mut rates = vec![0.0; states.len()];
+        self.instance.rates(&mut rates).map_err(told)?;
+        Ok(rates)
+    }
+
+    fn indicators(&mut self, from: f64, time: f64, states: &[f64]) -> Result<Vec<bool>, String> {
+        self.put(from, time, states)?;
+        let mut values = vec![0.0; self.opened.model.conditions];
+        self.instance.residuals(&mut values).map_err(told)?;
+        Ok(values.into_iter().map(|value| value > 0.0).collect())
+    }
+
+    /// The state a step of `h` on, and its error by the tolerance.
+    fn extrapolated(&mut self, h: f64) -> Result<(Vec<f64>, f64), String> {
+        let (t, y) = (self.time, self.states.clone());
+        let first = self.rates(t, t, &y)?;
+        let mut last: Vec<Vec<f64>> = Vec::new();
+        for column in 0..COLUMNS {
+            let count = steps_of(column);
+            let d = h / count as f64;
+            // Midpoint rule: y₁ = y₀ + d f₀, y_{m+1} = y_{m−1} + 2 d f_m
+            let mut before = y.clone();
+            let mut now: Vec<f64> = y.iter().zip(&first).map(|(y, f)| y + d * f).collect();
+            for m in 1..count {
+                // A step that runs off every number is too long.
+                if now.iter().any(|y: &f64| !y.is_finite()) {
+                    return Ok((y, f64::INFINITY));
+                }
+                let rates = self.rates(t, t + m as f64 * d, &now)?;
+                let next = before.iter().zip(&rates).map(|(y, f)| y + 2.0 * d * f).collect();
+                before = std::mem::replace(&mut now, next);
+            }
+            // T_{j,k} = T_{j,k−1} + (T_{j,k−1} − T_{j−1,k−1})/((n_j/n_{j−k})² − 1)
+            let mut row = vec![now];
+            for k in 1..=column {
+                let ratio = count as f64 / steps_of(column - k) as f64;
+                let pairs = row[k - 1].iter().zip(&last[k - 1]);
+                row.push(pairs.map(|(new, old)| new + (new - old) / (ratio * ratio - 1.0)).collect());
+            }
+            let best = &row[column];
+            let mut error = f64::INFINITY;
+            if column > 1 {
+                let terms = best.iter().zip(&row[column - 1]).zip(&self.nominals).zip(&y);
+                let terms = terms.map(|(((a, b), nominal), y)| (a - b).abs() / (TOLERANCE * nominal.max(y.abs())));
+                error = terms.fold(0.0, |most, e| if e.is_nan() { f64::INFINITY } else { e.max(most) });
+            }
+            if error <= 1.0 || column + 1 == COLUMNS {
+                return Ok((best.clone(), error));
+            }
+            last = row;
+        }
+        Err("the extrapolation has no column".into())
+    }
+
+    /// Event mode at the present time and state; then continuous time again.
+    fn event(&mut self) -> Result<(), String> {
+        let (time, states) = (self.time, self.states.clone());
+        self.put(time, time, &states)?;
+        if self.instance.phase() == Phase::Continuous {
+            self.instance.go_into("event", &[Phase::Continuous], Phase::Event).map_err(told)?;
+        }
+        let settled = self.instance.settle().map_err(told)?;
+        self.next_event = settled.next;
+        self.instance.states(&mut self.states).map_err(told)?;
+        self.instance.go_into("continuous", &[Phase::Event], Phase::Continuous).map_err(told)
+    }
+
+    /// Goes on to `until`, over whose inside no edge of an input lies; false where the run ended before.
+    fn go(&mut self, until: f64) -> Result<bool, String> {
+        let near = 8.0 * f64::EPSILON * until.abs();
+        while self.time < until - near {
+            self.work += 1;
+            if self.work > MOST {
+                return Err("more steps than are worth the time".into());
+            }
+            if self.instance.is_over() {
+                return Ok(false);
+            }
+            let limit = self.next_event.filter(|next| *next > self.time + near).unwrap_or(until).min(until);
+            let h = self.step.min(self.longest).min(limit - self.time);
+            let (from, start) = (self.time, self.states.clone());
+            let was = self.indicators(from, from, &start)?;
+            let (states, error) = self.extrapolated(h)?;
+            let reach = h * (0.8 * error.max(1e-12).powf(-1.0 / 15.0)).clamp(0.2, 2.5);
+            if error > 1.0 {
+                self.step = reach;
+                continue;
+            }
+            if h >= 0.999 * self.step || reach < self.step {
+                self.step = reach;
+            }
+            let is = self.indicators(from, from + h, &states)?;
+            if is == was {
+                let at_limit = (from + h - limit).abs() <= near;
+                self.time = if at_limit { limit } else { from + h };
+                self.states = states;
+                let (time, states) = (self.time, self.states.clone());
+                self.put(from, time, &states)?;
+                let due = self.next_event.is_some_and(|next| next <= self.time + near);
+                if due || self.instance.has_fallen().map_err(told)? {
+                    self.event()?;
+                }
+                continue;
+            }
+            // The earliest change, to the last bits of time.
+            let (mut low, mut high, mut beyond) = (0.0, h, states);
+            while high - low > (4.0 * f64::EPSILON * (from + high)).max(f64::MIN_POSITIVE) {
+                let middle = 0.5 * (low + high);
+                if middle <= low || middle >= high {
+                    break;
+                }
+                let (states, _) = self.extrapolated(middle)?;
+                match self.indicators(from, from + middle, &states)? == was {
+                    true => low = middle,
+                    false => (high, beyond) = (middle, states),
+                }
+            }
+            (self.time, self.states) = (from + high, beyond);
+            self.event()?;
+        }
+        self.time = until;
+        Ok(!self.instance.is_over())
+    }
+}
+
+/// Steps of a column.
+fn steps_of(column: usize) -> usize {
+    2 * (column + 1)
+}
+
+/// Runs it.
+pub fn run(subject: &Subject) -> Result<Answer, String> {
+    let opened = Opened::new(subject)?;
+    let [until, every] = subject.times();
+    let chains = subject.chains(until, &mut Double::from)?;
+    let mut edges: Vec<f64> = chains.iter().flatten().map(|piece| piece.start.high).collect();
+    edges.retain(|edge| *edge > 0.0 && *edge < until);
+    edges.sort_by(f64::total_cmp);
+    edges.dedup();
+    let mut instance = Instance::new(Arc::clone(&opened.model), Use::ModelExchange);
+    instance.set_up(0.0, None).map_err(told)?;
+    instance.enter_initialization().map_err(told)?;
+    let count = opened.model.quantities.len();
+    let mut importer = Importer {
+        instance,
+        opened: &opened,
+        chains,
+        subject,
+        nominals: vec![1.0; count],
+        time: 0.0,
+        states: vec![0.0; count],
+        step: every / 16.0,
+        longest: every / 16.0,
+        work: 0,
+        next_event: None,
+    };
+    let first = importer.inputs(0.0);
+    importer.instance.set_reals(&opened.inputs[..first.len()], &first).map_err(told)?;
+    importer.instance.exit_initialization().map_err(told)?;
+    importer.instance.states(&mut importer.states).map_err(told)?;
+    importer.instance.nominals(&mut importer.nominals).map_err(told)?;
+    importer.event()?;
+    let (mut times, mut positions, mut end) = (Vec::new(), Vec::new(), End::Complete);
+    let rows_count = (until / every * (1.0 + 1e-12)).floor() as usize;
+    for k in 0..=rows_count {
+        let time = k as f64 * every;
+        times.push(time);
+        while end == End::Complete {
+            let edge = edges.first().copied().filter(|edge| *edge <= time);
+            if !importer.go(edge.unwrap_or(time))? {
+                end = End::Left(importer.instance.time());
+                break;
+            }
+            // A jump of an input is an event at a time that is known.
+            let Some(_) = edge else { break };
+            edges.remove(0);
+            importer.event()?;
+        }
+        if end == End::Complete {
+            let (time, states) = (importer.time, importer.states.clone());
+            importer.put(time, time, &states)?;
+            let mut values = vec![0.0; opened.positions.len()];
+            importer.instance.reals(&opened.positions, &mut values).map_err(told)?;
+            positions.push(values);
+        }
+    }
+    let machine = subject.machine(&mut Double::from);
+    let rows = rows(subject, &machine, &positions);
+    let fed = if matches!(subject, Subject::Loop(_)) { Fed::Sampled } else { Fed::AsGiven };
+    Ok(Answer { subject: None, fed, times, rows, events: None, end, allowed: ALLOWED, is_stated: false, ties: 0 })
+}

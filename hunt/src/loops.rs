@@ -1,0 +1,411 @@
+//! Controllers around the independent solver, written from the definitions of docs/control.md. Of state feedback the
+//! gains and the filter are taut's own; the machine around it is not. References are those of taut's profiles.
+
+use crate::double::Double;
+use crate::input::Piece;
+use crate::machine::{Machine, ROTOR, Taken, WAY};
+use crate::solve::{Ending, Pieces, Run, Solver};
+use std::f64::consts::PI;
+use taut::case::Case;
+use taut::control::{Controller, Observation, Standard};
+use taut::design::{Cascade, Design, FeedForwardModel, Fuzzy, Pid, SlidingMode, Structure};
+use taut::signal::profile::Reference;
+use taut::stage::{AmplifierMode, EncoderPlace, Stage};
+
+/// The reference that feed-forward sees.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Looks {
+    /// That of the profile.
+    Ahead,
+    /// What follows from position and derivatives at the sample, as inputs of an FMU have them.
+    OnFromSample,
+}
+
+/// The reference a time later, by its derivatives: Σ y⁽ᵏ⁾ tᵏ/k!
+fn later(y: &Reference, t: f64) -> Reference {
+    let d = [y.position, y.speed, y.acceleration, y.jerk, y.snap];
+    let from = |first: usize| {
+        let (mut sum, mut power) = (0.0, 1.0);
+        for (k, derivative) in d[first..].iter().enumerate() {
+            sum += derivative * power;
+            power *= t / (k + 1) as f64;
+        }
+        sum
+    };
+    Reference { position: from(0), speed: from(1), acceleration: from(2), jerk: from(3), snap: from(4) }
+}
+
+/// Runs the first move of a case on this machine, which its controller takes for `model`.
+pub fn run(
+    (case, model, looks): (&Case, &Stage, Looks),
+    machine: &Machine,
+    times: &[f64],
+    kept: Option<Taken>,
+) -> Result<Run, String> {
+    let design = case.controller.as_ref().ok_or("the case has no controller")?;
+    let (stage, profile) = (&case.stage, &case.moves[0].profile);
+    let end = times.last().copied().unwrap_or(0.0);
+    let mut law = Law::new(design, model)?;
+    let (every, delay) = (design.every, design.delay);
+    let lead = design.feed_forward.lead.unwrap_or(delay + 0.5 * every);
+    let whole = (delay / every).round();
+    let mut solver = Solver::new(machine, times, kept);
+    let none = || -> Pieces { Default::default() };
+    let mut acting = none();
+    // Commands on their way: when each acts, and what it is.
+    let mut waiting: std::collections::VecDeque<(f64, f64)> = std::collections::VecDeque::new();
+    let mut now = 0.0;
+    for k in 0_u32.. {
+        let sample = f64::from(k) * every;
+        if sample >= end {
+            break;
+        }
+        // Up to the sample, with what takes over on the way.
+        while let Some(&(at, value)) = waiting.front().filter(|(at, _)| *at < sample) {
+            waiting.pop_front();
+            solver.go(&acting, Double::from(at));
+            acting = pieces(at, value);
+            now = at;
+        }
+        if sample > now {
+            solver.go(&acting, Double::from(sample));
+        }
+        if *solver.ending() != Ending::Complete {
+            break;
+        }
+        let current = solver.current(0, &acting).high;
+        let z = solver.state();
+        let at_belt = |place: usize| (z[place] + machine.origin[0]).high;
+        let shaft = if machine.drives[0].play.is_some() { ROTOR[0][0] } else { WAY[0] };
+        let (motor, pulley, cart) = (at_belt(shaft), at_belt(WAY[0]), at_belt(WAY[1]));
+        let position = measured(stage, [motor, pulley, cart]);
+        let scale = stage.scale.as_ref().map(|scale| in_counts(cart, 4.0 * scale.lines));
+        let reference = profile.at(sample);
+        let ahead = match looks {
+            Looks::Ahead => profile.at(sample + lead),
+            Looks::OnFromSample => later(&reference, lead),
+        };
+        let given = law.step(&Seen { time: sample, reference, ahead, position, scale, current });
+        // A delay of whole samples ends at a sample, to the last bit: its command acts from behind that one on.
+        let at = if (delay / every - whole).abs() < 1e-9 { (f64::from(k) + whole) * every } else { sample + delay };
+        // Before the delay is over nothing is commanded.
+        if at <= sample {
+            acting = pieces(sample, given);
+        } else {
+            waiting.push_back((at, given));
+        }
+        now = sample;
+        // One that takes over exactly at a sample does so behind it.
+        while let Some(&(at, value)) = waiting.front().filter(|(at, _)| *at <= now) {
+            waiting.pop_front();
+            acting = pieces(at, value);
+        }
+    }
+    while let Some((at, value)) = waiting.pop_front().filter(|(at, _)| *at < end) {
+        solver.go(&acting, Double::from(at));
+        acting = pieces(at, value);
+    }
+    solver.go(&acting, Double::from(end));
+    Ok(solver.finish())
+}
+
+fn pieces(at: f64, value: f64) -> Pieces {
+    [Piece::line(Double::from(at), Double::from(value), Double::ZERO), Piece::default()]
+}
+
+/// The measured position along the belt.
+fn measured(stage: &Stage, [motor, pulley, cart]: [f64; 3]) -> f64 {
+    let r = stage.pulley_radius;
+    let Some(encoder) = &stage.encoder else { return motor };
+    match encoder.at {
+        EncoderPlace::Motor => r * in_counts(motor / r, 4.0 * stage.motor.gear_ratio * encoder.lines / (2.0 * PI)),
+        EncoderPlace::DrivePulley => r * in_counts(pulley / r, 4.0 * encoder.lines / (2.0 * PI)),
+        EncoderPlace::Cart => in_counts(cart, 4.0 * encoder.lines),
+    }
+}
+
+fn in_counts(value: f64, counts: f64) -> f64 {
+    (counts * value).round() / counts
+}
+
+/// What a controller is shown at a sample.
+struct Seen {
+    time: f64,
+    reference: Reference,
+    ahead: Reference,
+    position: f64,
+    scale: Option<f64>,
+    current: f64,
+}
+
+/// A controller under way.
+struct Law {
+    structure: Kind,
+    every: f64,
+    limit: Option<f64>,
+    feed: Option<Rigid>,
+    /// Measured position at the last sample, filtered speed, integral, filtered derivative, integral of the current.
+    last: Option<f64>,
+    last_error: Option<f64>,
+    speed: f64,
+    integral: f64,
+    derivative: f64,
+    of_current: f64,
+}
+
+enum Kind {
+    Pid(Pid),
+    Cascade(Cascade),
+    Sliding(SlidingMode, f64, f64),
+    Fuzzy(Fuzzy),
+    Borrowed(Box<Standard>),
+}
+
+impl Law {
+    fn new(design: &Design, stage: &Stage) -> Result<Self, String> {
+        let rigid = Rigid::of(stage);
+        let own = design.filters.is_empty()
+            && design.disturbance_observer.is_none()
+            && design.shaper.is_empty()
+            && design.feed_forward.model != FeedForwardModel::Elastic
+            && !design.feed_forward.compensate_stretch;
+        let structure = match &design.structure {
+            Structure::Pid(pid) if own => Kind::Pid(*pid),
+            Structure::Cascade(cascade) if own => Kind::Cascade(*cascade),
+            Structure::SlidingMode(sliding) if own => Kind::Sliding(*sliding, rigid.mass, rigid.push),
+            Structure::Fuzzy(fuzzy) if own => Kind::Fuzzy(fuzzy.clone()),
+            Structure::Pid(_)
+            | Structure::Cascade(_)
+            | Structure::SlidingMode(_)
+            | Structure::Fuzzy(_)
+            | Structure::StateFeedback(_) => {
+                let mut standard = Standard::new(design, stage).map_err(|error| error.to_string())?;
+                standard.reset();
+                Kind::Borrowed(Box::new(standard))
+            }
+        };
+        let feed = (design.feed_forward.model == FeedForwardModel::Rigid).then_some(Rigid {
+            inertia: design.feed_forward.inertia,
+            dry: design.feed_forward.friction,
+            ..rigid
+        });
+        Ok(Self {
+            structure,
+            every: design.every,
+            limit: design.limit,
+            feed,
+            last: None,
+            last_error: None,
+            speed: 0.0,
+            integral: 0.0,
+            derivative: 0.0,
+            of_current: 0.0,
+        })
+    }
+
+    /// v_k = a v_{k−1} + (1 − a)(p_k − p_{k−1})/T, a = e^{−2π f T}
+    fn speed(&mut self, position: f64, filter: f64) -> f64 {
+        let a = (-2.0 * PI * filter * self.every).exp();
+        let change = position - self.last.unwrap_or(position);
+        self.last = Some(position);
+        self.speed = a * self.speed + (1.0 - a) * change / self.every;
+        self.speed
+    }
+
+    /// The command that is given.
+    fn step(&mut self, seen: &Seen) -> f64 {
+        let t = self.every;
+        let y = &seen.reference;
+        let clip = |asked: f64| {
+            let asked = if asked.is_finite() { asked } else { 0.0 };
+            self.limit.map_or(asked, |limit| asked.clamp(-limit, limit))
+        };
+        let limit = self.limit;
+        let added = match &self.structure {
+            Kind::Borrowed(_) => 0.0,
+            Kind::Pid(_) | Kind::Cascade(_) | Kind::Sliding(..) | Kind::Fuzzy(_) => {
+                self.feed.as_ref().map_or(0.0, |rigid| rigid.command(&seen.ahead))
+            }
+        };
+        let give = |u: f64| match limit {
+            Some(limit) => (u + added).clamp(-limit, limit),
+            None => u + added,
+        };
+        let e = y.position - seen.position;
+        match &mut self.structure {
+            Kind::Borrowed(standard) => {
+                let &Seen { time, reference, ahead, position, scale, current } = seen;
+                let asked = standard.step(&Observation { time, reference, ahead, position, scale, current });
+                let given = clip(asked);
+                standard.limited(given);
+                given
+            }
+            Kind::Pid(pid) => {
+                let pid = *pid;
+                let tau = 1.0 / (2.0 * PI * pid.filter);
+                let change = e - self.last_error.unwrap_or(e);
+                self.last_error = Some(e);
+                self.derivative = (tau * self.derivative + change) / (tau + t);
+                self.integral += pid.integral * t * e;
+                let u = pid.proportional * e + self.integral + pid.derivative * self.derivative;
+                let given = give(u);
+                if pid.integral != 0.0 {
+                    self.integral += (t / pid.tracking).min(1.0) * (given - (u + added));
+                }
+                given
+            }
+            Kind::Cascade(cascade) => {
+                let cascade = *cascade;
+                let v = self.speed(seen.position, cascade.filter);
+                let e = seen.scale.map_or(e, |scale| y.position - scale);
+                let wanted = cascade.position * e + cascade.reference_speed * y.speed;
+                let epsilon = wanted - v;
+                self.integral += cascade.speed_integral * t * epsilon;
+                let u = cascade.speed * epsilon + self.integral;
+                let share = (t / cascade.tracking).min(1.0);
+                let has_integral = cascade.speed_integral != 0.0;
+                let Some(current) = cascade.current else {
+                    let given = give(u);
+                    if has_integral {
+                        self.integral += share * (given - (u + added));
+                    }
+                    return given;
+                };
+                let wanted = current.limit.map_or(u, |limit| u.clamp(-limit, limit));
+                if has_integral {
+                    self.integral += share * (wanted - u);
+                }
+                let lacks = wanted - seen.current;
+                self.of_current += current.integral * t * lacks;
+                let u = current.proportional * lacks + self.of_current;
+                let given = give(u);
+                let back = share * (given - (u + added));
+                if current.integral != 0.0 {
+                    self.of_current += back;
+                }
+                if has_integral && current.proportional != 0.0 {
+                    self.integral += back / current.proportional;
+                }
+                given
+            }
+            Kind::Sliding(sliding, mass, push) => {
+                let (sliding, mass, push) = (*sliding, *mass, *push);
+                let rate = y.speed - self.speed(seen.position, sliding.filter);
+                self.integral += t * e;
+                let (lambda, kappa) = (sliding.bandwidth, sliding.integral);
+                let sigma = rate + lambda * e + kappa * self.integral;
+                let saturated = (sigma / sliding.boundary).clamp(-1.0, 1.0);
+                let u = mass * (lambda * rate + kappa * e + sliding.reaching * saturated) / push;
+                let given = give(u);
+                if kappa > 0.0 {
+                    let delta = given - (u + added);
+                    let back = delta * push * sliding.boundary / (mass * kappa * sliding.reaching);
+                    self.integral += (lambda * t).min(1.0) * back;
+                }
+                given
+            }
+            Kind::Fuzzy(fuzzy) => {
+                let fuzzy = fuzzy.clone();
+                let rate = y.speed - self.speed(seen.position, fuzzy.filter);
+                let rule = between(&fuzzy.rules, e / fuzzy.error, rate / fuzzy.rate);
+                let u = match fuzzy.incremental {
+                    true => {
+                        self.integral += t * fuzzy.command * rule;
+                        self.integral
+                    }
+                    false => fuzzy.command * rule,
+                };
+                let given = give(u);
+                if fuzzy.incremental {
+                    self.integral += given - (u + added);
+                }
+                given
+            }
+        }
+    }
+}
+
+/// Bilinear interpolation of rules on evenly spaced sets from −1 to 1, held beyond.
+fn between(rules: &[Vec<f64>], error: f64, rate: f64) -> f64 {
+    let count = rules.len();
+    let place = |x: f64| {
+        let at = (x.clamp(-1.0, 1.0) + 1.0) / 2.0 * (count - 1) as f64;
+        let low = (at.floor() as usize).min(count - 2);
+        (low, at - low as f64)
+    };
+    let ((i, a), (j, b)) = (place(error), place(rate));
+    (1.0 - a) * ((1.0 - b) * rules[i][j] + b * rules[i][j + 1])
+        + a * ((1.0 - b) * rules[i + 1][j] + b * rules[i + 1][j + 1])
+}
+
+/// All bodies as one mass at the belt.
+#[derive(Clone)]
+struct Rigid {
+    mass: f64,
+    /// Forward and backward.
+    viscous: [f64; 2],
+    coulomb: [f64; 2],
+    load: f64,
+    /// Force per command at rest.
+    push: f64,
+    inertia: f64,
+    dry: f64,
+    stage: Stage,
+}
+
+impl Rigid {
+    fn of(stage: &Stage) -> Self {
+        let (r, motor) = (stage.pulley_radius, &stage.motor);
+        let (j1, j2, n) = (stage.drive_pulley.inertia, stage.idler_pulley.inertia, motor.gear_ratio);
+        // M = m + (J₁ + n² J_r + J₂)/r²
+        let mass = stage.cart.mass + (j1 + n * n * motor.rotor_inertia + j2) / (r * r);
+        let sides = [&stage.cart.friction, &stage.drive_pulley.friction, &stage.idler_pulley.friction];
+        let sum = |of: fn(&taut::friction::Side) -> f64, backward: bool, arm: f64| {
+            let side = |f: &taut::friction::Friction| of(if backward { &f.backward } else { &f.forward });
+            side(sides[0]) + (side(sides[1]) + side(sides[2])) / arm
+        };
+        let per_volt = motor.gear_efficiency * n * motor.torque_constant / r * stage.amplifier.gain;
+        Self {
+            mass,
+            viscous: [false, true].map(|back| sum(|side| side.viscous, back, r * r)),
+            coulomb: [false, true].map(|back| sum(|side| side.coulomb, back, r)),
+            load: stage.cart.constant_force(),
+            push: match stage.amplifier.mode {
+                AmplifierMode::Voltage => per_volt / motor.resistance,
+                AmplifierMode::Current => per_volt,
+            },
+            inertia: 1.0,
+            dry: 1.0,
+            stage: stage.clone(),
+        }
+    }
+
+    /// F = p M y″ + q (b y′ + s F_c) − F_L, and the command for it.
+    fn command(&self, y: &Reference) -> f64 {
+        let (motor, amplifier, r) = (&self.stage.motor, &self.stage.amplifier, self.stage.pulley_radius);
+        // s = sgn y′ where abs(y′) > 1 µm/s, else sgn y″ where abs(y″) > 1 mm/s², else 0
+        let s = match (y.speed.abs() > 1e-6, y.acceleration.abs() > 1e-3) {
+            (true, _) => y.speed.signum(),
+            (false, true) => y.acceleration.signum(),
+            (false, false) => 0.0,
+        };
+        let side = usize::from(s < 0.0);
+        let resists = self.viscous[side] * y.speed + s * self.coulomb[side];
+        let force = self.inertia * self.mass * y.acceleration + self.dry * resists - self.load;
+        let rate = self.inertia * self.mass * y.jerk;
+        let (eta, n) = (motor.gear_efficiency, motor.gear_ratio);
+        let per_force = match force * y.speed < 0.0 && y.speed.abs() > 1e-6 {
+            true => eta * r / (n * motor.torque_constant),
+            false => r / (eta * n * motor.torque_constant),
+        };
+        let command = match amplifier.mode {
+            AmplifierMode::Voltage => {
+                motor.resistance * per_force * force
+                    + motor.inductance * per_force * rate
+                    + n * motor.back_emf_constant * y.speed / r
+            }
+            AmplifierMode::Current => per_force * force,
+        };
+        command / amplifier.gain
+    }
+}

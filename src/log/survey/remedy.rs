@@ -1,0 +1,94 @@
+//! What would mend a log, if a suspicion were right: a model can be put through both.
+
+use crate::log::{Log, Quantity};
+
+/// A change of a log with which a suspicion would be gone.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Remedy {
+    /// Another sign of what went in.
+    Reverse,
+    /// Another sign of an output.
+    Flip(Quantity),
+    /// A factor on an output.
+    Scale(Quantity, f64),
+    /// The same, of an output that is odd for the machine of the case.
+    Unit(Quantity, f64),
+    /// Of two outputs the first is this many times the second.
+    Ratio(Quantity, Quantity, f64),
+    /// Two outputs change places.
+    Exchange(Quantity, Quantity),
+    /// Jumps of this size taken out of an output.
+    Unwrap(Quantity, f64),
+    /// Samples of an output that do not count.
+    Leave(Quantity, Vec<usize>),
+}
+
+impl Remedy {
+    /// Changes a log. Of a ratio, it is the first output that changes.
+    pub fn apply(&self, log: &mut Log) {
+        let mut of = |quantity: &Quantity, change: &mut dyn FnMut(&mut Vec<f64>)| {
+            for output in log.outputs.iter_mut().filter(|output| output.quantity == *quantity) {
+                change(&mut output.values);
+            }
+        };
+        let scaled = |values: &mut Vec<f64>, factor: f64| values.iter_mut().for_each(|value| *value *= factor);
+        match self {
+            Self::Reverse => {
+                for output in log.outputs.iter_mut().filter(|output| !output.absolute) {
+                    scaled(&mut output.values, -1.0);
+                }
+            }
+            Self::Flip(quantity) => of(quantity, &mut |values| scaled(values, -1.0)),
+            Self::Scale(quantity, factor) | Self::Unit(quantity, factor) => {
+                of(quantity, &mut |values| scaled(values, *factor));
+            }
+            Self::Ratio(quantity, _, ratio) => of(quantity, &mut |values| scaled(values, 1.0 / ratio)),
+            Self::Exchange(a, b) => {
+                for output in &mut log.outputs {
+                    output.quantity = match output.quantity {
+                        quantity if quantity == *a => *b,
+                        quantity if quantity == *b => *a,
+                        quantity => quantity,
+                    };
+                }
+            }
+            Self::Unwrap(quantity, turn) => of(quantity, &mut |values| unwrap(values, *turn)),
+            Self::Leave(quantity, samples) => of(quantity, &mut |values| {
+                for &k in samples {
+                    values[k] = f64::NAN;
+                }
+            }),
+        }
+    }
+}
+
+/// Takes jumps of about `turn` out.
+fn unwrap(values: &mut [f64], turn: f64) {
+    let (mut off, mut last) = (0.0, f64::NAN);
+    for value in values.iter_mut() {
+        let own = *value;
+        // The nearest number of turns, where there is a jump at all.
+        let jump = ((own - last) / turn).round();
+        if jump.is_finite() {
+            off -= jump * turn;
+        }
+        last = own;
+        *value = own + off;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::unwrap;
+
+    #[test]
+    fn an_angle_that_wraps_goes_on() {
+        let turn = std::f64::consts::TAU;
+        let straight: Vec<f64> = (0..400).map(|k| 0.1 * f64::from(k) - 0.0005 * f64::from(k * k)).collect();
+        let mut values: Vec<f64> = straight.iter().map(|v| (v + 3.0).rem_euclid(turn)).collect();
+        unwrap(&mut values, turn);
+        for (value, straight) in values.iter().zip(&straight) {
+            assert!((value - 3.0 - straight).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,324 @@
+//! A bound of what rounding does to a run whose errors can grow.
+//!
+//! Where springs do no more than pull and push in proportion, errors do not grow ([`crate::solve::rounding`]). A force
+//! line can feed the motion, and a flank, a stop or a slack span turns a small difference of the moment at which it
+//! touches into a larger one of the motion. Of such machines the errors of the state are followed, as an ellipsoid
+//! {C^½ u, |u| ≤ 1} that holds all of them:
+//!
+//! ```text
+//! within a mode        C ← F C Fᵀ ⊕ Q,   F = e^{A τ}
+//! where a guard falls  C ← S C Sᵀ ⊕ q,   S = I + (f⁺ − f⁻) wᵀ/(w·f⁻)      f = ż before and after, w the guard
+//! what is added        Q = diag(d²),     d = c ε ((N + Φ) |z|_max + τ (|A| |z|_max + K))
+//!                      q = (f⁺ − f⁻)(f⁺ − f⁻)ᵀ δt²,   δt = δg/|w·f⁻|, δg the rounding of the guard
+//! the sum ⊕            C₁ ⊕ C₂ = (1 + 1/p) C₁ + (1 + p) C₂,   p = √(tr C₁/tr C₂): the ellipsoid of least trace around
+//!                      all sums of two errors
+//! ```
+//!
+//! N counts steps, Φ the radians of the fastest swing, K the constant forces of a mode before they are added up: near
+//! an unstable equilibrium they cancel, and their rounding is the error from which all others grow. A guard that only
+//! grazes falls by its bend: |w·f⁻| is taken for no less than √(½ |w·f̈| δg), the slope at which it leaves its rounding.
+//! A belt position w·z is off by at most √(wᵀ C w).
+
+use super::Core;
+use super::matrices::Watch;
+use crate::friction::Motion;
+use crate::mechanism::{Cause, Mechanism, SpringLaw};
+use crate::solve::propagator::{EXPONENTIAL_REACH, Matrix};
+use crate::solve::saved::{Pass, Passed};
+
+/// c: roundings of a step or of a radian.
+const UNITS: f64 = 2.0;
+
+/// The error of a sine's polynomials over ε, both relative to the peak.
+const OF_SINES: f64 = 45.0;
+
+/// The error is evaluated this often within a mode.
+const PARTS: u32 = 4;
+
+/// Halvings of the time in a mode, at most.
+const HALVINGS: i32 = 60;
+
+/// So many roundings of a rate are no jump of it.
+const NO_JUMP: f64 = 40.0;
+
+/// Entries beyond this are not squared any more.
+const BEYOND: f64 = 1e280;
+
+/// The errors of a state.
+#[derive(Clone)]
+pub(super) struct Ellipsoid<const N: usize> {
+    /// C, of the states alone.
+    c: [[f64; N]; N],
+    states: usize,
+    /// The largest magnitudes of the state so far.
+    size: [f64; N],
+    /// Until when errors are accounted for, s, and how many steps until then.
+    since: f64,
+    steps: u64,
+    /// The largest error of a position at the belt so far, m.
+    largest: f64,
+}
+
+/// A guard that falls, as it is before the mode changes.
+pub(super) struct Crossing<const N: usize> {
+    /// w.
+    guard: [f64; N],
+    /// f⁻, and its rounding.
+    before: [f64; N],
+    noise: [f64; N],
+    /// w·f⁻ and w·f̈.
+    fall: f64,
+    bend: f64,
+    /// δg by the rounding of the state alone.
+    rounding: f64,
+}
+
+/// Whether errors can grow in a machine of these parts.
+pub(super) fn can_grow(mechanism: &Mechanism) -> bool {
+    mechanism.springs.iter().any(|spring| match spring.law {
+        SpringLaw::Gap { .. } | SpringLaw::Tension { .. } | SpringLaw::Line { .. } => true,
+        SpringLaw::TwoSided | SpringLaw::Bounds { .. } | SpringLaw::None => false,
+    })
+}
+
+impl<const N: usize> Ellipsoid<N> {
+    pub(super) fn new(states: usize) -> Self {
+        Self { c: [[0.0; N]; N], states, size: [0.0; N], since: 0.0, steps: 0, largest: 0.0 }
+    }
+
+    /// The same in another kernel.
+    pub(super) fn resized<const M: usize>(&self) -> Ellipsoid<M> {
+        let mut new = Ellipsoid::<M>::new(self.states);
+        for (new, own) in new.c.iter_mut().zip(&self.c).take(self.states) {
+            new[..self.states].copy_from_slice(&own[..self.states]);
+        }
+        new.size[..self.states].copy_from_slice(&self.size[..self.states]);
+        (new.since, new.steps, new.largest) = (self.since, self.steps, self.largest);
+        new
+    }
+
+    /// As plain numbers.
+    pub(super) fn pass(&mut self, pass: &mut Pass) -> Passed {
+        let states = self.states;
+        self.c.iter_mut().take(states).try_for_each(|row| pass.numbers(&mut row[..states]))?;
+        pass.numbers(&mut self.size[..states])?;
+        pass.number(&mut self.since)?;
+        pass.bits(&mut self.steps)?;
+        pass.number(&mut self.largest)
+    }
+
+    /// The largest error of a position at the belt so far, m.
+    pub(super) fn largest(&self) -> f64 {
+        self.largest
+    }
+
+    /// Adds errors, another ellipsoid.
+    fn add(&mut self, other: &[[f64; N]; N]) {
+        let weights = self.weights();
+        add(&mut self.c, other, &weights, self.states);
+    }
+
+    /// What makes errors of all states comparable: one over the squares of their sizes.
+    fn weights(&self) -> [f64; N] {
+        self.size.map(|size| if size > 0.0 { 1.0 / (size * size) } else { 0.0 })
+    }
+
+    /// Takes note of the errors of positions.
+    fn evaluate(&mut self, positions: &[[f64; N]]) {
+        for row in positions {
+            let square = self.variance(row);
+            // What is no number has grown beyond all bounds.
+            self.largest = self.largest.max(if square.is_nan() { f64::INFINITY } else { square.sqrt() });
+        }
+    }
+
+    /// wᵀ C w.
+    fn variance(&self, row: &[f64; N]) -> f64 {
+        let n = self.states;
+        let mut sum = 0.0;
+        for (i, own) in row.iter().enumerate().take(n).filter(|(_, own)| **own != 0.0) {
+            sum += own * self.c[i][..n].iter().zip(row).map(|(c, other)| c * other).sum::<f64>();
+        }
+        sum.max(0.0)
+    }
+
+    /// What stands still, or is held, is not off.
+    fn settle(&mut self, place: usize) {
+        self.c[place] = [0.0; N];
+        self.c.iter_mut().for_each(|row| row[place] = 0.0);
+    }
+}
+
+/// C₁ ← C₁ ⊕ C₂.
+fn add<const N: usize>(c: &mut [[f64; N]; N], other: &[[f64; N]; N], weights: &[f64; N], states: usize) {
+    let trace = |c: &[[f64; N]; N]| (0..states).map(|i| c[i][i] * weights[i]).sum::<f64>();
+    let (own, added) = (trace(c), trace(other));
+    let (first, second) = match own > 0.0 && added > 0.0 {
+        true => (1.0 + (added / own).sqrt(), 1.0 + (own / added).sqrt()),
+        // Of what has no size no share is known; of nothing none is needed.
+        false if own == 0.0 && added == 0.0 => (2.0, 2.0),
+        false => (1.0, 1.0),
+    };
+    for (own, other) in c.iter_mut().zip(other).take(states) {
+        own[..states].iter_mut().zip(other).for_each(|(own, other)| *own = first * *own + second * other);
+    }
+}
+
+/// (I + P) C (I + P)ᵀ.
+fn carried<const N: usize>(step: &Matrix<N, N>, c: &[[f64; N]; N], states: usize) -> [[f64; N]; N] {
+    // T = C + P C; C is symmetric, so that its rows are its columns.
+    let mut moved = *c;
+    for row in moved.iter_mut().take(states) {
+        step.advance(row);
+    }
+    // The rows of `moved` are the columns of T; those of its transpose are moved in the same way.
+    let mut out = transposed(&moved, states);
+    for row in out.iter_mut().take(states) {
+        step.advance(row);
+    }
+    // As symmetric as rounding lets it be, and not beyond.
+    let other = transposed(&out, states);
+    for (row, column) in out.iter_mut().zip(&other).take(states) {
+        row.iter_mut().zip(column).for_each(|(a, b)| *a = 0.5 * (*a + b));
+        row[states..].fill(0.0);
+    }
+    out
+}
+
+fn transposed<const N: usize>(c: &[[f64; N]; N], states: usize) -> [[f64; N]; N] {
+    let mut out = [[0.0; N]; N];
+    for (i, row) in c.iter().enumerate().take(states) {
+        row.iter().enumerate().take(states).for_each(|(j, value)| out[j][i] = *value);
+    }
+    out
+}
+
+impl<const N: usize> Core<N> {
+    /// Brings the errors to where the run stands, in the present mode.
+    pub(super) fn carry_errors(&mut self) {
+        let Some(mut errors) = self.errors.take() else { return };
+        self.see();
+        let (time, steps) = (self.time(), self.common.cost.steps + self.common.cost.series);
+        let (length, taken) = (time - errors.since, (steps - errors.steps) as f64);
+        (errors.since, errors.steps) = (time, steps);
+        let states = errors.states;
+        errors.size[..states].iter_mut().zip(&self.largest).for_each(|(size, z)| *size = size.max(*z));
+        if length > 0.0 && errors.largest < BEYOND {
+            self.carry_errors_by(&mut errors, length, taken);
+        }
+        self.errors = Some(errors);
+    }
+
+    /// C ← F C Fᵀ ⊕ Q over a time in which so many steps were taken.
+    fn carry_errors_by(&self, errors: &mut Ellipsoid<N>, length: f64, taken: f64) {
+        let (law, states) = (&self.matrices, errors.states);
+        let part = length / f64::from(PARTS);
+        let halvings = ((law.speed() * part / EXPONENTIAL_REACH).log2().ceil() as i32).clamp(0, HALVINGS);
+        let first = part * 0.5_f64.powi(halvings);
+        // d = c ε ((N + Φ) |z|_max + τ (|A| |z|_max + K))
+        let mut sizes = self.largest;
+        let space = &self.common.space;
+        if space.highest > 1 {
+            (0..space.layout.inputs).for_each(|drive| sizes[space.chain(drive, 0)] *= OF_SINES);
+        }
+        let rates = law.rates().absolute().rate(&sizes);
+        let shares = (taken / length + law.swing) * first;
+        let mut added = [[0.0; N]; N];
+        for i in 0..states {
+            let error = UNITS * f64::EPSILON * (shares * errors.size[i] + first * (rates[i] + law.crude[i]));
+            added[i][i] = error * error;
+        }
+        let weights = errors.weights();
+        let mut step = law.rates().exponential(first);
+        for _ in 0..halvings {
+            let earlier = carried(&step, &added, states);
+            add(&mut added, &earlier, &weights, states);
+            step = step.doubled();
+        }
+        let positions = self.positions();
+        for _ in 0..PARTS {
+            errors.c = carried(&step, &errors.c, states);
+            errors.add(&added);
+            errors.evaluate(&positions);
+        }
+    }
+
+    /// The positions at the belt as weights of the state.
+    fn positions(&self) -> Vec<[f64; N]> {
+        let (layout, mechanism) = (&self.common.space.layout, &self.common.mechanism);
+        let row = |body: usize| {
+            let (weights, _) = self.common.coordinates.way(layout, body);
+            let lever = mechanism.bodies[body].kind.lever();
+            let mut row = [0.0; N];
+            (0..layout.bodies()).for_each(|other| row[layout.coordinate[other]] = lever * weights[other]);
+            row
+        };
+        mechanism.held_bodies().map(row).collect()
+    }
+
+    /// What an event does to the errors depends on the state before it.
+    pub(super) fn crossing(&self, cause: Cause) -> Option<Crossing<N>> {
+        let errors = self.errors.as_ref()?;
+        let law = &self.matrices;
+        let watch: &Watch<N> = law.guards.iter().find(|guard| guard.cause == cause)?;
+        let before = law.rate(&self.z);
+        let guard = watch.row.whole();
+        let mut sizes = self.z;
+        // A speed that falls to zero is as uncertain as those that it had.
+        sizes[..errors.states].copy_from_slice(&errors.size[..errors.states]);
+        Some(Crossing {
+            guard,
+            before,
+            noise: law.noise_of_rate(&self.z),
+            fall: watch.value(&before),
+            bend: watch.value(&law.rate(&before)),
+            rounding: f64::EPSILON * watch.size(&sizes),
+        })
+    }
+
+    /// Takes the errors through an event: C ← S C Sᵀ ⊕ q. It stands in the mode that follows.
+    pub(super) fn cross(&mut self, crossing: Option<Crossing<N>>) {
+        let (Some(crossing), Some(mut errors)) = (crossing, self.errors.take()) else { return };
+        let states = errors.states;
+        let Crossing { guard, before, noise, fall, bend, rounding } = crossing;
+        let (after, law) = (self.matrices.rate(&self.z), &self.matrices);
+        let noise_after = law.noise_of_rate(&self.z);
+        let mut jump = [0.0; N];
+        for k in 0..states {
+            let change = before[k] - after[k];
+            jump[k] = if change.abs() <= NO_JUMP * (noise[k] + noise_after[k]) { 0.0 } else { change };
+        }
+        if jump != [0.0; N] {
+            let error = errors.variance(&guard).sqrt() + rounding;
+            // The guard leaves its rounding by its slope, or by its bend.
+            let slope = fall.abs().max((0.5 * bend.abs() * error).sqrt());
+            if slope > 0.0 {
+                // δz⁺ = δz⁻ + (f⁻ − f⁺) δt,   δt = w·δz/|w·f⁻|
+                let mut matrix = Matrix::zero();
+                for (row, own) in jump.iter().enumerate().take(states) {
+                    (0..states).for_each(|column| matrix.set(row, column, own * guard[column] / slope));
+                }
+                errors.c = carried(&matrix, &errors.c, states);
+                let time = rounding / slope;
+                let mut added = [[0.0; N]; N];
+                for (row, own) in added.iter_mut().zip(jump).take(states) {
+                    (0..states).for_each(|column| row[column] = own * jump[column] * time * time);
+                }
+                errors.add(&added);
+            }
+        }
+        let (mode, layout) = (&self.common.mode, &self.common.space.layout);
+        for body in (0..layout.bodies()).filter(|&body| mode.motion[body] == Motion::Stuck) {
+            errors.settle(layout.speed[body]);
+        }
+        self.errors = Some(errors);
+    }
+
+    /// Ends the present mode by `cause`, and takes up what follows.
+    pub(super) fn go_through(&mut self, cause: Cause) {
+        let crossing = self.crossing(cause);
+        self.change(cause);
+        self.resolve();
+        self.cross(crossing);
+    }
+}

@@ -1,0 +1,101 @@
+//! An axis as one mass along its belt.
+
+use super::{AmplifierMode, Stage};
+
+/// Largest speed of a reference that counts as rest, m/s, and largest acceleration that counts as none, m/s²: what
+/// rounding leaves of a generated trajectory, in single precision too, has no direction.
+pub const REST_SPEED: f64 = 1e-6;
+/// m/s²
+pub const REST_ACCELERATION: f64 = 1e-3;
+
+/// The axis as one mass along the belt (Li & Rehani 1996), and its motor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rigid {
+    /// M + (J₁ + n² J_r + J₂)/r², kg.
+    pub mass: f64,
+    /// Of that (J₁ + n² J_r)/r², what moves before the belt, kg.
+    pub driving: f64,
+    /// b + (B₁ + B₂)/r², N s/m, forward and backward.
+    pub viscous: [f64; 2],
+    /// F_c + (τ_c1 + τ_c2)/r, N, forward and backward.
+    pub coulomb: [f64; 2],
+    /// Constant force on the cart, N.
+    pub constant: f64,
+    /// n K_t/r, N/A, without the gear's loss.
+    pub force_per_ampere: f64,
+    efficiency: f64,
+    /// n K_e/r, V s/m.
+    pub brake: f64,
+    resistance: f64,
+    inductance: f64,
+    gain: f64,
+    mode: AmplifierMode,
+}
+
+impl Rigid {
+    /// That of `stage`.
+    pub fn of(stage: &Stage) -> Self {
+        let (r, motor) = (stage.pulley_radius, &stage.motor);
+        let n = motor.gear_ratio;
+        let pulleys = stage.drive_pulley.inertia + n * n * motor.rotor_inertia + stage.idler_pulley.inertia;
+        let [drive, cart, idler] = [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction];
+        Self {
+            mass: stage.cart.mass + pulleys / (r * r),
+            driving: (stage.drive_pulley.inertia + n * n * motor.rotor_inertia) / (r * r),
+            viscous: [true, false].map(|forward| {
+                cart.side(forward).viscous + (drive.side(forward).viscous + idler.side(forward).viscous) / (r * r)
+            }),
+            coulomb: [true, false].map(|forward| {
+                cart.side(forward).coulomb + (drive.side(forward).coulomb + idler.side(forward).coulomb) / r
+            }),
+            constant: stage.cart.constant_force(),
+            force_per_ampere: n * motor.torque_constant / r,
+            efficiency: motor.gear_efficiency,
+            brake: n * motor.back_emf_constant / r,
+            resistance: motor.resistance,
+            inductance: motor.inductance,
+            gain: stage.amplifier.gain,
+            mode: stage.amplifier.mode,
+        }
+    }
+
+    /// Motor current, A, and voltage at its terminals, V, that push with `force` (N, changing at `rate`, N/s) at `speed`.
+    pub fn electrical(&self, force: f64, rate: f64, speed: f64) -> (f64, f64) {
+        // What drives through the gear loses, what is driven holds more; at rest it is taken to drive.
+        let drives = speed.abs() <= REST_SPEED || force * speed >= 0.0;
+        let efficiency = if drives { self.efficiency } else { 1.0 / self.efficiency };
+        let per_ampere = self.force_per_ampere * efficiency;
+        let current = force / per_ampere;
+        // v = R i + L di/dt + K_e n φ̇                                        (4) with an inductance
+        (current, self.resistance * current + self.inductance * rate / per_ampere + self.brake * speed)
+    }
+
+    /// The command that makes the motor push with `force` (N, changing at `rate`, N/s) at `speed`, V or A.
+    pub fn command(&self, force: f64, rate: f64, speed: f64) -> f64 {
+        let (current, voltage) = self.electrical(force, rate, speed);
+        match self.mode {
+            AmplifierMode::Current => current / self.gain,
+            AmplifierMode::Voltage => voltage / self.gain,
+        }
+    }
+
+    /// Force per command at rest, N/V or N/A.
+    pub fn force_per_command(&self) -> f64 {
+        1.0 / self.command(1.0, 0.0, 0.0)
+    }
+
+    /// Resistance to speed of axis and motor together, N s/m: b, and of a commanded voltage also n² K_t K_e/(R r²).
+    pub fn drag(&self) -> f64 {
+        self.viscous[0]
+            + match self.mode {
+                AmplifierMode::Current => 0.0,
+                AmplifierMode::Voltage => self.force_per_ampere * self.brake / self.resistance,
+            }
+    }
+
+    /// Friction of the axis at this speed, N; its viscous part and its dry part, which goes the way of `sign`.
+    pub fn friction(&self, speed: f64, sign: f64) -> (f64, f64) {
+        let side = usize::from(sign < 0.0);
+        (self.viscous[side] * speed, self.coulomb[side] * sign)
+    }
+}

@@ -1,0 +1,73 @@
+//! Feed-forward beside the gains that were found: it often adds more than any gains.
+
+use super::verdict::Verdict;
+use super::work::Work;
+use crate::design::{Design, FeedForward, FeedForwardModel, Structure};
+use crate::error::Result;
+use crate::stage::{BeltModel, EncoderPlace, Stage};
+
+/// Share of the largest error that has to remain at most, so that feed-forward is advised.
+const PAYS: f64 = 0.9;
+
+/// Feed-forward that makes the moves better than the gains alone.
+#[derive(Debug, Clone)]
+pub struct Ahead {
+    /// The verdict on the gains with it.
+    pub verdict: Verdict,
+}
+
+impl Ahead {
+    /// The value of `controller.feed_forward`, as a case file has it.
+    pub fn text(&self) -> String {
+        let FeedForward { model, compensate_stretch, .. } = self.verdict.design.feed_forward;
+        let stretch = if compensate_stretch { ", compensate_stretch = true" } else { "" };
+        format!("{{ model = \"{}\"{stretch} }}", model.word())
+    }
+}
+
+/// The forms of feed-forward that go beyond a design's own on this stage.
+fn forms(stage: &Stage, design: &Design) -> Vec<FeedForward> {
+    let own = &design.feed_forward;
+    // State feedback and sliding mode have their model already.
+    if !matches!(design.structure, Structure::Pid(_) | Structure::Cascade(_) | Structure::Fuzzy(_)) {
+        return Vec::new();
+    }
+    let models: &[FeedForwardModel] = match own.model {
+        FeedForwardModel::None => &[FeedForwardModel::Rigid, FeedForwardModel::Elastic],
+        FeedForwardModel::Rigid => &[FeedForwardModel::Elastic],
+        FeedForwardModel::Elastic => &[],
+    };
+    let is_elastic = stage.belt.model != BeltModel::Rigid;
+    let sees_stretch = stage.encoder.is_some_and(|encoder| encoder.at == EncoderPlace::Cart)
+        || matches!(design.structure, Structure::Cascade(_)) && stage.scale.is_some();
+    let mut forms = Vec::new();
+    for &model in models.iter().filter(|model| is_elastic || **model != FeedForwardModel::Elastic) {
+        for compensate_stretch in [own.compensate_stretch, true] {
+            let form = FeedForward { model, compensate_stretch, ..FeedForward::NONE };
+            if !(compensate_stretch && (sees_stretch || !is_elastic)) && !forms.contains(&form) {
+                forms.push(form);
+            }
+        }
+    }
+    forms
+}
+
+impl Work<'_> {
+    /// The feed-forward that pays most beside the gains of `after`: J is smaller with it, and the largest error by a tenth
+    /// or more; none where none does.
+    pub fn ahead(&self, after: &Verdict) -> Result<Option<Ahead>> {
+        let mut best: Option<Verdict> = None;
+        for feed_forward in forms(&self.case.stage, &after.design) {
+            if (self.stop)() {
+                return Ok(None);
+            }
+            let verdict = self.verdict(&Design { feed_forward, ..after.design.clone() })?;
+            // A J that is no number is not smaller.
+            if verdict.objective < best.as_ref().unwrap_or(after).objective {
+                best = Some(verdict);
+            }
+        }
+        let worst = |verdict: &Verdict| verdict.moves.iter().map(|one| one.at_worst.error.0).fold(0.0, f64::max);
+        Ok(best.filter(|best| worst(best) <= PAYS * worst(after)).map(|verdict| Ahead { verdict }))
+    }
+}

@@ -1,0 +1,111 @@
+//! Parameters of a machine that are not known exactly.
+
+use super::family::SPREAD;
+use crate::chance::normal_quantile;
+use crate::number::engineering;
+use crate::parameter::{Free, kinds_without};
+use crate::stage::Stage;
+
+/// A parameter that is not known exactly.
+#[derive(Debug, Clone)]
+pub struct Unknown {
+    /// Its name.
+    pub name: String,
+    /// The least and the most: factors where it was never fitted, values in SI units where it was.
+    pub low: f64,
+    /// The most.
+    pub high: f64,
+    /// True if its interval is that of a fit or its draws, where it is normal; within a spread all values are as
+    /// likely.
+    pub is_fitted: bool,
+    pub(super) free: Free,
+    /// The first of those that it varies with: the two constants of one motor, both pulleys.
+    pub(super) with: usize,
+}
+
+impl Unknown {
+    /// A parameter that is off by a share to either side.
+    pub fn spread(free: Free, share: f64) -> Self {
+        let [low, high] = [1.0 - share, 1.0 + share].map(|factor| factor * free.start);
+        Self { name: free.name.clone(), low, high, is_fitted: false, free, with: 0 }
+    }
+
+    /// A parameter with the interval of a fit.
+    pub fn fitted(free: Free, [low, high]: [f64; 2]) -> Self {
+        Self { name: free.name.clone(), low, high, is_fitted: true, free, with: 0 }
+    }
+
+    /// Its unit, SI; none of a factor.
+    pub fn unit(&self) -> &'static str {
+        self.free.unit
+    }
+
+    /// Its value: `low` for −1, `high` for 1, what it is taken for at 0.
+    pub(super) fn value(&self, off: f64) -> f64 {
+        let end = if off < 0.0 { self.low } else { self.high };
+        let value = self.free.start + off.abs() * (end - self.free.start);
+        // Draws of a fit go beyond the ends of its interval, but never through zero.
+        if self.free.start > 0.0 { value.max(1e-3 * self.free.start) } else { value }
+    }
+
+    /// How far off it is with this value: what [`Unknown::value`] takes.
+    pub(super) fn off(&self, value: f64) -> f64 {
+        let from = value - self.free.start;
+        if from < 0.0 { from / (self.free.start - self.low) } else { from / (self.high - self.free.start) }
+    }
+
+    /// How far off it is at this quantile.
+    pub(super) fn quantile(&self, u: f64) -> f64 {
+        match self.is_fitted {
+            true => normal_quantile(u) / normal_quantile(0.975),
+            false => 2.0 * u - 1.0,
+        }
+    }
+
+    /// How far off it is, in words: its value where it was fitted, else a share.
+    pub(super) fn words(&self, off: f64) -> String {
+        let value = self.value(off);
+        match self.is_fitted {
+            true => format!("{} {}", self.name, engineering(value, self.free.unit, 4)),
+            false => format!("{} {:+.0} %", self.name, 100.0 * (value / self.free.start - 1.0)),
+        }
+    }
+}
+
+/// The name of what a parameter varies with: K_t and K_e of one motor are one number in SI units, and pulleys of one
+/// make are alike.
+fn kin(name: &str) -> String {
+    let first = name.split(" = ").next().unwrap_or(name);
+    first.replace("back_emf_constant", "torque_constant").replace("idler_pulley.", "drive_pulley.")
+}
+
+/// Lets those vary together that are alike.
+pub(super) fn tie(unknowns: &mut [Unknown]) {
+    let names: Vec<String> = unknowns.iter().map(|unknown| kin(&unknown.name)).collect();
+    for (unknown, name) in unknowns.iter_mut().zip(&names) {
+        unknown.with = names.iter().position(|other| other == name).unwrap_or_default();
+    }
+}
+
+/// What no fit knows anything of keeps its default spread. Of the two constants of a motor, which are one number, the one
+/// that was not fitted is off by as large a share as the other.
+pub(super) fn with_the_rest(mut fitted: Vec<Unknown>, stage: &Stage) -> Vec<Unknown> {
+    let frees: Vec<&Free> = fitted.iter().map(|unknown| &unknown.free).collect();
+    let rest = kinds_without(stage, &frees).into_iter().map(|free| {
+        let is_constant =
+            |name: &str| name.contains("motor.torque_constant") || name.contains("motor.back_emf_constant");
+        let own = |name: &str| is_constant(name).then(|| kin(name));
+        let same = fitted.iter().find(|other| own(&free.name).is_some() && own(&other.name) == own(&free.name));
+        match same {
+            Some(same) => {
+                let share = |value: f64| value / same.free.start * free.start;
+                let (low, high) = (share(same.low), share(same.high));
+                Unknown { low, high, is_fitted: same.is_fitted, ..Unknown::spread(free, SPREAD) }
+            }
+            None => Unknown::spread(free, SPREAD),
+        }
+    });
+    let rest: Vec<Unknown> = rest.collect();
+    fitted.extend(rest);
+    fitted
+}

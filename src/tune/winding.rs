@@ -1,0 +1,63 @@
+//! Stability of a sampled loop by Nyquist's criterion.
+
+use super::margins::Plant;
+use crate::control::feedback::Turn;
+use nalgebra::Complex;
+use std::f64::consts::PI;
+
+/// Nyquist's criterion: F(z) = (1 + L)(1 − 1/z)^m, with m poles at z = 1, turns by π (P − Z) from θ = 0 to π, P poles
+/// of the axis and Z of the closed loop being outside.
+pub(super) struct Winding {
+    unstable: f64,
+    /// The first two of ω and 1 + L, of which m is known.
+    first: Option<(f64, Complex<f64>, Turn)>,
+    poles: i32,
+    /// F where it begins and where it is, whole turns between, and whether all were numbers.
+    start: Complex<f64>,
+    now: Complex<f64>,
+    turns: f64,
+    is_number: bool,
+}
+
+impl Winding {
+    pub fn new(plant: &Plant) -> Self {
+        let zero = Complex::ZERO;
+        let unstable = plant.unstable as f64;
+        Self { unstable, first: None, poles: 0, start: zero, now: zero, turns: 0.0, is_number: true }
+    }
+
+    /// On to the next frequency.
+    pub fn go_on(&mut self, omega: f64, difference: Complex<f64>, turn: &Turn) {
+        self.is_number &= difference.re.is_finite() && difference.im.is_finite() && difference != Complex::ZERO;
+        let Some((w0, begin, at)) = self.first else {
+            self.first = Some((omega, difference, *turn));
+            return;
+        };
+        if self.start == Complex::ZERO {
+            // |F| ~ ω^−m
+            self.poles = -((difference.norm() / begin.norm()).ln() / (omega / w0).ln()).round() as i32;
+            self.start = begin * at.lag().powi(self.poles);
+            self.now = self.start;
+        }
+        let (was, is) = (self.now, difference * turn.lag().powi(self.poles));
+        // The way from one to the next crosses the negative real axis where both are on other sides of the axis and
+        // their cross product tells that zero is to the right.
+        let cross = was.re * is.im - is.re * was.im;
+        match (was.im < 0.0, is.im < 0.0) {
+            (false, true) if cross > 0.0 => self.turns += 1.0,
+            (true, false) if cross < 0.0 => self.turns -= 1.0,
+            _ => {}
+        }
+        self.now = is;
+    }
+
+    /// Whether no pole of the closed loop is outside.
+    pub fn is_stable(&self) -> bool {
+        let arg = |v: Complex<f64>| (v.im + 0.0).atan2(v.re);
+        // It begins on the real axis.
+        let start = arg(if self.start.re < 0.0 { -self.start } else { self.start });
+        let sum = start + arg(self.now) - arg(self.start) + 2.0 * PI * self.turns;
+        let outside = self.unstable - (sum / PI).round();
+        self.is_number && self.first.is_some() && start.abs() < 0.5 && outside == 0.0
+    }
+}

@@ -1,0 +1,197 @@
+//! What is said to be wrong with a log is borne out by simulation: false suspicions of good logs, and true ones of bad.
+
+use crate::common::chance::Chance;
+use std::f64::consts::TAU;
+use std::sync::Arc;
+use taut::case::{Case, Plan, TEMPLATE};
+use taut::fit::{Fit, fit};
+use taut::log::{Log, Output, Quantity};
+use taut::signal::{Hold, Signal};
+use taut::solve::{Flow, Solver, simulate};
+
+const EVERY: f64 = 1e-3;
+const COUNT: usize = 4001;
+
+/// A machine in current mode: mass, viscous and Coulomb friction, all at the cart.
+const AXIS: &str = r#"
+[motor]
+torque_constant = 1
+back_emf_constant = 0
+resistance = 1
+[amplifier]
+mode = "current"
+[drive_pulley]
+radius = 1
+inertia = 1e-6
+[idler_pulley]
+inertia = 1e-6
+[belt]
+model = "rigid"
+[cart]
+mass = "1 kg"
+friction = { viscous = "10 N s/m", coulomb = "1.5 N" }
+[[experiment]]
+name = "log"
+input = { step = "1 A" }
+until = "1 s"
+every = "1 ms"
+[fit]
+free = ["cart.mass", "cart.friction.viscous", "cart.friction.coulomb"]
+"#;
+
+/// The case with a log of another machine of its kind: random levels of current, a position with noise of second order
+/// about 15 Hz, damped by 0.05, and an input that acts so many rows late.
+fn drawn(seed: u64, noise: f64, late: usize) -> Case {
+    let mut chance = Chance::new(seed);
+    let mut case = Case::from_text("axis.toml", AXIS).unwrap();
+    let mut truth = case.stage.clone();
+    let mut off = || 2f64.powf(chance.uniform() - 0.5);
+    truth.cart.mass *= off();
+    let (b, c) = (off(), off());
+    for side in [&mut truth.cart.friction.forward, &mut truth.cart.friction.backward] {
+        (side.viscous, side.coulomb, side.breakaway) = (b * side.viscous, c * side.coulomb, c * side.breakaway);
+    }
+    let mut input = vec![0.0; COUNT];
+    let (mut k, mut sign) = (50, 1.0);
+    while k + 400 < COUNT {
+        let next = k + 100 + (200.0 * chance.uniform()) as usize;
+        input[k..next].fill(sign * (5.0 + 10.0 * chance.uniform()));
+        (k, sign) = (next + (60.0 * chance.uniform()) as usize, -sign);
+    }
+    let time: Vec<f64> = (0..COUNT).map(|k| k as f64 * EVERY).collect();
+    let mut experiment = case.experiments[0].clone();
+    (experiment.until, experiment.every) = ((COUNT - 1) as f64 * EVERY, EVERY);
+    experiment.input = Signal::Sampled { times: time.clone(), values: input.clone(), hold: Hold::Zero };
+    let run = simulate(&truth, &experiment, Solver::of(&truth)).unwrap().trajectory;
+    // x_k = 2 ρ cos(ω h) x_{k−1} − ρ² x_{k−2} + e_k
+    let (zeta, omega) = (0.05, TAU * 15.0);
+    let rho = (-zeta * omega * EVERY).exp();
+    let (a, b) = (2.0 * rho * (omega * (1.0f64 - zeta * zeta).sqrt() * EVERY).cos(), -rho * rho);
+    let (mut last, mut before) = (0.0, 0.0);
+    let mut ar: Vec<f64> = Vec::new();
+    for _ in 0..COUNT + 2000 {
+        let next = a * last + b * before + chance.normal();
+        (last, before) = (next, last);
+        ar.push(next);
+    }
+    ar.drain(..2000);
+    let size = (ar.iter().map(|v| v * v).sum::<f64>() / COUNT as f64).sqrt();
+    let position = run.get("cart_position").unwrap();
+    let mut values: Vec<f64> =
+        (0..COUNT).map(|k| position[k.saturating_sub(late)] + noise * ar[k] / size + 1e-5 * chance.normal()).collect();
+    values.iter_mut().for_each(|v| *v = (*v / 1e-6).round() * 1e-6);
+    experiment.name = "log".into();
+    experiment.log = Some(Arc::new(Log {
+        name: "log".into(),
+        file: Default::default(),
+        time,
+        input,
+        hold: Hold::Zero,
+        added: None,
+        reference: None,
+        outputs: vec![Output { quantity: Quantity::CartPosition, absolute: false, values }],
+        ended: None,
+    }));
+    case.experiments = vec![experiment];
+    case
+}
+
+fn fitted(case: &Case) -> Fit {
+    fit(case, case.fit.as_ref().unwrap(), None, &mut |_| Flow::Continue).unwrap()
+}
+
+fn warned(found: &Fit, code: &str) -> bool {
+    found.warnings().any(|one| one.code == code)
+}
+
+/// "The logs answer their input 34 ms late" was said of 71 of 100 good fits under narrow-band noise, of which a
+/// regression on derivatives makes what it likes.
+#[test]
+fn narrow_band_noise_is_no_delay() {
+    let count: u64 = std::env::var("TAUT_SUSPICIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(40);
+    let mut told = Vec::new();
+    for seed in 1..=count {
+        let found = fitted(&drawn(seed, 1e-3, 0));
+        told.extend(found.warnings().map(|one| format!("seed {seed}: {one}")));
+    }
+    assert!(told.len() as u64 <= count / 20, "{told:#?}");
+}
+
+/// And a delay is found beside that noise.
+#[test]
+fn a_delay_is_found_beside_narrow_band_noise() {
+    let found = (1..=10).filter(|&seed| warned(&fitted(&drawn(100 + seed, 1e-3, 8 + 2 * seed as usize)), "delay"));
+    let found = found.count();
+    assert!(found >= 9, "{found} of 10");
+}
+
+/// Another sign of the log, and a factor between two of its columns, are found beside that noise, too.
+#[test]
+fn signs_and_ratios_are_found_beside_narrow_band_noise() {
+    for seed in 1..=5 {
+        let mut case = drawn(200 + seed, 1e-3, 0);
+        let change = |case: &mut Case, change: &dyn Fn(&mut Log)| {
+            change(Arc::make_mut(case.experiments[0].log.as_mut().unwrap()));
+        };
+        let mut flipped = case.clone();
+        change(&mut flipped, &|log| log.outputs[0].values.iter_mut().for_each(|v| *v = -*v));
+        assert!(warned(&fitted(&flipped), "sign"), "seed {seed}");
+        // An angle behind a gear that the case does not know.
+        change(&mut case, &|log| {
+            let values = log.outputs[0].values.iter().map(|v| 3.0 * v).collect();
+            log.outputs.push(Output { quantity: Quantity::DriveAngle, absolute: false, values });
+        });
+        assert!(warned(&fitted(&case), "unit"), "seed {seed}");
+    }
+}
+
+/// Between its zero and its resonance a cart goes against its motor, and further than that: neither is a wrong sign nor
+/// a wrong unit, as the model itself shows.
+#[test]
+fn a_cart_on_a_soft_belt_is_not_taken_for_a_wrong_sign_or_unit() {
+    let soft = [
+        "belt.stiffness=[\"1 kN/m\", \"1 kN/m\", \"1 kN/m\"]",
+        "cart.friction.viscous=1",
+        "cart.friction.coulomb=0.02",
+    ];
+    let mut reported = 0;
+    for tenths in [90, 110, 130, 150, 180, 220, 260] {
+        let input = format!("experiment.0.input={{ sine = \"10 V\", frequency = \"{} Hz\" }}", tenths as f64 / 10.0);
+        let mut case = Case::from_text_with("axis.toml", TEMPLATE, &[&soft[..], &[&input]].concat()).unwrap();
+        case.experiments.truncate(1);
+        let experiment = &mut case.experiments[0];
+        let run = simulate(&case.stage, experiment, Solver::of(&case.stage)).unwrap().trajectory;
+        let column = |name: &str| run.get(name).unwrap().to_vec();
+        let mut chance = Chance::new(tenths);
+        let mut output = |quantity, name, noise: f64| {
+            let values = column(name).iter().map(|v| v + noise * chance.normal()).collect();
+            Output { quantity, absolute: false, values }
+        };
+        let outputs = vec![
+            output(Quantity::CartPosition, "cart_position", 1e-6),
+            output(Quantity::DriveAngle, "drive_angle", 1e-4),
+        ];
+        let (time, input) = (column("time"), column("voltage"));
+        experiment.input = Signal::Sampled { times: time.clone(), values: input.clone(), hold: Hold::Zero };
+        let name = experiment.name.clone();
+        experiment.log = Some(Arc::new(Log {
+            name,
+            file: Default::default(),
+            time,
+            input,
+            hold: Hold::Zero,
+            added: None,
+            reference: None,
+            outputs,
+            ended: None,
+        }));
+        let survey = taut::log::Survey::new(experiment.log.as_ref().unwrap(), &case.stage);
+        reported += usize::from(survey.has("sign") || survey.has("unit"));
+        let plan = Plan { free: vec!["cart.mass".into(), "cart.friction.viscous".into()], ..Plan::default() };
+        let found = fit(&case, &plan, None, &mut |_| Flow::Continue).unwrap();
+        let told: Vec<String> = found.warnings().map(|one| one.to_string()).collect();
+        assert!(!warned(&found, "sign") && !warned(&found, "unit"), "{tenths}: {told:?}");
+    }
+    // The survey by itself would have said so.
+    assert!(reported > 0);
+}

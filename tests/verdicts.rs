@@ -1,0 +1,112 @@
+//! What a tuning says of its gains: hunting, what varies, why it is worse, what to do next.
+
+use std::path::Path;
+use taut::case::{Case, Cost, TEMPLATE, Tuning};
+use taut::control::feedback::Feedback;
+use taut::tune::{Family, Judgement, Margins, Plant, SPREAD, evaluate, hunting, tune};
+
+fn case(name: &str) -> Case {
+    Case::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/loops").join(name)).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// An axis whose integral needs a minute and more from one breakaway to the other was said to rest: it slips by ±450 µm.
+#[test]
+fn an_axis_that_slips_after_a_minute_hunts() {
+    let case = case("hunts-slowly.toml");
+    let hunt = hunting(&case.stage, case.controller.as_ref().unwrap()).unwrap().expect("it hunts");
+    println!("{hunt:?}");
+    assert!(hunt.amplitude > 2e-4 && hunt.amplitude < 2e-3, "{hunt:?}");
+    assert!(hunt.slips_every > 1.0 && hunt.slips_every < 200.0, "{hunt:?}");
+    assert!(hunt.needs.contains(&"integral action") && hunt.needs.contains(&"dry friction"), "{hunt:?}");
+    // Without the integral nothing moves it.
+    let still = case.text.replace("integral = \"3000 V/(m s)\", ", "");
+    let still = Case::from_text("still.toml", &still).unwrap();
+    assert_eq!(hunting(&still.stage, still.controller.as_ref().unwrap()).unwrap(), None);
+}
+
+/// Gains were worse on seven axes, "forced by" nothing; the limit that those of the file break was not named.
+#[test]
+fn what_is_worse_has_its_reason() {
+    let case = case("no-active-limit.toml");
+    for (sensitivity, effort) in [(1.8, 0.1), (1.5, 0.1), (1.3, 0.1)] {
+        let tuned = tune(&case, &Tuning { sensitivity, effort, ..case.tune.clone().unwrap() }, &|| false).unwrap();
+        println!("{:?} {:?}", tuned.judgement, tuned.forced);
+        assert_eq!(tuned.judgement == Judgement::Worse, tuned.forced.is_some());
+    }
+}
+
+/// After a fit of two parameters all others were taken for exact: Ms 1.77 was promised where the spread gives 2.11.
+#[test]
+fn what_was_never_fitted_keeps_its_spread() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
+    let plain = Case::read(folder.join("pid-elastic.toml")).unwrap();
+    let mass = plain.stage.cart.mass;
+    let text =
+        format!("{}\n[uncertainty]\n\"cart.mass\" = {{ low = {}, high = {} }}\n", plain.text, 0.99 * mass, 1.01 * mass);
+    let fitted = Case::from_text(folder.join("fitted.toml"), &text).unwrap();
+    let [all, some] = [&plain, &fitted].map(|case| Family::of(case, &Tuning::default()).unwrap());
+    assert_eq!(some.unknowns.len(), all.unknowns.len(), "{:?}", some.unknowns);
+    for unknown in &some.unknowns {
+        let share = (unknown.high - unknown.low) / (unknown.high + unknown.low);
+        let expected = if unknown.name == "cart.mass" { 0.01 } else { SPREAD };
+        assert!((share - expected).abs() < 1e-9 && unknown.is_fitted == (expected == 0.01), "{unknown:?}");
+    }
+    let stiffness = some.machines.iter().map(|corner| some.stage_at(corner).belt.stiffness[0]);
+    let (low, high) = stiffness.fold((f64::INFINITY, 0.0_f64), |(low, high), k| (low.min(k), high.max(k)));
+    assert!(high / low > 1.3, "{low} {high}");
+    // So the promise is nearly that of the spread.
+    let worst = [&plain, &fitted].map(|case| evaluate(case, &Tuning::default()).unwrap().before.unstable.0);
+    assert!(worst[1] > 0 && worst[0] > 0, "{worst:?}");
+}
+
+/// The suggested gains led to "worse" on the stage that `taut init` writes, and were refused where currents are
+/// commanded: now they are in the unit of the case, and their loop has margins.
+#[test]
+fn suggested_gains_run() {
+    for mode in ["voltage", "current"] {
+        let base = TEMPLATE.replace("mode = \"voltage\"", &format!("mode = \"{mode}\""));
+        let base = if mode == "current" { base.replace("5 V\"", "5 A\"") } else { base };
+        let missing = Case::from_text("axis.toml", &format!("{base}\n[controller]\nevery = \"1 ms\"\n")).unwrap_err();
+        let told = missing.to_string();
+        let hint = told.split("add for example ").nth(1).unwrap_or_else(|| panic!("{told}")).trim();
+        let unit = if mode == "current" { "A/mm" } else { "V/mm" };
+        assert!(hint.starts_with("pid = { proportional") && hint.contains(unit), "{told}");
+        let text = format!("{base}\n[controller]\nevery = \"1 ms\"\n{hint}\n");
+        let case = Case::from_text("axis.toml", &text).unwrap_or_else(|error| panic!("{error}\n{hint}"));
+        let tuning = Tuning { cost: Some(Cost::Disturbance), ..Tuning::default() };
+        let judged = evaluate(&case, &tuning).unwrap();
+        let nominal = judged.before.nominal;
+        assert!(nominal.stable && nominal.sensitivity <= 1.5 && nominal.complementary <= 1.5, "{hint}: {nominal:?}");
+    }
+}
+
+/// The suggestion is of rules, not of a search: its loop has margins on other axes and at other sample times too.
+#[test]
+fn suggested_gains_have_margins_on_drawn_axes() {
+    let mut random = rand_pcg::Pcg64::new(11, 7);
+    let mut factor = |most: f64| most.powf(2.0 * taut::chance::uniform(&mut random) - 1.0);
+    for k in 0..40 {
+        let template = Case::from_text("axis.toml", TEMPLATE).unwrap().stage;
+        let stiffness = template.belt.stiffness.map(|stiffness| stiffness * factor(4.0));
+        let (mass, every) = (template.cart.mass * factor(6.0), 1e-3 * factor(3.0));
+        let mode = if k % 2 == 0 { "voltage" } else { "current" };
+        let unit = if k % 2 == 0 { "V" } else { "A" };
+        let base = TEMPLATE
+            .replace("mode = \"voltage\"", &format!("mode = \"{mode}\""))
+            .replace("5 V\"", &format!("5 {unit}\""));
+        let sets = [
+            format!("cart.mass={mass}"),
+            format!("belt.stiffness=[{}, {}, {}]", stiffness[0], stiffness[1], stiffness[2]),
+            format!("motor.resistance={}", template.motor.resistance * factor(3.0)),
+        ];
+        let sets: Vec<&str> = sets.iter().map(String::as_str).collect();
+        let head = format!("{base}\n[controller]\nevery = {every}\n");
+        let told = Case::from_text_with("axis.toml", &head, &sets).unwrap_err().to_string();
+        let hint = told.split("add for example ").nth(1).unwrap_or_else(|| panic!("{told}")).trim();
+        let case = Case::from_text_with("axis.toml", &format!("{head}{hint}\n"), &sets).unwrap();
+        let design = case.controller.as_ref().unwrap();
+        let plant = Plant::of(&case.stage, 0.0, design, &[]).unwrap();
+        let margins = Margins::of(&plant, &Feedback::new(design, &case.stage).unwrap());
+        assert!(margins.excess(1.7, 1.7) <= 1.0, "{hint}, every {every}: {margins:?}\n{sets:?}");
+    }
+}
